@@ -1,0 +1,3 @@
+//! `deltag`: search, check and draw DelTag code families.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! `deltille`: make, detect and verify deltille targets.
+
+fn main() {}

@@ -1,0 +1,29 @@
+//! The triangular lattice: where its vertices and tiles are, how it maps onto itself, and how the
+//! cells of a tag lie inside a tile. Everything else takes bit layout and rotation from here.
+//!
+//! ```text
+//!        row 2      ·───────·───────·
+//!                  ╱█╲     ╱█╲     ╱
+//!                 ╱███╲   ╱███╲   ╱          a tile is *upright* (black, █) or *inverted* (white);
+//!        row 1   ·───────·───────·           the upright tile (r,c) has its lower-left vertex
+//!               ╱█╲     ╱█╲     ╱            at (r,c)
+//!              ╱███╲   ╱███╲   ╱
+//!        row 0 ·───────·───────·
+//!            col 0   col 1   col 2
+//! ```
+//!
+//! With edge length `s` the vertex (row `r`, column `c`) lies at `x = (c + r/2)·s`,
+//! `y = r·s·√3/2`: columns run along the lower edge, rows lean to the right by 60°.
+
+mod cells;
+mod map;
+mod tile;
+mod vertex;
+
+pub use cells::{Cell, Dimension, DimensionError, TagCells};
+pub use map::LatticeMap;
+pub use tile::{Orientation, Tile};
+pub use vertex::Vertex;
+
+/// Height of an equilateral triangle over its edge, √3/2.
+pub const ROW_HEIGHT: f64 = 0.866_025_403_784_438_6;

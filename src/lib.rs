@@ -1,0 +1,25 @@
+//! Deltille calibration targets: code families, verified print files, detection and calibration.
+//!
+//! A *deltille grid* is the triangular tiling coloured black and white; a *DelTag* is a triangular
+//! 2D code inside one of its black tiles (Ha et al., "Deltille Grids for Geometric Camera
+//! Calibration", ICCV 2017). This crate makes such targets, finds them in photographs and proves
+//! every file it writes by reading it back.
+//!
+//! The modules form floors; each imports only from floors below it:
+//!
+//! | floor | module | its one job |
+//! |---|---|---|
+//! | 1 | [`lattice`] | the triangular lattice: vertices, tiles, symmetries, the cells of a tag |
+//! | 1 | [`raster`] | grey images: storage, sampling, blur, files |
+//! | 2 | [`family`] | DelTag code families: search, certificates, decoding, files |
+//! | 3 | [`target`] | what exists in the world: panels, corners and tags in millimetres |
+//! | 4 | [`artwork`] | what is drawn, in millimetres, independent of file type |
+//! | 4 | [`detect`] | from pixels to labelled corners |
+//! | 5 | [`export`] | artwork and targets to files and back |
+//! | 6 | [`verify`] | an artifact read back from disk and compared with its target |
+//! | 7 | `cli` | the programs' arguments, progress and messages |
+//!
+//! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
+//! images row-major with y down, the board frame right-handed with x right and y up on the print.
+
+pub mod lattice;
