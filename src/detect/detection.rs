@@ -1,0 +1,68 @@
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::target::GridKind;
+
+/// What was found in one image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Detection {
+    /// File name of the image, or a name given by the caller.
+    pub image: String,
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// Grids: labelled ones by panel id, then the others, largest first.
+    pub grids: Vec<Grid>,
+    /// Milliseconds per stage.
+    pub timing_ms: BTreeMap<String, f64>,
+}
+
+/// A connected piece of a tiling.
+///
+/// On a grid with `panel: None` rows and columns are relative: a right-handed lattice with its
+/// own origin, correct up to a motion of the lattice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grid {
+    /// The tiling.
+    pub kind: GridKind,
+    /// Panel of the target, once known.
+    pub panel: Option<u32>,
+    /// Corners, ordered by row, then column.
+    pub corners: Vec<GridCorner>,
+    /// Tags that were decoded and agree with the labelling.
+    pub tags: Vec<DecodedTag>,
+}
+
+/// A corner in the image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GridCorner {
+    /// Lattice row.
+    pub row: i32,
+    /// Lattice column.
+    pub col: i32,
+    /// Corner id in the target, once known.
+    pub id: Option<u32>,
+    /// Position, px; pixel centres at integers.
+    pub x: f64,
+    /// Position, px, downwards.
+    pub y: f64,
+    /// Covariance xx, xy, yy, px²; `None` where the method gives none.
+    pub cov: Option<[f64; 3]>,
+}
+
+/// A tag read in the image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DecodedTag {
+    /// Index of the code in its family.
+    pub id: u32,
+    /// Name of the family.
+    pub family: String,
+    /// Row of the tile's lower-left vertex, in the grid's rows.
+    pub row: i32,
+    /// Column of the tile's lower-left vertex.
+    pub col: i32,
+    /// Corrected bits.
+    pub errors: u32,
+}

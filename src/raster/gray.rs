@@ -1,0 +1,95 @@
+/// A pixel type: 8 or 16 bits, or a float.
+pub trait Intensity: Copy + Default + Send + Sync + PartialOrd + 'static {
+    /// Full scale: 255, 65535, or 1.
+    const FULL_SCALE: f32;
+
+    /// The value as a float, in the type's own units.
+    fn to_f32(self) -> f32;
+}
+
+impl Intensity for u8 {
+    const FULL_SCALE: f32 = 255.0;
+
+    fn to_f32(self) -> f32 {
+        f32::from(self)
+    }
+}
+
+impl Intensity for u16 {
+    const FULL_SCALE: f32 = 65535.0;
+
+    fn to_f32(self) -> f32 {
+        f32::from(self)
+    }
+}
+
+impl Intensity for f32 {
+    const FULL_SCALE: f32 = 1.0;
+
+    fn to_f32(self) -> f32 {
+        self
+    }
+}
+
+/// A grey image of `width × height` pixels, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gray<T> {
+    width: usize,
+    height: usize,
+    data: Vec<T>,
+}
+
+impl<T: Intensity> Gray<T> {
+    /// A black image.
+    pub fn new(width: usize, height: usize) -> Self {
+        Self { width, height, data: vec![T::default(); width * height] }
+    }
+
+    /// An image from its pixels; `None` unless there are `width · height` of them.
+    pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {
+        (data.len() == width * height).then_some(Self { width, height, data })
+    }
+
+    /// An image whose pixel (x, y) is `pixel(x, y)`.
+    pub fn from_fn(width: usize, height: usize, mut pixel: impl FnMut(usize, usize) -> T) -> Self {
+        let data =
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y));
+        Self { width, height, data: data.collect() }
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// All pixels, row by row.
+    pub fn pixels(&self) -> &[T] {
+        &self.data
+    }
+
+    /// All pixels, row by row.
+    pub fn pixels_mut(&mut self) -> &mut [T] {
+        &mut self.data
+    }
+
+    /// One row.
+    pub fn row(&self, y: usize) -> &[T] {
+        &self.data[y * self.width..(y + 1) * self.width]
+    }
+
+    /// The pixel at (x, y), which must lie in the image.
+    pub fn at(&self, x: usize, y: usize) -> T {
+        self.data[y * self.width + x]
+    }
+
+    /// The image in another pixel type.
+    pub fn map<U: Intensity>(&self, f: impl Fn(T) -> U) -> Gray<U> {
+        let data = self.data.iter().map(|&v| f(v)).collect();
+        Gray { width: self.width, height: self.height, data }
+    }
+}

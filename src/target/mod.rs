@@ -1,0 +1,139 @@
+//! What exists in the world: panels with a pose, their corners and tags, in millimetres.
+//!
+//! A [`TargetSpec`] says what was asked for; a [`Target`] says what that is, corner by corner. The
+//! JSON file of a target (FORMAT `deltille/target/1`) holds both, so that a sheet printed today can
+//! be detected, verified and made again from that one file.
+//!
+//! Frames: a *panel* frame has its origin on the panel's lattice vertex (0,0), x along the rows, y
+//! up on the print, z towards the viewer; `target = rotation · panel + translation`.
+
+mod spec;
+
+use serde::{Deserialize, Serialize};
+
+pub use spec::{BoardSpec, TagSpec, TargetSpec};
+
+/// A target: its panels, and the sheets they are printed on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Target {
+    /// Name; the stem of the files made from it.
+    pub name: String,
+    /// What was asked for.
+    pub spec: TargetSpec,
+    /// The family of its tags; `None` on an untagged target.
+    pub family: Option<FamilyRef>,
+    /// Planar pieces, by ascending id.
+    pub panels: Vec<Panel>,
+    /// Where the panels lie on paper; empty when the target came from a file without sheets.
+    pub sheets: Vec<SheetLayout>,
+}
+
+/// Names a family so that a changed code table cannot go unnoticed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FamilyRef {
+    /// The family's name, such as `delTag25h7`.
+    pub name: String,
+    /// Its fingerprint, see [`crate::family`].
+    pub fingerprint: String,
+}
+
+/// Which tiling a panel carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GridKind {
+    /// Triangles; six tiles meet at a corner.
+    Deltille,
+    /// Squares; four tiles meet at a corner.
+    Checker,
+}
+
+/// A planar piece of a target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Panel {
+    /// Board id, unique within the target.
+    pub id: u32,
+    /// The tiling.
+    pub kind: GridKind,
+    /// Length of a tile's edge, mm.
+    pub edge_mm: f64,
+    /// Border of its tags in bit-widths along the edge; `None` without tags.
+    pub border_bits: Option<f64>,
+    /// Whether the colours are exchanged: white upright tiles on black.
+    pub inverted: bool,
+    /// Pose of the panel frame in the target frame.
+    pub pose: PanelPose,
+    /// Saddle points, ordered by row, then column.
+    pub corners: Vec<Corner>,
+    /// Tags, ordered like the corners.
+    pub tags: Vec<TagPlacement>,
+}
+
+/// `target = rotation · panel + translation`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PanelPose {
+    /// Rotation matrix, row-major.
+    pub rotation: [f64; 9],
+    /// Translation, mm.
+    pub translation_mm: [f64; 3],
+}
+
+/// A vertex of a panel where all tiles meet (six of a deltille, four of a checkerboard).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Corner {
+    /// Unique within the target.
+    pub id: u32,
+    /// Lattice row.
+    pub row: i32,
+    /// Lattice column.
+    pub col: i32,
+    /// Position in the panel frame, mm.
+    pub panel_mm: [f64; 2],
+    /// Position in the target frame, mm.
+    pub target_mm: [f64; 3],
+}
+
+/// A tag in the upright tile whose lower-left vertex is (row, col).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TagPlacement {
+    /// Index of the code in the family.
+    pub id: u32,
+    /// Row of the tile's lower-left vertex.
+    pub row: i32,
+    /// Column of the tile's lower-left vertex.
+    pub col: i32,
+}
+
+/// One printed page: its size, where panels lie on it, and its check bars.
+///
+/// The page frame has its origin at the lower-left corner of the page, x right, y up, mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SheetLayout {
+    /// Page width, mm.
+    pub width_mm: f64,
+    /// Page height, mm.
+    pub height_mm: f64,
+    /// Panels on the page.
+    pub placements: Vec<Placement>,
+    /// Lines of stated length, to be measured with a ruler.
+    pub check_bars: Vec<CheckBar>,
+}
+
+/// `page = turn(angle) · panel + origin`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Placement {
+    /// Which panel.
+    pub panel: u32,
+    /// Counter-clockwise turn of the panel on the page, radians.
+    pub angle_rad: f64,
+    /// Page position of the panel's origin, mm.
+    pub origin_mm: [f64; 2],
+}
+
+/// A check bar: the distance between the outer edges of its two end strokes is its length.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CheckBar {
+    /// One end on the page, mm.
+    pub from_mm: [f64; 2],
+    /// The other end on the page, mm.
+    pub to_mm: [f64; 2],
+}
