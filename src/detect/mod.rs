@@ -1,5 +1,24 @@
 //! From pixels to labelled corners.
+//!
+//! The stages, each in its file, each from the paper (§3) with what measurements added:
+//!
+//! 1. [`ring`] finds candidates: pixels around which dark and bright alternate three times.
+//! 2. [`cubic`] fits cubic surfaces and walks to the umbilic point; J < 0 or it is no corner.
+//! 3. [`sectors`] reads the six half-edges with their colours.
+//! 4. [`links`] joins corners along clean edges ([`edge`]).
+//! 5. [`grow`] starts from quads of tiles, grows breadth-first and fills the gaps.
+//! 6. [`refine`] gives the last word on positions.
 
+mod cubic;
 mod detection;
+mod detector;
+mod edge;
+mod grow;
+mod links;
+mod refine;
+mod ring;
+mod saddles;
+mod sectors;
 
 pub use detection::{DecodedTag, Detection, Grid, GridCorner};
+pub use detector::{Detector, DetectorConfig};

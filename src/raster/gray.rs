@@ -1,6 +1,6 @@
-/// A pixel type: 8 or 16 bits, or a float.
+/// A pixel type: 8 or 16 bits, signed for intermediate results, or a float.
 pub trait Intensity: Copy + Default + Send + Sync + PartialOrd + 'static {
-    /// Full scale: 255, 65535, or 1.
+    /// The value of white: 255, 65535, 32767, or 1.
     const FULL_SCALE: f32;
 
     /// The value as a float, in the type's own units.
@@ -17,6 +17,14 @@ impl Intensity for u8 {
 
 impl Intensity for u16 {
     const FULL_SCALE: f32 = 65535.0;
+
+    fn to_f32(self) -> f32 {
+        f32::from(self)
+    }
+}
+
+impl Intensity for i16 {
+    const FULL_SCALE: f32 = 32767.0;
 
     fn to_f32(self) -> f32 {
         f32::from(self)
@@ -82,9 +90,31 @@ impl<T: Intensity> Gray<T> {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
+    /// One row.
+    pub fn row_mut(&mut self, y: usize) -> &mut [T] {
+        &mut self.data[y * self.width..(y + 1) * self.width]
+    }
+
     /// The pixel at (x, y), which must lie in the image.
     pub fn at(&self, x: usize, y: usize) -> T {
         self.data[y * self.width + x]
+    }
+
+    /// Bilinear interpolation at (x, y); positions outside take the nearest border value.
+    ///
+    /// An empty image reads 0.
+    pub fn bilinear(&self, x: f64, y: f64) -> f32 {
+        if self.data.is_empty() {
+            return 0.0;
+        }
+        let x = x.clamp(0.0, (self.width - 1) as f64);
+        let y = y.clamp(0.0, (self.height - 1) as f64);
+        let (x0, y0) = (x as usize, y as usize);
+        let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(self.height - 1));
+        let (fx, fy) = ((x - x0 as f64) as f32, (y - y0 as f64) as f32);
+        let upper = self.at(x0, y0).to_f32() * (1.0 - fx) + self.at(x1, y0).to_f32() * fx;
+        let lower = self.at(x0, y1).to_f32() * (1.0 - fx) + self.at(x1, y1).to_f32() * fx;
+        upper * (1.0 - fy) + lower * fy
     }
 
     /// The image in another pixel type.

@@ -3,5 +3,9 @@
 //! Row-major, y down, pixel centres at integer coordinates.
 
 mod gray;
+pub mod io;
+mod pyramid;
 
 pub use gray::{Gray, Intensity};
+pub use io::{AnyGray, ImageError, read};
+pub use pyramid::{PYRAMID_FULL_SCALE, Pyramid};

@@ -1,0 +1,109 @@
+//! Whether two corners are joined by an edge of the tiling.
+
+use super::saddles::Saddle;
+use super::sectors::turn;
+use crate::raster::Gray;
+
+/// Largest angle between the chord of an edge and the rays at its ends. Over one tile a fisheye
+/// bends an edge by up to 20°, half of it at either end; the rays add a few degrees of noise.
+pub const MAX_CHORD_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
+
+/// Places along the edge that are looked at.
+const STATIONS: usize = 8;
+
+/// Part of the edge at either end that is left out: blur mixes the sectors there.
+const END: f64 = 0.15;
+
+/// Distance of the samples from the edge, as a part of its length: well inside the border of a tag
+/// (0.13 at 1.5 bits of 25) and beyond the blur on all but tiny tiles.
+const SIDE: f64 = 0.07;
+
+/// The least distance of the samples from the edge, px.
+const MIN_SIDE_PX: f64 = 1.5;
+
+/// A sample must leave the level by this part of the corners' amplitude.
+const MIN_DEVIATION: f64 = 0.25;
+
+/// Stations that may fail: a scratch or a highlight, not a gap.
+const ALLOWED_FAILURES: usize = 1;
+
+/// Follows the edge that leaves `a` along ray `i` and arrives at `b` along ray `j`, and tells
+/// whether the sides keep their colours.
+///
+/// The edge is taken as the cubic through both corners with the directions of both rays, which is
+/// the circular arc of the paper where the rays agree with one.
+pub fn is_clean(image: &Gray<i16>, a: &Saddle, i: usize, b: &Saddle, j: usize) -> bool {
+    let [ax, ay] = a.position;
+    let (dx, dy) = (b.position[0] - ax, b.position[1] - ay);
+    let length = dx.hypot(dy);
+    let chord = dy.atan2(dx);
+    // Slopes of the curve against its chord at the two ends.
+    let start = turn(chord, a.sectors.rays[i]).tan();
+    let end = turn(chord + std::f64::consts::PI, b.sectors.rays[j]).tan();
+    let side = (SIDE * length).max(MIN_SIDE_PX);
+    // Unit vectors along the chord and to its left on the print.
+    let (along, left) = ([dx / length, dy / length], [dy / length, -dx / length]);
+    let dark_left = i % 2 == 0;
+    let amplitude = a.sectors.amplitude.min(b.sectors.amplitude);
+    let mut failures = 0;
+    for station in 0..STATIONS {
+        let t = END + (1.0 - 2.0 * END) * (station as f64 + 0.5) / STATIONS as f64;
+        // Hermite cubic in units of the length; image angles fall to the left, hence the signs.
+        let offset = length * (-start * t * (1.0 - t) * (1.0 - t) + end * t * t * (1.0 - t));
+        let deviation = |lateral: f64| {
+            let x = ax + along[0] * t * length + left[0] * lateral;
+            let y = ay + along[1] * t * length + left[1] * lateral;
+            let level = a.sectors.level + t * (b.sectors.level - a.sectors.level);
+            f64::from(image.bilinear(x, y)) - level
+        };
+        let (on_left, on_right) = (deviation(offset + side), deviation(offset - side));
+        let (dark, bright) = if dark_left { (on_left, on_right) } else { (on_right, on_left) };
+        let clean = dark < -MIN_DEVIATION * amplitude && bright > MIN_DEVIATION * amplitude;
+        failures += usize::from(!clean);
+        if failures > ALLOWED_FAILURES {
+            return false;
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sectors::Sectors;
+    use super::*;
+
+    /// Dark above the arc y = 50 + bulge, bright below; corners at x = 20 and x = 80.
+    fn scene(bulge: f64) -> (Gray<i16>, Saddle, Saddle) {
+        let image = Gray::from_fn(100, 100, |x, y| {
+            let t = (x as f64 - 20.0) / 60.0;
+            if (y as f64) < 50.0 + 4.0 * bulge * t * (1.0 - t) { 100 } else { 700 }
+        });
+        let slope = (4.0 * bulge / 60.0).atan();
+        let saddle = |x: f64, rays| Saddle {
+            position: [x, 49.5],
+            sectors: Sectors { rays, level: 400.0, amplitude: 250.0 },
+        };
+        let mut from = [0.0; 6];
+        let mut to = [0.0; 6];
+        from[0] = slope;
+        to[3] = std::f64::consts::PI - slope;
+        (image, saddle(20.0, from), saddle(80.0, to))
+    }
+
+    #[test]
+    fn straight_and_bent_edges_are_clean_in_both_directions() {
+        for bulge in [-6.0, 0.0, 6.0] {
+            let (image, a, b) = scene(bulge);
+            assert!(is_clean(&image, &a, 0, &b, 3), "bulge {bulge}");
+            assert!(is_clean(&image, &b, 3, &a, 0), "bulge {bulge}, backwards");
+        }
+    }
+
+    #[test]
+    fn wrong_colours_and_flat_images_are_not() {
+        let (image, a, b) = scene(0.0);
+        let negative = image.map(|v| 800 - v);
+        assert!(!is_clean(&negative, &a, 0, &b, 3));
+        assert!(!is_clean(&Gray::new(100, 100), &a, 0, &b, 3));
+    }
+}

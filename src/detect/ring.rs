@@ -1,0 +1,159 @@
+//! Dense candidates: where a ring of twelve samples alternates three times.
+//!
+//! On a circle the cubic form of a monkey saddle is `Re(α·e^{3iθ} + β·e^{iθ})`, and the paper's
+//! discriminant of star-shaped umbilics (Eq. 5) is `J ∝ |β|² − 9|α|²`. The ring measures the same
+//! α and β as third and first harmonic of twelve samples at 30° steps,
+//!
+//! ```text
+//!     R = 9|α|² − |β|² − ½V
+//! ```
+//!
+//! where V is the variance of the sums of opposite samples: a monkey saddle is odd, `f(−Δ) = −f(Δ)`
+//! about its level, so V is noise there, while an edge that passes beside the centre has 9|α|² >
+//! |β|² as well and is told apart by its V. With twelve samples the third harmonic needs additions
+//! only, so the whole image costs about a nanosecond a pixel and level.
+
+use crate::raster::Gray;
+
+/// Offsets of half the ring, near 0°, 30°, …, 150°; the other half is opposite. Radius 3.6 to 4 px:
+/// the smallest ring on which the twelve directions stay within 4° of multiples of 30°, so that it
+/// fits between a corner and the code of a small tag (5 px at 2 px a bit).
+const HALF_RING: [(isize, isize); 6] = [(4, 0), (3, 2), (2, 3), (0, 4), (-2, 3), (-3, 2)];
+
+/// Largest offset in [`HALF_RING`], px.
+const RADIUS: usize = 4;
+
+/// Half-width of the window in which a candidate must be the strongest, px. Two corners can not be
+/// closer than a ring's radius, so half of it suppresses only echoes.
+const SUPPRESSION_RADIUS: usize = 2;
+
+/// A pixel whose neighbourhood looks like a monkey saddle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Column, px.
+    pub x: usize,
+    /// Row, px.
+    pub y: usize,
+    /// R, in squared image units.
+    pub response: f32,
+}
+
+/// All local maxima of R above `9·min_amplitude²`, where `min_amplitude` is the smallest amplitude
+/// |α| of interest in units of the image (values of at most 10 bits).
+pub fn candidates(image: &Gray<i16>, min_amplitude: f32) -> Vec<Candidate> {
+    let (width, height) = (image.width(), image.height());
+    let margin = RADIUS + SUPPRESSION_RADIUS;
+    if width <= 2 * margin || height <= 2 * margin {
+        return Vec::new();
+    }
+    let threshold = 9.0 * min_amplitude * min_amplitude;
+    let rows = 2 * SUPPRESSION_RADIUS + 1;
+    // A rolling window of response rows: row y lives at y mod rows.
+    let mut window = vec![vec![0.0f32; width]; rows];
+    let mut found = Vec::new();
+    for y in RADIUS..height - RADIUS {
+        response_row(image, y, &mut window[y % rows][RADIUS..width - RADIUS]);
+        if y >= RADIUS + rows - 1 {
+            maxima_of_row(&window, y - SUPPRESSION_RADIUS, threshold, &mut found);
+        }
+    }
+    found
+}
+
+/// R of row `y` for columns RADIUS .. width − RADIUS.
+fn response_row(image: &Gray<i16>, y: usize, out: &mut [f32]) {
+    let n = out.len();
+    let at = |dx: isize, dy: isize| {
+        let row = image.row(y.wrapping_add_signed(dy));
+        &row[RADIUS.wrapping_add_signed(dx)..][..n]
+    };
+    let p = HALF_RING.map(|(dx, dy)| at(dx, dy));
+    let q = HALF_RING.map(|(dx, dy)| at(-dx, -dy));
+    for i in 0..n {
+        let odd: [i16; 6] = std::array::from_fn(|k| p[k][i] - q[k][i]);
+        let even: [i16; 6] = std::array::from_fn(|k| p[k][i] + q[k][i]);
+        // Third harmonic, 6α, and first harmonic with weights 8·cos 30°k ≈ 8, 7, 4, 0: 48β.
+        let c3 = i32::from(odd[0] - odd[2] + odd[4]);
+        let s3 = i32::from(odd[1] - odd[3] + odd[5]);
+        let c1 = i32::from(8 * odd[0] + 7 * (odd[1] - odd[5]) + 4 * (odd[2] - odd[4]));
+        let s1 = i32::from(8 * odd[3] + 7 * (odd[2] + odd[4]) + 4 * (odd[1] + odd[5]));
+        let sum: i32 = even.iter().map(|&e| i32::from(e)).sum();
+        let squares: i32 = even.iter().map(|&e| i32::from(e) * i32::from(e)).sum();
+        let nine_alpha = (c3 * c3 + s3 * s3) as f32 * (1.0 / 4.0);
+        let beta = (c1 * c1 + s1 * s1) as f32 * (1.0 / 2304.0);
+        let variance = squares as f32 - (sum * sum) as f32 * (1.0 / 6.0);
+        out[i] = nine_alpha - beta - 0.5 * variance;
+    }
+}
+
+/// Appends the maxima of row `y`, whose neighbouring rows are all in the window.
+fn maxima_of_row(window: &[Vec<f32>], y: usize, threshold: f32, found: &mut Vec<Candidate>) {
+    let rows = window.len();
+    let width = window[0].len();
+    let centre = &window[y % rows];
+    let margin = RADIUS + SUPPRESSION_RADIUS;
+    for x in margin..width - margin {
+        let response = centre[x];
+        if response <= threshold {
+            continue;
+        }
+        let columns = x - SUPPRESSION_RADIUS..=x + SUPPRESSION_RADIUS;
+        // Ties go to the later pixel in reading order, so exactly one of equal neighbours stays.
+        let is_maximum = (y - SUPPRESSION_RADIUS..=y + SUPPRESSION_RADIUS).all(|v| {
+            let row = &window[v % rows];
+            columns
+                .clone()
+                .all(|u| if (v, u) > (y, x) { row[u] < response } else { row[u] <= response })
+        });
+        if is_maximum {
+            found.push(Candidate { x, y, response });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::Pyramid;
+
+    /// Sectors of 50 and 200, meeting at (cx, cy), turned by `angle`.
+    fn star(cx: f64, cy: f64, angle: f64, sectors: f64) -> Gray<i16> {
+        let sharp = Gray::from_fn(40, 40, |x, y| {
+            let theta = (y as f64 - cy).atan2(x as f64 - cx) + angle;
+            if (theta * sectors / 2.0).sin() > 0.0 { 200u8 } else { 50 }
+        });
+        Pyramid::new(&sharp, 1, 8).levels()[0].clone()
+    }
+
+    #[test]
+    fn one_candidate_at_a_monkey_saddle_whatever_its_turn() {
+        for k in 0..12 {
+            let found = candidates(&star(20.2, 19.7, 0.1 * f64::from(k), 6.0), 20.0);
+            assert!(!found.is_empty());
+            let best = found.iter().max_by(|a, b| a.response.total_cmp(&b.response)).unwrap();
+            assert!(best.x.abs_diff(20) <= 1 && best.y.abs_diff(20) <= 1);
+        }
+    }
+
+    fn strongest(image: &Gray<i16>) -> f32 {
+        candidates(image, 1.0).iter().map(|c| c.response).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn edges_and_checkerboard_corners_are_weak() {
+        let corner = strongest(&star(20.0, 20.0, 0.05, 6.0));
+        for k in 0..12 {
+            for sectors in [2.0, 4.0] {
+                let other = strongest(&star(20.0, 20.0, 0.1 * f64::from(k) + 0.05, sectors));
+                assert!(other < corner / 8.0, "{sectors} sectors: {other} of {corner}");
+            }
+        }
+    }
+
+    #[test]
+    fn small_and_constant_images_have_none() {
+        for side in [0, 1, 8, 12, 13, 40] {
+            assert!(candidates(&Gray::new(side, side), 1.0).is_empty());
+        }
+    }
+}

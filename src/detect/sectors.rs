@@ -1,0 +1,251 @@
+//! The six edges that meet at a corner, as directions with a sign.
+//!
+//! The paper takes three polarities from the roots of the cubic form. A circle around the corner
+//! tells more: each of the six half-edges by itself, so that perspective and distortion may bend
+//! them, and proof that dark and bright really alternate. The cubic's roots serve where the circle
+//! is too noisy to read.
+//!
+//! ```text
+//!          ray 2   ray 1            rays run counter-clockwise on the print (image angles fall,
+//!             ╲  ░  ╱               y is down); the sector after an even ray is dark, so an
+//!           ███╲   ╱███             even ray is a step along a row of the lattice turned by a
+//!    ray 3 ─────·───── ray 0        multiple of 120°, with the black tile on its left
+//!           ░  ╱███╲  ░
+//!             ╱█████╲
+//!          ray 4   ray 5
+//! ```
+
+use std::f64::consts::{PI, TAU};
+
+use super::cubic::CubicSurface;
+use crate::raster::Gray;
+
+/// Samples on a circle. A sector seen at 75° is 17° wide; 7.5° steps put two samples into it.
+const SAMPLES: usize = 48;
+
+/// Radii of the circles, px, in the order of trial. Larger circles give better directions, smaller
+/// ones stay clear of the neighbours on small boards.
+const RADII_PX: [f64; 4] = [6.0, 4.5, 8.0, 3.5];
+
+/// Samples within this part of the largest deviation from the mean count for neither side.
+const DEAD_BAND: f64 = 0.12;
+
+/// Where the cubic's roots give the rays, every sector must leave the level by this part of the
+/// circle's amplitude: half of what an evenly divided circle shows under its own noise.
+const MIN_SECTOR: f64 = 0.3;
+
+/// Largest deviation of opposite rays from a straight line. Perspective keeps lines straight;
+/// within a circle of 8 px no lens bends them by more than a few degrees, noise and blur add some.
+const MAX_BEND_RAD: f64 = 20.0 * PI / 180.0;
+
+/// Directions and brightness around a corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sectors {
+    /// Image angles of the six half-edges, counter-clockwise on the print, starting with one that
+    /// has a dark sector on its counter-clockwise side. Radians.
+    pub rays: [f64; 6],
+    /// Mean brightness, which is half-way between dark and bright.
+    pub level: f64,
+    /// Mean deviation from it: half the contrast.
+    pub amplitude: f64,
+}
+
+impl Sectors {
+    /// Reads the sectors around `position`, from circles or else from the cubic's roots.
+    pub fn read(image: &Gray<i16>, position: [f64; 2], surface: &CubicSurface) -> Option<Self> {
+        let circles = RADII_PX.iter().filter_map(|&radius| Circle::sample(image, position, radius));
+        let mut first = None;
+        for circle in circles {
+            if let Some(rays) = circle.crossings().and_then(|c| ordered_rays(&c)) {
+                return Some(circle.sectors(rays));
+            }
+            first.get_or_insert(circle);
+        }
+        let rays = ordered_rays(&roots(surface)?)?;
+        first.filter(|circle| circle.alternates(&rays)).map(|circle| circle.sectors(rays))
+    }
+}
+
+/// A sign change at an image angle; `rising` when brightness grows with the angle.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    angle: f64,
+    rising: bool,
+}
+
+/// Brightness on a circle, by rising image angle.
+struct Circle {
+    level: f64,
+    deviations: [f64; SAMPLES],
+}
+
+impl Circle {
+    /// `None` when the circle leaves the image.
+    fn sample(image: &Gray<i16>, [x, y]: [f64; 2], radius: f64) -> Option<Self> {
+        let inside = x - radius >= 0.0
+            && y - radius >= 0.0
+            && x + radius <= (image.width() - 1) as f64
+            && y + radius <= (image.height() - 1) as f64;
+        if !inside {
+            return None;
+        }
+        let values: [f64; SAMPLES] = std::array::from_fn(|k| {
+            let (sin, cos) = angle_of(k as f64).sin_cos();
+            f64::from(image.bilinear(x + radius * cos, y + radius * sin))
+        });
+        // Opposite sectors have opposite colours, so the mean is the level of the edges.
+        let level = values.iter().sum::<f64>() / SAMPLES as f64;
+        Some(Self { level, deviations: values.map(|v| v - level) })
+    }
+
+    fn sectors(&self, rays: [f64; 6]) -> Sectors {
+        let amplitude = self.deviations.iter().map(|d| d.abs()).sum::<f64>() / SAMPLES as f64;
+        Sectors { rays, level: self.level, amplitude }
+    }
+
+    /// Whether the sectors between given rays are dark and bright in turn, on the average.
+    fn alternates(&self, rays: &[f64; 6]) -> bool {
+        let amplitude = self.deviations.iter().map(|d| d.abs()).sum::<f64>() / SAMPLES as f64;
+        (0..6).all(|i| {
+            let width = -turn(rays[i], rays[(i + 1) % 6]);
+            let inside = (0..SAMPLES).filter(|&k| {
+                let behind = (rays[i] - angle_of(k as f64)).rem_euclid(TAU);
+                behind > 0.0 && behind < width
+            });
+            let (mut sum, mut count) = (0.0, 0.0);
+            for k in inside {
+                sum += self.deviations[k];
+                count += 1.0;
+            }
+            let darkness = if i % 2 == 0 { -sum } else { sum };
+            count > 0.0 && darkness / count > MIN_SECTOR * amplitude
+        })
+    }
+
+    /// The six sign changes; `None` unless there are exactly six.
+    fn crossings(&self) -> Option<[Crossing; 6]> {
+        let largest = self.deviations.iter().fold(0.0f64, |m, d| m.max(d.abs()));
+        let dead = DEAD_BAND * largest;
+        let clear: Vec<usize> = (0..SAMPLES).filter(|&k| self.deviations[k].abs() > dead).collect();
+        let mut crossings = Vec::with_capacity(8);
+        for (n, &a) in clear.iter().enumerate() {
+            let b = clear[(n + 1) % clear.len()];
+            if (self.deviations[a] > 0.0) != (self.deviations[b] > 0.0) {
+                if crossings.len() == 6 {
+                    return None;
+                }
+                crossings.push(self.crossing_between(a, b));
+            }
+        }
+        crossings.try_into().ok()
+    }
+
+    /// Zero of the straight line through the clear samples a and b (b after a, round the circle).
+    fn crossing_between(&self, a: usize, b: usize) -> Crossing {
+        let (from, to) = (self.deviations[a], self.deviations[b]);
+        let steps = (b + SAMPLES - a) % SAMPLES;
+        // With samples in the dead band between them, the zero lies where the sign turns.
+        let mut start = 0;
+        while start + 1 < steps {
+            let next = self.deviations[(a + start + 1) % SAMPLES];
+            if (next > 0.0) != (from > 0.0) {
+                break;
+            }
+            start += 1;
+        }
+        let low = self.deviations[(a + start) % SAMPLES];
+        let high = self.deviations[(a + start + 1) % SAMPLES];
+        let fraction = if low == high { 0.5 } else { low / (low - high) };
+        Crossing { angle: angle_of((a + start) as f64 + fraction), rising: to > from }
+    }
+}
+
+fn angle_of(sample: f64) -> f64 {
+    sample * TAU / SAMPLES as f64
+}
+
+/// The zeros of the cubic form around the circle; `None` unless all three roots are real.
+fn roots(surface: &CubicSurface) -> Option<[Crossing; 6]> {
+    let values: [f64; SAMPLES] = std::array::from_fn(|k| surface.form(angle_of(k as f64)));
+    let mut crossings = Vec::with_capacity(6);
+    for k in 0..SAMPLES {
+        let (from, to) = (values[k], values[(k + 1) % SAMPLES]);
+        if (from > 0.0) != (to > 0.0) && from != to {
+            let angle = angle_of(k as f64 + from / (from - to));
+            crossings.push(Crossing { angle, rising: to > from });
+        }
+    }
+    crossings.try_into().ok()
+}
+
+/// Rays in the order of [`Sectors::rays`]; `None` when opposite ones are not in line.
+fn ordered_rays(crossings: &[Crossing; 6]) -> Option<[f64; 6]> {
+    let straight =
+        (0..3).all(|k| turn(crossings[k].angle, crossings[k + 3].angle + PI).abs() <= MAX_BEND_RAD);
+    if !straight {
+        return None;
+    }
+    // Falling image angle is counter-clockwise on the print. Going that way, a crossing that rises
+    // with the angle leads from bright to… dark: its counter-clockwise sector is dark.
+    let start = crossings.iter().position(|c| c.rising)?;
+    Some(std::array::from_fn(|k| crossings[(start + 6 - k) % 6].angle))
+}
+
+/// The turn from `from` to `to`, −π to π.
+pub fn turn(from: f64, to: f64) -> f64 {
+    let turn = (to - from).rem_euclid(TAU);
+    if turn > PI { turn - TAU } else { turn }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A corner whose black tile lies between image angles −60°+tilt and 0°+tilt: upright on the
+    /// print, right of the corner.
+    fn corner(tilt: f64) -> Gray<i16> {
+        Gray::from_fn(41, 41, |x, y| {
+            let theta = (y as f64 - 20.0).atan2(x as f64 - 20.0) - tilt;
+            if (3.0 * theta).sin() < 0.0 { 100 } else { 700 }
+        })
+    }
+
+    #[test]
+    fn rays_follow_the_print_and_even_ones_have_black_on_their_left() {
+        for k in 0..20 {
+            let tilt = 0.3 * f64::from(k);
+            let flat = CubicSurface { c: [0.0; 7] };
+            let sectors = Sectors::read(&corner(tilt), [20.0, 20.0], &flat).unwrap();
+            assert!((sectors.level - 400.0).abs() < 20.0 && sectors.amplitude > 250.0);
+            for (i, &ray) in sectors.rays.iter().enumerate() {
+                let next = sectors.rays[(i + 1) % 6];
+                assert!((turn(ray, next) + PI / 3.0).abs() < 0.25, "60° apart, image angles fall");
+                let nearest = (0..6)
+                    .map(|n| turn(ray, tilt - f64::from(n) * PI / 3.0))
+                    .min_by(|a, b| a.abs().total_cmp(&b.abs()));
+                assert!(nearest.unwrap().abs() < 0.12);
+            }
+            // Half a sector counter-clockwise of ray 0 the image is dark.
+            let middle = sectors.rays[0] - PI / 6.0;
+            let value = corner(tilt).bilinear(20.0 + 6.0 * middle.cos(), 20.0 + 6.0 * middle.sin());
+            assert!(value < 400.0);
+        }
+    }
+
+    #[test]
+    fn four_sectors_and_flat_images_have_no_rays() {
+        let flat = CubicSurface { c: [0.0; 7] };
+        let checker = Gray::from_fn(41, 41, |x, y| if (x < 20) == (y < 20) { 100 } else { 700 });
+        assert!(Sectors::read(&checker, [19.5, 19.5], &flat).is_none());
+        assert!(Sectors::read(&Gray::new(41, 41), [20.0, 20.0], &flat).is_none());
+        assert!(Sectors::read(&Gray::new(3, 3), [1.0, 1.0], &flat).is_none());
+    }
+
+    #[test]
+    fn the_cubics_roots_serve_as_rays() {
+        let monkey = CubicSurface { c: [1.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0] };
+        let rays = ordered_rays(&roots(&monkey).unwrap()).unwrap();
+        assert!(turn(rays[0], rays[3] + PI).abs() < 1e-9);
+        assert!(monkey.form(rays[0] - 0.3) < 0.0, "dark after an even ray");
+    }
+}

@@ -1,0 +1,111 @@
+use super::{Gray, Intensity};
+
+/// Full scale of a pyramid's pixels: 10 bits leave room for sums of a dozen in 16-bit arithmetic.
+pub const PYRAMID_FULL_SCALE: f32 = 1023.0;
+
+/// Smoothed copies of an image, each half the size of the one before.
+///
+/// Level 0 is the image under a 3×3 binomial, level n+1 the 2×2 mean of level n; all in 10 bits.
+/// Pixel x of level n+1 covers pixels 2x and 2x+1, so `x_n = 2·x_{n+1} + 0.5`.
+#[derive(Clone, Debug)]
+pub struct Pyramid {
+    levels: Vec<Gray<i16>>,
+}
+
+impl Pyramid {
+    /// At most `count` levels; stops before a side would fall under `min_side` pixels.
+    pub fn new<T: Intensity>(image: &Gray<T>, count: usize, min_side: usize) -> Self {
+        let mut levels = vec![binomial(image)];
+        while levels.len() < count {
+            let last = &levels[levels.len() - 1];
+            if last.width().min(last.height()) / 2 < min_side {
+                break;
+            }
+            levels.push(half(last));
+        }
+        Self { levels }
+    }
+
+    /// The levels, finest first; never empty.
+    pub fn levels(&self) -> &[Gray<i16>] {
+        &self.levels
+    }
+
+    /// Position in level 0 of a position in `level`, px.
+    pub fn to_level_0(level: usize, [x, y]: [f64; 2]) -> [f64; 2] {
+        let scale = f64::from(1u32 << level);
+        [(x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5]
+    }
+}
+
+/// The 3×3 binomial (1 2 1)ᵀ(1 2 1)/16, borders repeated, in 10 bits.
+fn binomial<T: Intensity>(image: &Gray<T>) -> Gray<i16> {
+    let (width, height) = (image.width(), image.height());
+    let to_10_bits = PYRAMID_FULL_SCALE / T::FULL_SCALE / 16.0;
+    let mut out = Gray::new(width, height);
+    if width == 0 || height == 0 {
+        return out;
+    }
+    let mut columns = vec![0.0f32; width + 2];
+    for y in 0..height {
+        let above = image.row(y.saturating_sub(1));
+        let here = image.row(y);
+        let below = image.row((y + 1).min(height - 1));
+        for (x, sum) in columns[1..=width].iter_mut().enumerate() {
+            *sum = above[x].to_f32() + 2.0 * here[x].to_f32() + below[x].to_f32();
+        }
+        columns[0] = columns[1];
+        columns[width + 1] = columns[width];
+        for (x, pixel) in out.row_mut(y).iter_mut().enumerate() {
+            let sum = columns[x] + 2.0 * columns[x + 1] + columns[x + 2];
+            *pixel = (sum * to_10_bits + 0.5) as i16;
+        }
+    }
+    out
+}
+
+/// The mean of each 2×2 block; an odd last row or column is dropped.
+fn half(image: &Gray<i16>) -> Gray<i16> {
+    let (width, height) = (image.width() / 2, image.height() / 2);
+    let mut out = Gray::new(width, height);
+    for y in 0..height {
+        let (upper, lower) = (image.row(2 * y), image.row(2 * y + 1));
+        let blocks = upper.chunks_exact(2).zip(lower.chunks_exact(2));
+        for (pixel, (u, l)) in out.row_mut(y).iter_mut().zip(blocks) {
+            *pixel = (u[0] + u[1] + l[0] + l[1] + 2) >> 2;
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn full_scale_stays_full_scale_at_every_depth_and_level() {
+        let eight = Pyramid::new(&Gray::from_fn(40, 33, |_, _| 255u8), 3, 8);
+        let sixteen = Pyramid::new(&Gray::from_fn(40, 33, |_, _| 65535u16), 3, 8);
+        assert_eq!(eight.levels().len(), 3);
+        for level in eight.levels().iter().chain(sixteen.levels()) {
+            assert!(level.pixels().iter().all(|&v| v == 1023));
+        }
+    }
+
+    #[test]
+    fn a_ramp_keeps_its_place() {
+        let ramp = Gray::from_fn(64, 64, |x, _| (4 * x) as u8);
+        let pyramid = Pyramid::new(&ramp, 3, 8);
+        for (n, level) in pyramid.levels().iter().enumerate() {
+            let [x0, _] = Pyramid::to_level_0(n, [5.0, 5.0]);
+            let expected = 4.0 * x0 / 255.0 * 1023.0;
+            assert!((f64::from(level.at(5, 5)) - expected).abs() < 1.0);
+        }
+    }
+
+    #[test]
+    fn tiny_images_have_one_level() {
+        assert_eq!(Pyramid::new(&Gray::<u8>::new(1, 1), 3, 8).levels().len(), 1);
+        assert_eq!(Pyramid::new(&Gray::<u8>::new(0, 0), 3, 8).levels().len(), 1);
+    }
+}
