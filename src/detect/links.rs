@@ -11,6 +11,10 @@ use crate::raster::Gray;
 /// Nearest corners looked at: the six neighbours, the twelve behind them, and as many strangers.
 const NEAREST: usize = 36;
 
+/// Contrasts of neighbouring corners differ by less than this factor: light falls off slowly, and
+/// what is weaker is noise on the paper beside the board.
+const MAX_CONTRAST_RATIO: f64 = 3.0;
+
 /// The far end of an edge: a corner, and which of its rays looks back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Link {
@@ -66,8 +70,13 @@ fn nearest_along(
 
 /// The ray of `b` that looks back along ray `i` of `a`; `None` when they do not face each other.
 ///
-/// Opposite ends of an edge see its dark side on opposite hands, so the rays differ in parity.
+/// Opposite ends of an edge see its dark side on opposite hands, so the rays differ in parity, and
+/// their contrasts are alike.
 pub fn facing_ray(a: &Saddle, i: usize, b: &Saddle) -> Option<usize> {
+    let (ours, theirs) = (a.sectors.amplitude, b.sectors.amplitude);
+    if ours.max(theirs) > MAX_CONTRAST_RATIO * ours.min(theirs) {
+        return None;
+    }
     let [dx, dy] = [b.position[0] - a.position[0], b.position[1] - a.position[1]];
     let chord = dy.atan2(dx);
     if turn(chord, a.sectors.rays[i]).abs() > MAX_CHORD_RAD {
