@@ -22,4 +22,7 @@
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
+#[cfg(feature = "cli")]
+pub mod cli;
+pub mod family;
 pub mod lattice;
