@@ -1,16 +1,19 @@
 //! The stages in their order.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-use super::detection::{Detection, Grid, GridCorner};
+use super::detection::{DecodedTag, Detection, Grid, GridCorner};
 use super::grow::{SaddleGrid, grids};
+use super::label::{Labelled, TagLabeller, fit_outline, leftovers};
 use super::refine::Refiner;
 use super::saddles::{SaddleFinder, noise};
-use crate::raster::{Gray, Intensity, Pyramid};
-use crate::target::GridKind;
+use crate::family::Family;
+use crate::lattice::Vertex;
+use crate::raster::{AnyGray, Gray, Intensity, Pyramid};
+use crate::target::{GridKind, Target, zigzag_vertices};
 
-/// Levels of the pyramid: tiles of up to four times the blur that the finest level can see.
+/// Levels of the pyramid: the coarsest sees four times the blur that the finest can.
 const PYRAMID_LEVELS: usize = 3;
 
 /// A level narrower than this shows no grid.
@@ -23,19 +26,72 @@ pub struct DetectorConfig {
     pub max_bit_errors: Option<u32>,
 }
 
-/// Finds grids in images.
+/// Finds grids in images and labels their corners.
+///
+/// ```
+/// use deltille::detect::{Detector, DetectorConfig};
+/// use deltille::raster::Gray;
+/// use deltille::target::GridKind;
+///
+/// let detector = Detector::for_grid(GridKind::Deltille, Some((10, 11)), DetectorConfig::default());
+/// let detection = detector.detect(&Gray::<u8>::new(640, 480), "black.png");
+/// assert!(detection.grids.is_empty());
+/// ```
 #[derive(Clone, Debug)]
 pub struct Detector {
     finder: SaddleFinder,
     refiner: Refiner,
+    labels: Labels,
+}
+
+/// How corners get absolute labels.
+#[derive(Clone, Debug)]
+enum Labels {
+    /// They do not.
+    None,
+    /// By the outline of a board that is seen whole.
+    Outline(BTreeSet<Vertex>),
+    /// By the tags of a target, or by the outlines of its untagged panels.
+    Target { tags: Option<TagLabeller>, panels: Vec<TargetPanel> },
+}
+
+/// What the detector must know of a panel.
+#[derive(Clone, Debug)]
+struct TargetPanel {
+    id: u32,
+    inverted: bool,
+    tagged: bool,
+    corner_ids: BTreeMap<Vertex, u32>,
 }
 
 impl Detector {
-    /// A detector of untagged grids; `size` is the number of rows and columns of corners, where
-    /// known, and fixes the labels of boards that are seen whole.
+    /// A detector of grids whatever they belong to.
+    ///
+    /// With `size`, the rows and columns of corners of a zigzag board, a grid that shows the whole
+    /// board is labelled from its lower left corner; all other grids have relative labels.
     pub fn for_grid(kind: GridKind, size: Option<(u32, u32)>, config: DetectorConfig) -> Self {
-        let _ = (kind, size, config);
-        Self { finder: SaddleFinder::new(), refiner: Refiner::new() }
+        let _ = (kind, config);
+        let labels = match size {
+            Some((rows, cols)) => Labels::Outline(zigzag_vertices(rows, cols).collect()),
+            None => Labels::None,
+        };
+        Self { finder: SaddleFinder::new(), refiner: Refiner::new(), labels }
+    }
+
+    /// A detector of a target; `family` is the family that the target names.
+    pub fn for_target(target: &Target, family: Option<&Family>, config: DetectorConfig) -> Self {
+        let tags = family.and_then(|family| {
+            let max_errors = config.max_bit_errors.unwrap_or(family.correctable());
+            TagLabeller::new(target, family, max_errors)
+        });
+        let panels = target.panels.iter().map(|panel| TargetPanel {
+            id: panel.id,
+            inverted: panel.inverted,
+            tagged: !panel.tags.is_empty(),
+            corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
+        });
+        let labels = Labels::Target { tags, panels: panels.collect() };
+        Self { finder: SaddleFinder::new(), refiner: Refiner::new(), labels }
     }
 
     /// Finds grids in one image; `name` is only noted in the result.
@@ -48,7 +104,14 @@ impl Detector {
         timing.lap("saddles");
         let found = grids(&self.finder, &pyramid, &saddles);
         timing.lap("grids");
-        let grids = found.iter().map(|grid| self.grid(image, grid)).collect();
+        let mut grids: Vec<Grid> =
+            found.iter().flat_map(|grid| self.labelled_grids(image, grid)).collect();
+        // Labelled grids by panel, then the others; a stable sort keeps the largest first.
+        grids.sort_by_key(|grid| grid.panel.unwrap_or(u32::MAX));
+        timing.lap("labels");
+        for corner in grids.iter_mut().flat_map(|grid| &mut grid.corners) {
+            [corner.x, corner.y] = self.refiner.refine(image, [corner.x, corner.y]);
+        }
         timing.lap("refine");
         Detection {
             image: name.to_owned(),
@@ -59,16 +122,84 @@ impl Detector {
         }
     }
 
-    fn grid<T: Intensity>(&self, image: &Gray<T>, grid: &SaddleGrid) -> Grid {
-        let corners = grid
-            .iter()
-            .map(|(vertex, placed)| {
-                let [x, y] = self.refiner.refine(image, placed.saddle.position);
-                GridCorner { row: vertex.row, col: vertex.col, id: None, x, y, cov: None }
-            })
-            .collect();
-        Grid { kind: GridKind::Deltille, panel: None, corners, tags: Vec::new() }
+    /// [`Self::detect`] for an image of either depth.
+    pub fn detect_any(&self, image: &AnyGray, name: &str) -> Detection {
+        match image {
+            AnyGray::U8(image) => self.detect(image, name),
+            AnyGray::U16(image) => self.detect(image, name),
+        }
     }
+
+    fn labelled_grids<T: Intensity>(&self, image: &Gray<T>, grid: &SaddleGrid) -> Vec<Grid> {
+        match &self.labels {
+            Labels::None => vec![unlabelled(grid)],
+            Labels::Outline(outline) => match fit_outline(grid, outline, false) {
+                Some(map) => {
+                    vec![relabelled(grid, |v| Some((map.apply(v), None)), None, Vec::new())]
+                }
+                None => vec![unlabelled(grid)],
+            },
+            Labels::Target { tags, panels } => {
+                let by_tags = tags.as_ref().map_or_else(Vec::new, |tags| tags.label(image, grid));
+                let mut grids: Vec<Grid> =
+                    by_tags.iter().map(|l| on_panel(grid, &panels[l.panel], l)).collect();
+                for rest in leftovers(grid, &by_tags) {
+                    grids.push(
+                        on_untagged_panel(&rest, panels).unwrap_or_else(|| unlabelled(&rest)),
+                    );
+                }
+                grids
+            }
+        }
+    }
+}
+
+fn unlabelled(grid: &SaddleGrid) -> Grid {
+    relabelled(grid, |v| Some((v, None)), None, Vec::new())
+}
+
+fn on_panel(grid: &SaddleGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid {
+    let label = |v: Vertex| {
+        let vertex = *labelled.vertices.get(&v)?;
+        Some((vertex, panel.corner_ids.get(&vertex).copied()))
+    };
+    relabelled(grid, label, Some(panel.id), labelled.tags.clone())
+}
+
+/// The grid on the one untagged panel whose outline it fills.
+fn on_untagged_panel(grid: &SaddleGrid, panels: &[TargetPanel]) -> Option<Grid> {
+    let mut fitting = panels.iter().filter(|panel| !panel.tagged).filter_map(|panel| {
+        let outline = panel.corner_ids.keys().copied().collect();
+        Some((panel, fit_outline(grid, &outline, panel.inverted)?))
+    });
+    let (panel, map) = fitting.next()?;
+    if fitting.next().is_some() {
+        return None;
+    }
+    let label = |v| {
+        let vertex = map.apply(v);
+        Some((vertex, panel.corner_ids.get(&vertex).copied()))
+    };
+    Some(relabelled(grid, label, Some(panel.id), Vec::new()))
+}
+
+/// A grid with new labels, ordered by them; corners without a label are left out.
+fn relabelled(
+    grid: &SaddleGrid,
+    label: impl Fn(Vertex) -> Option<(Vertex, Option<u32>)>,
+    panel: Option<u32>,
+    tags: Vec<DecodedTag>,
+) -> Grid {
+    let mut corners: Vec<GridCorner> = grid
+        .iter()
+        .filter_map(|(&vertex, placed)| {
+            let (Vertex { row, col }, id) = label(vertex)?;
+            let [x, y] = placed.saddle.position;
+            Some(GridCorner { row, col, id, x, y, cov: None })
+        })
+        .collect();
+    corners.sort_by_key(|corner| (corner.row, corner.col));
+    Grid { kind: GridKind::Deltille, panel, corners, tags }
 }
 
 /// Stopwatch of the stages.

@@ -15,7 +15,7 @@ use crate::raster::Pyramid;
 
 /// Fewest corners of a grid: a hexagon of tiles. A quad or two of random texture may pass for
 /// tiles, seven corners with twelve clean edges between them do not.
-const MIN_CORNERS: usize = 7;
+pub const MIN_CORNERS: usize = 7;
 
 /// Largest distance of a corner from where its neighbours predict it, over the edge length.
 const MAX_SURPRISE: f64 = 0.2;
@@ -65,6 +65,23 @@ pub fn grids(finder: &SaddleFinder, pyramid: &Pyramid, saddles: &[Saddle]) -> Ve
     }
     grids.sort_by_key(|grid| std::cmp::Reverse(grid.len()));
     grids
+}
+
+/// The connected parts of a grid, by their lowest vertex.
+pub fn connected(mut grid: SaddleGrid) -> Vec<SaddleGrid> {
+    let mut parts = Vec::new();
+    while let Some(first) = grid.first_key_value().map(|(&vertex, _)| vertex) {
+        let mut part = SaddleGrid::new();
+        let mut queue = vec![first];
+        while let Some(vertex) = queue.pop() {
+            if let Some(placed) = grid.remove(&vertex) {
+                part.insert(vertex, placed);
+                queue.extend(vertex.neighbours());
+            }
+        }
+        parts.push(part);
+    }
+    parts
 }
 
 /// Four corners of two tiles that share an edge, with their places.

@@ -7,18 +7,22 @@
 //! 3. [`sectors`] reads the six half-edges with their colours.
 //! 4. [`links`] joins corners along clean edges ([`edge`]).
 //! 5. [`grow`] starts from quads of tiles, grows breadth-first and fills the gaps.
-//! 6. [`refine`] gives the last word on positions.
+//! 6. [`tags`] reads the tiles, [`label`] lets all tags together decide panel, rows and columns.
+//! 7. [`refine`] gives the last word on positions.
 
 mod cubic;
 mod detection;
 mod detector;
 mod edge;
 mod grow;
+mod label;
 mod links;
 mod refine;
 mod ring;
 mod saddles;
 mod sectors;
+mod tags;
+mod tile_map;
 
 pub use detection::{DecodedTag, Detection, Grid, GridCorner};
 pub use detector::{Detector, DetectorConfig};

@@ -40,7 +40,7 @@ pub use error::FamilyError;
 pub use file::{Construction, SCHEMA};
 pub use rules::{Rules, Screen};
 pub use shipped::shipped_names;
-pub use statistics::{distance_histogram, false_positive_rates};
+pub use statistics::{ball, distance_histogram, false_positive_rates};
 pub use tagwords::TagWords;
 
 use crate::lattice::Dimension;

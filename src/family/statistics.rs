@@ -43,7 +43,7 @@ pub fn false_positive_rates(dimension: Dimension, distance: u32, codes: usize) -
 }
 
 /// Number of words within `radius` of a word, Σ_{i≤radius} C(b,i).
-pub(super) fn ball(bits: u32, radius: u32) -> f64 {
+pub fn ball(bits: u32, radius: u32) -> f64 {
     let mut binomial = 1.0;
     let mut sum = 1.0;
     for i in 0..radius {

@@ -137,3 +137,13 @@ pub struct CheckBar {
     /// The other end on the page, mm.
     pub to_mm: [f64; 2],
 }
+
+/// The corners of a zigzag board of `rows × cols` corners: odd rows lie half an edge to the right
+/// of even ones, and the smallest column is 0.
+pub fn zigzag_vertices(rows: u32, cols: u32) -> impl Iterator<Item = crate::lattice::Vertex> {
+    let (rows, cols) = (rows as i32, cols as i32);
+    (0..rows).flat_map(move |row| {
+        let first = (rows - 1) / 2 - row / 2;
+        (first..first + cols).map(move |col| crate::lattice::Vertex::new(row, col))
+    })
+}

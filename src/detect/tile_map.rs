@@ -1,0 +1,75 @@
+use nalgebra::{DMatrix, DVector};
+
+use super::grow::SaddleGrid;
+use crate::lattice::{Tile, Vertex};
+
+/// Weight of a tile's own corners in the fit; the surroundings only bend the map.
+const OWN_WEIGHT: f64 = 8.0;
+
+/// Penalty on the bending terms, in units of one corner's equation: where few corners are known
+/// the map falls back to an affine one.
+const BENDING_PENALTY: f64 = 0.05;
+
+/// Image positions of the points of a tile: a quadratic map fitted to its corners and to the
+/// corners around it, so that perspective and distortion are followed.
+#[derive(Clone, Debug)]
+pub struct TileMap {
+    /// Coefficients of 1, u, v, u², uv, v² for x and for y.
+    coefficients: [[f64; 6]; 2],
+}
+
+impl TileMap {
+    /// The map of `tile`; `None` unless all its three corners are in the grid.
+    ///
+    /// Tile coordinates: A + u·(B − A) + v·(C − A), with A, B, C = [`Tile::vertices`].
+    pub fn new(grid: &SaddleGrid, tile: Tile) -> Option<Self> {
+        let own = tile.vertices();
+        let mut around: Vec<Vertex> = own.iter().flat_map(|v| v.neighbours()).collect();
+        around.sort();
+        around.dedup();
+        let at = |v: &Vertex| grid.get(v).map(|placed| placed.saddle.position);
+        for vertex in &own {
+            at(vertex)?;
+        }
+        let known: Vec<(Vertex, [f64; 2])> =
+            around.iter().filter_map(|v| Some((*v, at(v)?))).collect();
+        let mut design = DMatrix::zeros(known.len() + 3, 6);
+        let mut x = DVector::zeros(known.len() + 3);
+        let mut y = DVector::zeros(known.len() + 3);
+        for (i, (vertex, position)) in known.iter().enumerate() {
+            let weight = if own.contains(vertex) { OWN_WEIGHT } else { 1.0 };
+            let [u, v] = tile_coordinates(own, *vertex);
+            for (j, monomial) in monomials([u, v]).into_iter().enumerate() {
+                design[(i, j)] = weight * monomial;
+            }
+            x[i] = weight * position[0];
+            y[i] = weight * position[1];
+        }
+        for k in 0..3 {
+            design[(known.len() + k, 3 + k)] = BENDING_PENALTY;
+        }
+        let svd = design.svd(true, true);
+        let solve = |b: &DVector<f64>| -> Option<[f64; 6]> {
+            svd.solve(b, 1e-12).ok()?.as_slice().try_into().ok()
+        };
+        Some(Self { coefficients: [solve(&x)?, solve(&y)?] })
+    }
+
+    /// Image position of the tile point (u, v), px.
+    pub fn image_from_tile(&self, point: [f64; 2]) -> [f64; 2] {
+        let monomials = monomials(point);
+        self.coefficients.map(|row| row.iter().zip(&monomials).map(|(c, m)| c * m).sum())
+    }
+}
+
+fn monomials([u, v]: [f64; 2]) -> [f64; 6] {
+    [1.0, u, v, u * u, u * v, v * v]
+}
+
+/// Coordinates of a vertex in the frame of a tile: the two edges from A are steps 60° apart.
+fn tile_coordinates([a, b, _]: [Vertex; 3], vertex: Vertex) -> [f64; 2] {
+    let offset = vertex - a;
+    // Upright: B − A is one column; inverted: B − A is one column backwards, and so is C − A.
+    let sign = f64::from((b - a).col);
+    [sign * f64::from(offset.col), sign * f64::from(offset.row)]
+}
