@@ -11,6 +11,7 @@
 //! |---|---|---|
 //! | 1 | [`lattice`] | the triangular lattice: vertices, tiles, symmetries, the cells of a tag |
 //! | 1 | [`raster`] | grey images: storage, sampling, blur, files |
+//! | 1 | [`camera`] | camera models and poses |
 //! | 2 | [`family`] | DelTag code families: search, certificates, decoding, files |
 //! | 3 | [`target`] | what exists in the world: panels, corners and tags in millimetres |
 //! | 4 | [`artwork`] | what is drawn, in millimetres, independent of file type |
@@ -22,6 +23,7 @@
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
+pub mod camera;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod detect;

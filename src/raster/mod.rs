@@ -2,10 +2,14 @@
 //!
 //! Row-major, y down, pixel centres at integer coordinates.
 
+mod blur;
+mod coverage;
 mod gray;
 pub mod io;
 mod pyramid;
 
+pub use blur::gaussian;
+pub use coverage::Coverage;
 pub use gray::{Gray, Intensity};
 pub use io::{AnyGray, ImageError, read};
 pub use pyramid::{PYRAMID_FULL_SCALE, Pyramid};

@@ -1,0 +1,64 @@
+use glam::{DMat3, DQuat, DVec3};
+
+/// A rigid motion `y = R·x + t` between two frames, named after both, as in
+/// `camera_from_target`. Translations in millimetres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// R, a unit quaternion.
+    pub rotation: DQuat,
+    /// t, mm.
+    pub translation: DVec3,
+}
+
+impl Pose {
+    /// The motion that leaves every point where it is.
+    pub const IDENTITY: Pose = Pose { rotation: DQuat::IDENTITY, translation: DVec3::ZERO };
+
+    /// Where `point` goes.
+    pub fn apply(&self, point: DVec3) -> DVec3 {
+        self.rotation * point + self.translation
+    }
+
+    /// The motion back.
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.conjugate();
+        Self { rotation, translation: -(rotation * self.translation) }
+    }
+
+    /// This motion after `first`.
+    pub fn after(&self, first: &Pose) -> Self {
+        Self {
+            rotation: self.rotation * first.rotation,
+            translation: self.rotation * first.translation + self.translation,
+        }
+    }
+
+    /// The camera_from_target pose of a camera that stands at `eye`, looks at `centre`, and has
+    /// `up` upwards in its image; `up` must not be parallel to the line of sight.
+    pub fn looking_at(eye: DVec3, centre: DVec3, up: DVec3) -> Self {
+        let forward = (centre - eye).normalize();
+        let right = forward.cross(up).normalize();
+        let down = forward.cross(right);
+        let rotation = DQuat::from_mat3(&DMat3::from_cols(right, down, forward).transpose());
+        Self { rotation, translation: -(rotation * eye) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_sees_what_it_looks_at_in_the_middle_and_up_is_up() {
+        let eye = DVec3::new(100.0, -50.0, 400.0);
+        let centre = DVec3::new(30.0, 20.0, 0.0);
+        let pose = Pose::looking_at(eye, centre, DVec3::Y);
+        let seen = pose.apply(centre);
+        assert!(seen.x.abs() < 1e-9 && seen.y.abs() < 1e-9 && seen.z > 0.0);
+        assert!(pose.apply(centre + DVec3::Y).y < 0.0, "y is down in the camera");
+        assert!(pose.apply(centre + DVec3::X).x > 0.0);
+        let back = pose.inverse().after(&pose);
+        assert!((back.apply(centre) - centre).length() < 1e-9);
+        assert!((pose.inverse().apply(DVec3::ZERO) - eye).length() < 1e-9);
+    }
+}
