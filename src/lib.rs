@@ -17,6 +17,7 @@
 //! | 4 | [`artwork`] | what is drawn, in millimetres, independent of file type |
 //! | 4 | [`detect`] | from pixels to labelled corners |
 //! | 5 | [`export`] | artwork and targets to files and back |
+//! | 5 | [`synth`] | a target seen by a camera, as an image |
 //! | 6 | [`verify`] | an artifact read back from disk and compared with its target |
 //! | 7 | `cli` | the programs' arguments, progress and messages |
 //!
@@ -30,4 +31,5 @@ pub mod detect;
 pub mod family;
 pub mod lattice;
 pub mod raster;
+pub mod synth;
 pub mod target;

@@ -1,0 +1,254 @@
+use glam::DVec3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+use serde::{Deserialize, Serialize};
+
+use crate::camera::{Camera, Pose};
+use crate::raster::{Coverage, Gray, gaussian};
+
+/// An edge is divided until its image leaves the straight line by less than this, px.
+const MAX_CHORD_ERROR_PX: f64 = 1e-4;
+
+/// Divisions of an edge stop here: 2¹⁰ pieces follow any lens.
+const MAX_DIVISIONS: u32 = 10;
+
+/// Brightness and imperfections of a photograph.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Level of white paper, of 1.
+    pub white: f64,
+    /// Level of black print, of 1.
+    pub black: f64,
+    /// Level of what is not the target, of 1.
+    pub background: f64,
+    /// Relative change of illumination across the width and down the height of the image.
+    pub gradient: [f64; 2],
+    /// Standard deviation of the Gaussian blur, px.
+    pub blur_px: f64,
+    /// Standard deviation of the Gaussian noise, of 1.
+    pub noise: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+impl Default for Light {
+    /// A good photograph: levels 0.1 and 0.9, 0.8 px of blur, 1 % of noise.
+    fn default() -> Self {
+        Self {
+            white: 0.9,
+            black: 0.1,
+            background: 0.5,
+            gradient: [0.0; 2],
+            blur_px: 0.8,
+            noise: 0.01,
+            seed: 0,
+        }
+    }
+}
+
+/// A plane piece of the world: white paper with black outlines, in its own frame (mm, y up).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// Panel id.
+    pub panel: u32,
+    /// target = pose · surface.
+    pub target_from_surface: Pose,
+    /// Outline of the paper, counter-clockwise.
+    pub paper_mm: Vec<[f64; 2]>,
+    /// Black areas by the even-odd rule: each area with its holes; areas do not overlap.
+    pub black_mm: Vec<Vec<Vec<[f64; 2]>>>,
+    /// Corners: id, row, column and place.
+    pub corners: Vec<(u32, i32, i32, [f64; 2])>,
+}
+
+/// Surfaces of a convex target, seen from their front sides.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scene {
+    /// The surfaces; none hides another.
+    pub surfaces: Vec<Surface>,
+}
+
+/// Where the corners of a synthetic image are.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Truth {
+    /// All corners in the image.
+    pub corners: Vec<TruthCorner>,
+}
+
+/// A visible corner.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TruthCorner {
+    /// Panel id.
+    pub panel: u32,
+    /// Corner id in the target.
+    pub id: u32,
+    /// Lattice row.
+    pub row: i32,
+    /// Lattice column.
+    pub col: i32,
+    /// Position, px.
+    pub x: f64,
+    /// Position, px.
+    pub y: f64,
+    /// Position in the target frame, mm.
+    pub target_mm: [f64; 3],
+}
+
+impl Scene {
+    /// The image that `camera` takes, on a scale of 0 to 1, before rounding to a pixel depth.
+    pub fn render(&self, camera: &Camera, camera_from_target: &Pose, light: &Light) -> Gray<f32> {
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let mut coverage = Coverage::new(width, height);
+        for surface in self.seen_from(camera_from_target) {
+            let view =
+                View { camera, camera_from_surface: surface.camera_from(camera_from_target) };
+            if let Some(paper) = view.outline(&surface.paper_mm) {
+                coverage.add(&clockwise(paper, true), light.white - light.background);
+            }
+            for area in &surface.black_mm {
+                for (i, outline) in area.iter().enumerate() {
+                    let Some(outline) = view.outline(outline) else { continue };
+                    let solid = depth(area, i).is_multiple_of(2);
+                    coverage.add(&clockwise(outline, solid), light.black - light.white);
+                }
+            }
+        }
+        let sharp = coverage.finish();
+        let background = light.background as f32;
+        let mut image = gaussian(&sharp.map(|v| v + background), light.blur_px);
+        let mut rng = ChaCha8Rng::seed_from_u64(light.seed);
+        let noise = Normal::new(0.0, light.noise.max(0.0)).ok();
+        let [across, down] = light.gradient;
+        for y in 0..height {
+            let row_gain = 1.0 + down * (y as f64 / height as f64 - 0.5);
+            for (x, pixel) in image.row_mut(y).iter_mut().enumerate() {
+                let gain = row_gain + across * (x as f64 / width as f64 - 0.5);
+                let shot = noise.map_or(0.0, |n| n.sample(&mut rng));
+                *pixel = (f64::from(*pixel) * gain + shot).clamp(0.0, 1.0) as f32;
+            }
+        }
+        image
+    }
+
+    /// The corners that the camera sees, at least `margin_px` inside the image.
+    pub fn truth(&self, camera: &Camera, camera_from_target: &Pose, margin_px: f64) -> Truth {
+        let mut truth = Truth::default();
+        for surface in self.seen_from(camera_from_target) {
+            let camera_from_surface = surface.camera_from(camera_from_target);
+            for &(id, row, col, [x, y]) in &surface.corners {
+                let point = DVec3::new(x, y, 0.0);
+                let pixel = camera.project(camera_from_surface.apply(point));
+                let Some([px, py]) = pixel.filter(|&p| camera.sees(p, margin_px)) else { continue };
+                let target_mm = surface.target_from_surface.apply(point).to_array();
+                let panel = surface.panel;
+                truth.corners.push(TruthCorner { panel, id, row, col, x: px, y: py, target_mm });
+            }
+        }
+        truth
+    }
+
+    /// The surfaces that turn their front to the camera.
+    fn seen_from<'a>(&'a self, camera_from_target: &'a Pose) -> impl Iterator<Item = &'a Surface> {
+        let eye = camera_from_target.inverse().translation;
+        self.surfaces.iter().filter(move |surface| {
+            let [x, y] = surface.paper_mm.first().copied().unwrap_or_default();
+            let on_surface = surface.target_from_surface.apply(DVec3::new(x, y, 0.0));
+            (surface.target_from_surface.rotation * DVec3::Z).dot(eye - on_surface) > 0.0
+        })
+    }
+}
+
+impl Surface {
+    fn camera_from(&self, camera_from_target: &Pose) -> Pose {
+        camera_from_target.after(&self.target_from_surface)
+    }
+}
+
+/// A surface's plane in a camera.
+struct View<'a> {
+    camera: &'a Camera,
+    camera_from_surface: Pose,
+}
+
+impl View<'_> {
+    fn project(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        self.camera.project(self.camera_from_surface.apply(DVec3::new(x, y, 0.0)))
+    }
+
+    /// The image of an outline as a fine polygon; `None` when a part of it cannot be projected.
+    fn outline(&self, outline: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+        let mut image = Vec::with_capacity(4 * outline.len());
+        for (i, &from) in outline.iter().enumerate() {
+            let to = outline[(i + 1) % outline.len()];
+            let (start, end) = (self.project(from)?, self.project(to)?);
+            image.push(start);
+            self.divide([from, to], [start, end], MAX_DIVISIONS, &mut image)?;
+        }
+        Some(image)
+    }
+
+    /// Pushes the points between the ends of an edge that its curvature asks for.
+    fn divide(
+        &self,
+        [from, to]: [[f64; 2]; 2],
+        [start, end]: [[f64; 2]; 2],
+        divisions: u32,
+        image: &mut Vec<[f64; 2]>,
+    ) -> Option<()> {
+        let middle = [(from[0] + to[0]) / 2.0, (from[1] + to[1]) / 2.0];
+        let seen = self.project(middle)?;
+        let (dx, dy) = (end[0] - start[0], end[1] - start[1]);
+        let cross = (seen[0] - start[0]) * dy - (seen[1] - start[1]) * dx;
+        if cross.abs() <= MAX_CHORD_ERROR_PX * dx.hypot(dy) || divisions == 0 {
+            return Some(());
+        }
+        self.divide([from, middle], [start, seen], divisions - 1, image)?;
+        image.push(seen);
+        self.divide([middle, to], [seen, end], divisions - 1, image)
+    }
+}
+
+/// How many of the other outlines of an area enclose outline `i`.
+fn depth(area: &[Vec<[f64; 2]>], i: usize) -> usize {
+    let Some(&point) = area[i].first() else { return 0 };
+    // Outlines may touch in vertices, so a point just inside the outline is asked about.
+    let inner = just_inside(&area[i]).unwrap_or(point);
+    (0..area.len()).filter(|&j| j != i && encloses(&area[j], inner)).count()
+}
+
+/// A point inside a polygon, close to the middle of its first edge.
+fn just_inside(polygon: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let (a, b) = (*polygon.first()?, *polygon.get(1)?);
+    let middle = [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0];
+    let normal = [-(b[1] - a[1]) * 1e-3, (b[0] - a[0]) * 1e-3];
+    [1.0, -1.0]
+        .map(|side| [middle[0] + side * normal[0], middle[1] + side * normal[1]])
+        .into_iter()
+        .find(|&p| encloses(polygon, p))
+}
+
+/// Even-odd rule.
+fn encloses(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+    let n = polygon.len();
+    (0..n).fold(false, |inside, i| {
+        let ([ax, ay], [bx, by]) = (polygon[i], polygon[(i + 1) % n]);
+        let crosses = (ay > y) != (by > y) && x < (bx - ax) * (y - ay) / (by - ay) + ax;
+        inside != crosses
+    })
+}
+
+/// The polygon clockwise on the screen if `solid`, else counter-clockwise.
+fn clockwise(mut polygon: Vec<[f64; 2]>, solid: bool) -> Vec<[f64; 2]> {
+    let n = polygon.len();
+    let doubled: f64 = (0..n)
+        .map(|i| {
+            let ([x, y], [u, v]) = (polygon[i], polygon[(i + 1) % n]);
+            x * v - u * y
+        })
+        .sum();
+    if (doubled > 0.0) != solid {
+        polygon.reverse();
+    }
+    polygon
+}
