@@ -1,0 +1,141 @@
+use kurbo::{Affine, BezPath, Point};
+
+use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, text};
+use crate::family::Family;
+use crate::lattice::{ROW_HEIGHT, TagCells, Tile};
+use crate::target::{Panel, Placement, SheetText, Target};
+
+/// The shapes of sheet `index` of a target.
+pub(super) fn sheet(
+    target: &Target,
+    family: Option<&Family>,
+    index: usize,
+) -> Result<Sheet, ArtworkError> {
+    let layout = &target.sheets[index];
+    let mut shapes = Vec::new();
+    for placement in &layout.placements {
+        let panel = target.panels.iter().find(|panel| panel.id == placement.panel);
+        let panel =
+            panel.ok_or(ArtworkError::NoSuchPanel { sheet: index + 1, panel: placement.panel })?;
+        shapes.extend(draw_panel(target, panel, placement, family)?);
+    }
+    for (index, bar) in layout.check_bars.iter().enumerate() {
+        let path = check_bar::outline(bar);
+        shapes.push(Shape { part: Part::CheckBar { index }, paint: Paint::Fill, path });
+    }
+    for (index, label) in layout.texts.iter().enumerate() {
+        let path = draw_text(label)?;
+        shapes.push(Shape { part: Part::Label { index }, paint: Paint::Fill, path });
+    }
+    Ok(Sheet { width_mm: layout.width_mm, height_mm: layout.height_mm, shapes })
+}
+
+/// The tiles of a panel on its page: one shape each, or one field on an inverted panel.
+fn draw_panel(
+    target: &Target,
+    panel: &Panel,
+    placement: &Placement,
+    family: Option<&Family>,
+) -> Result<Vec<Shape>, ArtworkError> {
+    let page_from_panel = Affine::translate((placement.origin_mm[0], placement.origin_mm[1]))
+        * Affine::rotate(placement.angle_rad);
+    let tiles = panel.upright_tiles();
+    let mut paths = Vec::with_capacity(tiles.len());
+    for tile in tiles {
+        let path = tile_path(panel, tile, tag_word(target, panel, tile, family)?);
+        paths.push((tile, page_from_panel * path));
+    }
+    if panel.inverted {
+        let mut field = page_from_panel * rectangle(panel.field_mm());
+        paths.into_iter().for_each(|(_, path)| field.extend(path));
+        let part = Part::Field { panel: panel.id };
+        return Ok(vec![Shape { part, paint: Paint::Fill, path: field }]);
+    }
+    let shapes = paths.into_iter().map(|(tile, path)| {
+        let (row, col) = (tile.anchor.row, tile.anchor.col);
+        Shape { part: Part::Tile { panel: panel.id, row, col }, paint: Paint::Fill, path }
+    });
+    Ok(shapes.collect())
+}
+
+/// Cells and code of the tag in a tile, if it has one.
+fn tag_word(
+    target: &Target,
+    panel: &Panel,
+    tile: Tile,
+    family: Option<&Family>,
+) -> Result<Option<(TagCells, u64)>, ArtworkError> {
+    let anchor = tile.anchor;
+    let Some(tag) = panel.tags.iter().find(|t| (t.row, t.col) == (anchor.row, anchor.col)) else {
+        return Ok(None);
+    };
+    let Some(family) = family else {
+        let name = target.family.as_ref().map_or_else(String::new, |f| f.name.clone());
+        return Err(ArtworkError::FamilyMissing(name));
+    };
+    let word = family.code(tag.id).ok_or_else(|| ArtworkError::NoSuchTag {
+        id: tag.id,
+        row: tag.row,
+        col: tag.col,
+        family: family.name().to_owned(),
+        len: family.len(),
+    })?;
+    Ok(Some((TagCells::new(family.dimension()), word)))
+}
+
+/// A tile's outline with the outlines of its tag's white areas, in the panel frame, mm.
+fn tile_path(panel: &Panel, tile: Tile, tag: Option<(TagCells, u64)>) -> BezPath {
+    let edge = panel.edge_mm;
+    let mut path = polygon(tile.vertices().map(|v| {
+        let [x, y] = v.position();
+        Point::new(x * edge, y * edge)
+    }));
+    if let Some((cells, word)) = tag {
+        let border = panel.border_bits.unwrap_or_default();
+        tag_outlines(&cells, word, border).for_each(|outline| {
+            path.extend(polygon(outline.into_iter().map(|[u, v]| {
+                let (row, col) = (f64::from(tile.anchor.row) + v, f64::from(tile.anchor.col) + u);
+                Point::new((col + row / 2.0) * edge, row * ROW_HEIGHT * edge)
+            })));
+        });
+    }
+    path
+}
+
+/// The outlines of a tag's white areas in tile coordinates (u along the lower edge, v along the
+/// left edge, 0..1).
+pub(super) fn tag_outlines(
+    cells: &TagCells,
+    word: u64,
+    border: f64,
+) -> impl Iterator<Item = Vec<[f64; 2]>> {
+    let width = f64::from(cells.dimension().rows()) + 3.0 * border;
+    let at = move |cell: i32| (border + f64::from(cell)) / width;
+    cells::white_outlines(cells, word)
+        .into_iter()
+        .map(move |outline| outline.into_iter().map(|v| [at(v.col), at(v.row)]).collect())
+}
+
+/// A text on its page, set smaller where it would be too long.
+fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph> {
+    let size = label.cap_height_mm / text::CAP_HEIGHT;
+    let (path, width) = text::outline(&label.text, size)?;
+    let fit = (label.max_width_mm / width).min(1.0);
+    let [x, y] = label.at_mm;
+    let place = Affine::translate((x, y)) * Affine::rotate(label.angle_rad);
+    Ok(place * Affine::scale(fit) * path)
+}
+
+/// A closed polygon.
+pub(super) fn polygon(points: impl IntoIterator<Item = Point>) -> BezPath {
+    let mut path = BezPath::new();
+    for (i, point) in points.into_iter().enumerate() {
+        if i == 0 { path.move_to(point) } else { path.line_to(point) }
+    }
+    path.close_path();
+    path
+}
+
+fn rectangle([x0, y0, x1, y1]: [f64; 4]) -> BezPath {
+    polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(Point::from))
+}

@@ -1,0 +1,139 @@
+use std::collections::BTreeMap;
+
+use crate::lattice::{TagCells, Tile, Vertex};
+
+/// The outlines of a tag's white areas, as vertices of the lattice of its cells.
+///
+/// ```text
+///      ·───·───·            White cells that share an edge form one area. Its outline runs with
+///     ╱ ╲w╱w╲ ╱             white on the left; an area with a black island has two loops. Areas
+///    ·───·═══·───·          that touch in a vertex only keep separate loops, so that every loop
+///   ╱ ╲ ╱ ╲w╱ ╲ ╱ ╲         is simple, and filling all of them by the even-odd rule is exact.
+/// ```
+///
+/// A vertex (row, col) lies at tile coordinates u = (border + col) / width, v = (border + row) /
+/// width, width = d + 3·border. Vertices on a straight run are left out. The order of the loops is
+/// fixed.
+pub fn white_outlines(cells: &TagCells, word: u64) -> Vec<Vec<Vertex>> {
+    let mut edges = boundary_edges(cells, word);
+    let mut loops = Vec::new();
+    while let Some((&start, directions)) = edges.first_key_value() {
+        let first = (start, directions[0]);
+        trace(&mut edges, first, &mut loops);
+    }
+    loops
+}
+
+/// Edges between white and black, white on the left: from each vertex the directions, as indices
+/// into [`Vertex::STEPS`], in ascending order.
+fn boundary_edges(cells: &TagCells, word: u64) -> BTreeMap<Vertex, Vec<usize>> {
+    let white = cells.cells().iter().enumerate().filter(|&(bit, _)| word >> bit & 1 == 1);
+    let mut edges = BTreeMap::<Vertex, Vec<usize>>::new();
+    for (_, cell) in white {
+        let anchor = Vertex::new(cell.row as i32, cell.col as i32);
+        let tile = if cell.upright { Tile::upright(anchor) } else { Tile::inverted(anchor) };
+        let [a, b, c] = tile.vertices();
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            if !remove(&mut edges, to, direction(to, from)) {
+                edges.entry(from).or_default().push(direction(from, to));
+            }
+        }
+    }
+    edges.values_mut().for_each(|directions| directions.sort_unstable());
+    edges
+}
+
+fn direction(from: Vertex, to: Vertex) -> usize {
+    let step = to - from;
+    Vertex::STEPS.iter().position(|&s| s == step).expect("cell edges join neighbours")
+}
+
+fn remove(edges: &mut BTreeMap<Vertex, Vec<usize>>, from: Vertex, direction: usize) -> bool {
+    let Some(directions) = edges.get_mut(&from) else { return false };
+    let Some(at) = directions.iter().position(|&d| d == direction) else { return false };
+    directions.remove(at);
+    if directions.is_empty() {
+        edges.remove(&from);
+    }
+    true
+}
+
+/// Follows an outline from its first step, turning left as sharply as possible at every vertex:
+/// that stays on the white area it started on where several meet. Each time the walk comes to a
+/// vertex for the second time, what lies between is cut off as a loop of its own.
+fn trace(
+    edges: &mut BTreeMap<Vertex, Vec<usize>>,
+    (start, first): (Vertex, usize),
+    loops: &mut Vec<Vec<Vertex>>,
+) {
+    let mut steps = vec![(start, first)];
+    while let Some(&(from, heading)) = steps.last() {
+        remove(edges, from, heading);
+        let at = from + Vertex::STEPS[heading];
+        if let Some(again) = steps.iter().position(|&(vertex, _)| vertex == at) {
+            loops.push(bends(&steps.split_off(again)));
+            if steps.is_empty() {
+                break;
+            }
+        }
+        let left_first = [2, 1, 0, 5, 4].map(|turn| (heading + turn) % 6);
+        let next = left_first.into_iter().find(|turn| edges[&at].contains(turn));
+        steps.push((at, next.expect("as many outlines leave a vertex as reach it")));
+    }
+}
+
+/// The vertices of a loop where its direction changes.
+fn bends(steps: &[(Vertex, usize)]) -> Vec<Vertex> {
+    let before = |i: usize| steps[(i + steps.len() - 1) % steps.len()].1;
+    let bends = steps.iter().enumerate().filter(|&(i, &(_, heading))| heading != before(i));
+    bends.map(|(_, &(vertex, _))| vertex).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::lattice::Dimension;
+
+    /// Twice the signed area in cells: a cell has area 1.
+    fn area(outline: &[Vertex]) -> i32 {
+        let next = outline.iter().cycle().skip(1);
+        outline.iter().zip(next).map(|(a, b)| a.col * b.row - a.row * b.col).sum()
+    }
+
+    fn cells(bits: u32) -> TagCells {
+        TagCells::new(Dimension::from_bits(bits).unwrap())
+    }
+
+    #[test]
+    fn one_cell_is_one_triangle_and_a_ring_has_two_loops() {
+        let cells = cells(9);
+        assert_eq!(
+            white_outlines(&cells, 1 << 8),
+            [[(2, 0), (2, 1), (3, 0)].map(|(row, col)| Vertex::new(row, col))]
+        );
+        // All white but bit 13, the lowest upright cell that does not touch the outside.
+        let ring = white_outlines(&self::cells(25), 0x1ff_ffff ^ (1 << 13));
+        let areas: Vec<i32> = ring.iter().map(|l| area(l)).collect();
+        assert_eq!(areas, [25, -1]);
+    }
+
+    proptest! {
+        /// The loops enclose exactly the white cells, each runs through a vertex once.
+        #[test]
+        fn loops_are_simple_and_enclose_the_white_cells(bits in 3u32..8, seed: u64) {
+            let cells = cells(bits * bits);
+            let word = seed & cells.dimension().mask();
+            let outlines = white_outlines(&cells, word);
+            let total: i32 = outlines.iter().map(|l| area(l)).sum();
+            prop_assert_eq!(total, word.count_ones() as i32);
+            for outline in &outlines {
+                let mut sorted = outline.clone();
+                sorted.sort();
+                sorted.dedup();
+                prop_assert_eq!(sorted.len(), outline.len());
+            }
+        }
+    }
+}

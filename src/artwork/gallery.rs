@@ -1,0 +1,66 @@
+use kurbo::{Affine, Point};
+
+use super::board::{polygon, tag_outlines};
+use super::{Paint, Part, Shape, Sheet, text};
+use crate::family::Family;
+use crate::lattice::{ROW_HEIGHT, TagCells};
+
+/// How tags are laid out for looking at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GalleryTile {
+    /// Length of a tag's edge, mm.
+    pub edge_mm: f64,
+    /// Border in bit-widths along the edge.
+    pub border_bits: f64,
+    /// Tags in a row.
+    pub columns: usize,
+}
+
+impl Default for GalleryTile {
+    fn default() -> Self {
+        Self { edge_mm: 30.0, border_bits: 1.5, columns: 5 }
+    }
+}
+
+/// Text size over edge length.
+const TEXT: f64 = 0.13;
+/// Space between two tags, and around all of them, over edge length.
+const GAP: f64 = 0.25;
+
+/// Draws the tags `ids` of a family, each with its id below, on a page that just holds them.
+///
+/// Ids that the family does not have are left out; the caller checks them first.
+pub fn tag_gallery(
+    family: &Family,
+    ids: &[u32],
+    style: GalleryTile,
+) -> Result<Sheet, text::MissingGlyph> {
+    let GalleryTile { edge_mm, border_bits, columns } = style;
+    let cells = TagCells::new(family.dimension());
+    let known: Vec<_> = ids.iter().filter_map(|&id| Some((id, family.code(id)?))).collect();
+    let columns = columns.clamp(1, known.len().max(1));
+    let rows = known.len().div_ceil(columns);
+    let (gap, size) = (GAP * edge_mm, TEXT * edge_mm);
+    let pitch = [edge_mm + gap, ROW_HEIGHT * edge_mm + 1.8 * size + gap];
+    let height_mm = rows as f64 * pitch[1] + gap;
+
+    let mut shapes = Vec::new();
+    for (index, (id, word)) in known.into_iter().enumerate() {
+        let x = gap + (index % columns) as f64 * pitch[0];
+        let y = height_mm - (index / columns + 1) as f64 * pitch[1] + 1.8 * size;
+        let place = |[u, v]: [f64; 2]| {
+            Point::new(x + (u + v / 2.0) * edge_mm, y + v * ROW_HEIGHT * edge_mm)
+        };
+        let mut path = polygon([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(place));
+        for outline in tag_outlines(&cells, word, border_bits) {
+            path.extend(polygon(outline.into_iter().map(place)));
+        }
+        let part = Part::Tile { panel: 0, row: 0, col: id as i32 };
+        shapes.push(Shape { part, paint: Paint::Fill, path });
+
+        let (glyphs, width) = text::outline(&id.to_string(), size)?;
+        let path = Affine::translate((x + (edge_mm - width) / 2.0, y - 1.3 * size)) * glyphs;
+        shapes.push(Shape { part: Part::Label { index }, paint: Paint::Fill, path });
+    }
+    Ok(Sheet { width_mm: columns as f64 * pitch[0] + gap, height_mm, shapes })
+}

@@ -1,0 +1,43 @@
+//! Artwork and targets to files and back, one module per format.
+//!
+//! Every writer takes shapes in millimetres and only changes units and syntax. Files appear whole
+//! or not at all, see [`atomic`].
+
+pub mod atomic;
+pub mod pdf;
+pub mod png;
+mod supersample;
+pub mod svg;
+
+use std::path::PathBuf;
+
+pub(crate) use supersample::{Block, SUBPIXELS, render as supersample};
+
+/// Why an artifact was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The file could not be written.
+    #[error(transparent)]
+    Write(#[from] atomic::WriteError),
+    /// A page larger than the format allows.
+    #[error("{path}: a page of {width_mm} x {height_mm} mm is too large, {limit}")]
+    TooLarge {
+        /// The file asked for.
+        path: PathBuf,
+        /// Page width, mm.
+        width_mm: f64,
+        /// Page height, mm.
+        height_mm: f64,
+        /// The limit, and what to do.
+        limit: String,
+    },
+}
+
+/// The file name of sheet `index` (from 0) of `count`: `name.svg`, or `name-2.svg` when there are
+/// several.
+pub fn sheet_file_name(name: &str, index: usize, count: usize, extension: &str) -> String {
+    match count {
+        1 => format!("{name}.{extension}"),
+        _ => format!("{name}-{}.{extension}", index + 1),
+    }
+}
