@@ -7,6 +7,7 @@
 //! Frames: a *panel* frame has its origin on the panel's lattice vertex (0,0), x along the rows, y
 //! up on the print, z towards the viewer; `target = rotation · panel + translation`.
 
+mod panel;
 mod spec;
 
 use serde::{Deserialize, Serialize};
@@ -37,6 +38,18 @@ pub struct FamilyRef {
     pub fingerprint: String,
 }
 
+/// How far the tiles of a panel reach beyond its corners.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Outline {
+    /// The black tiles that touch a corner.
+    #[default]
+    Touching,
+    /// The same and one tile more at the right end of the lowest row, so that every row of a
+    /// zigzag board has as many tiles as the next.
+    Zigzag,
+}
+
 /// Which tiling a panel carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -58,8 +71,14 @@ pub struct Panel {
     pub edge_mm: f64,
     /// Border of its tags in bit-widths along the edge; `None` without tags.
     pub border_bits: Option<f64>,
-    /// Whether the colours are exchanged: white upright tiles on black.
+    /// Whether the colours are exchanged: white upright tiles on a black field.
     pub inverted: bool,
+    /// Which tiles are drawn around the corners.
+    #[serde(default)]
+    pub outline: Outline,
+    /// Columns and rows of the matrix in which `.dsc` and `.orpc` files number the corners
+    /// (FORMATS §5); it holds every corner.
+    pub matrix: [u32; 2],
     /// Pose of the panel frame in the target frame.
     pub pose: PanelPose,
     /// Saddle points, ordered by row, then column.
@@ -116,6 +135,8 @@ pub struct SheetLayout {
     pub placements: Vec<Placement>,
     /// Lines of stated length, to be measured with a ruler.
     pub check_bars: Vec<CheckBar>,
+    /// The label and the words on the check bars.
+    pub texts: Vec<TextLine>,
 }
 
 /// `page = turn(angle) · panel + origin`.
@@ -136,4 +157,19 @@ pub struct CheckBar {
     pub from_mm: [f64; 2],
     /// The other end on the page, mm.
     pub to_mm: [f64; 2],
+}
+
+/// One line of text on a page, set in the built-in font.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TextLine {
+    /// The words: ASCII and `° ± · × – −`.
+    pub text: String,
+    /// Left end of the base line on the page, mm.
+    pub origin_mm: [f64; 2],
+    /// Counter-clockwise turn of the base line, radians.
+    pub angle_rad: f64,
+    /// Height of a capital letter, mm.
+    pub cap_height_mm: f64,
+    /// The line is set smaller where it would be longer than this, mm.
+    pub max_width_mm: f64,
 }
