@@ -136,7 +136,7 @@ pub struct SheetLayout {
     /// Lines of stated length, to be measured with a ruler.
     pub check_bars: Vec<CheckBar>,
     /// The label and the words on the check bars.
-    pub texts: Vec<TextLine>,
+    pub texts: Vec<SheetText>,
 }
 
 /// `page = turn(angle) · panel + origin`.
@@ -161,11 +161,11 @@ pub struct CheckBar {
 
 /// One line of text on a page, set in the built-in font.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TextLine {
+pub struct SheetText {
     /// The words: ASCII and `° ± · × – −`.
     pub text: String,
     /// Left end of the base line on the page, mm.
-    pub origin_mm: [f64; 2],
+    pub at_mm: [f64; 2],
     /// Counter-clockwise turn of the base line, radians.
     pub angle_rad: f64,
     /// Height of a capital letter, mm.

@@ -28,30 +28,35 @@ impl Panel {
         anchors.into_iter().map(Tile::upright).collect()
     }
 
-    /// Bounding box of the drawn tiles in the panel frame: lower-left and upper-right corner, mm.
-    pub fn bounds_mm(&self) -> [[f64; 2]; 2] {
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    /// Bounding box of the drawn tiles in the panel frame, mm: left, lower, right and upper end.
+    pub fn bounds_mm(&self) -> [f64; 4] {
+        let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
         for tile in self.upright_tiles() {
             // Left, right and lower end are those of the base, the upper end is the apex.
-            let [left, bottom] = tile.anchor.position();
-            for axis in 0..2 {
-                low[axis] = low[axis].min([left, bottom][axis]);
-                high[axis] = high[axis].max([left + 1.0, bottom + ROW_HEIGHT][axis]);
-            }
+            let [x, y] = tile.anchor.position();
+            bounds[0] = bounds[0].min(x);
+            bounds[1] = bounds[1].min(y);
+            bounds[2] = bounds[2].max(x + 1.0);
+            bounds[3] = bounds[3].max(y + ROW_HEIGHT);
         }
-        [low, high].map(|point| point.map(|v| v * self.edge_mm))
+        bounds.map(|v| v * self.edge_mm)
     }
 
     /// Width of the quiet zone around [`Self::bounds_mm`], mm. Nothing else is printed in it; on
     /// an inverted panel it is black.
     pub fn quiet_zone_mm(&self) -> f64 {
-        (QUIET_EDGES * self.edge_mm).max(QUIET_MIN_MM)
+        quiet_zone_mm(self.edge_mm)
     }
 
-    /// The bounding box with its quiet zone: on an inverted panel, the black field.
-    pub fn field_mm(&self) -> [[f64; 2]; 2] {
+    /// The bounding box with its quiet zone, mm: on an inverted panel, the black field.
+    pub fn field_mm(&self) -> [f64; 4] {
         let quiet = self.quiet_zone_mm();
-        let [low, high] = self.bounds_mm();
-        [low.map(|v| v - quiet), high.map(|v| v + quiet)]
+        let [left, lower, right, upper] = self.bounds_mm();
+        [left - quiet, lower - quiet, right + quiet, upper + quiet]
     }
+}
+
+/// Width of the quiet zone around tiles of a given edge, mm.
+fn quiet_zone_mm(edge_mm: f64) -> f64 {
+    (QUIET_EDGES * edge_mm).max(QUIET_MIN_MM)
 }
