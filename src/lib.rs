@@ -22,7 +22,10 @@
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod detect;
+pub mod family;
 pub mod lattice;
 pub mod raster;
 pub mod target;

@@ -1,3 +1,9 @@
 //! `deltag`: search, check and draw DelTag code families.
 
-fn main() {}
+use std::process::ExitCode;
+
+use deltille::cli::{deltag, run};
+
+fn main() -> ExitCode {
+    run::run(deltag::run)
+}

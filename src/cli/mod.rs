@@ -1,0 +1,7 @@
+//! The programs: arguments, progress, messages and exit codes. No algorithm lives here.
+
+pub mod deltag;
+pub mod interrupt;
+pub mod output;
+pub mod progress;
+pub mod run;

@@ -1,0 +1,44 @@
+//! From a command's result to an exit code and one line on standard error.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+/// Exit code for bad input of every kind.
+pub const BAD_INPUT: u8 = 2;
+/// Exit code when what was checked does not hold, or some of many inputs failed.
+pub const FAILED: u8 = 1;
+
+/// Parses the arguments and runs a program; errors become one line on standard error.
+pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> ExitCode {
+    let result = match A::try_parse() {
+        Ok(arguments) => program(arguments),
+        Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error))),
+        Err(help_or_version) => {
+            // Nothing is left to say when the reader of the help text has gone away.
+            let _ = help_or_version.print();
+            return ExitCode::SUCCESS;
+        }
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {}", format!("{error:#}").replace('\n', " "));
+        ExitCode::from(BAD_INPUT)
+    })
+}
+
+/// The first paragraph of a message of clap, and its tip, on one line.
+fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let mut paragraphs = text
+        .split("\n\n")
+        .map(|paragraph| paragraph.split_whitespace().collect::<Vec<_>>().join(" "));
+    let first = paragraphs.next().unwrap_or_default();
+    let first = first.trim_start_matches("error: ").to_owned();
+    if first.starts_with("Usage") || !text.starts_with("error") {
+        return "a command is missing; --help lists them".to_owned();
+    }
+    match paragraphs.find(|paragraph| paragraph.starts_with("tip: ")) {
+        Some(tip) => format!("{first} ({})", tip.trim_start_matches("tip: ")),
+        None => format!("{first} (--help tells more)"),
+    }
+}

@@ -1,0 +1,39 @@
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::FamilyError;
+
+/// How far a long search has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Units of work done.
+    pub done: u64,
+    /// Units of work in all.
+    pub total: u64,
+    /// Codes found so far.
+    pub codes: usize,
+}
+
+/// What lets a long search be watched and stopped; the library itself prints nothing.
+#[derive(Clone, Copy, Default)]
+pub struct Control<'a> {
+    /// Stops the search soon after it becomes true.
+    pub cancel: Option<&'a AtomicBool>,
+    /// Called now and then, from one thread at a time.
+    pub report: Option<&'a (dyn Fn(Progress) + Sync)>,
+}
+
+impl Control<'_> {
+    pub(super) fn is_cancelled(&self) -> bool {
+        self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+
+    pub(super) fn check(&self) -> Result<(), FamilyError> {
+        if self.is_cancelled() { Err(FamilyError::Cancelled) } else { Ok(()) }
+    }
+
+    pub(super) fn report(&self, done: u64, total: u64, codes: usize) {
+        if let Some(report) = self.report {
+            report(Progress { done, total, codes });
+        }
+    }
+}

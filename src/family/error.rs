@@ -1,0 +1,61 @@
+use std::path::PathBuf;
+
+/// What is wrong with a family, its file or its name.
+#[derive(Debug, thiserror::Error)]
+pub enum FamilyError {
+    /// No shipped family and no file of this name.
+    #[error(
+        "no family is called `{name}`: give one of {}, or the path of a .json family file",
+        super::shipped_names().join(", ")
+    )]
+    Unknown {
+        /// The name asked for.
+        name: String,
+    },
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// Something is wrong inside a file.
+    #[error("{}: {error}", path.display())]
+    In {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        error: Box<FamilyError>,
+    },
+    /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
+    #[error("not a family file: {0}; generate it anew with `deltag gen-family`")]
+    Json(#[from] serde_json::Error),
+    /// Another schema, or another version of it.
+    #[error(
+        "field `schema` is `{found}`, this version reads `{}`: generate the file anew with \
+         `deltag gen-family`",
+        super::SCHEMA
+    )]
+    Schema {
+        /// The schema that the file names.
+        found: String,
+    },
+    /// A field holds what it must not.
+    #[error("field `{field}`: {problem}")]
+    Field {
+        /// The field.
+        field: String,
+        /// What is wrong and what to do.
+        problem: String,
+    },
+    /// The search was stopped from outside.
+    #[error("interrupted; nothing was written")]
+    Cancelled,
+}
+
+impl FamilyError {
+    pub(super) fn field(field: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::Field { field: field.into(), problem: problem.into() }
+    }
+}

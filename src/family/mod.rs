@@ -1,0 +1,187 @@
+//! DelTag code families: what a family is, how one is searched, checked, stored and decoded.
+//!
+//! A *family* of bits b and distance h is a list of b-bit codes such that any two of the words a
+//! camera may read off the tags, the codes and their turns by 120° and 240°, differ in at least h
+//! cells. So up to ⌊(h−1)/2⌋ cells may be misread and the tag, and how it is turned, is still known.
+//!
+//! ```
+//! use deltille::family::{Decoder, Family};
+//!
+//! let family = Family::resolve("delTag25h7")?;
+//! let decoder = Decoder::new(&family);
+//! let read = family.code(12).unwrap() ^ 0b1000_0010_0000_0001; // three cells misread
+//! let decoded = decoder.decode(read, 3).unwrap();
+//! assert_eq!((decoded.id, decoded.turns, decoded.errors), (12, 0, 3));
+//! # Ok::<(), deltille::family::FamilyError>(())
+//! ```
+//!
+//! Limits: codes have 9, 16, 25, 36 or 49 bits ([`crate::lattice::Dimension`]). Loading a family
+//! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
+//! costs the square of their number.
+
+mod certificate;
+mod control;
+mod decoder;
+mod error;
+mod file;
+pub mod lexicode;
+mod rules;
+mod shipped;
+mod statistics;
+mod tagwords;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+pub use certificate::{Certificate, certify};
+pub use control::{Control, Progress};
+pub use decoder::{Decoded, Decoder};
+pub use error::FamilyError;
+pub use file::{Construction, SCHEMA};
+pub use rules::{Rules, Screen};
+pub use shipped::shipped_names;
+pub use statistics::{distance_histogram, false_positive_rates};
+pub use tagwords::TagWords;
+
+use crate::lattice::Dimension;
+
+/// A DelTag family: its codes, and how they came about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Family {
+    name: String,
+    dimension: Dimension,
+    distance: u32,
+    codes: Vec<u64>,
+    rules: Rules,
+    construction: Construction,
+    histogram: BTreeMap<u32, u64>,
+    fingerprint: String,
+}
+
+impl Family {
+    /// A family of `codes`, in the order of their ids.
+    ///
+    /// Checks the form (name, code width, no code twice in any turn) but not the distance, which
+    /// [`certify`] proves. The distance histogram is counted here.
+    pub fn new(
+        name: &str,
+        dimension: Dimension,
+        distance: u32,
+        codes: Vec<u64>,
+        rules: Rules,
+        construction: Construction,
+    ) -> Result<Self, FamilyError> {
+        file::check_form(name, dimension, distance, &codes, &rules)?;
+        let histogram = distance_histogram(dimension, &codes);
+        let fingerprint = file::fingerprint(dimension, distance, &codes);
+        let name = name.to_owned();
+        Ok(Self { name, dimension, distance, codes, rules, construction, histogram, fingerprint })
+    }
+
+    /// A shipped family by its name, or a family file by its path.
+    pub fn resolve(name_or_path: &str) -> Result<Self, FamilyError> {
+        if let Some(json) = shipped::json(name_or_path) {
+            return Self::from_json(json);
+        }
+        let path = Path::new(name_or_path);
+        if path.extension().is_some_and(|e| e == "json") || path.exists() {
+            return Self::read(path);
+        }
+        Err(FamilyError::Unknown { name: name_or_path.to_owned() })
+    }
+
+    /// Reads a family file.
+    pub fn read(path: &Path) -> Result<Self, FamilyError> {
+        let json = std::fs::read_to_string(path)
+            .map_err(|source| FamilyError::Read { path: path.to_owned(), source })?;
+        Self::from_json(&json)
+            .map_err(|error| FamilyError::In { path: path.to_owned(), error: Box::new(error) })
+    }
+
+    /// Reads the text of a family file (FORMATS §9, schema [`SCHEMA`]).
+    pub fn from_json(json: &str) -> Result<Self, FamilyError> {
+        file::from_json(json)
+    }
+
+    /// The text of the family file.
+    pub fn to_json(&self) -> String {
+        file::to_json(self)
+    }
+
+    /// The name, usable as the stem of a file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The dimension of its tags.
+    pub fn dimension(&self) -> Dimension {
+        self.dimension
+    }
+
+    /// The claimed minimum distance h between any two words read off different tags or turns.
+    pub fn distance(&self) -> u32 {
+        self.distance
+    }
+
+    /// The number of misread cells that never hide which tag was read, ⌊(h−1)/2⌋.
+    pub fn correctable(&self) -> u32 {
+        (self.distance - 1) / 2
+    }
+
+    /// The codes; an id is a position in this list.
+    pub fn codes(&self) -> &[u64] {
+        &self.codes
+    }
+
+    /// The code of a tag.
+    pub fn code(&self, id: u32) -> Option<u64> {
+        self.codes.get(id as usize).copied()
+    }
+
+    /// Number of codes.
+    pub fn len(&self) -> usize {
+        self.codes.len()
+    }
+
+    /// Whether there is no code; never so for a family that was checked.
+    pub fn is_empty(&self) -> bool {
+        self.codes.is_empty()
+    }
+
+    /// What every single code satisfies.
+    pub fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    /// How the codes were found, in enough detail to find them again.
+    pub fn construction(&self) -> &Construction {
+        &self.construction
+    }
+
+    /// Number of unordered pairs, among the codes and their turns, at each distance.
+    pub fn histogram(&self) -> &BTreeMap<u32, u64> {
+        &self.histogram
+    }
+
+    /// Probability that a word of fair coin tosses is taken for a tag, for 0, 1, …,
+    /// [`Self::correctable`] corrected bits.
+    pub fn false_positive_rates(&self) -> Vec<f64> {
+        false_positive_rates(self.dimension, self.distance, self.codes.len())
+    }
+
+    /// 16 hexadecimal digits that stand for bits, distance and codes: the first half of the first
+    /// half of the SHA-256 of the text
+    ///
+    /// ```text
+    /// deltille/family
+    /// bits 25
+    /// distance 7
+    /// 0x08f50a7
+    /// …
+    /// ```
+    ///
+    /// one code a line in id order, lower case, ⌈b/4⌉ digits, every line ended by a line feed.
+    pub fn fingerprint(&self) -> &str {
+        &self.fingerprint
+    }
+}

@@ -1,0 +1,54 @@
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::TagWords;
+use crate::lattice::Dimension;
+
+/// Number of unordered pairs of different words, among the codes and their turns, at each distance.
+///
+/// Turning both words of a pair changes nothing, so pairs come in threes and the count is
+/// 3·(pairs of two codes in any turn) + 3·(a code and its own turn).
+pub fn distance_histogram(dimension: Dimension, codes: &[u64]) -> BTreeMap<u32, u64> {
+    let words = TagWords::new(dimension);
+    let turned: Vec<[u64; 3]> = codes.iter().map(|&code| words.turns(code)).collect();
+    let counts = turned
+        .par_iter()
+        .enumerate()
+        .map(|(i, &[code, once, _])| {
+            let mut counts = [0u64; 65];
+            counts[(code ^ once).count_ones() as usize] += 1;
+            for other in turned[..i].as_flattened() {
+                counts[(code ^ other).count_ones() as usize] += 1;
+            }
+            counts
+        })
+        .reduce(
+            || [0; 65],
+            |mut sum, counts| {
+                sum.iter_mut().zip(counts).for_each(|(s, c)| *s += c);
+                sum
+            },
+        );
+    (0..).zip(counts).filter(|&(_, n)| n > 0).map(|(d, n)| (d, 3 * n)).collect()
+}
+
+/// Probability that a random word is within t cells of a code or one of its turns, for
+/// t = 0 … ⌊(h−1)/2⌋: 3·N·Σ_{i≤t} C(b,i) / 2^b, exact because these balls do not overlap.
+pub fn false_positive_rates(dimension: Dimension, distance: u32, codes: usize) -> Vec<f64> {
+    let b = dimension.bits();
+    let correctable = distance.saturating_sub(1) / 2;
+    let words = 3.0 * codes as f64 / 2f64.powi(b as i32);
+    (0..=correctable).map(|t| words * ball(b, t)).collect()
+}
+
+/// Number of words within `radius` of a word, Σ_{i≤radius} C(b,i).
+pub(super) fn ball(bits: u32, radius: u32) -> f64 {
+    let mut binomial = 1.0;
+    let mut sum = 1.0;
+    for i in 0..radius {
+        binomial = binomial * f64::from(bits - i) / f64::from(i + 1);
+        sum += binomial;
+    }
+    sum
+}

@@ -1,0 +1,129 @@
+//! Every shipped family: what it claims holds, and it decodes what was misread.
+
+use deltille::family::{Control, Decoder, Family, TagWords, certify, lexicode, shipped_names};
+use proptest::prelude::*;
+
+fn shipped() -> Vec<Family> {
+    shipped_names().into_iter().map(|name| Family::resolve(name).unwrap()).collect()
+}
+
+#[test]
+fn every_claim_of_every_shipped_family_holds() {
+    for family in shipped() {
+        let certificate = certify(&family);
+        assert_eq!(certificate.failures, [""; 0], "{}", family.name());
+    }
+}
+
+#[test]
+fn files_read_back_as_written() {
+    for family in shipped() {
+        assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
+    }
+}
+
+/// The published tables where they are at hand; fingerprints of them in any case.
+#[test]
+fn published_families_are_the_published_ones() {
+    let tables = std::env::var("DELTILLE_DATA").unwrap_or_else(|_| "../shared/data".into());
+    for (name, file, size, fingerprint) in [
+        ("delTag16h5", "d16h5.txt", 34, "d250fdd5130d8e60"),
+        ("delTag25h7", "d25h7.txt", 343, "bc9573cc255c8668"),
+        ("delTag25h9", "d25h9.txt", 47, "c671f2882edb930c"),
+        ("delTag36h9", "d36h9.txt", 6659, "23cf18bf544c2252"),
+        ("delTag36h11", "d36h11.txt", 753, "0d6eda16b2685b64"),
+    ] {
+        let family = Family::resolve(name).unwrap();
+        assert_eq!((family.len(), family.fingerprint()), (size, fingerprint), "{name}");
+        let path = format!("{tables}/reference-families/{file}");
+        match std::fs::read_to_string(&path) {
+            Ok(table) => {
+                let words = TagWords::new(family.dimension());
+                let codes: Vec<String> = family.codes().iter().map(|&c| words.hex(c)).collect();
+                assert_eq!(table.split_whitespace().collect::<Vec<_>>(), codes, "{name}");
+            }
+            Err(_) => println!("skipped: {path} is not there (set DELTILLE_DATA)"),
+        }
+    }
+}
+
+#[test]
+fn lexicodes_of_up_to_25_bits_are_the_published_ones() {
+    for name in ["delTag16h5", "delTag25h7", "delTag25h9"] {
+        let published = Family::resolve(name).unwrap();
+        let search = lexicode::Lexicode::published(published.dimension(), published.distance());
+        assert_eq!(search.family(name, Control::default()).unwrap(), published);
+    }
+}
+
+#[test]
+fn the_first_candidates_of_the_36_bit_lexicodes_give_the_published_prefix() {
+    for name in ["delTag36h9", "delTag36h11"] {
+        let published = Family::resolve(name).unwrap();
+        let mut search = lexicode::Lexicode::published(published.dimension(), published.distance());
+        search.candidates = 200_000;
+        let codes = search.codes(Control::default()).unwrap();
+        assert!(codes.len() > 100);
+        assert_eq!(codes, published.codes()[..codes.len()]);
+    }
+}
+
+/// The number of threads may change the time a search takes, and nothing else.
+#[test]
+fn lexicodes_do_not_depend_on_threads() {
+    let published = Family::resolve("delTag36h11").unwrap();
+    let mut search = lexicode::Lexicode::published(published.dimension(), 11);
+    search.candidates = 50_000;
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| search.codes(Control::default()).unwrap())
+    };
+    assert_eq!(with(1), with(3));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn up_to_t_errors_are_corrected(
+        pick: prop::sample::Index, id: prop::sample::Index, turns in 0..3u8,
+        flips in prop::collection::btree_set(0..49u32, 0..6),
+    ) {
+        // Decoders are built once; all shipped families take their turn.
+        static DECODERS: std::sync::OnceLock<Vec<(Family, Decoder)>> = std::sync::OnceLock::new();
+        let decoders = DECODERS.get_or_init(|| {
+            shipped().into_iter().map(|f| { let d = Decoder::new(&f); (f, d) }).collect()
+        });
+        let (family, decoder) = &decoders[pick.index(decoders.len())];
+        let id = id.index(family.len());
+        let words = TagWords::new(family.dimension());
+        let flips: Vec<u32> = flips.into_iter()
+            .filter(|&bit| bit < family.dimension().bits())
+            .take(family.correctable() as usize)
+            .collect();
+        let read = flips.iter()
+            .fold(words.turns(family.codes()[id])[turns as usize], |word, bit| word ^ 1 << bit);
+        let errors = flips.len() as u32;
+        let decoded = decoder.decode(read, family.correctable()).unwrap();
+        prop_assert_eq!((decoded.id as usize, decoded.turns, decoded.errors), (id, turns, errors));
+        prop_assert_eq!(decoder.decode(read, errors), Some(decoded));
+        if errors > 0 {
+            prop_assert_eq!(decoder.decode(read, errors - 1), None);
+        }
+        // The slower search beyond ⌊(h−1)/2⌋ sees the same.
+        let beyond = decoder.decode(read, family.correctable() + 1).unwrap();
+        prop_assert_eq!((beyond.id, beyond.turns, beyond.errors), (decoded.id, turns, errors));
+    }
+
+    #[test]
+    fn a_word_read_at_random_decodes_to_its_nearest_code_or_not_at_all(word: u64) {
+        for family in [&shipped()[1]] {
+            let word = word & family.dimension().mask();
+            let words = TagWords::new(family.dimension());
+            let nearest = family.codes().iter().map(|&c| words.distance(word, c)).min().unwrap();
+            let decoded = Decoder::new(family).decode(word, family.correctable());
+            prop_assert_eq!(decoded.map(|d| d.errors),
+                (nearest <= family.correctable()).then_some(nearest));
+        }
+    }
+}
