@@ -26,6 +26,7 @@
 pub mod cli;
 pub mod detect;
 pub mod family;
+mod json;
 pub mod lattice;
 pub mod raster;
 pub mod target;
