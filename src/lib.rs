@@ -31,6 +31,7 @@ pub mod cli;
 pub mod detect;
 pub mod export;
 pub mod family;
+mod json;
 pub mod lattice;
 pub mod raster;
 pub mod synth;

@@ -7,15 +7,28 @@
 //! Frames: a *panel* frame has its origin on the panel's lattice vertex (0,0), x along the rows, y
 //! up on the print, z towards the viewer; `target = rotation · panel + translation`.
 
+mod board;
+mod build;
+mod error;
+pub(crate) mod json;
+mod layout;
+mod length;
 mod panel;
+mod paper;
 mod spec;
 
 use serde::{Deserialize, Serialize};
 
-pub use spec::{BoardSpec, TagSpec, TargetSpec};
+pub use board::zigzag_vertices;
+pub use build::largest_edge_mm;
+pub use error::TargetError;
+pub use json::{SCHEMA, TargetFileError};
+pub use length::{LengthError, parse_length_mm};
+pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec};
+pub use spec::{BoardSpec, ListedSpec, TagSpec, TargetSpec};
 
 /// A target: its panels, and the sheets they are printed on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// Name; the stem of the files made from it.
     pub name: String,
@@ -31,6 +44,7 @@ pub struct Target {
 
 /// Names a family so that a changed code table cannot go unnoticed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FamilyRef {
     /// The family's name, such as `delTag25h7`.
     pub name: String,
@@ -62,6 +76,7 @@ pub enum GridKind {
 
 /// A planar piece of a target.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Panel {
     /// Board id, unique within the target.
     pub id: u32,
@@ -89,6 +104,7 @@ pub struct Panel {
 
 /// `target = rotation · panel + translation`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PanelPose {
     /// Rotation matrix, row-major.
     pub rotation: [f64; 9],
@@ -96,8 +112,24 @@ pub struct PanelPose {
     pub translation_mm: [f64; 3],
 }
 
+impl PanelPose {
+    /// The panel frame is the target frame.
+    pub const IDENTITY: PanelPose = PanelPose {
+        rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        translation_mm: [0.0; 3],
+    };
+
+    /// The target position of a point of the panel's plane, mm.
+    pub fn target_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        [0, 1, 2].map(|i| {
+            self.rotation[3 * i] * x + self.rotation[3 * i + 1] * y + self.translation_mm[i]
+        })
+    }
+}
+
 /// A vertex of a panel where all tiles meet (six of a deltille, four of a checkerboard).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Corner {
     /// Unique within the target.
     pub id: u32,
@@ -113,6 +145,7 @@ pub struct Corner {
 
 /// A tag in the upright tile whose lower-left vertex is (row, col).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct TagPlacement {
     /// Index of the code in the family.
     pub id: u32,
@@ -126,6 +159,7 @@ pub struct TagPlacement {
 ///
 /// The page frame has its origin at the lower-left corner of the page, x right, y up, mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SheetLayout {
     /// Page width, mm.
     pub width_mm: f64,
@@ -141,6 +175,7 @@ pub struct SheetLayout {
 
 /// `page = turn(angle) · panel + origin`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Placement {
     /// Which panel.
     pub panel: u32,
@@ -152,6 +187,7 @@ pub struct Placement {
 
 /// A check bar: the distance between the outer edges of its two end strokes is its length.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CheckBar {
     /// One end on the page, mm.
     pub from_mm: [f64; 2],
@@ -159,18 +195,16 @@ pub struct CheckBar {
     pub to_mm: [f64; 2],
 }
 
-/// The corners of a zigzag board of `rows × cols` corners: odd rows lie half an edge to the right
-/// of even ones, and the smallest column is 0.
-pub fn zigzag_vertices(rows: u32, cols: u32) -> impl Iterator<Item = crate::lattice::Vertex> {
-    let (rows, cols) = (rows as i32, cols as i32);
-    (0..rows).flat_map(move |row| {
-        let first = (rows - 1) / 2 - row / 2;
-        (first..first + cols).map(move |col| crate::lattice::Vertex::new(row, col))
-    })
+impl CheckBar {
+    /// The length that it states and has, mm.
+    pub fn length_mm(&self) -> f64 {
+        (self.to_mm[0] - self.from_mm[0]).hypot(self.to_mm[1] - self.from_mm[1])
+    }
 }
 
 /// One line of text on a page, set in the built-in font.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SheetText {
     /// The words: ASCII and `° ± · × – −`.
     pub text: String,

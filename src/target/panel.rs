@@ -1,6 +1,6 @@
 use std::collections::BTreeSet;
 
-use super::{Outline, Panel};
+use super::{Corner, GridKind, Outline, Panel};
 use crate::lattice::{ROW_HEIGHT, Tile, Vertex};
 
 /// White left around the tiles of a panel, in edges. All six tiles of every corner lie inside the
@@ -13,6 +13,21 @@ const QUIET_EDGES: f64 = 0.25;
 const QUIET_MIN_MM: f64 = 5.0;
 
 impl Panel {
+    /// The corner at a vertex.
+    pub fn corner_at(&self, vertex: Vertex) -> Option<&Corner> {
+        let found = self.corners.binary_search_by_key(&vertex, |c| Vertex::new(c.row, c.col));
+        found.ok().map(|index| &self.corners[index])
+    }
+
+    /// Where a vertex of the panel's lattice lies in the panel frame, mm.
+    pub fn lattice_mm(&self, vertex: Vertex) -> [f64; 2] {
+        let place = match self.kind {
+            GridKind::Deltille => vertex.position(),
+            GridKind::Checker => [f64::from(vertex.col), f64::from(vertex.row)],
+        };
+        place.map(|v| v * self.edge_mm)
+    }
+
     /// The upright tiles that are drawn, ordered by row, then column: black ones on white, or, on
     /// an inverted panel, white ones on black.
     pub fn upright_tiles(&self) -> Vec<Tile> {
@@ -45,7 +60,7 @@ impl Panel {
     /// Width of the quiet zone around [`Self::bounds_mm`], mm. Nothing else is printed in it; on
     /// an inverted panel it is black.
     pub fn quiet_zone_mm(&self) -> f64 {
-        quiet_zone_mm(self.edge_mm)
+        Self::quiet_zone_at_mm(self.edge_mm)
     }
 
     /// The bounding box with its quiet zone, mm: on an inverted panel, the black field.
@@ -54,9 +69,16 @@ impl Panel {
         let [left, lower, right, upper] = self.bounds_mm();
         [left - quiet, lower - quiet, right + quiet, upper + quiet]
     }
-}
 
-/// Width of the quiet zone around tiles of a given edge, mm.
-fn quiet_zone_mm(edge_mm: f64) -> f64 {
-    (QUIET_EDGES * edge_mm).max(QUIET_MIN_MM)
+    /// Width of the quiet zone around tiles of a given edge, mm.
+    pub(super) fn quiet_zone_at_mm(edge_mm: f64) -> f64 {
+        (QUIET_EDGES * edge_mm).max(QUIET_MIN_MM)
+    }
+
+    /// Width and height of the drawn tiles of a zigzag board, mm; what [`Self::bounds_mm`] finds
+    /// without a panel at hand.
+    pub(super) fn zigzag_size_mm(rows: u32, cols: u32, edge_mm: f64) -> [f64; 2] {
+        let (rows, cols) = (f64::from(rows), f64::from(cols));
+        [(cols + 1.5) * edge_mm, (rows + 1.0) * ROW_HEIGHT * edge_mm]
+    }
 }

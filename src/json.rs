@@ -1,0 +1,131 @@
+//! JSON text that people can read: one record per line.
+
+use std::io;
+
+use serde::Serialize;
+use serde_json::ser::{CompactFormatter, Formatter, PrettyFormatter};
+
+/// Serialises plain data, indented down to `depth` levels; what lies deeper stays on one line.
+pub(crate) fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
+    let mut text = Vec::new();
+    let layout = Layout { pretty: PrettyFormatter::new(), depth, level: 0 };
+    let mut serializer = serde_json::Serializer::with_formatter(&mut text, layout);
+    value.serialize(&mut serializer).expect("plain data has a JSON form");
+    text.push(b'\n');
+    String::from_utf8(text).expect("JSON is UTF-8")
+}
+
+/// The pretty layout above `depth`, the compact one below.
+struct Layout {
+    pretty: PrettyFormatter<'static>,
+    depth: usize,
+    /// Number of arrays and objects around the current position.
+    level: usize,
+}
+
+impl Layout {
+    fn open(&mut self) -> bool {
+        self.level += 1;
+        self.level <= self.depth
+    }
+
+    fn close(&mut self) -> bool {
+        self.level -= 1;
+        self.level < self.depth
+    }
+
+    fn indents(&self) -> bool {
+        self.level <= self.depth
+    }
+}
+
+/// A separator inside a line is followed by a space.
+fn comma<W: ?Sized + io::Write>(writer: &mut W, first: bool) -> io::Result<()> {
+    if first { Ok(()) } else { writer.write_all(b", ") }
+}
+
+impl Formatter for Layout {
+    fn begin_array<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.open() {
+            self.pretty.begin_array(writer)
+        } else {
+            CompactFormatter.begin_array(writer)
+        }
+    }
+
+    fn end_array<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.close() {
+            self.pretty.end_array(writer)
+        } else {
+            CompactFormatter.end_array(writer)
+        }
+    }
+
+    fn begin_array_value<W: ?Sized + io::Write>(
+        &mut self,
+        writer: &mut W,
+        first: bool,
+    ) -> io::Result<()> {
+        if self.indents() {
+            self.pretty.begin_array_value(writer, first)
+        } else {
+            comma(writer, first)
+        }
+    }
+
+    fn end_array_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.indents() { self.pretty.end_array_value(writer) } else { Ok(()) }
+    }
+
+    fn begin_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.open() {
+            self.pretty.begin_object(writer)
+        } else {
+            CompactFormatter.begin_object(writer)
+        }
+    }
+
+    fn end_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.close() {
+            self.pretty.end_object(writer)
+        } else {
+            CompactFormatter.end_object(writer)
+        }
+    }
+
+    fn begin_object_key<W: ?Sized + io::Write>(
+        &mut self,
+        writer: &mut W,
+        first: bool,
+    ) -> io::Result<()> {
+        if self.indents() {
+            self.pretty.begin_object_key(writer, first)
+        } else {
+            comma(writer, first)
+        }
+    }
+
+    fn begin_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        writer.write_all(b": ")
+    }
+
+    fn end_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.indents() { self.pretty.end_object_value(writer) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deep_records_stay_on_their_line() {
+        let value = serde_json::json!({"a": [{"x": 1, "y": [2, 3]}, {}], "b": []});
+        let text = to_text(&value, 2);
+        assert_eq!(
+            text,
+            "{\n  \"a\": [\n    {\"x\": 1, \"y\": [2, 3]},\n    {}\n  ],\n  \"b\": []\n}\n"
+        );
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&text).unwrap(), value);
+    }
+}

@@ -1,0 +1,92 @@
+use super::layout::{arrange, label};
+use super::paper::PaperSpec;
+use super::{BoardSpec, Panel, Target, TargetError, TargetSpec, board};
+use crate::family::Family;
+
+/// Longest name, characters: it is part of the label and of file names.
+const LONGEST_NAME: usize = 64;
+
+impl Target {
+    /// Makes what `spec` asks for, laid out on `layout`; without a layout there are no sheets.
+    ///
+    /// `family` holds the codes of the tags; an untagged target needs none.
+    pub fn build(
+        name: &str,
+        spec: &TargetSpec,
+        family: Option<&Family>,
+        layout: Option<&PaperSpec>,
+    ) -> Result<Target, TargetError> {
+        check_name(name)?;
+        let TargetSpec::Board(board) = spec else {
+            let problem = "a listed target is read from its list, it cannot be made anew";
+            return Err(TargetError::invalid("kind", problem));
+        };
+        board.check()?;
+        let arrangement = layout.map(|paper| arrange(board, paper)).transpose()?;
+        let (panels, family) = board::panels(board, family)?;
+        let sheet = |panel: &Panel| {
+            let words = label(name, board, panel, family.as_ref());
+            Some(arrangement.as_ref()?.sheet(panel, words))
+        };
+        let sheets = panels.iter().filter_map(sheet).collect();
+        let (name, spec) = (name.to_owned(), spec.clone());
+        Ok(Target { name, spec, family, panels, sheets })
+    }
+
+    /// Checks that this target can be used together with another one: no tag of the same family
+    /// and no board has the same id.
+    pub fn check_beside(&self, other: &Target) -> Result<(), TargetError> {
+        let overlap = |option, what: &str, own: &[u32], others: &[u32]| {
+            let (Some([first, last]), Some([low, high])) = (range(own), range(others)) else {
+                return Ok(());
+            };
+            if !own.iter().any(|id| others.contains(id)) {
+                return Ok(());
+            }
+            Err(TargetError::Overlap {
+                option,
+                what: format!("{what} {first} to {last} and {low} to {high}"),
+                name: self.name.clone(),
+                other: other.name.clone(),
+                free: u64::from(high) + 1,
+            })
+        };
+        let tags = |target: &Target| -> Vec<u32> {
+            target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
+        };
+        let boards = |target: &Target| target.panels.iter().map(|p| p.id).collect::<Vec<_>>();
+        if self.family.is_some() && self.family == other.family {
+            overlap("--first-id", "tags", &tags(self), &tags(other))?;
+        }
+        overlap("--board-id", "boards", &boards(self), &boards(other))
+    }
+}
+
+/// Lowest and highest of some ids.
+fn range(ids: &[u32]) -> Option<[u32; 2]> {
+    Some([*ids.iter().min()?, *ids.iter().max()?])
+}
+
+/// The largest edge in whole millimetres with which a board fits on paper, if one of 5 mm does.
+pub fn largest_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> Option<f64> {
+    // Twice the longest side of any sheet is no edge that fits: the error proposes one that does.
+    let probe = BoardSpec { edge_mm: 1000.0, ..spec.clone() };
+    match arrange(&probe, paper) {
+        Ok(_) => Some(probe.edge_mm),
+        Err(TargetError::DoesNotFit { fitting_edge_mm, .. }) => fitting_edge_mm.map(f64::from),
+        Err(_) => None,
+    }
+}
+
+/// A name is part of the label, which is set in a font of few characters, and the stem of files.
+fn check_name(name: &str) -> Result<(), TargetError> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    let problem = if name.is_empty() || name.len() > LONGEST_NAME {
+        format!("`{name}` must have 1 to {LONGEST_NAME} characters")
+    } else if !name.chars().all(plain) || name.starts_with('.') {
+        format!("`{name}` may hold only letters, digits, -, _ and ., and not start with .")
+    } else {
+        return Ok(());
+    };
+    Err(TargetError::invalid("--name", problem))
+}

@@ -1,0 +1,81 @@
+/// Why a target cannot be made. Messages name the option of `deltille` to change; a template has
+/// the same names without the dashes.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TargetError {
+    /// A value that is no use by itself.
+    #[error("{option}: {problem}")]
+    Invalid {
+        /// The option.
+        option: &'static str,
+        /// What is wrong and what would do.
+        problem: String,
+    },
+    /// Tags are asked for and no family was given, or another one.
+    #[error("--family: the target carries tags of {wanted}, {given}")]
+    Family {
+        /// The family asked for.
+        wanted: String,
+        /// What was given instead.
+        given: String,
+    },
+    /// More tags than codes.
+    #[error(
+        "--first-id: tags {first} to {last} are needed, but family {family} ends at {end}: \
+         {}raise --tag-spacing, make fewer or smaller --boards, or take a larger --family",
+        match highest_first { Some(id) => format!("lower it to at most {id}, "), None => String::new() }
+    )]
+    IdsRunOut {
+        /// First id needed.
+        first: u32,
+        /// Last id needed.
+        last: u64,
+        /// Name of the family.
+        family: String,
+        /// Last id that the family has.
+        end: u64,
+        /// Highest first id that would do, if any does.
+        highest_first: Option<u64>,
+    },
+    /// Targets to be used together share ids.
+    #[error("{option}: {what} of `{name}` and of `{other}` overlap: start at {free}")]
+    Overlap {
+        /// The option to change.
+        option: &'static str,
+        /// Which ids, such as `tags 0 to 8`.
+        what: String,
+        /// One target.
+        name: String,
+        /// The other target.
+        other: String,
+        /// Lowest id above those of the other target.
+        free: u64,
+    },
+    /// The board is too large for the paper.
+    #[error(
+        "--paper: {rows} × {cols} corners with {edge} edges and what is printed around them do \
+         not fit {paper}: take larger paper, fewer --rows or --cols, or {}",
+        match fitting_edge_mm {
+            Some(mm) => format!("an --edge of at most {mm} mm"),
+            None => "a smaller --margin".to_owned(),
+        }
+    )]
+    DoesNotFit {
+        /// Rows of corners.
+        rows: u32,
+        /// Corners in each row.
+        cols: u32,
+        /// The edge, such as `20 mm`.
+        edge: String,
+        /// The paper, such as `A4`.
+        paper: String,
+        /// Largest edge in whole millimetres that fits.
+        fitting_edge_mm: Option<u32>,
+    },
+}
+
+impl TargetError {
+    pub(super) fn invalid(option: &'static str, problem: impl Into<String>) -> Self {
+        Self::Invalid { option, problem: problem.into() }
+    }
+}

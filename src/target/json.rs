@@ -1,0 +1,283 @@
+//! The target file (FORMATS §9): reading with every field checked, and writing.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+use super::{FamilyRef, GridKind, Panel, SheetLayout, Target, TargetSpec};
+use crate::lattice::Vertex;
+
+/// Schema and version that this crate writes and reads.
+pub const SCHEMA: &str = "deltille/target/1";
+
+/// How far a corner may lie from its place in the lattice, and its target position from that of
+/// its panel, in edges. Measured positions differ by far less; another unit or another corner's
+/// position differs by more.
+const SLACK_EDGES: f64 = 0.01;
+
+/// How far the rotation of a pose may be from orthonormal: what six written digits leave.
+const ROTATION_SLACK: f64 = 1e-5;
+
+/// What is wrong with a target file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TargetFileError {
+    /// Not JSON, or cut off.
+    #[error("not a target file: {0}; make it anew with `deltille board`")]
+    Json(serde_json::Error),
+    /// Another schema, or another version of it.
+    #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
+    Schema {
+        /// The schema that the file names.
+        found: String,
+    },
+    /// A field is missing, unknown, or holds what it must not.
+    #[error("field `{field}`: {problem}")]
+    Field {
+        /// The field, such as `panels[0].corners[3].row`.
+        field: String,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TargetFile {
+    schema: String,
+    name: String,
+    spec: TargetSpec,
+    family: Option<FamilyRef>,
+    panels: Vec<Panel>,
+    #[serde(default)]
+    sheets: Vec<SheetLayout>,
+}
+
+impl Target {
+    /// Reads the text of a target file.
+    pub fn from_json(json: &str) -> Result<Target, TargetFileError> {
+        // The schema is looked at first, so that a file of another version is called just that.
+        #[derive(Deserialize)]
+        struct Head {
+            schema: String,
+        }
+        let head: Head = parse(json)?;
+        if head.schema != SCHEMA {
+            return Err(TargetFileError::Schema { found: head.schema });
+        }
+        let TargetFile { schema: _, name, spec, family, panels, sheets } = parse(json)?;
+        let target = Target { name, spec, family, panels, sheets };
+        check(&target).map_err(|(field, problem)| TargetFileError::Field { field, problem })?;
+        Ok(target)
+    }
+
+    /// The text of the target file, a corner a line.
+    pub fn to_json(&self) -> String {
+        let Target { name, spec, family, panels, sheets } = self.clone();
+        let file = TargetFile { schema: SCHEMA.to_owned(), name, spec, family, panels, sheets };
+        crate::json::to_text(&file, 4)
+    }
+}
+
+/// Parses JSON; an error that is not one of JSON's grammar names the field.
+fn parse<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, TargetFileError> {
+    let mut deserializer = serde_json::Deserializer::from_str(json);
+    let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+        let field = error.path().to_string();
+        let inner = error.into_inner();
+        if inner.is_data() && field != "." {
+            TargetFileError::Field { field, problem: inner.to_string() }
+        } else {
+            TargetFileError::Json(inner)
+        }
+    })?;
+    deserializer.end().map_err(TargetFileError::Json)?;
+    Ok(value)
+}
+
+pub(crate) type Problem = (String, String);
+
+fn problem<T>(field: impl Into<String>, problem: impl Into<String>) -> Result<T, Problem> {
+    Err((field.into(), problem.into()))
+}
+
+/// Checks what the types do not say; returns the field at fault and what is wrong with it.
+pub(crate) fn check(target: &Target) -> Result<(), Problem> {
+    if target.panels.is_empty() {
+        return problem("panels", "there is none");
+    }
+    let (mut panels, mut corners, mut tags) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
+    for (p, panel) in target.panels.iter().enumerate() {
+        let field = format!("panels[{p}]");
+        if panels.last().is_some_and(|&last| last >= panel.id) {
+            return problem(format!("{field}.id"), "ids must ascend from panel to panel");
+        }
+        panels.insert(panel.id);
+        check_panel(panel, &field)?;
+        for (i, corner) in panel.corners.iter().enumerate() {
+            if !corners.insert(corner.id) {
+                let what = format!("{} is the id of another corner too", corner.id);
+                return problem(format!("{field}.corners[{i}].id"), what);
+            }
+        }
+        for (i, tag) in panel.tags.iter().enumerate() {
+            if !tags.insert(tag.id) {
+                let what = format!("{} is the id of another tag too", tag.id);
+                return problem(format!("{field}.tags[{i}].id"), what);
+            }
+        }
+        if !panel.tags.is_empty() && target.family.is_none() {
+            return problem("family", "there are tags, so there must be a family");
+        }
+    }
+    for (s, sheet) in target.sheets.iter().enumerate() {
+        let sides = [("width_mm", sheet.width_mm), ("height_mm", sheet.height_mm)];
+        if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm <= 0.0) {
+            return problem(format!("sheets[{s}].{side}"), "it must be positive");
+        }
+        if let Some(placed) = sheet.placements.iter().find(|p| !panels.contains(&p.panel)) {
+            let what = format!("there is no panel {}", placed.panel);
+            return problem(format!("sheets[{s}].placements"), what);
+        }
+    }
+    Ok(())
+}
+
+fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
+    if panel.edge_mm <= 0.0 {
+        return problem(format!("{field}.edge_mm"), "it must be positive");
+    }
+    if panel.border_bits.is_some_and(|bits| bits < 0.0) {
+        return problem(format!("{field}.border_bits"), "it must not be negative");
+    }
+    if panel.border_bits.is_none() && !panel.tags.is_empty() {
+        return problem(format!("{field}.border_bits"), "there are tags, so there must be one");
+    }
+    if panel.corners.is_empty() {
+        return problem(format!("{field}.corners"), "there is none");
+    }
+    check_rotation(&panel.pose.rotation, field)?;
+    let slack = SLACK_EDGES * panel.edge_mm;
+    let mut previous = None;
+    for (i, corner) in panel.corners.iter().enumerate() {
+        let field = |key: &str| format!("{field}.corners[{i}].{key}");
+        let vertex = Vertex::new(corner.row, corner.col);
+        if previous.is_some_and(|previous| previous >= vertex) {
+            return problem(field("row"), "corners must be ordered by row, then column");
+        }
+        previous = Some(vertex);
+        let [cols, rows] = panel.matrix.map(i64::from);
+        let inside = |index: i32, size: i64| (0..size).contains(&i64::from(index));
+        if !inside(corner.row, rows) || !inside(corner.col, cols) {
+            let what = format!("{vertex:?} is outside the matrix of {cols} columns, {rows} rows");
+            return problem(field("row"), what);
+        }
+        if distance(&corner.panel_mm, &panel.lattice_mm(vertex)) > slack {
+            let what = "it is more than 1 % of an edge away from its place in the lattice";
+            return problem(field("panel_mm"), what);
+        }
+        let expected = panel.pose.target_from_panel(corner.panel_mm);
+        if distance(&corner.target_mm, &expected) > slack {
+            let what = "it is more than 1 % of an edge away from rotation · panel + translation";
+            return problem(field("target_mm"), what);
+        }
+    }
+    let mut previous = None;
+    for (i, tag) in panel.tags.iter().enumerate() {
+        let vertex = Vertex::new(tag.row, tag.col);
+        if previous.is_some_and(|previous| previous >= vertex) {
+            let what = "tags must be ordered by row, then column";
+            return problem(format!("{field}.tags[{i}].row"), what);
+        }
+        previous = Some(vertex);
+        let corner = |v: &Vertex| panel.corner_at(*v).is_some();
+        let complete = panel.kind == GridKind::Checker
+            || crate::lattice::Tile::upright(vertex).vertices().iter().all(corner);
+        if !complete {
+            let what = "its tile does not lie between three corners";
+            return problem(format!("{field}.tags[{i}].row"), what);
+        }
+    }
+    Ok(())
+}
+
+fn check_rotation(rotation: &[f64; 9], field: &str) -> Result<(), Problem> {
+    let r = nalgebra::Matrix3::from_row_slice(rotation);
+    let off = (r * r.transpose() - nalgebra::Matrix3::identity()).amax();
+    if off > ROTATION_SLACK || r.determinant() < 0.0 {
+        return problem(format!("{field}.pose.rotation"), "it is not a rotation");
+    }
+    Ok(())
+}
+
+fn distance<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::family::Family;
+    use crate::target::{BoardSpec, PaperSpec, TagSpec};
+
+    fn board(rows: u32, cols: u32, edge_mm: f64, tagged: bool, boards: u32) -> Target {
+        let tags = tagged.then(TagSpec::default);
+        let inverted = rows % 2 == 1;
+        let spec = BoardSpec { rows, cols, edge_mm, boards, board_id: 3, tags, inverted };
+        let family = Family::resolve("delTag25h7").unwrap();
+        let paper = PaperSpec::default();
+        Target::build("board", &TargetSpec::Board(spec), Some(&family), Some(&paper)).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn writing_and_reading_changes_nothing(
+            rows in 2u32..12, cols in 2u32..12, edge_mm in 5.0f64..30.0,
+            tagged: bool, boards in 1u32..3,
+        ) {
+            let target = board(rows, cols, edge_mm, tagged, if tagged { boards } else { 1 });
+            let json = target.to_json();
+            prop_assert_eq!(&Target::from_json(&json).unwrap(), &target);
+        }
+
+        #[test]
+        fn truncated_files_are_refused(cut in 0.0f64..1.0) {
+            let json = board(3, 3, 20.0, true, 1).to_json();
+            let end = (cut * (json.len() - 2) as f64) as usize;
+            if let Some(part) = json.get(..end) {
+                prop_assert!(matches!(Target::from_json(part), Err(TargetFileError::Json(_))));
+            }
+        }
+    }
+
+    /// What is said about a file in which `from` is replaced by `to`.
+    fn complaint(from: &str, to: &str) -> String {
+        let json = board(4, 4, 20.0, true, 1).to_json();
+        assert!(json.contains(from), "{from} is not in {json}");
+        Target::from_json(&json.replacen(from, to, 1)).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_error_names_its_field() {
+        assert!(complaint("target/1", "target/9").contains("`schema` is `deltille/target/9`"));
+        let cases = [
+            (r#""edge_mm": 20.0"#, r#""edge_mm": "wide""#, "spec"),
+            (r#""id": 3"#, r#""id": -3"#, "panels[0].id"),
+            (r#""kind": "deltille""#, r#""kind": "hexagons""#, "panels[0].kind"),
+            (r#""panel_mm": [20.0"#, r#""panel_mm": [21.0"#, "panels[0].corners[0].panel_mm"),
+            (r#""target_mm": [20.0"#, r#""target_mm": [21.0"#, "panels[0].corners[0].target_mm"),
+            (r#""col": 2"#, r#""col": 1"#, "panels[0].corners[1].row"),
+            (r#""id": 1, "row""#, r#""id": 0, "row""#, "panels[0].corners[1].id"),
+            (r#""rotation": [1.0"#, r#""rotation": [0.9"#, "panels[0].pose.rotation"),
+            (r#""width_mm": "#, r#""width_mm": -"#, "sheets[0].width_mm"),
+            (r#""panel": 3"#, r#""panel": 4"#, "sheets[0].placements"),
+            (r#""matrix""#, r#""matrices""#, "panels[0].matrices"),
+        ];
+        for (from, to, field) in cases {
+            let said = complaint(from, to);
+            assert!(said.starts_with(&format!("field `{field}")), "{from}: {said}");
+        }
+    }
+}

@@ -1,0 +1,165 @@
+use std::fmt;
+use std::str::FromStr;
+
+use super::length::{format_mm, parse_length_mm};
+
+/// Sizes with a name: short and long side, mm (ISO 216; ANSI A and B, US legal).
+const NAMED: [(&str, [f64; 2]); 9] = [
+    ("A0", [841.0, 1189.0]),
+    ("A1", [594.0, 841.0]),
+    ("A2", [420.0, 594.0]),
+    ("A3", [297.0, 420.0]),
+    ("A4", [210.0, 297.0]),
+    ("A5", [148.0, 210.0]),
+    ("letter", [215.9, 279.4]),
+    ("legal", [215.9, 355.6]),
+    ("tabloid", [279.4, 431.8]),
+];
+
+/// The longest side of a sheet, mm: PDF page boxes end at 14,400 pt (ISO 32000-1, annex C).
+const LONGEST_MM: f64 = 5080.0;
+
+/// The shortest side, mm: on less than this there is no room for check bars.
+const SHORTEST_MM: f64 = 50.0;
+
+/// Margin unless another is asked for, mm. Office printers leave 3 to 5 mm blank.
+pub const DEFAULT_MARGIN_MM: f64 = 5.0;
+
+/// What to print on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PaperSpec {
+    /// The paper; `None` for the smallest of A4, A3, A2, A1 and A0 that takes the board.
+    pub size: Option<PaperSize>,
+    /// Which way it lies.
+    pub orientation: Orientation,
+    /// Width of the strip along the paper's edges that stays blank, mm.
+    pub margin_mm: f64,
+}
+
+impl Default for PaperSpec {
+    fn default() -> Self {
+        Self { size: None, orientation: Orientation::Auto, margin_mm: DEFAULT_MARGIN_MM }
+    }
+}
+
+/// Which way a sheet lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Orientation {
+    /// The one that takes the board.
+    #[default]
+    Auto,
+    /// Upright.
+    Portrait,
+    /// Lying.
+    Landscape,
+}
+
+/// A paper size: its name, such as `A4` or `297 × 420 mm`, and its sides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PaperSize {
+    name: String,
+    short_mm: f64,
+    long_mm: f64,
+}
+
+/// A text that names no paper.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PaperError {
+    /// Neither a name nor two lengths.
+    #[error(
+        "`{0}` is no paper: give A0 to A5, letter, legal, tabloid, or a size such as 297x420mm"
+    )]
+    Unknown(String),
+    /// A side that is too short or too long.
+    #[error("`{0}` is no paper: its sides must be {SHORTEST_MM} to {LONGEST_MM} mm long")]
+    Side(String),
+}
+
+impl PaperSize {
+    /// The sizes tried, smallest first, when none is asked for.
+    pub fn automatic() -> impl Iterator<Item = PaperSize> {
+        NAMED[..5].iter().rev().map(|&(name, sides)| Self::named(name, sides))
+    }
+
+    fn named(name: &str, [short_mm, long_mm]: [f64; 2]) -> Self {
+        Self { name: name.to_owned(), short_mm, long_mm }
+    }
+
+    /// The name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Width and height of the upright sheet, mm.
+    pub fn portrait_mm(&self) -> [f64; 2] {
+        [self.short_mm, self.long_mm]
+    }
+
+    /// Width and height of the lying sheet, mm.
+    pub fn landscape_mm(&self) -> [f64; 2] {
+        [self.long_mm, self.short_mm]
+    }
+}
+
+impl fmt::Display for PaperSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+impl FromStr for PaperSize {
+    type Err = PaperError;
+
+    /// A name in any case, or two lengths such as `297x420mm`, `11 × 17 in` or `30cmx40cm`.
+    fn from_str(text: &str) -> Result<Self, PaperError> {
+        let unknown = || PaperError::Unknown(text.to_owned());
+        let trimmed = text.trim();
+        if let Some(&(name, sides)) = NAMED.iter().find(|(n, _)| n.eq_ignore_ascii_case(trimmed)) {
+            return Ok(Self::named(name, sides));
+        }
+        let (first, second) = trimmed.split_once(['x', 'X', '×']).ok_or_else(unknown)?;
+        let (first, second) = (first.trim(), second.trim());
+        // One unit at the end serves both sides.
+        let unit = second.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
+        let shared = first.ends_with(|c: char| c.is_ascii_digit() || c == '.');
+        let first = if shared { format!("{first}{unit}") } else { first.to_owned() };
+        let sides = [parse_length_mm(&first), parse_length_mm(second)];
+        let [Ok(a), Ok(b)] = sides else { return Err(unknown()) };
+        if ![a, b].iter().all(|side| (SHORTEST_MM..=LONGEST_MM).contains(side)) {
+            return Err(PaperError::Side(text.to_owned()));
+        }
+        let name = format!("{} × {}", format_mm(a).trim_end_matches(" mm"), format_mm(b));
+        Ok(Self { name, short_mm: a.min(b), long_mm: a.max(b) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_sizes() {
+        let sides = |text: &str| text.parse::<PaperSize>().unwrap().portrait_mm();
+        assert_eq!(sides("a4"), [210.0, 297.0]);
+        assert_eq!(sides("Letter"), [215.9, 279.4]);
+        for text in ["297x420mm", "420 x 297 mm", "29.7×42cm", "297mmx42cm", "420x297"] {
+            let [short, long] = sides(text);
+            assert!((short - 297.0).abs() < 1e-9 && (long - 420.0).abs() < 1e-9, "{text}");
+        }
+        let custom: PaperSize = "11x17in".parse().unwrap();
+        assert_eq!(custom.name(), "279.4 × 431.8 mm");
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for text in ["", "A6", "x", "10x", "297x420km", "A4x"] {
+            assert!(matches!(text.parse::<PaperSize>(), Err(PaperError::Unknown(_))), "{text}");
+        }
+        for text in ["0x100mm", "-210x297mm", "210x9999mm", "1x1m", "49x100mm"] {
+            let read = text.parse::<PaperSize>();
+            let fine = text == "1x1m";
+            assert_eq!(matches!(read, Err(PaperError::Side(_))), !fine, "{text}");
+        }
+        assert!("NaNxNaN".parse::<PaperSize>().is_err());
+    }
+}
