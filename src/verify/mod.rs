@@ -143,7 +143,7 @@ impl<'a> Verifier<'a> {
     fn verify_page(&self, document: &Document, page: usize, index: usize) -> SheetVerdict {
         let layout = &self.target.sheets[index];
         let tolerance_mm = document.size_tolerance_mm();
-        let page = document.render_fine(page);
+        let mut page = document.render_fine(page);
         let mut verdict = SheetVerdict {
             sheet: index + 1,
             px_per_mm: page.px_per_mm,
@@ -160,6 +160,10 @@ impl<'a> Verifier<'a> {
         let found_mm = verdict.size_mm;
         if (0..2).any(|i| (found_mm[i] - stated_mm[i]).abs() > tolerance_mm) {
             verdict.findings.push(Finding::PageSize { found_mm, stated_mm });
+        } else {
+            // Pictures begin at the upper edge and end with a whole pixel: heights are counted
+            // from the true lower edge, not from the end of the last pixel.
+            page.height_mm = layout.height_mm;
         }
         check_bars(&page, layout, &mut verdict);
         board::check(self, &page, layout, &mut verdict);
