@@ -8,6 +8,7 @@ pub mod csv;
 pub mod detection;
 pub mod dsc;
 pub mod orpc;
+pub mod overlay;
 pub mod pdf;
 pub mod png;
 mod supersample;
