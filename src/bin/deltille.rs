@@ -1,3 +1,9 @@
 //! `deltille`: make, detect and verify deltille targets.
 
-fn main() {}
+use std::process::ExitCode;
+
+use ::deltille::cli::{deltille, run};
+
+fn main() -> ExitCode {
+    run::run(deltille::run)
+}

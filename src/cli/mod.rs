@@ -1,6 +1,7 @@
 //! The programs: arguments, progress, messages and exit codes. No algorithm lives here.
 
 pub mod deltag;
+pub mod deltille;
 pub mod interrupt;
 pub mod output;
 pub mod progress;

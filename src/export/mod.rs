@@ -1,9 +1,14 @@
-//! Artwork and targets to files and back, one module per format.
+//! Artwork, targets and detections to files and back, one module per format.
 //!
-//! Every writer takes shapes in millimetres and only changes units and syntax. Files appear whole
-//! or not at all, see [`atomic`].
+//! Writers of artwork take shapes in millimetres and only change units and syntax; those of
+//! targets and detections make text. Files appear whole or not at all, see [`atomic`].
 
 pub mod atomic;
+pub mod csv;
+pub mod detection;
+pub mod dsc;
+pub mod orpc;
+pub mod overlay;
 pub mod pdf;
 pub mod png;
 mod supersample;

@@ -15,6 +15,7 @@ mod layout;
 mod length;
 mod panel;
 mod paper;
+mod pose;
 mod spec;
 
 use serde::{Deserialize, Serialize};
@@ -25,7 +26,7 @@ pub use error::TargetError;
 pub use json::{SCHEMA, TargetFileError};
 pub use length::{LengthError, parse_length_mm};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec};
-pub use spec::{BoardSpec, ListedSpec, TagSpec, TargetSpec};
+pub use spec::{BoardSpec, ListFormat, ListedSpec, TagSpec, TargetSpec};
 
 /// A target: its panels, and the sheets they are printed on.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +49,8 @@ pub struct Target {
 pub struct FamilyRef {
     /// The family's name, such as `delTag25h7`.
     pub name: String,
-    /// Its fingerprint, see [`crate::family`].
+    /// Its fingerprint, see [`crate::family::Family::fingerprint`]; empty where a file from
+    /// elsewhere names a family whose codes this crate does not have.
     pub fingerprint: String,
 }
 
@@ -110,21 +112,6 @@ pub struct PanelPose {
     pub rotation: [f64; 9],
     /// Translation, mm.
     pub translation_mm: [f64; 3],
-}
-
-impl PanelPose {
-    /// The panel frame is the target frame.
-    pub const IDENTITY: PanelPose = PanelPose {
-        rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        translation_mm: [0.0; 3],
-    };
-
-    /// The target position of a point of the panel's plane, mm.
-    pub fn target_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 3] {
-        [0, 1, 2].map(|i| {
-            self.rotation[3 * i] * x + self.rotation[3 * i + 1] * y + self.translation_mm[i]
-        })
-    }
 }
 
 /// A vertex of a panel where all tiles meet (six of a deltille, four of a checkerboard).

@@ -54,6 +54,19 @@ pub enum Orientation {
     Landscape,
 }
 
+impl FromStr for Orientation {
+    type Err = PaperError;
+
+    fn from_str(text: &str) -> Result<Self, PaperError> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "portrait" => Ok(Self::Portrait),
+            "landscape" => Ok(Self::Landscape),
+            _ => Err(PaperError::Orientation(text.to_owned())),
+        }
+    }
+}
+
 /// A paper size: its name, such as `A4` or `297 × 420 mm`, and its sides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperSize {
@@ -62,7 +75,7 @@ pub struct PaperSize {
     long_mm: f64,
 }
 
-/// A text that names no paper.
+/// A text that names no paper, or no orientation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PaperError {
     /// Neither a name nor two lengths.
@@ -73,6 +86,9 @@ pub enum PaperError {
     /// A side that is too short or too long.
     #[error("`{0}` is no paper: its sides must be {SHORTEST_MM} to {LONGEST_MM} mm long")]
     Side(String),
+    /// None of the three.
+    #[error("`{0}` is none of auto, portrait, landscape")]
+    Orientation(String),
 }
 
 impl PaperSize {

@@ -68,11 +68,21 @@ pub struct TagSpec {
 }
 
 /// Where a listed target comes from.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ListedSpec {
-    /// The format of the list, such as `dsc, fork dialect`.
-    pub format: String,
+    /// The format of the list.
+    pub format: ListFormat,
+}
+
+/// Formats that list a target's corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ListFormat {
+    /// `.dsc` in the dialect of the reference detector (FORMATS §5).
+    DscOriginal,
+    /// `.dsc` in the dialect of its fork.
+    DscFork,
 }
 
 impl Default for TagSpec {

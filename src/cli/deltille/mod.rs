@@ -1,0 +1,34 @@
+//! `deltille`: make, detect and verify deltille targets.
+
+mod board;
+mod detect;
+mod settings;
+mod target_file;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Make, detect and verify deltille targets.
+#[derive(Parser)]
+#[command(name = "deltille", version, arg_required_else_help = false)]
+pub struct Deltille {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Make a board: its description, and what to print
+    Board(Box<board::Args>),
+    /// Find a target, or untagged boards, in photographs
+    Detect(detect::Args),
+}
+
+/// Runs the program.
+pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
+    match deltille.command {
+        Command::Board(args) => board::run(*args),
+        Command::Detect(args) => detect::run(args),
+    }
+}

@@ -1,0 +1,229 @@
+//! What `deltille board` is told: the same settings as options and as a TOML template.
+
+use std::path::Path;
+
+use anyhow::{Context, anyhow, bail};
+use serde::{Deserialize, Serialize};
+
+use crate::export::dsc::Dialect;
+use crate::target::{
+    BoardSpec, DEFAULT_MARGIN_MM, PaperSpec, TagSpec, largest_edge_mm, parse_length_mm,
+};
+
+/// Edge where neither an edge nor a paper is given, mm: that of the published board, which fits
+/// A4 with 10 × 11 corners.
+const DEFAULT_EDGE_MM: f64 = 20.0;
+
+/// Resolution of PNG files, dots per inch.
+const DEFAULT_DPI: u32 = 300;
+
+/// Settings as they are given; what is not given has a default.
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct Settings {
+    /// Rows of corners
+    #[arg(long)]
+    rows: Option<u32>,
+    /// Corners in each row
+    #[arg(long)]
+    cols: Option<u32>,
+    /// Edge of a tile, such as 20mm, 2cm, 0.8in [default: 20mm, or the largest in whole
+    /// millimetres that fits --paper]
+    #[arg(long, value_name = "LENGTH")]
+    edge: Option<String>,
+    /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
+    #[arg(long)]
+    family: Option<String>,
+    /// No tags
+    #[arg(long, conflicts_with_all = ["family", "tag_spacing", "tag_border", "first_id"])]
+    #[serde(skip_serializing_if = "is_false")]
+    untagged: bool,
+    /// A tag in every n-th row and column [default: 3]
+    #[arg(long, value_name = "N")]
+    tag_spacing: Option<u32>,
+    /// Black border of a tag, in widths of a bit [default: 1.5]
+    #[arg(long, value_name = "BITS")]
+    tag_border: Option<f64>,
+    /// Id of the first tag; the others follow [default: 0]
+    #[arg(long, value_name = "ID")]
+    first_id: Option<u32>,
+    /// Id of the first board [default: 0]
+    #[arg(long, value_name = "ID")]
+    board_id: Option<u32>,
+    /// Number of boards, alike but for their ids, each on its own sheet [default: 1]
+    #[arg(long, value_name = "N")]
+    boards: Option<u32>,
+    /// White tiles on black
+    #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
+    invert: bool,
+    /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm [default: the smallest of A4
+    /// to A0 that takes the board]
+    #[arg(long, value_name = "SIZE")]
+    paper: Option<String>,
+    /// auto, portrait or landscape [default: auto]
+    #[arg(long)]
+    orientation: Option<String>,
+    /// Blank along the edges of the paper [default: 5mm]
+    #[arg(long, value_name = "LENGTH")]
+    margin: Option<String>,
+    /// Write <name>.pdf; so it is where no other of pdf, svg, png is asked for
+    #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
+    pdf: bool,
+    /// Write <name>.svg
+    #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
+    svg: bool,
+    /// Write <name>.png
+    #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
+    png: bool,
+    /// Write <name>.dsc, for the reference detector or its fork
+    #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
+    dsc: bool,
+    /// fork or original [default: fork]
+    #[arg(long, value_name = "DIALECT")]
+    dsc_dialect: Option<String>,
+    /// Resolution of the PNG, dots per inch [default: 300]
+    #[arg(long)]
+    dpi: Option<u32>,
+    /// Stem of the files' names, printed on the sheet [default: board]
+    #[arg(long)]
+    name: Option<String>,
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// Settings understood.
+pub struct Plan {
+    pub name: String,
+    pub spec: BoardSpec,
+    pub paper: PaperSpec,
+    pub pdf: bool,
+    pub svg: bool,
+    pub png: bool,
+    pub dsc: Option<Dialect>,
+    pub dpi: u32,
+}
+
+impl Settings {
+    /// Reads a template.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        let text = std::fs::read_to_string(path)
+            .with_context(|| format!("--template: cannot read {}", path.display()))?;
+        toml::from_str(&text).map_err(|error| {
+            let before = error.span().map_or("", |span| &text[..span.start]);
+            let line = before.matches('\n').count() + 1;
+            let message = error.message().replace('\n', " ");
+            anyhow!("--template: {} line {line}: {message}", path.display())
+        })
+    }
+
+    /// The text of a template.
+    pub fn to_toml(&self) -> String {
+        let settings = toml::to_string(self).expect("plain settings have a TOML form");
+        format!("# Made with `deltille board --save-template`.\n{settings}")
+    }
+
+    /// These settings, and those of a template where these say nothing.
+    pub fn or(self, template: Self) -> Self {
+        let tagged = self.family.is_some()
+            || self.tag_spacing.is_some()
+            || self.tag_border.is_some()
+            || self.first_id.is_some();
+        let formats = self.pdf || self.svg || self.png;
+        Self {
+            rows: self.rows.or(template.rows),
+            cols: self.cols.or(template.cols),
+            edge: self.edge.or(template.edge),
+            family: self.family.or(template.family),
+            untagged: self.untagged || (template.untagged && !tagged),
+            tag_spacing: self.tag_spacing.or(template.tag_spacing),
+            tag_border: self.tag_border.or(template.tag_border),
+            first_id: self.first_id.or(template.first_id),
+            board_id: self.board_id.or(template.board_id),
+            boards: self.boards.or(template.boards),
+            invert: self.invert || template.invert,
+            paper: self.paper.or(template.paper),
+            orientation: self.orientation.or(template.orientation),
+            margin: self.margin.or(template.margin),
+            pdf: self.pdf || (template.pdf && !formats),
+            svg: self.svg || (template.svg && !formats),
+            png: self.png || (template.png && !formats),
+            dsc: self.dsc || template.dsc,
+            dsc_dialect: self.dsc_dialect.or(template.dsc_dialect),
+            dpi: self.dpi.or(template.dpi),
+            name: self.name.or(template.name),
+        }
+    }
+
+    /// Understands the settings; numbers that no board has are left to its making.
+    pub fn plan(&self) -> anyhow::Result<Plan> {
+        let (Some(rows), Some(cols)) = (self.rows, self.cols) else {
+            bail!("--rows and --cols are needed, here or in a --template");
+        };
+        let length = |option: &str, text: &Option<String>| {
+            let parsed = text.as_deref().map(parse_length_mm).transpose();
+            parsed.with_context(|| format!("--{option}"))
+        };
+        let paper = PaperSpec {
+            size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
+            orientation: match &self.orientation {
+                Some(text) => text.parse().context("--orientation")?,
+                None => Default::default(),
+            },
+            margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
+        };
+        let default = TagSpec::default();
+        let tags = (!self.untagged).then(|| TagSpec {
+            family: self.family.clone().unwrap_or(default.family),
+            first_id: self.first_id.unwrap_or(default.first_id),
+            spacing: self.tag_spacing.unwrap_or(default.spacing),
+            border_bits: self.tag_border.unwrap_or(default.border_bits),
+        });
+        let mut spec = BoardSpec {
+            rows,
+            cols,
+            edge_mm: DEFAULT_EDGE_MM,
+            boards: self.boards.unwrap_or(1),
+            board_id: self.board_id.unwrap_or(0),
+            tags,
+            inverted: self.invert,
+        };
+        spec.edge_mm = match length("edge", &self.edge)? {
+            Some(mm) => mm,
+            None if paper.size.is_some() => {
+                // Where nothing fits, making the board says so.
+                largest_edge_mm(&spec, &paper).unwrap_or(DEFAULT_EDGE_MM)
+            }
+            None => DEFAULT_EDGE_MM,
+        };
+        let dialect = match &self.dsc_dialect {
+            Some(text) => text.parse().map_err(|error: String| anyhow!("--dsc-dialect: {error}"))?,
+            None => Dialect::default(),
+        };
+        let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
+        if !(72..=2400).contains(&dpi) {
+            bail!("--dpi: {dpi} is not between 72 and 2400");
+        }
+        Ok(Plan {
+            name: self.name.clone().unwrap_or_else(|| "board".to_owned()),
+            spec,
+            paper,
+            pdf: self.pdf || !(self.svg || self.png),
+            svg: self.svg,
+            png: self.png,
+            dsc: self.dsc.then_some(dialect),
+            dpi,
+        })
+    }
+
+    /// The same with the edge that was chosen, so that a template gives the same board again.
+    pub fn with_edge(self, edge_mm: f64) -> Self {
+        Self { edge: Some(format!("{edge_mm}mm")), ..self }
+    }
+}

@@ -1,0 +1,52 @@
+//! Targets from files, and the families that they name.
+
+use std::path::Path;
+
+use anyhow::{Context, anyhow, bail};
+
+use crate::export::dsc;
+use crate::family::Family;
+use crate::target::{Target, TargetSpec};
+
+/// Reads a target: `.dsc` by its extension, JSON otherwise.
+pub fn read(path: &Path) -> anyhow::Result<Target> {
+    let show = || path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", show()))?;
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dsc")) {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        return dsc::read(&text, &stem).with_context(show);
+    }
+    Target::from_json(&text).with_context(show)
+}
+
+/// The family of a target: the file given, else by the name in the target, else by the path in its
+/// spec. Its codes must be those that the target was made with.
+pub fn family(target: &Target, given: Option<&str>) -> anyhow::Result<Option<Family>> {
+    let Some(wanted) = &target.family else {
+        if given.is_some() {
+            bail!("--family: {} has no tags", target.name);
+        }
+        return Ok(None);
+    };
+    let in_spec = match &target.spec {
+        TargetSpec::Board(board) => board.tags.as_ref().map(|tags| tags.family.as_str()),
+        TargetSpec::Listed(_) => None,
+    };
+    let family = match given {
+        Some(given) => Family::resolve(given).context("--family")?,
+        None => Family::resolve(&wanted.name)
+            .or_else(|error| in_spec.map_or(Err(error), Family::resolve))
+            .with_context(|| format!("{} carries tags of {}", target.name, wanted.name))
+            .context("give the family's file with --family")?,
+    };
+    if !wanted.fingerprint.is_empty() && family.fingerprint() != wanted.fingerprint {
+        return Err(anyhow!(
+            "--family: {} was made with fingerprint {} of {}, this one is {}",
+            target.name,
+            wanted.fingerprint,
+            wanted.name,
+            family.fingerprint()
+        ));
+    }
+    Ok(Some(family))
+}

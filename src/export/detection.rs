@@ -1,0 +1,56 @@
+//! Detections as JSON (FORMATS §9, schema `deltille/detection/1`), and back.
+
+use serde::{Deserialize, Serialize};
+
+use crate::detect::{Detection, Grid};
+
+/// Schema and version that this crate writes and reads.
+pub const SCHEMA: &str = "deltille/detection/1";
+
+/// What is wrong with a detection file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DetectionFileError {
+    /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
+    #[error("not a detection file: {0}; make it anew with `deltille detect`")]
+    Json(#[from] serde_json::Error),
+    /// Another schema, or another version of it.
+    #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
+    Schema {
+        /// The schema that the file names.
+        found: String,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DetectionFile {
+    schema: String,
+    image: String,
+    width: u32,
+    height: u32,
+    grids: Vec<Grid>,
+    timing_ms: std::collections::BTreeMap<String, f64>,
+}
+
+/// The text of the JSON file of one image, a corner a line.
+pub fn write(detection: &Detection) -> String {
+    let Detection { image, width, height, grids, timing_ms } = detection.clone();
+    let file = DetectionFile { schema: SCHEMA.to_owned(), image, width, height, grids, timing_ms };
+    crate::json::to_text(&file, 4)
+}
+
+/// Reads the text of a detection file.
+pub fn read(json: &str) -> Result<Detection, DetectionFileError> {
+    #[derive(Deserialize)]
+    struct Head {
+        schema: String,
+    }
+    let Head { schema } = serde_json::from_str(json)?;
+    if schema != SCHEMA {
+        return Err(DetectionFileError::Schema { found: schema });
+    }
+    let file: DetectionFile = serde_json::from_str(json)?;
+    let DetectionFile { schema: _, image, width, height, grids, timing_ms } = file;
+    Ok(Detection { image, width, height, grids, timing_ms })
+}

@@ -1,0 +1,95 @@
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Corner, PanelPose};
+
+/// Corners within this of their places count as unrotated, in parts of the panel's extent: the
+/// written digits of a flat target.
+const FLAT: f64 = 1e-9;
+
+/// The second singular value of a set of points on one line, relative to the first.
+const LINE: f64 = 1e-9;
+
+impl PanelPose {
+    /// The panel frame is the target frame.
+    pub const IDENTITY: PanelPose = PanelPose {
+        rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        translation_mm: [0.0; 3],
+    };
+
+    /// The target position of a point of the panel's plane, mm.
+    pub fn target_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        [0, 1, 2].map(|i| {
+            self.rotation[3 * i] * x + self.rotation[3 * i + 1] * y + self.translation_mm[i]
+        })
+    }
+
+    /// The pose that takes panel positions to target positions with the least sum of squares;
+    /// `None` when the corners lie on one line.
+    ///
+    /// With centred p and q, H = Σ q pᵀ = U S Vᵀ and R = U diag(1, 1, det U Vᵀ) Vᵀ (Kabsch 1976).
+    pub fn fit(corners: &[Corner]) -> Option<PanelPose> {
+        let n = corners.len() as f64;
+        let panel = |c: &Corner| Vector3::new(c.panel_mm[0], c.panel_mm[1], 0.0);
+        let target = |c: &Corner| Vector3::from(c.target_mm);
+        let p0 = corners.iter().map(panel).sum::<Vector3<f64>>() / n;
+        let q0 = corners.iter().map(target).sum::<Vector3<f64>>() / n;
+        let moved = |c: &Corner| ((target(c) - q0) - (panel(c) - p0)).amax();
+        let extent = corners.iter().map(|c| (panel(c) - p0).amax()).fold(0.0, f64::max);
+        let flat = corners.iter().all(|c| moved(c) <= FLAT * extent);
+
+        let h: Matrix3<f64> =
+            corners.iter().map(|c| (target(c) - q0) * (panel(c) - p0).transpose()).sum();
+        let svd = h.svd(true, true);
+        let (u, v_t) = (svd.u?, svd.v_t?);
+        let mut sizes: Vec<f64> = svd.singular_values.iter().copied().collect();
+        sizes.sort_by(f64::total_cmp);
+        if sizes[1] <= LINE * sizes[2] {
+            return None;
+        }
+        // The smallest singular value belongs to the normal of the panel: it takes the sign.
+        let normal = svd.singular_values.imin();
+        let mut signs = Vector3::repeat(1.0);
+        signs[normal] = (u * v_t).determinant().signum();
+        let r = if flat { Matrix3::identity() } else { u * Matrix3::from_diagonal(&signs) * v_t };
+        let t = q0 - r * p0;
+        let t = if flat { t.map(|v| if v.abs() <= FLAT * extent { 0.0 } else { v }) } else { t };
+        let mut rotation = [0.0; 9];
+        rotation.copy_from_slice(r.transpose().as_slice());
+        Some(PanelPose { rotation, translation_mm: t.into() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::lattice::Vertex;
+
+    proptest! {
+        #[test]
+        fn a_fit_recovers_any_pose(
+            roll in -3.0f64..3.0, pitch in -1.5f64..1.5, yaw in -3.0f64..3.0,
+            t in prop::array::uniform3(-500.0f64..500.0),
+        ) {
+            let r = Rotation3::from_euler_angles(roll, pitch, yaw);
+            let corners: Vec<Corner> = [(0, 0), (0, 3), (2, 1), (4, -2)]
+                .into_iter()
+                .map(|(row, col)| {
+                    let [x, y] = Vertex::new(row, col).position().map(|v| v * 20.0);
+                    let target = r * Vector3::new(x, y, 0.0) + Vector3::from(t);
+                    let (panel_mm, target_mm) = ([x, y], target.into());
+                    Corner { id: 0, row, col, panel_mm, target_mm }
+                })
+                .collect();
+            let pose = PanelPose::fit(&corners).unwrap();
+            for c in &corners {
+                let back = pose.target_from_panel(c.panel_mm);
+                let off = (Vector3::from(back) - Vector3::from(c.target_mm)).amax();
+                prop_assert!(off < 1e-9, "{off}");
+            }
+            prop_assert!(PanelPose::fit(&corners[..2]).is_none());
+        }
+    }
+}
