@@ -81,9 +81,7 @@ impl Board {
 
 /// The shape of a tile.
 fn tile(artwork: &mut Artwork, (row, col): (i32, i32)) -> &mut Shape {
-    let is_it = |shape: &&mut Shape| {
-        matches!(shape.part, Part::Tile { row: r, col: c, .. } if (r, c) == (row, col))
-    };
+    let is_it = |shape: &&mut Shape| matches!(shape.part, Part::Tile { row: r, col: c, .. } if (r, c) == (row, col));
     artwork.sheets[0].shapes.iter_mut().find(is_it).expect("the tile is drawn")
 }
 

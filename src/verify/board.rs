@@ -144,7 +144,8 @@ fn check_positions(
         .collect();
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let largest = |map: &AffineMap| {
-        let deviations = corners.iter().map(|(_, stated, found)| distance(map.apply(*stated), *found));
+        let deviations =
+            corners.iter().map(|(_, stated, found)| distance(map.apply(*stated), *found));
         deviations.fold(0.0, f64::max)
     };
     let raw = largest(&AffineMap::IDENTITY);
@@ -179,10 +180,8 @@ fn causes(panel: &Panel, map: &AffineMap, pairs: &[([f64; 2], [f64; 2])]) -> Vec
     };
     let centre = [mean(|p| p.0[0]), mean(|p| p.0[1])];
     let by_mm = [mean(|p| p.1[0]) - centre[0], mean(|p| p.1[1]) - centre[1]];
-    let radius = pairs
-        .iter()
-        .map(|(p, _)| (p[0] - centre[0]).hypot(p[1] - centre[1]))
-        .fold(0.0, f64::max);
+    let radius =
+        pairs.iter().map(|(p, _)| (p[0] - centre[0]).hypot(p[1] - centre[1])).fold(0.0, f64::max);
 
     let mut causes = Vec::new();
     let [x, y] = map.scales();

@@ -274,7 +274,8 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.artifact)?;
         if self.passed {
-            let sum = |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
+            let sum =
+                |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
             let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
             write!(f, "verified, ")?;
             if self.sheets.len() > 1 {
@@ -287,7 +288,9 @@ impl fmt::Display for Verdict {
                 bars.filter_map(|(_, found)| Some(format!("{:.2}", (*found)?))).collect();
             return match bars.as_slice() {
                 [] => write!(f, "page size exact"),
-                bars if bars.len() > NAMED => write!(f, "{} check bars, page size exact", bars.len()),
+                bars if bars.len() > NAMED => {
+                    write!(f, "{} check bars, page size exact", bars.len())
+                }
                 bars => write!(f, "check bars {} mm, page size exact", bars.join(" and ")),
             };
         }

@@ -203,7 +203,9 @@ impl Settings {
             None => DEFAULT_EDGE_MM,
         };
         let dialect = match &self.dsc_dialect {
-            Some(text) => text.parse().map_err(|error: String| anyhow!("--dsc-dialect: {error}"))?,
+            Some(text) => {
+                text.parse().map_err(|error: String| anyhow!("--dsc-dialect: {error}"))?
+            }
             None => Dialect::default(),
         };
         let dpi = self.dpi.unwrap_or(DEFAULT_DPI);

@@ -1,0 +1,99 @@
+//! Real photographs and the published artifacts, from `../shared/data` or `DELTILLE_DATA`.
+
+mod common;
+
+use std::collections::BTreeMap;
+
+use common::data;
+use deltille::detect::{Detector, DetectorConfig, Grid};
+use deltille::export::dsc;
+use deltille::family::Family;
+use deltille::raster;
+use deltille::target::GridKind;
+use deltille::verify::Document;
+
+/// Every image of a folder of the data.
+fn images(folder: &str) -> Option<Vec<std::path::PathBuf>> {
+    let mut images: Vec<_> =
+        std::fs::read_dir(data(folder)?).ok()?.map(|entry| entry.unwrap().path()).collect();
+    images.sort();
+    Some(images)
+}
+
+/// A grid is a lattice seen through a lens: every corner lies near the middle of its opposite
+/// neighbours, and all small triangles have the same, unmirrored handedness.
+fn topology_is_consistent(grid: &Grid) -> bool {
+    let at: BTreeMap<(i32, i32), [f64; 2]> =
+        grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+    at.iter().all(|(&(row, col), p)| {
+        let near = |dr: i32, dc: i32| at.get(&(row + dr, col + dc));
+        let straight = [(0, 1), (1, 0), (1, -1)].into_iter().all(|(dr, dc)| {
+            let (Some(q), Some(r)) = (near(dr, dc), near(-dr, -dc)) else { return true };
+            let edge = (q[0] - r[0]).hypot(q[1] - r[1]) / 2.0;
+            ((q[0] + r[0]) / 2.0 - p[0]).hypot((q[1] + r[1]) / 2.0 - p[1]) < 0.1 * edge
+        });
+        let handed = match (near(0, 1), near(1, 0)) {
+            (Some(q), Some(r)) => {
+                (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0
+            }
+            _ => true,
+        };
+        straight && handed
+    })
+}
+
+#[test]
+fn all_110_corners_of_the_robot_hand_photographs() {
+    let Some(images) = images("robot-hand") else { return };
+    let detector =
+        Detector::for_grid(GridKind::Deltille, Some((10, 11)), DetectorConfig::default());
+    let mut complete = 0;
+    for path in &images {
+        let detection = detector.detect_any(&raster::read(path).unwrap(), "photograph");
+        assert!(detection.grids.len() <= 1, "a false grid in {}", path.display());
+        let Some(grid) = detection.grids.first() else { continue };
+        assert!(topology_is_consistent(grid), "wrong topology in {}", path.display());
+        let labelled = (grid.corners.first().map(|c| (c.row, c.col)) == Some((0, 4)))
+            && grid.corners.last().map(|c| (c.row, c.col)) == Some((9, 10));
+        complete += usize::from(grid.corners.len() == 110 && labelled);
+    }
+    println!("{complete} of {} photographs complete", images.len());
+    assert!(complete + 1 >= images.len());
+}
+
+#[test]
+fn checkerboards_and_lamps_are_no_deltille_grids() {
+    let Some(images) = images("fisheye") else { return };
+    let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
+    for path in images.iter().step_by(4) {
+        let detection = detector.detect_any(&raster::read(path).unwrap(), "photograph");
+        assert!(detection.grids.is_empty(), "a false grid in {}", path.display());
+    }
+}
+
+#[test]
+fn published_targets_decode_completely() {
+    for (name, corners, tags) in [("a4_deltille", 76, 8), ("ico_deltille", 66, 10)] {
+        let Some(folder) = data("reference-boards") else { return };
+        let text = std::fs::read_to_string(folder.join(format!("{name}.dsc"))).unwrap();
+        let target = dsc::read(&text, name).unwrap();
+        let family = Family::resolve(&target.family.as_ref().unwrap().name).unwrap();
+        let detector = Detector::for_target(&target, Some(&family), DetectorConfig::default());
+        let document = Document::open(&folder.join(format!("{name}.pdf"))).unwrap();
+        assert_eq!(document.pages(), target.panels.len());
+        for page in 0..document.pages() {
+            let image = document.render(page, 300.0 / 25.4).image;
+            let detection = detector.detect(&image, name);
+            assert_eq!(detection.grids.len(), 1, "{name}, page {page}");
+            let grid = &detection.grids[0];
+            assert_eq!(grid.panel, Some(page as u32));
+            assert_eq!(
+                (grid.corners.len(), grid.tags.len()),
+                (corners, tags),
+                "{name}, page {page}"
+            );
+            assert!(grid.tags.iter().all(|tag| tag.errors == 0));
+            assert!(grid.corners.iter().all(|corner| corner.id.is_some()));
+        }
+    }
+}
