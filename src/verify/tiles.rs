@@ -148,16 +148,15 @@ impl PlacedPanel<'_> {
         let [a, b, c] = self.vertices_px(tile);
         let (ab, ac) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
         let det = ab[0] * ac[1] - ab[1] * ac[0];
-        let uv = |[x, y]: [f64; 2]| {
-            [(x * ac[1] - y * ac[0]) / det, (y * ab[0] - x * ab[1]) / det]
-        };
+        let uv = |[x, y]: [f64; 2]| [(x * ac[1] - y * ac[0]) / det, (y * ab[0] - x * ab[1]) / det];
         let around: Vec<[f64; 2]> = (0..8)
             .map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4)
             .map(|angle| uv([EDGE_PX * angle.cos(), EDGE_PX * angle.sin()]))
             .collect();
         let bit = |p: [f64; 2]| expected.tag.as_ref().and_then(|tag| tag.looks.bit(p));
         let ink = |bit: Option<u32>| {
-            let white_cell = expected.tag.as_ref().zip(bit).is_some_and(|(t, b)| t.word >> b & 1 == 1);
+            let white_cell =
+                expected.tag.as_ref().zip(bit).is_some_and(|(t, b)| t.word >> b & 1 == 1);
             expected.black != white_cell
         };
         let inside = |[u, v]: [f64; 2]| u >= 0.0 && v >= 0.0 && u + v <= 1.0;

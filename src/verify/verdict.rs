@@ -205,6 +205,11 @@ pub enum Finding {
     },
 }
 
+/// Rounded to what is shown, so that a tiny negative number is not shown as −0.
+fn micrometres(mm: f64) -> f64 {
+    (mm * 1e3).round() / 1e3 + 0.0
+}
+
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -224,11 +229,15 @@ impl fmt::Display for Finding {
                 write!(f, "stretched: scale {x:.4} along x, {y:.4} along y")
             }
             Self::Turned { angle_deg, .. } => write!(f, "turned by {angle_deg:.3}°"),
-            Self::Shifted { by_mm: [x, y], .. } => write!(f, "shifted by ({x:.3}, {y:.3}) mm"),
+            Self::Shifted { by_mm, .. } => {
+                let [x, y] = by_mm.map(micrometres);
+                write!(f, "shifted by ({x:.3}, {y:.3}) mm")
+            }
             Self::CornerMissing { id, row, col } => {
                 write!(f, "corner {id} at row {row} col {col} not found")
             }
-            Self::CornerOff { id, row, col, by_mm: [x, y] } => {
+            Self::CornerOff { id, row, col, by_mm } => {
+                let [x, y] = by_mm.map(micrometres);
                 write!(f, "corner {id} at row {row} col {col} off by ({x:.3}, {y:.3}) mm")
             }
             Self::CornerExtra { at_mm: [x, y] } => {
@@ -274,7 +283,8 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.artifact)?;
         if self.passed {
-            let sum = |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
+            let sum =
+                |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
             let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
             write!(f, "verified, ")?;
             if self.sheets.len() > 1 {
@@ -287,7 +297,9 @@ impl fmt::Display for Verdict {
                 bars.filter_map(|(_, found)| Some(format!("{:.2}", (*found)?))).collect();
             return match bars.as_slice() {
                 [] => write!(f, "page size exact"),
-                bars if bars.len() > NAMED => write!(f, "{} check bars, page size exact", bars.len()),
+                bars if bars.len() > NAMED => {
+                    write!(f, "{} check bars, page size exact", bars.len())
+                }
                 bars => write!(f, "check bars {} mm, page size exact", bars.join(" and ")),
             };
         }

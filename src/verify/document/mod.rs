@@ -191,8 +191,7 @@ fn luma([r, g, b]: [u8; 3]) -> u8 {
 /// Stretches the grey values so that the darkest pixel is 0 and the brightest 255: pure K is not
 /// quite black on screen.
 fn stretch(mut image: Gray<u8>) -> Gray<u8> {
-    let (least, most) =
-        image.pixels().iter().fold((255, 0), |(lo, hi), &v| (v.min(lo), v.max(hi)));
+    let (least, most) = image.pixels().iter().fold((255, 0), |(lo, hi), &v| (v.min(lo), v.max(hi)));
     if most - least.min(most) >= 128 {
         let range = f32::from(most - least);
         let table: Vec<u8> = (0..=255u8)

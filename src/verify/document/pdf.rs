@@ -70,7 +70,8 @@ fn band<'a>(
     render_into(page, cache, &interpreter, &RenderSettings::default(), &mut context, transform);
     context.flush();
     let mut pixmap = Pixmap::new(context.width(), context.height());
-    let settings = RasterizerSettings { target_init: TargetInit::Clear(WHITE), ..Default::default() };
+    let settings =
+        RasterizerSettings { target_init: TargetInit::Clear(WHITE), ..Default::default() };
     context.render_with(&mut pixmap, &mut Resources::default(), settings);
     for row in pixmap.data().chunks_exact(usize::from(pixmap.width())) {
         grey.extend(row.iter().map(|p| luma([p.r, p.g, p.b])));

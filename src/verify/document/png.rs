@@ -20,7 +20,11 @@ impl Png {
             Some(dims) if dims.unit == png::Unit::Meter && dims.xppu == dims.yppu => {
                 f64::from(dims.xppu) / 1000.0
             }
-            _ => return Err("it states no resolution in pixels per metre: its size is unknown".into()),
+            _ => {
+                return Err(
+                    "it states no resolution in pixels per metre: its size is unknown".into()
+                );
+            }
         };
         let mut reader = ImageReader::new(Cursor::new(bytes));
         reader.set_format(image::ImageFormat::Png);
