@@ -36,3 +36,4 @@ pub mod lattice;
 pub mod raster;
 pub mod synth;
 pub mod target;
+pub mod verify;

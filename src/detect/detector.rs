@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::detection::{DecodedTag, Detection, Grid, GridCorner};
 use super::grow::{SaddleGrid, grids};
-use super::label::{Labelled, TagLabeller, fit_outline, leftovers};
+use super::label::{Labelled, TagLabeller, fit_outline};
 use super::refine::Refiner;
 use super::saddles::{SaddleFinder, noise};
 use crate::family::Family;
@@ -141,14 +141,12 @@ impl Detector {
             },
             Labels::Target { tags, panels } => {
                 let by_tags = tags.as_ref().map_or_else(Vec::new, |tags| tags.label(image, grid));
-                let mut grids: Vec<Grid> =
-                    by_tags.iter().map(|l| on_panel(grid, &panels[l.panel], l)).collect();
-                for rest in leftovers(grid, &by_tags) {
-                    grids.push(
-                        on_untagged_panel(&rest, panels).unwrap_or_else(|| unlabelled(&rest)),
-                    );
+                if by_tags.is_empty() {
+                    let by_outline = on_untagged_panel(grid, panels);
+                    return vec![by_outline.unwrap_or_else(|| unlabelled(grid))];
                 }
-                grids
+                // What hangs on to labelled panels without being part of one is not reported.
+                by_tags.iter().map(|l| on_panel(grid, &panels[l.panel], l)).collect()
             }
         }
     }

@@ -14,12 +14,12 @@ const STATIONS: usize = 8;
 /// Part of the edge at either end that is left out: blur mixes the sectors there.
 const END: f64 = 0.15;
 
-/// Distance of the samples from the edge, as a part of its length: well inside the border of a tag
-/// (0.13 at 1.5 bits of 25) and beyond the blur on all but tiny tiles.
-const SIDE: f64 = 0.07;
+/// Distance of the samples from the edge, as a part of the height of the tile on that side: well
+/// inside the border of a tag (0.16 at 1.5 bits of 25) and beyond the blur on all but tiny tiles.
+const SIDE: f64 = 0.08;
 
 /// The least distance of the samples from the edge, px.
-const MIN_SIDE_PX: f64 = 1.5;
+const MIN_SIDE_PX: f64 = 1.2;
 
 /// A sample must leave the level by this part of the corners' amplitude.
 const MIN_DEVIATION: f64 = 0.25;
@@ -40,7 +40,16 @@ pub fn is_clean(image: &Gray<i16>, a: &Saddle, i: usize, b: &Saddle, j: usize) -
     // Slopes of the curve against its chord at the two ends.
     let start = turn(chord, a.sectors.rays[i]).tan();
     let end = turn(chord + std::f64::consts::PI, b.sectors.rays[j]).tan();
-    let side = (SIDE * length).max(MIN_SIDE_PX);
+    // Rays run to the left, counter-clockwise on the print, so the tile on the left lies between
+    // ray i and i + 1 here, between j and j − 1 there.
+    let side = |at_a: usize, at_b: usize| {
+        let cot = |saddle: &Saddle, p: usize, q: usize| {
+            1.0 / turn(saddle.sectors.rays[p], saddle.sectors.rays[q]).abs().tan()
+        };
+        let height = length / (cot(a, i, at_a) + cot(b, j, at_b));
+        (SIDE * height.clamp(0.0, length)).max(MIN_SIDE_PX)
+    };
+    let (left_side, right_side) = (side((i + 1) % 6, (j + 5) % 6), side((i + 5) % 6, (j + 1) % 6));
     // Unit vectors along the chord and to its left on the print.
     let (along, left) = ([dx / length, dy / length], [dy / length, -dx / length]);
     let dark_left = i % 2 == 0;
@@ -56,7 +65,7 @@ pub fn is_clean(image: &Gray<i16>, a: &Saddle, i: usize, b: &Saddle, j: usize) -
             let level = a.sectors.level + t * (b.sectors.level - a.sectors.level);
             f64::from(image.bilinear(x, y)) - level
         };
-        let (on_left, on_right) = (deviation(offset + side), deviation(offset - side));
+        let (on_left, on_right) = (deviation(offset + left_side), deviation(offset - right_side));
         let (dark, bright) = if dark_left { (on_left, on_right) } else { (on_right, on_left) };
         let clean = dark < -MIN_DEVIATION * amplitude && bright > MIN_DEVIATION * amplitude;
         failures += usize::from(!clean);

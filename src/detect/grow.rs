@@ -10,7 +10,7 @@ use super::edge::is_clean;
 use super::links::{Link, facing_ray, links};
 use super::saddles::{Saddle, SaddleFinder};
 use super::sectors::turn;
-use crate::lattice::Vertex;
+use crate::lattice::{Tile, Vertex};
 use crate::raster::Pyramid;
 
 /// Fewest corners of a grid: a hexagon of tiles. A quad or two of random texture may pass for
@@ -64,24 +64,34 @@ pub fn grids(finder: &SaddleFinder, pyramid: &Pyramid, saddles: &[Saddle]) -> Ve
         grids.push(grid);
     }
     grids.sort_by_key(|grid| std::cmp::Reverse(grid.len()));
-    grids
+    without_tag_cells(grids)
 }
 
-/// The connected parts of a grid, by their lowest vertex.
-pub fn connected(mut grid: SaddleGrid) -> Vec<SaddleGrid> {
-    let mut parts = Vec::new();
-    while let Some(first) = grid.first_key_value().map(|(&vertex, _)| vertex) {
-        let mut part = SaddleGrid::new();
-        let mut queue = vec![first];
-        while let Some(vertex) = queue.pop() {
-            if let Some(placed) = grid.remove(&vertex) {
-                part.insert(vertex, placed);
-                queue.extend(vertex.neighbours());
-            }
+/// Drops grids that lie within one tile of a larger grid: the cells of a tag are a tiling too.
+fn without_tag_cells(grids: Vec<SaddleGrid>) -> Vec<SaddleGrid> {
+    let mut kept: Vec<SaddleGrid> = Vec::new();
+    for grid in grids {
+        if !kept.iter().any(|larger| in_one_tile(larger, &grid)) {
+            kept.push(grid);
         }
-        parts.push(part);
     }
-    parts
+    kept
+}
+
+fn in_one_tile(larger: &SaddleGrid, grid: &SaddleGrid) -> bool {
+    let tiles = larger.keys().flat_map(|&v| [Tile::upright(v), Tile::inverted(v)]);
+    let mut triangles = tiles.filter_map(|tile| {
+        let [a, b, c] = tile.vertices().map(|v| larger.get(&v).map(|p| p.saddle.position));
+        Some([a?, b?, c?])
+    });
+    let inside = |[a, b, c]: [[f64; 2]; 3], p: [f64; 2]| {
+        let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
+            (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0
+        };
+        // Counter-clockwise on the print is clockwise in the image's axes.
+        side(a, b, p) && side(b, c, p) && side(c, a, p)
+    };
+    triangles.any(|t| grid.values().all(|placed| inside(t, placed.saddle.position)))
 }
 
 /// Four corners of two tiles that share an edge, with their places.
@@ -232,18 +242,7 @@ fn corner_near(
 ) -> Option<PlacedSaddle> {
     let image = &pyramid.levels()[0];
     let reach = (MAX_SURPRISE * edge_px).max(1.0);
-    // The fit converges from a few pixels away; wider uncertainty is covered by a raster of starts.
-    let rings = (reach / 2.0).ceil().min(4.0) as i32;
-    let starts = (-rings..=rings).flat_map(|v| (-rings..=rings).map(move |u| (u, v)));
-    let mut starts: Vec<(i32, i32)> = starts.collect();
-    starts.sort_by_key(|&(u, v)| (u * u + v * v, v, u));
-    let saddle = starts.into_iter().find_map(|(u, v)| {
-        let step = reach / f64::from(rings.max(1));
-        let start = [position[0] + f64::from(u) * step, position[1] + f64::from(v) * step];
-        let saddle = finder.at(pyramid, start)?;
-        let [x, y] = saddle.position;
-        ((x - position[0]).hypot(y - position[1]) <= reach).then_some(saddle)
-    })?;
+    let saddle = finder.near(pyramid, position, reach)?;
     // The turn that the neighbours agree on.
     let mut votes = [0usize; 6];
     for (step, neighbour) in vertex.neighbours().into_iter().enumerate() {

@@ -8,7 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::detection::DecodedTag;
-use super::grow::{MIN_CORNERS, SaddleGrid, connected};
+use super::grow::{MIN_CORNERS, SaddleGrid};
 use super::tags::{Reading, TagReader};
 use crate::family::{Family, ball};
 use crate::lattice::{LatticeMap, Orientation, Tile, Vertex};
@@ -244,11 +244,4 @@ pub fn fit_outline(
     });
     let map = fitting.next()?;
     fitting.next().is_none().then_some(map)
-}
-
-/// The parts of what is left of a grid that are large enough to be reported.
-pub fn leftovers(grid: &SaddleGrid, labelled: &[Labelled]) -> Vec<SaddleGrid> {
-    let mut rest = grid.clone();
-    rest.retain(|vertex, _| labelled.iter().all(|l| !l.vertices.contains_key(vertex)));
-    connected(rest).into_iter().filter(|part| part.len() >= MIN_CORNERS).collect()
 }

@@ -35,6 +35,12 @@ pub struct Saddle {
     pub sectors: Sectors,
 }
 
+/// Distance between the starts of a search, px: the fit converges from that far.
+const START_STEP_PX: f64 = 2.0;
+
+/// Most rings of starts around an uncertain place.
+const MAX_START_RINGS: i32 = 4;
+
 /// Finds and describes saddles in a pyramid.
 #[derive(Clone, Debug)]
 pub struct SaddleFinder {
@@ -65,7 +71,7 @@ impl SaddleFinder {
                     Sectors::read(level, on_level.position, &on_level.surface)
                         .map(|sectors| Saddle { position: on_level.position, sectors })
                 } else {
-                    self.at(pyramid, coarse).or_else(|| {
+                    self.near(pyramid, coarse, f64::from(1u32 << n)).or_else(|| {
                         let sectors = Sectors::read(level, on_level.position, &on_level.surface)?;
                         Some(Saddle { position: coarse, sectors })
                     })
@@ -89,6 +95,22 @@ impl SaddleFinder {
         let umbilic = self.fit.refine(image, start, FIT_ITERATIONS)?;
         let sectors = Sectors::read(image, umbilic.position, &umbilic.surface)?;
         Some(Saddle { position: umbilic.position, sectors })
+    }
+
+    /// The first saddle that the fit reaches from starts ever further from `place`, if it lies
+    /// within `reach_px` of it.
+    pub fn near(&self, pyramid: &Pyramid, place: [f64; 2], reach_px: f64) -> Option<Saddle> {
+        let rings = ((reach_px / START_STEP_PX).ceil() as i32).clamp(1, MAX_START_RINGS);
+        let step = reach_px / f64::from(rings);
+        let starts = (-rings..=rings).flat_map(|v| (-rings..=rings).map(move |u| (u, v)));
+        let mut starts: Vec<(i32, i32)> = starts.collect();
+        starts.sort_by_key(|&(u, v)| (u * u + v * v, v, u));
+        starts.into_iter().find_map(|(u, v)| {
+            let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
+            let saddle = self.at(pyramid, start)?;
+            let [x, y] = saddle.position;
+            ((x - place[0]).hypot(y - place[1]) <= reach_px).then_some(saddle)
+        })
     }
 }
 

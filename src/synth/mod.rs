@@ -5,5 +5,7 @@
 //! positions of the corners.
 
 mod scene;
+mod sheet;
 
 pub use scene::{Light, Scene, Surface, Truth, TruthCorner};
+pub use sheet::scene_of_sheet;

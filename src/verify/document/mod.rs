@@ -1,0 +1,203 @@
+//! Artifacts read back from disk as pictures, by other code than wrote them: hayro for PDF, resvg
+//! for SVG, the image crates for PNG.
+
+mod pdf;
+mod png;
+mod svg;
+
+use std::path::{Path, PathBuf};
+
+use crate::raster::Gray;
+
+/// Resolution of 300 dpi, px/mm: print resolution, at which 0.02 mm is a quarter of a pixel.
+const FINE_PX_PER_MM: f64 = 300.0 / 25.4;
+/// Largest picture that is drawn for a check, px.
+const MAX_PIXELS: f64 = 60.0e6;
+
+/// Which kind of file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// Portable Document Format.
+    Pdf,
+    /// Scalable Vector Graphics.
+    Svg,
+    /// Portable Network Graphics.
+    Png,
+}
+
+/// Why an artifact cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum DocumentError {
+    /// The file cannot be opened.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is not what its name says, or has no size in units of length.
+    #[error("{}: {problem}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+/// An opened artifact.
+pub struct Document {
+    content: Content,
+    format: Format,
+}
+
+enum Content {
+    Pdf(pdf::Pdf),
+    Svg(svg::Svg),
+    Png(png::Png),
+}
+
+/// One page as a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Page {
+    /// Page width as the file states it, mm.
+    pub width_mm: f64,
+    /// Page height as the file states it, mm.
+    pub height_mm: f64,
+    /// Resolution, px/mm; the picture's upper-left corner is the page's.
+    pub px_per_mm: f64,
+    /// The picture.
+    pub image: Gray<u8>,
+}
+
+impl Document {
+    /// Opens a `.pdf`, `.svg` or `.png` file.
+    pub fn open(path: &Path) -> Result<Self, DocumentError> {
+        let unreadable =
+            |problem: String| DocumentError::Unreadable { path: path.to_owned(), problem };
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let format = match extension.as_deref() {
+            Some("pdf") => Format::Pdf,
+            Some("svg") => Format::Svg,
+            Some("png") => Format::Png,
+            _ => return Err(unreadable("not a .pdf, .svg or .png file".to_owned())),
+        };
+        let bytes = std::fs::read(path)
+            .map_err(|source| DocumentError::Io { path: path.to_owned(), source })?;
+        let content = match format {
+            Format::Pdf => Content::Pdf(pdf::Pdf::parse(bytes).map_err(unreadable)?),
+            Format::Svg => Content::Svg(svg::Svg::parse(&bytes).map_err(unreadable)?),
+            Format::Png => Content::Png(png::Png::parse(&bytes).map_err(unreadable)?),
+        };
+        Ok(Self { content, format })
+    }
+
+    /// Kind of the file.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// Number of pages.
+    pub fn pages(&self) -> usize {
+        match &self.content {
+            Content::Pdf(pdf) => pdf.pages(),
+            Content::Svg(_) | Content::Png(_) => 1,
+        }
+    }
+
+    /// Width and height of a page (counted from 0) as the file states them, mm.
+    pub fn size_mm(&self, page: usize) -> [f64; 2] {
+        match &self.content {
+            Content::Pdf(pdf) => pdf.size_mm(page),
+            Content::Svg(svg) => svg.size_mm(),
+            Content::Png(png) => png.size_mm(),
+        }
+    }
+
+    /// How far the stated size may be from the true one by the nature of the format, mm.
+    pub fn size_tolerance_mm(&self) -> f64 {
+        match &self.content {
+            // Points in single precision, and decimals written.
+            Content::Pdf(_) | Content::Svg(_) => 1e-3,
+            // Whole pixels: half of one, and as much again for the rounding of the resolution.
+            Content::Png(png) => 0.5001 / png.px_per_mm() + 1e-3,
+        }
+    }
+
+    /// A page as a picture, on white. `px_per_mm` is a wish: a PNG has its own resolution, and
+    /// large pages are drawn coarser to bound the memory.
+    pub fn render(&self, page: usize, px_per_mm: f64) -> Page {
+        let [width_mm, height_mm] = self.size_mm(page);
+        let most = (MAX_PIXELS / (width_mm * height_mm)).sqrt();
+        let px_per_mm = match &self.content {
+            Content::Png(png) => png.px_per_mm(),
+            _ => px_per_mm.min(most),
+        };
+        let image = match &self.content {
+            Content::Pdf(pdf) => pdf.render(page, px_per_mm),
+            Content::Svg(svg) => svg.render(px_per_mm),
+            Content::Png(png) => png.image().clone(),
+        };
+        Page { width_mm, height_mm, px_per_mm, image }
+    }
+
+    /// [`Self::render`] at print resolution.
+    pub fn render_fine(&self, page: usize) -> Page {
+        self.render(page, FINE_PX_PER_MM)
+    }
+}
+
+impl Page {
+    /// Pixel position of a point of the page frame (mm, y up).
+    pub fn px_from_page(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [x * self.px_per_mm - 0.5, (self.height_mm - y) * self.px_per_mm - 0.5]
+    }
+
+    /// Point of the page frame (mm, y up) of a pixel position.
+    pub fn page_from_px(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [(x + 0.5) / self.px_per_mm, self.height_mm - (y + 0.5) / self.px_per_mm]
+    }
+
+    /// The page as in a mirror, left and right exchanged.
+    pub fn mirrored(&self) -> Self {
+        let mut page = self.clone();
+        let width = page.image.width();
+        page.image.pixels_mut().chunks_exact_mut(width).for_each(<[u8]>::reverse);
+        page
+    }
+
+    /// Ink at a pixel, 0 on paper to 1 in solid black; paper beyond the page.
+    pub fn ink(&self, [x, y]: [f64; 2]) -> f64 {
+        let inside = x > -0.5
+            && y > -0.5
+            && x < self.image.width() as f64 - 0.5
+            && y < self.image.height() as f64 - 0.5;
+        if inside { 1.0 - f64::from(self.image.bilinear(x, y)) / 255.0 } else { 0.0 }
+    }
+}
+
+/// Whole pixels of a length.
+fn pixels(mm: f64, px_per_mm: f64) -> usize {
+    ((mm * px_per_mm).round() as usize).max(1)
+}
+
+/// Luma of an opaque colour, Rec. 709 weights.
+fn luma([r, g, b]: [u8; 3]) -> u8 {
+    (0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b)).round() as u8
+}
+
+/// Stretches the grey values so that the darkest pixel is 0 and the brightest 255: pure K is not
+/// quite black on screen.
+fn stretch(mut image: Gray<u8>) -> Gray<u8> {
+    let (least, most) = image.pixels().iter().fold((255, 0), |(lo, hi), &v| (v.min(lo), v.max(hi)));
+    if most - least.min(most) >= 128 {
+        let range = f32::from(most - least);
+        let table: Vec<u8> = (0..=255u8)
+            .map(|v| (f32::from(v.saturating_sub(least)) * 255.0 / range).round() as u8)
+            .collect();
+        image.pixels_mut().iter_mut().for_each(|v| *v = table[usize::from(*v)]);
+    }
+    image
+}

@@ -1,0 +1,81 @@
+use resvg::tiny_skia::{Color, Pixmap, Transform};
+use resvg::usvg::{self, roxmltree};
+
+use super::{luma, pixels, stretch};
+use crate::export::{Block, SUBPIXELS, supersample};
+use crate::raster::Gray;
+
+/// An SVG, drawn by resvg.
+pub(super) struct Svg {
+    tree: usvg::Tree,
+    size_mm: [f64; 2],
+}
+
+impl Svg {
+    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+        let text = std::str::from_utf8(bytes).map_err(|_| "not a text file".to_owned())?;
+        let xml = roxmltree::Document::parse(text)
+            .map_err(|error| format!("not a readable SVG ({error})"))?;
+        let length = |name: &str| {
+            let value = xml.root_element().attribute(name).unwrap_or_default();
+            length_mm(value).ok_or_else(|| {
+                format!("its {name} {value:?} is not a length in mm, cm, in, pt, pc or px")
+            })
+        };
+        let size_mm = [length("width")?, length("height")?];
+        let tree = usvg::Tree::from_xmltree(&xml, &usvg::Options::default())
+            .map_err(|error| format!("not a readable SVG ({error})"))?;
+        Ok(Self { tree, size_mm })
+    }
+
+    pub fn size_mm(&self) -> [f64; 2] {
+        self.size_mm
+    }
+
+    pub fn render(&self, px_per_mm: f64) -> Gray<u8> {
+        let [width, height] = self.size_mm.map(|mm| pixels(mm, px_per_mm));
+        let scale = px_per_mm * self.size_mm[0] / f64::from(self.tree.size().width());
+        let mut grey = Vec::with_capacity(width * height);
+        let drawn = supersample(
+            width,
+            height,
+            |block| self.coverage(block, scale),
+            |band| {
+                grey.extend_from_slice(band);
+                Ok::<_, std::convert::Infallible>(())
+            },
+        );
+        match drawn {
+            Ok(()) => stretch(Gray::from_vec(width, height, grey).expect("bands fill the page")),
+            Err(never) => match never {},
+        }
+    }
+
+    fn coverage(&self, block: Block, scale: f64) -> Vec<u8> {
+        let size = [block.width, block.height].map(|n| (n * SUBPIXELS) as u32);
+        let mut pixmap = Pixmap::new(size[0], size[1]).expect("a block has pixels");
+        pixmap.fill(Color::WHITE);
+        let samples = SUBPIXELS as f64;
+        let scale = (scale * samples) as f32;
+        let [x, y] = [block.x, block.y].map(|n| -(n as f64 * samples) as f32);
+        let transform = Transform::from_row(scale, 0.0, 0.0, scale, x, y);
+        resvg::render(&self.tree, transform, &mut pixmap.as_mut());
+        pixmap.pixels().iter().map(|p| 255 - luma([p.red(), p.green(), p.blue()])).collect()
+    }
+}
+
+/// A length with an absolute unit, mm; px are CSS pixels of 1/96 inch, and so are bare numbers.
+fn length_mm(text: &str) -> Option<f64> {
+    let number = text.trim().trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let mm = match text.trim()[number.len()..].to_ascii_lowercase().as_str() {
+        "mm" => 1.0,
+        "cm" => 10.0,
+        "in" => 25.4,
+        "pt" => 25.4 / 72.0,
+        "pc" => 25.4 / 6.0,
+        "px" | "" => 25.4 / 96.0,
+        _ => return None,
+    };
+    let value = number.trim().parse::<f64>().ok()? * mm;
+    (value.is_finite() && value > 0.0).then_some(value)
+}

@@ -1,0 +1,196 @@
+//! An artifact read back from disk, seen, detected and compared with its target.
+//!
+//! Nothing here knows how a file was drawn: a PDF is rasterised by hayro, an SVG by resvg, and the
+//! picture goes through the detector like a photograph. Then, for each page:
+//!
+//! - the page size that the file states is the target's;
+//! - each check bar, measured in the picture, has its stated length;
+//! - every corner is found, once, with its label, within [`TOLERANCE_MM`] of its stated position,
+//!   and no other corner is;
+//! - every tile, and every cell of every tag, has its colour over its whole area, also where
+//!   decoding would correct a wrong cell.
+//!
+//! What is wrong is named by its cause where one cause explains it: a scale, a mirror image, a
+//! turn, a shift of the whole board rather than a list of all corners.
+//!
+//! Limits: marks outside the tiles and check bars (labels, dirt in the margin) are not compared.
+
+mod bars;
+mod board;
+mod document;
+mod fit;
+mod tiles;
+mod verdict;
+
+use std::path::{Path, PathBuf};
+
+use crate::detect::{Detector, DetectorConfig};
+use crate::export::sheet_file_name;
+use crate::family::Family;
+use crate::target::{SheetLayout, Target};
+use fit::AffineMap;
+
+pub use document::{Document, DocumentError, Format, Page};
+pub use verdict::{Finding, SheetVerdict, Verdict};
+
+/// Largest deviation of a position or a length, mm: a fifth of what a good printer adds.
+pub const TOLERANCE_MM: f64 = 0.02;
+
+/// Why an artifact cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The artifact cannot be read.
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    /// The target says nothing about paper.
+    #[error("target {0} has no sheets: it was not laid out on paper")]
+    NoSheets(String),
+    /// The file name does not tell which sheet is on it.
+    #[error("{}: the target has {sheets} sheets; name the file {example} for the first", path.display())]
+    WhichSheet {
+        /// The file.
+        path: PathBuf,
+        /// Number of sheets.
+        sheets: usize,
+        /// A name that tells.
+        example: String,
+    },
+    /// The family needed is not the one given.
+    #[error("the target needs family {needed}: {given}")]
+    Family {
+        /// Name and fingerprint of the family of the target.
+        needed: String,
+        /// What was given instead.
+        given: String,
+    },
+}
+
+/// Compares artifacts with their target.
+pub struct Verifier<'a> {
+    target: &'a Target,
+    family: Option<&'a Family>,
+    detector: Detector,
+}
+
+impl<'a> Verifier<'a> {
+    /// A verifier for the artifacts of `target`, whose family must be given if it has tags.
+    pub fn new(target: &'a Target, family: Option<&'a Family>) -> Result<Self, VerifyError> {
+        if target.sheets.is_empty() {
+            return Err(VerifyError::NoSheets(target.name.clone()));
+        }
+        if let Some(needed) = &target.family {
+            // A .dsc file names its family without a fingerprint.
+            let same = |family: &Family| {
+                needed.fingerprint.is_empty() || family.fingerprint() == needed.fingerprint
+            };
+            let given = match family {
+                Some(family) if same(family) => None,
+                Some(family) => {
+                    Some(format!("{} has fingerprint {}", family.name(), family.fingerprint()))
+                }
+                None => Some("none is given".to_owned()),
+            };
+            if let Some(given) = given {
+                let needed = format!("{} with fingerprint {}", needed.name, needed.fingerprint);
+                return Err(VerifyError::Family { needed, given });
+            }
+        }
+        let detector = Detector::for_target(target, family, DetectorConfig::default());
+        Ok(Self { target, family, detector })
+    }
+
+    /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
+    /// that its name tells.
+    pub fn verify(&self, path: &Path) -> Result<Verdict, VerifyError> {
+        let document = Document::open(path)?;
+        let sheets = &self.target.sheets;
+        let mut findings = Vec::new();
+        let indices: Vec<usize> = match document.format() {
+            Format::Pdf => {
+                let (found, stated) = (document.pages(), sheets.len());
+                if found != stated {
+                    findings.push(Finding::Pages { found, stated });
+                }
+                (0..found.min(stated)).collect()
+            }
+            Format::Svg | Format::Png => vec![self.sheet_of(path)?],
+        };
+        let mut verdicts = Vec::with_capacity(indices.len());
+        for index in indices {
+            let page = if document.format() == Format::Pdf { index } else { 0 };
+            verdicts.push(self.verify_page(&document, page, index));
+        }
+        Ok(Verdict {
+            artifact: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            format: document.format(),
+            passed: findings.is_empty() && verdicts.iter().all(|s| s.findings.is_empty()),
+            findings,
+            sheets: verdicts,
+        })
+    }
+
+    /// The sheet that a file of a single page shows, by its name.
+    fn sheet_of(&self, path: &Path) -> Result<usize, VerifyError> {
+        let count = self.target.sheets.len();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let number = stem.rsplit_once('-').and_then(|(_, number)| number.parse::<usize>().ok());
+        match number {
+            _ if count == 1 => Ok(0),
+            Some(number) if (1..=count).contains(&number) => Ok(number - 1),
+            _ => {
+                let extension = path.extension().unwrap_or_default().to_string_lossy();
+                let example = sheet_file_name(&self.target.name, 0, count, &extension);
+                Err(VerifyError::WhichSheet { path: path.to_owned(), sheets: count, example })
+            }
+        }
+    }
+
+    fn verify_page(&self, document: &Document, page: usize, index: usize) -> SheetVerdict {
+        let layout = &self.target.sheets[index];
+        let tolerance_mm = document.size_tolerance_mm();
+        let mut page = document.render_fine(page);
+        let mut verdict = SheetVerdict {
+            sheet: index + 1,
+            px_per_mm: page.px_per_mm,
+            size_mm: [page.width_mm, page.height_mm],
+            check_bars_mm: Vec::new(),
+            corners: 0,
+            corners_found: 0,
+            tags: 0,
+            tags_exact: 0,
+            max_deviation_mm: 0.0,
+            findings: Vec::new(),
+        };
+        let stated_mm = [layout.width_mm, layout.height_mm];
+        let found_mm = verdict.size_mm;
+        if (0..2).any(|i| (found_mm[i] - stated_mm[i]).abs() > tolerance_mm) {
+            verdict.findings.push(Finding::PageSize { found_mm, stated_mm });
+        } else {
+            // Pictures begin at the upper edge and end with a whole pixel: heights are counted
+            // from the true lower edge, not from the end of the last pixel.
+            page.height_mm = layout.height_mm;
+        }
+        let found_from_stated = board::check(self, &page, layout, &mut verdict);
+        check_bars(&page, layout, &found_from_stated, &mut verdict);
+        verdict
+    }
+}
+
+/// Measures the check bars. Where the boards lie only tells where to look for them.
+fn check_bars(
+    page: &Page,
+    layout: &SheetLayout,
+    found_from_stated: &AffineMap,
+    verdict: &mut SheetVerdict,
+) {
+    for (index, bar) in layout.check_bars.iter().enumerate() {
+        let [dx, dy] = [0, 1].map(|i| bar.to_mm[i] - bar.from_mm[i]);
+        let stated_mm = dx.hypot(dy);
+        let found_mm =
+            bars::measure(page, [bar.from_mm, bar.to_mm].map(|end| found_from_stated.apply(end)));
+        verdict.check_bars_mm.push((stated_mm, found_mm));
+        if found_mm.is_none_or(|found| (found - stated_mm).abs() > TOLERANCE_MM) {
+            verdict.findings.push(Finding::CheckBar { bar: index + 1, found_mm, stated_mm });
+        }
+    }
+}

@@ -1,0 +1,322 @@
+use std::fmt;
+
+use serde::Serialize;
+
+use super::document::Format;
+
+/// What was found in one artifact.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Verdict {
+    /// File name of the artifact.
+    pub artifact: String,
+    /// Kind of file.
+    pub format: Format,
+    /// Whether the artifact is what the target says; true when nothing was found wrong.
+    pub passed: bool,
+    /// What is wrong with the file as a whole.
+    pub findings: Vec<Finding>,
+    /// Its pages.
+    pub sheets: Vec<SheetVerdict>,
+}
+
+/// What was found on one page.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SheetVerdict {
+    /// Sheet of the target, counted from 1.
+    pub sheet: usize,
+    /// Resolution at which it was looked at, px/mm.
+    pub px_per_mm: f64,
+    /// Page size as the file states it, mm.
+    pub size_mm: [f64; 2],
+    /// Lengths of the check bars, mm: stated, and measured where both ends were found.
+    pub check_bars_mm: Vec<(f64, Option<f64>)>,
+    /// Corners that the target has on this sheet.
+    pub corners: usize,
+    /// Those that were found with the right label.
+    pub corners_found: usize,
+    /// Tags that the target has on this sheet.
+    pub tags: usize,
+    /// Those that read exactly as stated, every cell.
+    pub tags_exact: usize,
+    /// Largest distance of a found corner from its stated position, mm.
+    pub max_deviation_mm: f64,
+    /// What is wrong.
+    pub findings: Vec<Finding>,
+}
+
+/// One way in which an artifact is not what the target says. Lengths in mm in the page frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Finding {
+    /// The file has too many or too few pages.
+    Pages {
+        /// Pages of the file.
+        found: usize,
+        /// Sheets of the target.
+        stated: usize,
+    },
+    /// The page has another size.
+    PageSize {
+        /// Width and height in the file.
+        found_mm: [f64; 2],
+        /// Width and height in the target.
+        stated_mm: [f64; 2],
+    },
+    /// A check bar has another length, or is not there.
+    CheckBar {
+        /// Which bar, from 1.
+        bar: usize,
+        /// Measured; `None` when an end was not found.
+        found_mm: Option<f64>,
+        /// Stated.
+        stated_mm: f64,
+    },
+    /// The panel was not recognised.
+    PanelMissing {
+        /// Its id.
+        panel: u32,
+    },
+    /// A panel was recognised that belongs on another sheet.
+    PanelForeign {
+        /// Its id.
+        panel: u32,
+    },
+    /// The panel is seen as in a mirror.
+    Mirrored {
+        /// Its id.
+        panel: u32,
+    },
+    /// The panel is larger or smaller than stated.
+    Scale {
+        /// Its id.
+        panel: u32,
+        /// Found over stated length.
+        scale: f64,
+    },
+    /// The panel is stretched: its scales along the page's axes differ.
+    Stretched {
+        /// Its id.
+        panel: u32,
+        /// Found over stated length along x and y.
+        scale: [f64; 2],
+    },
+    /// The panel is turned on the page.
+    Turned {
+        /// Its id.
+        panel: u32,
+        /// Counter-clockwise.
+        angle_deg: f64,
+    },
+    /// The panel lies elsewhere on the page.
+    Shifted {
+        /// Its id.
+        panel: u32,
+        /// Found minus stated position of its middle.
+        by_mm: [f64; 2],
+    },
+    /// A corner was not found.
+    CornerMissing {
+        /// Corner id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+    },
+    /// A corner lies elsewhere, all else being right.
+    CornerOff {
+        /// Corner id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Found minus stated position.
+        by_mm: [f64; 2],
+    },
+    /// A corner was found where the target has none.
+    CornerExtra {
+        /// Where.
+        at_mm: [f64; 2],
+    },
+    /// A tag reads as another one of its family.
+    TagReads {
+        /// Stated id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// The id that it reads.
+        reads: u32,
+        /// By how many thirds of a turn it is turned counter-clockwise.
+        turns: u8,
+    },
+    /// A tag has too many wrong cells to be corrected.
+    TagUnreadable {
+        /// Stated id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Wrong cells, by bit.
+        bits: Vec<u32>,
+    },
+    /// A tag has wrong cells that decoding would correct.
+    TagDamaged {
+        /// Stated id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Wrong cells, by bit.
+        bits: Vec<u32>,
+    },
+    /// The detector reads a tag that the target does not have there.
+    TagExtra {
+        /// The id that it reads.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+    },
+    /// A tile has the wrong colour.
+    TileColour {
+        /// Row of its lower-left vertex.
+        row: i32,
+        /// Column of its lower-left vertex.
+        col: i32,
+        /// Whether it should be black.
+        should_be_black: bool,
+    },
+    /// Part of a tile has the wrong colour.
+    Blemish {
+        /// Row of the tile's lower-left vertex.
+        row: i32,
+        /// Column of the tile's lower-left vertex.
+        col: i32,
+        /// The middle of the spot.
+        at_mm: [f64; 2],
+        /// Its area, mm².
+        area_mm2: f64,
+    },
+}
+
+/// Rounded to what is shown, so that a tiny negative number is not shown as −0.
+fn micrometres(mm: f64) -> f64 {
+    (mm * 1e3).round() / 1e3 + 0.0
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pages { found, stated } => write!(f, "{found} pages instead of {stated}"),
+            Self::PageSize { found_mm: [fw, fh], stated_mm: [sw, sh] } => {
+                write!(f, "page of {fw:.3} x {fh:.3} mm instead of {sw:.3} x {sh:.3} mm")
+            }
+            Self::CheckBar { bar, found_mm: Some(found), stated_mm } => {
+                write!(f, "check bar {bar} measures {found:.3} mm instead of {stated_mm:.3} mm")
+            }
+            Self::CheckBar { bar, found_mm: None, .. } => write!(f, "check bar {bar} not found"),
+            Self::PanelMissing { panel } => write!(f, "board {panel} not recognised"),
+            Self::PanelForeign { panel } => write!(f, "shows board {panel} of another sheet"),
+            Self::Mirrored { panel } => write!(f, "board {panel} is mirrored"),
+            Self::Scale { scale, .. } => write!(f, "scale {scale:.4}"),
+            Self::Stretched { scale: [x, y], .. } => {
+                write!(f, "stretched: scale {x:.4} along x, {y:.4} along y")
+            }
+            Self::Turned { angle_deg, .. } => write!(f, "turned by {angle_deg:.3}°"),
+            Self::Shifted { by_mm, .. } => {
+                let [x, y] = by_mm.map(micrometres);
+                write!(f, "shifted by ({x:.3}, {y:.3}) mm")
+            }
+            Self::CornerMissing { id, row, col } => {
+                write!(f, "corner {id} at row {row} col {col} not found")
+            }
+            Self::CornerOff { id, row, col, by_mm } => {
+                let [x, y] = by_mm.map(micrometres);
+                write!(f, "corner {id} at row {row} col {col} off by ({x:.3}, {y:.3}) mm")
+            }
+            Self::CornerExtra { at_mm: [x, y] } => {
+                write!(f, "a corner at ({x:.2}, {y:.2}) mm where none should be")
+            }
+            Self::TagReads { id, row, col, reads, .. } if id == reads => {
+                write!(f, "tag {id} at row {row} col {col} is turned")
+            }
+            Self::TagReads { id, row, col, reads, .. } => {
+                write!(f, "tag {id} at row {row} col {col} reads {reads}")
+            }
+            Self::TagUnreadable { id, row, col, bits } => {
+                let n = bits.len();
+                write!(f, "tag {id} at row {row} col {col} unreadable: {n} bits differ")
+            }
+            Self::TagDamaged { id, row, col, bits } => {
+                let n = bits.len();
+                let differ = if n == 1 { "bit differs" } else { "bits differ" };
+                write!(f, "tag {id} at row {row} col {col} damaged: {n} {differ}")
+            }
+            Self::TagExtra { id, row, col } => {
+                write!(f, "tag {id} is read at row {row} col {col}, where it should not be")
+            }
+            Self::TileColour { row, col, should_be_black: true } => {
+                write!(f, "tile missing at row {row} col {col}")
+            }
+            Self::TileColour { row, col, should_be_black: false } => {
+                write!(f, "tile at row {row} col {col} is black instead of white")
+            }
+            Self::Blemish { row, col, at_mm: [x, y], area_mm2 } => write!(
+                f,
+                "spot of {area_mm2:.3} mm² at ({x:.2}, {y:.2}) mm in the tile at row {row} col {col}"
+            ),
+        }
+    }
+}
+
+/// Findings named on the line for people; the report has all.
+const NAMED: usize = 4;
+
+impl fmt::Display for Verdict {
+    /// One line: what was proved, or what is wrong.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.artifact)?;
+        if self.passed {
+            let sum =
+                |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
+            let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
+            write!(f, "verified, ")?;
+            if self.sheets.len() > 1 {
+                write!(f, "{} pages, ", self.sheets.len())?;
+            }
+            write!(f, "{} corners within {deviation:.4} mm, ", sum(|s| s.corners_found))?;
+            write!(f, "{} tags exact, ", sum(|s| s.tags_exact))?;
+            let bars = self.sheets.iter().flat_map(|s| &s.check_bars_mm);
+            let bars: Vec<String> =
+                bars.filter_map(|(_, found)| Some(format!("{:.2}", (*found)?))).collect();
+            return match bars.as_slice() {
+                [] => write!(f, "page size exact"),
+                bars if bars.len() > NAMED => {
+                    write!(f, "{} check bars, page size exact", bars.len())
+                }
+                bars => write!(f, "check bars {} mm, page size exact", bars.join(" and ")),
+            };
+        }
+        let everywhere = self.findings.iter().map(ToString::to_string);
+        let on_sheets = self.sheets.iter().flat_map(|sheet| {
+            let page = if self.sheets.len() > 1 {
+                format!("page {}: ", sheet.sheet)
+            } else {
+                String::new()
+            };
+            sheet.findings.iter().map(move |finding| format!("{page}{finding}"))
+        });
+        let all: Vec<String> = everywhere.chain(on_sheets).collect();
+        write!(f, "FAILED, {}", all[..all.len().min(NAMED)].join("; "))?;
+        match all.len().saturating_sub(NAMED) {
+            0 => Ok(()),
+            more => write!(f, "; and {more} more"),
+        }
+    }
+}
