@@ -148,7 +148,8 @@ pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, Artwork
 fn subject(target: &Target) -> String {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
-    let mut subject = format!("deltille calibration target, {corners} corners, {tags} tags");
+    let plural = if tags == 1 { "" } else { "s" };
+    let mut subject = format!("deltille calibration target, {corners} corners, {tags} tag{plural}");
     if let Some(family) = &target.family {
         subject += &format!(", family {}, fingerprint {}", family.name, family.fingerprint);
     }

@@ -21,9 +21,23 @@ pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> Ex
         }
     };
     result.unwrap_or_else(|error| {
-        eprintln!("error: {}", format!("{error:#}").replace('\n', " "));
+        report(&error);
         ExitCode::from(BAD_INPUT)
     })
+}
+
+/// Prints an error and its causes on one line; a cause that the message above it tells already is
+/// left out.
+pub fn report(error: &anyhow::Error) {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if text.is_empty() {
+            text = cause;
+        } else if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    eprintln!("error: {}", text.replace('\n', " "));
 }
 
 /// The first paragraph of a message of clap, and its tip, on one line.

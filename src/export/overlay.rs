@@ -22,13 +22,13 @@ const COLOURS: [[u8; 3]; 6] =
 
 /// A tile edge is at least this long in the picture, px, where enlarging allows: so that ids of
 /// three digits stay legible beside their corners.
-const READABLE_EDGE_PX: f64 = 44.0;
+const READABLE_EDGE_PX: f64 = 52.0;
 /// Photographs are enlarged at most so many times, and only to this many pixels a side.
 const MOST_ENLARGED: u32 = 8;
 const LARGEST_SIDE_PX: u32 = 4096;
 /// Text height, line width and ring radius in tile edges.
-const TEXT_EDGES: f64 = 0.2;
-const TAG_TEXT_EDGES: f64 = 0.34;
+const TEXT_EDGES: f64 = 0.17;
+const TAG_TEXT_EDGES: f64 = 0.3;
 const LINE_EDGES: f64 = 0.03;
 const RING_EDGES: f64 = 0.09;
 

@@ -36,29 +36,24 @@ impl Target {
     /// Checks that this target can be used together with another one: no tag of the same family
     /// and no board has the same id.
     pub fn check_beside(&self, other: &Target) -> Result<(), TargetError> {
-        let overlap = |option, what: &str, own: &[u32], others: &[u32]| {
-            let (Some([first, last]), Some([low, high])) = (range(own), range(others)) else {
+        let overlap = |option, what, own: &[u32], others: &[u32]| {
+            let (Some([first, last]), Some([_, high])) = (range(own), range(others)) else {
                 return Ok(());
             };
             if !own.iter().any(|id| others.contains(id)) {
                 return Ok(());
             }
-            Err(TargetError::Overlap {
-                option,
-                what: format!("{what} {first} to {last} and {low} to {high}"),
-                name: self.name.clone(),
-                other: other.name.clone(),
-                free: u64::from(high) + 1,
-            })
+            let (other, free) = (other.name.clone(), u64::from(high) + 1);
+            Err(TargetError::Overlap { option, what, first, last, other, free })
         };
         let tags = |target: &Target| -> Vec<u32> {
             target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
         };
         let boards = |target: &Target| target.panels.iter().map(|p| p.id).collect::<Vec<_>>();
         if self.family.is_some() && self.family == other.family {
-            overlap("--first-id", "tags", &tags(self), &tags(other))?;
+            overlap("--first-id", "tag ids", &tags(self), &tags(other))?;
         }
-        overlap("--board-id", "boards", &boards(self), &boards(other))
+        overlap("--board-id", "board ids", &boards(self), &boards(other))
     }
 }
 
@@ -69,7 +64,7 @@ fn range(ids: &[u32]) -> Option<[u32; 2]> {
 
 /// The largest edge in whole millimetres with which a board fits on paper, if one of 5 mm does.
 pub fn largest_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> Option<f64> {
-    // Twice the longest side of any sheet is no edge that fits: the error proposes one that does.
+    // A metre fits next to nothing, and the refusal proposes an edge that does.
     let probe = BoardSpec { edge_mm: 1000.0, ..spec.clone() };
     match arrange(&probe, paper) {
         Ok(_) => Some(probe.edge_mm),

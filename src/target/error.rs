@@ -38,14 +38,16 @@ pub enum TargetError {
         highest_first: Option<u64>,
     },
     /// Targets to be used together share ids.
-    #[error("{option}: {what} of `{name}` and of `{other}` overlap: start at {free}")]
+    #[error("{option}: {what} {first} to {last} overlap those of `{other}`: start at {free}")]
     Overlap {
         /// The option to change.
         option: &'static str,
-        /// Which ids, such as `tags 0 to 8`.
-        what: String,
-        /// One target.
-        name: String,
+        /// Ids of what.
+        what: &'static str,
+        /// Lowest id.
+        first: u32,
+        /// Highest id.
+        last: u32,
         /// The other target.
         other: String,
         /// Lowest id above those of the other target.

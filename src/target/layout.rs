@@ -27,14 +27,9 @@ const LABEL_CAP_MM: f64 = 2.2;
 const HALF_STROKE_MM: f64 = 1.5;
 /// What letters such as g reach below the base line, in capital heights.
 const DESCENT_CAPS: f64 = 0.33;
-/// Blank between a bar and its words, and between marks, mm.
-const GAP_MM: f64 = 0.4;
-/// Distance of a bar's line from the outer side of its strip, mm.
-const BAR_LINE_MM: f64 = BAR_CAP_MM * (1.0 + DESCENT_CAPS) + GAP_MM;
-/// Thickness of the strip that a bar and its words take, mm.
-const BAR_STRIP_MM: f64 = BAR_LINE_MM + HALF_STROKE_MM;
-/// Thickness of the strip that the label takes, mm.
-const LABEL_STRIP_MM: f64 = LABEL_CAP_MM * (1.0 + DESCENT_CAPS) + 2.0 * GAP_MM;
+/// Blanks between a bar, its words and the label, mm: the first that leaves room for the board. The
+/// last is what 10 × 11 corners with 20 mm edges leave on A4.
+const GAPS_MM: [f64; 3] = [1.5, 0.8, 0.4];
 /// Blank between the ends of a bar and its words, mm.
 const BAR_INDENT_MM: f64 = 3.0;
 /// Check bars are a multiple of this long, mm: a round number is read off a ruler without error.
@@ -77,7 +72,36 @@ pub(super) struct Arrangement {
     turned: bool,
     /// Lower-left corner of the footprint.
     board_at: [f64; 2],
-    label_below: bool,
+    /// What lies along the lower and the right margin.
+    marks: [Marks; 2],
+}
+
+/// A check bar and perhaps the label, along a margin: distances from the margin inwards, mm.
+#[derive(Clone, Copy)]
+struct Marks {
+    label: bool,
+    gap: f64,
+}
+
+impl Marks {
+    /// Base line of the label.
+    const LABEL: f64 = LABEL_CAP_MM * DESCENT_CAPS;
+
+    /// Base line of the words on the bar.
+    fn words(self) -> f64 {
+        let label = if self.label { Self::LABEL + LABEL_CAP_MM + self.gap } else { 0.0 };
+        label + BAR_CAP_MM * DESCENT_CAPS
+    }
+
+    /// The line of the bar.
+    fn line(self) -> f64 {
+        self.words() + BAR_CAP_MM + self.gap
+    }
+
+    /// All of it.
+    fn depth(self) -> f64 {
+        self.line() + HALF_STROKE_MM
+    }
 }
 
 /// Fits a board on paper, in this order of preference: the smallest paper (where it is free), the
@@ -140,17 +164,19 @@ fn on_page(
 ) -> Option<Arrangement> {
     let Footprint { width, height, edge_blank, mark_blank } = *footprint;
     let board = if turned { [height, width] } else { [width, height] };
+    // The widest gaps that leave room along one axis, with or without the label there.
+    let widest = |axis: usize, label: bool| {
+        let outside = edge_blank + margin + mark_blank;
+        let room = page[axis] - outside - board[axis];
+        GAPS_MM.into_iter().map(|gap| Marks { label, gap }).find(|marks| marks.depth() <= room)
+    };
     [true, false].into_iter().find_map(|label_below| {
-        let strip = |with_label| BAR_STRIP_MM + if with_label { LABEL_STRIP_MM } else { 0.0 };
-        let right = margin + strip(!label_below) + mark_blank;
-        let lower = margin + strip(label_below) + mark_blank;
-        let room = [page[0] - edge_blank - right, page[1] - edge_blank - lower];
-        if board[0] > room[0] || board[1] > room[1] {
-            return None;
-        }
+        let (lower, right) = (widest(1, label_below)?, widest(0, !label_below)?);
         let middle = [(page[0] - board[0]) / 2.0, (page[1] - board[1]) / 2.0];
-        let board_at = [middle[0].min(page[0] - right - board[0]), middle[1].max(lower)];
-        Some(Arrangement { page, margin, turned, board_at, label_below })
+        let right_end = page[0] - margin - right.depth() - mark_blank - board[0];
+        let lower_end = margin + lower.depth() + mark_blank;
+        let board_at = [middle[0].min(right_end), middle[1].max(lower_end)];
+        Some(Arrangement { page, margin, turned, board_at, marks: [lower, right] })
     })
 }
 
@@ -158,50 +184,38 @@ impl Arrangement {
     /// The sheet of one panel.
     pub(super) fn sheet(&self, panel: &Panel, label: String) -> SheetLayout {
         let [width_mm, height_mm] = self.page;
-        let mut texts = Vec::new();
-        let (label_below, label_right) =
-            if self.label_below { (LABEL_STRIP_MM, 0.0) } else { (0.0, LABEL_STRIP_MM) };
-
-        // Both strips in the frame of the lower one: x along the bar, y outside in.
-        let right_strip = BAR_STRIP_MM + label_right;
+        let [lower_marks, right_marks] = self.marks;
+        let corner = right_marks.depth() + right_marks.gap;
         let lower = Strip {
             start: [self.margin, self.margin],
             turned: false,
-            length: width_mm - 2.0 * self.margin - right_strip - 2.0 * GAP_MM,
+            length: width_mm - 2.0 * self.margin - corner,
         };
         let right = Strip {
             start: [width_mm - self.margin, self.margin],
             turned: true,
             length: height_mm - 2.0 * self.margin,
         };
-        let check_bars =
-            [(&lower, label_below), (&right, label_right)].into_iter().map(|(strip, depth)| {
-                let length = (strip.length / BAR_STEP_MM).floor() * BAR_STEP_MM;
-                let from = (strip.length - length) / 2.0;
-                texts.push(SheetText {
-                    text: bar_words(length),
-                    at_mm: strip.at(from + BAR_INDENT_MM, depth + BAR_CAP_MM * DESCENT_CAPS),
-                    angle_rad: strip.angle(),
-                    cap_height_mm: BAR_CAP_MM,
-                    max_width_mm: length - 2.0 * BAR_INDENT_MM,
-                });
-                CheckBar {
-                    from_mm: strip.at(from, depth + BAR_LINE_MM),
-                    to_mm: strip.at(from + length, depth + BAR_LINE_MM),
-                }
-            });
-        let check_bars = check_bars.collect();
-        let strip = if self.label_below { &lower } else { &right };
-        texts.insert(
-            0,
-            SheetText {
-                text: label,
-                at_mm: strip.at(0.0, LABEL_CAP_MM * DESCENT_CAPS),
-                angle_rad: strip.angle(),
-                cap_height_mm: LABEL_CAP_MM,
-                max_width_mm: strip.length,
-            },
-        );
+        let strips = [(lower, lower_marks), (right, right_marks)];
+        let label = strips.iter().filter(|(_, marks)| marks.label).map(|(strip, _)| SheetText {
+            text: label.clone(),
+            at_mm: strip.at(0.0, Marks::LABEL),
+            angle_rad: strip.angle(),
+            cap_height_mm: LABEL_CAP_MM,
+            max_width_mm: strip.length,
+        });
+        let words = strips.iter().map(|(strip, marks)| SheetText {
+            text: bar_words(strip.bar_mm()),
+            at_mm: strip.at(BAR_INDENT_MM, marks.words()),
+            angle_rad: strip.angle(),
+            cap_height_mm: BAR_CAP_MM,
+            max_width_mm: strip.bar_mm() - 2.0 * BAR_INDENT_MM,
+        });
+        let bars = strips.iter().map(|(strip, marks)| CheckBar {
+            from_mm: strip.at(0.0, marks.line()),
+            to_mm: strip.at(strip.bar_mm(), marks.line()),
+        });
+        let (texts, check_bars) = (label.chain(words).collect(), bars.collect());
         SheetLayout {
             width_mm,
             height_mm,
@@ -237,6 +251,11 @@ impl Strip {
     fn at(&self, along: f64, inwards: f64) -> [f64; 2] {
         let [x, y] = self.start;
         if self.turned { [x - inwards, y + along] } else { [x + along, y + inwards] }
+    }
+
+    /// Length of the bar along it, mm.
+    fn bar_mm(&self) -> f64 {
+        (self.length / BAR_STEP_MM).floor() * BAR_STEP_MM
     }
 
     fn angle(&self) -> f64 {

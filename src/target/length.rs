@@ -28,6 +28,9 @@ pub fn parse_length_mm(text: &str) -> Result<f64, LengthError> {
 
 /// The shortest way to write a length in millimetres, with its unit: `20 mm`, `12.5 mm`.
 pub(super) fn format_mm(mm: f64) -> String {
+    if mm.abs() > 1e9 {
+        return format!("{mm:e} mm");
+    }
     // A nanometre is finer than any print; rounding there hides the noise of unit conversion.
     format!("{} mm", (mm * 1e6).round() / 1e6)
 }

@@ -1,13 +1,12 @@
 //! Check bars measured in a picture, without knowledge of how they were drawn.
 
 use super::document::Page;
-use crate::target::CheckBar;
 
 /// Distances from the line at which the end strokes are met, mm: beyond the line's own thickness
 /// and within strokes that reach 1.2 mm to either side.
 const OFFSETS_MM: std::ops::RangeInclusive<f64> = 0.5..=1.2;
 
-/// How far from its stated end a stroke is looked for: at least so far, mm,
+/// How far from its expected end a stroke is looked for: at least so far, mm,
 const REACH_MM: f64 = 3.0;
 /// or so far in lengths of the bar.
 const REACH: f64 = 0.05;
@@ -15,9 +14,10 @@ const REACH: f64 = 0.05;
 /// Ink that a stroke has at least at its darkest, 0 to 1; below it is dirt.
 const MIN_INK: f64 = 0.2;
 
-/// The distance between the outer edges of a bar's end strokes, mm; `None` where one is missing.
-pub(super) fn measure(page: &Page, bar: &CheckBar) -> Option<f64> {
-    let [from, to] = [bar.from_mm, bar.to_mm].map(|end| page.px_from_page(end));
+/// The distance between the outer edges of the end strokes of a bar near `ends_mm` on the page, mm;
+/// `None` where one is missing.
+pub(super) fn measure(page: &Page, ends_mm: [[f64; 2]; 2]) -> Option<f64> {
+    let [from, to] = ends_mm.map(|end| page.px_from_page(end));
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
     let length = dx.hypot(dy);
     if length < 1.0 {
@@ -33,7 +33,7 @@ pub(super) fn measure(page: &Page, bar: &CheckBar) -> Option<f64> {
 /// How far beyond `end`, in direction `outwards`, the outer edge of the stroke lies, px.
 ///
 /// Ink is sampled at whole pixels along lines parallel to the bar. A stroke is what is dark on all
-/// of them; the one nearest to the stated end counts. Its ink adds up to its width, and its centre
+/// of them; the one nearest to the expected end counts. Its ink adds up to its width, and its centre
 /// of gravity is its middle, whatever the resolution: edge = middle + width / 2.
 fn outer_edge(page: &Page, end: [f64; 2], outwards: [f64; 2], reach: f64) -> Option<f64> {
     let across = [-outwards[1], outwards[0]];

@@ -18,16 +18,17 @@ const MATCH_EDGES: f64 = 0.25;
 /// name them one by one would say nothing.
 const MAX_WRONG_TILES: f64 = 0.25;
 
-/// Compares all panels of a page.
+/// Compares all panels of a page, and tells where on the page the first of them lies.
 pub(super) fn check(
     verifier: &Verifier,
     page: &Page,
     layout: &SheetLayout,
     verdict: &mut SheetVerdict,
-) {
+) -> AffineMap {
     let detection = verifier.detector.detect(&page.image, "page");
     // Looked at in a mirror only if need be.
     let mut mirrored: Option<Detection> = None;
+    let mut mirror = None;
     let mut placed = Vec::new();
     for placement in &layout.placements {
         let id = placement.panel;
@@ -42,6 +43,8 @@ pub(super) fn check(
                 .get_or_insert_with(|| verifier.detector.detect(&page.mirrored().image, "mirror"));
             if mirrored.grids.iter().any(|grid| grid.panel == Some(id)) {
                 verdict.findings.push(Finding::Mirrored { panel: id });
+                let linear = [[-1.0, 0.0], [0.0, 1.0]];
+                mirror = Some(AffineMap { linear, shift: [page.width_mm, 0.0] });
                 continue;
             }
         }
@@ -58,6 +61,8 @@ pub(super) fn check(
     if verdict.corners_found > 0 {
         extra_corners(&detection, &placed, verdict);
     }
+    let first = placed.first().map(|panel| panel.found_from_stated);
+    mirror.or(first).unwrap_or(AffineMap::IDENTITY)
 }
 
 /// Compares one panel: corners, then tiles and tags where the corners say they are.

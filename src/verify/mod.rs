@@ -28,6 +28,7 @@ use crate::detect::{Detector, DetectorConfig};
 use crate::export::sheet_file_name;
 use crate::family::Family;
 use crate::target::{SheetLayout, Target};
+use fit::AffineMap;
 
 pub use document::{Document, DocumentError, Format, Page};
 pub use verdict::{Finding, SheetVerdict, Verdict};
@@ -78,8 +79,12 @@ impl<'a> Verifier<'a> {
             return Err(VerifyError::NoSheets(target.name.clone()));
         }
         if let Some(needed) = &target.family {
+            // A .dsc file names its family without a fingerprint.
+            let same = |family: &Family| {
+                needed.fingerprint.is_empty() || family.fingerprint() == needed.fingerprint
+            };
             let given = match family {
-                Some(family) if family.fingerprint() == needed.fingerprint => None,
+                Some(family) if same(family) => None,
                 Some(family) => {
                     Some(format!("{} has fingerprint {}", family.name(), family.fingerprint()))
                 }
@@ -165,17 +170,24 @@ impl<'a> Verifier<'a> {
             // from the true lower edge, not from the end of the last pixel.
             page.height_mm = layout.height_mm;
         }
-        check_bars(&page, layout, &mut verdict);
-        board::check(self, &page, layout, &mut verdict);
+        let found_from_stated = board::check(self, &page, layout, &mut verdict);
+        check_bars(&page, layout, &found_from_stated, &mut verdict);
         verdict
     }
 }
 
-fn check_bars(page: &Page, layout: &SheetLayout, verdict: &mut SheetVerdict) {
+/// Measures the check bars. Where the boards lie only tells where to look for them.
+fn check_bars(
+    page: &Page,
+    layout: &SheetLayout,
+    found_from_stated: &AffineMap,
+    verdict: &mut SheetVerdict,
+) {
     for (index, bar) in layout.check_bars.iter().enumerate() {
         let [dx, dy] = [0, 1].map(|i| bar.to_mm[i] - bar.from_mm[i]);
         let stated_mm = dx.hypot(dy);
-        let found_mm = bars::measure(page, bar);
+        let found_mm =
+            bars::measure(page, [bar.from_mm, bar.to_mm].map(|end| found_from_stated.apply(end)));
         verdict.check_bars_mm.push((stated_mm, found_mm));
         if found_mm.is_none_or(|found| (found - stated_mm).abs() > TOLERANCE_MM) {
             verdict.findings.push(Finding::CheckBar { bar: index + 1, found_mm, stated_mm });

@@ -205,6 +205,11 @@ pub enum Finding {
     },
 }
 
+/// Rounded to what is shown, so that a tiny negative number is not shown as −0.
+fn micrometres(mm: f64) -> f64 {
+    (mm * 1e3).round() / 1e3 + 0.0
+}
+
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -224,11 +229,15 @@ impl fmt::Display for Finding {
                 write!(f, "stretched: scale {x:.4} along x, {y:.4} along y")
             }
             Self::Turned { angle_deg, .. } => write!(f, "turned by {angle_deg:.3}°"),
-            Self::Shifted { by_mm: [x, y], .. } => write!(f, "shifted by ({x:.3}, {y:.3}) mm"),
+            Self::Shifted { by_mm, .. } => {
+                let [x, y] = by_mm.map(micrometres);
+                write!(f, "shifted by ({x:.3}, {y:.3}) mm")
+            }
             Self::CornerMissing { id, row, col } => {
                 write!(f, "corner {id} at row {row} col {col} not found")
             }
-            Self::CornerOff { id, row, col, by_mm: [x, y] } => {
+            Self::CornerOff { id, row, col, by_mm } => {
+                let [x, y] = by_mm.map(micrometres);
                 write!(f, "corner {id} at row {row} col {col} off by ({x:.3}, {y:.3}) mm")
             }
             Self::CornerExtra { at_mm: [x, y] } => {

@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use anyhow::{Context, bail};
 
 use super::settings::{Plan, Settings};
-use super::target_file;
+use super::{target_file, verify};
 use crate::artwork::{self, Artwork};
 use crate::cli::interrupt;
 use crate::export::{atomic, dsc, pdf, png, sheet_file_name, svg};
@@ -33,9 +33,12 @@ pub struct Args {
     /// Folder to write to
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
+    /// Do not read the written files back to compare them with the description
+    #[arg(long)]
+    no_verify: bool,
 }
 
-/// Makes a board and writes its files.
+/// Makes a board, writes its files, and verifies what it wrote.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let settings = match &args.template {
         Some(path) => args.settings.or(Settings::read(path)?),
@@ -57,10 +60,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         atomic::write(path, |out| out.write_all(template.as_bytes()))?;
     }
     println!("{}", summary(&target));
-    for path in written {
+    for path in &written {
         println!("wrote {}", path.display());
     }
-    Ok(ExitCode::SUCCESS)
+    if args.no_verify {
+        return Ok(ExitCode::SUCCESS);
+    }
+    let drawn = |path: &PathBuf| path.extension().is_some_and(|e| e != "json" && e != "dsc");
+    let artifacts: Vec<PathBuf> = written.into_iter().filter(drawn).collect();
+    verify::verify(&target, family.as_ref(), &artifacts, None)
 }
 
 /// A file to be written: its name, and what writes it to a path.

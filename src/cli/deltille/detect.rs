@@ -11,7 +11,7 @@ use clap::ValueEnum;
 use rayon::prelude::*;
 
 use super::target_file;
-use crate::cli::run::{BAD_INPUT, FAILED};
+use crate::cli::run::{self, BAD_INPUT, FAILED};
 use crate::cli::{interrupt, progress};
 use crate::detect::{Detection, Detector, DetectorConfig};
 use crate::export::{atomic, csv, detection, orpc, overlay};
@@ -25,22 +25,22 @@ pub struct Args {
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
     /// Description of the target: the .json of `deltille board`, or a .dsc
-    #[arg(long, value_name = "FILE", conflicts_with = "grid", required_unless_present = "grid")]
+    #[arg(long, value_name = "FILE", conflicts_with = "grid")]
     target: Option<PathBuf>,
     /// Find untagged boards of this tiling instead
     #[arg(long, value_name = "KIND")]
     grid: Option<Kind>,
     /// Rows of corners of the untagged board: labels boards seen whole from their lower left
-    #[arg(long, requires = "grid", requires = "cols", value_parser = side())]
+    #[arg(long, conflicts_with = "target", requires = "cols", value_parser = side())]
     rows: Option<u32>,
     /// Corners in each row of the untagged board
-    #[arg(long, requires = "grid", requires = "rows", value_parser = side())]
+    #[arg(long, conflicts_with = "target", requires = "rows", value_parser = side())]
     cols: Option<u32>,
     /// Family file, where the target names a family that is not shipped
-    #[arg(long, requires = "target")]
+    #[arg(long, conflicts_with = "grid")]
     family: Option<String>,
     /// Most bits of a tag that may be corrected [default: ⌊(h−1)/2⌋ of its family]
-    #[arg(long, value_name = "BITS", requires = "target")]
+    #[arg(long, value_name = "BITS", conflicts_with = "grid")]
     max_errors: Option<u32>,
     /// Folder for the results, named after the images
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
@@ -79,6 +79,9 @@ fn side() -> clap::builder::RangedI64ValueParser<u32> {
 
 /// Detects in all images; an image that cannot be read is reported, and the rest go on.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.target.is_none() && args.grid.is_none() {
+        bail!("give --target FILE, or --grid deltille for untagged boards");
+    }
     let target = args.target.as_deref().map(target_file::read).transpose().context("--target")?;
     let detector = detector(&args, target.as_ref())?;
     let stems = stems(&args)?;
@@ -113,7 +116,7 @@ fn report(results: Vec<anyhow::Result<String>>) -> anyhow::Result<ExitCode> {
         match result {
             Ok(line) => println!("{line}"),
             Err(error) if all == 1 => return Err(error),
-            Err(error) => eprintln!("error: {}", format!("{error:#}").replace('\n', " ")),
+            Err(error) => run::report(&error),
         }
     }
     if failed == 0 {

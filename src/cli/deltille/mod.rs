@@ -4,6 +4,7 @@ mod board;
 mod detect;
 mod settings;
 mod target_file;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -23,6 +24,8 @@ enum Command {
     Board(Box<board::Args>),
     /// Find a target, or untagged boards, in photographs
     Detect(detect::Args),
+    /// Compare the files of a target with its description
+    Verify(verify::Args),
 }
 
 /// Runs the program.
@@ -30,5 +33,6 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Board(args) => board::run(*args),
         Command::Detect(args) => detect::run(args),
+        Command::Verify(args) => verify::run(args),
     }
 }

@@ -22,14 +22,14 @@ const DEFAULT_DPI: u32 = 300;
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct Settings {
     /// Rows of corners
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     rows: Option<u32>,
     /// Corners in each row
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     cols: Option<u32>,
     /// Edge of a tile, such as 20mm, 2cm, 0.8in [default: 20mm, or the largest in whole
     /// millimetres that fits --paper]
-    #[arg(long, value_name = "LENGTH")]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
     /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
     #[arg(long)]
@@ -39,19 +39,19 @@ pub struct Settings {
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
     /// A tag in every n-th row and column [default: 3]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     tag_spacing: Option<u32>,
     /// Black border of a tag, in widths of a bit [default: 1.5]
-    #[arg(long, value_name = "BITS")]
+    #[arg(long, value_name = "BITS", allow_negative_numbers = true)]
     tag_border: Option<f64>,
     /// Id of the first tag; the others follow [default: 0]
-    #[arg(long, value_name = "ID")]
+    #[arg(long, value_name = "ID", allow_negative_numbers = true)]
     first_id: Option<u32>,
     /// Id of the first board [default: 0]
-    #[arg(long, value_name = "ID")]
+    #[arg(long, value_name = "ID", allow_negative_numbers = true)]
     board_id: Option<u32>,
     /// Number of boards, alike but for their ids, each on its own sheet [default: 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     boards: Option<u32>,
     /// White tiles on black
     #[arg(long)]
@@ -65,7 +65,7 @@ pub struct Settings {
     #[arg(long)]
     orientation: Option<String>,
     /// Blank along the edges of the paper [default: 5mm]
-    #[arg(long, value_name = "LENGTH")]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     margin: Option<String>,
     /// Write <name>.pdf; so it is where no other of pdf, svg, png is asked for
     #[arg(long)]
@@ -87,7 +87,7 @@ pub struct Settings {
     #[arg(long, value_name = "DIALECT")]
     dsc_dialect: Option<String>,
     /// Resolution of the PNG, dots per inch [default: 300]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     dpi: Option<u32>,
     /// Stem of the files' names, printed on the sheet [default: board]
     #[arg(long)]

@@ -1,0 +1,103 @@
+//! `deltille verify`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use serde::Serialize;
+
+use super::target_file;
+use crate::cli::run::FAILED;
+use crate::export::{atomic, sheet_file_name};
+use crate::family::Family;
+use crate::target::Target;
+use crate::verify::{Verdict, Verifier};
+
+/// Arguments of `deltille verify`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Description of the target, as `deltille board` writes it
+    target: PathBuf,
+    /// Files to verify; without any, the PDF, SVG and PNG files of the target beside it
+    artifacts: Vec<PathBuf>,
+    /// Family of the tags, by name or file; only needed where the target's name for it is not known
+    #[arg(long)]
+    family: Option<String>,
+    /// Write all that was measured and found as JSON
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+}
+
+/// Compares files with the target that they should show.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let target = target_file::read(&args.target)?;
+    let family = target_file::family(&target, args.family.as_deref())?;
+    let folder = args.target.parent().unwrap_or(Path::new("."));
+    let artifacts = match args.artifacts.as_slice() {
+        [] => artifacts_in(folder, &target),
+        given => given.to_vec(),
+    };
+    if artifacts.is_empty() {
+        let name = &target.name;
+        bail!("no {name}.pdf, .svg or .png beside {}: name the files", args.target.display());
+    }
+    verify(&target, family.as_ref(), &artifacts, args.report.as_deref())
+}
+
+/// Verifies files and prints a line on each, then the sum of it.
+pub fn verify(
+    target: &Target,
+    family: Option<&Family>,
+    artifacts: &[PathBuf],
+    report: Option<&Path>,
+) -> anyhow::Result<ExitCode> {
+    let verifier = Verifier::new(target, family)?;
+    let mut verdicts = Vec::with_capacity(artifacts.len());
+    for path in artifacts {
+        let verdict = verifier.verify(path)?;
+        println!("{verdict}");
+        verdicts.push(verdict);
+    }
+    let failed = verdicts.iter().filter(|verdict| !verdict.passed).count();
+    if let Some(path) = report {
+        let report = Report::new(target, &verdicts);
+        let json = serde_json::to_string_pretty(&report).context("--report")? + "\n";
+        atomic::write(path, |file| file.write_all(json.as_bytes())).context("--report")?;
+    }
+    let count = verdicts.len();
+    let files = if count == 1 { "file" } else { "files" };
+    if failed > 0 {
+        println!("FAILED: {failed} of {count} {files} differ from target {}", target.name);
+        return Ok(ExitCode::from(FAILED));
+    }
+    println!("verified: {count} {files} of target {}", target.name);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The artifacts of a target that are in a folder.
+fn artifacts_in(folder: &Path, target: &Target) -> Vec<PathBuf> {
+    let count = target.sheets.len();
+    let pages = ["svg", "png"].into_iter().flat_map(|extension| {
+        (0..count).map(move |index| sheet_file_name(&target.name, index, count, extension))
+    });
+    std::iter::once(format!("{}.pdf", target.name))
+        .chain(pages)
+        .map(|name| folder.join(name))
+        .filter(|path| path.is_file())
+        .collect()
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    schema: &'static str,
+    target: &'a str,
+    passed: bool,
+    artifacts: &'a [Verdict],
+}
+
+impl<'a> Report<'a> {
+    fn new(target: &'a Target, artifacts: &'a [Verdict]) -> Self {
+        let passed = artifacts.iter().all(|verdict| verdict.passed);
+        Self { schema: "deltille/verdict/1", target: &target.name, passed, artifacts }
+    }
+}

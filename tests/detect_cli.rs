@@ -1,0 +1,124 @@
+//! `deltille detect`: results in every format, overlays, and images that cannot be read.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use deltille::export::detection;
+use deltille::target::Target;
+
+fn deltille(folder: &Path, args: &str) -> std::process::Output {
+    let mut command = Command::cargo_bin("deltille").unwrap();
+    command.current_dir(folder).args(args.split_whitespace()).output().unwrap()
+}
+
+/// A folder with a board as `board.json`, `board.dsc` and `sheet/board.png`.
+fn board() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let made = deltille(folder.path(), "board --rows 6 --cols 7 --png --dsc --dpi 100 -o sheet");
+    assert!(made.status.success());
+    for name in ["board.json", "board.dsc"] {
+        std::fs::rename(folder.path().join("sheet").join(name), folder.path().join(name)).unwrap();
+    }
+    folder
+}
+
+/// Where a corner of the target lies in the image of its sheet, px.
+fn image_of(target: &Target, corner: usize, dpi: f64) -> [f64; 2] {
+    let (placement, sheet) = (&target.sheets[0].placements[0], &target.sheets[0]);
+    let [u, v] = target.panels[0].corners[corner].panel_mm;
+    let [x, y] = [placement.origin_mm[0] + u, placement.origin_mm[1] + v];
+    [x / 25.4 * dpi - 0.5, (sheet.height_mm - y) / 25.4 * dpi - 0.5]
+}
+
+#[test]
+fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
+    let folder = board();
+    let path = |name: &str| folder.path().join(name);
+    for target in ["board.json", "board.dsc"] {
+        let args = format!(
+            "detect --target {target} sheet/board.png -o out --format json,orpc,csv --overlay -j 1"
+        );
+        let output = deltille(folder.path(), &args);
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{:?}", String::from_utf8(output.stderr));
+        assert!(said.contains("1 grid, 42 corners"), "{said}");
+
+        let json = std::fs::read_to_string(path("out/board.json")).unwrap();
+        let found = detection::read(&json).unwrap();
+        assert_eq!(detection::write(&found), json);
+        let target = Target::from_json(&std::fs::read_to_string(path("board.json")).unwrap());
+        let target = target.unwrap();
+        assert_eq!(found.grids[0].panel, Some(0));
+        for (i, corner) in found.grids[0].corners.iter().enumerate() {
+            assert_eq!(corner.id, Some(i as u32));
+            let [x, y] = image_of(&target, i, 100.0);
+            assert!((corner.x - x).hypot(corner.y - y) < 0.1, "{corner:?} at {x}, {y}");
+        }
+
+        let orpc = std::fs::read_to_string(path("out/board.orpc")).unwrap();
+        let lines: Vec<&str> = orpc.lines().collect();
+        assert_eq!(lines[0], "filename: board.png");
+        assert_eq!(lines[3..5], ["num_corners: 42", "encoding: ascii"]);
+        // Matrix of 9 columns: rows 0 and 1 start in column 2, rows 2 and 3 in column 1.
+        assert!(lines[5].starts_with("0,2,1,") && lines[12].starts_with("0,11,1,"));
+        assert!(lines[19].starts_with("0,19,1,") && lines.len() == 47);
+
+        let csv = std::fs::read_to_string(path("out/board.csv")).unwrap();
+        assert_eq!(csv.lines().count(), 43);
+        assert!(csv.lines().nth(1).unwrap().starts_with("0,deltille,0,0,2,0,"));
+
+        let overlay = deltille::raster::read(&path("out/board.overlay.png")).unwrap();
+        assert!(overlay.width() as u32 >= found.width);
+    }
+}
+
+#[test]
+fn unreadable_images_are_counted_and_the_rest_go_on() {
+    let folder = board();
+    let png = std::fs::read(folder.path().join("sheet/board.png")).unwrap();
+    std::fs::write(folder.path().join("cut.png"), &png[..png.len() / 2]).unwrap();
+    std::fs::write(folder.path().join("empty.png"), "").unwrap();
+    let args = "detect --grid deltille cut.png empty.png sheet/board.png missing.png -o out";
+    let output = deltille(folder.path(), args);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    for name in ["cut.png", "empty.png", "missing.png", "3 of 4 images failed"] {
+        assert_eq!(said.matches(name).count(), 1, "{said}");
+    }
+    let written: Vec<_> = std::fs::read_dir(folder.path().join("out")).unwrap().collect();
+    assert_eq!(written.len(), 1);
+}
+
+#[test]
+fn bad_input_is_one_line_and_exit_code_2() {
+    let folder = board();
+    let json = std::fs::read_to_string(folder.path().join("board.json")).unwrap();
+    std::fs::write(folder.path().join("cut.json"), &json[..json.len() / 2]).unwrap();
+    std::fs::write(folder.path().join("empty.dsc"), "").unwrap();
+    std::fs::create_dir(folder.path().join("other")).unwrap();
+    std::fs::copy(folder.path().join("sheet/board.png"), folder.path().join("other/board.png"))
+        .unwrap();
+    for (args, words) in [
+        ("detect sheet/board.png", "--target FILE, or --grid"),
+        ("detect --target board.json", "<IMAGE>"),
+        ("detect --target cut.json sheet/board.png", "cut.json"),
+        ("detect --target empty.dsc sheet/board.png", "empty.dsc"),
+        ("detect --target missing.json sheet/board.png", "missing.json"),
+        ("detect --target sheet/board.png sheet/board.png", "sheet/board.png"),
+        ("detect --target board.json sheet/board.png --max-errors 9", "--max-errors"),
+        ("detect --target board.json sheet/board.png --rows 3 --cols 3", "--rows"),
+        ("detect --target board.json sheet/board.png --family delTag25h9", "fingerprint"),
+        ("detect --target board.json sheet/board.png", "overwrite the target"),
+        ("detect --grid hexagons sheet/board.png", "hexagons"),
+        ("detect --grid deltille sheet/board.png --rows 0 --cols 4", "--rows"),
+        ("detect --grid deltille sheet/board.png -j 0", "-j"),
+        ("detect --grid deltille sheet/board.png other/board.png", "board.json"),
+        ("detect --grid deltille empty.dsc", "empty.dsc"),
+    ] {
+        let output = deltille(folder.path(), args);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{args}: {said}");
+        assert!(said.starts_with("error: ") && said.lines().count() == 1, "{args}: {said}");
+        assert!(said.contains(words), "{args}: {said}");
+    }
+}
