@@ -14,7 +14,7 @@ fn deltille(folder: &Path, args: &str) -> std::process::Output {
 /// A folder with a board as `board.json`, `board.dsc` and `sheet/board.png`.
 fn board() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let made = deltille(folder.path(), "board --rows 6 --cols 7 --png --dsc --dpi 100 -o sheet");
+    let made = deltille(folder.path(), "board --rows 6 --cols 7 --png --dsc --dpi 200 -o sheet");
     assert!(made.status.success());
     for name in ["board.json", "board.dsc"] {
         std::fs::rename(folder.path().join("sheet").join(name), folder.path().join(name)).unwrap();
@@ -51,7 +51,7 @@ fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
         assert_eq!(found.grids[0].panel, Some(0));
         for (i, corner) in found.grids[0].corners.iter().enumerate() {
             assert_eq!(corner.id, Some(i as u32));
-            let [x, y] = image_of(&target, i, 100.0);
+            let [x, y] = image_of(&target, i, 200.0);
             assert!((corner.x - x).hypot(corner.y - y) < 0.1, "{corner:?} at {x}, {y}");
         }
 

@@ -71,10 +71,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     verify::verify(&target, family.as_ref(), &artifacts, None)
 }
 
-/// A file to be written: its name, and what writes it to a path.
+/// Writes one file to a path.
+type Writer = dyn Fn(&Path) -> anyhow::Result<()>;
+
+/// A file to be written: its name, and what writes it.
 struct File {
     name: String,
-    write: Box<dyn Fn(&Path) -> anyhow::Result<()>>,
+    write: Box<Writer>,
 }
 
 /// The files of a plan. What can be refused is refused here, before anything is written.
@@ -148,7 +151,7 @@ fn summary(target: &Target) -> String {
         format!("{}: {boards}{} × {} corners, edge {edge} mm", target.name, spec.rows, spec.cols);
     let mut ids = panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id);
     if let (Some(family), Some(first)) = (&target.family, ids.next()) {
-        let last = ids.last().unwrap_or(first);
+        let last = ids.next_back().unwrap_or(first);
         text += &format!(", {} ids {first}–{last}", family.name);
     }
     text + &format!(", page {} × {} mm", sheet.width_mm, sheet.height_mm)

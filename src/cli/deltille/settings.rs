@@ -17,6 +17,9 @@ const DEFAULT_EDGE_MM: f64 = 20.0;
 /// Resolution of PNG files, dots per inch.
 const DEFAULT_DPI: u32 = 300;
 
+/// Range of the resolution: in a coarser picture a check bar cannot be measured to 0.02 mm.
+const DPI: std::ops::RangeInclusive<u32> = 200..=2400;
+
 /// Settings as they are given; what is not given has a default.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
@@ -209,8 +212,8 @@ impl Settings {
             None => Dialect::default(),
         };
         let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
-        if !(72..=2400).contains(&dpi) {
-            bail!("--dpi: {dpi} is not between 72 and 2400");
+        if !DPI.contains(&dpi) {
+            bail!("--dpi: {dpi} is not between {} and {}", DPI.start(), DPI.end());
         }
         Ok(Plan {
             name: self.name.clone().unwrap_or_else(|| "board".to_owned()),
