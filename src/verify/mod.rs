@@ -36,6 +36,12 @@ pub use verdict::{Finding, SheetVerdict, Verdict};
 /// Largest deviation of a position or a length, mm: a fifth of what a good printer adds.
 pub const TOLERANCE_MM: f64 = 0.02;
 
+/// Print resolution of 300 dpi, px/mm: 0.02 mm is a quarter of a pixel.
+const PRINT_PX_PER_MM: f64 = 300.0 / 25.4;
+
+/// Least edge of a tag's cell in the picture, px: its inside is then more than a few pixels.
+const CELL_PX: f64 = 8.0;
+
 /// Why an artifact cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
@@ -145,10 +151,21 @@ impl<'a> Verifier<'a> {
         }
     }
 
+    /// Print resolution, or finer where the cells of tags are small.
+    fn wish_px_per_mm(&self, layout: &SheetLayout) -> f64 {
+        let panels = self.target.panels.iter();
+        let here = panels.filter(|panel| layout.placements.iter().any(|p| p.panel == panel.id));
+        let cells_mm = here.filter_map(|panel| {
+            let rows = f64::from(self.family?.dimension().rows());
+            Some(panel.edge_mm / (rows + 3.0 * panel.border_bits?))
+        });
+        cells_mm.map(|cell_mm| CELL_PX / cell_mm).fold(PRINT_PX_PER_MM, f64::max)
+    }
+
     fn verify_page(&self, document: &Document, page: usize, index: usize) -> SheetVerdict {
         let layout = &self.target.sheets[index];
         let tolerance_mm = document.size_tolerance_mm();
-        let mut page = document.render_fine(page);
+        let mut page = document.render(page, self.wish_px_per_mm(layout));
         let mut verdict = SheetVerdict {
             sheet: index + 1,
             px_per_mm: page.px_per_mm,

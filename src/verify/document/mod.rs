@@ -9,8 +9,6 @@ use std::path::{Path, PathBuf};
 
 use crate::raster::Gray;
 
-/// Resolution of 300 dpi, px/mm: print resolution, at which 0.02 mm is a quarter of a pixel.
-const FINE_PX_PER_MM: f64 = 300.0 / 25.4;
 /// Largest picture that is drawn for a check, px.
 const MAX_PIXELS: f64 = 60.0e6;
 
@@ -55,7 +53,7 @@ pub struct Document {
 
 enum Content {
     Pdf(pdf::Pdf),
-    Svg(svg::Svg),
+    Svg(Box<svg::Svg>),
     Png(png::Png),
 }
 
@@ -88,7 +86,7 @@ impl Document {
             .map_err(|source| DocumentError::Io { path: path.to_owned(), source })?;
         let content = match format {
             Format::Pdf => Content::Pdf(pdf::Pdf::parse(bytes).map_err(unreadable)?),
-            Format::Svg => Content::Svg(svg::Svg::parse(&bytes).map_err(unreadable)?),
+            Format::Svg => Content::Svg(Box::new(svg::Svg::parse(&bytes).map_err(unreadable)?)),
             Format::Png => Content::Png(png::Png::parse(&bytes).map_err(unreadable)?),
         };
         Ok(Self { content, format })
@@ -141,11 +139,6 @@ impl Document {
             Content::Png(png) => png.image().clone(),
         };
         Page { width_mm, height_mm, px_per_mm, image }
-    }
-
-    /// [`Self::render`] at print resolution.
-    pub fn render_fine(&self, page: usize) -> Page {
-        self.render(page, FINE_PX_PER_MM)
     }
 }
 

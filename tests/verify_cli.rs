@@ -1,0 +1,82 @@
+//! `deltille verify` as a user meets it.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use predicates::prelude::PredicateBooleanExt;
+use predicates::str::contains;
+use tempfile::TempDir;
+
+fn deltille(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("deltille").unwrap().current_dir(folder).args(arguments).assert()
+}
+
+/// A folder with a small board in every format.
+fn board() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    let arguments = ["board", "--rows", "3", "--cols", "4", "--edge", "20mm", "--name", "b"];
+    let formats = ["--pdf", "--svg", "--png"];
+    deltille(folder.path(), &[&arguments[..], &formats].concat()).success();
+    folder
+}
+
+#[test]
+fn the_files_beside_the_description_are_verified() {
+    let folder = board();
+    deltille(folder.path(), &["verify", "b.json", "--report", "r.json"])
+        .success()
+        .stdout(contains("b.pdf: verified, 12 corners within"))
+        .stdout(contains("b.svg: verified"))
+        .stdout(contains("b.png: verified"))
+        .stdout(contains("verified: 3 files of target b"));
+    let report = fs::read_to_string(folder.path().join("r.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["passed"], true);
+    assert_eq!(report["artifacts"][0]["sheets"][0]["corners_found"], 12);
+}
+
+#[test]
+fn a_changed_file_fails_with_exit_code_1() {
+    let folder = board();
+    let svg = folder.path().join("b.svg");
+    let text = fs::read_to_string(&svg).unwrap();
+    // The tile at row 1, column 1 is gone.
+    let line = text.lines().find(|line| line.contains("id=\"tile-0-r1-c1\"")).unwrap();
+    fs::write(&svg, text.replace(line, "")).unwrap();
+    deltille(folder.path(), &["verify", "b.json", "b.svg", "b.pdf", "--report", "r.json"])
+        .code(1)
+        .stdout(contains("b.svg: FAILED").and(contains("tile missing at row 1 col 1")))
+        .stdout(contains("b.pdf: verified"))
+        .stdout(contains("FAILED: 1 of 2 files differ from target b"));
+    let report = fs::read_to_string(folder.path().join("r.json")).unwrap();
+    assert!(report.contains("\"kind\": \"tile_colour\""));
+}
+
+#[test]
+fn bad_input_is_one_line_and_exit_code_2() {
+    let folder = board();
+    let path = folder.path();
+    fs::write(path.join("empty.pdf"), "").unwrap();
+    let pdf = fs::read(path.join("b.pdf")).unwrap();
+    fs::write(path.join("cut.pdf"), &pdf[..pdf.len() / 2]).unwrap();
+    fs::write(path.join("broken.json"), "{").unwrap();
+    fs::create_dir(path.join("alone")).unwrap();
+    fs::copy(path.join("b.json"), path.join("alone/b.json")).unwrap();
+    let cases: [(&[&str], &str); 7] = [
+        (&["b.json", "empty.pdf"], "empty.pdf"),
+        (&["b.json", "cut.pdf"], "cut.pdf"),
+        (&["b.json", "absent.png"], "absent.png"),
+        (&["b.json", "b.json"], "not a .pdf, .svg or .png"),
+        (&["broken.json"], "broken.json"),
+        (&["alone/b.json"], "no b.pdf, .svg or .png beside"),
+        (&["b.json", "--report", "nowhere/r.json"], "nowhere"),
+    ];
+    for (arguments, reason) in cases {
+        let output = deltille(path, &[&["verify"], arguments].concat()).code(2);
+        let output = output.stderr(contains(reason));
+        let stderr = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+        assert_eq!(stderr.lines().count(), 1, "{stderr}");
+        assert!(stderr.starts_with("error: "), "{stderr}");
+    }
+}
