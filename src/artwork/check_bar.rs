@@ -1,9 +1,6 @@
 use kurbo::{Affine, BezPath};
 
-use crate::target::CheckBar;
-
-/// Length of an end stroke, across the bar, mm.
-pub const STROKE_LENGTH_MM: f64 = 3.0;
+use crate::target::{CHECK_BAR_STROKE_MM, CheckBar};
 
 /// Width of an end stroke, along the bar, mm: a hair wider than a ruler's line.
 pub const STROKE_WIDTH_MM: f64 = 0.3;
@@ -18,7 +15,7 @@ const LINE_MM: f64 = 0.2;
 /// ```
 pub(super) fn outline(bar: &CheckBar) -> BezPath {
     let [dx, dy] = [bar.to_mm[0] - bar.from_mm[0], bar.to_mm[1] - bar.from_mm[1]];
-    let (length, stroke, line) = (dx.hypot(dy), STROKE_LENGTH_MM / 2.0, LINE_MM / 2.0);
+    let (length, stroke, line) = (dx.hypot(dy), CHECK_BAR_STROKE_MM / 2.0, LINE_MM / 2.0);
     let (inner, outer) = (STROKE_WIDTH_MM, length - STROKE_WIDTH_MM);
     let corners = [
         (0.0, -stroke),

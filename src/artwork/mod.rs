@@ -23,7 +23,7 @@ use crate::family::Family;
 use crate::target::Target;
 
 pub use cells::white_outlines;
-pub use check_bar::{STROKE_LENGTH_MM, STROKE_WIDTH_MM};
+pub use check_bar::STROKE_WIDTH_MM;
 pub use gallery::{GalleryTile, tag_gallery};
 
 /// Everything that is drawn of one target.

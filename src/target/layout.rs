@@ -23,13 +23,14 @@ use super::{
 const BAR_CAP_MM: f64 = 1.8;
 /// Capital height of the label, mm.
 const LABEL_CAP_MM: f64 = 2.2;
-/// Half the length of a bar's end strokes, mm.
-const HALF_STROKE_MM: f64 = 1.5;
+/// Length of a bar's end strokes, across the bar, mm: enough to lay a ruler on, short enough to
+/// leave room for the words.
+pub const CHECK_BAR_STROKE_MM: f64 = 2.0;
 /// What letters such as g reach below the base line, in capital heights.
 const DESCENT_CAPS: f64 = 0.33;
 /// Blanks between a bar, its words and the label, mm: the first that leaves room for the board. The
 /// last is what 10 × 11 corners with 20 mm edges leave on A4.
-const GAPS_MM: [f64; 3] = [1.5, 0.8, 0.4];
+const GAPS_MM: [f64; 2] = [1.5, 0.8];
 /// Blank between the ends of a bar and its words, mm.
 const BAR_INDENT_MM: f64 = 3.0;
 /// Check bars are a multiple of this long, mm: a round number is read off a ruler without error.
@@ -100,7 +101,7 @@ impl Marks {
 
     /// All of it.
     fn depth(self) -> f64 {
-        self.line() + HALF_STROKE_MM
+        self.line() + CHECK_BAR_STROKE_MM / 2.0
     }
 }
 
@@ -393,9 +394,9 @@ mod tests {
             let slack = 1e-9;
             prop_assert!(left >= edge_blank - slack && upper <= sheet.height_mm - edge_blank + slack);
             let [below, beside] = &sheet.check_bars[..] else { panic!("two bars") };
-            prop_assert!(below.from_mm[1] + HALF_STROKE_MM + mark_blank <= lower + slack);
-            prop_assert!(beside.from_mm[0] - HALF_STROKE_MM - mark_blank >= right - slack);
-            prop_assert!(below.to_mm[0] < beside.to_mm[0] - HALF_STROKE_MM);
+            prop_assert!(below.from_mm[1] + (CHECK_BAR_STROKE_MM / 2.0) + mark_blank <= lower + slack);
+            prop_assert!(beside.from_mm[0] - (CHECK_BAR_STROKE_MM / 2.0) - mark_blank >= right - slack);
+            prop_assert!(below.to_mm[0] < beside.to_mm[0] - (CHECK_BAR_STROKE_MM / 2.0));
             for (bar, axis) in [(below, 0), (beside, 1)] {
                 let size = [sheet.width_mm, sheet.height_mm][axis];
                 prop_assert!(bar.from_mm[axis] >= margin - slack && bar.to_mm[axis] <= size - margin + slack);

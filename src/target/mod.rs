@@ -24,6 +24,7 @@ pub use board::zigzag_vertices;
 pub use build::largest_edge_mm;
 pub use error::TargetError;
 pub use json::{SCHEMA, TargetFileError};
+pub use layout::CHECK_BAR_STROKE_MM;
 pub use length::{LengthError, parse_length_mm};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec};
 pub use spec::{BoardSpec, ListFormat, ListedSpec, TagSpec, TargetSpec};

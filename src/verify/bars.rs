@@ -3,8 +3,8 @@
 use super::document::Page;
 
 /// Distances from the line at which the end strokes are met, mm: beyond the line's own thickness
-/// and within strokes that reach 1.2 mm to either side.
-const OFFSETS_MM: std::ops::RangeInclusive<f64> = 0.5..=1.2;
+/// and within strokes that reach 1 mm to either side.
+const OFFSETS_MM: std::ops::RangeInclusive<f64> = 0.4..=0.8;
 
 /// How far from its expected end a stroke is looked for: at least so far, mm,
 const REACH_MM: f64 = 3.0;
