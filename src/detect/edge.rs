@@ -52,7 +52,7 @@ pub fn is_clean(image: &Gray<i16>, a: &Saddle, i: usize, b: &Saddle, j: usize) -
     let (left_side, right_side) = (side((i + 1) % 6, (j + 5) % 6), side((i + 5) % 6, (j + 1) % 6));
     // Unit vectors along the chord and to its left on the print.
     let (along, left) = ([dx / length, dy / length], [dy / length, -dx / length]);
-    let dark_left = i % 2 == 0;
+    let dark_left = i.is_multiple_of(2);
     let amplitude = a.sectors.amplitude.min(b.sectors.amplitude);
     let mut failures = 0;
     for station in 0..STATIONS {

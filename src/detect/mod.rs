@@ -2,13 +2,13 @@
 //!
 //! The stages, each in its file, each from the paper (§3) with what measurements added:
 //!
-//! 1. [`ring`] finds candidates: pixels around which dark and bright alternate three times.
-//! 2. [`cubic`] fits cubic surfaces and walks to the umbilic point; J < 0 or it is no corner.
-//! 3. [`sectors`] reads the six half-edges with their colours.
-//! 4. [`links`] joins corners along clean edges ([`edge`]).
-//! 5. [`grow`] starts from quads of tiles, grows breadth-first and fills the gaps.
-//! 6. [`tags`] reads the tiles, [`label`] lets all tags together decide panel, rows and columns.
-//! 7. [`refine`] gives the last word on positions.
+//! 1. `ring` finds candidates: pixels around which dark and bright alternate three times.
+//! 2. `cubic` fits cubic surfaces and walks to the umbilic point; J < 0 or it is no corner.
+//! 3. `sectors` reads the six half-edges with their colours.
+//! 4. `links` joins corners along clean edges (`edge`).
+//! 5. `grow` starts from quads of tiles, grows breadth-first and fills the gaps.
+//! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns.
+//! 7. `refine` gives the last word on positions.
 
 mod cubic;
 mod detection;

@@ -92,8 +92,7 @@ fn maxima_of_row(window: &[Vec<f32>], y: usize, threshold: f32, found: &mut Vec<
     let width = window[0].len();
     let centre = &window[y % rows];
     let margin = RADIUS + SUPPRESSION_RADIUS;
-    for x in margin..width - margin {
-        let response = centre[x];
+    for (x, &response) in centre.iter().enumerate().take(width - margin).skip(margin) {
         if response <= threshold {
             continue;
         }

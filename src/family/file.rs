@@ -67,7 +67,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
         .codes
         .iter()
         .enumerate()
-        .map(|(id, text)| parse_word(text).ok_or_else(|| (id, text)))
+        .map(|(id, text)| parse_word(text).ok_or((id, text)))
         .collect::<Result<Vec<u64>, _>>()
         .map_err(|(id, text)| {
             let problem = format!("`{text}` is not a hexadecimal word such as 0x08f50a7");
