@@ -19,12 +19,17 @@
 //! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
 //! costs the square of their number.
 
+pub mod algebra;
+pub mod best;
 mod certificate;
 mod control;
 mod decoder;
 mod error;
 mod file;
+mod independent;
+mod kernels;
 pub mod lexicode;
+mod polish;
 mod rules;
 mod shipped;
 mod statistics;
