@@ -127,6 +127,8 @@ pub struct Best {
     pub time: Duration,
     /// Seed of all random choices.
     pub seed: u64,
+    /// Whether local search may exchange codes at the end; without it the family is algebraic.
+    pub exchange: bool,
 }
 
 /// A union, how it is arranged, and how many words pass.
@@ -146,7 +148,7 @@ impl Best {
         let start = Instant::now();
         // Most of the gain comes from good sources and arrangements, at 25 bits and fewer also
         // from exchanging codes.
-        let small = self.dimension.bits() <= super::polish::MAX_BITS;
+        let small = self.exchange && self.dimension.bits() <= super::polish::MAX_BITS;
         let until = |share: f64| start + self.time.mul_f64(share);
         let [sources, arrangements] = if small { [0.3, 0.5] } else { [0.6, 1.0] };
         let mut candidates = self.sources(until(sources), start, control)?;
@@ -247,7 +249,11 @@ impl Best {
         let free_centre = has_free_centre(union);
         let arranger =
             Arranger::new(self.dimension, self.distance, &self.rules, orbits, free_centre);
-        if self.rules.min_complexity > 0.0 && min_distance(union) > self.distance {
+        if self.exchange
+            && self.rules.min_complexity > 0.0
+            && self.dimension.bits() <= super::polish::MAX_BITS
+            && min_distance(union) > self.distance
+        {
             arranger.with_nearly(REPAIR.0, REPAIR.1)
         } else {
             arranger
@@ -370,6 +376,9 @@ impl Best {
             seed: self.seed,
         };
         let codes = construction.codes(screen)?;
+        if !self.exchange {
+            return Ok((codes, Construction::Algebraic(construction)));
+        }
         let effort = Effort { seed: self.seed, rounds: 50, steps: 400_000 };
         let quiet = Control { report: None, ..control };
         let polished = polish(screen, codes.clone(), effort, quiet, || Instant::now() >= end);

@@ -21,10 +21,12 @@
 
 pub mod algebra;
 pub mod best;
+pub mod bounds;
 mod certificate;
 mod control;
 mod decoder;
 mod error;
+mod export;
 mod file;
 mod independent;
 mod kernels;
@@ -42,6 +44,7 @@ pub use certificate::{Certificate, certify};
 pub use control::{Control, Progress};
 pub use decoder::{Decoded, Decoder};
 pub use error::FamilyError;
+pub use export::{ExportFormat, export};
 pub use file::{Construction, SCHEMA};
 pub use rules::{Rules, Screen};
 pub use shipped::shipped_names;
