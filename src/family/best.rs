@@ -6,7 +6,7 @@
 
 use std::time::{Duration, Instant};
 
-use rand::seq::SliceRandom;
+use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -40,6 +40,9 @@ pub struct AlgebraicConstruction {
     pub arrangement: Arrangement,
     /// Words of the tag that local search put in, hexadecimal.
     pub exchanged: Vec<String>,
+    /// Only so many codes are listed, the first in order; absent for all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limit: Option<u64>,
     /// Seed of the search that found all this.
     pub seed: u64,
 }
@@ -58,8 +61,6 @@ impl AlgebraicConstruction {
             code: Span::of(self.words("basis", &self.basis, dimension)?),
             cosets: self.words("cosets", &self.cosets, dimension)?,
         };
-        /// Beyond this the list would not fit in memory.
-        const MOST_DIMENSIONS: u32 = 26;
         if union.code.dimension() > MOST_DIMENSIONS {
             return Err(FamilyError::field("construction.basis", "more than 26 dimensions"));
         }
@@ -73,8 +74,50 @@ impl AlgebraicConstruction {
             codes.retain(apart);
         }
         codes.extend(exchanged);
-        codes.par_sort_unstable_by_key(|&code| screen.words().canonical(code));
+        codes.sort_by_cached_key(|&code| screen.words().canonical(code));
+        codes.truncate(self.limit.map_or(usize::MAX, |limit| limit as usize));
         Ok(codes)
+    }
+
+    /// A proof, from the structure of the code, that words of the family and their turns are
+    /// `distance` apart; or the reason why it is none. Takes time in proportion to the number of
+    /// codes, not to its square.
+    ///
+    /// The basis has to span a code that the turn leaves invariant and whose lightest word weighs
+    /// `distance` or more (all are looked at), and each code, arranged back, has to lie in it. Then
+    /// any two words are as far apart as some word of the linear code is heavy.
+    pub fn prove(&self, screen: &Screen, codes: &[u64]) -> Result<(), String> {
+        let dimension = screen.words().dimension();
+        let space = CycleSpace::of(dimension);
+        let words = |field, list| self.words(field, list, dimension).map_err(|e| e.to_string());
+        let code = Span::of(words("basis", &self.basis)?);
+        let cosets = words("cosets", &self.cosets)?;
+        if !self.arrangement.fits(space) || code.dimension() > MOST_DIMENSIONS {
+            return Err("the construction does not fit such tags".to_owned());
+        }
+        if !self.exchanged.is_empty() || cosets != [0] {
+            return Err("not a linear code alone".to_owned());
+        }
+        if !code.rows().iter().all(|&row| code.contains(space.turn(row))) {
+            return Err("the linear code changes when the tag turns".to_owned());
+        }
+        let light = |word: &u64| (1..screen.distance()).contains(&word.count_ones());
+        if code.words().any(|word| light(&word)) {
+            return Err("the linear code has too light a word".to_owned());
+        }
+        let union = CosetUnion { space, code, cosets };
+        // The free centre is no part of the linear code: it only adds distance.
+        let ignored = if has_free_centre(&union) { 1u64 << (space.bits() - 1) } else { 0 };
+        let translation = self.arrangement.translation(space);
+        let map = self.arrangement.bit_map(dimension);
+        let back = |tag: u64| {
+            (0..).zip(&map).fold(0u64, |word, (i, &from)| word | (tag >> from & 1) << i)
+        };
+        let belongs = |&tag: &u64| union.code.contains((back(tag) ^ translation) & !ignored);
+        match codes.par_iter().position_first(|tag| !belongs(tag)) {
+            Some(id) => Err(format!("code {id} is not in the linear code")),
+            None => Ok(()),
+        }
     }
 
     fn words(
@@ -94,6 +137,9 @@ impl AlgebraicConstruction {
             .collect()
     }
 }
+
+/// Beyond this the list of words would not fit in memory.
+const MOST_DIMENSIONS: u32 = 26;
 
 /// The words of a union on the tag, one of each orbit, as far as the screen admits them.
 fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> Vec<u64> {
@@ -127,6 +173,8 @@ pub struct Best {
     pub time: Duration,
     /// Seed of all random choices.
     pub seed: u64,
+    /// Number of codes at most.
+    pub limit: Option<u64>,
     /// Whether local search may exchange codes at the end; without it the family is algebraic.
     pub exchange: bool,
 }
@@ -246,7 +294,12 @@ impl Best {
         /// A changed cell makes up to three pairs differ, and about this share of such words can
         /// be had without conflict.
         const REPAIR: (u32, f64) = (3, 0.7);
+        /// Words by which an arrangement is judged, at most.
+        const JUDGED_WORDS: usize = 30_000;
         let free_centre = has_free_centre(union);
+        // Of very many words a part tells which arrangement is good.
+        let step = orbits.len().div_ceil(JUDGED_WORDS);
+        let orbits = orbits.into_iter().step_by(step.max(1)).collect();
         let arranger =
             Arranger::new(self.dimension, self.distance, &self.rules, orbits, free_centre);
         if self.exchange
@@ -268,8 +321,10 @@ impl Best {
             .filter(|&q| residue::min_distance(q) >= self.distance)
             .filter(|&q| residue::space(q).cycles >= space.cycles)
             .collect();
-        if draw % 4 == 0 && !primes.is_empty() {
-            let q = primes[(draw / 4) as usize % primes.len()];
+        // A random code of 49 bits takes long to check and is far smaller.
+        let only_residue = self.dimension.bits() > 36;
+        if (draw % 4 == 0 || only_residue) && !primes.is_empty() {
+            let q = *primes.choose(random).expect("not empty");
             let whole = residue::space(q);
             let mut keep: Vec<u32> = (0..whole.cycles).collect();
             keep.shuffle(random);
@@ -373,6 +428,7 @@ impl Best {
             cosets: hex(&candidate.union.cosets),
             arrangement: candidate.arrangement.clone(),
             exchanged: Vec::new(),
+            limit: self.limit,
             seed: self.seed,
         };
         let codes = construction.codes(screen)?;

@@ -53,6 +53,9 @@ pub use tagwords::TagWords;
 
 use crate::lattice::Dimension;
 
+/// The pairs of larger families are too many to count one by one.
+pub(crate) const PAIRS_COUNTED: usize = 100_000;
+
 /// A DelTag family: its codes, and how they came about.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Family {
@@ -80,7 +83,11 @@ impl Family {
         construction: Construction,
     ) -> Result<Self, FamilyError> {
         file::check_form(name, dimension, distance, &codes, &rules)?;
-        let histogram = distance_histogram(dimension, &codes);
+        let histogram = if codes.len() <= PAIRS_COUNTED {
+            distance_histogram(dimension, &codes)
+        } else {
+            BTreeMap::new()
+        };
         let fingerprint = file::fingerprint(dimension, distance, &codes);
         let name = name.to_owned();
         Ok(Self { name, dimension, distance, codes, rules, construction, histogram, fingerprint })
@@ -166,7 +173,8 @@ impl Family {
         &self.construction
     }
 
-    /// Number of unordered pairs, among the codes and their turns, at each distance.
+    /// Number of unordered pairs, among the codes and their turns, at each distance; empty for
+    /// families of more than 100,000 codes.
     pub fn histogram(&self) -> &BTreeMap<u32, u64> {
         &self.histogram
     }

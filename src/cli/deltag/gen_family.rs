@@ -43,6 +43,10 @@ pub(super) struct Args {
     /// For a 36-bit lexicode: keep a checkpoint in this file, and go on from it if it is there
     #[arg(long)]
     resume: Option<PathBuf>,
+    /// Number of codes at most, for the methods best and algebraic [default: as many as a file of
+    /// 64 MiB holds]
+    #[arg(long)]
+    limit: Option<u64>,
     /// Name of the family, also the stem of its file [default: as the bits and distance]
     #[arg(long)]
     name: Option<String>,
@@ -86,6 +90,14 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         family.fingerprint()
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// Size of a family file, roughly, at most.
+const FILE_LIMIT: u64 = 64 << 20;
+
+/// Length of a code's line: four spaces, quotes, 0x, digits, comma, line feed.
+fn bytes_per_code(dimension: Dimension) -> u64 {
+    u64::from(dimension.bits().div_ceil(4)) + 10
 }
 
 fn search(
@@ -137,7 +149,8 @@ fn search(
             let time = Duration::from_secs_f64(args.time);
             let exchange = args.method == Method::Best;
             let seed = args.seed;
-            Best { dimension, distance, rules, time, seed, exchange }.family(name, control)?
+            let limit = args.limit.or((dimension.bits() > 36).then(|| FILE_LIMIT / bytes_per_code(dimension)));
+            Best { dimension, distance, rules, time, seed, limit, exchange }.family(name, control)?
         }
     };
     bar.finish_and_clear();
