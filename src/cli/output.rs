@@ -15,6 +15,14 @@ pub fn file(output: &Path, stem: &str, extension: &str) -> PathBuf {
     }
 }
 
+/// Prints a result; a reader that has gone away (`| head`) is not an error.
+pub fn print(text: &str) -> anyhow::Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}
+
 /// Writes a file under a temporary name beside it, then renames it.
 pub fn write(path: &Path, content: &[u8]) -> anyhow::Result<()> {
     let folder = match path.parent() {

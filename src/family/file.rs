@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::best::AlgebraicConstruction;
 use super::{Family, FamilyError, Rules, TagWords};
 use crate::lattice::Dimension;
 
@@ -25,6 +26,18 @@ pub enum Construction {
         step: u64,
         /// Number of candidates tried.
         candidates: u64,
+    },
+    /// A union of cosets of a linear code, arranged on the tag, with some codes exchanged
+    /// ([`super::algebra`]).
+    Algebraic(AlgebraicConstruction),
+    /// Local search from nothing ([`super::best`]); rerun with the same numbers it gives the same.
+    Search {
+        /// Seed of the random choices.
+        seed: u64,
+        /// Rounds of the search.
+        rounds: u32,
+        /// Moves in each round.
+        steps: u64,
     },
     /// Codes taken over from elsewhere.
     Imported {

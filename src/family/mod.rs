@@ -19,12 +19,19 @@
 //! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
 //! costs the square of their number.
 
+pub mod algebra;
+pub mod best;
+pub mod bounds;
 mod certificate;
 mod control;
 mod decoder;
 mod error;
+mod export;
 mod file;
+mod independent;
+mod kernels;
 pub mod lexicode;
+mod polish;
 mod rules;
 mod shipped;
 mod statistics;
@@ -37,6 +44,7 @@ pub use certificate::{Certificate, certify};
 pub use control::{Control, Progress};
 pub use decoder::{Decoded, Decoder};
 pub use error::FamilyError;
+pub use export::{ExportFormat, export};
 pub use file::{Construction, SCHEMA};
 pub use rules::{Rules, Screen};
 pub use shipped::shipped_names;
@@ -44,6 +52,9 @@ pub use statistics::{ball, distance_histogram, false_positive_rates};
 pub use tagwords::TagWords;
 
 use crate::lattice::Dimension;
+
+/// The pairs of larger families are too many to count one by one.
+pub(crate) const PAIRS_COUNTED: usize = 100_000;
 
 /// A DelTag family: its codes, and how they came about.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +83,11 @@ impl Family {
         construction: Construction,
     ) -> Result<Self, FamilyError> {
         file::check_form(name, dimension, distance, &codes, &rules)?;
-        let histogram = distance_histogram(dimension, &codes);
+        let histogram = if codes.len() <= PAIRS_COUNTED {
+            distance_histogram(dimension, &codes)
+        } else {
+            BTreeMap::new()
+        };
         let fingerprint = file::fingerprint(dimension, distance, &codes);
         let name = name.to_owned();
         Ok(Self { name, dimension, distance, codes, rules, construction, histogram, fingerprint })
@@ -158,7 +173,8 @@ impl Family {
         &self.construction
     }
 
-    /// Number of unordered pairs, among the codes and their turns, at each distance.
+    /// Number of unordered pairs, among the codes and their turns, at each distance; empty for
+    /// families of more than 100,000 codes.
     pub fn histogram(&self) -> &BTreeMap<u32, u64> {
         &self.histogram
     }

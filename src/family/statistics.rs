@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::TagWords;
+use super::kernels::count_distances;
 use crate::lattice::Dimension;
 
 /// Number of unordered pairs of different words, among the codes and their turns, at each distance.
@@ -18,9 +19,7 @@ pub fn distance_histogram(dimension: Dimension, codes: &[u64]) -> BTreeMap<u32, 
         .map(|(i, &[code, once, _])| {
             let mut counts = [0u64; 65];
             counts[(code ^ once).count_ones() as usize] += 1;
-            for other in turned[..i].as_flattened() {
-                counts[(code ^ other).count_ones() as usize] += 1;
-            }
+            count_distances(code, turned[..i].as_flattened(), &mut counts);
             counts
         })
         .reduce(

@@ -1,7 +1,12 @@
 //! `deltag`: search, check and list DelTag code families.
 
+mod bounds;
+mod export;
 mod gen_family;
+mod info;
 mod list;
+mod parameters;
+mod plan;
 mod verify_family;
 
 use std::process::ExitCode;
@@ -22,6 +27,14 @@ enum Command {
     GenFamily(gen_family::Args),
     /// Check every claim of a family file from nothing but its codes
     VerifyFamily(verify_family::Args),
+    /// Tell all about a family
+    Info(info::Args),
+    /// Print upper bounds for the size of a family, and how close the shipped ones come
+    Bounds(bounds::Args),
+    /// Name the smallest shipped family that suffices for a target
+    Plan(plan::Args),
+    /// Write a family for another program
+    Export(export::Args),
     /// List the families that come with the program
     List(list::Args),
 }
@@ -31,6 +44,10 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
     match deltag.command {
         Command::GenFamily(args) => gen_family::run(args),
         Command::VerifyFamily(args) => verify_family::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Bounds(args) => bounds::run(args),
+        Command::Plan(args) => plan::run(args),
+        Command::Export(args) => export::run(args),
         Command::List(args) => list::run(args),
     }
 }

@@ -1,0 +1,61 @@
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::ValueEnum;
+
+use crate::cli::output;
+use crate::family::{ExportFormat, Family, export};
+
+#[derive(clap::Args)]
+pub(super) struct Args {
+    /// A shipped family, or a family file
+    family: String,
+    /// What to write
+    #[arg(long, value_enum)]
+    format: Format,
+    /// Folder for the file, or the file itself [default: standard output]
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Stem of the file [default: the family's name]
+    #[arg(long)]
+    name: Option<String>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    /// C header
+    C,
+    /// Rust module
+    Rust,
+    /// Python module
+    Python,
+    /// The family file
+    Json,
+    /// One hexadecimal word a line
+    Txt,
+    /// OpenCV FileStorage YAML
+    Opencv,
+}
+
+pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let family = Family::resolve(&args.family)?;
+    let format = match args.format {
+        Format::C => ExportFormat::C,
+        Format::Rust => ExportFormat::Rust,
+        Format::Python => ExportFormat::Python,
+        Format::Json => ExportFormat::Json,
+        Format::Txt => ExportFormat::Text,
+        Format::Opencv => ExportFormat::OpenCv,
+    };
+    let text = export(&family, format);
+    match args.output {
+        None => output::print(&text)?,
+        Some(place) => {
+            let stem = args.name.as_deref().unwrap_or(family.name());
+            let path = output::file(&place, stem, format.extension());
+            output::write(&path, text.as_bytes())?;
+            println!("{}", path.display());
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,27 @@
+use std::str::FromStr;
+
+use crate::lattice::Dimension;
+
+/// Bits and distance, written d25h7.
+#[derive(Clone, Copy)]
+pub(super) struct Parameters {
+    pub(super) dimension: Dimension,
+    pub(super) distance: u32,
+}
+
+impl FromStr for Parameters {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (bits, distance) = text
+            .strip_prefix('d')
+            .and_then(|rest| rest.split_once('h'))
+            .and_then(|(b, h)| Some((b.parse().ok()?, h.parse().ok()?)))
+            .ok_or("write bits and distance such as d25h7")?;
+        let dimension = Dimension::from_bits(bits).map_err(|e| e.to_string())?;
+        if !(1..=bits).contains(&distance) {
+            return Err(format!("the distance must be between 1 and the {bits} bits"));
+        }
+        Ok(Self { dimension, distance })
+    }
+}

@@ -1,0 +1,260 @@
+//! Which cycle of a code goes where on the tag.
+//!
+//! Assigning cycles, turning them on their places and adding a rotation-fixed word change neither
+//! distances nor invariance ([`Arrangement`]), but they decide how many words are complex enough
+//! to be tags. Simulated annealing over these choices; all words are judged at once, 64 to a
+//! machine word, by counting differing neighbours in bit slices.
+
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{Arrangement, CycleSpace};
+use crate::family::{Rules, Screen, TagWords};
+use crate::lattice::{Dimension, TagCells};
+
+/// 512 words of the code, one bit each.
+type Slice = [u64; 8];
+
+/// Judges arrangements of one code.
+#[derive(Clone, Debug)]
+pub struct Arranger {
+    dimension: Dimension,
+    space: CycleSpace,
+    words: Vec<u64>,
+    /// slices[i][bit]: bit `bit` of words 512·i to 512·i + 511.
+    slices: Vec<Vec<Slice>>,
+    edges: Vec<[u8; 2]>,
+    min_pairs: u32,
+    black_distance: u32,
+    white_distance: u32,
+    free_centre: bool,
+    /// Pairs that a word may lack and still be worth something, and what it is worth.
+    nearly: Option<(u32, f64)>,
+}
+
+impl Arranger {
+    /// For the words of a code, one of each orbit. With `free_centre` the central bit of each word
+    /// may be chosen after the fact, and a word counts when either choice is fine.
+    pub fn new(
+        dimension: Dimension,
+        distance: u32,
+        rules: &Rules,
+        words: Vec<u64>,
+        free_centre: bool,
+    ) -> Self {
+        let space = CycleSpace::of(dimension);
+        let slices = words
+            .chunks(512)
+            .map(|chunk| {
+                let slice = |bit: u32| {
+                    let mut slice = [0; 8];
+                    for (i, word) in chunk.iter().enumerate() {
+                        slice[i / 64] |= (word >> bit & 1) << (i % 64);
+                    }
+                    slice
+                };
+                (0..space.bits()).map(slice).collect()
+            })
+            .collect();
+        Self {
+            dimension,
+            space,
+            slices,
+            edges: TagCells::new(dimension).neighbours().to_vec(),
+            min_pairs: Screen::new(TagWords::new(dimension), distance, rules).min_pairs,
+            black_distance: rules.black_distance,
+            white_distance: rules.white_distance,
+            words,
+            free_centre: free_centre && space.centre,
+            nearly: None,
+        }
+    }
+
+    /// Counts a word that lacks up to `pairs` differing pairs as the fraction `worth` of one: where
+    /// the code's distance leaves room, one changed cell may repair it.
+    pub fn with_nearly(mut self, pairs: u32, worth: f64) -> Self {
+        self.nearly = Some((pairs.min(self.min_pairs), worth));
+        self
+    }
+
+    /// Number of words that satisfy the rules under an arrangement.
+    pub fn score(&self, arrangement: &Arrangement) -> u32 {
+        let weights = self.weights(arrangement.inverted);
+        self.count(arrangement, &weights, self.min_pairs)
+    }
+
+    /// What annealing maximises.
+    fn worth(&self, arrangement: &Arrangement, weights: &[Slice]) -> f64 {
+        let good = f64::from(self.count(arrangement, weights, self.min_pairs));
+        self.nearly.map_or(good, |(pairs, worth)| {
+            let nearly = self.count(arrangement, weights, self.min_pairs - pairs);
+            good + worth * (f64::from(nearly) - good)
+        })
+    }
+
+    /// Which words are far enough from all black and all white; where cycles go does not matter.
+    fn weights(&self, inverted: u32) -> Vec<Slice> {
+        let translation =
+            Arrangement { inverted, ..Arrangement::plain(self.space) }.translation(self.space);
+        let bits = self.space.bits();
+        let centre = u64::from(self.free_centre) << (bits - 1);
+        let fine = |word: u64| {
+            // With a free centre the choice that helps is taken.
+            let white = (word | centre).count_ones();
+            let black = bits - (word & !centre).count_ones();
+            white >= self.black_distance && black >= self.white_distance
+        };
+        self.words
+            .chunks(512)
+            .map(|chunk| {
+                let mut slice = [0; 8];
+                for (i, word) in chunk.iter().enumerate() {
+                    slice[i / 64] |= u64::from(fine(word ^ translation)) << (i % 64);
+                }
+                slice
+            })
+            .collect()
+    }
+
+    fn count(&self, arrangement: &Arrangement, weights: &[Slice], min_pairs: u32) -> u32 {
+        let to_tag = arrangement.bit_map(self.dimension);
+        let mut code_bit = [0u8; 64];
+        (0..).zip(&to_tag).for_each(|(i, &to)| code_bit[usize::from(to)] = i);
+        let inverted = arrangement.translation(self.space);
+        // Per edge of the tag: the two bits of the code, and whether just one is inverted.
+        let edges: Vec<(u8, u8, u64)> = self
+            .edges
+            .iter()
+            .map(|&[a, b]| {
+                let (a, b) = (code_bit[usize::from(a)], code_bit[usize::from(b)]);
+                let flip = (inverted >> a ^ inverted >> b) & 1;
+                (a, b, flip.wrapping_neg())
+            })
+            .collect();
+        let centre = self.free_centre.then(|| self.space.bits() as u8 - 1);
+        self.slices
+            .iter()
+            .zip(weights)
+            .map(|(slices, weights)| {
+                let mut pass = enough(&edges, slices, centre, 0, min_pairs);
+                if centre.is_some() {
+                    let other = enough(&edges, slices, centre, u64::MAX, min_pairs);
+                    pass = std::array::from_fn(|i| pass[i] | other[i]);
+                }
+                pass.iter().zip(weights).map(|(p, w)| (p & w).count_ones()).sum::<u32>()
+            })
+            .sum()
+    }
+
+    /// Anneals from a random arrangement; the same for the same seed and number of steps. Returns
+    /// what the best arrangement is worth, and it.
+    pub fn anneal(&self, seed: u64, steps: u32) -> (f64, Arrangement) {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let n = self.space.cycles as usize;
+        let flips = self.space.cycles + u32::from(self.space.centre && !self.free_centre);
+        let mut now = Arrangement::plain(self.space);
+        now.places.shuffle(&mut random);
+        now.starts.iter_mut().for_each(|s| *s = random.random_range(0..3));
+        now.inverted = random.random_range(0..1 << flips);
+        let mut weights = self.weights(now.inverted);
+        let mut score = self.worth(&now, &weights);
+        let mut best = (score, now.clone());
+        // From a spread of scores as large as chance makes it down to single words.
+        let hot = (self.words.len() as f64).sqrt().max(2.0) * 0.5;
+        for step in 0..steps {
+            let temperature = hot * (0.3 / hot).powf(f64::from(step) / f64::from(steps));
+            let mut next = now.clone();
+            match random.random_range(0..10) {
+                0..4 => next.places.swap(random.random_range(0..n), random.random_range(0..n)),
+                4..7 => {
+                    let start = &mut next.starts[random.random_range(0..n)];
+                    *start = (*start + random.random_range(1..3)) % 3;
+                }
+                _ => next.inverted ^= 1 << random.random_range(0..flips),
+            }
+            let other = (next.inverted != now.inverted).then(|| self.weights(next.inverted));
+            let next_score = self.worth(&next, other.as_ref().unwrap_or(&weights));
+            let gain = next_score - score;
+            if gain >= 0.0 || random.random::<f64>() < (gain / temperature).exp() {
+                (now, score) = (next, next_score);
+                weights = other.unwrap_or(weights);
+                if score > best.0 {
+                    best = (score, now.clone());
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Words of a slice whose differing neighbours number at least `min_pairs`.
+///
+/// Counts in bit slices: 64 − `min_pairs` plus one for each differing pair overflows into bit 6
+/// exactly when there are enough. Eight pairs at a time go through seven full adders.
+fn enough(
+    edges: &[(u8, u8, u64)],
+    slices: &[Slice],
+    centre: Option<u8>,
+    centre_value: u64,
+    min_pairs: u32,
+) -> Slice {
+    let start = 64 - min_pairs;
+    let mut count: [Slice; 7] =
+        std::array::from_fn(|bit| [u64::from(start >> bit & 1).wrapping_neg(); 8]);
+    let value = |bit: u8| {
+        if Some(bit) == centre { [centre_value; 8] } else { slices[usize::from(bit)] }
+    };
+    for eight in edges.chunks(8) {
+        let mut x = [[0u64; 8]; 8];
+        for (x, &(a, b, flip)) in x.iter_mut().zip(eight) {
+            let (a, b) = (value(a), value(b));
+            *x = std::array::from_fn(|i| a[i] ^ b[i] ^ flip);
+        }
+        let [twos_a, twos_b, twos_c, twos_d] =
+            [0, 2, 4, 6].map(|i| add(&mut count[0], &x[i], &x[i + 1]));
+        let fours_a = add(&mut count[1], &twos_a, &twos_b);
+        let fours_b = add(&mut count[1], &twos_c, &twos_d);
+        let mut carry = add(&mut count[2], &fours_a, &fours_b);
+        for digit in &mut count[3..] {
+            let sum: Slice = std::array::from_fn(|i| digit[i] ^ carry[i]);
+            carry = std::array::from_fn(|i| digit[i] & carry[i]);
+            *digit = sum;
+        }
+    }
+    count[6]
+}
+
+/// Adds two slices to a digit and returns the carries.
+#[inline(always)]
+fn add(digit: &mut Slice, a: &Slice, b: &Slice) -> Slice {
+    let mut carry = [0; 8];
+    for i in 0..8 {
+        let half = digit[i] ^ a[i];
+        carry[i] = (digit[i] & a[i]) | (half & b[i]);
+        digit[i] = half ^ b[i];
+    }
+    carry
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bit_slices_count_what_the_screen_admits() {
+        for (rows, distance) in [(4, 5), (5, 7), (6, 9), (7, 12)] {
+            let dimension = Dimension::from_bits(rows * rows).unwrap();
+            let mut random = ChaCha8Rng::seed_from_u64(7);
+            let words: Vec<u64> =
+                (0..700).map(|_| random.random::<u64>() & dimension.mask()).collect();
+            let rules = Rules::published(distance);
+            let screen = Screen::new(TagWords::new(dimension), distance, &rules);
+            let arranger = Arranger::new(dimension, distance, &rules, words.clone(), false);
+            let (score, arrangement) = arranger.anneal(3, 20);
+            let score = score as usize;
+            let fine = |words: &[u64]| words.iter().filter(|&&w| screen.look_is_fine(w)).count();
+            assert_eq!(score, fine(&arrangement.apply(dimension, &words)));
+        }
+    }
+}

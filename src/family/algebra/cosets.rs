@@ -1,0 +1,196 @@
+//! Unions of cosets of an invariant linear code K, by clique search.
+//!
+//! Two cosets of K are at distance h or more exactly when the sum of their syndromes is not the
+//! syndrome of a word lighter than h. So mark these syndromes once; a code K ∪ (K+a) ∪ … with
+//! distance h is a set of syndromes, containing 0, all of whose pairwise sums are unmarked: a
+//! clique in a Cayley graph. Its vertices here are whole orbits of syndromes under the turn, so
+//! that the union is invariant.
+
+use rand::seq::IndexedRandom;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::{CycleSpace, Span};
+
+/// Codes with more than this many bits of syndrome need too large a table.
+pub const MAX_SYNDROME_BITS: u32 = 27;
+
+/// A union of cosets of a linear code, invariant under the turn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CosetUnion {
+    /// Where the words live.
+    pub space: CycleSpace,
+    /// The linear code.
+    pub code: Span,
+    /// One word of each coset.
+    pub cosets: Vec<u64>,
+}
+
+impl CosetUnion {
+    /// One word of each orbit of three words; words that turning leaves as they are do not count.
+    pub fn orbits(&self) -> Vec<u64> {
+        let space = self.space;
+        let words = self.cosets.iter().flat_map(|&c| self.code.words().map(move |w| w ^ c));
+        words.filter(|&w| space.turn(w) != w && space.canonical(w) == w).collect()
+    }
+}
+
+/// The graph of the cosets of one code.
+#[derive(Clone, Debug)]
+pub struct CosetGraph {
+    space: CycleSpace,
+    code: Span,
+    free_bits: Vec<u32>,
+    /// Bit s: some word lighter than h has syndrome s.
+    marked: Vec<u64>,
+    turn_tables: Vec<[u32; 256]>,
+    vertices: Vec<Vertex>,
+}
+
+/// An orbit of syndromes: one that the turn leaves as it is, or three.
+#[derive(Clone, Copy, Debug)]
+struct Vertex {
+    syndrome: u32,
+    /// Orbits of words in its cosets.
+    weight: u32,
+}
+
+impl CosetGraph {
+    /// The graph of `code` for `distance`; `None` when the code itself is not that good, or its
+    /// syndromes have more than [`MAX_SYNDROME_BITS`] bits.
+    pub fn new(space: CycleSpace, code: Span, distance: u32) -> Option<Self> {
+        let free_bits = code.free_bits(space.bits());
+        let syndrome_bits = free_bits.len() as u32;
+        if syndrome_bits > MAX_SYNDROME_BITS {
+            return None;
+        }
+        let syndrome = |word: u64| compress(code.reduce(word), &free_bits);
+        let columns: Vec<u32> = (0..space.bits()).map(|i| syndrome(1 << i)).collect();
+        let mut marked = vec![0u64; (1usize << syndrome_bits).div_ceil(64)];
+        if !mark(&columns, 0, distance - 1, &mut marked) {
+            return None;
+        }
+        let turned: Vec<u32> = free_bits.iter().map(|&i| syndrome(space.turn(1 << i))).collect();
+        let turn_tables = turned
+            .chunks(8)
+            .map(|columns| {
+                std::array::from_fn(|x| {
+                    (0..).zip(columns).filter(|&(i, _)| x >> i & 1 == 1).fold(0, |s, (_, c)| s ^ c)
+                })
+            })
+            .collect();
+        let mut graph =
+            Self { space, code, free_bits, marked, turn_tables, vertices: Vec::new() };
+        graph.vertices = graph.find_vertices();
+        Some(graph)
+    }
+
+    /// Number of orbits of cosets that can join the code itself.
+    pub fn vertices(&self) -> usize {
+        self.vertices.len()
+    }
+
+    fn find_vertices(&self) -> Vec<Vertex> {
+        let words = 1u32 << self.code.dimension();
+        let fixed_words = self.code.words().filter(|&w| self.space.turn(w) == w).count() as u32;
+        let fixed_weight = (words - fixed_words) / 3;
+        (1..1u32 << self.free_bits.len())
+            .filter(|&s| !self.is_marked(s))
+            .filter_map(|syndrome| {
+                let once = self.turn(syndrome);
+                if once == syndrome {
+                    return Some(Vertex { syndrome, weight: fixed_weight });
+                }
+                let twice = self.turn(once);
+                let first = syndrome < once && syndrome < twice;
+                (first && !self.is_marked(syndrome ^ once))
+                    .then_some(Vertex { syndrome, weight: words })
+            })
+            .collect()
+    }
+
+    fn is_marked(&self, syndrome: u32) -> bool {
+        self.marked[syndrome as usize / 64] >> (syndrome % 64) & 1 == 1
+    }
+
+    fn turn(&self, syndrome: u32) -> u32 {
+        self.turn_tables
+            .iter()
+            .enumerate()
+            .fold(0, |turned, (i, table)| turned ^ table[(syndrome >> (8 * i) & 0xff) as usize])
+    }
+
+    fn adjacent(&self, a: u32, b: u32) -> bool {
+        let once = self.turn(b);
+        !self.is_marked(a ^ b) && !self.is_marked(a ^ once) && !self.is_marked(a ^ self.turn(once))
+    }
+
+    /// A large union found from one random start: vertices are added one by one, each the one, of
+    /// a few looked at, that leaves most of the others possible.
+    pub fn grow(&self, seed: u64) -> CosetUnion {
+        /// Vertices looked at before each choice.
+        const LOOK_AT: usize = 12;
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut chosen: Vec<Vertex> = Vec::new();
+        let mut open = self.vertices.clone();
+        while !open.is_empty() {
+            let tries = if open.len() > 50_000 { 1 } else { LOOK_AT.min(open.len()) };
+            let best = (0..tries)
+                .map(|_| {
+                    let pick = *open.choose(&mut random).expect("not empty");
+                    let left: Vec<Vertex> = open
+                        .iter()
+                        .copied()
+                        .filter(|v| {
+                            v.syndrome != pick.syndrome && self.adjacent(v.syndrome, pick.syndrome)
+                        })
+                        .collect();
+                    (pick, left)
+                })
+                .max_by_key(|(pick, left)| {
+                    let weight: u64 = left.iter().map(|v| u64::from(v.weight)).sum();
+                    u64::from(pick.weight) * 3 + weight
+                });
+            let Some((pick, left)) = best else { break };
+            chosen.push(pick);
+            open = left;
+        }
+        self.union(&chosen)
+    }
+
+    fn union(&self, chosen: &[Vertex]) -> CosetUnion {
+        let mut syndromes = vec![0];
+        for vertex in chosen {
+            let once = self.turn(vertex.syndrome);
+            syndromes.push(vertex.syndrome);
+            if once != vertex.syndrome {
+                syndromes.extend([once, self.turn(once)]);
+            }
+        }
+        let cosets = syndromes.iter().map(|&s| self.word(s)).collect();
+        CosetUnion { space: self.space, code: self.code.clone(), cosets }
+    }
+
+    /// A word with the syndrome.
+    fn word(&self, syndrome: u32) -> u64 {
+        (0..)
+            .zip(&self.free_bits)
+            .filter(|&(i, _)| syndrome >> i & 1 == 1)
+            .fold(0, |word, (_, bit)| word | 1 << bit)
+    }
+}
+
+fn compress(word: u64, bits: &[u32]) -> u32 {
+    (0..).zip(bits).fold(0, |packed, (i, bit)| packed | ((word >> bit & 1) as u32) << i)
+}
+
+/// Marks the sums of up to `weight` columns; false when one of one or more is zero.
+fn mark(columns: &[u32], sum: u32, weight: u32, marked: &mut [u64]) -> bool {
+    marked[sum as usize / 64] |= 1 << (sum % 64);
+    if weight == 0 {
+        return true;
+    }
+    columns.iter().enumerate().all(|(i, column)| {
+        sum != *column && mark(&columns[i + 1..], sum ^ column, weight - 1, marked)
+    })
+}

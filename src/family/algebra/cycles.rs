@@ -1,0 +1,162 @@
+use serde::{Deserialize, Serialize};
+
+use crate::lattice::{Dimension, TagCells};
+
+/// Words of m three-cycles, and perhaps a fixed central bit, in cycle coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CycleSpace {
+    /// Number of three-cycles, m.
+    pub cycles: u32,
+    /// Whether there is a central bit, number 3m.
+    pub centre: bool,
+}
+
+impl CycleSpace {
+    /// The space of the tags of a dimension.
+    pub fn of(dimension: Dimension) -> Self {
+        Self { cycles: dimension.bits() / 3, centre: dimension.bits() % 3 == 1 }
+    }
+
+    /// Number of bits.
+    pub fn bits(self) -> u32 {
+        3 * self.cycles + u32::from(self.centre)
+    }
+
+    /// Every third bit: the first of each cycle.
+    fn firsts(self) -> u64 {
+        0x9249_2492_4924_9249 & ((1 << (3 * self.cycles)) - 1)
+    }
+
+    /// The word after one turn.
+    #[inline]
+    pub fn turn(self, word: u64) -> u64 {
+        let (first, cycles) = (self.firsts(), (1 << (3 * self.cycles)) - 1);
+        let moved = word & (first | first << 1);
+        (moved << 1) | ((word >> 2) & first) | (word & !cycles)
+    }
+
+    /// The orbit's representative: the smallest of the three turned words.
+    #[inline]
+    pub fn canonical(self, word: u64) -> u64 {
+        let once = self.turn(word);
+        word.min(once).min(self.turn(once))
+    }
+
+    /// The words that turning leaves as they are, as a basis: a whole cycle each, and the centre.
+    pub fn fixed_basis(self) -> Vec<u64> {
+        let cycles = (0..self.cycles).map(|c| 0b111 << (3 * c));
+        cycles.chain(self.centre.then_some(1 << (3 * self.cycles))).collect()
+    }
+}
+
+/// Where the cycles of a code go on the tag: everything that changes neither distances nor
+/// invariance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Arrangement {
+    /// Cycle of the tag for each cycle of the code.
+    pub places: Vec<u8>,
+    /// Number of steps, 0 to 2, by which each cycle of the code is turned on its place.
+    pub starts: Vec<u8>,
+    /// Cycles of the code that are inverted (a rotation-fixed word is added), as a bit set; the
+    /// central bit comes after the last cycle.
+    pub inverted: u32,
+}
+
+impl Arrangement {
+    /// Every cycle of the code on the tag's cycle of the same number.
+    pub fn plain(space: CycleSpace) -> Self {
+        let n = space.cycles as usize;
+        Self { places: (0..n as u8).collect(), starts: vec![0; n], inverted: 0 }
+    }
+
+    /// Whether it is an arrangement of the cycles of `space`.
+    pub fn fits(&self, space: CycleSpace) -> bool {
+        let n = space.cycles as usize;
+        let mut seen = self.places.clone();
+        seen.sort_unstable();
+        seen.iter().map(|&p| usize::from(p)).eq(0..n)
+            && self.starts.len() == n
+            && self.starts.iter().all(|&s| s < 3)
+            && self.inverted >> (space.cycles + u32::from(space.centre)) == 0
+    }
+
+    /// Tag bit of each code bit.
+    pub fn bit_map(&self, dimension: Dimension) -> Vec<u8> {
+        let (cycles, centre) = tag_cycles(dimension);
+        let mut map = Vec::with_capacity(dimension.bits() as usize);
+        for (&place, &start) in self.places.iter().zip(&self.starts) {
+            let cycle = cycles[usize::from(place)];
+            map.extend((0..3).map(|j| cycle[(j + usize::from(start)) % 3]));
+        }
+        map.extend(centre);
+        map
+    }
+
+    /// The rotation-fixed word that is added, in cycle coordinates.
+    pub fn translation(&self, space: CycleSpace) -> u64 {
+        let basis = space.fixed_basis();
+        (0..).zip(basis).filter(|&(i, _)| self.inverted >> i & 1 == 1).fold(0, |t, (_, w)| t ^ w)
+    }
+
+    /// The words as they are on the tag.
+    pub fn apply(&self, dimension: Dimension, words: &[u64]) -> Vec<u64> {
+        let map = self.bit_map(dimension);
+        let translation = self.translation(CycleSpace::of(dimension));
+        words
+            .iter()
+            .map(|word| {
+                let word = word ^ translation;
+                (0..).zip(&map).fold(0, |tag, (i, &to)| tag | ((word >> i & 1) << to))
+            })
+            .collect()
+    }
+}
+
+/// The three-cycles of a tag's bits, each in the order in which a turn moves their content, and
+/// the bit that stays.
+fn tag_cycles(dimension: Dimension) -> (Vec<[u8; 3]>, Option<u8>) {
+    let cells = TagCells::new(dimension);
+    let source = cells.rotation();
+    let (mut cycles, mut centre) = (Vec::new(), None);
+    for bit in 0..dimension.bits() as u8 {
+        // A turn moves the content of `source[i]` to i, so content runs the other way.
+        let before = source[usize::from(bit)];
+        let two_before = source[usize::from(before)];
+        if before == bit {
+            centre = Some(bit);
+        } else if bit < before && bit < two_before {
+            cycles.push([bit, two_before, before]);
+        }
+    }
+    (cycles, centre)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Turning in cycle coordinates is turning on the tag, under every arrangement.
+        #[test]
+        fn arrangements_commute_with_turns(
+            rows in 3..=7u32, word: u64, seed: u64, inverted: u32,
+        ) {
+            let dimension = Dimension::from_bits(rows * rows).unwrap();
+            let space = CycleSpace::of(dimension);
+            let word = word & dimension.mask();
+            let mut arrangement = Arrangement::plain(space);
+            let n = space.cycles as usize;
+            arrangement.places.rotate_left(seed as usize % n);
+            arrangement.starts.iter_mut().enumerate()
+                .for_each(|(i, s)| *s = ((seed >> i) % 3) as u8);
+            arrangement.inverted = inverted & ((1 << (space.cycles + u32::from(space.centre))) - 1);
+            prop_assert!(arrangement.fits(space));
+            let [direct, turned] =
+                arrangement.apply(dimension, &[word, space.turn(word)])[..] else { unreachable!() };
+            prop_assert_eq!(TagCells::new(dimension).rotate(direct), turned);
+        }
+    }
+}

@@ -1,0 +1,115 @@
+/// A binary linear code of length up to 64, by a reduced basis.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Span {
+    /// Rows with distinct leading bits, each leading bit set in its own row only; descending.
+    rows: Vec<u64>,
+}
+
+impl Span {
+    /// The span of some words.
+    pub fn of(words: impl IntoIterator<Item = u64>) -> Self {
+        let mut span = Self::default();
+        for word in words {
+            span.insert(word);
+        }
+        span
+    }
+
+    /// Number of dimensions.
+    pub fn dimension(&self) -> u32 {
+        self.rows.len() as u32
+    }
+
+    /// The reduced basis.
+    pub fn rows(&self) -> &[u64] {
+        &self.rows
+    }
+
+    /// The representative of the word's coset: zero at every leading bit.
+    pub fn reduce(&self, word: u64) -> u64 {
+        self.rows.iter().fold(word, |word, &row| {
+            if word >> row.ilog2() & 1 == 1 { word ^ row } else { word }
+        })
+    }
+
+    /// Whether the word is in the code.
+    pub fn contains(&self, word: u64) -> bool {
+        self.reduce(word) == 0
+    }
+
+    /// Adds a word to the span; false when it was in it.
+    pub fn insert(&mut self, word: u64) -> bool {
+        let word = self.reduce(word);
+        if word == 0 {
+            return false;
+        }
+        let lead = word.ilog2();
+        for row in &mut self.rows {
+            if *row >> lead & 1 == 1 {
+                *row ^= word;
+            }
+        }
+        let place = self.rows.partition_point(|&row| row > word);
+        self.rows.insert(place, word);
+        true
+    }
+
+    /// All words, each once, zero first (in Gray code order).
+    pub fn words(&self) -> impl Iterator<Item = u64> + '_ {
+        let mut word = 0;
+        (0u64..1 << self.rows.len()).map(move |i| {
+            if i > 0 {
+                word ^= self.rows[i.trailing_zeros() as usize];
+            }
+            word
+        })
+    }
+
+    /// The words that vanish wherever `mask` is set.
+    pub fn vanishing_on(&self, mask: u64) -> Self {
+        // Reduce with the masked bits leading: what is left of rows that have none of them.
+        let mut rows = self.rows.clone();
+        let mut kept = Vec::new();
+        while let Some(row) = rows.pop() {
+            if row & mask == 0 {
+                kept.push(row);
+                continue;
+            }
+            let lead = (row & mask).ilog2();
+            for other in &mut rows {
+                if *other >> lead & 1 == 1 {
+                    *other ^= row;
+                }
+            }
+        }
+        Self::of(kept)
+    }
+
+    /// Bits of a word of `length` bits that are leading in no row; they name cosets.
+    pub fn free_bits(&self, length: u32) -> Vec<u32> {
+        let leading = self.rows.iter().fold(0u64, |bits, row| bits | 1 << row.ilog2());
+        (0..length).filter(|i| leading >> i & 1 == 0).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn spans_are_closed_and_shorten_rightly(words: [u16; 5], mask: u16) {
+            let span = Span::of(words.map(u64::from));
+            let all: Vec<u64> = span.words().collect();
+            prop_assert_eq!(all.len(), 1 << span.dimension());
+            prop_assert!(words.iter().all(|&w| span.contains(u64::from(w))));
+            prop_assert!(all.iter().all(|&w| all.contains(&(w ^ u64::from(words[0])))));
+            let short = span.vanishing_on(u64::from(mask));
+            let expected = all.iter().filter(|&&w| w & u64::from(mask) == 0).count();
+            prop_assert_eq!(1 << short.dimension(), expected);
+            prop_assert!(short.words().all(|w| span.contains(w) && w & u64::from(mask) == 0));
+        }
+    }
+}

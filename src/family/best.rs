@@ -1,0 +1,505 @@
+//! The best of all methods within a time limit: sources of invariant codes, arranged on the tag so
+//! that as many words as possible satisfy the rules, then repaired and extended by local search.
+//!
+//! How far it gets depends on the time, so what it found is recorded in full
+//! ([`AlgebraicConstruction`]) and gives the same codes again without any search.
+
+use std::time::{Duration, Instant};
+
+use rand::seq::{IndexedRandom, SliceRandom};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::algebra::arrange::Arranger;
+use super::algebra::cosets::{CosetGraph, CosetUnion, MAX_SYNDROME_BITS};
+use super::algebra::quasicyclic::{Symmetry, random_code};
+use super::algebra::{Arrangement, CycleSpace, Span, residue};
+use super::file::parse_word;
+use super::polish::{Effort, polish};
+use super::{Construction, Control, Family, FamilyError, Rules, Screen, TagWords};
+use crate::lattice::Dimension;
+
+/// All that is needed to write down an algebraic family again.
+///
+/// The codes are one word of each orbit of the union of cosets, arranged on the tag, as far as the
+/// rules admit them and no exchanged word excludes them; and the exchanged words. Where no word of
+/// the union uses the central cell, it is white if the rules need it, else black. In order of the
+/// smallest of the three turned words.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AlgebraicConstruction {
+    /// Where the linear code comes from, in words.
+    pub source: String,
+    /// Basis of the linear code, in cycle coordinates, hexadecimal.
+    pub basis: Vec<String>,
+    /// One word of each coset, in cycle coordinates, hexadecimal.
+    pub cosets: Vec<String>,
+    /// Where its cycles go on the tag.
+    pub arrangement: Arrangement,
+    /// Words of the tag that local search put in, hexadecimal.
+    pub exchanged: Vec<String>,
+    /// Only so many codes are listed, the first in order; absent for all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limit: Option<u64>,
+    /// Seed of the search that found all this.
+    pub seed: u64,
+}
+
+impl AlgebraicConstruction {
+    /// Writes down the codes, in the order of the family.
+    pub fn codes(&self, screen: &Screen) -> Result<Vec<u64>, FamilyError> {
+        let dimension = screen.words().dimension();
+        let space = CycleSpace::of(dimension);
+        if !self.arrangement.fits(space) {
+            let problem = "does not arrange the cycles of such a tag";
+            return Err(FamilyError::field("construction.arrangement", problem));
+        }
+        let union = CosetUnion {
+            space,
+            code: Span::of(self.words("basis", &self.basis, dimension)?),
+            cosets: self.words("cosets", &self.cosets, dimension)?,
+        };
+        if union.code.dimension() > MOST_DIMENSIONS {
+            return Err(FamilyError::field("construction.basis", "more than 26 dimensions"));
+        }
+        let exchanged = self.words("exchanged", &self.exchanged, dimension)?;
+        let turned: Vec<u64> = exchanged.iter().flat_map(|&w| screen.words().turns(w)).collect();
+        let mut codes = arranged(screen, &union, &self.arrangement);
+        let apart = |code: &u64| {
+            turned.par_iter().all(|other| (code ^ other).count_ones() >= screen.distance())
+        };
+        if !turned.is_empty() {
+            codes.retain(apart);
+        }
+        codes.extend(exchanged);
+        codes.sort_by_cached_key(|&code| screen.words().canonical(code));
+        codes.truncate(self.limit.map_or(usize::MAX, |limit| limit as usize));
+        Ok(codes)
+    }
+
+    /// A proof, from the structure of the code, that words of the family and their turns are
+    /// `distance` apart; or the reason why it is none. Takes time in proportion to the number of
+    /// codes, not to its square.
+    ///
+    /// The basis has to span a code that the turn leaves invariant and whose lightest word weighs
+    /// `distance` or more (all are looked at), and each code, arranged back, has to lie in it. Then
+    /// any two words are as far apart as some word of the linear code is heavy.
+    pub fn prove(&self, screen: &Screen, codes: &[u64]) -> Result<(), String> {
+        let dimension = screen.words().dimension();
+        let space = CycleSpace::of(dimension);
+        let words = |field, list| self.words(field, list, dimension).map_err(|e| e.to_string());
+        let code = Span::of(words("basis", &self.basis)?);
+        let cosets = words("cosets", &self.cosets)?;
+        if !self.arrangement.fits(space) || code.dimension() > MOST_DIMENSIONS {
+            return Err("the construction does not fit such tags".to_owned());
+        }
+        if !self.exchanged.is_empty() || cosets != [0] {
+            return Err("not a linear code alone".to_owned());
+        }
+        if !code.rows().iter().all(|&row| code.contains(space.turn(row))) {
+            return Err("the linear code changes when the tag turns".to_owned());
+        }
+        let light = |word: &u64| (1..screen.distance()).contains(&word.count_ones());
+        if code.words().any(|word| light(&word)) {
+            return Err("the linear code has too light a word".to_owned());
+        }
+        let union = CosetUnion { space, code, cosets };
+        // The free centre is no part of the linear code: it only adds distance.
+        let ignored = if has_free_centre(&union) { 1u64 << (space.bits() - 1) } else { 0 };
+        let translation = self.arrangement.translation(space);
+        let map = self.arrangement.bit_map(dimension);
+        let back = |tag: u64| {
+            (0..).zip(&map).fold(0u64, |word, (i, &from)| word | (tag >> from & 1) << i)
+        };
+        let belongs = |&tag: &u64| union.code.contains((back(tag) ^ translation) & !ignored);
+        match codes.par_iter().position_first(|tag| !belongs(tag)) {
+            Some(id) => Err(format!("code {id} is not in the linear code")),
+            None => Ok(()),
+        }
+    }
+
+    fn words(
+        &self,
+        field: &str,
+        texts: &[String],
+        dimension: Dimension,
+    ) -> Result<Vec<u64>, FamilyError> {
+        texts
+            .iter()
+            .map(|text| {
+                parse_word(text).filter(|&word| word <= dimension.mask()).ok_or_else(|| {
+                    let problem = format!("`{text}` is not a word of {} bits", dimension.bits());
+                    FamilyError::field(format!("construction.{field}"), problem)
+                })
+            })
+            .collect()
+    }
+}
+
+/// Beyond this the list of words would not fit in memory.
+const MOST_DIMENSIONS: u32 = 26;
+
+/// The words of a union on the tag, one of each orbit, as far as the screen admits them.
+fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> Vec<u64> {
+    let dimension = screen.words().dimension();
+    let words = arrangement.apply(dimension, &union.orbits());
+    if !has_free_centre(union) {
+        return words.into_iter().filter(|&w| screen.admits(w)).collect();
+    }
+    let centre = 1u64 << arrangement.bit_map(dimension)[3 * union.space.cycles as usize];
+    let choose = |word: u64| [word & !centre, word | centre].into_iter().find(|&w| screen.admits(w));
+    words.into_par_iter().filter_map(choose).collect()
+}
+
+/// Whether the space has a central bit that no word of the union uses.
+fn has_free_centre(union: &CosetUnion) -> bool {
+    let centre = 1u64 << (union.space.bits() - 1);
+    union.space.centre
+        && union.code.rows().iter().chain(&union.cosets).all(|word| word & centre == 0)
+}
+
+/// What to search and for how long.
+#[derive(Clone, Debug)]
+pub struct Best {
+    /// Dimension of the tags.
+    pub dimension: Dimension,
+    /// Distance h.
+    pub distance: u32,
+    /// Rules for single codes.
+    pub rules: Rules,
+    /// Time for all of it.
+    pub time: Duration,
+    /// Seed of all random choices.
+    pub seed: u64,
+    /// Number of codes at most.
+    pub limit: Option<u64>,
+    /// Whether local search may exchange codes at the end; without it the family is algebraic.
+    pub exchange: bool,
+}
+
+/// A union, how it is arranged, and how many words pass.
+#[derive(Clone, Debug)]
+struct Candidate {
+    source: String,
+    union: CosetUnion,
+    arrangement: Arrangement,
+    worth: f64,
+}
+
+impl Best {
+    /// Searches and makes a family of what was found. Progress is reported in thousandths of the time.
+    pub fn family(&self, name: &str, control: Control) -> Result<Family, FamilyError> {
+        self.rules.check(self.dimension.bits())?;
+        let screen = Screen::new(TagWords::new(self.dimension), self.distance, &self.rules);
+        let start = Instant::now();
+        // Most of the gain comes from good sources and arrangements, at 25 bits and fewer also
+        // from exchanging codes.
+        let small = self.exchange && self.dimension.bits() <= super::polish::MAX_BITS;
+        let until = |share: f64| start + self.time.mul_f64(share);
+        let [sources, arrangements] = if small { [0.3, 0.5] } else { [0.6, 1.0] };
+        let mut candidates = self.sources(until(sources), start, control)?;
+        self.rearrange(&mut candidates, until(arrangements), start, control)?;
+
+        let mut best: Option<(Vec<u64>, Construction)> = None;
+        for candidate in candidates {
+            let left = until(1.0).saturating_duration_since(Instant::now());
+            if best.is_some() && (left.is_zero() || !small) {
+                break;
+            }
+            let end = Instant::now() + left / 2;
+            let found = self.finish(&screen, &candidate, end, control)?;
+            if best.as_ref().is_none_or(|(codes, _)| found.0.len() > codes.len()) {
+                best = Some(found);
+            }
+            control.report(self.thousandths(start), 1000, best.as_ref().map_or(0, |b| b.0.len()));
+        }
+        control.check()?;
+        let (codes, construction) = match best {
+            Some(found) if !found.0.is_empty() => found,
+            _ => self.from_nothing(&screen, control)?,
+        };
+        let rules = self.rules.clone();
+        Family::new(name, self.dimension, self.distance, codes, rules, construction)
+    }
+
+    fn thousandths(&self, start: Instant) -> u64 {
+        let share = start.elapsed().as_secs_f64() / self.time.as_secs_f64().max(1e-3);
+        (1000.0 * share.min(1.0)) as u64
+    }
+
+    /// Draws unions of cosets until the time is over; the most promising first.
+    fn sources(
+        &self,
+        until: Instant,
+        start: Instant,
+        control: Control,
+    ) -> Result<Vec<Candidate>, FamilyError> {
+        /// Draws between two looks at the clock.
+        const BATCH: u64 = 16;
+        /// Candidates kept for a thorough arrangement.
+        const KEPT: usize = 6;
+        let mut kept: Vec<Candidate> = Vec::new();
+        let mut most_orbits = 0;
+        let mut draw = 0;
+        loop {
+            control.check()?;
+            let most = most_orbits;
+            let batch: Vec<(usize, Option<Candidate>)> = (draw..draw + BATCH)
+                .into_par_iter()
+                .map(|i| self.candidate(self.seed.wrapping_add(i), i, most))
+                .collect();
+            draw += BATCH;
+            for (orbits, candidate) in batch {
+                most_orbits = most_orbits.max(orbits);
+                let Some(candidate) = candidate else { continue };
+                let same = |c: &Candidate| {
+                    c.union.code == candidate.union.code && c.worth == candidate.worth
+                };
+                if !kept.iter().any(same) {
+                    kept.push(candidate);
+                }
+            }
+            kept.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+            kept.truncate(KEPT);
+            let best = kept.first().map_or(0, |c| c.worth as usize);
+            control.report(self.thousandths(start), 1000, best);
+            if Instant::now() >= until {
+                return Ok(kept);
+            }
+        }
+    }
+
+    /// One draw: how many orbits it has, and, when that is near the most seen, a quick arrangement.
+    fn candidate(&self, seed: u64, draw: u64, most_orbits: usize) -> (usize, Option<Candidate>) {
+        /// Share of the most orbits seen from which on an arrangement is tried.
+        const WORTH_A_TRY: f64 = 0.93;
+        /// Steps of the quick arrangement.
+        const STEPS: u32 = 3_000;
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let Some((source, code)) = self.linear_code(draw, &mut random) else { return (0, None) };
+        let union = self.with_cosets(code, &mut random);
+        let orbits = union.orbits();
+        let count = orbits.len();
+        if count == 0 || (count as f64) < WORTH_A_TRY * most_orbits as f64 {
+            return (count, None);
+        }
+        let arranger = self.arranger(&union, orbits);
+        let (worth, arrangement) = arranger.anneal(random.random(), STEPS);
+        (count, Some(Candidate { source, union, arrangement, worth }))
+    }
+
+    fn arranger(&self, union: &CosetUnion, orbits: Vec<u64>) -> Arranger {
+        /// A changed cell makes up to three pairs differ, and about this share of such words can
+        /// be had without conflict.
+        const REPAIR: (u32, f64) = (3, 0.7);
+        /// Words by which an arrangement is judged, at most.
+        const JUDGED_WORDS: usize = 30_000;
+        let free_centre = has_free_centre(union);
+        // Of very many words a part tells which arrangement is good.
+        let step = orbits.len().div_ceil(JUDGED_WORDS);
+        let orbits = orbits.into_iter().step_by(step.max(1)).collect();
+        let arranger =
+            Arranger::new(self.dimension, self.distance, &self.rules, orbits, free_centre);
+        if self.exchange
+            && self.rules.min_complexity > 0.0
+            && self.dimension.bits() <= super::polish::MAX_BITS
+            && min_distance(union) > self.distance
+        {
+            arranger.with_nearly(REPAIR.0, REPAIR.1)
+        } else {
+            arranger
+        }
+    }
+
+    /// A linear code: a shortened quadratic-residue code or a random quasi-cyclic one, by turns.
+    fn linear_code(&self, draw: u64, random: &mut ChaCha8Rng) -> Option<(String, Span)> {
+        let space = CycleSpace::of(self.dimension);
+        let primes: Vec<u32> = residue::PRIMES
+            .into_iter()
+            .filter(|&q| residue::min_distance(q) >= self.distance)
+            .filter(|&q| residue::space(q).cycles >= space.cycles)
+            .collect();
+        // A random code of 49 bits takes long to check and is far smaller.
+        let only_residue = self.dimension.bits() > 36;
+        if (draw % 4 == 0 || only_residue) && !primes.is_empty() {
+            let q = *primes.choose(random).expect("not empty");
+            let whole = residue::space(q);
+            let mut keep: Vec<u32> = (0..whole.cycles).collect();
+            keep.shuffle(random);
+            keep.truncate(space.cycles as usize);
+            keep.sort_unstable();
+            let source = format!("extended quadratic-residue code of length {}", q + 1);
+            let source = if keep.len() < whole.cycles as usize {
+                format!("{source}, shortened to the cycles {keep:?}")
+            } else {
+                source
+            };
+            return Some((source, residue::shortened(&residue::extended(q), whole, &keep)));
+        }
+        let symmetries = Symmetry::all(space);
+        let symmetry = symmetries[random.random_range(0..symmetries.len())];
+        /// Beyond this even the list of words of a linear code is long.
+        const MOST_DIMENSIONS: u32 = 20;
+        let bits = space.bits();
+        // Small codes leave room for many cosets, as long as syndromes can be tabulated.
+        let least = bits.saturating_sub(SYNDROME_BITS).max(1);
+        let most = if random.random_bool(0.5) || bits > 25 {
+            MOST_DIMENSIONS
+        } else {
+            least + random.random_range(2..=6)
+        };
+        let code = random_code(space, symmetry, self.distance, most, 60, random);
+        let source = format!(
+            "quasi-cyclic code of dimension {}, cycles shifted in blocks of {}{}",
+            code.dimension(),
+            symmetry.block,
+            if symmetry.twisted { ", twisted" } else { "" }
+        );
+        (code.dimension() > 0).then_some((source, code))
+    }
+
+    fn with_cosets(&self, code: Span, random: &mut ChaCha8Rng) -> CosetUnion {
+        /// Random starts of the clique search.
+        const STARTS: u64 = 8;
+        let space = CycleSpace::of(self.dimension);
+        let alone = CosetUnion { space, code: code.clone(), cosets: vec![0] };
+        if space.bits() - code.dimension() > SYNDROME_BITS {
+            return alone;
+        }
+        let Some(graph) = CosetGraph::new(space, code, self.distance) else { return alone };
+        if graph.vertices() == 0 {
+            return alone;
+        }
+        let first: u64 = random.random();
+        (0..STARTS)
+            .map(|i| graph.grow(first.wrapping_add(i)))
+            .max_by_key(|union| union.orbits().len())
+            .unwrap_or(alone)
+    }
+
+    /// Arranges the candidates thoroughly; the best first.
+    fn rearrange(
+        &self,
+        candidates: &mut [Candidate],
+        until: Instant,
+        start: Instant,
+        control: Control,
+    ) -> Result<(), FamilyError> {
+        let arrangers: Vec<Arranger> =
+            candidates.iter().map(|c| self.arranger(&c.union, c.union.orbits())).collect();
+        let mut steps = 4_000;
+        for round in 0.. {
+            control.check()?;
+            candidates.par_iter_mut().zip(&arrangers).for_each(|(candidate, arranger)| {
+                if Instant::now() < until {
+                    let seed = self.seed.wrapping_add(1_000_003 * (round + 1));
+                    let (worth, arrangement) = arranger.anneal(seed, steps);
+                    if worth > candidate.worth {
+                        (candidate.worth, candidate.arrangement) = (worth, arrangement);
+                    }
+                }
+            });
+            let best = candidates.iter().map(|c| c.worth as usize).max().unwrap_or(0);
+            control.report(self.thousandths(start), 1000, best);
+            if Instant::now() >= until || candidates.is_empty() {
+                break;
+            }
+            steps = (steps * 3 / 2).min(200_000);
+        }
+        candidates.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+        Ok(())
+    }
+
+    /// The codes of a candidate, exchanged where that gains some.
+    fn finish(
+        &self,
+        screen: &Screen,
+        candidate: &Candidate,
+        end: Instant,
+        control: Control,
+    ) -> Result<(Vec<u64>, Construction), FamilyError> {
+        let words = screen.words();
+        let hex = |list: &[u64]| list.iter().map(|&w| words.hex(w)).collect();
+        let mut construction = AlgebraicConstruction {
+            source: candidate.source.clone(),
+            basis: hex(candidate.union.code.rows()),
+            cosets: hex(&candidate.union.cosets),
+            arrangement: candidate.arrangement.clone(),
+            exchanged: Vec::new(),
+            limit: self.limit,
+            seed: self.seed,
+        };
+        let codes = construction.codes(screen)?;
+        if !self.exchange {
+            return Ok((codes, Construction::Algebraic(construction)));
+        }
+        let effort = Effort { seed: self.seed, rounds: 50, steps: 400_000 };
+        let quiet = Control { report: None, ..control };
+        let polished = polish(screen, codes.clone(), effort, quiet, || Instant::now() >= end);
+        let exchanged: Vec<u64> =
+            polished.into_iter().filter(|code| !codes.contains(code)).collect();
+        construction.exchanged = hex(&exchanged);
+        Ok((construction.codes(screen)?, Construction::Algebraic(construction)))
+    }
+
+    /// Local search alone, for distances that leave no room for a linear code.
+    fn from_nothing(
+        &self,
+        screen: &Screen,
+        control: Control,
+    ) -> Result<(Vec<u64>, Construction), FamilyError> {
+        let search = Search { seed: self.seed, rounds: 3, steps: 200_000 };
+        let codes = search.codes(screen, control)?;
+        if codes.is_empty() {
+            let problem = format!(
+                "no word of {} bits satisfies the rules at distance {}; loosen them",
+                self.dimension.bits(),
+                self.distance
+            );
+            return Err(FamilyError::field("distance", problem));
+        }
+        let Search { seed, rounds, steps } = search;
+        Ok((codes, Construction::Search { seed, rounds, steps }))
+    }
+}
+
+/// Syndromes of up to this many bits are tabulated in a search that draws many codes.
+const SYNDROME_BITS: u32 = if MAX_SYNDROME_BITS < 24 { MAX_SYNDROME_BITS } else { 24 };
+
+/// Local search from nothing; deterministic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Search {
+    /// Seed of the random choices.
+    pub seed: u64,
+    /// Rounds, each with new candidates.
+    pub rounds: u32,
+    /// Moves in each round.
+    pub steps: u64,
+}
+
+impl Search {
+    /// The codes found; for words of up to 25 bits.
+    pub fn codes(&self, screen: &Screen, control: Control) -> Result<Vec<u64>, FamilyError> {
+        let effort = Effort { seed: self.seed, rounds: self.rounds, steps: self.steps };
+        let mut codes = polish(screen, Vec::new(), effort, control, || false);
+        control.check()?;
+        codes.sort_unstable_by_key(|&code| screen.words().canonical(code));
+        Ok(codes)
+    }
+}
+
+/// Minimum distance of a union of cosets.
+fn min_distance(union: &CosetUnion) -> u32 {
+    let differences = union
+        .cosets
+        .iter()
+        .enumerate()
+        .flat_map(|(i, a)| union.cosets[..=i].iter().map(move |b| a ^ b));
+    differences
+        .flat_map(|shift| union.code.words().map(move |w| (w ^ shift).count_ones()))
+        .filter(|&weight| weight > 0)
+        .min()
+        .unwrap_or(u32::MAX)
+}

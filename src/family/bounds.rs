@@ -1,0 +1,159 @@
+//! Upper bounds on the size of a family.
+//!
+//! The codes of a family and their turns are a binary code of length b, distance h, with three
+//! words a tag; so what bounds binary codes bounds families, divided by three.
+//!
+//! *Sphere packing*: balls of radius ⌊(h−1)/2⌋ do not overlap.
+//!
+//! *Linear programming* (Delsarte, "An algebraic approach to the association schemes of coding
+//! theory", 1973): the distance distribution A_h, …, A_b of a code of M words satisfies
+//! A_i ≥ 0 and Σ_i A_i K_k(i) ≥ −C(b,k) with the Krawtchouk polynomials K_k, and
+//! M = 1 + Σ A_i. The program is solved in floating point; its dual solution is then rounded to
+//! integers and checked exactly, so the bound does not rest on rounding. For odd h a parity bit
+//! gives a code of length b+1, distance h+1 and even distances only, whose bound is often lower.
+
+use super::statistics::ball;
+use crate::lattice::Dimension;
+
+/// Upper bounds on the number of tags.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bounds {
+    /// Delsarte's bound, a third of it.
+    pub linear_programming: u64,
+    /// The sphere-packing bound, a third of it.
+    pub sphere_packing: u64,
+}
+
+/// Bounds for tags of a dimension at distance `distance` ≥ 1.
+pub fn bounds(dimension: Dimension, distance: u32) -> Bounds {
+    let b = dimension.bits();
+    let words = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
+    let plain = delsarte(b, (distance..=b).collect());
+    let all = 1u64 << b;
+    let best = if distance % 2 == 1 {
+        let even = (distance + 1..=b + 1).filter(|i| i % 2 == 0).collect();
+        plain.min(delsarte(b + 1, even))
+    } else {
+        plain
+    };
+    Bounds { linear_programming: best.min(all) / 3, sphere_packing: words as u64 / 3 }
+}
+
+/// K_k(i) for length n, exactly: the coefficient of z^k in (1−z)^i (1+z)^(n−i).
+fn krawtchouk(n: u32, k: u32, i: u32) -> i128 {
+    (0..=k.min(i))
+        .filter(|&j| k - j <= n - i)
+        .map(|j| {
+            let sign = if j % 2 == 0 { 1 } else { -1 };
+            sign * binomial(i, j) * binomial(n - i, k - j)
+        })
+        .sum()
+}
+
+fn binomial(n: u32, k: u32) -> i128 {
+    (0..k).fold(1, |b, i| b * i128::from(n - i) / i128::from(i + 1))
+}
+
+/// Largest number of words of length n whose distances are all among `distances`, or more.
+fn delsarte(n: u32, distances: Vec<u32>) -> u64 {
+    let constraints: Vec<u32> = (1..=n).collect();
+    // max Σ a_i with Σ_i −K_k(i)/C(n,k) · a_i ≤ 1: feasible at a = 0, so the simplex can start.
+    let matrix: Vec<Vec<f64>> = constraints
+        .iter()
+        .map(|&k| {
+            let scale = binomial(n, k) as f64;
+            distances.iter().map(|&i| -krawtchouk(n, k, i) as f64 / scale).collect()
+        })
+        .collect();
+    let multipliers = maximise_sum(matrix);
+
+    /// Denominator of the rounded dual solution.
+    const SCALE: i128 = 1 << 60;
+    // f(x) = 1 + Σ f_k K_k(x), f_k ≥ 0; if f(i) ≤ 0 for all distances i then M ≤ f(0).
+    let f: Vec<i128> = constraints
+        .iter()
+        .zip(&multipliers)
+        .map(|(&k, &y)| (y.max(0.0) / binomial(n, k) as f64 * SCALE as f64).round() as i128)
+        .collect();
+    let value = |i: u32| -> i128 {
+        constraints.iter().zip(&f).map(|(&k, f)| f * krawtchouk(n, k, i)).sum::<i128>() + SCALE
+    };
+    // Rounding may leave f(i) a little above zero: lower the constant term by as much.
+    let excess = distances.iter().map(|&i| value(i)).max().unwrap_or(0).max(0);
+    if excess >= SCALE {
+        return u64::MAX;
+    }
+    ((value(0) - excess) / (SCALE - excess)) as u64
+}
+
+/// Simplex method for max Σ x_j, A x ≤ 1, x ≥ 0; returns the dual solution, one value a row.
+fn maximise_sum(mut a: Vec<Vec<f64>>) -> Vec<f64> {
+    /// Smaller numbers are rounding noise; entries are at most 1 in size at the start.
+    const ZERO: f64 = 1e-9;
+    /// Bland's rule from here on, which cannot cycle.
+    const CAREFUL_AFTER: usize = 2_000;
+    let (rows, columns) = (a.len(), a.first().map_or(0, Vec::len));
+    // Slack variables columns.., right-hand side last.
+    for (i, row) in a.iter_mut().enumerate() {
+        row.extend((0..rows).map(|j| f64::from(u8::from(i == j))));
+        row.push(1.0);
+    }
+    let width = columns + rows;
+    let mut cost: Vec<f64> = (0..=width).map(|j| if j < columns { -1.0 } else { 0.0 }).collect();
+    for pivot in 0..10 * CAREFUL_AFTER {
+        let improving = (0..width).filter(|&j| cost[j] < -ZERO);
+        let entering = if pivot < CAREFUL_AFTER {
+            improving.min_by(|&i, &j| cost[i].total_cmp(&cost[j]))
+        } else {
+            improving.min()
+        };
+        let Some(column) = entering else { break };
+        let leaving = (0..rows)
+            .filter(|&i| a[i][column] > ZERO)
+            .min_by(|&i, &j| {
+                (a[i][width] / a[i][column]).total_cmp(&(a[j][width] / a[j][column]))
+            });
+        let Some(row) = leaving else { break };
+        let scale = 1.0 / a[row][column];
+        a[row].iter_mut().for_each(|x| *x *= scale);
+        let pivot_row = a[row].clone();
+        let eliminate = |other: &mut Vec<f64>| {
+            let factor = other[column];
+            if factor != 0.0 {
+                other.iter_mut().zip(&pivot_row).for_each(|(x, p)| *x -= factor * p);
+            }
+        };
+        a.iter_mut().enumerate().filter(|(i, _)| *i != row).for_each(|(_, r)| eliminate(r));
+        eliminate(&mut cost);
+    }
+    cost[columns..width].to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_are_the_published_ones() {
+        // The last column of the table in FORMATS §4 and, for 25 bits, h = 8.
+        for (bits, distance, expected) in [
+            (16, 5, 141),
+            (25, 7, 3478),
+            (25, 8, 2158),
+            (25, 9, 346),
+            (36, 9, 251_756),
+            (36, 11, 22_313),
+        ] {
+            let found = bounds(Dimension::from_bits(bits).unwrap(), distance).linear_programming;
+            assert_eq!(found, expected, "d{bits}h{distance}");
+        }
+    }
+
+    #[test]
+    fn perfect_codes_meet_the_bounds() {
+        // The binary Golay code of length 23 has 4096 words, the repetition code of length 9 two.
+        assert_eq!(delsarte(23, (7..=23).collect()), 4096);
+        assert_eq!(delsarte(9, vec![9]), 2);
+        assert_eq!(delsarte(15, (3..=15).collect()), 2048);
+    }
+}

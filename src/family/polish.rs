@@ -1,0 +1,112 @@
+//! Local search among all words: codes are exchanged for others until more fit.
+//!
+//! Most words conflict with many codes of a good family and never help. So each round counts, for
+//! every word, how many codes it conflicts with, takes the words with the fewest as candidates,
+//! and looks for a larger set of compatible ones among them and the present codes.
+
+use rand::seq::IndexedRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::independent::ConflictGraph;
+use super::kernels::nearer;
+use super::{Control, Screen};
+
+/// Words are counted in a table of all of them up to this size.
+pub(super) const MAX_BITS: u32 = 25;
+
+/// Candidates taken into one round: their conflicts must fit in memory.
+const POOL: usize = 24_000;
+
+/// How long and from where to search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Effort {
+    pub(super) seed: u64,
+    pub(super) rounds: u32,
+    /// Moves of the local search in a round.
+    pub(super) steps: u64,
+}
+
+/// A family at least as large as `codes`, which has to be valid. Every code of the result is
+/// admitted by the screen and its distance from all others holds.
+pub(super) fn polish(
+    screen: &Screen,
+    codes: Vec<u64>,
+    effort: Effort,
+    control: Control,
+    stop: impl Fn() -> bool,
+) -> Vec<u64> {
+    let bits = screen.words().dimension().bits();
+    if bits > MAX_BITS {
+        return codes;
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(effort.seed);
+    let mut best = codes;
+    let halt = || control.is_cancelled() || stop();
+    for round in 0..effort.rounds {
+        if halt() {
+            break;
+        }
+        let pool = candidates(screen, &best, &mut random);
+        let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
+        let graph = ConflictGraph::new(pool.len(), |i| {
+            let mut near = nearer(pool[i], &turned, screen.distance());
+            near.iter_mut().for_each(|j| *j /= 3);
+            near.dedup();
+            near.retain(|&j| j != i as u32);
+            near
+        });
+        let initial: Vec<u32> = (0..best.len() as u32).collect();
+        let found = graph.search(&initial, random.random(), effort.steps, halt);
+        best = found.into_iter().map(|i| pool[i as usize]).collect();
+        control.report(u64::from(round) + 1, u64::from(effort.rounds), best.len());
+    }
+    best
+}
+
+/// The codes, then the words with the fewest conflicts, up to [`POOL`] in all.
+fn candidates(screen: &Screen, codes: &[u64], random: &mut ChaCha8Rng) -> Vec<u64> {
+    let words = screen.words();
+    let bits = words.dimension().bits();
+    let mut conflicts = vec![0u8; 1 << bits];
+    for &code in codes {
+        for word in words.turns(code) {
+            count_ball(&mut conflicts, word as usize, bits, screen.distance() - 1);
+        }
+    }
+    let mut own: Vec<u64> = codes.iter().map(|&code| words.canonical(code)).collect();
+    own.sort_unstable();
+    let mut by_conflicts: Vec<Vec<u64>> = vec![Vec::new(); 256];
+    for word in 0..1u64 << bits {
+        let count = conflicts[word as usize];
+        let level = &mut by_conflicts[usize::from(count)];
+        if level.len() < 50 * POOL
+            && screen.admits(word)
+            && words.canonical(word) == word
+            && own.binary_search(&word).is_err()
+        {
+            level.push(word);
+        }
+    }
+    let mut pool = codes.to_vec();
+    for level in by_conflicts {
+        let room = POOL.saturating_sub(pool.len());
+        if level.len() <= room {
+            pool.extend(level);
+        } else {
+            pool.extend(level.choose_multiple(random, room));
+            break;
+        }
+    }
+    pool
+}
+
+/// Adds one to the count of every word within `radius` of `word`.
+fn count_ball(counts: &mut [u8], word: usize, bits: u32, radius: u32) {
+    counts[word] = counts[word].saturating_add(1);
+    if radius > 0 {
+        for bit in 0..bits {
+            count_ball(counts, word ^ 1 << bit, bit, radius - 1);
+        }
+    }
+}
