@@ -110,9 +110,8 @@ impl AlgebraicConstruction {
         let ignored = if has_free_centre(&union) { 1u64 << (space.bits() - 1) } else { 0 };
         let translation = self.arrangement.translation(space);
         let map = self.arrangement.bit_map(dimension);
-        let back = |tag: u64| {
-            (0..).zip(&map).fold(0u64, |word, (i, &from)| word | (tag >> from & 1) << i)
-        };
+        let back =
+            |tag: u64| (0..).zip(&map).fold(0u64, |word, (i, &from)| word | (tag >> from & 1) << i);
         let belongs = |&tag: &u64| union.code.contains((back(tag) ^ translation) & !ignored);
         match codes.par_iter().position_first(|tag| !belongs(tag)) {
             Some(id) => Err(format!("code {id} is not in the linear code")),
@@ -149,7 +148,8 @@ fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> V
         return words.into_iter().filter(|&w| screen.admits(w)).collect();
     }
     let centre = 1u64 << arrangement.bit_map(dimension)[3 * union.space.cycles as usize];
-    let choose = |word: u64| [word & !centre, word | centre].into_iter().find(|&w| screen.admits(w));
+    let choose =
+        |word: u64| [word & !centre, word | centre].into_iter().find(|&w| screen.admits(w));
     words.into_par_iter().filter_map(choose).collect()
 }
 

@@ -1,4 +1,4 @@
-//! `deltag`: search, check and list DelTag code families.
+//! `deltag`: search, check, list and draw DelTag code families.
 
 mod bounds;
 mod export;
@@ -7,13 +7,14 @@ mod info;
 mod list;
 mod parameters;
 mod plan;
+mod show;
 mod verify_family;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-/// Search, check and list DelTag code families.
+/// Search, check, list and draw DelTag code families.
 #[derive(Parser)]
 #[command(name = "deltag", version, arg_required_else_help = false)]
 pub struct Deltag {
@@ -35,6 +36,8 @@ enum Command {
     Plan(plan::Args),
     /// Write a family for another program
     Export(export::Args),
+    /// Draw tags of a family
+    Show(show::Args),
     /// List the families that come with the program
     List(list::Args),
 }
@@ -48,6 +51,7 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
         Command::Bounds(args) => bounds::run(args),
         Command::Plan(args) => plan::run(args),
         Command::Export(args) => export::run(args),
+        Command::Show(args) => show::run(args),
         Command::List(args) => list::run(args),
     }
 }
