@@ -67,18 +67,18 @@ impl SaddleFinder {
                 if !saddles.is_free(coarse) {
                     continue;
                 }
-                let saddle = if n == 0 {
-                    Sectors::read(level, on_level.position, &on_level.surface)
-                        .map(|sectors| Saddle { position: on_level.position, sectors })
-                } else {
-                    self.near(pyramid, coarse, f64::from(1u32 << n)).or_else(|| {
-                        let sectors = Sectors::read(level, on_level.position, &on_level.surface)?;
-                        Some(Saddle { position: coarse, sectors })
-                    })
+                let Some(sectors) = Sectors::read(level, on_level.position, &on_level.surface)
+                else {
+                    continue;
                 };
-                if let Some(saddle) = saddle {
-                    saddles.push(saddle);
-                }
+                let described = Saddle { position: coarse, sectors };
+                // What a coarse level shows is looked for again at full resolution; a corner that
+                // is too blurred for that stays as it was found.
+                let fine = match n {
+                    0 => None,
+                    _ => self.near(pyramid, coarse, f64::from(1u32 << n)),
+                };
+                saddles.push(fine.unwrap_or(described));
             }
         }
         let mut all = saddles.all;
