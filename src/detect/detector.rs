@@ -19,6 +19,10 @@ const PYRAMID_LEVELS: usize = 3;
 /// A level narrower than this shows no grid.
 const MIN_LEVEL_SIDE: usize = 24;
 
+/// Fewest corners of a grid that no tag vouches for: a hexagon of tiles. A quad or two of random
+/// texture may pass for tiles, seven corners with twelve clean edges between them do not.
+const MIN_UNTAGGED_CORNERS: usize = 7;
+
 /// Options of a detector.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DetectorConfig {
@@ -106,6 +110,7 @@ impl Detector {
         timing.lap("grids");
         let mut grids: Vec<Grid> =
             found.iter().flat_map(|grid| self.labelled_grids(image, grid)).collect();
+        grids.retain(|grid| !grid.tags.is_empty() || grid.corners.len() >= MIN_UNTAGGED_CORNERS);
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
         grids.sort_by_key(|grid| grid.panel.unwrap_or(u32::MAX));
         timing.lap("labels");

@@ -13,10 +13,6 @@ use super::sectors::turn;
 use crate::lattice::{Tile, Vertex};
 use crate::raster::Pyramid;
 
-/// Fewest corners of a grid: a hexagon of tiles. A quad or two of random texture may pass for
-/// tiles, seven corners with twelve clean edges between them do not.
-pub const MIN_CORNERS: usize = 7;
-
 /// Largest distance of a corner from where its neighbours predict it, over the edge length.
 const MAX_SURPRISE: f64 = 0.2;
 
@@ -50,9 +46,6 @@ pub fn grids(finder: &SaddleFinder, pyramid: &Pyramid, saddles: &[Saddle]) -> Ve
             continue;
         }
         let places = grow(&links, &seed, &taken);
-        if places.len() < MIN_CORNERS {
-            continue;
-        }
         let mut grid: SaddleGrid = places
             .iter()
             .map(|(&corner, place)| {

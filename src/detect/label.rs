@@ -8,7 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::detection::DecodedTag;
-use super::grow::{MIN_CORNERS, SaddleGrid};
+use super::grow::SaddleGrid;
 use super::tags::{Reading, TagReader};
 use crate::family::{Family, ball};
 use crate::lattice::{LatticeMap, Orientation, Tile, Vertex};
@@ -96,8 +96,7 @@ impl TagLabeller {
             .collect();
         let mut rest = grid.clone();
         let mut found = Vec::new();
-        while rest.len() >= MIN_CORNERS {
-            let Some(labelled) = self.best(&readings, &rest) else { break };
+        while let Some(labelled) = self.best(&readings, &rest) {
             rest.retain(|vertex, _| !labelled.vertices.contains_key(vertex));
             found.push(labelled);
         }

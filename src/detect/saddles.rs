@@ -4,7 +4,7 @@ use rstar::RTree;
 
 use super::cubic::CubicFit;
 use super::ring::candidates;
-use super::sectors::Sectors;
+use super::sectors::{Sectors, contrast_around};
 use crate::raster::{Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
 
 /// Radius of the fit that decides what is a corner, px; the reference detector's choice.
@@ -34,6 +34,10 @@ pub struct Saddle {
     /// Its edges and brightness.
     pub sectors: Sectors,
 }
+
+/// A blurred corner shows less than this part of its contrast on the smallest circle: half of it
+/// would make it a corner at full resolution.
+const MAX_BLURRED_CONTRAST: f64 = 0.5;
 
 /// Distance between the starts of a search, px: the fit converges from that far.
 const START_STEP_PX: f64 = 2.0;
@@ -74,11 +78,13 @@ impl SaddleFinder {
                 let described = Saddle { position: coarse, sectors };
                 // What a coarse level shows is looked for again at full resolution; a corner that
                 // is too blurred for that stays as it was found.
-                let fine = match n {
-                    0 => None,
-                    _ => self.near(pyramid, coarse, f64::from(1u32 << n)),
+                let saddle = match n {
+                    0 => Some(described),
+                    _ => self
+                        .near(pyramid, coarse, f64::from(1u32 << n))
+                        .or_else(|| is_blurred(pyramid, &described).then_some(described)),
                 };
-                saddles.push(fine.unwrap_or(described));
+                saddles.extend(saddle);
             }
         }
         let mut all = saddles.all;
@@ -114,6 +120,13 @@ impl SaddleFinder {
     }
 }
 
+/// Whether full resolution shows next to nothing where a coarse level shows a corner. What is sharp
+/// there, and no corner, is none on a coarse level either: a thin line beside an edge, say.
+fn is_blurred(pyramid: &Pyramid, coarse: &Saddle) -> bool {
+    let fine = contrast_around(&pyramid.levels()[0], coarse.position);
+    fine.is_some_and(|amplitude| amplitude < MAX_BLURRED_CONTRAST * coarse.sectors.amplitude)
+}
+
 /// Saddles with an index of their places, so that a corner found twice is kept once.
 #[derive(Default)]
 struct Merged {
@@ -126,8 +139,8 @@ impl Merged {
         self.places.locate_within_distance(position, MERGE_PX * MERGE_PX).next().is_none()
     }
 
-    fn push(&mut self, saddle: Saddle) {
-        if self.is_free(saddle.position) {
+    fn extend(&mut self, saddle: Option<Saddle>) {
+        if let Some(saddle) = saddle.filter(|saddle| self.is_free(saddle.position)) {
             self.places.insert(saddle.position);
             self.all.push(saddle);
         }

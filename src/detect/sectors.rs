@@ -66,6 +66,12 @@ impl Sectors {
     }
 }
 
+/// Mean deviation from the mean on the smallest circle around a place; `None` at the border.
+pub fn contrast_around(image: &Gray<i16>, position: [f64; 2]) -> Option<f64> {
+    let smallest = RADII_PX.into_iter().fold(f64::INFINITY, f64::min);
+    Circle::sample(image, position, smallest).map(|circle| circle.amplitude())
+}
+
 /// A sign change at an image angle; `rising` when brightness grows with the angle.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
@@ -98,14 +104,18 @@ impl Circle {
         Some(Self { level, deviations: values.map(|v| v - level) })
     }
 
+    /// Mean deviation from the level.
+    fn amplitude(&self) -> f64 {
+        self.deviations.iter().map(|d| d.abs()).sum::<f64>() / SAMPLES as f64
+    }
+
     fn sectors(&self, rays: [f64; 6]) -> Sectors {
-        let amplitude = self.deviations.iter().map(|d| d.abs()).sum::<f64>() / SAMPLES as f64;
-        Sectors { rays, level: self.level, amplitude }
+        Sectors { rays, level: self.level, amplitude: self.amplitude() }
     }
 
     /// Whether the sectors between given rays are dark and bright in turn, on the average.
     fn alternates(&self, rays: &[f64; 6]) -> bool {
-        let amplitude = self.deviations.iter().map(|d| d.abs()).sum::<f64>() / SAMPLES as f64;
+        let amplitude = self.amplitude();
         (0..6).all(|i| {
             let width = -turn(rays[i], rays[(i + 1) % 6]);
             let inside = (0..SAMPLES).filter(|&k| {

@@ -10,6 +10,9 @@ const MOST_ROWS: u32 = 500;
 /// Most corners of all boards together: their description takes 100 MB of text.
 const MOST_CORNERS: u64 = 1_000_000;
 
+/// Fewest corners of an untagged board: what the detector asks for where no tag vouches for a grid.
+const LEAST_UNTAGGED_CORNERS: u32 = 7;
+
 /// Range of a tile's edge, mm.
 const EDGE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
@@ -120,6 +123,14 @@ impl BoardSpec {
         if self.board_id.checked_add(self.boards).is_none() {
             let problem = format!("{} leaves no ids for the boards after it", self.board_id);
             return Err(TargetError::invalid("--board-id", problem));
+        }
+        if self.tags.is_none() && self.rows * self.cols < LEAST_UNTAGGED_CORNERS {
+            let problem = format!(
+                "{} × {} corners without tags are too few to be told from texture: take at least \
+                 {LEAST_UNTAGGED_CORNERS} corners, or tags",
+                self.rows, self.cols
+            );
+            return Err(TargetError::invalid("--untagged", problem));
         }
         match &self.tags {
             Some(tags) => tags.check(),
