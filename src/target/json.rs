@@ -234,7 +234,7 @@ mod tests {
     proptest! {
         #[test]
         fn writing_and_reading_changes_nothing(
-            rows in 2u32..12, cols in 2u32..12, edge_mm in 5.0f64..30.0,
+            rows in 3u32..12, cols in 3u32..12, edge_mm in 5.0f64..30.0,
             tagged: bool, boards in 1u32..3,
         ) {
             let target = board(rows, cols, edge_mm, tagged, if tagged { boards } else { 1 });
