@@ -188,6 +188,21 @@ struct Candidate {
     worth: f64,
 }
 
+/// What a random linear code is drawn by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Shape {
+    symmetry: Symmetry,
+    /// Dimensions at most.
+    most: u32,
+}
+
+/// One draw: how many orbits it has, how it was drawn, and an arrangement when it is worth one.
+struct Draw {
+    orbits: usize,
+    shape: Option<Shape>,
+    candidate: Option<Candidate>,
+}
+
 impl Best {
     /// Searches and makes a family of what was found. Progress is reported in thousandths of the time.
     pub fn family(&self, name: &str, control: Control) -> Result<Family, FamilyError> {
@@ -208,7 +223,7 @@ impl Best {
             if best.is_some() && (left.is_zero() || !small) {
                 break;
             }
-            let end = Instant::now() + left / 2;
+            let end = Instant::now() + left.mul_f64(0.7);
             let found = self.finish(&screen, &candidate, end, control)?;
             if best.as_ref().is_none_or(|(codes, _)| found.0.len() > codes.len()) {
                 best = Some(found);
@@ -240,19 +255,28 @@ impl Best {
         const BATCH: u64 = 16;
         /// Candidates kept for a thorough arrangement.
         const KEPT: usize = 6;
+        /// Shapes of random codes to draw more of.
+        const PROMISING: usize = 4;
         let mut kept: Vec<Candidate> = Vec::new();
+        let mut promising: Vec<(usize, Shape)> = Vec::new();
         let mut most_orbits = 0;
         let mut draw = 0;
         loop {
             control.check()?;
             let most = most_orbits;
-            let batch: Vec<(usize, Option<Candidate>)> = (draw..draw + BATCH)
+            let batch: Vec<Draw> = (draw..draw + BATCH)
                 .into_par_iter()
-                .map(|i| self.candidate(self.seed.wrapping_add(i), i, most))
+                .map(|i| self.candidate(self.seed.wrapping_add(i), i, most, &promising))
                 .collect();
             draw += BATCH;
-            for (orbits, candidate) in batch {
+            for Draw { orbits, shape, candidate } in batch {
                 most_orbits = most_orbits.max(orbits);
+                if let Some(shape) = shape {
+                    match promising.iter_mut().find(|(_, s)| *s == shape) {
+                        Some((best, _)) => *best = orbits.max(*best),
+                        None => promising.push((orbits, shape)),
+                    }
+                }
                 let Some(candidate) = candidate else { continue };
                 let same = |c: &Candidate| {
                     c.union.code == candidate.union.code && c.worth == candidate.worth
@@ -263,6 +287,8 @@ impl Best {
             }
             kept.sort_by(|a, b| b.worth.total_cmp(&a.worth));
             kept.truncate(KEPT);
+            promising.sort_by_key(|&(best, shape)| (std::cmp::Reverse(best), shape));
+            promising.truncate(PROMISING);
             let best = kept.first().map_or(0, |c| c.worth as usize);
             control.report(self.thousandths(start), 1000, best);
             if Instant::now() >= until {
@@ -271,29 +297,38 @@ impl Best {
         }
     }
 
-    /// One draw: how many orbits it has, and, when that is near the most seen, a quick arrangement.
-    fn candidate(&self, seed: u64, draw: u64, most_orbits: usize) -> (usize, Option<Candidate>) {
+    /// One draw, with a quick arrangement when it has nearly the most orbits seen.
+    fn candidate(
+        &self,
+        seed: u64,
+        draw: u64,
+        most_orbits: usize,
+        promising: &[(usize, Shape)],
+    ) -> Draw {
         /// Share of the most orbits seen from which on an arrangement is tried.
         const WORTH_A_TRY: f64 = 0.93;
         /// Steps of the quick arrangement.
         const STEPS: u32 = 3_000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let Some((source, code)) = self.linear_code(draw, &mut random) else { return (0, None) };
+        let Some((source, code, shape)) = self.linear_code(draw, promising, &mut random) else {
+            return Draw { orbits: 0, shape: None, candidate: None };
+        };
         let union = self.with_cosets(code, &mut random);
         let orbits = union.orbits();
         let count = orbits.len();
         if count == 0 || (count as f64) < WORTH_A_TRY * most_orbits as f64 {
-            return (count, None);
+            return Draw { orbits: count, shape, candidate: None };
         }
         let arranger = self.arranger(&union, orbits);
         let (worth, arrangement) = arranger.anneal(random.random(), STEPS);
-        (count, Some(Candidate { source, union, arrangement, worth }))
+        let candidate = Some(Candidate { source, union, arrangement, worth });
+        Draw { orbits: count, shape, candidate }
     }
 
     fn arranger(&self, union: &CosetUnion, orbits: Vec<u64>) -> Arranger {
         /// A changed cell makes up to three pairs differ, and about this share of such words can
         /// be had without conflict.
-        const REPAIR: (u32, f64) = (3, 0.7);
+        const REPAIR: (u32, f64) = (3, 0.45);
         /// Words by which an arrangement is judged, at most.
         const JUDGED_WORDS: usize = 30_000;
         let free_centre = has_free_centre(union);
@@ -314,7 +349,12 @@ impl Best {
     }
 
     /// A linear code: a shortened quadratic-residue code or a random quasi-cyclic one, by turns.
-    fn linear_code(&self, draw: u64, random: &mut ChaCha8Rng) -> Option<(String, Span)> {
+    fn linear_code(
+        &self,
+        draw: u64,
+        promising: &[(usize, Shape)],
+        random: &mut ChaCha8Rng,
+    ) -> Option<(String, Span, Option<Shape>)> {
         let space = CycleSpace::of(self.dimension);
         let primes: Vec<u32> = residue::PRIMES
             .into_iter()
@@ -336,10 +376,11 @@ impl Best {
             } else {
                 source
             };
-            return Some((source, residue::shortened(&residue::extended(q), whole, &keep)));
+            let code = residue::shortened(&residue::extended(q), whole, &keep);
+            return Some((source, code, None));
         }
         let symmetries = Symmetry::all(space);
-        let symmetry = symmetries[random.random_range(0..symmetries.len())];
+        let drawn = symmetries[random.random_range(0..symmetries.len())];
         /// Beyond this even the list of words of a linear code is long.
         const MOST_DIMENSIONS: u32 = 20;
         let bits = space.bits();
@@ -350,6 +391,12 @@ impl Best {
         } else {
             least + random.random_range(2..=6)
         };
+        // Half of the draws follow the shapes that did best so far.
+        let shape = match promising.choose(random) {
+            Some(&(_, shape)) if random.random_bool(0.5) => shape,
+            _ => Shape { symmetry: drawn, most },
+        };
+        let Shape { symmetry, most } = shape;
         let code = random_code(space, symmetry, self.distance, most, 60, random);
         let source = format!(
             "quasi-cyclic code of dimension {}, cycles shifted in blocks of {}{}",
@@ -357,7 +404,7 @@ impl Best {
             symmetry.block,
             if symmetry.twisted { ", twisted" } else { "" }
         );
-        (code.dimension() > 0).then_some((source, code))
+        (code.dimension() > 0).then_some((source, code, Some(shape)))
     }
 
     fn with_cosets(&self, code: Span, random: &mut ChaCha8Rng) -> CosetUnion {
