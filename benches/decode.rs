@@ -40,9 +40,8 @@ fn decode(criterion: &mut Criterion) {
             group.bench_function(format!("{kind}, brute force"), |bencher| {
                 bencher.iter(|| {
                     let turns = words.turns(*next.next().expect("endless"));
-                    let distance = |code: &u64| {
-                        turns.iter().map(|turn| (turn ^ code).count_ones()).min()
-                    };
+                    let distance =
+                        |code: &u64| turns.iter().map(|turn| (turn ^ code).count_ones()).min();
                     black_box(family.codes().iter().enumerate().min_by_key(|(_, c)| distance(c)))
                 });
             });

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::algebra::arrange::Arranger;
 use super::algebra::cosets::{CosetGraph, CosetUnion, MAX_SYNDROME_BITS};
 use super::algebra::quasicyclic::{Symmetry, random_code};
+use super::algebra::ranked::Ranked;
 use super::algebra::{Arrangement, CycleSpace, Span, residue};
 use super::file::parse_word;
 use super::polish::{Effort, polish};
@@ -79,6 +80,22 @@ impl AlgebraicConstruction {
         Ok(codes)
     }
 
+    /// The tag number `rank` of the whole linear code, whether or not it satisfies the rules; and
+    /// how many there are. `None` when the construction is more than a linear code. The central
+    /// cell, where the code does not use it, is black.
+    pub fn by_rank(&self, dimension: Dimension, rank: u64) -> Option<(Option<u64>, u64)> {
+        let space = CycleSpace::of(dimension);
+        let words = |field, list| self.words(field, list, dimension).ok();
+        let linear = self.exchanged.is_empty() && words("cosets", &self.cosets)? == [0];
+        let code = Span::of(words("basis", &self.basis)?);
+        if !linear || !self.arrangement.fits(space) {
+            return None;
+        }
+        let ranked = Ranked::new(space, &code)?;
+        let word = ranked.word(rank).map(|w| self.arrangement.apply(dimension, &[w])[0]);
+        Some((word, ranked.len()))
+    }
+
     /// A proof, from the structure of the code, that words of the family and their turns are
     /// `distance` apart; or the reason why it is none. Takes time in proportion to the number of
     /// codes, not to its square.
@@ -110,9 +127,8 @@ impl AlgebraicConstruction {
         let ignored = if has_free_centre(&union) { 1u64 << (space.bits() - 1) } else { 0 };
         let translation = self.arrangement.translation(space);
         let map = self.arrangement.bit_map(dimension);
-        let back = |tag: u64| {
-            (0..).zip(&map).fold(0u64, |word, (i, &from)| word | (tag >> from & 1) << i)
-        };
+        let back =
+            |tag: u64| (0..).zip(&map).fold(0u64, |word, (i, &from)| word | (tag >> from & 1) << i);
         let belongs = |&tag: &u64| union.code.contains((back(tag) ^ translation) & !ignored);
         match codes.par_iter().position_first(|tag| !belongs(tag)) {
             Some(id) => Err(format!("code {id} is not in the linear code")),
@@ -149,7 +165,8 @@ fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> V
         return words.into_iter().filter(|&w| screen.admits(w)).collect();
     }
     let centre = 1u64 << arrangement.bit_map(dimension)[3 * union.space.cycles as usize];
-    let choose = |word: u64| [word & !centre, word | centre].into_iter().find(|&w| screen.admits(w));
+    let choose =
+        |word: u64| [word & !centre, word | centre].into_iter().find(|&w| screen.admits(w));
     words.into_par_iter().filter_map(choose).collect()
 }
 

@@ -110,9 +110,7 @@ fn maximise_sum(mut a: Vec<Vec<f64>>) -> Vec<f64> {
         let Some(column) = entering else { break };
         let leaving = (0..rows)
             .filter(|&i| a[i][column] > ZERO)
-            .min_by(|&i, &j| {
-                (a[i][width] / a[i][column]).total_cmp(&(a[j][width] / a[j][column]))
-            });
+            .min_by(|&i, &j| (a[i][width] / a[i][column]).total_cmp(&(a[j][width] / a[j][column])));
         let Some(row) = leaving else { break };
         let scale = 1.0 / a[row][column];
         a[row].iter_mut().for_each(|x| *x *= scale);

@@ -62,10 +62,12 @@ for_this_processor! {
 fn nearer_portable(word: u64, list: &[u64], distance: u32) -> Vec<u32> {
     let mut found = Vec::new();
     for (b, block) in list.chunks(64).enumerate() {
-        let near = block.iter().fold(0u64, |n, w| n + u64::from((word ^ w).count_ones() < distance));
+        let near =
+            block.iter().fold(0u64, |n, w| n + u64::from((word ^ w).count_ones() < distance));
         if near > 0 {
             let position = |i: usize| (64 * b + i) as u32;
-            let hits = block.iter().enumerate().filter(|(_, w)| (word ^ **w).count_ones() < distance);
+            let hits =
+                block.iter().enumerate().filter(|(_, w)| (word ^ **w).count_ones() < distance);
             found.extend(hits.map(|(i, _)| position(i)));
         }
     }

@@ -100,12 +100,7 @@ fn bytes_per_code(dimension: Dimension) -> u64 {
     u64::from(dimension.bits().div_ceil(4)) + 10
 }
 
-fn search(
-    args: &Args,
-    dimension: Dimension,
-    distance: u32,
-    name: &str,
-) -> anyhow::Result<Family> {
+fn search(args: &Args, dimension: Dimension, distance: u32, name: &str) -> anyhow::Result<Family> {
     let rules = rules(args, distance)?;
     let lexicode = Lexicode { rules: rules.clone(), ..Lexicode::published(dimension, distance) };
     let (total, unit) = match args.method {
@@ -149,8 +144,11 @@ fn search(
             let time = Duration::from_secs_f64(args.time);
             let exchange = args.method == Method::Best;
             let seed = args.seed;
-            let limit = args.limit.or((dimension.bits() > 36).then(|| FILE_LIMIT / bytes_per_code(dimension)));
-            Best { dimension, distance, rules, time, seed, limit, exchange }.family(name, control)?
+            let limit = args
+                .limit
+                .or((dimension.bits() > 36).then(|| FILE_LIMIT / bytes_per_code(dimension)));
+            Best { dimension, distance, rules, time, seed, limit, exchange }
+                .family(name, control)?
         }
     };
     bar.finish_and_clear();
@@ -207,10 +205,8 @@ fn lexicode_codes(
     }
     let failed = std::sync::Mutex::new(None);
     let save = |checkpoint: &Checkpoint| {
-        let saved = SavedCheckpoint {
-            search: format!("{lexicode:?}"),
-            checkpoint: checkpoint.clone(),
-        };
+        let saved =
+            SavedCheckpoint { search: format!("{lexicode:?}"), checkpoint: checkpoint.clone() };
         let written = serde_json::to_vec(&saved)
             .map_err(anyhow::Error::from)
             .and_then(|bytes| output::write(path, &bytes));
@@ -223,8 +219,7 @@ fn lexicode_codes(
         return Err(error);
     }
     if path.exists() {
-        std::fs::remove_file(path)
-            .with_context(|| format!("cannot remove {}", path.display()))?;
+        std::fs::remove_file(path).with_context(|| format!("cannot remove {}", path.display()))?;
     }
     Ok(codes)
 }

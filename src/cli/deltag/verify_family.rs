@@ -17,7 +17,10 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         let certificate = certify(&family);
         if certificate.holds() {
             let how = if certificate.all_compared {
-                format!("any two, in any turn, differ in at least {} cells", certificate.min_distance)
+                format!(
+                    "any two, in any turn, differ in at least {} cells",
+                    certificate.min_distance
+                )
             } else {
                 format!(
                     "all are in a linear code of distance {} that turning leaves as it is, checked \

@@ -6,8 +6,8 @@
 //! clique in a Cayley graph. Its vertices here are whole orbits of syndromes under the turn, so
 //! that the union is invariant.
 
-use rand::seq::IndexedRandom;
 use rand::SeedableRng;
+use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
 use super::{CycleSpace, Span};
@@ -79,8 +79,7 @@ impl CosetGraph {
                 })
             })
             .collect();
-        let mut graph =
-            Self { space, code, free_bits, marked, turn_tables, vertices: Vec::new() };
+        let mut graph = Self { space, code, free_bits, marked, turn_tables, vertices: Vec::new() };
         graph.vertices = graph.find_vertices();
         Some(graph)
     }

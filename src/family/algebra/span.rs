@@ -27,9 +27,12 @@ impl Span {
 
     /// The representative of the word's coset: zero at every leading bit.
     pub fn reduce(&self, word: u64) -> u64 {
-        self.rows.iter().fold(word, |word, &row| {
-            if word >> row.ilog2() & 1 == 1 { word ^ row } else { word }
-        })
+        self.rows.iter().fold(
+            word,
+            |word, &row| {
+                if word >> row.ilog2() & 1 == 1 { word ^ row } else { word }
+            },
+        )
     }
 
     /// Whether the word is in the code.

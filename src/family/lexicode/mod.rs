@@ -144,8 +144,8 @@ impl Lexicode {
             checkpoint.parts_done = to;
             save(checkpoint);
             let share = to as f64 / sweep.parts() as f64;
-            let done = FIRST_CANDIDATES as f64
-                + share * (self.candidates - FIRST_CANDIDATES) as f64;
+            let done =
+                FIRST_CANDIDATES as f64 + share * (self.candidates - FIRST_CANDIDATES) as f64;
             control.report(done as u64, self.candidates, kept.codes.len());
         }
         Ok(())

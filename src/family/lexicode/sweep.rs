@@ -49,9 +49,7 @@ impl<'a> Sweep<'a> {
         let bit_map = Arrangement::plain(space).bit_map(dimension);
         let list = turned
             .iter()
-            .map(|word| {
-                (0..).zip(&bit_map).fold(0, |w, (i, &tag)| w | (word >> tag & 1) << i)
-            })
+            .map(|word| (0..).zip(&bit_map).fold(0, |w, (i, &tag)| w | (word >> tag & 1) << i))
             .collect();
         let balls = (0..=LEAF_BITS)
             .flat_map(|radius| (0..1u32 << LEAF_BITS).map(move |centre| ball(centre, radius)))
@@ -61,9 +59,9 @@ impl<'a> Sweep<'a> {
             parts = parts
                 .into_iter()
                 .flat_map(|(prefix, decided)| {
-                    symbols(decided).iter().map(move |&s| {
-                        (prefix << 3 | s, decided || !is_constant(s))
-                    })
+                    symbols(decided)
+                        .iter()
+                        .map(move |&s| (prefix << 3 | s, decided || !is_constant(s)))
                 })
                 .collect();
         }
@@ -149,9 +147,8 @@ impl<'a> Walk<'a> {
                 let suffix = 64 * i as u64 + u64::from(open.trailing_zeros());
                 open &= open - 1;
                 let word = prefix << LEAF_BITS | suffix;
-                let tag = (0..)
-                    .zip(&sweep.bit_map)
-                    .fold(0, |tag, (i, &to)| tag | (word >> i & 1) << to);
+                let tag =
+                    (0..).zip(&sweep.bit_map).fold(0, |tag, (i, &to)| tag | (word >> i & 1) << to);
                 if sweep.screen.admits(tag) {
                     self.found.push(sweep.screen.words().canonical(tag));
                 }
