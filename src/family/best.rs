@@ -322,8 +322,10 @@ impl Best {
         most_orbits: usize,
         promising: &[(usize, Shape)],
     ) -> Draw {
-        /// Share of the most orbits seen from which on an arrangement is tried.
-        const WORTH_A_TRY: f64 = 0.93;
+        /// Share of the most orbits seen from which on an arrangement is tried. Small codes differ
+        /// more in how many of their words pass, and are arranged quickly.
+        const WORTH_A_TRY: [f64; 2] = [0.75, 0.93];
+        const MANY_ORBITS: usize = 1_000;
         /// Steps of the quick arrangement.
         const STEPS: u32 = 3_000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -333,7 +335,8 @@ impl Best {
         let union = self.with_cosets(code, &mut random);
         let orbits = union.orbits();
         let count = orbits.len();
-        if count == 0 || (count as f64) < WORTH_A_TRY * most_orbits as f64 {
+        let share = WORTH_A_TRY[usize::from(most_orbits > MANY_ORBITS)];
+        if count == 0 || (count as f64) < share * most_orbits as f64 {
             return Draw { orbits: count, shape, candidate: None };
         }
         let arranger = self.arranger(&union, orbits);
