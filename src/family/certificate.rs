@@ -32,7 +32,7 @@ impl Certificate {
 /// Turns are taken from [`TagCells::rotate`] and complexity from its list of neighbours, not from
 /// the tables that the searches use. Up to 100,000 codes all pairs are compared. Beyond, the
 /// distance is proved from the structure that the file records
-/// ([`super::best::AlgebraicConstruction::prove`]), and a sample of pairs is compared as well.
+/// ([`super::algebra::AlgebraicConstruction::prove`]), and a sample of pairs is compared as well.
 /// An algebraic construction is written down again and has to give the same codes.
 pub fn certify(family: &Family) -> Certificate {
     let cells = TagCells::new(family.dimension());

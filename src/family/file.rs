@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::best::AlgebraicConstruction;
+use super::algebra::AlgebraicConstruction;
 use super::{Family, FamilyError, Rules, TagWords};
 use crate::lattice::Dimension;
 
@@ -80,7 +80,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
         .codes
         .iter()
         .enumerate()
-        .map(|(id, text)| parse_word(text).ok_or_else(|| (id, text)))
+        .map(|(id, text)| parse_word(text).ok_or((id, text)))
         .collect::<Result<Vec<u64>, _>>()
         .map_err(|(id, text)| {
             let problem = format!("`{text}` is not a hexadecimal word such as 0x08f50a7");

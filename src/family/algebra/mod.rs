@@ -16,8 +16,10 @@ pub mod cosets;
 mod cycles;
 pub mod quasicyclic;
 pub mod ranked;
+pub(in crate::family) mod record;
 pub mod residue;
 mod span;
 
 pub use cycles::{Arrangement, CycleSpace};
+pub use record::AlgebraicConstruction;
 pub use span::Span;
