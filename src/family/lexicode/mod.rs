@@ -266,7 +266,7 @@ mod tests {
         let dimension = Dimension::from_bits(36).unwrap();
         let screen = Screen::new(TagWords::new(dimension), 13, &Rules::published(13));
         let mut search = Lexicode::published(dimension, 13);
-        search.candidates = 30_000;
+        search.candidates = 100;
         let kept = Kept::of(search.codes(Control::default()).unwrap(), &screen);
         let fine = |w: u64| screen.admits(w) && kept.allows(w, 0);
         let sweep = Sweep::new(&screen, &kept.turned);
