@@ -170,13 +170,12 @@ proptest! {
 
     #[test]
     fn a_word_read_at_random_decodes_to_its_nearest_code_or_not_at_all(word: u64) {
-        for family in [&shipped()[1]] {
-            let word = word & family.dimension().mask();
-            let words = TagWords::new(family.dimension());
-            let nearest = family.codes().iter().map(|&c| words.distance(word, c)).min().unwrap();
-            let decoded = Decoder::new(family).decode(word, family.correctable());
-            prop_assert_eq!(decoded.map(|d| d.errors),
-                (nearest <= family.correctable()).then_some(nearest));
-        }
+        let family = Family::resolve("delTag25h7").unwrap();
+        let word = word & family.dimension().mask();
+        let words = TagWords::new(family.dimension());
+        let nearest = family.codes().iter().map(|&c| words.distance(word, c)).min().unwrap();
+        let decoded = Decoder::new(&family).decode(word, family.correctable());
+        let expected = (nearest <= family.correctable()).then_some(nearest);
+        prop_assert_eq!(decoded.map(|d| d.errors), expected);
     }
 }
