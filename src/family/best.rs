@@ -271,8 +271,8 @@ impl Best {
     }
 
     fn with_cosets(&self, code: Span, random: &mut ChaCha8Rng) -> CosetUnion {
-        /// Random starts of the clique search.
-        const STARTS: u64 = 8;
+        /// Random starts of the clique search; in small spaces they cost next to nothing.
+        const STARTS: [u64; 2] = [40, 8];
         let space = CycleSpace::of(self.dimension);
         let alone = CosetUnion { space, code: code.clone(), cosets: vec![0] };
         if space.bits() - code.dimension() > SYNDROME_BITS {
@@ -283,7 +283,7 @@ impl Best {
             return alone;
         }
         let first: u64 = random.random();
-        (0..STARTS)
+        (0..STARTS[usize::from(space.bits() > 16)])
             .map(|i| graph.grow(first.wrapping_add(i)))
             .max_by_key(|union| union.orbits().len())
             .unwrap_or(alone)
