@@ -83,3 +83,58 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
             .stderr(predicates::str::starts_with("error: ").and(one_line));
     }
 }
+
+#[test]
+fn a_search_without_an_answer_says_why_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    deltag()
+        .args(["gen-family", "d9h9", "--method", "search", "--rounds", "1", "-o"])
+        .arg(folder.path())
+        .assert()
+        .code(2)
+        .stderr(predicates::str::starts_with("error: "));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn rules_come_from_a_file_and_unknown_ones_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let rules = folder.path().join("rules.toml");
+    let search = |text: &str| {
+        std::fs::write(&rules, text).unwrap();
+        deltag()
+            .args(["gen-family", "d16h5", "--method", "lexicode", "--rules"])
+            .arg(&rules)
+            .arg("-o")
+            .arg(folder.path().join("d16h5.json"))
+            .assert()
+    };
+    search("min_complexity = 0.7").success();
+    deltag().arg("verify-family").arg(folder.path().join("d16h5.json")).assert().success();
+    search("min_complexty = 0.7").code(2).stderr(contains("min_complexty"));
+    search("min_complexity = nan").code(2).stderr(contains("between 0 and 1"));
+}
+
+#[test]
+fn plan_names_the_smallest_family_that_suffices() {
+    deltag()
+        .args(["plan", "--faces", "20", "--tags-per-face", "10"])
+        .assert()
+        .success()
+        .stdout(contains("25h7"));
+    deltag().args(["plan", "--faces", "9999999"]).assert().code(2).stderr(contains("--faces"));
+}
+
+#[test]
+fn exports_list_every_code() {
+    for format in ["c", "rust", "python", "json", "txt"] {
+        let output = deltag().args(["export", "delTag16h5", "--format", format]).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(text.matches("0x").count(), 34 + usize::from(format == "json"), "{format}");
+    }
+    deltag()
+        .args(["export", "delTag16h5", "--format", "opencv"])
+        .assert()
+        .success()
+        .stdout(contains("marker_0: \"0010010011010110\""));
+}

@@ -1,6 +1,9 @@
 //! Every shipped family: what it claims holds, and it decodes what was misread.
 
-use deltille::family::{Control, Decoder, Family, TagWords, certify, lexicode, shipped_names};
+use deltille::family::{
+    Control, Decoder, Family, Rules, TagWords, best, certify, lexicode, shipped_names,
+};
+use deltille::lattice::Dimension;
 use proptest::prelude::*;
 
 fn shipped() -> Vec<Family> {
@@ -44,6 +47,56 @@ fn published_families_are_the_published_ones() {
             }
             Err(_) => println!("skipped: {path} is not there (set DELTILLE_DATA)"),
         }
+    }
+}
+
+/// What the searches reached must not be lost again.
+#[test]
+fn own_families_are_as_large_as_documented() {
+    for (name, size) in [
+        ("d16h5", 78),
+        ("d25h7", 1199),
+        ("d25h9", 81),
+        ("d36h9", 12_924),
+        ("d36h11", 1902),
+        ("d49h12", 20_000),
+    ] {
+        let family = Family::resolve(name).unwrap();
+        assert!(family.len() >= size, "{name} has {}", family.len());
+        assert_eq!(family.rules(), &Rules::published(family.distance()), "{name}");
+    }
+}
+
+/// Minutes of work: `cargo test --release -- --ignored`.
+#[test]
+#[ignore = "looks for the codes among all 2^36 words, minutes of work"]
+fn lexicodes_of_36_bits_are_the_published_ones() {
+    for name in ["delTag36h11", "delTag36h9"] {
+        let published = Family::resolve(name).unwrap();
+        let search = lexicode::Lexicode::published(published.dimension(), published.distance());
+        assert_eq!(search.family(name, Control::default()).unwrap(), published);
+    }
+}
+
+#[test]
+fn best_families_hold_whatever_the_rules() {
+    for (bits, distance, rules) in [
+        (9, 3, Rules { min_complexity: 0.0, black_distance: 3, white_distance: 0 }),
+        (16, 6, Rules { min_complexity: 0.6, black_distance: 6, white_distance: 6 }),
+        (36, 13, Rules::published(13)),
+    ] {
+        let search = best::Best {
+            dimension: Dimension::from_bits(bits).unwrap(),
+            distance,
+            rules,
+            time: std::time::Duration::from_millis(500),
+            seed: 3,
+            limit: None,
+            exchange: true,
+        };
+        let family = search.family("test", Control::default()).unwrap();
+        assert_eq!(certify(&family).failures, [""; 0]);
+        assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
     }
 }
 
@@ -117,12 +170,12 @@ proptest! {
 
     #[test]
     fn a_word_read_at_random_decodes_to_its_nearest_code_or_not_at_all(word: u64) {
-        let family = &shipped()[1];
+        let family = Family::resolve("delTag25h7").unwrap();
         let word = word & family.dimension().mask();
         let words = TagWords::new(family.dimension());
         let nearest = family.codes().iter().map(|&c| words.distance(word, c)).min().unwrap();
-        let decoded = Decoder::new(family).decode(word, family.correctable());
-        prop_assert_eq!(decoded.map(|d| d.errors),
-            (nearest <= family.correctable()).then_some(nearest));
+        let decoded = Decoder::new(&family).decode(word, family.correctable());
+        let expected = (nearest <= family.correctable()).then_some(nearest);
+        prop_assert_eq!(decoded.map(|d| d.errors), expected);
     }
 }

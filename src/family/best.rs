@@ -10,155 +10,15 @@ use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::algebra::arrange::Arranger;
 use super::algebra::cosets::{CosetGraph, CosetUnion, MAX_SYNDROME_BITS};
 use super::algebra::quasicyclic::{Symmetry, random_code};
-use super::algebra::{Arrangement, CycleSpace, Span, residue};
-use super::file::parse_word;
+use super::algebra::record::has_free_centre;
+use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, residue};
 use super::polish::{Effort, polish};
 use super::{Construction, Control, Family, FamilyError, Rules, Screen, TagWords};
 use crate::lattice::Dimension;
-
-/// All that is needed to write down an algebraic family again.
-///
-/// The codes are one word of each orbit of the union of cosets, arranged on the tag, as far as the
-/// rules admit them and no exchanged word excludes them; and the exchanged words. Where no word of
-/// the union uses the central cell, it is white if the rules need it, else black. In order of the
-/// smallest of the three turned words.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct AlgebraicConstruction {
-    /// Where the linear code comes from, in words.
-    pub source: String,
-    /// Basis of the linear code, in cycle coordinates, hexadecimal.
-    pub basis: Vec<String>,
-    /// One word of each coset, in cycle coordinates, hexadecimal.
-    pub cosets: Vec<String>,
-    /// Where its cycles go on the tag.
-    pub arrangement: Arrangement,
-    /// Words of the tag that local search put in, hexadecimal.
-    pub exchanged: Vec<String>,
-    /// Only so many codes are listed, the first in order; absent for all of them.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub limit: Option<u64>,
-    /// Seed of the search that found all this.
-    pub seed: u64,
-}
-
-impl AlgebraicConstruction {
-    /// Writes down the codes, in the order of the family.
-    pub fn codes(&self, screen: &Screen) -> Result<Vec<u64>, FamilyError> {
-        let dimension = screen.words().dimension();
-        let space = CycleSpace::of(dimension);
-        if !self.arrangement.fits(space) {
-            let problem = "does not arrange the cycles of such a tag";
-            return Err(FamilyError::field("construction.arrangement", problem));
-        }
-        let union = CosetUnion {
-            space,
-            code: Span::of(self.words("basis", &self.basis, dimension)?),
-            cosets: self.words("cosets", &self.cosets, dimension)?,
-        };
-        if union.code.dimension() > MOST_DIMENSIONS {
-            return Err(FamilyError::field("construction.basis", "more than 26 dimensions"));
-        }
-        let exchanged = self.words("exchanged", &self.exchanged, dimension)?;
-        let turned: Vec<u64> = exchanged.iter().flat_map(|&w| screen.words().turns(w)).collect();
-        let mut codes = arranged(screen, &union, &self.arrangement);
-        let apart = |code: &u64| {
-            turned.par_iter().all(|other| (code ^ other).count_ones() >= screen.distance())
-        };
-        if !turned.is_empty() {
-            codes.retain(apart);
-        }
-        codes.extend(exchanged);
-        codes.sort_by_cached_key(|&code| screen.words().canonical(code));
-        codes.truncate(self.limit.map_or(usize::MAX, |limit| limit as usize));
-        Ok(codes)
-    }
-
-    /// A proof, from the structure of the code, that words of the family and their turns are
-    /// `distance` apart; or the reason why it is none. Takes time in proportion to the number of
-    /// codes, not to its square.
-    ///
-    /// The basis has to span a code that the turn leaves invariant and whose lightest word weighs
-    /// `distance` or more (all are looked at), and each code, arranged back, has to lie in it. Then
-    /// any two words are as far apart as some word of the linear code is heavy.
-    pub fn prove(&self, screen: &Screen, codes: &[u64]) -> Result<(), String> {
-        let dimension = screen.words().dimension();
-        let space = CycleSpace::of(dimension);
-        let words = |field, list| self.words(field, list, dimension).map_err(|e| e.to_string());
-        let code = Span::of(words("basis", &self.basis)?);
-        let cosets = words("cosets", &self.cosets)?;
-        if !self.arrangement.fits(space) || code.dimension() > MOST_DIMENSIONS {
-            return Err("the construction does not fit such tags".to_owned());
-        }
-        if !self.exchanged.is_empty() || cosets != [0] {
-            return Err("not a linear code alone".to_owned());
-        }
-        if !code.rows().iter().all(|&row| code.contains(space.turn(row))) {
-            return Err("the linear code changes when the tag turns".to_owned());
-        }
-        let light = |word: &u64| (1..screen.distance()).contains(&word.count_ones());
-        if code.words().any(|word| light(&word)) {
-            return Err("the linear code has too light a word".to_owned());
-        }
-        let union = CosetUnion { space, code, cosets };
-        // The free centre is no part of the linear code: it only adds distance.
-        let ignored = if has_free_centre(&union) { 1u64 << (space.bits() - 1) } else { 0 };
-        let translation = self.arrangement.translation(space);
-        let map = self.arrangement.bit_map(dimension);
-        let back =
-            |tag: u64| (0..).zip(&map).fold(0u64, |word, (i, &from)| word | (tag >> from & 1) << i);
-        let belongs = |&tag: &u64| union.code.contains((back(tag) ^ translation) & !ignored);
-        match codes.par_iter().position_first(|tag| !belongs(tag)) {
-            Some(id) => Err(format!("code {id} is not in the linear code")),
-            None => Ok(()),
-        }
-    }
-
-    fn words(
-        &self,
-        field: &str,
-        texts: &[String],
-        dimension: Dimension,
-    ) -> Result<Vec<u64>, FamilyError> {
-        texts
-            .iter()
-            .map(|text| {
-                parse_word(text).filter(|&word| word <= dimension.mask()).ok_or_else(|| {
-                    let problem = format!("`{text}` is not a word of {} bits", dimension.bits());
-                    FamilyError::field(format!("construction.{field}"), problem)
-                })
-            })
-            .collect()
-    }
-}
-
-/// Beyond this the list of words would not fit in memory.
-const MOST_DIMENSIONS: u32 = 26;
-
-/// The words of a union on the tag, one of each orbit, as far as the screen admits them.
-fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> Vec<u64> {
-    let dimension = screen.words().dimension();
-    let words = arrangement.apply(dimension, &union.orbits());
-    if !has_free_centre(union) {
-        return words.into_iter().filter(|&w| screen.admits(w)).collect();
-    }
-    let centre = 1u64 << arrangement.bit_map(dimension)[3 * union.space.cycles as usize];
-    let choose =
-        |word: u64| [word & !centre, word | centre].into_iter().find(|&w| screen.admits(w));
-    words.into_par_iter().filter_map(choose).collect()
-}
-
-/// Whether the space has a central bit that no word of the union uses.
-fn has_free_centre(union: &CosetUnion) -> bool {
-    let centre = 1u64 << (union.space.bits() - 1);
-    union.space.centre
-        && union.code.rows().iter().chain(&union.cosets).all(|word| word & centre == 0)
-}
 
 /// What to search and for how long.
 #[derive(Clone, Debug)]
@@ -188,6 +48,21 @@ struct Candidate {
     worth: f64,
 }
 
+/// What a random linear code is drawn by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Shape {
+    symmetry: Symmetry,
+    /// Dimensions at most.
+    most: u32,
+}
+
+/// One draw: how many orbits it has, how it was drawn, and an arrangement when it is worth one.
+struct Draw {
+    orbits: usize,
+    shape: Option<Shape>,
+    candidate: Option<Candidate>,
+}
+
 impl Best {
     /// Searches and makes a family of what was found. Progress is reported in thousandths of the time.
     pub fn family(&self, name: &str, control: Control) -> Result<Family, FamilyError> {
@@ -208,7 +83,7 @@ impl Best {
             if best.is_some() && (left.is_zero() || !small) {
                 break;
             }
-            let end = Instant::now() + left / 2;
+            let end = Instant::now() + left.mul_f64(0.7);
             let found = self.finish(&screen, &candidate, end, control)?;
             if best.as_ref().is_none_or(|(codes, _)| found.0.len() > codes.len()) {
                 best = Some(found);
@@ -218,7 +93,7 @@ impl Best {
         control.check()?;
         let (codes, construction) = match best {
             Some(found) if !found.0.is_empty() => found,
-            _ => self.from_nothing(&screen, control)?,
+            _ => self.search_alone(&screen, control)?,
         };
         let rules = self.rules.clone();
         Family::new(name, self.dimension, self.distance, codes, rules, construction)
@@ -240,19 +115,28 @@ impl Best {
         const BATCH: u64 = 16;
         /// Candidates kept for a thorough arrangement.
         const KEPT: usize = 6;
+        /// Shapes of random codes to draw more of.
+        const PROMISING: usize = 4;
         let mut kept: Vec<Candidate> = Vec::new();
+        let mut promising: Vec<(usize, Shape)> = Vec::new();
         let mut most_orbits = 0;
         let mut draw = 0;
         loop {
             control.check()?;
             let most = most_orbits;
-            let batch: Vec<(usize, Option<Candidate>)> = (draw..draw + BATCH)
+            let batch: Vec<Draw> = (draw..draw + BATCH)
                 .into_par_iter()
-                .map(|i| self.candidate(self.seed.wrapping_add(i), i, most))
+                .map(|i| self.candidate(self.seed.wrapping_add(i), i, most, &promising))
                 .collect();
             draw += BATCH;
-            for (orbits, candidate) in batch {
+            for Draw { orbits, shape, candidate } in batch {
                 most_orbits = most_orbits.max(orbits);
+                if let Some(shape) = shape {
+                    match promising.iter_mut().find(|(_, s)| *s == shape) {
+                        Some((best, _)) => *best = orbits.max(*best),
+                        None => promising.push((orbits, shape)),
+                    }
+                }
                 let Some(candidate) = candidate else { continue };
                 let same = |c: &Candidate| {
                     c.union.code == candidate.union.code && c.worth == candidate.worth
@@ -263,6 +147,8 @@ impl Best {
             }
             kept.sort_by(|a, b| b.worth.total_cmp(&a.worth));
             kept.truncate(KEPT);
+            promising.sort_by_key(|&(best, shape)| (std::cmp::Reverse(best), shape));
+            promising.truncate(PROMISING);
             let best = kept.first().map_or(0, |c| c.worth as usize);
             control.report(self.thousandths(start), 1000, best);
             if Instant::now() >= until {
@@ -271,29 +157,41 @@ impl Best {
         }
     }
 
-    /// One draw: how many orbits it has, and, when that is near the most seen, a quick arrangement.
-    fn candidate(&self, seed: u64, draw: u64, most_orbits: usize) -> (usize, Option<Candidate>) {
-        /// Share of the most orbits seen from which on an arrangement is tried.
-        const WORTH_A_TRY: f64 = 0.93;
+    /// One draw, with a quick arrangement when it has nearly the most orbits seen.
+    fn candidate(
+        &self,
+        seed: u64,
+        draw: u64,
+        most_orbits: usize,
+        promising: &[(usize, Shape)],
+    ) -> Draw {
+        /// Share of the most orbits seen from which on an arrangement is tried. Small codes differ
+        /// more in how many of their words pass, and are arranged quickly.
+        const WORTH_A_TRY: [f64; 2] = [0.75, 0.93];
+        const MANY_ORBITS: usize = 1_000;
         /// Steps of the quick arrangement.
         const STEPS: u32 = 3_000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let Some((source, code)) = self.linear_code(draw, &mut random) else { return (0, None) };
+        let Some((source, code, shape)) = self.linear_code(draw, promising, &mut random) else {
+            return Draw { orbits: 0, shape: None, candidate: None };
+        };
         let union = self.with_cosets(code, &mut random);
         let orbits = union.orbits();
         let count = orbits.len();
-        if count == 0 || (count as f64) < WORTH_A_TRY * most_orbits as f64 {
-            return (count, None);
+        let share = WORTH_A_TRY[usize::from(most_orbits > MANY_ORBITS)];
+        if count == 0 || (count as f64) < share * most_orbits as f64 {
+            return Draw { orbits: count, shape, candidate: None };
         }
         let arranger = self.arranger(&union, orbits);
         let (worth, arrangement) = arranger.anneal(random.random(), STEPS);
-        (count, Some(Candidate { source, union, arrangement, worth }))
+        let candidate = Some(Candidate { source, union, arrangement, worth });
+        Draw { orbits: count, shape, candidate }
     }
 
     fn arranger(&self, union: &CosetUnion, orbits: Vec<u64>) -> Arranger {
         /// A changed cell makes up to three pairs differ, and about this share of such words can
         /// be had without conflict.
-        const REPAIR: (u32, f64) = (3, 0.7);
+        const REPAIR: (u32, f64) = (3, 0.45);
         /// Words by which an arrangement is judged, at most.
         const JUDGED_WORDS: usize = 30_000;
         let free_centre = has_free_centre(union);
@@ -314,7 +212,12 @@ impl Best {
     }
 
     /// A linear code: a shortened quadratic-residue code or a random quasi-cyclic one, by turns.
-    fn linear_code(&self, draw: u64, random: &mut ChaCha8Rng) -> Option<(String, Span)> {
+    fn linear_code(
+        &self,
+        draw: u64,
+        promising: &[(usize, Shape)],
+        random: &mut ChaCha8Rng,
+    ) -> Option<(String, Span, Option<Shape>)> {
         let space = CycleSpace::of(self.dimension);
         let primes: Vec<u32> = residue::PRIMES
             .into_iter()
@@ -323,7 +226,7 @@ impl Best {
             .collect();
         // A random code of 49 bits takes long to check and is far smaller.
         let only_residue = self.dimension.bits() > 36;
-        if (draw % 4 == 0 || only_residue) && !primes.is_empty() {
+        if (draw.is_multiple_of(4) || only_residue) && !primes.is_empty() {
             let q = *primes.choose(random).expect("not empty");
             let whole = residue::space(q);
             let mut keep: Vec<u32> = (0..whole.cycles).collect();
@@ -336,10 +239,11 @@ impl Best {
             } else {
                 source
             };
-            return Some((source, residue::shortened(&residue::extended(q), whole, &keep)));
+            let code = residue::shortened(&residue::extended(q), whole, &keep);
+            return Some((source, code, None));
         }
         let symmetries = Symmetry::all(space);
-        let symmetry = symmetries[random.random_range(0..symmetries.len())];
+        let drawn = symmetries[random.random_range(0..symmetries.len())];
         /// Beyond this even the list of words of a linear code is long.
         const MOST_DIMENSIONS: u32 = 20;
         let bits = space.bits();
@@ -350,6 +254,12 @@ impl Best {
         } else {
             least + random.random_range(2..=6)
         };
+        // Half of the draws follow the shapes that did best so far.
+        let shape = match promising.choose(random) {
+            Some(&(_, shape)) if random.random_bool(0.5) => shape,
+            _ => Shape { symmetry: drawn, most },
+        };
+        let Shape { symmetry, most } = shape;
         let code = random_code(space, symmetry, self.distance, most, 60, random);
         let source = format!(
             "quasi-cyclic code of dimension {}, cycles shifted in blocks of {}{}",
@@ -357,12 +267,12 @@ impl Best {
             symmetry.block,
             if symmetry.twisted { ", twisted" } else { "" }
         );
-        (code.dimension() > 0).then_some((source, code))
+        (code.dimension() > 0).then_some((source, code, Some(shape)))
     }
 
     fn with_cosets(&self, code: Span, random: &mut ChaCha8Rng) -> CosetUnion {
-        /// Random starts of the clique search.
-        const STARTS: u64 = 8;
+        /// Random starts of the clique search; in small spaces they cost next to nothing.
+        const STARTS: [u64; 2] = [40, 8];
         let space = CycleSpace::of(self.dimension);
         let alone = CosetUnion { space, code: code.clone(), cosets: vec![0] };
         if space.bits() - code.dimension() > SYNDROME_BITS {
@@ -373,7 +283,7 @@ impl Best {
             return alone;
         }
         let first: u64 = random.random();
-        (0..STARTS)
+        (0..STARTS[usize::from(space.bits() > 16)])
             .map(|i| graph.grow(first.wrapping_add(i)))
             .max_by_key(|union| union.orbits().len())
             .unwrap_or(alone)
@@ -445,7 +355,7 @@ impl Best {
     }
 
     /// Local search alone, for distances that leave no room for a linear code.
-    fn from_nothing(
+    fn search_alone(
         &self,
         screen: &Screen,
         control: Control,

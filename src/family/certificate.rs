@@ -32,7 +32,8 @@ impl Certificate {
 /// Turns are taken from [`TagCells::rotate`] and complexity from its list of neighbours, not from
 /// the tables that the searches use. Up to 100,000 codes all pairs are compared. Beyond, the
 /// distance is proved from the structure that the file records
-/// ([`super::best::AlgebraicConstruction::prove`]), and a sample of pairs is compared as well.
+/// ([`super::algebra::AlgebraicConstruction::prove`]), and a sample of pairs is compared as well.
+/// An algebraic construction is written down again and has to give the same codes.
 pub fn certify(family: &Family) -> Certificate {
     let cells = TagCells::new(family.dimension());
     let codes = family.codes();
@@ -73,6 +74,13 @@ pub fn certify(family: &Family) -> Certificate {
     if let Some(first) = rule_breakers.first() {
         let many = rule_breakers.len();
         failures.push(format!("rules: {many} codes break them, the first is code {first}"));
+    }
+    if let Construction::Algebraic(construction) = family.construction() {
+        match construction.codes(&screen) {
+            Ok(again) if again == codes => {}
+            Ok(_) => failures.push("construction: gives other codes than the file".to_owned()),
+            Err(error) => failures.push(error.to_string()),
+        }
     }
     let all_compared = compared.len() == codes.len();
     if all_compared && histogram != *family.histogram() {

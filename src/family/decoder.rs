@@ -1,3 +1,4 @@
+use super::kernels::first_nearer;
 use super::{Family, TagWords};
 
 /// A word recognised as a tag.
@@ -134,18 +135,17 @@ impl Block {
     fn find(&self, key: u32, word: u64, max_errors: u32) -> Option<Decoded> {
         let (from, to) = (self.starts[key as usize], self.starts[key as usize + 1]);
         let bucket = from as usize..to as usize;
-        let close = |&other: &u64| (word ^ other).count_ones() <= max_errors;
-        let found = self.words[bucket.clone()].iter().position(close)?;
+        let found = first_nearer(word, &self.words[bucket.clone()], max_errors + 1)?;
         let reading = self.readings[bucket.start + found];
         let errors = (word ^ self.words[bucket.start + found]).count_ones();
         Some(Decoded { id: reading / 3, turns: (reading % 3) as u8, errors, runner_up: None })
     }
 }
 
-/// Number of blocks with the least work for a word that is no code: a bucket costs about as much
-/// to reach as four words to compare.
+/// Number of blocks with the least work for a word that is no code.
 fn block_count(bits: u32, correctable: u32, words: usize) -> u32 {
-    const BUCKET_COST: f64 = 4.0;
+    /// A bucket costs about as much to reach as this many words to compare, side by side.
+    const BUCKET_COST: f64 = 50.0;
     let cost = |count: &u32| {
         let width = (bits / count).min(MAX_BLOCK_BITS);
         let in_bucket = words as f64 / f64::from(1u32 << width);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::best::AlgebraicConstruction;
+use super::algebra::AlgebraicConstruction;
 use super::{Family, FamilyError, Rules, TagWords};
 use crate::lattice::Dimension;
 

@@ -54,6 +54,23 @@ fn any_nearer_portable(word: u64, list: &[u64], distance: u32) -> bool {
 }
 
 for_this_processor! {
+    /// Position of the first word of `list` that is nearer to `word` than `distance`.
+    fn first_nearer / first_nearer_portable(word: u64, list: &[u64], distance: u32) -> Option<usize>
+}
+
+#[inline(always)]
+fn first_nearer_portable(word: u64, list: &[u64], distance: u32) -> Option<usize> {
+    let near = |w: &u64| (word ^ w).count_ones() < distance;
+    let (blocks, rest) = list.as_chunks::<32>();
+    for (i, block) in blocks.iter().enumerate() {
+        if block.iter().fold(0u64, |n, w| n + u64::from(near(w))) > 0 {
+            return block.iter().position(near).map(|at| 32 * i + at);
+        }
+    }
+    rest.iter().position(near).map(|at| 32 * blocks.len() + at)
+}
+
+for_this_processor! {
     /// Positions in `list` of the words nearer to `word` than `distance`.
     fn nearer / nearer_portable(word: u64, list: &[u64], distance: u32) -> Vec<u32>
 }
@@ -146,6 +163,9 @@ mod tests {
             for distance in [0, 20, 26, 40] {
                 let near = nearer_portable(word, &list, distance);
                 prop_assert_eq!(nearer(word, &list, distance), near.clone());
+                let first = near.first().map(|&i| i as usize);
+                prop_assert_eq!(first_nearer(word, &list, distance), first);
+                prop_assert_eq!(first_nearer_portable(word, &list, distance), first);
                 prop_assert_eq!(any_nearer(word, &list, distance), !near.is_empty());
                 prop_assert_eq!(any_nearer_portable(word, &list, distance), !near.is_empty());
             }

@@ -1,6 +1,7 @@
 //! `deltag`: search, check, list and draw DelTag code families.
 
 mod bounds;
+mod by_rank;
 mod export;
 mod gen_family;
 mod info;
@@ -34,6 +35,8 @@ enum Command {
     Bounds(bounds::Args),
     /// Name the smallest shipped family that suffices for a target
     Plan(plan::Args),
+    /// Print tags of a linear family by number, also those that its file does not list
+    ByRank(by_rank::Args),
     /// Write a family for another program
     Export(export::Args),
     /// Draw tags of a family
@@ -50,6 +53,7 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
         Command::Info(args) => info::run(args),
         Command::Bounds(args) => bounds::run(args),
         Command::Plan(args) => plan::run(args),
+        Command::ByRank(args) => by_rank::run(args),
         Command::Export(args) => export::run(args),
         Command::Show(args) => show::run(args),
         Command::List(args) => list::run(args),

@@ -8,14 +8,18 @@
 //! - [`residue`]: extended quadratic-residue codes, which have a symmetry of order three.
 //! - [`quasicyclic`]: random invariant linear codes with further symmetries.
 //! - [`cosets`]: unions of cosets of an invariant linear code, by clique search.
+//! - [`ranked`]: the tags of a linear code by number, without listing them.
 //! - [`arrange`]: which cycle of the code goes where on the tag decides how many words look good.
 
 pub mod arrange;
 pub mod cosets;
 mod cycles;
 pub mod quasicyclic;
+pub mod ranked;
+pub(in crate::family) mod record;
 pub mod residue;
 mod span;
 
 pub use cycles::{Arrangement, CycleSpace};
+pub use record::AlgebraicConstruction;
 pub use span::Span;

@@ -12,7 +12,7 @@ use super::{CycleSpace, Span};
 /// A symmetry that commutes with the turn: within each block of `block` cycles a cycle goes to the
 /// next, the last to the first, there turned once more if `twisted`. Cycles that fill no block,
 /// and the centre, stay.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Symmetry {
     /// Cycles in a block; 1 for no symmetry besides the turn (when not twisted).
     pub block: u32,

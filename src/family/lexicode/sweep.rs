@@ -39,7 +39,7 @@ const PART_SYMBOLS: u32 = 3;
 impl<'a> Sweep<'a> {
     /// Whether words of this many bits can be swept: whole symbols, and enough of them.
     pub(super) fn suits(bits: u32) -> bool {
-        bits % 3 == 0 && bits / 3 > PART_SYMBOLS + LEAF_BITS / 3
+        bits.is_multiple_of(3) && bits / 3 > PART_SYMBOLS + LEAF_BITS / 3
     }
 
     /// A sweep for the words that `screen` admits and that are far enough from all of `turned`.

@@ -1,0 +1,54 @@
+//! Nearest-code lookup against brute force, on a family of many codes.
+//!
+//! `cargo bench --bench decode`; each figure is the time for one word. Words with four misread
+//! cells are what a camera sees at worst, random words what clutter gives.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use deltille::family::{Decoder, Family, TagWords};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn decode(criterion: &mut Criterion) {
+    for name in ["delTag25h7", "d36h9", "d36h11"] {
+        let family = Family::resolve(name).expect("a shipped family");
+        let decoder = Decoder::new(&family);
+        let words = TagWords::new(family.dimension());
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let bits = family.dimension().bits();
+        let misread: Vec<u64> = (0..1024)
+            .map(|_| {
+                let code = family.codes()[random.random_range(0..family.len())];
+                let word = words.turns(code)[random.random_range(0..3)];
+                (0..family.correctable()).fold(word, |w, _| w ^ 1 << random.random_range(0..bits))
+            })
+            .collect();
+        let clutter: Vec<u64> =
+            (0..1024).map(|_| random.random::<u64>() & family.dimension().mask()).collect();
+
+        let mut group = criterion.benchmark_group(format!("{name}, {} codes", family.len()));
+        for (kind, reads) in [("misread tag", &misread), ("random word", &clutter)] {
+            let mut next = reads.iter().cycle();
+            group.bench_function(format!("{kind}, blocks"), |bencher| {
+                bencher.iter(|| {
+                    let word = *next.next().expect("endless");
+                    black_box(decoder.decode(word, family.correctable()))
+                });
+            });
+            let mut next = reads.iter().cycle();
+            group.bench_function(format!("{kind}, brute force"), |bencher| {
+                bencher.iter(|| {
+                    let turns = words.turns(*next.next().expect("endless"));
+                    let distance =
+                        |code: &u64| turns.iter().map(|turn| (turn ^ code).count_ones()).min();
+                    black_box(family.codes().iter().enumerate().min_by_key(|(_, c)| distance(c)))
+                });
+            });
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(benches, decode);
+criterion_main!(benches);

@@ -1,0 +1,45 @@
+use std::fmt::Write;
+use std::process::ExitCode;
+
+use anyhow::Context;
+
+use crate::cli::output;
+use crate::family::{Construction, Family, Screen, TagWords};
+
+#[derive(clap::Args)]
+pub(super) struct Args {
+    /// A shipped family such as d49h12, or a family file
+    family: String,
+    /// First number, from 0
+    #[arg(long)]
+    rank: u64,
+    /// How many
+    #[arg(long, default_value_t = 1)]
+    count: u64,
+}
+
+pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let family = Family::resolve(&args.family)?;
+    let Construction::Algebraic(construction) = family.construction() else {
+        anyhow::bail!("{}: not an algebraic family, its codes have no rank", args.family);
+    };
+    let words = TagWords::new(family.dimension());
+    let screen = Screen::new(words.clone(), family.distance(), family.rules());
+    for i in 0..args.count {
+        let rank = args.rank.saturating_add(i);
+        let (word, count) = construction.by_rank(family.dimension(), rank).with_context(|| {
+            format!("{}: more than a linear code, its codes have no rank", args.family)
+        })?;
+        let word = word.with_context(|| {
+            format!("--rank {rank}: there are {count}, numbered from 0 to {}", count - 1)
+        })?;
+        let mut line = format!("{rank} {}", words.hex(word));
+        if !screen.admits(word) {
+            line.push_str(" breaks a rule of the family");
+        }
+        // Writing to a String cannot fail.
+        let _ = writeln!(line);
+        output::print(&line)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,97 @@
+//! The tags of an invariant linear code by number, without listing them.
+//!
+//! The turn σ splits such a code into the words F that it fixes and the words E with
+//! w + σw + σ²w = 0. On E the turn is multiplication by a primitive third root of unity, so E is a
+//! vector space over F4, and w + f and w' + f (w, w' in E) are turns of each other exactly when
+//! they span the same F4-line. So the orbits of three words are the pairs of a word of F and a
+//! point of the projective space of E: |F| · (|E|−1)/3 of them.
+
+use super::{CycleSpace, Span};
+
+/// The orbits of three words of an invariant linear code, numbered from 0.
+#[derive(Clone, Debug)]
+pub struct Ranked {
+    space: CycleSpace,
+    fixed: Vec<u64>,
+    /// A basis of E over F4.
+    lines: Vec<u64>,
+}
+
+impl Ranked {
+    /// Numbers the orbits of `code`; `None` when the turn does not leave it invariant.
+    pub fn new(space: CycleSpace, code: &Span) -> Option<Self> {
+        if !code.rows().iter().all(|&row| code.contains(space.turn(row))) {
+            return None;
+        }
+        let trace = |w: u64| w ^ space.turn(w) ^ space.turn(space.turn(w));
+        let fixed = Span::of(code.rows().iter().map(|&row| trace(row))).rows().to_vec();
+        let mut span = Span::default();
+        let mut lines = Vec::new();
+        for &row in code.rows() {
+            let word = row ^ trace(row);
+            if span.insert(word) {
+                span.insert(space.turn(word));
+                lines.push(word);
+            }
+        }
+        Some(Self { space, fixed, lines })
+    }
+
+    /// Number of orbits.
+    pub fn len(&self) -> u64 {
+        self.points() << self.fixed.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.lines.is_empty()
+    }
+
+    /// Points of the projective space, (4^n − 1)/3.
+    fn points(&self) -> u64 {
+        ((1u64 << (2 * self.lines.len())) - 1) / 3
+    }
+
+    /// A word of orbit number `rank`, in cycle coordinates.
+    pub fn word(&self, rank: u64) -> Option<u64> {
+        if rank >= self.len() {
+            return None;
+        }
+        let (which, mut point) = (rank / self.points(), rank % self.points());
+        let chosen = (0..).zip(&self.fixed).filter(|&(i, _)| which >> i & 1 == 1);
+        let mut word = chosen.fold(0, |sum, (_, w)| sum ^ w);
+        // Points whose last non-zero coordinate, a one, is number `lead`: 4^lead of them.
+        let mut lead = 0;
+        while point >> (2 * lead) != 0 {
+            point -= 1 << (2 * lead);
+            lead += 1;
+        }
+        word ^= self.lines[lead];
+        for (i, &line) in self.lines[..lead].iter().enumerate() {
+            let once = self.space.turn(line);
+            word ^= [0, line, once, line ^ once][(point >> (2 * i) & 0b11) as usize];
+        }
+        Some(word)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::super::residue;
+    use super::*;
+
+    #[test]
+    fn ranks_meet_every_orbit_once() {
+        let (code, space) = (residue::extended(23), residue::space(23));
+        let ranked = Ranked::new(space, &code).unwrap();
+        let orbits: HashSet<u64> =
+            (0..ranked.len()).map(|r| space.canonical(ranked.word(r).unwrap())).collect();
+        assert_eq!((ranked.len(), orbits.len()), (1360, 1360));
+        assert!(orbits.iter().all(|&w| code.contains(w) && space.turn(w) != w));
+        assert_eq!(ranked.word(ranked.len()), None);
+        let large = Ranked::new(residue::space(47), &residue::extended(47)).unwrap();
+        assert_eq!(large.len(), 5_592_320);
+    }
+}
