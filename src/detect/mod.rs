@@ -10,6 +10,7 @@
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns.
 //! 7. `refine` gives the last word on positions.
 
+mod cone_fit;
 mod cubic;
 mod detection;
 mod detector;
@@ -17,6 +18,7 @@ mod edge;
 mod grow;
 mod label;
 mod links;
+mod quadric;
 mod refine;
 mod ring;
 mod saddles;
