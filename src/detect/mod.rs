@@ -8,9 +8,13 @@
 //! 4. `links` joins corners along clean edges (`edge`).
 //! 5. `grow` starts from quads of tiles, grows breadth-first and fills the gaps.
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns.
-//! 7. `refine` gives the last word on positions.
+//! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`.
 
+mod blurred_corner;
+mod clearance;
 mod cone_fit;
+mod corner_model;
+mod corner_start;
 mod cubic;
 mod detection;
 mod detector;
@@ -28,3 +32,4 @@ mod tile_map;
 
 pub use detection::{DecodedTag, Detection, Grid, GridCorner};
 pub use detector::{Detector, DetectorConfig};
+pub use refine::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};
