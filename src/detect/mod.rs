@@ -30,6 +30,7 @@ mod sectors;
 mod tags;
 mod tile_map;
 
+pub use corner_model::SLOPE_PRIOR;
 pub use detection::{DecodedTag, Detection, Grid, GridCorner};
 pub use detector::{Detector, DetectorConfig};
 pub use refine::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};

@@ -84,7 +84,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let table = table(&refined);
     match &args.output {
         Some(path) => output::write(path, table.as_bytes())?,
-        None => print!("{table}"),
+        None => output::print(&table)?,
     }
     Ok(ExitCode::SUCCESS)
 }
