@@ -19,6 +19,7 @@
 //! | 5 | [`export`] | artwork and targets to files and back |
 //! | 5 | [`synth`] | a target seen by a camera, as an image |
 //! | 6 | [`verify`] | an artifact read back from disk and compared with its target |
+//! | 6 | [`experiment`] | simulations that measure the library itself |
 //! | 7 | `cli` | the programs' arguments, progress and messages |
 //!
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
@@ -29,6 +30,7 @@ pub mod camera;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod detect;
+pub mod experiment;
 pub mod export;
 pub mod family;
 mod json;

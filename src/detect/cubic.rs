@@ -6,13 +6,12 @@
 //!     f(u,v) = c1 u³ + c2 u²v + c3 uv² + c4 v³ + c5 u² + c6 uv + c7 v² + c8 u + c9 v + c10
 //! ```
 //!
-//! All positions share one window, so the coefficients are one linear map of the window's pixels.
-//! The image is smoothed with a cone before the fit; both maps are linear and are kept as their
-//! product. A corner is where all second derivatives vanish (Eq. 3), and a star-shaped umbilic
+//! (see [`super::cone_fit`]). A corner is where all second derivatives vanish (Eq. 3), and a star-shaped umbilic
 //! when J < 0 (Eq. 5), which depends on the cubic terms alone.
 
-use nalgebra::{DMatrix, Matrix3x2, Vector3};
+use nalgebra::{Matrix3x2, Vector3};
 
+use super::cone_fit::{ConeFit, Powers};
 use crate::raster::{Gray, Intensity};
 
 /// Number of coefficients kept: c1 … c7; slopes and level do not move the corner.
@@ -53,14 +52,14 @@ impl CubicSurface {
     }
 }
 
+/// Monomials of Eq. 1 in the order of its coefficients.
+const MONOMIALS: [Powers; 10] =
+    [(3, 0), (2, 1), (1, 2), (0, 3), (2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0)];
+
 /// Fits cubic surfaces in one fixed window.
 #[derive(Clone, Debug)]
 pub struct CubicFit {
-    radius: usize,
-    /// Side of the window of pixels that is read: 4r + 1.
-    side: usize,
-    /// One kernel of side² weights for each of c1 … c7.
-    kernels: [Vec<f32>; KEPT],
+    fit: ConeFit<KEPT>,
 }
 
 /// A corner found by iterating the fit.
@@ -75,75 +74,16 @@ pub struct Umbilic {
 impl CubicFit {
     /// A fit over offsets within `radius` + 1 px, after smoothing with a cone of that radius.
     pub fn new(radius: usize) -> Self {
-        let r = radius as isize;
-        let cone = |u: isize, v: isize| (radius as f64 + 1.0 - (u as f64).hypot(v as f64)).max(0.0);
-        let offsets = |r: isize| (-r..=r).flat_map(move |v| (-r..=r).map(move |u| (u, v)));
-        let points: Vec<_> = offsets(r).filter(|&(u, v)| cone(u, v) > 0.0).collect();
-        let monomials = DMatrix::from_fn(points.len(), 10, |i, j| {
-            let (u, v) = (points[i].0 as f64, points[i].1 as f64);
-            let powers: [(i32, i32); 10] =
-                [(3, 0), (2, 1), (1, 2), (0, 3), (2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0)];
-            u.powi(powers[j].0) * v.powi(powers[j].1)
-        });
-        let fit = monomials.pseudo_inverse(1e-12).expect("a non-negative tolerance");
-        let volume: f64 = offsets(r).map(|(u, v)| cone(u, v)).sum();
-        let side = 4 * radius + 1;
-        let kernels = std::array::from_fn(|k| {
-            let mut kernel = vec![0.0f64; side * side];
-            for (i, &(u, v)) in points.iter().enumerate() {
-                for (du, dv) in offsets(r) {
-                    let x = (u + du + 2 * r) as usize;
-                    let y = (v + dv + 2 * r) as usize;
-                    kernel[y * side + x] += fit[(k, i)] * cone(du, dv) / volume;
-                }
-            }
-            kernel.into_iter().map(|w| w as f32).collect()
-        });
-        Self { radius, side, kernels }
+        Self { fit: ConeFit::new(radius, &MONOMIALS) }
     }
 
     /// The surface around `position`; `None` where the window leaves the image.
-    pub fn surface<T: Intensity>(&self, image: &Gray<T>, [x, y]: [f64; 2]) -> Option<CubicSurface> {
-        let reach = (2 * self.radius) as f64;
-        let fits = x >= reach
-            && y >= reach
-            && x + reach + 1.0 < image.width() as f64
-            && y + reach + 1.0 < image.height() as f64;
-        if !fits {
-            return None;
-        }
-        let (left, top) = (x as usize - 2 * self.radius, y as usize - 2 * self.radius);
-        let window = self.window(image, left, top, [x.fract() as f32, y.fract() as f32]);
-        Some(CubicSurface { c: std::array::from_fn(|k| f64::from(dot(&self.kernels[k], &window))) })
-    }
-
-    /// Bilinear samples of the window whose first pixel is (left, top), shifted by a fraction.
-    fn window<T: Intensity>(
+    pub fn surface<T: Intensity>(
         &self,
         image: &Gray<T>,
-        left: usize,
-        top: usize,
-        [fx, fy]: [f32; 2],
-    ) -> Vec<f32> {
-        // Taking the centre's level away first keeps single precision exact enough at 16 bits.
-        let level = image.at(left + self.side / 2, top + self.side / 2).to_f32();
-        let blend_row = |y: usize, out: &mut Vec<f32>| {
-            let row = &image.row(y)[left..=left + self.side];
-            out.clear();
-            out.extend(row.windows(2).map(|pair| {
-                let (a, b) = (pair[0].to_f32() - level, pair[1].to_f32() - level);
-                a + fx * (b - a)
-            }));
-        };
-        let mut window = Vec::with_capacity(self.side * self.side);
-        let (mut upper, mut lower) = (Vec::with_capacity(self.side), Vec::with_capacity(self.side));
-        blend_row(top, &mut upper);
-        for y in top..top + self.side {
-            blend_row(y + 1, &mut lower);
-            window.extend(upper.iter().zip(&lower).map(|(u, l)| u + fy * (l - u)));
-            std::mem::swap(&mut upper, &mut lower);
-        }
-        window
+        position: [f64; 2],
+    ) -> Option<CubicSurface> {
+        Some(CubicSurface { c: self.fit.coefficients(image, position)? })
     }
 
     /// Iterates from `start`, at most `iterations` times. `None` when the surface is no
@@ -155,7 +95,7 @@ impl CubicFit {
         start: [f64; 2],
         iterations: usize,
     ) -> Option<Umbilic> {
-        let radius = self.radius as f64;
+        let radius = self.fit.radius() as f64;
         let mut position = start;
         let mut surface = self.surface(image, position)?;
         for iteration in 1.. {
@@ -176,19 +116,6 @@ impl CubicFit {
         }
         Some(Umbilic { position, surface })
     }
-}
-
-/// Dot product with eight running sums, which the compiler keeps in vector registers.
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f32 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
-    let mut sums = [0.0f32; 8];
-    for (x, y) in a8.zip(b8) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    tail + sums.iter().sum::<f32>()
 }
 
 #[cfg(test)]

@@ -3,13 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
+use super::clearance::clear_squares;
+use super::corner_model::CornerFitter;
 use super::detection::{DecodedTag, Detection, Grid, GridCorner};
 use super::grow::{SaddleGrid, grids};
 use super::label::{Labelled, TagLabeller, fit_outline};
-use super::refine::Refiner;
+use super::refine::{Refinement, Refiner};
 use super::saddles::{SaddleFinder, noise};
 use crate::family::Family;
-use crate::lattice::Vertex;
+use crate::lattice::{TagCells, Vertex};
 use crate::raster::{AnyGray, Gray, Intensity, Pyramid};
 use crate::target::{GridKind, Target, zigzag_vertices};
 
@@ -28,7 +30,16 @@ const MIN_UNTAGGED_CORNERS: usize = 7;
 pub struct DetectorConfig {
     /// Most bits of a tag that may be corrected; `None` for ⌊(h − 1)/2⌋ of its family.
     pub max_bit_errors: Option<u32>,
+    /// How the positions of corners are refined.
+    pub refinement: Refinement,
 }
+
+/// Radius of the polynomial that refines, px: the reference detector's.
+const POLYNOMIAL_RADIUS: usize = 3;
+
+/// Largest radius of the model that refines, px: beyond, lenses bend edges more than a wider
+/// window gains.
+const MODEL_RADIUS: usize = 10;
 
 /// Finds grids in images and labels their corners.
 ///
@@ -45,6 +56,8 @@ pub struct DetectorConfig {
 pub struct Detector {
     finder: SaddleFinder,
     refiner: Refiner,
+    /// Part of the way across a tile where its tag begins; 1 without tags.
+    clear_part: f64,
     labels: Labels,
 }
 
@@ -74,12 +87,16 @@ impl Detector {
     /// With `size`, the rows and columns of corners of a zigzag board, a grid that shows the whole
     /// board is labelled from its lower left corner; all other grids have relative labels.
     pub fn for_grid(kind: GridKind, size: Option<(u32, u32)>, config: DetectorConfig) -> Self {
-        let _ = (kind, config);
         let labels = match size {
             Some((rows, cols)) => Labels::Outline(zigzag_vertices(rows, cols).collect()),
             None => Labels::None,
         };
-        Self { finder: SaddleFinder::new(), refiner: Refiner::new(), labels }
+        Self {
+            finder: SaddleFinder::new(),
+            refiner: refiner(kind, config),
+            clear_part: 1.0,
+            labels,
+        }
     }
 
     /// A detector of a target; `family` is the family that the target names.
@@ -95,7 +112,9 @@ impl Detector {
             corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
         });
         let labels = Labels::Target { tags, panels: panels.collect() };
-        Self { finder: SaddleFinder::new(), refiner: Refiner::new(), labels }
+        let clear_part = family.map_or(1.0, |family| clear_part(target, family));
+        let refiner = refiner(GridKind::Deltille, config);
+        Self { finder: SaddleFinder::new(), refiner, clear_part, labels }
     }
 
     /// Finds grids in one image; `name` is only noted in the result.
@@ -114,8 +133,15 @@ impl Detector {
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
         grids.sort_by_key(|grid| grid.panel.unwrap_or(u32::MAX));
         timing.lap("labels");
-        for corner in grids.iter_mut().flat_map(|grid| &mut grid.corners) {
-            [corner.x, corner.y] = self.refiner.refine(image, [corner.x, corner.y]);
+        let mut fitter = CornerFitter::default();
+        for grid in &mut grids {
+            let clear = clear_squares(grid, self.clear_part);
+            for (corner, clear_px) in grid.corners.iter_mut().zip(clear) {
+                let start = [corner.x, corner.y];
+                let refined = self.refiner.refine_within(&mut fitter, image, start, clear_px);
+                [corner.x, corner.y] = refined.position;
+                corner.cov = refined.cov;
+            }
         }
         timing.lap("refine");
         Detection {
@@ -155,6 +181,23 @@ impl Detector {
             }
         }
     }
+}
+
+fn refiner(kind: GridKind, config: DetectorConfig) -> Refiner {
+    Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
+}
+
+/// Part of the way from a corner to the far side of a tile where the nearest tag cell begins.
+fn clear_part(target: &Target, family: &Family) -> f64 {
+    let cells = TagCells::new(family.dimension());
+    let nearest = |border: f64| {
+        (0..family.dimension().bits())
+            .flat_map(|bit| cells.corners(bit, border))
+            .map(|[u, v]| u + v)
+            .fold(1.0, f64::min)
+    };
+    let tagged = target.panels.iter().filter(|panel| !panel.tags.is_empty());
+    tagged.map(|panel| nearest(panel.border_bits.unwrap_or(1.0))).fold(1.0, f64::min)
 }
 
 fn unlabelled(grid: &SaddleGrid) -> Grid {

@@ -8,8 +8,13 @@
 //! 4. `links` joins corners along clean edges (`edge`).
 //! 5. `grow` starts from quads of tiles, grows breadth-first and fills the gaps.
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns.
-//! 7. `refine` gives the last word on positions.
+//! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`.
 
+mod blurred_corner;
+mod clearance;
+mod cone_fit;
+mod corner_model;
+mod corner_start;
 mod cubic;
 mod detection;
 mod detector;
@@ -17,6 +22,7 @@ mod edge;
 mod grow;
 mod label;
 mod links;
+mod quadric;
 mod refine;
 mod ring;
 mod saddles;
@@ -24,5 +30,7 @@ mod sectors;
 mod tags;
 mod tile_map;
 
+pub use corner_model::SLOPE_PRIOR;
 pub use detection::{DecodedTag, Detection, Grid, GridCorner};
 pub use detector::{Detector, DetectorConfig};
+pub use refine::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};

@@ -1,28 +1,173 @@
 //! The last word on a corner's position, from the raw pixels.
+//!
+//! The paper's polynomial walks to the corner; the model ([`super::corner_model`]) starts there
+//! and adds a covariance. Where the model does not hold, the polynomial's result stays.
+//!
+//! ```
+//! use deltille::detect::{Refinement, Refiner};
+//! use deltille::synth::SimulatedCorner;
+//! use deltille::target::GridKind;
+//!
+//! let image = SimulatedCorner::seen_from(2, 0.3, 0.5, [20.2, 19.9], 1.0).render(41, 41);
+//! let refined = Refiner::new(GridKind::Checker, Refinement::Model, 21).refine(&image, [21.0, 20.0]);
+//! assert!((refined.position[0] - 20.2).abs() < 1e-3 && refined.cov.is_some());
+//! ```
 
+use super::corner_model::{CornerFitter, MAX_RADIUS, Window};
+use super::corner_start::start;
 use super::cubic::CubicFit;
+use super::quadric::QuadricFit;
 use crate::raster::{Gray, Intensity};
+use crate::target::GridKind;
 
-/// Radius of the fit, px.
-const RADIUS: usize = 3;
+/// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
+pub const MIN_MODEL_RADIUS: usize = 3;
 
-/// Iterations of the fit; from a start that is right to a tenth of a pixel two suffice.
-const ITERATIONS: usize = 5;
+/// Largest side of a window, px.
+pub const MAX_WINDOW_PX: usize = 2 * MAX_RADIUS + 1;
 
-/// Refines corners on the image itself.
+/// Iterations of the polynomial fits; the reference detector's.
+const CUBIC_ITERATIONS: usize = 5;
+const QUADRIC_ITERATIONS: usize = 20;
+
+/// How positions are refined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Refinement {
+    /// The paper's: the umbilic point of a cubic, or the saddle of a quadric.
+    Polynomial,
+    /// A blurred corner fitted to the pixels, from the polynomial's result.
+    #[default]
+    Model,
+}
+
+/// What came of a refinement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RefineStatus {
+    /// The method asked for has found the corner.
+    Ok,
+    /// The model does not hold here; the position is the polynomial's.
+    Polynomial,
+    /// No corner; the position is the start.
+    Failed,
+}
+
+/// A refined position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refined {
+    /// Position, px.
+    pub position: [f64; 2],
+    /// Covariance xx, xy, yy, px², where the method gives one.
+    pub cov: Option<[f64; 3]>,
+    /// Which method found it.
+    pub status: RefineStatus,
+}
+
+#[derive(Clone, Debug)]
+enum Polynomial {
+    Cubic(CubicFit),
+    Quadric(QuadricFit),
+}
+
+/// Refines corners of one kind.
 #[derive(Clone, Debug)]
 pub struct Refiner {
-    fit: CubicFit,
+    polynomial: Polynomial,
+    iterations: usize,
+    method: Refinement,
+    /// Windows of the model by radius, from [`MIN_MODEL_RADIUS`].
+    windows: Vec<Window>,
 }
 
 impl Refiner {
-    /// The paper's polynomial refinement.
-    pub fn new() -> Self {
-        Self { fit: CubicFit::new(RADIUS) }
+    /// A refiner that reads at most `window_px` × `window_px` pixels, an odd number from 9 to
+    /// [`MAX_WINDOW_PX`]; the polynomial reads 4r + 1 pixels for a whole r, the largest that fits.
+    pub fn new(kind: GridKind, method: Refinement, window_px: usize) -> Self {
+        let window_px = window_px.clamp(9, MAX_WINDOW_PX);
+        Self::with_radii(kind, method, (window_px - 1) / 4, (window_px - 1) / 2)
     }
 
-    /// The refined position, or `start` where the fit does not apply.
-    pub fn refine<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> [f64; 2] {
-        self.fit.refine(image, start, ITERATIONS).map_or(start, |umbilic| umbilic.position)
+    /// A refiner with a polynomial of radius r and a model of at most `model_radius`.
+    pub(super) fn with_radii(
+        kind: GridKind,
+        method: Refinement,
+        polynomial_radius: usize,
+        model_radius: usize,
+    ) -> Self {
+        let (polynomial, iterations) = match kind {
+            GridKind::Deltille => {
+                (Polynomial::Cubic(CubicFit::new(polynomial_radius)), CUBIC_ITERATIONS)
+            }
+            GridKind::Checker => {
+                (Polynomial::Quadric(QuadricFit::new(polynomial_radius)), QUADRIC_ITERATIONS)
+            }
+        };
+        let windows = (MIN_MODEL_RADIUS..=model_radius.min(MAX_RADIUS)).map(Window::new).collect();
+        Self { polynomial, iterations, method, windows }
+    }
+
+    /// The same refiner with another number of iterations of the polynomial.
+    pub fn with_iterations(self, iterations: usize) -> Self {
+        Self { iterations, ..self }
+    }
+
+    /// The corner near `start`, in the whole window.
+    pub fn refine<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Refined {
+        self.refine_within(&mut CornerFitter::default(), image, start, f64::INFINITY)
+    }
+
+    /// The corner near `start`, from pixels whose both coordinates are within `clear_px` of it;
+    /// what lies beyond shows something else than the corner.
+    pub(super) fn refine_within<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        image: &Gray<T>,
+        start: [f64; 2],
+        clear_px: f64,
+    ) -> Refined {
+        let polynomial = match &self.polynomial {
+            Polynomial::Cubic(fit) => {
+                fit.refine(image, start, self.iterations).map(|umbilic| umbilic.position)
+            }
+            Polynomial::Quadric(fit) => fit.refine(image, start, self.iterations),
+        };
+        if self.method == Refinement::Model
+            && let Some(refined) = self.model(fitter, image, polynomial.unwrap_or(start), clear_px)
+        {
+            return refined;
+        }
+        let status = match (polynomial, self.method) {
+            (None, _) => RefineStatus::Failed,
+            (Some(_), Refinement::Polynomial) => RefineStatus::Ok,
+            (Some(_), Refinement::Model) => RefineStatus::Polynomial,
+        };
+        Refined { position: polynomial.unwrap_or(start), cov: None, status }
+    }
+
+    /// The model in the largest window that is clear and lies in the image.
+    fn model<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        image: &Gray<T>,
+        position: [f64; 2],
+        clear_px: f64,
+    ) -> Option<Refined> {
+        let [x, y] = position;
+        let (right, bottom) = (image.width() as f64 - 2.0 - x, image.height() as f64 - 2.0 - y);
+        let room = [x - 1.0, y - 1.0, right, bottom, clear_px];
+        let reach = room.into_iter().fold(f64::INFINITY, f64::min).floor();
+        let window = self.windows.iter().rev().find(|window| window.radius() as f64 <= reach)?;
+        let (position, cov) = match self.polynomial {
+            Polynomial::Cubic(_) => {
+                let first = start::<3, T>(image, position, window.radius())?;
+                let fitted = fitter.fit(image, window, &first)?;
+                (fitted.corner.position, fitted.cov)
+            }
+            Polynomial::Quadric(_) => {
+                let first = start::<2, T>(image, position, window.radius())?;
+                let fitted = fitter.fit(image, window, &first)?;
+                (fitted.corner.position, fitted.cov)
+            }
+        };
+        Some(Refined { position, cov: Some(cov), status: RefineStatus::Ok })
     }
 }

@@ -4,8 +4,10 @@
 //! ([`crate::raster::Coverage`]), so the image before blur and noise is exact, and so are the
 //! positions of the corners.
 
+mod corner;
 mod scene;
 mod sheet;
 
+pub use corner::SimulatedCorner;
 pub use scene::{Light, Scene, Surface, Truth, TruthCorner};
 pub use sheet::scene_of_sheet;

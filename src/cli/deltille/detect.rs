@@ -10,6 +10,7 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use rayon::prelude::*;
 
+use super::refine::Method;
 use super::target_file;
 use crate::cli::run::{self, BAD_INPUT, FAILED};
 use crate::cli::{interrupt, progress};
@@ -42,6 +43,9 @@ pub struct Args {
     /// Most bits of a tag that may be corrected [default: ⌊(h−1)/2⌋ of its family]
     #[arg(long, value_name = "BITS", conflicts_with = "grid")]
     max_errors: Option<u32>,
+    /// How corners are refined
+    #[arg(long, value_name = "METHOD", default_value = "model")]
+    refine: Method,
     /// Folder for the results, named after the images
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
@@ -127,7 +131,7 @@ fn report(results: Vec<anyhow::Result<String>>) -> anyhow::Result<ExitCode> {
 }
 
 fn detector(args: &Args, target: Option<&Target>) -> anyhow::Result<Detector> {
-    let config = DetectorConfig { max_bit_errors: args.max_errors };
+    let config = DetectorConfig { max_bit_errors: args.max_errors, refinement: args.refine.into() };
     let Some(target) = target else {
         return Ok(Detector::for_grid(GridKind::Deltille, args.rows.zip(args.cols), config));
     };

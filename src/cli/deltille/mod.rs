@@ -2,6 +2,8 @@
 
 mod board;
 mod detect;
+mod experiment;
+mod refine;
 mod settings;
 mod target_file;
 mod verify;
@@ -24,6 +26,10 @@ enum Command {
     Board(Box<board::Args>),
     /// Find a target, or untagged boards, in photographs
     Detect(detect::Args),
+    /// Measure the library on simulated images
+    Experiment(experiment::Args),
+    /// Refine given positions of corners
+    Refine(refine::Args),
     /// Compare the files of a target with its description
     Verify(verify::Args),
 }
@@ -33,6 +39,8 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Board(args) => board::run(*args),
         Command::Detect(args) => detect::run(args),
+        Command::Experiment(args) => experiment::run(args),
+        Command::Refine(args) => refine::run(args),
         Command::Verify(args) => verify::run(args),
     }
 }

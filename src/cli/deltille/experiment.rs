@@ -1,0 +1,73 @@
+//! `deltille experiment`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+
+use anyhow::{Context, bail};
+use clap::Subcommand;
+
+use crate::cli::{interrupt, output, progress};
+use crate::experiment::{corners, plot};
+
+/// Arguments of `deltille experiment`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(Subcommand)]
+enum Experiment {
+    /// Precision of refined corners against blur, noise and tilt, with the Cramér–Rao bound:
+    /// corners.csv, corners.svg and corners.png
+    Corners(CornersArgs),
+}
+
+#[derive(clap::Args)]
+struct CornersArgs {
+    /// Simulated images at every point; each is refined from four starts
+    #[arg(long, value_name = "N", default_value_t = 1000,
+          value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    images: u32,
+    /// Seed of all random choices
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Threads [default: one per processor]
+    #[arg(short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// Folder for the results
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
+    output: PathBuf,
+}
+
+/// Runs an experiment; nothing is written when it is interrupted.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let Experiment::Corners(args) = args.experiment;
+    let bar = progress::bar(corners::rows_count() as u64, "rows");
+    let interrupted = interrupt::flag();
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
+    let rows = threads
+        .build()?
+        .install(|| corners::run(args.images as usize, args.seed, interrupted, &|| bar.inc(1)));
+    bar.finish_and_clear();
+    let Some(rows) = rows.filter(|_| !interrupted.load(Ordering::Relaxed)) else {
+        bail!("interrupted; nothing was written");
+    };
+    let svg = plot::svg(&rows);
+    let png = plot::png(&svg).context("the plot cannot be drawn")?;
+    for (name, content) in [
+        ("corners.csv", corners::csv(&rows).into_bytes()),
+        ("corners.svg", svg.into_bytes()),
+        ("corners.png", png),
+    ] {
+        output::write(&args.output.join(name), &content)?;
+    }
+    println!(
+        "{}: {} fits a point, seed {}",
+        args.output.join("corners.csv").display(),
+        4 * args.images,
+        args.seed
+    );
+    Ok(ExitCode::SUCCESS)
+}

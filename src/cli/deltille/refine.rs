@@ -1,0 +1,124 @@
+//! `deltille refine`.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+
+use crate::cli::output;
+use crate::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};
+use crate::raster::{self, AnyGray};
+use crate::target::GridKind;
+
+/// Arguments of `deltille refine`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Photograph: PNG, JPEG, TIFF, BMP, PGM or WebP
+    #[arg(value_name = "IMAGE")]
+    image: PathBuf,
+    /// What meets at the corners
+    #[arg(long)]
+    kind: Kind,
+    /// Starts, `x,y` per line in px, pixel centres at integers; a header line is skipped
+    #[arg(long, value_name = "FILE")]
+    seeds: PathBuf,
+    /// How to refine
+    #[arg(long, default_value = "model")]
+    method: Method,
+    /// Side of the square of pixels that may be read, an odd number; the polynomial's window is
+    /// the largest 4r + 1 within it
+    #[arg(long, value_name = "PIXELS", default_value_t = 21, value_parser = window)]
+    window: usize,
+    /// File for the results [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// How corners are refined.
+#[derive(Clone, Copy, ValueEnum)]
+pub enum Method {
+    /// The paper's fit of a cubic (deltille) or quadric (checker); no covariances
+    Polynomial,
+    /// A blurred corner fitted to the pixels, with covariances
+    Model,
+}
+
+impl From<Method> for Refinement {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Polynomial => Self::Polynomial,
+            Method::Model => Self::Model,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Kind {
+    /// Six triangles
+    Deltille,
+    /// Four squares
+    Checker,
+}
+
+fn window(text: &str) -> Result<usize, String> {
+    text.parse()
+        .ok()
+        .filter(|side| side % 2 == 1 && (9..=MAX_WINDOW_PX).contains(side))
+        .ok_or_else(|| format!("an odd number from 9 to {MAX_WINDOW_PX} is needed"))
+}
+
+/// Refines all seeds; a seed that no corner is near is reported in its line, not as an error.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let seeds = read_seeds(&args.seeds).context("--seeds")?;
+    let kind = match args.kind {
+        Kind::Deltille => GridKind::Deltille,
+        Kind::Checker => GridKind::Checker,
+    };
+    let refiner = Refiner::new(kind, args.method.into(), args.window);
+    let refined: Vec<Refined> = match raster::read(&args.image)? {
+        AnyGray::U8(image) => seeds.iter().map(|&seed| refiner.refine(&image, seed)).collect(),
+        AnyGray::U16(image) => seeds.iter().map(|&seed| refiner.refine(&image, seed)).collect(),
+    };
+    let table = table(&refined);
+    match &args.output {
+        Some(path) => output::write(path, table.as_bytes())?,
+        None => output::print(&table)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The results as CSV; covariances in px², empty where the method gives none.
+fn table(refined: &[Refined]) -> String {
+    let mut text = "x,y,cov_xx,cov_xy,cov_yy,status\n".to_owned();
+    for Refined { position: [x, y], cov, status } in refined {
+        let cov = cov.map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
+        let status = match status {
+            RefineStatus::Ok => "ok",
+            RefineStatus::Polynomial => "polynomial",
+            RefineStatus::Failed => "failed",
+        };
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{x},{y},{cov},{status}");
+    }
+    text
+}
+
+fn read_seeds(path: &Path) -> anyhow::Result<Vec<[f64; 2]>> {
+    let show = path.display();
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {show}"))?;
+    let mut seeds = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+        let numbers: Option<Vec<f64>> =
+            fields.iter().map(|f| f.parse().ok().filter(|n: &f64| n.is_finite())).collect();
+        match numbers.as_deref() {
+            Some(&[x, y]) => seeds.push([x, y]),
+            _ if line.trim().is_empty() => {}
+            _ if i == 0 && fields == ["x", "y"] => {}
+            _ => bail!("{show}: line {}: write x,y in px, not {line:?}", i + 1),
+        }
+    }
+    Ok(seeds)
+}

@@ -1,0 +1,51 @@
+//! How much of the surroundings of a corner shows nothing but that corner.
+//!
+//! ```text
+//!        2 ╱╲ 1        the six neighbours of a corner span a hexagon; its sides are the nearest
+//!       ╱────────╲      other edges. With tags in the tiles, cells begin part of the way out.
+//!    3 ╱    ·     ╲ 0
+//!      ╲          ╱
+//!     4 ╲────────╱ 5
+//! ```
+
+use std::collections::BTreeMap;
+
+use super::detection::{Grid, GridCorner};
+
+/// Steps to the neighbours in turn.
+const STEPS: [(i32, i32); 6] = [(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)];
+
+/// Blur of the next edges reaches this far into the clear, px: two standard deviations at 1 px.
+const BLUR_MARGIN_PX: f64 = 2.0;
+
+/// Half the side of the largest clear square around every corner of a grid, px, in their order.
+///
+/// `part` is the part of the way to the far side of a tile where its tag begins, 1 without tags.
+/// A corner with no two neighbours in turn has none: 0.
+pub fn clear_squares(grid: &Grid, part: f64) -> Vec<f64> {
+    let places: BTreeMap<(i32, i32), [f64; 2]> =
+        grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+    let square = |&GridCorner { row, col, x, y, .. }: &GridCorner| {
+        let seen =
+            |(dr, dc): (i32, i32)| places.get(&(row + dr, col + dc)).map(|p| [p[0] - x, p[1] - y]);
+        // A neighbour that is not there lies as far as the one opposite.
+        let neighbour = |(dr, dc): (i32, i32)| {
+            seen((dr, dc)).or_else(|| seen((-dr, -dc)).map(|p| [-p[0], -p[1]]))
+        };
+        let sides = (0..STEPS.len()).filter_map(|i| {
+            Some(distance(neighbour(STEPS[i])?, neighbour(STEPS[(i + 1) % STEPS.len()])?))
+        });
+        let clear = sides.min_by(f64::total_cmp).unwrap_or(0.0);
+        (part * clear - BLUR_MARGIN_PX).max(0.0) * std::f64::consts::FRAC_1_SQRT_2
+    };
+    grid.corners.iter().map(square).collect()
+}
+
+/// Distance of the origin from the segment a–b.
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    let along = [b[0] - a[0], b[1] - a[1]];
+    let length2 = along[0] * along[0] + along[1] * along[1];
+    let t = -(a[0] * along[0] + a[1] * along[1]) / length2.max(f64::MIN_POSITIVE);
+    let t = t.clamp(0.0, 1.0);
+    (a[0] + t * along[0]).hypot(a[1] + t * along[1])
+}

@@ -1,0 +1,86 @@
+//! The paper's checkerboard corner: the saddle of a quadric fitted to the image.
+//!
+//! ```text
+//!     f(u,v) = c1 u² + c2 uv + c3 v² + c4 u + c5 v + c6
+//! ```
+//!
+//! The corner is the stationary point, 2c1 u + c2 v + c4 = 0 and c2 u + 2c3 v + c5 = 0, a saddle
+//! where the Hessian's determinant 4 c1 c3 − c2² is negative. The fit is [`super::cone_fit`]'s.
+
+use super::cone_fit::{ConeFit, Powers};
+use crate::raster::{Gray, Intensity};
+
+/// Monomials in the order of the coefficients.
+const MONOMIALS: [Powers; 6] = [(2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0)];
+
+/// A step shorter than this ends the iteration, px.
+const CONVERGED_PX: f64 = 0.001;
+
+/// Fits quadrics in one fixed window.
+#[derive(Clone, Debug)]
+pub struct QuadricFit {
+    fit: ConeFit<5>,
+}
+
+impl QuadricFit {
+    /// A fit over offsets within `radius` + 1 px, after smoothing with a cone of that radius.
+    pub fn new(radius: usize) -> Self {
+        Self { fit: ConeFit::new(radius, &MONOMIALS) }
+    }
+
+    /// Iterates from `start`, at most `iterations` times. `None` when the surface is no saddle, a
+    /// step or the whole way exceeds the radius, or the window leaves the image.
+    pub fn refine<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        start: [f64; 2],
+        iterations: usize,
+    ) -> Option<[f64; 2]> {
+        let radius = self.fit.radius() as f64;
+        let mut position = start;
+        for _ in 0..iterations {
+            let [dx, dy] = stationary_point(self.fit.coefficients(image, position)?)?;
+            position = [position[0] + dx, position[1] + dy];
+            let way = (position[0] - start[0]).hypot(position[1] - start[1]);
+            let step = dx.hypot(dy);
+            if step > radius || way > radius {
+                return None;
+            }
+            if step < CONVERGED_PX {
+                break;
+            }
+        }
+        Some(position)
+    }
+}
+
+/// The saddle point of a quadric; `None` for bowls and flat surfaces.
+fn stationary_point([c1, c2, c3, c4, c5]: [f64; 5]) -> Option<[f64; 2]> {
+    let determinant = 4.0 * c1 * c3 - c2 * c2;
+    let point = [(c2 * c5 - 2.0 * c3 * c4) / determinant, (c2 * c4 - 2.0 * c1 * c5) / determinant];
+    (determinant < 0.0 && point.iter().all(|c| c.is_finite())).then_some(point)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn surface(form: impl Fn(f32, f32) -> f32) -> Gray<f32> {
+        Gray::from_fn(40, 40, |x, y| form(x as f32 - 20.3, y as f32 - 18.9))
+    }
+
+    #[test]
+    fn a_saddle_is_found_exactly_in_two_steps() {
+        let saddle = surface(|u, v| 0.01 * (u * u - 2.0 * v * v + 0.5 * u * v) + 3.0);
+        let [x, y] = QuadricFit::new(5).refine(&saddle, [20.0, 20.0], 2).unwrap();
+        assert!((x - 20.3).hypot(y - 18.9) < 1e-3, "{x} {y}");
+    }
+
+    #[test]
+    fn bowls_planes_and_borders_are_refused() {
+        let fit = QuadricFit::new(3);
+        assert!(fit.refine(&surface(|u, v| u * u + v * v), [20.0, 20.0], 5).is_none());
+        assert!(fit.refine(&surface(|_, _| 1.0), [20.0, 20.0], 5).is_none());
+        assert!(fit.refine(&surface(|u, v| u * v), [3.0, 20.0], 5).is_none());
+    }
+}

@@ -1,0 +1,143 @@
+//! The plot of the corner experiment: a row of panels per kind, a column per sweep, errors on a
+//! logarithmic scale. Text is outlines, so the picture looks the same everywhere.
+
+use std::fmt::Write as _;
+
+use kurbo::Affine;
+
+use super::corners::{METHODS, Method, Row, Sweep, name};
+use crate::artwork::text;
+use crate::target::GridKind;
+
+/// Size of a panel's axes and the room around it, in user units.
+const PANEL: [f64; 2] = [300.0, 230.0];
+const MARGIN: [f64; 2] = [70.0, 62.0];
+const HEAD: f64 = 56.0;
+
+/// Range of the vertical axis, px.
+const ERRORS_PX: [f64; 2] = [0.002, 0.1];
+
+/// Where lines lie across the panels, px.
+const GUIDES_PX: [f64; 6] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1];
+
+const BOUND_COLOUR: &str = "#000000";
+
+fn colour(method: Method) -> &'static str {
+    match method {
+        Method::Polynomial(1) => "#9ecae1",
+        Method::Polynomial(2) => "#4292c6",
+        Method::Polynomial(_) => "#08519c",
+        Method::Model => "#d94801",
+    }
+}
+
+/// The plot as SVG.
+pub fn svg(rows: &[Row]) -> String {
+    let (width, height) =
+        (3.0 * (PANEL[0] + MARGIN[0]) + 20.0, HEAD + 2.0 * (PANEL[1] + MARGIN[1]) + 4.0);
+    let mut body = String::new();
+    legend(&mut body);
+    for (j, kind) in [GridKind::Deltille, GridKind::Checker].into_iter().enumerate() {
+        for (i, sweep) in Sweep::ALL.into_iter().enumerate() {
+            let origin = [
+                MARGIN[0] + i as f64 * (PANEL[0] + MARGIN[0]),
+                HEAD + j as f64 * (PANEL[1] + MARGIN[1]),
+            ];
+            let rows: Vec<&Row> =
+                rows.iter().filter(|row| row.kind == kind && row.sweep == sweep).collect();
+            panel(&mut body, origin, kind, sweep, &rows);
+        }
+    }
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+         viewBox=\"0 0 {width} {height}\">\n<rect width=\"100%\" height=\"100%\" \
+         fill=\"#fff\"/>\n{body}</svg>\n"
+    )
+}
+
+/// A plot made by [`svg`] as PNG, twice its size; `None` only if it is no such plot.
+pub fn png(svg: &str) -> Option<Vec<u8>> {
+    const SCALE: f32 = 2.0;
+    let tree = resvg::usvg::Tree::from_str(svg, &resvg::usvg::Options::default()).ok()?;
+    let size = tree.size().to_int_size().scale_by(SCALE)?;
+    let mut pixmap = resvg::tiny_skia::Pixmap::new(size.width(), size.height())?;
+    let scale = resvg::tiny_skia::Transform::from_scale(SCALE, SCALE);
+    resvg::render(&tree, scale, &mut pixmap.as_mut());
+    pixmap.encode_png().ok()
+}
+
+fn legend(body: &mut String) {
+    let mut x = MARGIN[0];
+    let entries = METHODS.iter().map(|&m| (m.name(), colour(m), ""));
+    for (label, colour, dash) in
+        entries.chain([("Cramér–Rao bound".replace('é', "e"), BOUND_COLOUR, "6 4")])
+    {
+        line(body, &[[x, 20.0], [x + 34.0, 20.0]], colour, 2.5, dash);
+        x += 42.0 + write(body, &label, [x + 42.0, 25.0], 0.0) + 30.0;
+    }
+}
+
+fn panel(body: &mut String, [left, top]: [f64; 2], kind: GridKind, sweep: Sweep, rows: &[&Row]) {
+    let [low, high] = ERRORS_PX.map(f64::ln);
+    let last = sweep.values().last().copied().unwrap_or(1.0);
+    let x = |value: f64| left + value / last * PANEL[0];
+    let y = |error: f64| {
+        let part = (error.max(ERRORS_PX[0]).ln() - low) / (high - low);
+        top + (1.0 - part.clamp(0.0, 1.0)) * PANEL[1]
+    };
+    for guide in GUIDES_PX {
+        line(body, &[[left, y(guide)], [left + PANEL[0], y(guide)]], "#cccccc", 0.8, "");
+        write(body, &format!("{guide}"), [left - 8.0, y(guide) + 5.0], 1.0);
+    }
+    let step = match sweep {
+        Sweep::Tilt => 15.0,
+        Sweep::Blur | Sweep::Noise => 1.0,
+    };
+    for tick in (0..).map(|n| f64::from(n) * step).take_while(|&tick| tick <= last) {
+        let bottom = top + PANEL[1];
+        line(body, &[[x(tick), bottom], [x(tick), bottom + 5.0]], "#444444", 1.0, "");
+        write(body, &format!("{tick}"), [x(tick), bottom + 19.0], 0.5);
+    }
+    let [right, bottom] = [left + PANEL[0], top + PANEL[1]];
+    line(body, &[[left, top], [left, bottom], [right, bottom]], "#444444", 1.2, "");
+    let axis = match sweep {
+        Sweep::Blur => "blur, px",
+        Sweep::Noise => "noise, percent",
+        Sweep::Tilt => "tilt, °",
+    };
+    write(body, axis, [left + PANEL[0] / 2.0, bottom + 38.0], 0.5);
+    write(body, &format!("{}: mean error, px", name(kind)), [left, top - 8.0], 0.0);
+    let of = |method| rows.iter().filter(move |row| row.method == method);
+    for method in METHODS {
+        let points: Vec<[f64; 2]> =
+            of(method).map(|row| [x(row.value), y(row.error_px[0])]).collect();
+        line(body, &points, colour(method), 2.2, "");
+    }
+    let bound: Vec<[f64; 2]> =
+        of(Method::Model).map(|row| [x(row.value), y(row.bound_px)]).collect();
+    line(body, &bound, BOUND_COLOUR, 1.6, "6 4");
+}
+
+fn line(body: &mut String, points: &[[f64; 2]], colour: &str, width: f64, dash: &str) {
+    let places: Vec<String> = points
+        .iter()
+        .filter(|[_, y]| y.is_finite())
+        .map(|[x, y]| format!("{x:.1},{y:.1}"))
+        .collect();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        body,
+        "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" \
+         stroke-dasharray=\"{dash}\" stroke-linejoin=\"round\"/>",
+        places.join(" ")
+    );
+}
+
+/// Writes text whose given part (0 start, 1 end) lies at a place; returns its width.
+fn write(body: &mut String, label: &str, [x, y]: [f64; 2], anchor: f64) -> f64 {
+    const SIZE: f64 = 14.0;
+    let Ok((path, width)) = text::outline(label, SIZE) else { return 0.0 };
+    let placed = Affine::new([1.0, 0.0, 0.0, -1.0, x - anchor * width, y]) * path;
+    let _ = writeln!(body, "<path d=\"{}\" fill=\"#222222\"/>", placed.to_svg());
+    width
+}
