@@ -6,6 +6,8 @@
 
 mod scene;
 mod sheet;
+mod solid;
 
 pub use scene::{Light, Scene, Surface, Truth, TruthCorner};
 pub use sheet::scene_of_sheet;
+pub use solid::scene_of_target;

@@ -2,13 +2,17 @@
 
 mod board;
 mod detect;
+mod files;
 mod settings;
+mod solid;
 mod target_file;
 mod verify;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::target::SolidShape;
 
 /// Make, detect and verify deltille targets.
 #[derive(Parser)]
@@ -22,6 +26,12 @@ pub struct Deltille {
 enum Command {
     /// Make a board: its description, and what to print
     Board(Box<board::Args>),
+    /// Make a tetrahedron with tagged boards on its faces: a mesh, and what to print
+    Tetrahedron(Box<solid::Args>),
+    /// Make an octahedron
+    Octahedron(Box<solid::Args>),
+    /// Make an icosahedron
+    Icosahedron(Box<solid::Args>),
     /// Find a target, or untagged boards, in photographs
     Detect(detect::Args),
     /// Compare the files of a target with its description
@@ -32,6 +42,9 @@ enum Command {
 pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Board(args) => board::run(*args),
+        Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),
+        Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),
+        Command::Icosahedron(args) => solid::run(SolidShape::Icosahedron, *args),
         Command::Detect(args) => detect::run(args),
         Command::Verify(args) => verify::run(args),
     }
