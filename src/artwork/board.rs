@@ -3,7 +3,7 @@ use kurbo::{Affine, BezPath, Point};
 use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, text};
 use crate::family::Family;
 use crate::lattice::{ROW_HEIGHT, TagCells, Tile};
-use crate::target::{Panel, Placement, SheetText, Target};
+use crate::target::{Panel, Placement, SheetLine, SheetText, Target};
 
 /// The shapes of sheet `index` of a target.
 pub(super) fn sheet(
@@ -23,6 +23,13 @@ pub(super) fn sheet(
         let path = check_bar::outline(bar);
         shapes.push(Shape { part: Part::CheckBar { index }, paint: Paint::Fill, path });
     }
+    for (index, &SheetLine { kind, from_mm, to_mm, width_mm }) in layout.lines.iter().enumerate() {
+        let mut path = BezPath::new();
+        path.move_to(Point::from((from_mm[0], from_mm[1])));
+        path.line_to(Point::from((to_mm[0], to_mm[1])));
+        let part = Part::Line { kind, index };
+        shapes.push(Shape { part, paint: Paint::Stroke { width_mm }, path });
+    }
     for (index, label) in layout.texts.iter().enumerate() {
         let path = draw_text(label)?;
         shapes.push(Shape { part: Part::Label { index }, paint: Paint::Fill, path });
@@ -31,7 +38,7 @@ pub(super) fn sheet(
 }
 
 /// The tiles of a panel on its page: one shape each, or one field on an inverted panel.
-fn draw_panel(
+pub(super) fn draw_panel(
     target: &Target,
     panel: &Panel,
     placement: &Placement,

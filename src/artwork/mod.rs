@@ -11,6 +11,7 @@
 //! Frame: the page frame of [`SheetLayout`](crate::target::SheetLayout), origin at the lower-left
 //! corner of the page, x right, y up.
 
+mod atlas;
 mod board;
 mod cells;
 mod check_bar;
@@ -20,8 +21,9 @@ pub mod text;
 use kurbo::BezPath;
 
 use crate::family::Family;
-use crate::target::Target;
+use crate::target::{LineKind, Panel, Placement, Target};
 
+pub use atlas::Atlas;
 pub use cells::white_outlines;
 pub use check_bar::STROKE_WIDTH_MM;
 pub use gallery::{GalleryTile, tag_gallery};
@@ -93,6 +95,13 @@ pub enum Part {
         /// Position in [`SheetLayout::check_bars`](crate::target::SheetLayout::check_bars).
         index: usize,
     },
+    /// A line to cut along, by index.
+    Line {
+        /// What it is for.
+        kind: LineKind,
+        /// Position in [`SheetLayout::lines`](crate::target::SheetLayout::lines).
+        index: usize,
+    },
     /// A line of text.
     Label {
         /// Position among the texts of the sheet.
@@ -143,6 +152,16 @@ pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, Artwork
         subject: subject(target),
         sheets: sheets.collect::<Result<_, _>>()?,
     })
+}
+
+/// The tiles of one panel in its own frame.
+pub fn panel_shapes(
+    target: &Target,
+    panel: &Panel,
+    family: Option<&Family>,
+) -> Result<Vec<Shape>, ArtworkError> {
+    let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [0.0; 2] };
+    board::draw_panel(target, panel, &placement, family)
 }
 
 fn subject(target: &Target) -> String {

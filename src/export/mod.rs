@@ -7,10 +7,14 @@ pub mod atomic;
 pub mod csv;
 pub mod detection;
 pub mod dsc;
+pub mod gltf;
+pub mod mesh;
+pub mod obj;
 pub mod orpc;
 pub mod overlay;
 pub mod pdf;
 pub mod png;
+pub mod stl;
 mod supersample;
 pub mod svg;
 

@@ -7,7 +7,9 @@
 mod corner;
 mod scene;
 mod sheet;
+mod solid;
 
 pub use corner::SimulatedCorner;
 pub use scene::{Light, Scene, Surface, Truth, TruthCorner};
 pub use sheet::scene_of_sheet;
+pub use solid::scene_of_target;

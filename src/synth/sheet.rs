@@ -2,7 +2,7 @@ use glam::{DMat3, DQuat, DVec3};
 use kurbo::{BezPath, PathEl};
 
 use super::{Scene, Surface};
-use crate::artwork::{Paint, Sheet};
+use crate::artwork::{Paint, Shape, Sheet};
 use crate::camera::Pose;
 use crate::target::{Placement, Target};
 
@@ -25,7 +25,7 @@ pub fn scene_of_sheet(target: &Target, sheet: &Sheet, index: usize) -> Scene {
             panel: panel.id,
             target_from_surface: target_from_page(placement, panel),
             paper_mm: rectangle(sheet.width_mm, sheet.height_mm),
-            black_mm: black_areas(sheet),
+            black_mm: black_areas(&sheet.shapes),
             corners: Vec::new(),
         });
         surface.corners.extend(panel.corners.iter().map(|corner| {
@@ -59,10 +59,9 @@ fn target_from_page(placement: &Placement, panel: &crate::target::Panel) -> Pose
     target_from_panel.after(&page_from_panel.inverse())
 }
 
-/// The filled shapes of a sheet as polygons.
-fn black_areas(sheet: &Sheet) -> Vec<Vec<Vec<[f64; 2]>>> {
-    sheet
-        .shapes
+/// The filled ones of some shapes as polygons.
+pub(super) fn black_areas(shapes: &[Shape]) -> Vec<Vec<Vec<[f64; 2]>>> {
+    shapes
         .iter()
         .filter(|shape| shape.paint == Paint::Fill)
         .map(|shape| polygons(&shape.path))

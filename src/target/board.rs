@@ -32,11 +32,10 @@ pub fn zigzag_vertices(rows: u32, cols: u32) -> impl Iterator<Item = Vertex> {
 /// A tag needs three corners to be read, so its tile has corners for vertices, in every
 /// `spacing`-th row and column. Of the possible starts the one with most tags is taken, and of
 /// those the one whose tags lie most evenly about the centre of the board.
-fn tagged_tiles(spec: &BoardSpec, tags: &TagSpec) -> Vec<Vertex> {
-    let corners: std::collections::BTreeSet<Vertex> =
-        zigzag_vertices(spec.rows, spec.cols).collect();
+pub(super) fn tagged_tiles(corners: &[Vertex], spacing: u32) -> Vec<Vertex> {
+    let corners: std::collections::BTreeSet<Vertex> = corners.iter().copied().collect();
     let complete = |&v: &Vertex| Tile::upright(v).vertices().iter().all(|v| corners.contains(v));
-    let spacing = tags.spacing as i32;
+    let spacing = spacing as i32;
     let mut by_start = BTreeMap::<(i32, i32), Vec<Vertex>>::new();
     for tile in corners.iter().copied().filter(complete) {
         by_start.entry((tile.row % spacing, tile.col % spacing)).or_default().push(tile);
@@ -52,7 +51,7 @@ fn tagged_tiles(spec: &BoardSpec, tags: &TagSpec) -> Vec<Vertex> {
     by_start
         .into_values()
         .min_by_key(|tiles| (std::cmp::Reverse(tiles.len()), off_centre(tiles)))
-        .expect("a board of at least 2 × 2 corners has a tile between corners")
+        .unwrap_or_default()
 }
 
 fn mean(points: &[[f64; 2]]) -> [f64; 2] {
@@ -66,12 +65,13 @@ pub(super) fn panels(
     family: Option<&Family>,
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
     spec.check()?;
-    let tiles = spec.tags.as_ref().map_or_else(Vec::new, |tags| tagged_tiles(spec, tags));
-    let family = match &spec.tags {
-        Some(tags) => Some(check_family(spec, tags, family, tiles.len() as u64)?),
-        None => None,
-    };
     let vertices: Vec<Vertex> = zigzag_vertices(spec.rows, spec.cols).collect();
+    let spacing = spec.tags.as_ref().map(|tags| tags.spacing);
+    let tiles = spacing.map_or_else(Vec::new, |spacing| tagged_tiles(&vertices, spacing));
+    let needed = tiles.len() * spec.boards as usize;
+    let instead = "raise --tag-spacing, make fewer or smaller --boards, or take a larger --family";
+    let tags = spec.tags.as_ref();
+    let family = tags.map(|tags| check_family(tags, family, needed, instead)).transpose()?;
     let matrix = [vertices.iter().map(|v| v.col as u32 + 1).max().unwrap_or(0), spec.rows];
     let panel = |board: u32| Panel {
         id: spec.board_id + board,
@@ -100,18 +100,19 @@ pub(super) fn panels(
     Ok(((0..spec.boards).map(panel).collect(), family))
 }
 
-/// Checks that the family is there and has enough codes.
-fn check_family(
-    spec: &BoardSpec,
+/// Checks that the family is there and has `needed` codes from the first id on; `instead` says what
+/// else to do where it has not.
+pub(super) fn check_family(
     tags: &TagSpec,
     family: Option<&Family>,
-    per_board: u64,
+    needed: usize,
+    instead: &'static str,
 ) -> Result<FamilyRef, TargetError> {
     let Some(family) = family else {
         let given = "and no family was given".to_owned();
         return Err(TargetError::Family { wanted: tags.family.clone(), given });
     };
-    let (needed, there) = (per_board * u64::from(spec.boards), family.len() as u64);
+    let (needed, there) = (needed as u64, family.len() as u64);
     let last = u64::from(tags.first_id) + needed - 1;
     if last >= there {
         return Err(TargetError::IdsRunOut {
@@ -120,6 +121,7 @@ fn check_family(
             family: family.name().to_owned(),
             end: there - 1,
             highest_first: there.checked_sub(needed),
+            instead,
         });
     }
     let (name, fingerprint) = (family.name().to_owned(), family.fingerprint().to_owned());
@@ -157,7 +159,8 @@ mod tests {
     #[test]
     fn tags_of_the_default_board_lie_in_three_rows_about_the_centre() {
         let board = spec(10, 11, 3);
-        let tiles = tagged_tiles(&board, board.tags.as_ref().unwrap());
+        let corners: Vec<Vertex> = zigzag_vertices(board.rows, board.cols).collect();
+        let tiles = tagged_tiles(&corners, 3);
         let rows: std::collections::BTreeSet<i32> = tiles.iter().map(|v| v.row).collect();
         assert_eq!(rows.into_iter().collect::<Vec<_>>(), [1, 4, 7]);
         assert!(tiles.len() >= 10, "{}", tiles.len());
@@ -185,8 +188,8 @@ mod tests {
             rows in 2u32..20, cols in 2u32..20, spacing in 1u32..8,
         ) {
             let board = spec(rows, cols, spacing);
-            let tiles = tagged_tiles(&board, board.tags.as_ref().unwrap());
             let corners: Vec<Vertex> = zigzag_vertices(board.rows, board.cols).collect();
+            let tiles = tagged_tiles(&corners, spacing);
             prop_assert!(!tiles.is_empty());
             prop_assert!(tiles.is_sorted());
             for tile in &tiles {

@@ -1,6 +1,9 @@
 use super::layout::{arrange, label};
 use super::paper::PaperSpec;
-use super::{BoardSpec, Panel, Target, TargetError, TargetSpec, board};
+use super::{
+    BoardSpec, FamilyRef, Panel, SheetLayout, Target, TargetError, TargetSpec, board, face_sheet,
+    solid,
+};
 use crate::family::Family;
 
 /// Longest name, characters: it is part of the label and of file names.
@@ -17,18 +20,19 @@ impl Target {
         layout: Option<&PaperSpec>,
     ) -> Result<Target, TargetError> {
         check_name(name)?;
-        let TargetSpec::Board(board) = spec else {
-            let problem = "a listed target is read from its list, it cannot be made anew";
-            return Err(TargetError::invalid("kind", problem));
+        let (panels, family, sheets) = match spec {
+            TargetSpec::Board(board) => board_parts(name, board, family, layout)?,
+            TargetSpec::Solid(spec) => {
+                let (panels, family) = solid::panels(spec, family)?;
+                let sheets = layout
+                    .map(|paper| face_sheet::sheets(name, spec, &panels, family.as_ref(), paper));
+                (panels, family, sheets.transpose()?.unwrap_or_default())
+            }
+            TargetSpec::Listed(_) => {
+                let problem = "a listed target is read from its list, it cannot be made anew";
+                return Err(TargetError::invalid("kind", problem));
+            }
         };
-        board.check()?;
-        let arrangement = layout.map(|paper| arrange(board, paper)).transpose()?;
-        let (panels, family) = board::panels(board, family)?;
-        let sheet = |panel: &Panel| {
-            let words = label(name, board, panel, family.as_ref());
-            Some(arrangement.as_ref()?.sheet(panel, words))
-        };
-        let sheets = panels.iter().filter_map(sheet).collect();
         let (name, spec) = (name.to_owned(), spec.clone());
         Ok(Target { name, spec, family, panels, sheets })
     }
@@ -55,6 +59,27 @@ impl Target {
         }
         overlap("--board-id", "board ids", &boards(self), &boards(other))
     }
+}
+
+/// What a target consists of.
+type Parts = (Vec<Panel>, Option<FamilyRef>, Vec<SheetLayout>);
+
+fn board_parts(
+    name: &str,
+    board: &BoardSpec,
+    family: Option<&Family>,
+    layout: Option<&PaperSpec>,
+) -> Result<Parts, TargetError> {
+    board.check()?;
+    let arrangement = layout.map(|paper| arrange(board, paper)).transpose()?;
+    let (panels, family) = board::panels(board, family)?;
+    let sheet = |panel: &Panel| {
+        let ink = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
+        let words = label(name, board, panel, family.as_ref());
+        Some(arrangement.as_ref()?.sheet(panel.id, ink, words))
+    };
+    let sheets = panels.iter().filter_map(sheet).collect();
+    Ok((panels, family, sheets))
 }
 
 /// Lowest and highest of some ids.

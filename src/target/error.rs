@@ -22,7 +22,7 @@ pub enum TargetError {
     /// More tags than codes.
     #[error(
         "--first-id: tags {first} to {last} are needed, but family {family} ends at {end}: \
-         {}raise --tag-spacing, make fewer or smaller --boards, or take a larger --family",
+         {}{instead}",
         match highest_first { Some(id) => format!("lower it to at most {id}, "), None => String::new() }
     )]
     IdsRunOut {
@@ -36,6 +36,8 @@ pub enum TargetError {
         end: u64,
         /// Highest first id that would do, if any does.
         highest_first: Option<u64>,
+        /// What else to do.
+        instead: &'static str,
     },
     /// Targets to be used together share ids.
     #[error("{option}: {what} {first} to {last} overlap those of `{other}`: start at {free}")]

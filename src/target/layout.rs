@@ -37,20 +37,20 @@ const BAR_INDENT_MM: f64 = 3.0;
 const BAR_STEP_MM: f64 = 10.0;
 /// Average advance of a character in the built-in font, in capital heights; a long text is set
 /// only where it fits by this estimate.
-const ADVANCE_CAPS: f64 = 0.76;
+pub(super) const ADVANCE_CAPS: f64 = 0.76;
 /// Blank between the black field of an inverted board and the marks, mm.
 const FIELD_GAP_MM: f64 = 1.0;
 /// Finest edge proposed to make a board fit, mm: what office printers resolve in a tag.
 const LEAST_PROPOSED_MM: u32 = 5;
 
-/// The rectangle that a board's ink takes, and the blanks it needs, mm.
-struct Footprint {
-    width: f64,
-    height: f64,
+/// The rectangle that a panel's ink takes, and the blanks it needs, mm.
+pub(super) struct Footprint {
+    pub width: f64,
+    pub height: f64,
     /// Distance to the edges of the paper.
-    edge_blank: f64,
+    pub edge_blank: f64,
     /// Distance to the marks.
-    mark_blank: f64,
+    pub mark_blank: f64,
 }
 
 impl Footprint {
@@ -108,20 +108,8 @@ impl Marks {
 /// Fits a board on paper, in this order of preference: the smallest paper (where it is free), the
 /// orientation of the board's longer side, the board not turned, the label below.
 pub(super) fn arrange(spec: &BoardSpec, paper: &PaperSpec) -> Result<Arrangement, TargetError> {
-    let margin = paper.margin_mm;
-    if !(0.0..=100.0).contains(&margin) {
-        let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
-        return Err(TargetError::invalid("--margin", problem));
-    }
-    let sizes: Vec<PaperSize> = match &paper.size {
-        Some(size) => vec![size.clone()],
-        None => PaperSize::automatic().collect(),
-    };
-    let fitting = |spec: &BoardSpec| {
-        let footprint = Footprint::new(spec, margin);
-        sizes.iter().find_map(|size| on_size(&footprint, size, paper.orientation, margin))
-    };
-    fitting(spec).ok_or_else(|| TargetError::DoesNotFit {
+    let fitting = |spec: &BoardSpec| fit(&Footprint::new(spec, paper.margin_mm), paper);
+    fitting(spec)?.ok_or_else(|| TargetError::DoesNotFit {
         rows: spec.rows,
         cols: spec.cols,
         edge: format_mm(spec.edge_mm),
@@ -131,10 +119,28 @@ pub(super) fn arrange(spec: &BoardSpec, paper: &PaperSpec) -> Result<Arrangement
             (Some(size), Orientation::Portrait) => format!("{size} portrait"),
             (Some(size), Orientation::Landscape) => format!("{size} landscape"),
         },
-        fitting_edge_mm: (LEAST_PROPOSED_MM..=spec.edge_mm.ceil() as u32)
-            .rev()
-            .find(|&mm| fitting(&BoardSpec { edge_mm: f64::from(mm), ..spec.clone() }).is_some()),
+        fitting_edge_mm: (LEAST_PROPOSED_MM..=spec.edge_mm.ceil() as u32).rev().find(|&mm| {
+            let smaller = BoardSpec { edge_mm: f64::from(mm), ..spec.clone() };
+            fitting(&smaller).is_ok_and(|found| found.is_some())
+        }),
     })
+}
+
+/// Fits a footprint on paper; `None` where it does not fit.
+pub(super) fn fit(
+    footprint: &Footprint,
+    paper: &PaperSpec,
+) -> Result<Option<Arrangement>, TargetError> {
+    let margin = paper.margin_mm;
+    if !(0.0..=100.0).contains(&margin) {
+        let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
+        return Err(TargetError::invalid("--margin", problem));
+    }
+    let sizes: Vec<PaperSize> = match &paper.size {
+        Some(size) => vec![size.clone()],
+        None => PaperSize::automatic().collect(),
+    };
+    Ok(sizes.iter().find_map(|size| on_size(footprint, size, paper.orientation, margin)))
 }
 
 /// Fits a board on one size of paper.
@@ -182,8 +188,8 @@ fn on_page(
 }
 
 impl Arrangement {
-    /// The sheet of one panel.
-    pub(super) fn sheet(&self, panel: &Panel, label: String) -> SheetLayout {
+    /// The sheet of one panel, whose `ink` is a rectangle of its frame.
+    pub(super) fn sheet(&self, panel: u32, ink: [f64; 4], label: String) -> SheetLayout {
         let [width_mm, height_mm] = self.page;
         let [lower_marks, right_marks] = self.marks;
         let corner = right_marks.depth() + right_marks.gap;
@@ -220,22 +226,21 @@ impl Arrangement {
         SheetLayout {
             width_mm,
             height_mm,
-            placements: vec![self.placement(panel)],
+            placements: vec![self.placement(panel, ink)],
+            lines: Vec::new(),
             check_bars,
             texts,
         }
     }
 
-    fn placement(&self, panel: &Panel) -> Placement {
-        let ink = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
-        let [left, lower, _, upper] = ink;
+    fn placement(&self, panel: u32, [left, lower, _, upper]: [f64; 4]) -> Placement {
         let [x, y] = self.board_at;
         if self.turned {
             // (u, v) of the panel goes to (−v, u): its upper end lies left.
             let origin_mm = [x + upper, y - left];
-            return Placement { panel: panel.id, angle_rad: FRAC_PI_2, origin_mm };
+            return Placement { panel, angle_rad: FRAC_PI_2, origin_mm };
         }
-        Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [x - left, y - lower] }
+        Placement { panel, angle_rad: 0.0, origin_mm: [x - left, y - lower] }
     }
 }
 

@@ -10,12 +10,15 @@
 mod board;
 mod build;
 mod error;
+mod face_sheet;
 pub(crate) mod json;
 mod layout;
 mod length;
 mod panel;
 mod paper;
+mod polyhedron;
 mod pose;
+mod solid;
 mod spec;
 
 use serde::{Deserialize, Serialize};
@@ -27,7 +30,8 @@ pub use json::{SCHEMA, TargetFileError};
 pub use layout::CHECK_BAR_STROKE_MM;
 pub use length::{LengthError, parse_length_mm};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec};
-pub use spec::{BoardSpec, ListFormat, ListedSpec, TagSpec, TargetSpec};
+pub use polyhedron::{Face, Polyhedron};
+pub use spec::{BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
 
 /// A target: its panels, and the sheets they are printed on.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +69,9 @@ pub enum Outline {
     /// The same and one tile more at the right end of the lowest row, so that every row of a
     /// zigzag board has as many tiles as the next.
     Zigzag,
+    /// The same and one tile more at each end of a triangle of corners, so that the tiles fill a
+    /// triangle.
+    Triangle,
 }
 
 /// Which tiling a panel carries.
@@ -157,6 +164,9 @@ pub struct SheetLayout {
     pub placements: Vec<Placement>,
     /// Lines of stated length, to be measured with a ruler.
     pub check_bars: Vec<CheckBar>,
+    /// Marks to cut and fold along.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<SheetLine>,
     /// The label and the words on the check bars.
     pub texts: Vec<SheetText>,
 }
@@ -171,6 +181,37 @@ pub struct Placement {
     pub angle_rad: f64,
     /// Page position of the panel's origin, mm.
     pub origin_mm: [f64; 2],
+}
+
+impl Placement {
+    /// Page position of a point of the panel, mm.
+    pub fn page_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (sin, cos) = self.angle_rad.sin_cos();
+        let [ox, oy] = self.origin_mm;
+        [ox + cos * x - sin * y, oy + sin * x + cos * y]
+    }
+}
+
+/// A straight line of a page.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheetLine {
+    /// What it is for.
+    pub kind: LineKind,
+    /// One end on the page, mm.
+    pub from_mm: [f64; 2],
+    /// The other end on the page, mm.
+    pub to_mm: [f64; 2],
+    /// Its width, mm.
+    pub width_mm: f64,
+}
+
+/// What a line of a page is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LineKind {
+    /// To cut along.
+    Cut,
 }
 
 /// A check bar: the distance between the outer edges of its two end strokes is its length.

@@ -40,6 +40,12 @@ impl Panel {
         {
             anchors.insert(*last + Vertex::new(0, 1));
         }
+        if self.outline == Outline::Triangle
+            && let Some(top) = self.corners.iter().map(|corner| corner.row).max()
+        {
+            let ends = [(-1, -1), (-1, top + 1), (top + 1, -1)];
+            anchors.extend(ends.map(|(row, col)| Vertex::new(row, col)));
+        }
         anchors.into_iter().map(Tile::upright).collect()
     }
 

@@ -16,6 +16,15 @@ const LEAST_UNTAGGED_CORNERS: u32 = 7;
 /// Range of a tile's edge, mm.
 const EDGE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
+/// Range of a solid's edge, mm.
+const SOLID_EDGE_MM: std::ops::RangeInclusive<f64> = 10.0..=5000.0;
+
+/// Range of tiles along a side of a face: with fewer than four there is no tile between corners.
+const FACE_TILES: std::ops::RangeInclusive<u32> = 4..=200;
+
+/// Most faces of a solid.
+const MOST_FACES: u32 = 10_000;
+
 /// Range of a tag's border, bit-widths. Below half a bit the border no longer separates the code
 /// from the white around the tile in a blurred image.
 const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.5..=10.0;
@@ -26,6 +35,8 @@ const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.5..=10.0;
 pub enum TargetSpec {
     /// Flat zigzag boards.
     Board(BoardSpec),
+    /// A solid with a board on each face.
+    Solid(SolidSpec),
     /// Known only by its corners and tags, as another program listed them.
     Listed(ListedSpec),
 }
@@ -70,6 +81,36 @@ pub struct TagSpec {
     pub border_bits: f64,
 }
 
+/// A solid whose faces carry triangular boards with tags.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolidSpec {
+    /// Which solid.
+    pub shape: SolidShape,
+    /// Length of the solid's edges, mm.
+    pub edge_mm: f64,
+    /// Black tiles along each side of a face.
+    pub tiles: u32,
+    /// Blank between a face's edges and its tiles, mm.
+    pub margin_mm: f64,
+    /// Id of the first face's board; the others follow in the order of the faces.
+    pub board_id: u32,
+    /// Tags: faces could not be told apart without.
+    pub tags: TagSpec,
+}
+
+/// The solids; see [`Polyhedron`](super::Polyhedron) for the order of their faces.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SolidShape {
+    /// Four faces.
+    Tetrahedron,
+    /// Eight faces.
+    Octahedron,
+    /// Twenty faces.
+    Icosahedron,
+}
+
 /// Where a listed target comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -94,6 +135,53 @@ impl Default for TagSpec {
     fn default() -> Self {
         let family = "delTag25h7".to_owned();
         Self { family, first_id: 0, spacing: 3, border_bits: 1.5 }
+    }
+}
+
+impl SolidShape {
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Tetrahedron => "tetrahedron",
+            Self::Octahedron => "octahedron",
+            Self::Icosahedron => "icosahedron",
+        }
+    }
+}
+
+impl SolidSpec {
+    /// Shortest edge, mm.
+    pub const LEAST_EDGE_MM: f64 = *SOLID_EDGE_MM.start();
+
+    /// Finest edge of a tile, mm: what [`BoardSpec`] allows.
+    pub const FINEST_TILE_MM: f64 = *EDGE_MM.start();
+
+    /// A solid of 150 mm edges, ten tiles a side (the tags of a face then lie symmetrically) and
+    /// 5 mm of blank along its edges, which leaves room to fold and glue.
+    pub fn new(shape: SolidShape) -> Self {
+        let tags = TagSpec::default();
+        Self { shape, edge_mm: 150.0, tiles: 10, margin_mm: 5.0, board_id: 0, tags }
+    }
+
+    /// Checks every number by itself.
+    pub(super) fn check(&self) -> Result<(), TargetError> {
+        if !SOLID_EDGE_MM.contains(&self.edge_mm) {
+            let problem = format!("{} is not between 10 mm and 5000 mm", format_mm(self.edge_mm));
+            return Err(TargetError::invalid("--edge", problem));
+        }
+        if !FACE_TILES.contains(&self.tiles) {
+            let problem = format!("{} is not between 4 and 200", self.tiles);
+            return Err(TargetError::invalid("--tiles", problem));
+        }
+        if !(0.0..=SOLID_EDGE_MM.end() / 4.0).contains(&self.margin_mm) {
+            let problem = format!("{} is no margin of a face", format_mm(self.margin_mm));
+            return Err(TargetError::invalid("--face-margin", problem));
+        }
+        if self.board_id.checked_add(MOST_FACES).is_none() {
+            let problem = format!("{} leaves no ids for the faces after it", self.board_id);
+            return Err(TargetError::invalid("--board-id", problem));
+        }
+        self.tags.check()
     }
 }
 

@@ -13,12 +13,18 @@
 //! What is wrong is named by its cause where one cause explains it: a scale, a mirror image, a
 //! turn, a shift of the whole board rather than a list of all corners.
 //!
+//! A mesh (`.glb`, `.obj`) is loaded, its texture included, and looked at by a camera before each
+//! face; every corner is followed along its ray onto the loaded triangles and must lie within
+//! [`MESH_TOLERANCE_MM`] of its stated position in space.
+//!
 //! Limits: marks outside the tiles and check bars (labels, dirt in the margin) are not compared.
 
 mod bars;
 mod board;
 mod document;
 mod fit;
+mod model;
+mod solid;
 mod tiles;
 mod verdict;
 
@@ -31,7 +37,8 @@ use crate::target::{SheetLayout, Target};
 use fit::AffineMap;
 
 pub use document::{Document, DocumentError, Format, Page};
-pub use verdict::{Finding, SheetVerdict, Verdict};
+pub use solid::MESH_TOLERANCE_MM;
+pub use verdict::{FaceVerdict, Finding, SheetVerdict, Verdict};
 
 /// Largest deviation of a position or a length, mm: a fifth of what a good printer adds.
 pub const TOLERANCE_MM: f64 = 0.02;
@@ -81,9 +88,6 @@ pub struct Verifier<'a> {
 impl<'a> Verifier<'a> {
     /// A verifier for the artifacts of `target`, whose family must be given if it has tags.
     pub fn new(target: &'a Target, family: Option<&'a Family>) -> Result<Self, VerifyError> {
-        if target.sheets.is_empty() {
-            return Err(VerifyError::NoSheets(target.name.clone()));
-        }
         if let Some(needed) = &target.family {
             // A .dsc file names its family without a fingerprint.
             let same = |family: &Family| {
@@ -108,6 +112,12 @@ impl<'a> Verifier<'a> {
     /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
     /// that its name tells.
     pub fn verify(&self, path: &Path) -> Result<Verdict, VerifyError> {
+        if let Some(format) = Format::of_mesh(path) {
+            return Ok(solid::verify(self, path, format)?);
+        }
+        if self.target.sheets.is_empty() {
+            return Err(VerifyError::NoSheets(self.target.name.clone()));
+        }
         let document = Document::open(path)?;
         let sheets = &self.target.sheets;
         let mut findings = Vec::new();
@@ -119,7 +129,7 @@ impl<'a> Verifier<'a> {
                 }
                 (0..found.min(stated)).collect()
             }
-            Format::Svg | Format::Png => vec![self.sheet_of(path)?],
+            _ => vec![self.sheet_of(path)?],
         };
         let mut verdicts = Vec::with_capacity(indices.len());
         for index in indices {
@@ -132,6 +142,7 @@ impl<'a> Verifier<'a> {
             passed: findings.is_empty() && verdicts.iter().all(|s| s.findings.is_empty()),
             findings,
             sheets: verdicts,
+            faces: Vec::new(),
         })
     }
 

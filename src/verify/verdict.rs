@@ -16,7 +16,32 @@ pub struct Verdict {
     /// What is wrong with the file as a whole.
     pub findings: Vec<Finding>,
     /// Its pages.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sheets: Vec<SheetVerdict>,
+    /// The faces of a mesh.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faces: Vec<FaceVerdict>,
+}
+
+/// What was found on one face of a mesh.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FaceVerdict {
+    /// Panel id.
+    pub panel: u32,
+    /// Resolution at which it was looked at, px/mm.
+    pub px_per_mm: f64,
+    /// Corners that the target has on this face.
+    pub corners: usize,
+    /// Those that were found with the right label.
+    pub corners_found: usize,
+    /// Tags that the target has on this face.
+    pub tags: usize,
+    /// Those that read without a wrong bit.
+    pub tags_exact: usize,
+    /// Largest distance of a found corner on the mesh from its stated position, mm.
+    pub max_deviation_mm: f64,
+    /// What is wrong.
+    pub findings: Vec<Finding>,
 }
 
 /// What was found on one page.
@@ -134,6 +159,33 @@ pub enum Finding {
         /// Found minus stated position.
         by_mm: [f64; 2],
     },
+    /// A corner of a mesh lies elsewhere.
+    CornerOff3d {
+        /// Corner id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Found minus stated position in the target frame.
+        by_mm: [f64; 3],
+    },
+    /// Triangles of a mesh whose normals are not theirs.
+    Normals {
+        /// How many.
+        triangles: usize,
+    },
+    /// A tag of a mesh is not read, or with wrong bits.
+    TagInexact {
+        /// Stated id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Wrong bits; `None` when it was not read.
+        errors: Option<u32>,
+    },
     /// A corner was found where the target has none.
     CornerExtra {
         /// Where.
@@ -240,6 +292,17 @@ impl fmt::Display for Finding {
                 let [x, y] = by_mm.map(micrometres);
                 write!(f, "corner {id} at row {row} col {col} off by ({x:.3}, {y:.3}) mm")
             }
+            Self::CornerOff3d { id, row, col, by_mm } => {
+                let [x, y, z] = by_mm.map(micrometres);
+                write!(f, "corner {id} at row {row} col {col} off by ({x:.3}, {y:.3}, {z:.3}) mm")
+            }
+            Self::Normals { triangles } => write!(f, "{triangles} triangles with wrong normals"),
+            Self::TagInexact { id, row, col, errors: None } => {
+                write!(f, "tag {id} at row {row} col {col} not read")
+            }
+            Self::TagInexact { id, row, col, errors: Some(n) } => {
+                write!(f, "tag {id} at row {row} col {col} read with {n} wrong bits")
+            }
             Self::CornerExtra { at_mm: [x, y] } => {
                 write!(f, "a corner at ({x:.2}, {y:.2}) mm where none should be")
             }
@@ -282,6 +345,18 @@ impl fmt::Display for Verdict {
     /// One line: what was proved, or what is wrong.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.artifact)?;
+        if self.passed && !self.faces.is_empty() {
+            let sum =
+                |count: fn(&FaceVerdict) -> usize| self.faces.iter().map(count).sum::<usize>();
+            let deviation = self.faces.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
+            let (corners, tags) = (sum(|s| s.corners_found), sum(|s| s.tags_exact));
+            let faces = self.faces.len();
+            return write!(
+                f,
+                "verified, {faces} faces, {corners} corners in space within {deviation:.4} mm, \
+                 {tags} tags exact"
+            );
+        }
         if self.passed {
             let sum =
                 |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
@@ -312,7 +387,10 @@ impl fmt::Display for Verdict {
             };
             sheet.findings.iter().map(move |finding| format!("{page}{finding}"))
         });
-        let all: Vec<String> = everywhere.chain(on_sheets).collect();
+        let on_faces = self.faces.iter().flat_map(|face| {
+            face.findings.iter().map(move |finding| format!("face {}: {finding}", face.panel))
+        });
+        let all: Vec<String> = everywhere.chain(on_sheets).chain(on_faces).collect();
         write!(f, "FAILED, {}", all[..all.len().min(NAMED)].join("; "))?;
         match all.len().saturating_sub(NAMED) {
             0 => Ok(()),

@@ -1,17 +1,15 @@
 //! `deltille board`.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::Ordering;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 
+use super::files::{File, Formats, drawn, text_file, write_all};
 use super::settings::{Plan, Settings};
 use super::{target_file, verify};
 use crate::artwork::{self, Artwork};
-use crate::cli::interrupt;
-use crate::export::{atomic, dsc, pdf, png, sheet_file_name, svg};
+use crate::export::{atomic, dsc};
 use crate::family::Family;
 use crate::target::{Target, TargetSpec};
 
@@ -71,74 +69,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     verify::verify(&target, family.as_ref(), &artifacts, None)
 }
 
-/// Writes one file to a path.
-type Writer = dyn Fn(&Path) -> anyhow::Result<()>;
-
-/// A file to be written: its name, and what writes it.
-struct File {
-    name: String,
-    write: Box<Writer>,
-}
-
 /// The files of a plan. What can be refused is refused here, before anything is written.
 fn files(plan: &Plan, target: &Target, artwork: Artwork) -> anyhow::Result<Vec<File>> {
     let name = &target.name;
-    let artwork = std::rc::Rc::new(artwork);
     let mut files = vec![text_file(format!("{name}.json"), target.to_json())];
     if let Some(dialect) = plan.dsc {
         let text = dsc::write(target, dialect).context("--dsc")?;
         files.push(text_file(format!("{name}.dsc"), text));
     }
-    if plan.pdf {
-        let artwork = artwork.clone();
-        let write = Box::new(move |path: &Path| Ok(pdf::write(&artwork, path)?));
-        files.push(File { name: format!("{name}.pdf"), write });
-    }
-    let count = target.sheets.len();
-    for index in 0..count {
-        if plan.svg {
-            let artwork = artwork.clone();
-            let write = Box::new(move |path: &Path| Ok(svg::write(&artwork, index, path)?));
-            files.push(File { name: sheet_file_name(name, index, count, "svg"), write });
-        }
-        if plan.png {
-            let (artwork, dpi) = (artwork.clone(), f64::from(plan.dpi));
-            let write = Box::new(move |path: &Path| {
-                Ok(png::write(&artwork.sheets[index], &artwork.title, path, dpi)?)
-            });
-            files.push(File { name: sheet_file_name(name, index, count, "png"), write });
-        }
-    }
+    let formats = Formats { pdf: plan.pdf, svg: plan.svg, png: plan.png };
+    files.extend(drawn(name, artwork, formats, plan.dpi));
     Ok(files)
-}
-
-fn text_file(name: String, text: String) -> File {
-    let write = move |path: &Path| Ok(atomic::write(path, |out| out.write_all(text.as_bytes()))?);
-    File { name, write: Box::new(write) }
-}
-
-/// Writes all files into a folder beside their places, then moves them there: all or none.
-fn write_all(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
-    let interrupted = interrupt::flag();
-    let context = || format!("-o: cannot write to {}", folder.display());
-    fs::create_dir_all(folder).with_context(context)?;
-    let staging = tempfile::Builder::new().prefix(".deltille-").tempdir_in(folder);
-    let staging = staging.with_context(context)?;
-    for file in files {
-        if interrupted.load(Ordering::Relaxed) {
-            bail!("interrupted; nothing was written");
-        }
-        (file.write)(&staging.path().join(&file.name))?;
-    }
-    files
-        .iter()
-        .map(|file| {
-            let path = folder.join(&file.name);
-            fs::rename(staging.path().join(&file.name), &path)
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            Ok(path)
-        })
-        .collect()
 }
 
 /// One line on what was made.

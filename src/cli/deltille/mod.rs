@@ -3,14 +3,18 @@
 mod board;
 mod detect;
 mod experiment;
+mod files;
 mod refine;
 mod settings;
+mod solid;
 mod target_file;
 mod verify;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::target::SolidShape;
 
 /// Make, detect and verify deltille targets.
 #[derive(Parser)]
@@ -24,6 +28,12 @@ pub struct Deltille {
 enum Command {
     /// Make a board: its description, and what to print
     Board(Box<board::Args>),
+    /// Make a tetrahedron with tagged boards on its faces: a mesh, and what to print
+    Tetrahedron(Box<solid::Args>),
+    /// Make an octahedron
+    Octahedron(Box<solid::Args>),
+    /// Make an icosahedron
+    Icosahedron(Box<solid::Args>),
     /// Find a target, or untagged boards, in photographs
     Detect(detect::Args),
     /// Measure the library on simulated images
@@ -38,6 +48,9 @@ enum Command {
 pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Board(args) => board::run(*args),
+        Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),
+        Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),
+        Command::Icosahedron(args) => solid::run(SolidShape::Icosahedron, *args),
         Command::Detect(args) => detect::run(args),
         Command::Experiment(args) => experiment::run(args),
         Command::Refine(args) => refine::run(args),

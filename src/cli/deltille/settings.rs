@@ -15,7 +15,7 @@ use crate::target::{
 const DEFAULT_EDGE_MM: f64 = 20.0;
 
 /// Resolution of PNG files, dots per inch.
-const DEFAULT_DPI: u32 = 300;
+pub const DEFAULT_DPI: u32 = 300;
 
 /// Range of the resolution: in a coarser picture a check bar cannot be measured to 0.02 mm.
 const DPI: std::ops::RangeInclusive<u32> = 200..=2400;

@@ -80,7 +80,9 @@ fn artifacts_in(folder: &Path, target: &Target) -> Vec<PathBuf> {
     let pages = ["svg", "png"].into_iter().flat_map(|extension| {
         (0..count).map(move |index| sheet_file_name(&target.name, index, count, extension))
     });
-    std::iter::once(format!("{}.pdf", target.name))
+    ["pdf", "glb", "obj"]
+        .map(|extension| format!("{}.{extension}", target.name))
+        .into_iter()
         .chain(pages)
         .map(|name| folder.join(name))
         .filter(|path| path.is_file())

@@ -22,6 +22,21 @@ pub enum Format {
     Svg,
     /// Portable Network Graphics.
     Png,
+    /// glTF 2.0 binary.
+    Glb,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+impl Format {
+    /// The kind of mesh that a file name tells.
+    pub fn of_mesh(path: &Path) -> Option<Self> {
+        match path.extension()?.to_string_lossy().to_lowercase().as_str() {
+            "glb" => Some(Self::Glb),
+            "obj" => Some(Self::Obj),
+            _ => None,
+        }
+    }
 }
 
 /// Why an artifact cannot be read.
@@ -87,7 +102,7 @@ impl Document {
         let content = match format {
             Format::Pdf => Content::Pdf(pdf::Pdf::parse(bytes).map_err(unreadable)?),
             Format::Svg => Content::Svg(Box::new(svg::Svg::parse(&bytes).map_err(unreadable)?)),
-            Format::Png => Content::Png(png::Png::parse(&bytes).map_err(unreadable)?),
+            _ => Content::Png(png::Png::parse(&bytes).map_err(unreadable)?),
         };
         Ok(Self { content, format })
     }

@@ -1,0 +1,92 @@
+//! The files of a target, written all or none.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::atomic::Ordering;
+
+use anyhow::{Context, bail};
+
+use crate::artwork::Artwork;
+use crate::cli::interrupt;
+use crate::export::{atomic, pdf, png, sheet_file_name, svg};
+
+/// Writes one file to a path.
+type Writer = dyn Fn(&Path) -> anyhow::Result<()>;
+
+/// A file to be written: its name, and what writes it.
+pub struct File {
+    name: String,
+    write: Box<Writer>,
+}
+
+impl File {
+    /// A file of that name, written by `write`.
+    pub fn new(name: String, write: impl Fn(&Path) -> anyhow::Result<()> + 'static) -> Self {
+        Self { name, write: Box::new(write) }
+    }
+}
+
+/// Formats of drawn sheets.
+#[derive(Clone, Copy)]
+pub struct Formats {
+    pub pdf: bool,
+    pub svg: bool,
+    pub png: bool,
+}
+
+/// A file of text.
+pub fn text_file(name: String, text: String) -> File {
+    File::new(name, move |path| Ok(atomic::write(path, |out| out.write_all(text.as_bytes()))?))
+}
+
+/// The sheets of an artwork in some formats.
+pub fn drawn(name: &str, artwork: Artwork, formats: Formats, dpi: u32) -> Vec<File> {
+    let artwork = Rc::new(artwork);
+    let mut files = Vec::new();
+    if formats.pdf {
+        let artwork = artwork.clone();
+        let write = move |path: &Path| Ok(pdf::write(&artwork, path)?);
+        files.push(File::new(format!("{name}.pdf"), write));
+    }
+    let count = artwork.sheets.len();
+    for index in 0..count {
+        if formats.svg {
+            let artwork = artwork.clone();
+            let write = move |path: &Path| Ok(svg::write(&artwork, index, path)?);
+            files.push(File::new(sheet_file_name(name, index, count, "svg"), write));
+        }
+        if formats.png {
+            let (artwork, dpi) = (artwork.clone(), f64::from(dpi));
+            let write = move |path: &Path| {
+                Ok(png::write(&artwork.sheets[index], &artwork.title, path, dpi)?)
+            };
+            files.push(File::new(sheet_file_name(name, index, count, "png"), write));
+        }
+    }
+    files
+}
+
+/// Writes all files into a folder beside their places, then moves them there: all or none.
+pub fn write_all(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
+    let interrupted = interrupt::flag();
+    let context = || format!("-o: cannot write to {}", folder.display());
+    fs::create_dir_all(folder).with_context(context)?;
+    let staging = tempfile::Builder::new().prefix(".deltille-").tempdir_in(folder);
+    let staging = staging.with_context(context)?;
+    for file in files {
+        if interrupted.load(Ordering::Relaxed) {
+            bail!("interrupted; nothing was written");
+        }
+        (file.write)(&staging.path().join(&file.name))?;
+    }
+    files
+        .iter()
+        .map(|file| {
+            let path = folder.join(&file.name);
+            fs::rename(staging.path().join(&file.name), &path)
+                .with_context(|| format!("cannot write {}", path.display()))?;
+            Ok(path)
+        })
+        .collect()
+}

@@ -1,0 +1,233 @@
+//! `deltille tetrahedron`, `octahedron`, `icosahedron`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, anyhow, bail};
+
+use super::files::{self, File, text_file};
+use super::settings::DEFAULT_DPI;
+use super::{target_file, verify};
+use crate::artwork;
+use crate::export::dsc::{self, Dialect};
+use crate::export::mesh::TexturedMesh;
+use crate::export::{gltf, obj, stl};
+use crate::family::Family;
+use crate::target::{
+    DEFAULT_MARGIN_MM, PaperSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec,
+    parse_length_mm,
+};
+
+/// Arguments of the commands that make solids.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Edge of the solid, such as 150mm, 15cm, 6in [default: 150mm]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    edge: Option<String>,
+    /// Black tiles along each side of a face [default: 10]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    tiles: Option<u32>,
+    /// Blank between a face's edges and its tiles [default: 5mm]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    face_margin: Option<String>,
+    /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
+    #[arg(long)]
+    family: Option<String>,
+    /// A tag in every n-th row and column of a face [default: 3]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    tag_spacing: Option<u32>,
+    /// Black border of a tag, in widths of a bit [default: 1.5]
+    #[arg(long, value_name = "BITS", allow_negative_numbers = true)]
+    tag_border: Option<f64>,
+    /// Id of the first tag; the others follow, face by face [default: 0]
+    #[arg(long, value_name = "ID", allow_negative_numbers = true)]
+    first_id: Option<u32>,
+    /// Id of the first face's board; the others follow [default: 0]
+    #[arg(long, value_name = "ID", allow_negative_numbers = true)]
+    board_id: Option<u32>,
+    /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); so it is where no other of gltf,
+    /// obj, stl, pdf, svg, png is asked for
+    #[arg(long)]
+    gltf: bool,
+    /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres)
+    #[arg(long)]
+    obj: bool,
+    /// Write <name>.stl, the bare solid (millimetres)
+    #[arg(long)]
+    stl: bool,
+    /// Resolution of the texture, dots per inch [default: 20 texels per tag bit]
+    #[arg(long, value_name = "DPI", allow_negative_numbers = true)]
+    texture_dpi: Option<f64>,
+    /// Write <name>.pdf: a page per face with marks to cut and to assemble
+    #[arg(long)]
+    pdf: bool,
+    /// Write <name>-<page>.svg
+    #[arg(long)]
+    svg: bool,
+    /// Write <name>-<page>.png
+    #[arg(long)]
+    png: bool,
+    /// Write <name>.dsc, for the reference detector or its fork
+    #[arg(long)]
+    dsc: bool,
+    /// fork or original [default: fork]
+    #[arg(long, value_name = "DIALECT")]
+    dsc_dialect: Option<String>,
+    /// Resolution of the PNG pages, dots per inch [default: 300]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(200..=2400))]
+    dpi: Option<u32>,
+    /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm [default: the smallest of A4
+    /// to A0 that takes a face]
+    #[arg(long, value_name = "SIZE")]
+    paper: Option<String>,
+    /// auto, portrait or landscape [default: auto]
+    #[arg(long)]
+    orientation: Option<String>,
+    /// Blank along the edges of the paper [default: 5mm]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    margin: Option<String>,
+    /// Stem of the files' names, printed on the sheets [default: the solid's name]
+    #[arg(long)]
+    name: Option<String>,
+    /// Description of another target to be used together with this one: ids that both have are
+    /// refused; may be repeated
+    #[arg(long, value_name = "FILE")]
+    with: Vec<PathBuf>,
+    /// Folder to write to
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
+    output: PathBuf,
+    /// Do not read the written files back to compare them with the description
+    #[arg(long)]
+    no_verify: bool,
+}
+
+/// Makes a solid, writes its files, and verifies what it wrote.
+pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
+    let spec = args.spec(shape)?;
+    let paper = args.paper()?;
+    let family = Family::resolve(&spec.tags.family).context("--family")?;
+    let name = args.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
+    let printed = args.pdf || args.svg || args.png;
+    let layout = printed.then_some(&paper);
+    let target = Target::build(&name, &TargetSpec::Solid(spec), Some(&family), layout)?;
+    for path in &args.with {
+        let other = target_file::read(path).context("--with")?;
+        target.check_beside(&other)?;
+    }
+    let files = args.files(&target, &family)?;
+    let written = files::write_all(&args.output, &files)?;
+    println!("{}", summary(&target));
+    for path in &written {
+        println!("wrote {}", path.display());
+    }
+    let proved = |path: &PathBuf| {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        let texture =
+            path.file_name().is_some_and(|f| f.to_string_lossy() == obj::texture_name(&name));
+        matches!(extension, "pdf" | "svg" | "png" | "glb" | "obj") && !texture
+    };
+    let artifacts: Vec<PathBuf> = written.into_iter().filter(proved).collect();
+    if args.no_verify || artifacts.is_empty() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    verify::verify(&target, Some(&family), &artifacts, None)
+}
+
+impl Args {
+    fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
+        let default = SolidSpec::new(shape);
+        let tags = TagSpec::default();
+        Ok(SolidSpec {
+            edge_mm: length("--edge", &self.edge)?.unwrap_or(default.edge_mm),
+            tiles: self.tiles.unwrap_or(default.tiles),
+            margin_mm: length("--face-margin", &self.face_margin)?.unwrap_or(default.margin_mm),
+            board_id: self.board_id.unwrap_or(default.board_id),
+            tags: TagSpec {
+                family: self.family.clone().unwrap_or(tags.family),
+                first_id: self.first_id.unwrap_or(tags.first_id),
+                spacing: self.tag_spacing.unwrap_or(tags.spacing),
+                border_bits: self.tag_border.unwrap_or(tags.border_bits),
+            },
+            shape: default.shape,
+        })
+    }
+
+    fn paper(&self) -> anyhow::Result<PaperSpec> {
+        Ok(PaperSpec {
+            size: self.paper.as_deref().map(str::parse).transpose().context("--paper")?,
+            orientation: match &self.orientation {
+                Some(text) => text.parse().context("--orientation")?,
+                None => Default::default(),
+            },
+            margin_mm: length("--margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
+        })
+    }
+
+    /// The files asked for. What can be refused is refused here, before anything is written.
+    fn files(&self, target: &Target, family: &Family) -> anyhow::Result<Vec<File>> {
+        let name = &target.name;
+        let mut files = vec![text_file(format!("{name}.json"), target.to_json())];
+        if self.dsc || self.dsc_dialect.is_some() {
+            let dialect = match &self.dsc_dialect {
+                Some(text) => text.parse().map_err(|e: String| anyhow!("--dsc-dialect: {e}"))?,
+                None => Dialect::default(),
+            };
+            let text = dsc::write(target, dialect).context("--dsc")?;
+            files.push(text_file(format!("{name}.dsc"), text));
+        }
+        let printed = self.pdf || self.svg || self.png;
+        let with_gltf = self.gltf || !(self.obj || self.stl || printed);
+        if self.texture_dpi.is_some_and(|dpi| !(1.0..=1e5).contains(&dpi)) {
+            bail!("--texture-dpi: it must be between 1 and 100000");
+        }
+        if with_gltf || self.obj || self.stl {
+            let mesh = TexturedMesh::new(target, Some(family), self.texture_dpi)?;
+            if with_gltf {
+                files.push(bytes_file(format!("{name}.glb"), gltf::to_bytes(&mesh)));
+            }
+            if self.stl {
+                files.push(bytes_file(format!("{name}.stl"), stl::to_bytes(&mesh)));
+            }
+            if self.obj {
+                files.push(text_file(format!("{name}.obj"), obj::text(&mesh)));
+                files.push(text_file(format!("{name}.mtl"), obj::material(&mesh)));
+                files.push(bytes_file(obj::texture_name(name), mesh.texture_png));
+            }
+        }
+        if printed {
+            let artwork = artwork::draw(target, Some(family))?;
+            let formats = files::Formats { pdf: self.pdf, svg: self.svg, png: self.png };
+            let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
+            files.extend(files::drawn(name, artwork, formats, dpi));
+        }
+        Ok(files)
+    }
+}
+
+fn bytes_file(name: String, bytes: Vec<u8>) -> File {
+    File::new(name, move |path| {
+        Ok(crate::export::atomic::write(path, |out| out.write_all(&bytes))?)
+    })
+}
+
+fn length(option: &str, text: &Option<String>) -> anyhow::Result<Option<f64>> {
+    text.as_deref().map(parse_length_mm).transpose().with_context(|| option.to_owned())
+}
+
+/// One line on what was made.
+fn summary(target: &Target) -> String {
+    let TargetSpec::Solid(spec) = &target.spec else { return target.name.clone() };
+    let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
+    let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
+    let last = spec.tags.first_id as usize + tags - 1;
+    format!(
+        "{}: {} of {} mm edges, {} faces, {corners} corners, tiles of {:.3} mm, {} ids {}–{last}",
+        target.name,
+        spec.shape.name(),
+        spec.edge_mm,
+        target.panels.len(),
+        target.panels[0].edge_mm,
+        target.family.as_ref().map_or("", |family| &family.name),
+        spec.tags.first_id,
+    )
+}

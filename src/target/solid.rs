@@ -1,0 +1,172 @@
+//! Solids with a board of tiles on each face.
+
+use super::board::{check_family, tagged_tiles};
+use super::length::format_mm;
+use super::polyhedron::{Face, Polyhedron};
+use super::{
+    Corner, FamilyRef, GridKind, Outline, Panel, SolidShape, SolidSpec, TagPlacement, TargetError,
+};
+use crate::family::Family;
+use crate::lattice::Vertex;
+
+impl SolidSpec {
+    /// The solid.
+    pub fn polyhedron(&self) -> Polyhedron {
+        match self.shape {
+            SolidShape::Tetrahedron => Polyhedron::tetrahedron(self.edge_mm),
+            SolidShape::Octahedron => Polyhedron::octahedron(self.edge_mm),
+            SolidShape::Icosahedron => Polyhedron::icosahedron(self.edge_mm),
+        }
+    }
+
+    /// Its faces with their boards, in the order of the panels; refused where the margin leaves
+    /// no room for tiles.
+    pub fn faces(&self) -> Result<Vec<Face>, TargetError> {
+        self.check()?;
+        let solid = self.polyhedron();
+        (0..solid.faces.len())
+            .map(|index| {
+                solid
+                    .face(index, self.tiles, self.margin_mm)
+                    .filter(|face| face.tile_edge_mm >= Self::FINEST_TILE_MM)
+                    .ok_or_else(|| self.too_fine())
+            })
+            .collect()
+    }
+
+    fn too_fine(&self) -> TargetError {
+        let tiles = f64::from(self.tiles) * Self::FINEST_TILE_MM;
+        let least = (tiles + 2.0 * 3f64.sqrt() * self.margin_mm).ceil();
+        let problem = format!(
+            "{} leaves no room for {} tiles of at least {} a side within margins of {}: take an \
+             --edge of at least {least} mm, fewer --tiles, or a smaller --face-margin",
+            format_mm(self.edge_mm),
+            self.tiles,
+            format_mm(Self::FINEST_TILE_MM),
+            format_mm(self.margin_mm),
+        );
+        TargetError::invalid("--edge", problem)
+    }
+}
+
+/// The corners of a face: a triangle of vertices, two fewer a side than there are tiles, so that
+/// all of them have six tiles around.
+///
+/// ```text
+///            ▲               tiles = 4: the vertices of the outline are no corners,
+///           ▲ ▲              two remain in the lowest row, one above
+///          ▲ · ▲
+///         ▲ · · ▲
+/// ```
+pub(super) fn triangle_vertices(tiles: u32) -> Vec<Vertex> {
+    let side = tiles as i32 - 2;
+    (0..side).flat_map(|row| (0..side - row).map(move |col| Vertex::new(row, col))).collect()
+}
+
+/// The panels of a checked spec, a face each, and the family of their tags.
+pub(super) fn panels(
+    spec: &SolidSpec,
+    family: Option<&Family>,
+) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
+    let faces = spec.faces()?;
+    let vertices = triangle_vertices(spec.tiles);
+    let tiles = tagged_tiles(&vertices, spec.tags.spacing);
+    let instead = "raise --tag-spacing, take fewer --tiles, or a larger --family";
+    let family = check_family(&spec.tags, family, faces.len() * tiles.len(), instead)?;
+    let panel = |(index, face): (u32, &Face)| Panel {
+        id: spec.board_id + index,
+        kind: GridKind::Deltille,
+        edge_mm: face.tile_edge_mm,
+        border_bits: Some(spec.tags.border_bits),
+        inverted: false,
+        outline: Outline::Triangle,
+        matrix: [spec.tiles - 2; 2],
+        pose: face.pose,
+        corners: vertices
+            .iter()
+            .zip(index * vertices.len() as u32..)
+            .map(|(v, id)| {
+                let panel_mm = v.position().map(|p| p * face.tile_edge_mm);
+                let target_mm = face.pose.target_from_panel(panel_mm);
+                Corner { id, row: v.row, col: v.col, panel_mm, target_mm }
+            })
+            .collect(),
+        tags: tiles
+            .iter()
+            .zip(spec.tags.first_id + index * tiles.len() as u32..)
+            .map(|(tile, id)| TagPlacement { id, row: tile.row, col: tile.col })
+            .collect(),
+    };
+    Ok(((0..).zip(&faces).map(panel).collect(), Some(family)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::target::{Target, TargetSpec};
+
+    const SHAPES: [SolidShape; 3] =
+        [SolidShape::Tetrahedron, SolidShape::Octahedron, SolidShape::Icosahedron];
+
+    fn build(spec: &SolidSpec) -> Result<Target, TargetError> {
+        let family = Family::resolve(&spec.tags.family).unwrap();
+        Target::build("solid", &TargetSpec::Solid(spec.clone()), Some(&family), None)
+    }
+
+    /// The published icosahedron has 13 tiles a side, 66 corners and 10 tags on a face.
+    #[test]
+    fn faces_of_13_tiles_are_those_of_the_published_icosahedron() {
+        let spec = SolidSpec { tiles: 13, ..SolidSpec::new(SolidShape::Icosahedron) };
+        let target = build(&spec).unwrap();
+        assert_eq!(target.panels.len(), 20);
+        for panel in &target.panels {
+            assert_eq!((panel.corners.len(), panel.tags.len()), (66, 10));
+            assert_eq!(panel.upright_tiles().len(), 13 * 14 / 2);
+        }
+    }
+
+    #[test]
+    fn ids_that_run_out_are_refused_with_what_would_do() {
+        let mut spec = SolidSpec { tiles: 13, ..SolidSpec::new(SolidShape::Icosahedron) };
+        spec.tags.first_id = 200;
+        let said = build(&spec).unwrap_err().to_string();
+        assert!(said.contains("lower it to at most 143"), "{said}");
+        spec.tags.family = "delTag16h5".to_owned();
+        let said = build(&spec).unwrap_err().to_string();
+        assert!(said.contains("larger --family") && said.contains("--tiles"), "{said}");
+        let small = SolidSpec { edge_mm: 20.0, ..SolidSpec::new(SolidShape::Icosahedron) };
+        let said = build(&small).unwrap_err().to_string();
+        assert!(said.contains("an --edge of at least "), "{said}");
+    }
+
+    proptest! {
+        /// Every tag once, every corner on its face's plane at its distance from the centre, and
+        /// the file says the same.
+        #[test]
+        fn every_solid_is_consistent(
+            shape in 0usize..3, tiles in 4u32..16, edge_mm in 100.0f64..400.0, spacing in 3u32..5,
+        ) {
+            let mut spec = SolidSpec { tiles, edge_mm, ..SolidSpec::new(SHAPES[shape].clone()) };
+            spec.tags.spacing = spacing;
+            spec.tags.family = "delTag36h11".to_owned();
+            let target = build(&spec).unwrap();
+            let ids: BTreeSet<u32> =
+                target.panels.iter().flat_map(|p| &p.tags).map(|tag| tag.id).collect();
+            prop_assert_eq!(ids.len(), target.panels.iter().map(|p| p.tags.len()).sum::<usize>());
+            prop_assert_eq!(Target::from_json(&target.to_json()).unwrap(), target.clone());
+            for panel in &target.panels {
+                let r = panel.pose.rotation;
+                let height = |p: [f64; 3]| r[2] * p[0] + r[5] * p[1] + r[8] * p[2];
+                let plane = height(panel.pose.translation_mm);
+                prop_assert!(plane > 0.0);
+                for corner in &panel.corners {
+                    prop_assert!((height(corner.target_mm) - plane).abs() < 1e-9);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! Meshes of solids: every face looked at by a camera, every corner followed back onto the mesh.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::model::{self, Model, View};
+use super::{DocumentError, FaceVerdict, Finding, Format, Verdict, Verifier};
+use crate::camera::{Camera, Pose};
+use crate::detect::Detection;
+use crate::lattice::Vertex;
+use crate::raster::Gray;
+use crate::target::{Panel, TargetSpec};
+
+/// Largest deviation of a corner of a mesh, mm: a tenth of what a well glued panel is off.
+pub const MESH_TOLERANCE_MM: f64 = 0.05;
+
+/// Deviation of a corner of a neighbouring face, seen at a grazing angle, mm: less than half a
+/// tile of any board that is detected so.
+const GRAZING_TOLERANCE_MM: f64 = 1.0;
+
+/// Edge of a tag's cell in the picture, px.
+const CELL_PX: f64 = 8.0;
+
+/// Longest side of a picture, px.
+const MAX_SIDE_PX: f64 = 4000.0;
+
+/// Distance of the camera in radii of the face, and its step aside, so that it sees the face at an
+/// angle of 11°, where depth matters.
+const DISTANCE: f64 = 6.0;
+const ASIDE: f64 = 1.2;
+
+/// How far a unit normal may be from that of its triangle.
+const NORMAL_SLACK: f64 = 1e-4;
+
+/// A mesh this much larger or smaller, relative, is not looked at any further.
+const MAX_SCALE_ERROR: f64 = 0.05;
+
+/// Reads a mesh from disk and compares it with the target.
+pub(super) fn verify(
+    verifier: &Verifier,
+    path: &Path,
+    format: Format,
+) -> Result<Verdict, DocumentError> {
+    let model = model::load(path)?;
+    let mut findings = Vec::new();
+    let mut faces = Vec::new();
+    let scale = scale(verifier, &model);
+    if let Some((scale, radius_mm)) = scale
+        && (scale - 1.0).abs() * radius_mm > MESH_TOLERANCE_MM
+    {
+        findings.push(Finding::Scale { panel: verifier.target.panels[0].id, scale });
+    }
+    let wrong = model.triangles.iter().filter(|triangle| {
+        let normal = triangle.winding().normalize_or_zero();
+        triangle.normals.iter().any(|n| n.distance(normal) > NORMAL_SLACK)
+    });
+    let wrong = wrong.count();
+    if wrong > 0 {
+        findings.push(Finding::Normals { triangles: wrong });
+    }
+    if scale.is_none_or(|(scale, _)| (scale - 1.0).abs() < MAX_SCALE_ERROR) {
+        let panels = verifier.target.panels.par_iter();
+        faces = panels.map(|panel| check_face(verifier, &model, panel)).collect();
+    }
+    let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let passed = findings.is_empty() && faces.iter().all(|face| face.findings.is_empty());
+    Ok(Verdict { artifact, format, passed, findings, sheets: Vec::new(), faces })
+}
+
+/// Circumradius of the mesh over that of the target's solid, and the latter, mm.
+fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
+    let TargetSpec::Solid(spec) = &verifier.target.spec else { return None };
+    let radius = |lengths: &mut dyn Iterator<Item = f64>| lengths.fold(0.0, f64::max);
+    let stated = radius(&mut spec.polyhedron().vertices_mm.iter().map(|v| v.length()));
+    let vertices = model.triangles.iter().flat_map(|triangle| triangle.vertices_mm);
+    let found = radius(&mut vertices.map(|v| v.length()));
+    Some((found / stated, stated))
+}
+
+/// A camera before a face, from where the target says that it is.
+fn view(verifier: &Verifier, panel: &Panel) -> (View, f64) {
+    let corners = || panel.corners.iter().map(|c| DVec3::from(c.target_mm));
+    let centre = corners().sum::<DVec3>() / panel.corners.len() as f64;
+    let radius = corners().map(|c| c.distance(centre)).fold(0.0, f64::max) + 2.0 * panel.edge_mm;
+    let rows = verifier.family.map_or(0, |family| family.dimension().rows());
+    let cell_mm = panel.edge_mm / (f64::from(rows) + 3.0 * panel.border_bits.unwrap_or_default());
+    let px_per_mm = (CELL_PX / cell_mm).min(MAX_SIDE_PX / (2.0 * radius));
+    let r = panel.pose.rotation;
+    let [x, y, z] = [0, 1, 2].map(|i| DVec3::new(r[i], r[3 + i], r[6 + i]));
+    let eye = centre + radius * (DISTANCE * z + ASIDE * x);
+    let side = (2.0 * radius * px_per_mm).ceil().max(64.0) as u32;
+    let mut camera = Camera::pinhole(side, side, 1.0);
+    camera.focal_px = [px_per_mm * eye.distance(centre); 2];
+    (View { camera, camera_from_target: Pose::looking_at(eye, centre, y) }, px_per_mm)
+}
+
+fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict {
+    let (view, px_per_mm) = view(verifier, panel);
+    let image = view.render(model);
+    let detection = verifier.detector.detect(&image, "face");
+    let mut verdict = FaceVerdict {
+        panel: panel.id,
+        px_per_mm,
+        corners: panel.corners.len(),
+        corners_found: 0,
+        tags: panel.tags.len(),
+        tags_exact: 0,
+        max_deviation_mm: 0.0,
+        findings: Vec::new(),
+    };
+    if !sees(&detection, panel.id) {
+        let mirrored = sees(&verifier.detector.detect(&mirror(image), "mirror"), panel.id);
+        let panel = panel.id;
+        let finding =
+            if mirrored { Finding::Mirrored { panel } } else { Finding::PanelMissing { panel } };
+        verdict.findings.push(finding);
+        return verdict;
+    }
+    check_corners(verifier, model, panel, &view, &detection, &mut verdict);
+    let own = || detection.grids.iter().filter(|grid| grid.panel == Some(panel.id));
+    for tag in &panel.tags {
+        let same = |found: &&crate::detect::DecodedTag| {
+            (found.id, found.row, found.col) == (tag.id, tag.row, tag.col)
+        };
+        let errors = own().flat_map(|grid| &grid.tags).find(same).map(|found| found.errors);
+        if errors == Some(0) {
+            verdict.tags_exact += 1;
+        } else {
+            let (id, row, col) = (tag.id, tag.row, tag.col);
+            verdict.findings.push(Finding::TagInexact { id, row, col, errors });
+        }
+    }
+    verdict
+}
+
+/// Follows every labelled corner back onto the mesh; neighbouring faces in the picture must be
+/// where they belong, too.
+fn check_corners(
+    verifier: &Verifier,
+    model: &Model,
+    panel: &Panel,
+    view: &View,
+    detection: &Detection,
+    verdict: &mut FaceVerdict,
+) {
+    let mut found = BTreeMap::new();
+    for grid in &detection.grids {
+        let Some(seen) = verifier.target.panels.iter().find(|p| Some(p.id) == grid.panel) else {
+            continue;
+        };
+        let own = seen.id == panel.id;
+        let tolerance_mm = if own { MESH_TOLERANCE_MM } else { GRAZING_TOLERANCE_MM };
+        for corner in &grid.corners {
+            let vertex = Vertex::new(corner.row, corner.col);
+            let Some(stated) = seen.corner_at(vertex).filter(|c| corner.id == Some(c.id)) else {
+                continue;
+            };
+            let at = view.meet(model, [corner.x, corner.y]).unwrap_or(DVec3::NAN);
+            let by_mm = (at - DVec3::from(stated.target_mm)).to_array();
+            let deviation_mm = DVec3::from(by_mm).length();
+            if own {
+                found.insert(stated.id, ());
+                verdict.max_deviation_mm = verdict.max_deviation_mm.max(deviation_mm);
+            }
+            // Written so that a ray that misses the mesh counts as off.
+            if !(deviation_mm <= tolerance_mm) {
+                let (id, row, col) = (stated.id, stated.row, stated.col);
+                verdict.findings.push(Finding::CornerOff3d { id, row, col, by_mm });
+            }
+        }
+    }
+    verdict.corners_found = found.len();
+    let missing = panel.corners.iter().filter(|corner| !found.contains_key(&corner.id));
+    verdict.findings.extend(missing.map(|corner| Finding::CornerMissing {
+        id: corner.id,
+        row: corner.row,
+        col: corner.col,
+    }));
+}
+
+fn sees(detection: &Detection, panel: u32) -> bool {
+    detection.grids.iter().any(|grid| grid.panel == Some(panel))
+}
+
+fn mirror(mut image: Gray<u8>) -> Gray<u8> {
+    let width = image.width();
+    image.pixels_mut().chunks_exact_mut(width).for_each(<[u8]>::reverse);
+    image
+}
