@@ -308,7 +308,7 @@ mod tests {
     fn the_model_is_near_the_bound_and_knows_its_errors() {
         let never = AtomicBool::new(false);
         for (kind, model_px, polynomial_px) in
-            [(GridKind::Deltille, 0.0070, 0.0117), (GridKind::Checker, 0.0085, 0.0171)]
+            [(GridKind::Deltille, 0.0070_f64, 0.0117), (GridKind::Checker, 0.0085, 0.0171)]
         {
             let rows = point(kind, Sweep::Blur, 1.0, [1, 0], 200, &never).unwrap();
             let (polynomial, model) = (&rows[2], &rows[3]);

@@ -11,7 +11,7 @@ use crate::target::GridKind;
 
 /// Size of a panel's axes and the room around it, in user units.
 const PANEL: [f64; 2] = [300.0, 230.0];
-const MARGIN: [f64; 2] = [70.0, 62.0];
+const MARGIN: [f64; 2] = [70.0, 78.0];
 const HEAD: f64 = 56.0;
 
 /// Range of the vertical axis, px.
@@ -70,7 +70,7 @@ fn legend(body: &mut String) {
     let mut x = MARGIN[0];
     let entries = METHODS.iter().map(|&m| (m.name(), colour(m), ""));
     for (label, colour, dash) in
-        entries.chain([("Cramér–Rao bound".replace('é', "e"), BOUND_COLOUR, "6 4")])
+        entries.chain([("Cramer–Rao bound".to_owned(), BOUND_COLOUR, "6 4")])
     {
         line(body, &[[x, 20.0], [x + 34.0, 20.0]], colour, 2.5, dash);
         x += 42.0 + write(body, &label, [x + 42.0, 25.0], 0.0) + 30.0;
