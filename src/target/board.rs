@@ -66,11 +66,19 @@ pub(super) fn panels(
     family: Option<&Family>,
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
     spec.check()?;
-    let tiles = spec.tags.as_ref().map_or_else(Vec::new, |tags| tagged_tiles(spec, tags));
+    let panels = untied_panels(spec);
+    let per_board = panels.first().map_or(0, |panel| panel.tags.len() as u64);
     let family = match &spec.tags {
-        Some(tags) => Some(check_family(spec, tags, family, tiles.len() as u64)?),
+        Some(tags) => Some(check_family(spec, tags, family, per_board)?),
         None => None,
     };
+    Ok((panels, family))
+}
+
+/// The panels of a checked spec, whether or not its family has so many tags.
+pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
+    let tiles = spec.tags.as_ref().map_or_else(Vec::new, |tags| tagged_tiles(spec, tags));
+    let first_tag = spec.tags.as_ref().map_or(0, |tags| tags.first_id);
     let vertices: Vec<Vertex> = zigzag_vertices(spec.rows, spec.cols).collect();
     let matrix = [vertices.iter().map(|v| v.col as u32 + 1).max().unwrap_or(0), spec.rows];
     let panel = |board: u32| Panel {
@@ -93,11 +101,16 @@ pub(super) fn panels(
             .collect(),
         tags: tiles
             .iter()
-            .zip(spec.tags.as_ref().map_or(0, |tags| tags.first_id) + board * tiles.len() as u32..)
-            .map(|(tile, id)| TagPlacement { id, row: tile.row, col: tile.col })
+            .enumerate()
+            // No family has so many codes that ids overflow; a spec may ask for them.
+            .map(|(i, tile)| TagPlacement {
+                id: first_tag.saturating_add(board * tiles.len() as u32 + i as u32),
+                row: tile.row,
+                col: tile.col,
+            })
             .collect(),
     };
-    Ok(((0..spec.boards).map(panel).collect(), family))
+    (0..spec.boards).map(panel).collect()
 }
 
 /// Checks that the family is there and has enough codes.
