@@ -20,7 +20,7 @@ pub mod text;
 use kurbo::BezPath;
 
 use crate::family::Family;
-use crate::target::Target;
+use crate::target::{SheetText, Target};
 
 pub use cells::white_outlines;
 pub use check_bar::STROKE_WIDTH_MM;
@@ -143,6 +143,11 @@ pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, Artwork
         subject: subject(target),
         sheets: sheets.collect::<Result<_, _>>()?,
     })
+}
+
+/// The outline of a text on its page, mm; filled by the even-odd rule.
+pub fn text_outline(text: &SheetText) -> Result<BezPath, text::MissingGlyph> {
+    board::draw_text(text)
 }
 
 fn subject(target: &Target) -> String {
