@@ -141,7 +141,11 @@ fn what_cannot_be_made_is_refused_with_the_option_to_change_and_leaves_nothing()
         (&["--dsc", "--untagged"][..], "tags"),
         (&["--dsc", "--invert"], "inverted"),
         (&["--dsc", "--dsc-dialect", "original"], "--dsc-dialect fork"),
-        (&["--dsc-dialect", "klingon"], "--dsc-dialect"),
+        (&["--dsc", "--dsc-dialect", "klingon"], "--dsc-dialect"),
+        (&["--dsc-dialect", "fork"], "--dsc-dialect: there is no .dsc to write: add --dsc"),
+        (&["--pdf", "--dpi", "300"], "--dpi: there is no PNG to write: add --png"),
+        (&["--tag-spacing", "99999999999"], "not a whole number from 1 to 500"),
+        (&["--tag-border", "0.5"], "not a number from 0.6 to 10"),
         (&["--family", "delTag25h7", "--untagged"], "--untagged"),
     ] {
         let said = refusal(folder.path(), &[&board, extra].concat());

@@ -297,3 +297,75 @@ fn dirt_and_holes_in_tiles_are_found() {
         assert_eq!(spots.count(), 2, "{verdict}");
     }
 }
+
+#[test]
+fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
+    let board = board(spec());
+    let mut altered = board.target.clone();
+    let label = &mut altered.sheets[0].texts[0].text;
+    *label = label.replace("edge 20 mm", "edge 21 mm");
+    let altered = artwork::draw(&altered, Some(&board.family)).unwrap();
+    let mut erased = board.artwork();
+    erased.sheets[0].shapes.retain(|shape| shape.part != (Part::Label { index: 1 }));
+    let mut blot = board.artwork();
+    let [left, lower] = board.target.sheets[0].placements[0].origin_mm;
+    let at = kurbo::Circle::new((left, lower - 2.5), 0.5);
+    let path = kurbo::Shape::to_path(&at, 0.001);
+    blot.sheets[0].shapes.push(Shape { part: Part::Label { index: 9 }, paint: Paint::Fill, path });
+    let cases = [
+        (altered, "label 1 differs from the description"),
+        (erased, "label 2 differs from the description"),
+        (blot, "spot of 0.7"),
+    ];
+    for (artwork, reason) in cases {
+        for format in ALL {
+            let verdict = board.verify(&artwork, format);
+            assert_fails(&verdict, &[reason]);
+            assert_eq!(verdict.sheets[0].findings.len(), 1, "{verdict}");
+        }
+    }
+}
+
+/// Verifies a picture of the sheet whose grey values were changed.
+fn verify_toned(board: &Board, tone: impl Fn(u8) -> u8) -> Verdict {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("b.png");
+    png::write(&board.artwork().sheets[0], "b", &path, DPI).unwrap();
+    let decoder = ::png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    let info = reader.info().clone();
+    pixels.iter_mut().for_each(|pixel| *pixel = tone(*pixel));
+    let mut encoder =
+        ::png::Encoder::new(std::fs::File::create(&path).unwrap(), info.width, info.height);
+    encoder.set_color(info.color_type);
+    encoder.set_depth(info.bit_depth);
+    encoder.set_pixel_dims(info.pixel_dims);
+    encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
+    Verifier::new(&board.target, Some(&board.family)).unwrap().verify(&path).unwrap()
+}
+
+#[test]
+fn wrong_tones_and_other_boards_are_called_that() {
+    let board = board(spec());
+    assert_fails(&verify_toned(&board, |v| 255 - v), &["inverted (black and white exchanged)"]);
+    assert_fails(&verify_toned(&board, |v| 170 + v / 3), &["contrast of board 3 too low"]);
+    let other = crate::board(BoardSpec { rows: 4, cols: 5, ..spec() });
+    let verdict = board.verify(&other.artwork(), Format::Png);
+    assert_fails(&verdict, &["shows another board: 20 corners instead of 35"]);
+    assert!(verdict.to_string().contains("another board"), "{verdict}");
+}
+
+#[test]
+fn a_bar_much_shorter_than_stated_is_measured() {
+    let mut board = board(spec());
+    let artwork = board.artwork();
+    let bar = &mut board.target.sheets[0].check_bars[0];
+    let printed = bar.length_mm();
+    bar.to_mm[0] += 10.0;
+    let verdict = board.verify(&artwork, Format::Png);
+    assert_fails(&verdict, &["check bar 1 measures"]);
+    let (_, found) = verdict.sheets[0].check_bars_mm[0];
+    assert!((found.unwrap() - printed).abs() < 0.02, "{verdict}");
+}

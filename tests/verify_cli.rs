@@ -48,7 +48,7 @@ fn a_changed_file_fails_with_exit_code_1() {
         .code(1)
         .stdout(contains("b.svg: FAILED").and(contains("tile missing at row 1 col 1")))
         .stdout(contains("b.pdf: verified"))
-        .stdout(contains("FAILED: 1 of 2 files differ from target b"));
+        .stdout(contains("FAILED: 1 of 2 files differs from target b"));
     let report = fs::read_to_string(folder.path().join("r.json")).unwrap();
     assert!(report.contains("\"kind\": \"tile_colour\""));
 }

@@ -124,7 +124,7 @@ pub(super) fn tag_outlines(
 }
 
 /// A text on its page, set smaller where it would be too long.
-fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph> {
+pub(super) fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph> {
     let size = label.cap_height_mm / text::CAP_HEIGHT;
     let (path, width) = text::outline(&label.text, size)?;
     let fit = (label.max_width_mm / width).min(1.0);

@@ -21,7 +21,7 @@ pub mod text;
 use kurbo::BezPath;
 
 use crate::family::Family;
-use crate::target::{LineKind, Panel, Placement, Target};
+use crate::target::{LineKind, Panel, Placement, SheetText, Target};
 
 pub use atlas::Atlas;
 pub use cells::white_outlines;
@@ -162,6 +162,11 @@ pub fn panel_shapes(
 ) -> Result<Vec<Shape>, ArtworkError> {
     let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [0.0; 2] };
     board::draw_panel(target, panel, &placement, family)
+}
+
+/// The outline of a text on its page, mm; filled by the even-odd rule.
+pub fn text_outline(text: &SheetText) -> Result<BezPath, text::MissingGlyph> {
+    board::draw_text(text)
 }
 
 fn subject(target: &Target) -> String {

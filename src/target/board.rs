@@ -65,13 +65,20 @@ pub(super) fn panels(
     family: Option<&Family>,
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
     spec.check()?;
-    let vertices: Vec<Vertex> = zigzag_vertices(spec.rows, spec.cols).collect();
-    let spacing = spec.tags.as_ref().map(|tags| tags.spacing);
-    let tiles = spacing.map_or_else(Vec::new, |spacing| tagged_tiles(&vertices, spacing));
-    let needed = tiles.len() * spec.boards as usize;
+    let panels = untied_panels(spec);
+    let needed = panels.iter().map(|panel| panel.tags.len()).sum();
     let instead = "raise --tag-spacing, make fewer or smaller --boards, or take a larger --family";
     let tags = spec.tags.as_ref();
     let family = tags.map(|tags| check_family(tags, family, needed, instead)).transpose()?;
+    Ok((panels, family))
+}
+
+/// The panels of a checked spec, whether or not its family has so many tags.
+pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
+    let first_tag = spec.tags.as_ref().map_or(0, |tags| tags.first_id);
+    let vertices: Vec<Vertex> = zigzag_vertices(spec.rows, spec.cols).collect();
+    let spacing = spec.tags.as_ref().map(|tags| tags.spacing);
+    let tiles = spacing.map_or_else(Vec::new, |spacing| tagged_tiles(&vertices, spacing));
     let matrix = [vertices.iter().map(|v| v.col as u32 + 1).max().unwrap_or(0), spec.rows];
     let panel = |board: u32| Panel {
         id: spec.board_id + board,
@@ -93,11 +100,16 @@ pub(super) fn panels(
             .collect(),
         tags: tiles
             .iter()
-            .zip(spec.tags.as_ref().map_or(0, |tags| tags.first_id) + board * tiles.len() as u32..)
-            .map(|(tile, id)| TagPlacement { id, row: tile.row, col: tile.col })
+            .enumerate()
+            // No family has so many codes that ids overflow; a spec may ask for them.
+            .map(|(i, tile)| TagPlacement {
+                id: first_tag.saturating_add(board * tiles.len() as u32 + i as u32),
+                row: tile.row,
+                col: tile.col,
+            })
             .collect(),
     };
-    Ok(((0..spec.boards).map(panel).collect(), family))
+    (0..spec.boards).map(panel).collect()
 }
 
 /// Checks that the family is there and has `needed` codes from the first id on; `instead` says what

@@ -4,7 +4,10 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::{FamilyRef, GridKind, Panel, SheetLayout, Target, TargetSpec};
+use super::{
+    BoardSpec, Corner, FamilyRef, GridKind, Panel, SheetLayout, TagPlacement, Target, TargetSpec,
+    board,
+};
 use crate::lattice::Vertex;
 
 /// Schema and version that this crate writes and reads.
@@ -14,6 +17,9 @@ pub const SCHEMA: &str = "deltille/target/1";
 /// its panel, in edges. Measured positions differ by far less; another unit or another corner's
 /// position differs by more.
 const SLACK_EDGES: f64 = 0.01;
+
+/// How far an edge may be from that of the spec, mm: what written digits leave.
+const SPEC_SLACK_MM: f64 = 1e-6;
 
 /// How far the rotation of a pose may be from orthonormal: what six written digits leave.
 const ROTATION_SLACK: f64 = 1e-5;
@@ -130,6 +136,9 @@ pub(crate) fn check(target: &Target) -> Result<(), Problem> {
             return problem("family", "there are tags, so there must be a family");
         }
     }
+    if let TargetSpec::Board(spec) = &target.spec {
+        check_against_spec(target, spec)?;
+    }
     for (s, sheet) in target.sheets.iter().enumerate() {
         let sides = [("width_mm", sheet.width_mm), ("height_mm", sheet.height_mm)];
         if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm <= 0.0) {
@@ -138,6 +147,64 @@ pub(crate) fn check(target: &Target) -> Result<(), Problem> {
         if let Some(placed) = sheet.placements.iter().find(|p| !panels.contains(&p.panel)) {
             let what = format!("there is no panel {}", placed.panel);
             return problem(format!("sheets[{s}].placements"), what);
+        }
+    }
+    Ok(())
+}
+
+/// Compares the panels with those that the spec makes: a file in which one of them was changed
+/// contradicts itself. Poses and measured positions may differ.
+fn check_against_spec(target: &Target, spec: &BoardSpec) -> Result<(), Problem> {
+    if let Err(error) = spec.check() {
+        return problem("spec", error.to_string());
+    }
+    let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
+        problem(field, format!("it is {found}, but the board of `spec` has {made}"))
+    };
+    let made = board::untied_panels(spec);
+    if target.panels.len() != made.len() {
+        return differs("panels.length".to_owned(), &target.panels.len(), &made.len());
+    }
+    if target.family.is_some() != spec.tags.is_some() {
+        return problem("family", "it must be there if, and only if, `spec.tags` is");
+    }
+    for (p, (panel, made)) in target.panels.iter().zip(&made).enumerate() {
+        let field = |key: &str| format!("panels[{p}].{key}");
+        if panel.id != made.id {
+            return differs(field("id"), &panel.id, &made.id);
+        }
+        if (panel.edge_mm - made.edge_mm).abs() > SPEC_SLACK_MM {
+            return differs(field("edge_mm"), &panel.edge_mm, &made.edge_mm);
+        }
+        let plain = [
+            ("kind", panel.kind == made.kind),
+            ("border_bits", panel.border_bits == made.border_bits),
+            ("inverted", panel.inverted == made.inverted),
+            ("outline", panel.outline == made.outline),
+            ("matrix", panel.matrix == made.matrix),
+        ];
+        if let Some((key, _)) = plain.iter().find(|(_, same)| !same) {
+            return problem(field(key), "it is not that of the board of `spec`");
+        }
+        if panel.corners.len() != made.corners.len() {
+            let (found, made) = (panel.corners.len(), made.corners.len());
+            return differs(field("corners.length"), &found, &made);
+        }
+        for (i, (corner, made)) in panel.corners.iter().zip(&made.corners).enumerate() {
+            if (corner.id, corner.row, corner.col) != (made.id, made.row, made.col) {
+                let place = |c: &Corner| format!("corner {} at row {} col {}", c.id, c.row, c.col);
+                return differs(field(&format!("corners[{i}]")), &place(corner), &place(made));
+            }
+        }
+        if panel.tags.len() != made.tags.len() {
+            return differs(field("tags.length"), &panel.tags.len(), &made.tags.len());
+        }
+        for (i, (tag, made)) in panel.tags.iter().zip(&made.tags).enumerate() {
+            if tag != made {
+                let place =
+                    |t: &TagPlacement| format!("tag {} at row {} col {}", t.id, t.row, t.col);
+                return differs(field(&format!("tags[{i}]")), &place(tag), &place(made));
+            }
         }
     }
     Ok(())
@@ -169,7 +236,10 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
         let [cols, rows] = panel.matrix.map(i64::from);
         let inside = |index: i32, size: i64| (0..size).contains(&i64::from(index));
         if !inside(corner.row, rows) || !inside(corner.col, cols) {
-            let what = format!("{vertex:?} is outside the matrix of {cols} columns, {rows} rows");
+            let Vertex { row, col } = vertex;
+            let what = format!(
+                "row {row}, column {col} is outside the matrix of {rows} rows, {cols} columns"
+            );
             return problem(field("row"), what);
         }
         if distance(&corner.panel_mm, &panel.lattice_mm(vertex)) > slack {
@@ -220,7 +290,7 @@ mod tests {
 
     use super::*;
     use crate::family::Family;
-    use crate::target::{BoardSpec, PaperSpec, TagSpec};
+    use crate::target::{PaperSpec, TagSpec};
 
     fn board(rows: u32, cols: u32, edge_mm: f64, tagged: bool, boards: u32) -> Target {
         let tags = tagged.then(TagSpec::default);
@@ -278,6 +348,30 @@ mod tests {
         for (from, to, field) in cases {
             let said = complaint(from, to);
             assert!(said.starts_with(&format!("field `{field}")), "{from}: {said}");
+        }
+    }
+
+    #[test]
+    fn a_file_that_contradicts_its_spec_is_refused() {
+        let edit = |change: fn(&mut Target)| {
+            let mut target = board(4, 4, 20.0, true, 1);
+            change(&mut target);
+            Target::from_json(&target.to_json()).unwrap_err().to_string()
+        };
+        fn spec(target: &mut Target) -> &mut BoardSpec {
+            let TargetSpec::Board(spec) = &mut target.spec else { panic!("a board") };
+            spec
+        }
+        let cases: [(fn(&mut Target), &str); 5] = [
+            (|t| t.panels[0].corners.truncate(1), "panels[0].corners.length"),
+            (|t| spec(t).rows = 11, "panels[0].matrix"),
+            (|t| spec(t).edge_mm = 21.0, "panels[0].edge_mm"),
+            (|t| t.panels[0].tags[0].id += 100, "panels[0].tags[0]"),
+            (|t| spec(t).cols = 0, "spec"),
+        ];
+        for (change, field) in cases {
+            let said = edit(change);
+            assert!(said.starts_with(&format!("field `{field}`")), "{said}");
         }
     }
 }

@@ -40,6 +40,9 @@ const BAR_STEP_MM: f64 = 10.0;
 pub(super) const ADVANCE_CAPS: f64 = 0.76;
 /// Blank between the black field of an inverted board and the marks, mm.
 const FIELD_GAP_MM: f64 = 1.0;
+/// Blank that is left along the edges of the paper whatever the margin, mm: a pixel at 200 dpi has
+/// 0.13 mm, and the stroke of a bar that touches the edge can neither be measured nor trimmed.
+const LEAST_MARGIN_MM: f64 = 0.5;
 /// Finest edge proposed to make a board fit, mm: what office printers resolve in a tag.
 const LEAST_PROPOSED_MM: u32 = 5;
 
@@ -136,6 +139,7 @@ pub(super) fn fit(
         let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
         return Err(TargetError::invalid("--margin", problem));
     }
+    let margin = margin.max(LEAST_MARGIN_MM);
     let sizes: Vec<PaperSize> = match &paper.size {
         Some(size) => vec![size.clone()],
         None => PaperSize::automatic().collect(),
@@ -301,12 +305,17 @@ pub(super) fn label(
         format!("edge {}", format_mm(spec.edge_mm)),
     ];
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
-        parts.push(format!("{} ids {}–{}", family.name, first.id, last.id));
+        parts.push(format!("{} {}", family.name, id_range(first.id, last.id)));
         parts.push(format!("fingerprint {}", family.fingerprint));
     }
     parts.push(format!("board {}", panel.id));
     parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
     parts.join(" · ")
+}
+
+/// Ids in words: `id 3`, `ids 3–7`.
+pub(crate) fn id_range(first: u32, last: u32) -> String {
+    if first == last { format!("id {first}") } else { format!("ids {first}–{last}") }
 }
 
 #[cfg(test)]
@@ -394,6 +403,7 @@ mod tests {
             let Ok(target) = build(&spec, &paper) else { return Ok(()) };
             let sheet = &target.sheets[0];
             let [left, lower, right, upper] = ink(&target);
+            let margin = margin.max(LEAST_MARGIN_MM);
             let edge_blank = if inverted { margin } else { margin.max(target.panels[0].quiet_zone_mm()) };
             let mark_blank = if inverted { FIELD_GAP_MM } else { target.panels[0].quiet_zone_mm() };
             let slack = 1e-9;

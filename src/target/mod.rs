@@ -28,9 +28,11 @@ pub use build::largest_edge_mm;
 pub use error::TargetError;
 pub use json::{SCHEMA, TargetFileError};
 pub use layout::CHECK_BAR_STROKE_MM;
+pub(crate) use layout::id_range;
 pub use length::{LengthError, parse_length_mm};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec};
 pub use polyhedron::{Face, Polyhedron};
+pub(crate) use spec::{BORDER_BITS, MOST_ROWS, SIDES};
 pub use spec::{BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
 
 /// A target: its panels, and the sheets they are printed on.

@@ -5,7 +5,10 @@ use super::length::format_mm;
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
 /// anybody prints, and few enough that no number overflows.
-const MOST_ROWS: u32 = 500;
+pub(crate) const MOST_ROWS: u32 = 500;
+
+/// Range of rows and of columns: two rows of two corners have a tile between them.
+pub(crate) const SIDES: std::ops::RangeInclusive<u32> = 2..=MOST_ROWS;
 
 /// Most corners of all boards together: their description takes 100 MB of text.
 const MOST_CORNERS: u64 = 1_000_000;
@@ -25,9 +28,10 @@ const FACE_TILES: std::ops::RangeInclusive<u32> = 4..=200;
 /// Most faces of a solid.
 const MOST_FACES: u32 = 10_000;
 
-/// Range of a tag's border, bit-widths. Below half a bit the border no longer separates the code
-/// from the white around the tile in a blurred image.
-const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.5..=10.0;
+/// Range of a tag's border, bit-widths. The border separates the code from the white around the
+/// tile; with half a bit of it the detector no longer finds every corner of a clean print, from 0.6
+/// on it does.
+pub(crate) const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.6..=10.0;
 
 /// What was asked for: enough to make the target again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -189,7 +193,7 @@ impl BoardSpec {
     /// Checks every number by itself.
     pub(super) fn check(&self) -> Result<(), TargetError> {
         for (option, value) in [("--rows", self.rows), ("--cols", self.cols)] {
-            if !(2..=MOST_ROWS).contains(&value) {
+            if !SIDES.contains(&value) {
                 let problem = format!("{value} is not between 2 and {MOST_ROWS}");
                 return Err(TargetError::invalid(option, problem));
             }
@@ -238,7 +242,7 @@ impl TagSpec {
             return Err(TargetError::invalid("--tag-spacing", problem));
         }
         if !BORDER_BITS.contains(&self.border_bits) {
-            let problem = format!("{} is not between 0.5 and 10 bit-widths", self.border_bits);
+            let problem = format!("{} is not between 0.6 and 10 bit-widths", self.border_bits);
             return Err(TargetError::invalid("--tag-border", problem));
         }
         Ok(())

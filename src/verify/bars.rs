@@ -6,13 +6,24 @@ use super::document::Page;
 /// and within strokes that reach 1 mm to either side.
 const OFFSETS_MM: std::ops::RangeInclusive<f64> = 0.4..=0.8;
 
-/// How far from its expected end a stroke is looked for: at least so far, mm,
+/// How far beyond its expected end a stroke is looked for: at least so far, mm,
 const REACH_MM: f64 = 3.0;
-/// or so far in lengths of the bar.
+/// or so far in lengths of the bar. Inwards it is looked for up to the middle, so that a bar much
+/// shorter than stated is measured too.
 const REACH: f64 = 0.05;
 
 /// Ink that a stroke has at least at its darkest, 0 to 1; below it is dirt.
 const MIN_INK: f64 = 0.2;
+
+/// Ink below which a sample is paper: half a grey level. Interpolation between white pixels leaves
+/// a trace of rounding, which must not make a stroke endless.
+const PAPER_INK: f64 = 0.5 / 255.0;
+
+/// Distances from the middle of a stroke at which the bar's line is met inwards and is not met
+/// outwards, mm.
+const LINE_MM: f64 = 0.6;
+/// How far beside its expected place the line may lie, mm.
+const LINE_BESIDE_MM: f64 = 0.25;
 
 /// The distance between the outer edges of the end strokes of a bar near `ends_mm` on the page, mm;
 /// `None` where one is missing.
@@ -24,55 +35,124 @@ pub(super) fn measure(page: &Page, ends_mm: [[f64; 2]; 2]) -> Option<f64> {
         return None;
     }
     let along = [dx / length, dy / length];
-    let reach = (REACH_MM * page.px_per_mm).max(REACH * length);
+    let reach = [length / 2.0, (REACH_MM * page.px_per_mm).max(REACH * length)];
     let start = outer_edge(page, from, [-along[0], -along[1]], reach)?;
     let end = outer_edge(page, to, along, reach)?;
     Some((length + start + end) / page.px_per_mm)
 }
 
-/// How far beyond `end`, in direction `outwards`, the outer edge of the stroke lies, px.
+/// How far beyond `end`, in direction `outwards`, the outer edge of the stroke lies, px; negative
+/// where it lies inwards.
 ///
 /// Ink is sampled at whole pixels along lines parallel to the bar. A stroke is what is dark on all
-/// of them; the one nearest to the expected end counts. Its ink adds up to its width, and its centre
-/// of gravity is its middle, whatever the resolution: edge = middle + width / 2.
-fn outer_edge(page: &Page, end: [f64; 2], outwards: [f64; 2], reach: f64) -> Option<f64> {
+/// of them, with the bar's line on its inner side alone; the one nearest to the expected end counts.
+/// Its ink adds up to its width, and its centre of gravity is its middle, whatever the resolution
+/// and wherever the pixels lie: edge = middle + width / 2.
+fn outer_edge(
+    page: &Page,
+    end: [f64; 2],
+    outwards: [f64; 2],
+    [inner_reach, outer_reach]: [f64; 2],
+) -> Option<f64> {
     let across = [-outwards[1], outwards[0]];
+    let ink = |t: f64, offset: f64| {
+        let at = |i: usize| end[i] + outwards[i] * t + across[i] * offset;
+        page.ink([at(0), at(1)])
+    };
     let (near, far) = (OFFSETS_MM.start() * page.px_per_mm, OFFSETS_MM.end() * page.px_per_mm);
     let lines = ((far - near).floor() as usize + 1).max(2);
     let offsets: Vec<f64> = (0..lines)
         .map(|i| near + (far - near) * i as f64 / (lines - 1) as f64)
         .flat_map(|offset| [offset, -offset])
         .collect();
-    let ink = |t: f64| {
-        offsets.iter().map(move |offset| {
-            let at = |i: usize| end[i] + outwards[i] * t + across[i] * offset;
-            page.ink([at(0), at(1)])
-        })
+    let first = -inner_reach.ceil();
+    let count = (inner_reach.ceil() + outer_reach.ceil()) as usize + 1;
+    let position = |i: usize| first + i as f64;
+    let least: Vec<f64> = (0..count)
+        .map(|i| offsets.iter().map(|&offset| ink(position(i), offset)).fold(1.0, f64::min))
+        .collect();
+    let mean =
+        |t: f64| offsets.iter().map(|&offset| ink(t, offset)).sum::<f64>() / offsets.len() as f64;
+    let line = |t: f64| {
+        let beside = LINE_BESIDE_MM * page.px_per_mm;
+        [-beside, 0.0, beside].into_iter().map(|offset| ink(t, offset)).fold(0.0, f64::max)
     };
-    let steps = reach.ceil() as i32;
-    let position = |step: i32| f64::from(step);
-    let least: Vec<f64> =
-        (-steps..=steps).map(|step| ink(position(step)).fold(1.0, f64::min)).collect();
 
-    // The darkest sample of each run above the threshold; of those the nearest to the end.
-    let is_dark = |i: usize| least[i] >= MIN_INK;
-    let centre = steps as usize;
-    let nearest = (0..least.len()).filter(|&i| is_dark(i)).min_by_key(|&i| i.abs_diff(centre))?;
-    let mut first = nearest;
-    while first > 0 && least[first - 1] > 0.0 {
-        first -= 1;
+    let runs = least.chunk_by(|a, b| (*a > PAPER_INK) == (*b > PAPER_INK)).scan(0, |start, run| {
+        let from = *start;
+        *start += run.len();
+        Some((from, run))
+    });
+    let strokes = runs.filter(|(_, run)| run.iter().any(|&ink| ink >= MIN_INK));
+    let edges = strokes.filter_map(|(from, run)| {
+        let (mut width, mut moment) = (0.0, 0.0);
+        for t in (from..from + run.len()).map(position) {
+            let ink = mean(t);
+            width += ink;
+            moment += ink * t;
+        }
+        let (middle, step) = (moment / width, LINE_MM * page.px_per_mm);
+        let ends_line = line(middle - step) >= MIN_INK && line(middle + step) < MIN_INK;
+        ends_line.then_some(middle + width / 2.0)
+    });
+    edges.min_by(|a, b| a.abs().total_cmp(&b.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::{Coverage, Gray};
+
+    /// A bar of 60 mm from (`x`, 10) on a page of 80 × 20 mm, drawn by exact coverage, or the same
+    /// standing upright; white is as white as in a picture.
+    fn page(px_per_mm: f64, x: f64, upright: bool) -> Page {
+        let rectangles = [
+            [0.0, -1.0, 0.3, 1.0],
+            [0.3, -0.1, 59.7, 0.1],
+            [59.7, -1.0, 60.0, 1.0],
+            [5.0, -3.0, 55.0, -0.8],
+        ];
+        let (width_mm, height_mm) = if upright { (20.0, 80.0) } else { (80.0, 20.0) };
+        let size = [width_mm, height_mm].map(|mm: f64| (mm * px_per_mm).round() as usize);
+        let mut page = Page { width_mm, height_mm, px_per_mm, image: Gray::new(size[0], size[1]) };
+        let mut coverage = Coverage::new(size[0], size[1]);
+        for [x0, y0, x1, y1] in rectangles {
+            let corners = [[x0, y0], [x0, y1], [x1, y1], [x1, y0]].map(|[u, v]| {
+                let (u, v) = (u + x, v + 10.0);
+                page.px_from_page(if upright { [20.0 - v, u] } else { [u, v] })
+            });
+            coverage.add(&corners, 1.0);
+        }
+        page.image = coverage.finish().map(|ink| (255.0 * (1.0 - ink)).round() as u8);
+        page
     }
-    let mut last = nearest;
-    while last + 1 < least.len() && least[last + 1] > 0.0 {
-        last += 1;
+
+    #[test]
+    fn a_bar_is_measured_at_every_phase_and_resolution() {
+        for dpi in [200.0, 240.0, 299.0, 300.0, 301.0, 400.0, 600.0] {
+            for phase in 0..10 {
+                let px_per_mm = dpi / 25.4;
+                let x = 9.0 + f64::from(phase) / 10.0 / px_per_mm;
+                for upright in [false, true] {
+                    let page = page(px_per_mm, x, upright);
+                    // Where the ends are expected lies between pixels as well.
+                    for (length, shift) in [(60.0, 0.0), (60.0, 0.013), (50.0, 0.0), (66.0, 0.0)] {
+                        let ends = [[x + shift, 10.0], [x + shift + length, 10.0]];
+                        let ends = ends.map(|[u, v]| if upright { [20.0 - v, u] } else { [u, v] });
+                        let found = measure(&page, ends);
+                        let off = found.map(|mm| (mm - 60.0).abs());
+                        // Within reach beyond the stated end only where the bar is longer.
+                        if length == 50.0 {
+                            assert_eq!(found, None);
+                        } else {
+                            assert!(
+                                off.is_some_and(|mm| mm < 0.005),
+                                "{dpi} dpi, phase {phase}, upright {upright}, {length} mm: {found:?}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
     }
-    let mean = |t: f64| ink(t).sum::<f64>() / offsets.len() as f64;
-    let (mut width, mut moment) = (0.0, 0.0);
-    for i in first..=last {
-        let t = position(i as i32 - steps);
-        let m = mean(t);
-        width += m;
-        moment += m * t;
-    }
-    Some(moment / width + width / 2.0)
 }

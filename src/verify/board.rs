@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::document::Page;
 use super::fit::AffineMap;
-use super::tiles::PlacedPanel;
+use super::tiles::{MAX_INK_ERROR, PlacedPanel};
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
 use crate::detect::{Detection, GridCorner};
 use crate::lattice::{Tile, Vertex};
@@ -17,6 +17,12 @@ const MATCH_EDGES: f64 = 0.25;
 /// With a larger share of tiles of the wrong colour the picture does not show the panel, and to
 /// name them one by one would say nothing.
 const MAX_WRONG_TILES: f64 = 0.25;
+
+/// With a larger share of corners missing, or more than stated, it is another board.
+const MAX_MISSING: f64 = 0.25;
+
+/// Difference of ink below which a sheet is called blank rather than faint.
+const MIN_CONTRAST: f64 = 0.03;
 
 /// Compares all panels of a page, and tells where on the page the first of them lies.
 pub(super) fn check(
@@ -49,7 +55,11 @@ pub(super) fn check(
             }
         }
         let found_from_stated = AffineMap::IDENTITY;
-        placed.push(PlacedPanel { page, panel, placement, found_from_stated });
+        let panel = PlacedPanel { page, panel, placement, found_from_stated };
+        match wrong_tones(&panel) {
+            Some(finding) => verdict.findings.push(finding),
+            None => placed.push(panel),
+        }
     }
     for panel in &mut placed {
         check_panel(verifier, &detection, panel, verdict);
@@ -61,8 +71,35 @@ pub(super) fn check(
     if verdict.corners_found > 0 {
         extra_corners(&detection, &placed, verdict);
     }
+    another_board(&detection, verdict);
     let first = placed.first().map(|panel| panel.found_from_stated);
     mirror.or(first).unwrap_or(AffineMap::IDENTITY)
+}
+
+/// Whether the tiles lie where they should, but are too grey, or black for white.
+fn wrong_tones(placed: &PlacedPanel) -> Option<Finding> {
+    let panel = placed.panel.id;
+    let ink @ [white, black] = placed.tones()?;
+    if white - black > 0.5 {
+        return Some(Finding::Inverted { panel });
+    }
+    let faint = black < 1.0 - MAX_INK_ERROR || white > MAX_INK_ERROR;
+    (faint && black - white > MIN_CONTRAST).then_some(Finding::Contrast { panel, ink })
+}
+
+/// Says first that the corners found are those of another board, where too few are the stated ones
+/// and their number differs.
+fn another_board(detection: &Detection, verdict: &mut SheetVerdict) {
+    let found: usize = detection.grids.iter().map(|grid| grid.corners.len()).sum();
+    let stated = verdict.corners;
+    let unknown = verdict.findings.iter().any(|finding| {
+        matches!(finding, Finding::PanelMissing { .. } | Finding::CornerExtra { .. })
+    });
+    let few = (verdict.corners_found as f64) < (1.0 - MAX_MISSING) * stated as f64;
+    let more = found as f64 > (1.0 + MAX_MISSING) * stated as f64;
+    if unknown && found > 0 && found != stated && (few || more) {
+        verdict.findings.insert(0, Finding::AnotherBoard { found, stated });
+    }
 }
 
 /// Compares one panel: corners, then tiles and tags where the corners say they are.

@@ -8,7 +8,8 @@
 //! - every corner is found, once, with its label, within [`TOLERANCE_MM`] of its stated position,
 //!   and no other corner is;
 //! - every tile, and every cell of every tag, has its colour over its whole area, also where
-//!   decoding would correct a wrong cell.
+//!   decoding would correct a wrong cell;
+//! - the sheet has the words of the description, and no ink beside the tiles, words and bars.
 //!
 //! What is wrong is named by its cause where one cause explains it: a scale, a mirror image, a
 //! turn, a shift of the whole board rather than a list of all corners.
@@ -17,12 +18,14 @@
 //! face; every corner is followed along its ray onto the loaded triangles and must lie within
 //! [`MESH_TOLERANCE_MM`] of its stated position in space.
 //!
-//! Limits: marks outside the tiles and check bars (labels, dirt in the margin) are not compared.
+//! Limits: words and stray ink are compared only where the boards lie as stated and are recognised;
+//! dirt within a few pixels of a word or a bar counts to it.
 
 mod bars;
 mod board;
 mod document;
 mod fit;
+mod marks;
 mod model;
 mod solid;
 mod tiles;
@@ -35,6 +38,7 @@ use crate::export::sheet_file_name;
 use crate::family::Family;
 use crate::target::{SheetLayout, Target};
 use fit::AffineMap;
+use tiles::PlacedPanel;
 
 pub use document::{Document, DocumentError, Format, Page};
 pub use solid::MESH_TOLERANCE_MM;
@@ -162,6 +166,16 @@ impl<'a> Verifier<'a> {
         }
     }
 
+    /// The panels of a page where they are stated.
+    fn placed<'p>(&'p self, page: &'p Page, layout: &'p SheetLayout) -> Vec<PlacedPanel<'p>> {
+        let found_from_stated = AffineMap::IDENTITY;
+        let placed = layout.placements.iter().filter_map(|placement| {
+            let panel = self.target.panels.iter().find(|panel| panel.id == placement.panel)?;
+            Some(PlacedPanel { page, panel, placement, found_from_stated })
+        });
+        placed.collect()
+    }
+
     /// Print resolution, or finer where the cells of tags are small.
     fn wish_px_per_mm(&self, layout: &SheetLayout) -> f64 {
         let panels = self.target.panels.iter();
@@ -199,7 +213,16 @@ impl<'a> Verifier<'a> {
             page.height_mm = layout.height_mm;
         }
         let found_from_stated = board::check(self, &page, layout, &mut verdict);
+        let toneless =
+            |f: &Finding| matches!(f, Finding::Inverted { .. } | Finding::Contrast { .. });
+        if verdict.findings.iter().any(toneless) {
+            return verdict;
+        }
+        let in_place = verdict.findings.iter().all(Finding::is_local);
         check_bars(&page, layout, &found_from_stated, &mut verdict);
+        if in_place {
+            marks::check(&page, layout, &self.placed(&page, layout), &mut verdict);
+        }
         verdict
     }
 }

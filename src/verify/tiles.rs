@@ -14,10 +14,13 @@ use crate::target::{Panel, Placement, TagPlacement};
 
 /// Pixels nearer than this to a change of colour are left out, px: the half diagonal of a pixel
 /// (0.71), over which an edge is smeared, and 0.02 mm at 300 dpi (0.24), and some blur.
-const EDGE_PX: f64 = 1.25;
+pub(super) const EDGE_PX: f64 = 1.25;
 
 /// A pixel is wrong when its ink differs by more than this from 0 or 1.
-const MAX_INK_ERROR: f64 = 0.3;
+pub(super) const MAX_INK_ERROR: f64 = 0.3;
+
+/// Tiles of one colour are alike where the ink of nine in ten is so near to their median.
+const TONE_SPREAD: f64 = 0.1;
 
 /// Counted pixels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -102,6 +105,39 @@ impl PlacedPanel<'_> {
         [cos * x - sin * y + ox, sin * x + cos * y + oy]
     }
 
+    /// Stated panel position of a point of the page.
+    pub fn panel_from_page(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (sin, cos) = self.placement.angle_rad.sin_cos();
+        let [ox, oy] = self.placement.origin_mm;
+        let (x, y) = (x - ox, y - oy);
+        [cos * x + sin * y, cos * y - sin * x]
+    }
+
+    /// The ink of the tiles that should be white and black, in the middle of plain tiles; `None`
+    /// where those of one colour are not alike, so that the picture shows something else.
+    pub fn tones(&self) -> Option<[f64; 2]> {
+        let tagged: BTreeSet<Vertex> =
+            self.panel.tags.iter().map(|tag| Vertex::new(tag.row, tag.col)).collect();
+        let mut inks = [Vec::new(), Vec::new()];
+        for tile in self.tiles() {
+            let upright = tile.orientation == Orientation::Upright;
+            if upright && tagged.contains(&tile.anchor) {
+                continue;
+            }
+            let [a, b, c] = self.vertices_px(tile);
+            let centre = [0, 1].map(|i| (a[i] + b[i] + c[i]) / 3.0);
+            inks[usize::from(upright != self.panel.inverted)].push(self.page.ink(centre));
+        }
+        let tone = |inks: &mut Vec<f64>| {
+            inks.sort_by(f64::total_cmp);
+            let median = *inks.get(inks.len() / 2)?;
+            let alike = inks.iter().filter(|ink| (*ink - median).abs() <= TONE_SPREAD).count();
+            (10 * alike >= 9 * inks.len()).then_some(median)
+        };
+        let [white, black] = &mut inks;
+        Some([tone(white)?, tone(black)?])
+    }
+
     /// Picture positions of a tile's vertices.
     fn vertices_px(&self, tile: Tile) -> [[f64; 2]; 3] {
         tile.vertices().map(|v| {
@@ -132,7 +168,7 @@ impl PlacedPanel<'_> {
     }
 
     /// The drawn tiles, and all tiles of the other colour that touch a corner.
-    fn tiles(&self) -> BTreeSet<Tile> {
+    pub fn tiles(&self) -> BTreeSet<Tile> {
         let mut tiles: BTreeSet<Tile> = self.panel.upright_tiles().into_iter().collect();
         for corner in &self.panel.corners {
             let v = Vertex::new(corner.row, corner.col);

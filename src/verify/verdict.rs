@@ -101,6 +101,39 @@ pub enum Finding {
         /// Its id.
         panel: u32,
     },
+    /// The picture shows another board: its corners are not those of the target.
+    AnotherBoard {
+        /// Corners that were found.
+        found: usize,
+        /// Corners that the target has on the sheet.
+        stated: usize,
+    },
+    /// Black and white are exchanged.
+    Inverted {
+        /// Panel id.
+        panel: u32,
+    },
+    /// Black and white tiles differ too little.
+    Contrast {
+        /// Panel id.
+        panel: u32,
+        /// Ink of white and black tiles, 0 to 1.
+        ink: [f64; 2],
+    },
+    /// A text is not there, or reads otherwise.
+    TextDiffers {
+        /// Which text of the sheet, from 1.
+        text: usize,
+        /// What it should be.
+        stated: String,
+    },
+    /// Ink, or on a black field a lack of it, outside the tiles, texts and check bars.
+    Spot {
+        /// The middle of the spot.
+        at_mm: [f64; 2],
+        /// Its area, mm².
+        area_mm2: f64,
+    },
     /// A panel was recognised that belongs on another sheet.
     PanelForeign {
         /// Its id.
@@ -257,6 +290,25 @@ pub enum Finding {
     },
 }
 
+impl Finding {
+    /// Whether the rest of the sheet is as stated: a tag, a tile or a corner is wrong, not a board.
+    pub(super) fn is_local(&self) -> bool {
+        use Finding::*;
+        matches!(
+            self,
+            TagReads { .. }
+                | TagUnreadable { .. }
+                | TagDamaged { .. }
+                | TagExtra { .. }
+                | TileColour { .. }
+                | Blemish { .. }
+                | CornerMissing { .. }
+                | CornerOff { .. }
+                | CornerExtra { .. }
+        )
+    }
+}
+
 /// Rounded to what is shown, so that a tiny negative number is not shown as −0.
 fn micrometres(mm: f64) -> f64 {
     (mm * 1e3).round() / 1e3 + 0.0
@@ -274,13 +326,36 @@ impl fmt::Display for Finding {
             }
             Self::CheckBar { bar, found_mm: None, .. } => write!(f, "check bar {bar} not found"),
             Self::PanelMissing { panel } => write!(f, "board {panel} not recognised"),
+            Self::AnotherBoard { found, stated } => {
+                write!(f, "shows another board: {found} corners instead of {stated}")
+            }
+            Self::Inverted { panel } => {
+                write!(f, "board {panel} is inverted (black and white exchanged)")
+            }
+            Self::Contrast { panel, ink: [white, black] } => {
+                let [white, black] = [white, black].map(|ink| 100.0 * ink);
+                write!(
+                    f,
+                    "contrast of board {panel} too low: black tiles have {black:.0} % ink, \
+                     white ones {white:.0} %"
+                )
+            }
+            Self::TextDiffers { text, .. } => {
+                write!(f, "label {text} differs from the description")
+            }
+            Self::Spot { at_mm: [x, y], area_mm2 } => {
+                write!(f, "spot of {area_mm2:.3} mm² at ({x:.2}, {y:.2}) mm")
+            }
             Self::PanelForeign { panel } => write!(f, "shows board {panel} of another sheet"),
             Self::Mirrored { panel } => write!(f, "board {panel} is mirrored"),
             Self::Scale { scale, .. } => write!(f, "scale {scale:.4}"),
             Self::Stretched { scale: [x, y], .. } => {
                 write!(f, "stretched: scale {x:.4} along x, {y:.4} along y")
             }
-            Self::Turned { angle_deg, .. } => write!(f, "turned by {angle_deg:.3}°"),
+            Self::Turned { angle_deg, .. } => {
+                let angle = micrometres(*angle_deg);
+                write!(f, "turned by {:.3}°", if angle == -180.0 { 180.0 } else { angle })
+            }
             Self::Shifted { by_mm, .. } => {
                 let [x, y] = by_mm.map(micrometres);
                 write!(f, "shifted by ({x:.3}, {y:.3}) mm")
@@ -366,7 +441,8 @@ impl fmt::Display for Verdict {
                 write!(f, "{} pages, ", self.sheets.len())?;
             }
             write!(f, "{} corners within {deviation:.4} mm, ", sum(|s| s.corners_found))?;
-            write!(f, "{} tags exact, ", sum(|s| s.tags_exact))?;
+            let tags = sum(|s| s.tags_exact);
+            write!(f, "{tags} {} exact, ", if tags == 1 { "tag" } else { "tags" })?;
             let bars = self.sheets.iter().flat_map(|s| &s.check_bars_mm);
             let bars: Vec<String> =
                 bars.filter_map(|(_, found)| Some(format!("{:.2}", (*found)?))).collect();

@@ -11,7 +11,7 @@ use super::{target_file, verify};
 use crate::artwork::{self, Artwork};
 use crate::export::{atomic, dsc};
 use crate::family::Family;
-use crate::target::{Target, TargetSpec};
+use crate::target::{Target, TargetSpec, id_range};
 
 /// Arguments of `deltille board`.
 #[derive(clap::Args)]
@@ -93,7 +93,7 @@ fn summary(target: &Target) -> String {
     let mut ids = panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id);
     if let (Some(family), Some(first)) = (&target.family, ids.next()) {
         let last = ids.next_back().unwrap_or(first);
-        text += &format!(", {} ids {first}–{last}", family.name);
+        text += &format!(", {} {}", family.name, id_range(first, last));
     }
     text + &format!(", page {} × {} mm", sheet.width_mm, sheet.height_mm)
 }

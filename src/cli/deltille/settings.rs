@@ -1,5 +1,6 @@
 //! What `deltille board` is told: the same settings as options and as a TOML template.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
@@ -7,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::export::dsc::Dialect;
 use crate::target::{
-    BoardSpec, DEFAULT_MARGIN_MM, PaperSpec, TagSpec, largest_edge_mm, parse_length_mm,
+    BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, MOST_ROWS, PaperSpec, SIDES, TagSpec,
+    largest_edge_mm, parse_length_mm,
 };
 
 /// Edge where neither an edge nor a paper is given, mm: that of the published board, which fits
@@ -18,17 +20,17 @@ const DEFAULT_EDGE_MM: f64 = 20.0;
 pub const DEFAULT_DPI: u32 = 300;
 
 /// Range of the resolution: in a coarser picture a check bar cannot be measured to 0.02 mm.
-const DPI: std::ops::RangeInclusive<u32> = 200..=2400;
+const DPI: RangeInclusive<u32> = 200..=2400;
 
 /// Settings as they are given; what is not given has a default.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct Settings {
-    /// Rows of corners
-    #[arg(long, allow_negative_numbers = true)]
+    /// Rows of corners, 2 to 500
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(SIDES))]
     rows: Option<u32>,
-    /// Corners in each row
-    #[arg(long, allow_negative_numbers = true)]
+    /// Corners in each row, 2 to 500
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(SIDES))]
     cols: Option<u32>,
     /// Edge of a tile, such as 20mm, 2cm, 0.8in [default: 20mm, or the largest in whole
     /// millimetres that fits --paper]
@@ -42,19 +44,19 @@ pub struct Settings {
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
     /// A tag in every n-th row and column [default: 3]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
-    /// Black border of a tag, in widths of a bit [default: 1.5]
-    #[arg(long, value_name = "BITS", allow_negative_numbers = true)]
+    /// Black border of a tag, in widths of a bit, 0.6 to 10 [default: 1.5]
+    #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = border)]
     tag_border: Option<f64>,
     /// Id of the first tag; the others follow [default: 0]
-    #[arg(long, value_name = "ID", allow_negative_numbers = true)]
+    #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
     /// Id of the first board [default: 0]
-    #[arg(long, value_name = "ID", allow_negative_numbers = true)]
+    #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     board_id: Option<u32>,
     /// Number of boards, alike but for their ids, each on its own sheet [default: 1]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     boards: Option<u32>,
     /// White tiles on black
     #[arg(long)]
@@ -67,7 +69,7 @@ pub struct Settings {
     /// auto, portrait or landscape [default: auto]
     #[arg(long)]
     orientation: Option<String>,
-    /// Blank along the edges of the paper [default: 5mm]
+    /// Blank along the edges of the paper; 0.5 mm are left in any case [default: 5mm]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     margin: Option<String>,
     /// Write <name>.pdf; so it is where no other of pdf, svg, png is asked for
@@ -89,12 +91,28 @@ pub struct Settings {
     /// fork or original [default: fork]
     #[arg(long, value_name = "DIALECT")]
     dsc_dialect: Option<String>,
-    /// Resolution of the PNG, dots per inch [default: 300]
-    #[arg(long, allow_negative_numbers = true)]
+    /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(DPI))]
     dpi: Option<u32>,
     /// Stem of the files' names, printed on the sheet [default: board]
     #[arg(long)]
     name: Option<String>,
+}
+
+/// Reads a whole number of a range.
+fn whole(range: RangeInclusive<u32>) -> impl Fn(&str) -> Result<u32, String> + Clone {
+    move |text| {
+        let number = text.trim().parse().ok().filter(|number| range.contains(number));
+        let (least, most) = (range.start(), range.end());
+        number.ok_or_else(|| format!("not a whole number from {least} to {most}"))
+    }
+}
+
+/// Reads the width of a tag's border.
+fn border(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|number| BORDER_BITS.contains(number));
+    let (least, most) = (BORDER_BITS.start(), BORDER_BITS.end());
+    number.ok_or_else(|| format!("not a number from {least} to {most}"))
 }
 
 fn is_false(value: &bool) -> bool {
@@ -139,6 +157,8 @@ impl Settings {
             || self.tag_border.is_some()
             || self.first_id.is_some();
         let formats = self.pdf || self.svg || self.png;
+        let png = self.png || (template.png && !formats);
+        let dsc = self.dsc || template.dsc;
         Self {
             rows: self.rows.or(template.rows),
             cols: self.cols.or(template.cols),
@@ -156,10 +176,11 @@ impl Settings {
             margin: self.margin.or(template.margin),
             pdf: self.pdf || (template.pdf && !formats),
             svg: self.svg || (template.svg && !formats),
-            png: self.png || (template.png && !formats),
-            dsc: self.dsc || template.dsc,
+            png,
+            dsc,
             dsc_dialect: self.dsc_dialect.or(template.dsc_dialect),
-            dpi: self.dpi.or(template.dpi),
+            // Of no use where other formats are asked for than in the template.
+            dpi: self.dpi.or(template.dpi.filter(|_| png || !template.png)),
             name: self.name.or(template.name),
         }
     }
@@ -205,6 +226,12 @@ impl Settings {
             }
             None => DEFAULT_EDGE_MM,
         };
+        if self.dsc_dialect.is_some() && !self.dsc {
+            bail!("--dsc-dialect: there is no .dsc to write: add --dsc");
+        }
+        if self.dpi.is_some() && !self.png {
+            bail!("--dpi: there is no PNG to write: add --png");
+        }
         let dialect = match &self.dsc_dialect {
             Some(text) => {
                 text.parse().map_err(|error: String| anyhow!("--dsc-dialect: {error}"))?

@@ -11,7 +11,8 @@ use crate::target::{Target, TargetSpec};
 /// Reads a target: `.dsc` by its extension, JSON otherwise.
 pub fn read(path: &Path) -> anyhow::Result<Target> {
     let show = || path.display().to_string();
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", show()))?;
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", show()))?;
+    let Ok(text) = String::from_utf8(bytes) else { bail!("{}: not a text file", show()) };
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dsc")) {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         return dsc::read(&text, &stem).with_context(show);

@@ -67,7 +67,8 @@ pub fn verify(
     let count = verdicts.len();
     let files = if count == 1 { "file" } else { "files" };
     if failed > 0 {
-        println!("FAILED: {failed} of {count} {files} differ from target {}", target.name);
+        let differ = if failed == 1 { "differs" } else { "differ" };
+        println!("FAILED: {failed} of {count} {files} {differ} from target {}", target.name);
         return Ok(ExitCode::from(FAILED));
     }
     println!("verified: {count} {files} of target {}", target.name);
