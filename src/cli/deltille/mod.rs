@@ -3,6 +3,7 @@
 mod board;
 mod detect;
 mod files;
+mod render;
 mod settings;
 mod solid;
 mod target_file;
@@ -34,6 +35,8 @@ enum Command {
     Icosahedron(Box<solid::Args>),
     /// Find a target, or untagged boards, in photographs
     Detect(detect::Args),
+    /// Take a synthetic photograph of a target, with the true positions of its corners
+    Render(render::Args),
     /// Compare the files of a target with its description
     Verify(verify::Args),
 }
@@ -46,6 +49,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),
         Command::Icosahedron(args) => solid::run(SolidShape::Icosahedron, *args),
         Command::Detect(args) => detect::run(args),
+        Command::Render(args) => render::run(args),
         Command::Verify(args) => verify::run(args),
     }
 }
