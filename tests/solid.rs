@@ -101,7 +101,9 @@ fn wrong_meshes_are_refused_with_the_cause() {
             line.to_owned()
         }
     });
-    let dented = text.replacen("v ", "v 0.1", 1);
+    let first = text.lines().find(|line| line.starts_with("v ")).unwrap();
+    let v = numbers(first);
+    let dented = text.replacen(first, &format!("v {} {} {}", v[0] + 0.5, v[1], v[2]), 1);
     let untextured = text.replace("usemtl print\n", "");
     for (name, text, code, said) in [
         ("scaled", scaled, 1, "scale 1.0100"),
