@@ -34,7 +34,7 @@ fn an_icosahedron_needs_no_option() {
 #[test]
 fn every_format_is_written_and_the_dsc_reads_back() {
     let folder = tempfile::tempdir().unwrap();
-    let args = "tetrahedron --edge 6cm --tiles 4 --face-margin 4mm --obj --stl --gltf --svg --dsc \
+    let args = "tetrahedron --edge 8cm --tiles 7 --face-margin 4mm --obj --stl --gltf --svg --dsc \
                 --name t -o new --first-id 9";
     deltille(folder.path(), args)
         .success()
@@ -71,7 +71,7 @@ fn every_format_is_written_and_the_dsc_reads_back() {
 fn wrong_meshes_are_refused_with_the_cause() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    deltille(path, "tetrahedron --edge 60mm --tiles 4 --face-margin 4mm --obj --name t").success();
+    deltille(path, "tetrahedron --edge 80mm --tiles 7 --face-margin 4mm --obj --name t").success();
     let text = std::fs::read_to_string(path.join("t.obj")).unwrap();
     let change = |edit: &dyn Fn(&str) -> String| -> String {
         text.lines().map(|line| edit(line) + "\n").collect()
@@ -101,7 +101,9 @@ fn wrong_meshes_are_refused_with_the_cause() {
             line.to_owned()
         }
     });
-    let dented = text.replacen("v ", "v 0.1", 1);
+    let first = text.lines().find(|line| line.starts_with("v ")).unwrap();
+    let v = numbers(first);
+    let dented = text.replacen(first, &format!("v {} {} {}", v[0] + 0.5, v[1], v[2]), 1);
     let untextured = text.replace("usemtl print\n", "");
     for (name, text, code, said) in [
         ("scaled", scaled, 1, "scale 1.0100"),

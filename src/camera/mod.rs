@@ -4,12 +4,14 @@
 //! projection. Pixel centres lie at integer coordinates.
 
 mod brown_conrady;
+pub mod file;
 mod kannala_brandt;
 mod pose;
 
 use glam::DVec3;
 
 pub use brown_conrady::BrownConrady;
+pub use file::CameraFileError;
 pub use kannala_brandt::KannalaBrandt;
 pub use pose::Pose;
 

@@ -136,6 +136,10 @@ impl Scene {
         let mut truth = Truth::default();
         for surface in self.seen_from(camera_from_target) {
             let camera_from_surface = surface.camera_from(camera_from_target);
+            // What cannot be projected whole is not drawn either.
+            if (View { camera, camera_from_surface }).outline(&surface.paper_mm).is_none() {
+                continue;
+            }
             for &(id, row, col, [x, y]) in &surface.corners {
                 let point = DVec3::new(x, y, 0.0);
                 let pixel = camera.project(camera_from_surface.apply(point));

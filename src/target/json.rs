@@ -363,7 +363,10 @@ mod tests {
             spec
         }
         let cases: [(fn(&mut Target), &str); 5] = [
-            (|t| t.panels[0].corners.truncate(1), "panels[0].corners.length"),
+            (
+                |t| t.panels[0].corners.truncate(t.panels[0].corners.len() - 1),
+                "panels[0].corners.length",
+            ),
             (|t| spec(t).rows = 11, "panels[0].matrix"),
             (|t| spec(t).edge_mm = 21.0, "panels[0].edge_mm"),
             (|t| t.panels[0].tags[0].id += 100, "panels[0].tags[0]"),

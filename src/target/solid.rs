@@ -148,7 +148,7 @@ mod tests {
         /// the file says the same.
         #[test]
         fn every_solid_is_consistent(
-            shape in 0usize..3, tiles in 4u32..16, edge_mm in 100.0f64..400.0, spacing in 3u32..5,
+            shape in 0usize..3, tiles in 6u32..16, edge_mm in 100.0f64..400.0, spacing in 3u32..5,
         ) {
             let mut spec = SolidSpec { tiles, edge_mm, ..SolidSpec::new(SHAPES[shape].clone()) };
             spec.tags.spacing = spacing;

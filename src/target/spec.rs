@@ -22,8 +22,9 @@ const EDGE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 /// Range of a solid's edge, mm.
 const SOLID_EDGE_MM: std::ops::RangeInclusive<f64> = 10.0..=5000.0;
 
-/// Range of tiles along a side of a face: with fewer than four there is no tile between corners.
-const FACE_TILES: std::ops::RangeInclusive<u32> = 4..=200;
+/// Range of tiles along a side of a face: with fewer than six a face has at most six corners,
+/// and the detector takes so few for no grid.
+const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
 
 /// Most faces of a solid.
 const MOST_FACES: u32 = 10_000;
@@ -174,7 +175,7 @@ impl SolidSpec {
             return Err(TargetError::invalid("--edge", problem));
         }
         if !FACE_TILES.contains(&self.tiles) {
-            let problem = format!("{} is not between 4 and 200", self.tiles);
+            let problem = format!("{} is not between 6 and 200", self.tiles);
             return Err(TargetError::invalid("--tiles", problem));
         }
         if !(0.0..=SOLID_EDGE_MM.end() / 4.0).contains(&self.margin_mm) {

@@ -146,7 +146,7 @@ mod tests {
                             assert_eq!(found, None);
                         } else {
                             assert!(
-                                off.is_some_and(|mm| mm < 0.005),
+                                off.is_some_and(|mm| mm < 0.01),
                                 "{dpi} dpi, phase {phase}, upright {upright}, {length} mm: {found:?}"
                             );
                         }

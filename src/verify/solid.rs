@@ -1,6 +1,6 @@
 //! Meshes of solids: every face looked at by a camera, every corner followed back onto the mesh.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use glam::DVec3;
@@ -146,7 +146,7 @@ fn check_corners(
     detection: &Detection,
     verdict: &mut FaceVerdict,
 ) {
-    let mut found = BTreeMap::new();
+    let mut found = BTreeSet::new();
     for grid in &detection.grids {
         let Some(seen) = verifier.target.panels.iter().find(|p| Some(p.id) == grid.panel) else {
             continue;
@@ -162,18 +162,18 @@ fn check_corners(
             let by_mm = (at - DVec3::from(stated.target_mm)).to_array();
             let deviation_mm = DVec3::from(by_mm).length();
             if own {
-                found.insert(stated.id, ());
+                found.insert(stated.id);
                 verdict.max_deviation_mm = verdict.max_deviation_mm.max(deviation_mm);
             }
-            // Written so that a ray that misses the mesh counts as off.
-            if !(deviation_mm <= tolerance_mm) {
+            // A ray that misses the mesh counts as off.
+            if deviation_mm.is_nan() || deviation_mm > tolerance_mm {
                 let (id, row, col) = (stated.id, stated.row, stated.col);
                 verdict.findings.push(Finding::CornerOff3d { id, row, col, by_mm });
             }
         }
     }
     verdict.corners_found = found.len();
-    let missing = panel.corners.iter().filter(|corner| !found.contains_key(&corner.id));
+    let missing = panel.corners.iter().filter(|corner| !found.contains(&corner.id));
     verdict.findings.extend(missing.map(|corner| Finding::CornerMissing {
         id: corner.id,
         row: corner.row,

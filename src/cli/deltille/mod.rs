@@ -5,6 +5,7 @@ mod detect;
 mod experiment;
 mod files;
 mod refine;
+mod render;
 mod settings;
 mod solid;
 mod target_file;
@@ -40,6 +41,8 @@ enum Command {
     Experiment(experiment::Args),
     /// Refine given positions of corners
     Refine(refine::Args),
+    /// Take a synthetic photograph of a target, with the true positions of its corners
+    Render(render::Args),
     /// Compare the files of a target with its description
     Verify(verify::Args),
 }
@@ -54,6 +57,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Detect(args) => detect::run(args),
         Command::Experiment(args) => experiment::run(args),
         Command::Refine(args) => refine::run(args),
+        Command::Render(args) => render::run(args),
         Command::Verify(args) => verify::run(args),
     }
 }

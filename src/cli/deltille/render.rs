@@ -1,0 +1,188 @@
+//! `deltille render`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use glam::{DMat3, DQuat, DVec3};
+use serde::Serialize;
+
+use super::target_file;
+use crate::camera::{Camera, Pose};
+use crate::cli::output;
+use crate::synth::{Light, TruthCorner, scene_of_target};
+use crate::target::TargetSpec;
+
+/// Arguments of `deltille render`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Description of the target: the .json of `deltille board` or `deltille icosahedron`
+    target: PathBuf,
+    /// The camera: a YAML file with width, height, focal_px, centre_px, model (pinhole, fisheye)
+    /// and distortion, or the camera file of ROS or OpenCV
+    #[arg(long, value_name = "FILE")]
+    camera: PathBuf,
+    /// Pose of the target in the camera frame (x right, y down, z forward): rotation vector in
+    /// radians and translation in mm
+    #[arg(
+        long,
+        value_name = "RX,RY,RZ,TX,TY,TZ",
+        value_parser = numbers::<6>,
+        allow_hyphen_values = true,
+        conflicts_with = "eye",
+        required_unless_present = "eye"
+    )]
+    pose: Option<[f64; 6]>,
+    /// Where the camera stands in the target frame, mm, instead of --pose
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_parser = numbers::<3>,
+        allow_hyphen_values = true
+    )]
+    eye: Option<[f64; 3]>,
+    /// What --eye looks at, mm [default: the middle of all corners]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_parser = numbers::<3>,
+        allow_hyphen_values = true,
+        requires = "eye"
+    )]
+    look_at: Option<[f64; 3]>,
+    /// What is up in the picture of --eye [default: 0,0,1, or 0,1,0 from straight above or below]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_parser = numbers::<3>,
+        allow_hyphen_values = true,
+        requires = "eye"
+    )]
+    up: Option<[f64; 3]>,
+    /// Standard deviation of the blur, px
+    #[arg(long, default_value_t = 0.8, value_name = "PX")]
+    blur: f64,
+    /// Standard deviation of the noise, percent of full scale
+    #[arg(long, default_value_t = 1.0, value_name = "PERCENT")]
+    noise: f64,
+    /// Relative change of the light across and down the picture
+    #[arg(long, value_name = "ACROSS,DOWN", value_parser = numbers::<2>,
+          allow_hyphen_values = true, default_value = "0,0")]
+    gradient: [f64; 2],
+    /// Seed of the noise
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Family file, where the target names a family that is not shipped
+    #[arg(long)]
+    family: Option<String>,
+    /// The picture, a .png file, or a folder for <target>-view.png; the true positions of all
+    /// corners in it are written beside it as .json
+    #[arg(short, long, value_name = "FILE", default_value = ".")]
+    output: PathBuf,
+}
+
+/// The truth about a picture, as it is written beside it.
+#[derive(Serialize)]
+struct Truth {
+    schema: &'static str,
+    image: String,
+    target: String,
+    camera_from_target: Motion,
+    blur_px: f64,
+    noise: f64,
+    gradient: [f64; 2],
+    seed: u64,
+    corners: Vec<TruthCorner>,
+}
+
+#[derive(Serialize)]
+struct Motion {
+    /// Row-major.
+    rotation: [f64; 9],
+    translation_mm: [f64; 3],
+}
+
+/// Takes a picture of a target and writes it with its truth.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let target = target_file::read(&args.target)?;
+    let family = target_file::family(&target, args.family.as_deref())?;
+    if !matches!(target.spec, TargetSpec::Solid(_)) && target.panels.len() > 1 {
+        bail!("{} has several loose boards: render targets of one board, or solids", target.name);
+    }
+    let show = || format!("--camera: {}", args.camera.display());
+    let text = std::fs::read_to_string(&args.camera).with_context(show)?;
+    let camera = Camera::from_yaml(&text).with_context(show)?;
+    let in_range = |option: &str, value: f64, most: f64| match (0.0..=most).contains(&value) {
+        true => Ok(value),
+        false => bail!("{option}: {value} is not between 0 and {most}"),
+    };
+    let light = Light {
+        blur_px: in_range("--blur", args.blur, 100.0)?,
+        noise: in_range("--noise", args.noise, 100.0)? / 100.0,
+        gradient: args.gradient,
+        seed: args.seed,
+        ..Light::default()
+    };
+    if light.gradient.iter().any(|g| !(-2.0..=2.0).contains(g)) {
+        bail!("--gradient: it must be between -2 and 2");
+    }
+    let corners = || target.panels.iter().flat_map(|panel| &panel.corners);
+    let middle = corners().map(|c| DVec3::from(c.target_mm)).sum::<DVec3>();
+    let pose = args.camera_from_target(middle / corners().count() as f64)?;
+
+    let scene = scene_of_target(&target, family.as_ref())?;
+    let image = scene.render(&camera, &pose, &light);
+    let seen = scene.truth(&camera, &pose, 0.0).corners;
+    let path = output::file(&args.output, &format!("{}-view", target.name), "png");
+    let truth = Truth {
+        schema: "deltille/truth/1",
+        image: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        target: target.name.clone(),
+        camera_from_target: Motion {
+            rotation: DMat3::from_quat(pose.rotation).transpose().to_cols_array(),
+            translation_mm: pose.translation.to_array(),
+        },
+        blur_px: light.blur_px,
+        noise: light.noise,
+        gradient: light.gradient,
+        seed: light.seed,
+        corners: seen,
+    };
+    let pixels = image.pixels().iter().map(|v| (v * 255.0 + 0.5) as u8).collect();
+    let picture = image::GrayImage::from_raw(camera.width, camera.height, pixels);
+    let mut png = std::io::Cursor::new(Vec::new());
+    picture.context("the picture is empty")?.write_to(&mut png, image::ImageFormat::Png)?;
+    let json = crate::json::to_text(&truth, 2);
+    output::write(&path.with_extension("json"), json.as_bytes())?;
+    output::write(&path, &png.into_inner())?;
+    println!("{}: {} corners in view", path.display(), truth.corners.len());
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Args {
+    fn camera_from_target(&self, middle: DVec3) -> anyhow::Result<Pose> {
+        if let Some(pose) = &self.pose {
+            let rotation = DQuat::from_scaled_axis(DVec3::from_slice(&pose[..3]));
+            return Ok(Pose { rotation, translation: DVec3::from_slice(&pose[3..]) });
+        }
+        let Some(eye) = self.eye.map(DVec3::from) else { bail!("--pose or --eye is needed") };
+        let centre = self.look_at.map(DVec3::from).unwrap_or(middle);
+        let sight = (centre - eye).normalize_or_zero();
+        let upright = if sight.cross(DVec3::Z).length() < 1e-6 { DVec3::Y } else { DVec3::Z };
+        let up = self.up.map(DVec3::from).unwrap_or(upright);
+        if sight.cross(up).length() < 1e-9 {
+            bail!("--up: it must not be parallel to the line of sight, nor --eye be --look-at");
+        }
+        Ok(Pose::looking_at(eye, centre, up))
+    }
+}
+
+/// So many finite numbers, separated by commas.
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parsed = text.split(',').map(|word| word.trim().parse::<f64>());
+    let numbers = parsed.collect::<Result<Vec<f64>, _>>().map_err(|error| error.to_string())?;
+    if numbers.iter().any(|v| !v.is_finite()) {
+        return Err("all numbers must be finite".to_owned());
+    }
+    numbers.try_into().map_err(|v: Vec<f64>| format!("{} numbers instead of {N}", v.len()))
+}
