@@ -117,7 +117,7 @@ fn arrange(
 /// Adds cutting marks and numbers.
 fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, edges: [usize; 3]) {
     let placement = sheet.placements[0];
-    for i in 0..3 {
+    for (i, number) in edges.into_iter().enumerate() {
         let (a, b) = (face.outline_mm[i], face.outline_mm[(i + 1) % 3]);
         for (end, outwards) in [(a, -1.0), (b, 1.0)] {
             let [from_mm, to_mm] =
@@ -125,7 +125,7 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
             let kind = LineKind::Cut;
             sheet.lines.push(SheetLine { kind, from_mm, to_mm, width_mm: MARK_WIDTH_MM });
         }
-        let text = format!("edge {}", edges[i]);
+        let text = format!("edge {number}");
         sheet.texts.push(edge_text(&placement, [a, b], text, -(EDGE_GAP_MM + EDGE_CAP_MM)));
     }
     let [left, _, _, upper] = bounds(face);

@@ -362,9 +362,12 @@ mod tests {
             let TargetSpec::Board(spec) = &mut target.spec else { panic!("a board") };
             spec
         }
-        let cases: [(fn(&mut Target), &str); 5] = [
+        type Edit = fn(&mut Target);
+        let cases: [(Edit, &str); 5] = [
             (
-                |t| t.panels[0].corners.truncate(t.panels[0].corners.len() - 1),
+                |t| {
+                    t.panels[0].corners.pop();
+                },
                 "panels[0].corners.length",
             ),
             (|t| spec(t).rows = 11, "panels[0].matrix"),
