@@ -55,7 +55,7 @@ pub fn svg(rows: &[Row]) -> String {
     )
 }
 
-/// A plot made by [`svg`] as PNG, twice its size; `None` only if it is no such plot.
+/// A plot made by [`svg()`] as PNG, twice its size; `None` only if it is no such plot.
 pub fn png(svg: &str) -> Option<Vec<u8>> {
     const SCALE: f32 = 2.0;
     let tree = resvg::usvg::Tree::from_str(svg, &resvg::usvg::Options::default()).ok()?;

@@ -61,12 +61,20 @@ pub(super) fn check(
     }
     for bar in &layout.check_bars {
         let blank = (CHECK_BAR_STROKE_MM / 2.0 + BAR_BLANK_MM) * page.px_per_mm;
-        let (from, to) = (bar.from_mm, bar.to_mm);
-        let [x0, y0] = [0, 1].map(|i| from[i].min(to[i]));
-        let [x1, y1] = [0, 1].map(|i| from[i].max(to[i]));
-        cover(pixels(page, [x0, y0, x1, y1], blank));
+        cover(pixels(page, spanned(bar.from_mm, bar.to_mm), blank));
+    }
+    for line in &layout.lines {
+        let blank = (line.width_mm / 2.0 + BAR_BLANK_MM) * page.px_per_mm;
+        cover(pixels(page, spanned(line.from_mm, line.to_mm), blank));
     }
     spots(page, &known, panels, verdict);
+}
+
+/// The rectangle that two points span: left, lower, right, upper.
+fn spanned(from: [f64; 2], to: [f64; 2]) -> [f64; 4] {
+    let [left, lower] = [0, 1].map(|i| from[i].min(to[i]));
+    let [right, upper] = [0, 1].map(|i| from[i].max(to[i]));
+    [left, lower, right, upper]
 }
 
 /// The pixels of a rectangle of the page (mm) with `blank` more on every side: first and
