@@ -45,7 +45,7 @@ pub(super) struct Args {
     resume: Option<PathBuf>,
     /// Number of codes at most, for the methods best and algebraic [default: as many as a file of
     /// 64 MiB holds]
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     limit: Option<u64>,
     /// Name of the family, also the stem of its file [default: as the bits and distance]
     #[arg(long)]
@@ -54,8 +54,8 @@ pub(super) struct Args {
     #[arg(short, long, default_value = "families")]
     output: PathBuf,
     /// Threads [default: one per processor]
-    #[arg(short = 'j', long)]
-    threads: Option<usize>,
+    #[arg(short = 'j', long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -73,8 +73,7 @@ enum Method {
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     if let Some(threads) = args.threads {
-        anyhow::ensure!(threads > 0, "--threads 0: at least one thread is needed");
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
     let path = output::file(&args.output, &name, "json");
