@@ -15,9 +15,6 @@ pub type Powers = (i32, i32);
 /// Numbers that the widest processors work on at once; rows of kernels are padded to so many.
 const LANES: usize = 16;
 
-/// Longest padded row of a window: 4r + 1 pixels for r ≤ 7.
-const MAX_ROW: usize = 2 * LANES;
-
 /// Kernels of the first N coefficients of a polynomial.
 #[derive(Clone, Debug)]
 pub struct ConeFit<const N: usize> {
@@ -30,9 +27,8 @@ pub struct ConeFit<const N: usize> {
 
 impl<const N: usize> ConeFit<N> {
     /// A fit of all `monomials`, over offsets within `radius` + 1 px after smoothing with a cone
-    /// of that radius, at most 7; the coefficients of the first N are kept.
+    /// of that radius; the coefficients of the first N are kept.
     pub fn new(radius: usize, monomials: &[Powers]) -> Self {
-        let radius = radius.min((MAX_ROW - 1) / 4);
         let r = radius as isize;
         let cone = |u: isize, v: isize| (radius as f64 + 1.0 - (u as f64).hypot(v as f64)).max(0.0);
         let offsets = |r: isize| (-r..=r).flat_map(move |v| (-r..=r).map(move |u| (u, v)));
@@ -96,28 +92,36 @@ fn products<const N: usize, T: Intensity>(
 ) -> [f32; N] {
     // Taking the centre's level away first keeps single precision exact enough at 16 bits.
     let level = image.at(left + side / 2, top + side / 2).to_f32();
-    let blend_row = |y: usize, out: &mut [f32; MAX_ROW]| {
-        let row = &image.row(y)[left..=left + side];
-        for (out, pair) in out[..side].iter_mut().zip(row.windows(2)) {
-            let (a, b) = (pair[0].to_f32() - level, pair[1].to_f32() - level);
-            *out = a + fx * (b - a);
-        }
-    };
-    let (mut upper, mut lower) = ([0.0; MAX_ROW], [0.0; MAX_ROW]);
+    let groups = side.div_ceil(LANES);
     let mut sums = [[0.0f32; LANES]; N];
-    blend_row(top, &mut upper);
-    for (i, row) in kernels.chunks_exact(side.div_ceil(LANES)).enumerate() {
-        blend_row(top + i + 1, &mut lower);
-        let groups = upper.as_chunks::<LANES>().0.iter().zip(lower.as_chunks::<LANES>().0);
-        for (kernels, (u, l)) in row.iter().zip(groups) {
-            let samples: [f32; LANES] = std::array::from_fn(|j| u[j] + fy * (l[j] - u[j]));
+    for group in 0..groups {
+        let column = left + group * LANES;
+        let blended = |y: usize| {
+            let pixels = pixels_from(image.row(y), column).map(|p| p.to_f32() - level);
+            let blend = |i: usize| pixels[i] + fx * (pixels[i + 1] - pixels[i]);
+            std::array::from_fn::<f32, LANES, _>(blend)
+        };
+        let mut upper = blended(top);
+        for (i, kernels) in kernels.iter().skip(group).step_by(groups).enumerate() {
+            let lower = blended(top + i + 1);
             for (sums, kernel) in sums.iter_mut().zip(kernels) {
                 for j in 0..LANES {
-                    sums[j] += kernel[j] * samples[j];
+                    sums[j] += kernel[j] * (upper[j] + fy * (lower[j] - upper[j]));
                 }
             }
+            upper = lower;
         }
-        upper = lower;
     }
     sums.map(|sums| sums.iter().sum())
+}
+
+/// Pixels of a row from a column on; behind its end, where kernels have no weight, black.
+#[inline(always)]
+fn pixels_from<T: Intensity>(row: &[T], column: usize) -> [T; LANES + 1] {
+    row[column..].first_chunk().copied().unwrap_or_else(|| {
+        let mut pixels = [T::default(); LANES + 1];
+        let rest = &row[column..];
+        pixels[..rest.len()].copy_from_slice(rest);
+        pixels
+    })
 }

@@ -329,7 +329,9 @@ fn fill_deltille<const C: usize>(
     corner: &Corner<C>,
     angles: [f64; 3],
 ) {
-    fill(columns, pixels, window, corner, angles, [0.0; 3], deltille);
+    // As a closure it is compiled for the target at hand, as a bare function it would not be.
+    let shade = |h| deltille(h);
+    fill(columns, pixels, window, corner, angles, [0.0; 3], shade);
 }
 
 /// Fills the columns of derivatives and residuals.
