@@ -96,17 +96,16 @@ fn products<const N: usize, T: Intensity>(
     let mut sums = [[0.0f32; LANES]; N];
     for group in 0..groups {
         let column = left + group * LANES;
-        let blended = |y: usize| {
-            let pixels = pixels_from(image.row(y), column).map(|p| p.to_f32() - level);
-            let blend = |i: usize| pixels[i] + fx * (pixels[i + 1] - pixels[i]);
-            std::array::from_fn::<f32, LANES, _>(blend)
-        };
-        let mut upper = blended(top);
+        let mut upper = blended(image.row(top), column, fx, level);
         for (i, kernels) in kernels.iter().skip(group).step_by(groups).enumerate() {
-            let lower = blended(top + i + 1);
-            for (sums, kernel) in sums.iter_mut().zip(kernels) {
+            let lower = blended(image.row(top + i + 1), column, fx, level);
+            let mut samples = [0.0; LANES];
+            for j in 0..LANES {
+                samples[j] = upper[j] + fy * (lower[j] - upper[j]);
+            }
+            for k in 0..N {
                 for j in 0..LANES {
-                    sums[j] += kernel[j] * (upper[j] + fy * (lower[j] - upper[j]));
+                    sums[k][j] += kernels[k][j] * samples[j];
                 }
             }
             upper = lower;
@@ -115,13 +114,24 @@ fn products<const N: usize, T: Intensity>(
     sums.map(|sums| sums.iter().sum())
 }
 
-/// Pixels of a row from a column on; behind its end, where kernels have no weight, black.
+/// Samples of a row between its pixels, from a column on, minus a level; behind the end of the row,
+/// where kernels have no weight, some number.
 #[inline(always)]
-fn pixels_from<T: Intensity>(row: &[T], column: usize) -> [T; LANES + 1] {
-    row[column..].first_chunk().copied().unwrap_or_else(|| {
-        let mut pixels = [T::default(); LANES + 1];
-        let rest = &row[column..];
-        pixels[..rest.len()].copy_from_slice(rest);
-        pixels
-    })
+fn blended<T: Intensity>(row: &[T], column: usize, fx: f32, level: f32) -> [f32; LANES] {
+    let mut padded = [T::default(); LANES + 1];
+    let rest = &row[column..];
+    let pixels = match rest.first_chunk() {
+        Some(pixels) => pixels,
+        None => {
+            padded[..rest.len()].copy_from_slice(rest);
+            &padded
+        }
+    };
+    // Plain loops: a closure handed to the standard library would not be compiled for the target.
+    let mut samples = [0.0; LANES];
+    for i in 0..LANES {
+        let (a, b) = (pixels[i].to_f32() - level, pixels[i + 1].to_f32() - level);
+        samples[i] = a + fx * (b - a);
+    }
+    samples
 }
