@@ -3,17 +3,30 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 
 use crate::export::atomic;
 
 /// The file that `-o` means: itself when it ends in the extension, else `<stem>.<extension>` in
-/// that folder.
-pub fn file(output: &Path, stem: &str, extension: &str) -> PathBuf {
-    if output.extension().is_some_and(|e| e == extension) {
-        output.to_owned()
-    } else {
-        output.join(format!("{stem}.{extension}"))
+/// that folder. A path that ends in another extension is no folder, unless it is there as one.
+pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBuf> {
+    let shown = output.display();
+    if output.is_dir() {
+        return Ok(output.join(format!("{stem}.{extension}")));
+    }
+    if output.is_file() && output.extension().is_none() {
+        bail!("-o {shown}: is a file; name a folder, or a file that ends in .{extension}");
+    }
+    match output.extension() {
+        Some(found) if found == extension => Ok(output.to_owned()),
+        Some(_) if !output.as_os_str().to_string_lossy().ends_with('/') => {
+            let instead = output.with_extension(extension);
+            bail!(
+                "-o {shown}: the file written is a .{extension} file; name it {}, or name a folder",
+                instead.display()
+            )
+        }
+        _ => Ok(output.join(format!("{stem}.{extension}"))),
     }
 }
 
@@ -27,9 +40,15 @@ pub fn print(text: &str) -> anyhow::Result<()> {
 
 /// Writes a file whole or not at all, making its folder where there is none.
 pub fn write(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    make_folder_of(path)?;
+    Ok(atomic::write(path, |file| file.write_all(content))?)
+}
+
+/// Makes the folder that a file goes to, where there is none.
+pub fn make_folder_of(path: &Path) -> anyhow::Result<()> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
-    Ok(atomic::write(path, |file| file.write_all(content))?)
+    Ok(())
 }

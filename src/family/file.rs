@@ -94,7 +94,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
              fetch or generate the file anew",
             file.fingerprint
         );
-        return Err(FamilyError::field("fingerprint", problem));
+        return Err(FamilyError::Claim { field: "fingerprint".to_owned(), problem });
     }
     Ok(Family {
         name: file.name,
@@ -163,7 +163,7 @@ pub(super) fn check_form(
             "{} is code {first} again, perhaps turned: remove one",
             words.hex(codes[second])
         );
-        return Err(FamilyError::field(format!("codes[{second}]"), problem));
+        return Err(FamilyError::Claim { field: format!("codes[{second}]"), problem });
     }
     Ok(())
 }
