@@ -34,6 +34,14 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         let word = word.with_context(|| {
             format!("--rank {rank}: there are {count}, numbered from 0 to {}", count - 1)
         })?;
+        // Found out at the first one, before anything is printed.
+        let left = count - args.rank;
+        anyhow::ensure!(
+            args.count <= left,
+            "--count {}: from --rank {} on there are {left}",
+            args.count,
+            args.rank
+        );
         let mut line = format!("{rank} {}", words.hex(word));
         if !screen.admits(word) {
             line.push_str(" breaks a rule of the family");

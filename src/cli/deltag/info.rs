@@ -1,6 +1,7 @@
 use std::process::ExitCode;
 
-use crate::family::{Family, bounds::bounds};
+use crate::family::{Family, TagWords, bounds::bounds};
+use crate::target::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -8,20 +9,29 @@ pub(super) struct Args {
     family: String,
 }
 
-/// Tags on one face of the common targets: a 10 × 11 board, or a face of an icosahedron with 66
-/// corners, when every third tile of every third row carries one.
-const TAGS_PER_FACE: usize = 10;
+/// Rows and columns of the board that coverage is told in, that of the paper.
+const BOARD: [u32; 2] = [10, 11];
+
+/// How many tags a target takes with the settings that `deltille` has by default.
+fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
+    let family = Family::resolve(&TagSpec::default().family)?;
+    let target = Target::build("probe", spec, Some(&family), None)?;
+    Ok(target.panels.iter().map(|panel| panel.tags.len()).sum())
+}
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = Family::resolve(&args.family)?;
     let (bits, rules) = (family.dimension().bits(), family.rules());
+    let pairs = TagWords::new(family.dimension()).pairs();
     println!("{}, fingerprint {}", family.name(), family.fingerprint());
     println!("  codes           {}", family.len());
     println!("  bits            {bits} in {} rows", family.dimension().rows());
     println!("  distance        {}, corrects {} cells", family.distance(), family.correctable());
     println!(
-        "  rules           {} % of neighbours differ, {} white and {} black cells at least",
-        100.0 * rules.min_complexity,
+        "  rules           every code: {} of {} neighbouring pairs of cells differ, {} cells are white, \
+         {} black, at least",
+        (rules.min_complexity * f64::from(pairs) - 1e-9).ceil(),
+        pairs,
         rules.black_distance,
         rules.white_distance
     );
@@ -38,14 +48,31 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         "  upper bound     {} codes (linear programming)",
         bounds(family.dimension(), family.distance()).linear_programming
     );
+    let [rows, cols] = BOARD;
+    let board = tags_of(&TargetSpec::Board(BoardSpec {
+        rows,
+        cols,
+        edge_mm: 20.0,
+        boards: 1,
+        board_id: 0,
+        tags: Some(TagSpec::default()),
+        inverted: false,
+    }))?;
+    let solid = tags_of(&TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron)))?;
     println!(
-        "  enough for      {} boards or {} icosahedra with {TAGS_PER_FACE} tags a face",
-        family.len() / TAGS_PER_FACE,
-        family.len() / (20 * TAGS_PER_FACE)
+        "  enough for      {} boards of {rows} x {cols} corners ({board} tags each) or {} icosahedra \
+         ({solid} tags each)",
+        family.len() / board,
+        family.len() / solid
     );
     println!("  a random pattern is taken for a tag with probability");
     for (corrected, rate) in family.false_positive_rates().iter().enumerate() {
-        println!("    {rate:>9.2e}  when {corrected} cells are corrected");
+        let cells = if corrected == 1 { "cell is" } else { "cells are" };
+        println!("    {rate:>9.2e}  when up to {corrected} {cells} corrected");
+    }
+    if family.histogram().is_empty() {
+        println!("  distances       of so many codes are not counted");
+        return Ok(ExitCode::SUCCESS);
     }
     println!("  pairs of words, turns included, at each distance");
     let most = family.histogram().values().copied().max().unwrap_or(1) as f64;
