@@ -212,6 +212,20 @@ fn plan_names_the_smallest_family_that_suffices() {
     plan(&["--faces", "9999999"]).code(2).stderr(contains("--faces"));
 }
 
+/// `deltag info d16h5 | head -1` is no error.
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_deltag"))
+        .args(["verify-family", "d36h11", "d16h5"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+}
+
 /// The tags of one board and of one icosahedron, as `deltille` makes them.
 #[test]
 fn info_tells_how_many_targets_a_family_covers() {

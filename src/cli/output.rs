@@ -38,6 +38,14 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
+/// Prints a line as [`print`] does, and returns from the function where that fails.
+macro_rules! say {
+    ($($argument:tt)*) => {
+        $crate::cli::output::print(&format!("{}\n", format_args!($($argument)*)))?
+    };
+}
+pub(crate) use say;
+
 /// Writes a file whole or not at all, making its folder where there is none.
 pub fn write(path: &Path, content: &[u8]) -> anyhow::Result<()> {
     make_folder_of(path)?;

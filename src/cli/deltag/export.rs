@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use clap::ValueEnum;
 
 use super::values::name;
-use crate::cli::output;
+use crate::cli::output::{self, say};
 use crate::family::{ExportFormat, Family, export};
 
 #[derive(clap::Args)]
@@ -59,7 +59,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
             let stem = args.name.as_deref().unwrap_or(family.name());
             let path = output::file(&place, stem, format.extension())?;
             output::write(&path, text.as_bytes())?;
-            println!("{}", path.display());
+            say!("{}", path.display());
         }
     }
     Ok(ExitCode::SUCCESS)

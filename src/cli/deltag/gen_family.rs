@@ -13,7 +13,7 @@ use super::parameters::Parameters;
 use super::rules::RuleArgs;
 use super::values::{name, number, whole};
 use crate::cli::run::INTERRUPTED;
-use crate::cli::{interrupt, output, progress};
+use crate::cli::{interrupt, output, output::say, progress};
 use crate::family::best::Best;
 use crate::family::lexicode::{self, Lexicode};
 use crate::family::search::{self, Search};
@@ -135,7 +135,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         None => file.finish()?,
     }
     if let Some(family) = family {
-        println!(
+        say!(
             "{}: {} codes of {} bits, distance {}, fingerprint {}",
             path.display(),
             family.len(),

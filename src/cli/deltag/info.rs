@@ -1,5 +1,6 @@
 use std::process::ExitCode;
 
+use crate::cli::output::say;
 use crate::family::{Family, TagWords, bounds::bounds};
 use crate::target::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 
@@ -23,11 +24,11 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = Family::resolve(&args.family)?;
     let (bits, rules) = (family.dimension().bits(), family.rules());
     let pairs = TagWords::new(family.dimension()).pairs();
-    println!("{}, fingerprint {}", family.name(), family.fingerprint());
-    println!("  codes           {}", family.len());
-    println!("  bits            {bits} in {} rows", family.dimension().rows());
-    println!("  distance        {}, corrects {} cells", family.distance(), family.correctable());
-    println!(
+    say!("{}, fingerprint {}", family.name(), family.fingerprint());
+    say!("  codes           {}", family.len());
+    say!("  bits            {bits} in {} rows", family.dimension().rows());
+    say!("  distance        {}, corrects {} cells", family.distance(), family.correctable());
+    say!(
         "  rules           every code: {} of {} neighbouring pairs of cells differ, {} cells are white, \
          {} black, at least",
         (rules.min_complexity * f64::from(pairs) - 1e-9).ceil(),
@@ -43,8 +44,8 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         _ => String::new(),
     };
-    println!("  construction    {construction}");
-    println!(
+    say!("  construction    {construction}");
+    say!(
         "  upper bound     {} codes (linear programming)",
         bounds(family.dimension(), family.distance()).linear_programming
     );
@@ -59,26 +60,26 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         inverted: false,
     }))?;
     let solid = tags_of(&TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron)))?;
-    println!(
+    say!(
         "  enough for      {} boards of {rows} x {cols} corners ({board} tags each) or {} icosahedra \
          ({solid} tags each)",
         family.len() / board,
         family.len() / solid
     );
-    println!("  a random pattern is taken for a tag with probability");
+    say!("  a random pattern is taken for a tag with probability");
     for (corrected, rate) in family.false_positive_rates().iter().enumerate() {
         let cells = if corrected == 1 { "cell is" } else { "cells are" };
-        println!("    {rate:>9.2e}  when up to {corrected} {cells} corrected");
+        say!("    {rate:>9.2e}  when up to {corrected} {cells} corrected");
     }
     if family.histogram().is_empty() {
-        println!("  distances       of so many codes are not counted");
+        say!("  distances       of so many codes are not counted");
         return Ok(ExitCode::SUCCESS);
     }
-    println!("  pairs of words, turns included, at each distance");
+    say!("  pairs of words, turns included, at each distance");
     let most = family.histogram().values().copied().max().unwrap_or(1) as f64;
     for (distance, pairs) in family.histogram() {
         let bar = "█".repeat((40.0 * *pairs as f64 / most).ceil() as usize);
-        println!("    {distance:>3} {pairs:>12} {bar}");
+        say!("    {distance:>3} {pairs:>12} {bar}");
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
 use super::values::whole;
+use crate::cli::output::say;
 use crate::family::{Family, shipped_names};
 
 #[derive(clap::Args)]
@@ -49,11 +50,11 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
             args.corrects
         );
     };
-    println!("{} x {} = {needed} tags: {}", args.faces, args.tags_per_face, about(best));
+    say!("{} x {} = {needed} tags: {}", args.faces, args.tags_per_face, about(best));
     // What more bits would buy.
     let more = suffice().filter(|f| f.correctable() > best.correctable()).min_by_key(order);
     if let Some(more) = more {
-        println!("to correct more, with smaller cells: {}", about(more));
+        say!("to correct more, with smaller cells: {}", about(more));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -8,6 +8,7 @@ use anyhow::{Context, ensure};
 use super::values::{Ids, name, whole};
 use crate::artwork;
 use crate::cli::deltille::files::{Formats, drawn, write_all};
+use crate::cli::output::say;
 use crate::cli::run::FAILED;
 use crate::family::Family;
 use crate::target::{
@@ -112,7 +113,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let files = drawn(&name, artwork, formats, args.dpi.unwrap_or(300));
     let written = write_all(&args.output, &files)?;
     for path in &written {
-        println!("wrote {}", path.display());
+        say!("wrote {}", path.display());
     }
     if args.no_verify {
         return Ok(ExitCode::SUCCESS);
@@ -121,7 +122,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut passed = true;
     for path in &written {
         let verdict = verifier.verify(path)?;
-        println!("{verdict}");
+        say!("{verdict}");
         passed &= verdict.passed;
     }
     Ok(if passed { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })

@@ -3,7 +3,7 @@ use std::process::ExitCode;
 
 use super::values::{Ids, name, whole};
 use crate::artwork::{Artwork, GalleryTile, tag_gallery};
-use crate::cli::output;
+use crate::cli::output::{self, say};
 use crate::export::{png, svg};
 use crate::family::Family;
 
@@ -68,7 +68,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         written.push(path);
     }
     for path in written {
-        println!("wrote {}", path.display());
+        say!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
 }

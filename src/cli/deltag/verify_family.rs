@@ -1,5 +1,6 @@
 use std::process::ExitCode;
 
+use crate::cli::output::say;
 use crate::cli::run::{BAD_INPUT, FAILED, report};
 use crate::family::{Family, FamilyError, certify};
 
@@ -20,7 +21,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         let family = match Family::resolve(name) {
             Ok(family) => family,
             Err(error) if error.is_broken_claim() => {
-                println!("{name}: DOES NOT HOLD. {}", reason(&error));
+                say!("{name}: DOES NOT HOLD. {}", reason(&error));
                 all_hold = false;
                 continue;
             }
@@ -45,7 +46,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
                     certificate.min_distance
                 )
             };
-            println!(
+            say!(
                 "{name}: holds. {} codes of {} bits; {how}; every code satisfies the rules; \
                  fingerprint {}",
                 family.len(),
@@ -53,7 +54,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
                 family.fingerprint()
             );
         } else {
-            println!("{name}: DOES NOT HOLD. {}", certificate.failures.join("; "));
+            say!("{name}: DOES NOT HOLD. {}", certificate.failures.join("; "));
             all_hold = false;
         }
     }
