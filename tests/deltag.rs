@@ -233,7 +233,7 @@ fn info_tells_how_many_targets_a_family_covers() {
         contains("1199")
             .and(contains("corrects 3 cells"))
             .and(contains("15 of 30 neighbouring pairs"))
-            .and(contains("boards of 10 x 11 corners (16 tags each)"))
+            .and(contains("boards of 10 x 11 corners (11 tags each)"))
             .and(contains("when up to 3 cells are corrected")),
     );
 }

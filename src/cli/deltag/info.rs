@@ -68,8 +68,12 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     );
     say!("  a random pattern is taken for a tag with probability");
     for (corrected, rate) in family.false_positive_rates().iter().enumerate() {
-        let cells = if corrected == 1 { "cell is" } else { "cells are" };
-        say!("    {rate:>9.2e}  when up to {corrected} {cells} corrected");
+        let corrected = match corrected {
+            0 => "nothing is".to_owned(),
+            1 => "1 cell is".to_owned(),
+            n => format!("up to {n} cells are"),
+        };
+        say!("    {rate:>9.2e}  when {corrected} corrected");
     }
     if family.histogram().is_empty() {
         say!("  distances       of so many codes are not counted");
