@@ -30,7 +30,7 @@ pub enum Construction {
     /// A union of cosets of a linear code, arranged on the tag, with some codes exchanged
     /// ([`super::algebra`]).
     Algebraic(AlgebraicConstruction),
-    /// Local search from nothing ([`super::best`]); rerun with the same numbers it gives the same.
+    /// Local search from nothing ([`super::search`]); rerun with the same numbers it gives the same.
     Search {
         /// Seed of the random choices.
         seed: u64,
