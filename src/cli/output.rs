@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 
 use crate::export::atomic;
 
@@ -28,6 +28,20 @@ pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBu
         }
         _ => Ok(output.join(format!("{stem}.{extension}"))),
     }
+}
+
+/// Finds out before hours of work, and without a trace, whether a file can be written.
+pub fn check_writable(path: &Path) -> anyhow::Result<()> {
+    let context = || format!("-o: {} cannot be written", path.display());
+    let folders = path.ancestors().skip(1);
+    let nearest = folders
+        .map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
+        .find(|folder| folder.exists());
+    if let Some(folder) = nearest {
+        ensure!(folder.is_dir(), "{}: {} is no folder", context(), folder.display());
+        tempfile::tempfile_in(folder).with_context(context)?;
+    }
+    Ok(())
 }
 
 /// Prints a result; a reader that has gone away (`| head`) is not an error.

@@ -104,6 +104,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
     let path = output::file(&args.output, &name, "json")?;
     let rules = args.rules.rules(args.family)?;
+    output::check_writable(&path)?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }

@@ -44,10 +44,13 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         } else {
             "lower".to_owned()
         };
+        let (kind, corrects) = match args.corrects {
+            0 => (String::new(), ""),
+            n => (format!(" that correct {n} cells"), " or --corrects"),
+        };
         anyhow::bail!(
-            "{needed} tags that correct {} cells: the largest shipped family, {name}, lists {len}; \
-             {instead} --faces, --tags-per-face or --corrects",
-            args.corrects
+            "{needed} tags{kind}: the largest shipped family, {name}, lists {len}; {instead} \
+             --faces or --tags-per-face{corrects}"
         );
     };
     say!("{} x {} = {needed} tags: {}", args.faces, args.tags_per_face, about(best));
