@@ -102,7 +102,7 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
     refused(&["gen-family", "d17h5"], "17");
     refused(&["gen-family", "d16h0"], "between 1 and the 16 bits");
     refused(&["gen-family", "d16h99999999999"], "d16h99999999999");
-    refused(&["gen-family", "d49h12", "--method", "search"], "--method");
+    refused(&["gen-family", "d49h12", "--method", "search"], "--method search");
     refused(&["gen-family", "d49h12", "--method", "lexicode"], "--method");
     gen_family(&["--threads", "0"], "--threads");
     gen_family(&["--time", "-1"], "--time");

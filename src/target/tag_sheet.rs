@@ -38,8 +38,7 @@ struct Blanks {
 }
 
 impl Blanks {
-    fn new(spec: &TagSheetSpec, family: &Family) -> Self {
-        let edge = spec.edge_mm;
+    fn new(edge: f64, spec: &TagSheetSpec, family: &Family) -> Self {
         let cell = edge / (f64::from(family.dimension().rows()) + 3.0 * spec.border_bits);
         let quiet = (QUIET.0 * edge).max(QUIET.1).max(cell);
         let (share, [least, most]) = ID_CAP;
@@ -78,8 +77,8 @@ pub(super) fn parts(
     panels.sort_by_key(|panel| panel.id);
     let Some(paper) = paper else { return Ok((panels, family_ref, Vec::new())) };
 
-    let blanks = Blanks::new(spec, family);
-    let (grid @ [columns, rows], arrangement) = arrange(spec, &blanks, paper)?;
+    let blanks = Blanks::new(spec.edge_mm, spec, family);
+    let (grid @ [columns, rows], arrangement) = arrange(spec, &blanks, family, paper)?;
     let pages: Vec<&[u32]> = spec.ids.chunks(columns * rows).collect();
     let count = pages.len();
     let sheets = pages.into_iter().enumerate().map(|(index, ids)| {
@@ -130,6 +129,7 @@ fn panel(spec: &TagSheetSpec, id: u32) -> Panel {
 fn arrange(
     spec: &TagSheetSpec,
     blanks: &Blanks,
+    family: &Family,
     paper: &PaperSpec,
 ) -> Result<([usize; 2], Arrangement), TargetError> {
     let margin = check_margin(paper)?;
@@ -145,7 +145,7 @@ fn arrange(
     let [across, down] = blanks.pitch();
     let tags = spec.ids.len();
     let mut best: Option<([usize; 2], Arrangement)> = None;
-    for page in pages {
+    for &page in &pages {
         for columns in 1..=(((page[0] / across) as usize + 1).min(tags)) {
             for rows in 1..=(((page[1] / down) as usize + 1).min(tags.div_ceil(columns))) {
                 let footprint = blanks.footprint([columns, rows], paper.margin_mm);
@@ -160,9 +160,16 @@ fn arrange(
     }
     best.ok_or_else(|| {
         let edge = format_mm(spec.edge_mm);
+        let fits = |mm: &u32| {
+            let footprint = Blanks::new(f64::from(*mm), spec, family).footprint([1, 1], margin);
+            pages.iter().any(|&page| on_page(&footprint, page, margin, false).is_some())
+        };
+        let instead = match (*EDGE_MM.start() as u32..spec.edge_mm.ceil() as u32).rev().find(fits) {
+            Some(mm) => format!("larger paper, or an --edge of at most {mm} mm"),
+            None => "larger paper, or a smaller --margin".to_owned(),
+        };
         let problem = format!(
-            "a tag with {edge} edges, its id and the check bars do not fit {size}: take larger \
-             paper or a smaller --edge"
+            "a tag with {edge} edges, its id and the check bars do not fit {size}: take {instead}"
         );
         TargetError::invalid("--paper", problem)
     })
@@ -249,7 +256,7 @@ mod tests {
 
     #[test]
     fn every_tag_is_on_one_page_with_blank_around_it() {
-        for (edge, paper) in [(5.0, "A4"), (30.0, "A4"), (30.0, "letter"), (170.0, "A4")] {
+        for (edge, paper) in [(5.0, "A4"), (30.0, "A4"), (30.0, "letter"), (140.0, "A4")] {
             let ids: Vec<u32> = (100..300).collect();
             let target = build(ids.clone(), edge, paper).unwrap();
             let placed: Vec<u32> =
@@ -275,7 +282,13 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused() {
-        assert!(build(vec![0], 250.0, "A4").unwrap_err().to_string().starts_with("--paper: a tag"));
+        let error = build(vec![0], 250.0, "A4").unwrap_err().to_string();
+        assert!(error.starts_with("--paper: a tag"), "{error}");
+        let largest = error.split("at most ").nth(1).and_then(|e| e.split(' ').next()).unwrap();
+        let largest: f64 = largest.parse().unwrap();
+        assert!(
+            build(vec![0], largest, "A4").is_ok() && build(vec![0], largest + 1.0, "A4").is_err()
+        );
         assert!(build(vec![0], 4.0, "A4").unwrap_err().to_string().starts_with("--edge: 4 mm"));
         assert!(build(vec![99_999], 30.0, "A4").unwrap_err().to_string().starts_with("--ids"));
     }

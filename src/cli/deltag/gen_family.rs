@@ -79,6 +79,13 @@ enum Method {
     Lexicode,
 }
 
+impl Method {
+    /// The name as it is typed.
+    fn name(self) -> String {
+        format!("{self:?}").to_lowercase()
+    }
+}
+
 /// What became of a search.
 struct Outcome {
     /// The codes, if there are any to be written.
@@ -173,13 +180,12 @@ impl Args {
             if !given || methods.contains(&method) {
                 return Ok(());
             }
-            let names = |m: &Method| format!("{m:?}").to_lowercase();
             let [last, others @ ..] = methods else { return Ok(()) };
-            let others: String = others.iter().map(|m| names(m) + " and ").collect();
+            let others: String = others.iter().map(|m| m.name() + " and ").collect();
             bail!(
                 "{option}: does nothing with --method {}, only with {others}{}; leave it out",
-                names(&method),
-                names(last)
+                method.name(),
+                last.name()
             )
         };
         refuse("--time", self.time.is_some(), &[Algebraic, Best])?;
@@ -202,7 +208,8 @@ impl Args {
         };
         ensure!(
             bits <= limit,
-            "--method {method:?}: works up to {limit} bits, not with {bits}; use best or algebraic"
+            "--method {}: works up to {limit} bits, not with {bits}; use best or algebraic",
+            method.name()
         );
         Ok(())
     }
