@@ -104,6 +104,8 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
     refused(&["gen-family", "d16h99999999999"], "d16h99999999999");
     refused(&["gen-family", "d49h12", "--method", "search"], "--method search");
     refused(&["gen-family", "d49h12", "--method", "lexicode"], "--method");
+    let far = ["gen-family", "d36h30", "--time", "0.1"];
+    refused(&far, "no word of 36 bits was found that satisfies the rules at distance 30");
     gen_family(&["--threads", "0"], "--threads");
     gen_family(&["--time", "-1"], "--time");
     gen_family(&["--time", "nan"], "--time");

@@ -356,10 +356,13 @@ impl Best {
         screen: &Screen,
         control: Control,
     ) -> Result<(Vec<u64>, Construction), FamilyError> {
-        let search = Search { seed: self.seed, rounds: 3, steps: 200_000 };
+        if self.dimension.bits() > super::polish::MAX_BITS {
+            control.check()?;
+            return Err(FamilyError::field("codes", "none was found"));
+        }
+        let search = Search { seed: self.seed, rounds: 3, steps: Search::STEPS };
         let codes = search.codes(screen, control)?;
-        let Search { seed, rounds, steps } = search;
-        Ok((codes, Construction::Search { seed, rounds, steps }))
+        Ok((codes, search.construction(search.rounds)))
     }
 }
 

@@ -213,8 +213,11 @@ impl<'a> Verifier<'a> {
             // from the true lower edge, not from the end of the last pixel.
             page.height_mm = layout.height_mm;
         }
-        let found_from_stated = if self.placed(&page, layout).iter().all(|p| p.panel.is_tag_alone())
-        {
+        let placed = self.placed(&page, layout);
+        let tags_alone = !placed.is_empty()
+            && placed.len() == layout.placements.len()
+            && placed.iter().all(|p| p.panel.is_tag_alone());
+        let found_from_stated = if tags_alone {
             tags::check(self, &page, layout, &mut verdict);
             AffineMap::IDENTITY
         } else {
