@@ -23,6 +23,9 @@ fn every_claim_of_every_shipped_family_holds() {
 fn files_read_back_as_written() {
     for family in shipped() {
         assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
+        // The file in the repository is what this version writes.
+        let path = format!("{}/families/{}.json", env!("CARGO_MANIFEST_DIR"), family.name());
+        assert!(std::fs::read_to_string(&path).unwrap() == family.to_json(), "{path}");
     }
 }
 

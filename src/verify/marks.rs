@@ -4,6 +4,7 @@
 //! those printed; what is proved is that the sheet has the words of the description.
 
 use std::collections::BTreeSet;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 use kurbo::{BezPath, PathEl, Shape};
 use rayon::prelude::*;
@@ -189,13 +190,20 @@ impl<'a> Ground<'a> {
         }
         let edge_mm = self.placed.panel.edge_mm;
         let near = EDGE_PX / page.px_per_mm;
-        let steps = [[0.0, 0.0], [near, 0.0], [-near, 0.0], [0.0, near], [0.0, -near]];
-        let in_tile = steps.iter().any(|[du, dv]| {
+        // Also aslant: a lone tile has sharp corners.
+        let aslant = near * FRAC_1_SQRT_2;
+        let steps = [[near, 0.0], [aslant, aslant]].into_iter();
+        let in_tile = steps.flat_map(quarter_turns).chain([[0.0; 2]]).any(|[du, dv]| {
             self.tiles.contains(&tile_at([(u + du) / edge_mm, (v + dv) / edge_mm]))
         });
         let undecided = in_tile || (self.inverted() && inside < EDGE_PX);
         Some((!undecided).then_some(if self.inverted() { 1.0 } else { 0.0 }))
     }
+}
+
+/// A step, and the same turned by one, two and three quarters.
+fn quarter_turns([x, y]: [f64; 2]) -> [[f64; 2]; 4] {
+    [[x, y], [-y, x], [-x, -y], [y, -x]]
 }
 
 /// The tile of the lattice at a position, in edges.
