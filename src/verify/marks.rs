@@ -14,7 +14,7 @@ use super::{Finding, SheetVerdict};
 use crate::artwork;
 use crate::lattice::{ROW_HEIGHT, Tile, Vertex};
 use crate::raster::{Coverage, Gray};
-use crate::target::{CHECK_BAR_STROKE_MM, SheetLayout, SheetText};
+use crate::target::{CHECK_BAR_STROKE_MM, SheetLayout, SheetLine, SheetText};
 
 /// Ink of a text and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
 /// that lies 0.02 mm off at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
@@ -27,14 +27,26 @@ const TEXT_BLANK_PX: f64 = 3.0;
 /// bar, its measurement tells.
 const BAR_BLANK_MM: f64 = 0.3;
 
+/// Least ink of a line, relative to what its width lets a pixel have at most.
+const LEAST_LINE_INK: f64 = 0.3;
+
+/// So near to the ends of a stroke its ink is not looked at, px.
+const LINE_END_PX: f64 = 1.5;
+
+/// Blank around the window of a page that belongs to it, px: what it shows is cut off at its rim,
+/// through pixels and through the width of lines.
+const WINDOW_BLANK_PX: f64 = 3.0;
+
 /// How finely curves are turned into lines, mm.
 const FLATNESS_MM: f64 = 0.002;
 
-/// Compares the texts, and looks for ink where none should be.
+/// Compares the texts and lines, and looks for ink where none should be. What is in `window`
+/// (left, lower, right, upper end, mm), the part of a larger sheet, is left to others.
 pub(super) fn check(
     page: &Page,
     layout: &SheetLayout,
     panels: &[PlacedPanel],
+    window: Option<[f64; 4]>,
     verdict: &mut SheetVerdict,
 ) {
     let (width, height) = (page.image.width(), page.image.height());
@@ -63,11 +75,62 @@ pub(super) fn check(
         let blank = (CHECK_BAR_STROKE_MM / 2.0 + BAR_BLANK_MM) * page.px_per_mm;
         cover(pixels(page, spanned(bar.from_mm, bar.to_mm), blank));
     }
-    for line in &layout.lines {
+    for (index, line) in layout.lines.iter().enumerate() {
+        if !has_strokes(page, line) {
+            let finding = Finding::LineDiffers { line: index + 1, purpose: line.kind };
+            verdict.findings.push(finding);
+        }
         let blank = (line.width_mm / 2.0 + BAR_BLANK_MM) * page.px_per_mm;
-        cover(pixels(page, spanned(line.from_mm, line.to_mm), blank));
+        let length_px = distance(line.from_mm, line.to_mm) * page.px_per_mm;
+        let steps = length_px.ceil().max(1.0) as usize;
+        for n in 0..=steps {
+            let at = between(line.from_mm, line.to_mm, n as f64 / steps as f64);
+            cover(pixels(page, spanned(at, at), blank));
+        }
     }
+    window.into_iter().for_each(|window| cover(pixels(page, window, WINDOW_BLANK_PX)));
     spots(page, &known, panels, verdict);
+}
+
+/// Whether a line is there: ink along its strokes, and none between them.
+fn has_strokes(page: &Page, line: &SheetLine) -> bool {
+    let strokes = artwork::strokes_mm(line);
+    let across = {
+        let length = distance(line.from_mm, line.to_mm);
+        [0, 1].map(|i| [line.from_mm[1] - line.to_mm[1], line.to_mm[0] - line.from_mm[0]][i] / length)
+    };
+    // A hairline lies between pixels: its ink is that of the darkest place across it.
+    let ink = |at: [f64; 2]| {
+        let [x, y] = page.px_from_page(at);
+        let offsets = [-1.0, -0.5, 0.0, 0.5, 1.0];
+        offsets.map(|d| page.ink([x + d * across[0], y - d * across[1]])).into_iter().fold(0.0, f64::max)
+    };
+    let full = (line.width_mm * page.px_per_mm).min(1.0);
+    let inked = |[from, to]: &[[f64; 2]; 2]| {
+        // The ends blur over a pixel.
+        let length_px = distance(*from, *to) * page.px_per_mm;
+        let margin = (LINE_END_PX / length_px).min(0.5);
+        let steps = (length_px / 2.0).ceil().max(1.0) as usize;
+        (0..=steps).all(|n| {
+            let part = margin + (1.0 - 2.0 * margin) * n as f64 / steps as f64;
+            ink(between(*from, *to, part)) > LEAST_LINE_INK * full
+        })
+    };
+    strokes.iter().all(inked)
+        && strokes.windows(2).all(|pair| {
+            let gap_px = distance(pair[0][1], pair[1][0]) * page.px_per_mm;
+            gap_px < 2.0 * LINE_END_PX
+                || ink(between(pair[0][1], pair[1][0], 0.5)) < LEAST_LINE_INK * full
+        })
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The point at a part of the way from a to b.
+fn between(a: [f64; 2], b: [f64; 2], part: f64) -> [f64; 2] {
+    [0, 1].map(|i| a[i] + (b[i] - a[i]) * part)
 }
 
 /// The rectangle that two points span: left, lower, right, upper.
@@ -165,13 +228,20 @@ struct Ground<'a> {
     tiles: BTreeSet<Tile>,
     /// The tiles and the black field of an inverted panel: left, lower, right, upper end, mm.
     field: [f64; 4],
+    /// Where on the picture that may be: left, upper, right, lower end, px.
+    around_px: [f64; 4],
 }
 
 impl<'a> Ground<'a> {
     fn new(placed: &'a PlacedPanel<'a>) -> Self {
         let panel = placed.panel;
         let field = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
-        Self { placed, tiles: placed.tiles(), field }
+        let [left, lower, right, upper] = field;
+        let ends = [[left, lower], [right, lower], [right, upper], [left, upper]];
+        let ends = ends.map(|p| placed.page.px_from_page(placed.page_from_panel(p)));
+        let most = |i: usize, sign: f64| ends.map(|p| sign * p[i]).into_iter().fold(f64::MIN, f64::max) + 2.0 * EDGE_PX;
+        let around_px = [-most(0, -1.0), -most(1, -1.0), most(0, 1.0), most(1, 1.0)];
+        Self { placed, tiles: placed.tiles(), field, around_px }
     }
 
     fn inverted(&self) -> bool {
@@ -179,8 +249,13 @@ impl<'a> Ground<'a> {
     }
 
     /// What a pixel of the panel's area should be; `Some(None)` in and beside the tiles, which are
-    /// compared by themselves, and at the edge of the field.
+    /// compared by themselves, and at the edge of the field. Between the tiles of a panel that is
+    /// not inverted there may be another one.
     fn expected(&self, page: &Page, [x, y]: [f64; 2]) -> Option<Option<f64>> {
+        let [left, upper, right, lower] = self.around_px;
+        if x < left || x > right || y < upper || y > lower {
+            return None;
+        }
         let [u, v] = self.placed.panel_from_page(page.page_from_px([x, y]));
         let [left, lower, right, upper] = self.field;
         let inside = (u - left).min(right - u).min(v - lower).min(upper - v) * page.px_per_mm;
@@ -194,7 +269,7 @@ impl<'a> Ground<'a> {
             self.tiles.contains(&tile_at([(u + du) / edge_mm, (v + dv) / edge_mm]))
         });
         let undecided = in_tile || (self.inverted() && inside < EDGE_PX);
-        Some((!undecided).then_some(if self.inverted() { 1.0 } else { 0.0 }))
+        if undecided { Some(None) } else { self.inverted().then_some(Some(1.0)) }
     }
 }
 
