@@ -26,7 +26,8 @@ pub fn strokes_mm(line: &SheetLine) -> Vec<[[f64; 2]; 2]> {
     let period: f64 = pattern.iter().sum();
     let count = ((length - pattern[0]) / period).round().max(0.0);
     let stretch = length / (count * period + pattern[0]);
-    let at = |mm: f64| [0, 1].map(|i| line.from_mm[i] + [dx, dy][i] * (mm * stretch / length).min(1.0));
+    let at =
+        |mm: f64| [0, 1].map(|i| line.from_mm[i] + [dx, dy][i] * (mm * stretch / length).min(1.0));
     let mut strokes = Vec::new();
     for n in 0..=count as usize {
         let mut start = n as f64 * period;

@@ -27,7 +27,8 @@ pub(super) fn clip(shape: Shape, window: Rect) -> Option<Shape> {
         if closed {
             append(&mut path, &clip_polygon(line, window), true);
         } else {
-            let segments = line.windows(2).filter_map(|ends| clip_segment([ends[0], ends[1]], window));
+            let segments =
+                line.windows(2).filter_map(|ends| clip_segment([ends[0], ends[1]], window));
             segments.for_each(|segment| append(&mut path, &segment, false));
         }
     }

@@ -261,7 +261,8 @@ pub enum LineKind {
     Fold,
     /// To fold along, towards the print; dash-dotted.
     Valley,
-    /// A stroke of a cross that pages share, to lay one on the other; drawn through.
+    /// A stroke of a registration cross: pages that share it are laid on one another, single faces
+    /// on their seats; or of the overview of such pages. Drawn through.
     Align,
 }
 

@@ -29,8 +29,8 @@ pub(super) fn assemble(
     layout: &SheetLayout,
     px_per_mm: f64,
 ) -> (Page, Vec<Finding>) {
-    let size_px = [layout.width_mm, layout.height_mm]
-        .map(|mm| ((mm * px_per_mm).round() as usize).max(1));
+    let size_px =
+        [layout.width_mm, layout.height_mm].map(|mm| ((mm * px_per_mm).round() as usize).max(1));
     let mut sheet = Page {
         width_mm: layout.width_mm,
         height_mm: layout.height_mm,

@@ -298,8 +298,12 @@ impl Net {
                 break;
             }
         }
-        let nothing =
-            Folded { places: Vec::new(), findings: Vec::new(), misplaced: false, deviation_mm: 0.0 };
+        let nothing = Folded {
+            places: Vec::new(),
+            findings: Vec::new(),
+            misplaced: false,
+            deviation_mm: 0.0,
+        };
         best.unwrap_or(nothing)
     }
 
@@ -372,14 +376,14 @@ impl Net {
             }
             if place.vertices != face.vertices {
                 misplaced = true;
-                let turns = (0..3).find(|&n| {
-                    (0..3).all(|i| place.vertices[(i + 3 - n) % 3] == face.vertices[i])
-                });
+                let turns = (0..3)
+                    .find(|&n| (0..3).all(|i| place.vertices[(i + 3 - n) % 3] == face.vertices[i]));
                 let angle_deg = 120.0 * turns.unwrap_or_default() as f64;
                 findings.push(Finding::FaceTurned { panel, angle_deg });
                 continue;
             }
-            let off = |&(at, space): &(DVec2, DVec3)| place.space_from_page.apply(at).distance(space);
+            let off =
+                |&(at, space): &(DVec2, DVec3)| place.space_from_page.apply(at).distance(space);
             let most = face.corners.iter().map(off).fold(0.0, f64::max);
             deviation_mm = deviation_mm.max(most);
             if most > FOLD_TOLERANCE_MM {
@@ -398,11 +402,7 @@ impl Net {
 
     /// How far the two sides of an edge are apart in space, if they belong together: folded
     /// against each other on the page, or cut and carrying the same number.
-    fn check_edge(
-        &self,
-        edge: &Edge,
-        carried: &[Option<SpaceFromPage>],
-    ) -> Result<f64, Finding> {
+    fn check_edge(&self, edge: &Edge, carried: &[Option<SpaceFromPage>]) -> Result<f64, Finding> {
         let [one, other] = edge.sides;
         let panels = [self.faces[one.0].panel, self.faces[other.0].panel];
         let ends = |side: (usize, usize)| {

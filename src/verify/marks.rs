@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use kurbo::{BezPath, PathEl, Shape};
+use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape};
 use rayon::prelude::*;
 
 use super::document::Page;
@@ -51,26 +51,17 @@ pub(super) fn check(
 ) {
     let (width, height) = (page.image.width(), page.image.height());
     let mut known = vec![false; width * height];
-    let mut cover = |[x0, y0, x1, y1]: [usize; 4]| {
-        (y0..y1).for_each(|y| known[y * width + x0..y * width + x1].fill(true));
-    };
     for (index, text) in layout.texts.iter().enumerate() {
-        let outline = artwork::text_outline(text).ok();
-        let area = outline.as_ref().filter(|path| !path.is_empty()).map(|path| {
-            let bounds = path.bounding_box();
-            pixels(page, [bounds.x0, bounds.y0, bounds.x1, bounds.y1], TEXT_BLANK_PX)
-        });
-        let same = match (&outline, area) {
-            (Some(path), Some(area)) => has_ink(page, path, area),
-            (Some(_), None) => true,
-            (None, _) => false,
-        };
-        if !same {
+        let words = Words::new(text);
+        if words.as_ref().is_none_or(|words| !words.has_ink(page)) {
             let SheetText { text, .. } = text;
             verdict.findings.push(Finding::TextDiffers { text: index + 1, stated: text.clone() });
         }
-        area.into_iter().for_each(&mut cover);
+        words.iter().for_each(|words| words.cover(page, &mut known));
     }
+    let mut cover = |[x0, y0, x1, y1]: [usize; 4]| {
+        (y0..y1).for_each(|y| known[y * width + x0..y * width + x1].fill(true));
+    };
     for bar in &layout.check_bars {
         let blank = (CHECK_BAR_STROKE_MM / 2.0 + BAR_BLANK_MM) * page.px_per_mm;
         cover(pixels(page, spanned(bar.from_mm, bar.to_mm), blank));
@@ -97,13 +88,17 @@ fn has_strokes(page: &Page, line: &SheetLine) -> bool {
     let strokes = artwork::strokes_mm(line);
     let across = {
         let length = distance(line.from_mm, line.to_mm);
-        [0, 1].map(|i| [line.from_mm[1] - line.to_mm[1], line.to_mm[0] - line.from_mm[0]][i] / length)
+        [0, 1]
+            .map(|i| [line.from_mm[1] - line.to_mm[1], line.to_mm[0] - line.from_mm[0]][i] / length)
     };
     // A hairline lies between pixels: its ink is that of the darkest place across it.
     let ink = |at: [f64; 2]| {
         let [x, y] = page.px_from_page(at);
         let offsets = [-1.0, -0.5, 0.0, 0.5, 1.0];
-        offsets.map(|d| page.ink([x + d * across[0], y - d * across[1]])).into_iter().fold(0.0, f64::max)
+        offsets
+            .map(|d| page.ink([x + d * across[0], y - d * across[1]]))
+            .into_iter()
+            .fold(0.0, f64::max)
     };
     let full = (line.width_mm * page.px_per_mm).min(1.0);
     let inked = |[from, to]: &[[f64; 2]; 2]| {
@@ -151,33 +146,87 @@ fn pixels(page: &Page, [x0, y0, x1, y1]: [f64; 4], blank: f64) -> [usize; 4] {
     [left.min(right), upper.min(lower), right, lower].map(|v| v as usize)
 }
 
-/// Whether an area of the page has the ink of an outline, and no other.
-fn has_ink(page: &Page, path: &BezPath, [x0, y0, x1, y1]: [usize; 4]) -> bool {
-    let (width, height) = (x1 - x0, y1 - y0);
-    let mut coverage = Coverage::new(width, height);
-    let mut polygon: Vec<[f64; 2]> = Vec::new();
-    kurbo::flatten(path, FLATNESS_MM, |element| match element {
-        PathEl::MoveTo(p) | PathEl::LineTo(p) => {
-            let [x, y] = page.px_from_page([p.x, p.y]);
-            polygon.push([x - x0 as f64, y - y0 as f64]);
+/// The outline of a text and the area that belongs to it: its bounds along its own base line, so
+/// that a slanted text claims no more than an upright one.
+struct Words {
+    path: BezPath,
+    /// From the page to a frame along the base line.
+    along: Affine,
+    /// Bounds in that frame, mm.
+    bounds: Rect,
+}
+
+impl Words {
+    /// `None` where the built-in font lacks a letter.
+    fn new(text: &SheetText) -> Option<Self> {
+        let path = artwork::text_outline(text).ok()?;
+        let along = Affine::rotate(-text.angle_rad);
+        let bounds = (along * &path).bounding_box();
+        Some(Self { path, along, bounds })
+    }
+
+    /// The rectangle of pixels around all of it.
+    fn pixels(&self, page: &Page) -> [usize; 4] {
+        let bounds = self.path.bounding_box();
+        pixels(page, [bounds.x0, bounds.y0, bounds.x1, bounds.y1], TEXT_BLANK_PX)
+    }
+
+    /// Whether a pixel belongs to it, with `blank` around.
+    fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
+        let [x, y] = page.page_from_px([x as f64, y as f64]);
+        let blank = blank_px / page.px_per_mm;
+        self.bounds.inflate(blank, blank).contains(self.along * Point::new(x, y))
+    }
+
+    /// Marks its pixels.
+    fn cover(&self, page: &Page, known: &mut [bool]) {
+        if self.path.is_empty() {
+            return;
         }
-        _ => {
-            coverage.add(&polygon, 1.0);
-            polygon.clear();
+        let [x0, y0, x1, y1] = self.pixels(page);
+        for y in y0..y1 {
+            for x in x0..x1 {
+                known[y * page.image.width() + x] |= self.contains(page, x, y, TEXT_BLANK_PX);
+            }
         }
-    });
-    // Which way outlines run is the font's business.
-    let stated = coverage.finish().map(|v| v.abs().min(1.0));
-    let found =
-        Gray::from_fn(width, height, |x, y| 1.0 - f32::from(page.image.at(x0 + x, y0 + y)) / 255.0);
-    let mean = |image: &Gray<f32>, x: usize, y: usize| {
-        let rows = (y - 1..=y + 1).map(|y| image.row(y)[x - 1..=x + 1].iter().sum::<f32>());
-        f64::from(rows.sum::<f32>()) / 9.0
-    };
-    let inside = |n: usize| 1..n.saturating_sub(1);
-    inside(height).all(|y| {
-        inside(width).all(|x| (mean(&stated, x, y) - mean(&found, x, y)).abs() <= MAX_TEXT_ERROR)
-    })
+    }
+
+    /// Whether its area has the ink of its outline, and no other.
+    fn has_ink(&self, page: &Page) -> bool {
+        if self.path.is_empty() {
+            return true;
+        }
+        let [x0, y0, x1, y1] = self.pixels(page);
+        let (width, height) = (x1 - x0, y1 - y0);
+        let mut coverage = Coverage::new(width, height);
+        let mut polygon: Vec<[f64; 2]> = Vec::new();
+        kurbo::flatten(&self.path, FLATNESS_MM, |element| match element {
+            PathEl::MoveTo(p) | PathEl::LineTo(p) => {
+                let [x, y] = page.px_from_page([p.x, p.y]);
+                polygon.push([x - x0 as f64, y - y0 as f64]);
+            }
+            _ => {
+                coverage.add(&polygon, 1.0);
+                polygon.clear();
+            }
+        });
+        // Which way outlines run is the font's business.
+        let stated = coverage.finish().map(|v| v.abs().min(1.0));
+        let found = Gray::from_fn(width, height, |x, y| {
+            1.0 - f32::from(page.image.at(x0 + x, y0 + y)) / 255.0
+        });
+        let mean = |image: &Gray<f32>, x: usize, y: usize| {
+            let rows = (y - 1..=y + 1).map(|y| image.row(y)[x - 1..=x + 1].iter().sum::<f32>());
+            f64::from(rows.sum::<f32>()) / 9.0
+        };
+        let inside = |n: usize| 1..n.saturating_sub(1);
+        inside(height).all(|y| {
+            inside(width).all(|x| {
+                !self.contains(page, x0 + x, y0 + y, TEXT_BLANK_PX - 1.0)
+                    || (mean(&stated, x, y) - mean(&found, x, y)).abs() <= MAX_TEXT_ERROR
+            })
+        })
+    }
 }
 
 /// Names each connected spot of wrong pixels outside the tiles and the `known` marks.
@@ -239,7 +288,9 @@ impl<'a> Ground<'a> {
         let [left, lower, right, upper] = field;
         let ends = [[left, lower], [right, lower], [right, upper], [left, upper]];
         let ends = ends.map(|p| placed.page.px_from_page(placed.page_from_panel(p)));
-        let most = |i: usize, sign: f64| ends.map(|p| sign * p[i]).into_iter().fold(f64::MIN, f64::max) + 2.0 * EDGE_PX;
+        let most = |i: usize, sign: f64| {
+            ends.map(|p| sign * p[i]).into_iter().fold(f64::MIN, f64::max) + 2.0 * EDGE_PX
+        };
         let around_px = [-most(0, -1.0), -most(1, -1.0), most(0, 1.0), most(1, 1.0)];
         Self { placed, tiles: placed.tiles(), field, around_px }
     }

@@ -160,7 +160,8 @@ impl<'a> Verifier<'a> {
                 if found != stated {
                     findings.push(Finding::Pages { found, stated });
                 }
-                let source = |page| (page < found).then_some(Source { document: &documents[0], page });
+                let source =
+                    |page| (page < found).then_some(Source { document: &documents[0], page });
                 (0..stated).map(source).collect()
             }
             _ if documents.len() > 1 => {
@@ -190,7 +191,8 @@ impl<'a> Verifier<'a> {
         if fold::is_net(self.target) && verdicts.len() == self.target.sheets.len() {
             fold::check(self.target, &seen, &mut verdicts);
         }
-        let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name =
+            |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let artifact = match files.as_slice() {
             [first, .., last] => format!("{} to {}", name(first), name(last)),
             _ => name(path),
@@ -259,13 +261,15 @@ impl<'a> Verifier<'a> {
         let mut pages = Vec::with_capacity(sources.len());
         let mut findings = Vec::new();
         let mut check_bars_mm = Vec::new();
-        for (source, SheetPage { label, window_mm, marks, .. }) in sources.iter().zip(&layout.pages) {
+        for (source, SheetPage { label, window_mm, marks, .. }) in sources.iter().zip(&layout.pages)
+        {
             let (page, wrong) = source.render(marks, px_per_mm);
             let mut verdict = SheetVerdict::new(index, &page, wrong);
             check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
             marks::check(&page, marks, &[], Some(*window_mm), &mut verdict);
-            findings.extend(verdict.findings.into_iter().map(|finding| {
-                Finding::OnPage { page: label.clone(), finding: Box::new(finding) }
+            findings.extend(verdict.findings.into_iter().map(|finding| Finding::OnPage {
+                page: label.clone(),
+                finding: Box::new(finding),
             }));
             check_bars_mm.extend(verdict.check_bars_mm);
             pages.push(page);

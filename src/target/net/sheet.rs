@@ -118,8 +118,7 @@ pub fn sheets(
 
 /// The unfoldings that have room for tabs, best liked first.
 fn nets(solid: &Polyhedron, spec: &SolidSpec, faces: &[Face], sides: &Sides) -> Vec<Net> {
-    let flat: Vec<[DVec2; 3]> =
-        faces.iter().map(|face| face.outline_mm.map(DVec2::from)).collect();
+    let flat: Vec<[DVec2; 3]> = faces.iter().map(|face| face.outline_mm.map(DVec2::from)).collect();
     let with_tabs = |pieces: Vec<Piece>| {
         let tabs = tabs::place(&pieces, sides)?;
         Some(Net { pieces, tabs })
@@ -342,7 +341,8 @@ impl<'a> Drawing<'a> {
         });
         parts.push(format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)));
         let tags = || self.panels.iter().flat_map(|panel| &panel.tags);
-        if let (Some(family), Some(first), Some(last)) = (self.family, tags().next(), tags().last()) {
+        if let (Some(family), Some(first), Some(last)) = (self.family, tags().next(), tags().last())
+        {
             parts.push(format!("{} ids {}–{}", family.name, first.id, last.id));
             parts.push(format!("fingerprint {}", family.fingerprint));
         }

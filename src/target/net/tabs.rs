@@ -63,7 +63,8 @@ pub fn place(pieces: &[Piece], sides: &Sides) -> Option<Vec<Vec<Tab>>> {
             Some((p, tab))
         });
         let (p, tab) = best.max_by(|(_, a), (_, b)| {
-            let order = |tab: &Tab| (std::cmp::Reverse(tab.side.side), std::cmp::Reverse(tab.side.face));
+            let order =
+                |tab: &Tab| (std::cmp::Reverse(tab.side.side), std::cmp::Reverse(tab.side.face));
             a.size().total_cmp(&b.size()).then_with(|| order(a).cmp(&order(b)))
         })?;
         tabs[p].push(tab);
@@ -116,9 +117,7 @@ fn largest(piece: &Piece, at: usize, side: Side, tabs: &[Tab]) -> Option<Tab> {
     let full = (part * ends[0].distance(ends[1])).clamp(least, most);
     let depths = DEPTHS.iter().map(|part| (part * full).max(least));
     let mut shapes = depths.flat_map(|depth| {
-        INSETS.iter().flat_map(move |&inset| {
-            LEGS_DEG.iter().map(move |&leg| (depth, inset, leg))
-        })
+        INSETS.iter().flat_map(move |&inset| LEGS_DEG.iter().map(move |&leg| (depth, inset, leg)))
     });
     let obstacles = || {
         let faces = piece.iter().enumerate().filter(|&(f, _)| f != at);

@@ -315,7 +315,10 @@ fn crosses(shared: [f64; 4], obstacles: &[Vec<DVec2>]) -> Vec<SheetLine> {
     let near: Vec<&Vec<DVec2>> =
         obstacles.iter().filter(|polygon| gap_mm(polygon, &rectangle(shared)) < arm).collect();
     let [left, lower, right, upper] = shared;
-    let (middle, half) = (DVec2::new(left + right, lower + upper) / 2.0, [right - left, upper - lower].map(|s| s / 2.0));
+    let (middle, half) = (
+        DVec2::new(left + right, lower + upper) / 2.0,
+        [right - left, upper - lower].map(|s| s / 2.0),
+    );
     let lengthwise = usize::from(half[1] > half[0]);
     let reach = arm + 1.0;
     let along = (half[lengthwise] - reach).max(0.0);
@@ -325,9 +328,8 @@ fn crosses(shared: [f64; 4], obstacles: &[Vec<DVec2>]) -> Vec<SheetLine> {
         let square = rectangle([at.x - area, at.y - area, at.x + area, at.y + area]);
         near.iter().all(|polygon| gap_mm(polygon, &square) > 0.0)
     };
-    let at = |u: f64, v: f64| {
-        middle + if lengthwise == 0 { DVec2::new(u, v) } else { DVec2::new(v, u) }
-    };
+    let at =
+        |u: f64, v: f64| middle + if lengthwise == 0 { DVec2::new(u, v) } else { DVec2::new(v, u) };
     let steps = (2.0 * along) as usize;
     let from_one_end = |sign: f64| {
         let places = (0..=steps).flat_map(|n| [0.0, 0.5, -0.5, 1.0, -1.0].map(|v| (n as f64, v)));

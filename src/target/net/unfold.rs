@@ -12,6 +12,9 @@ use crate::target::{Polyhedron, SolidShape};
 /// Seed of the search for nets of meshes: any will do, a fixed one makes results repeatable.
 const SEED: u64 = 20;
 
+/// Grown nets that are looked at further.
+const MOST_GROWN: usize = 8;
+
 /// Orders of growth tried for a mesh: fewer for many faces, since each takes a time that grows
 /// with their square.
 fn tries(faces: usize) -> u64 {
@@ -78,23 +81,31 @@ impl Sides {
 /// Ways to unfold a solid, best liked first: each a list of pieces that together hold every face
 /// once. `flat` holds the outlines of the faces, each in a frame of its own, mm.
 ///
-/// A named solid has its usual nets. Any other is grown from many beginnings in many orders; a
-/// face is laid on the first free side where it overlaps nothing, and what finds no place begins
-/// another piece, so that every result is a valid one. Fewer pieces are better, then a smaller
-/// bounding box.
+/// A named solid has its usual nets, any other solid those that are [`grown`].
 pub fn unfoldings(solid: &Polyhedron, shape: &SolidShape, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
+    let usual = usual(solid, shape, flat);
+    if usual.is_empty() { grown(solid, flat) } else { usual }
+}
+
+/// The usual nets of a named solid.
+fn usual(solid: &Polyhedron, shape: &SolidShape, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
     let sides = Sides::new(solid);
-    let usual = usual_hinges(shape).into_iter().filter_map(|(root, hinges)| {
-        hang(flat, &sides, root, &hinges).filter(|piece| piece.len() == flat.len())
+    let nets = usual_hinges(shape).into_iter().filter_map(|(root, hinges)| {
+        let piece = hang(flat, &sides, root, &hinges)?;
+        (piece.len() == flat.len()).then(|| vec![piece])
     });
-    let usual: Vec<Vec<Piece>> = usual.map(|piece| vec![piece]).collect();
-    if !usual.is_empty() {
-        return usual;
-    }
+    nets.collect()
+}
+
+/// Nets grown from many beginnings in many orders: a face is laid on the first free side where it
+/// overlaps nothing, and what finds no place begins another piece, so that every result is a valid
+/// one. Fewer pieces are better, then a smaller bounding box.
+fn grown(solid: &Polyhedron, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
+    let sides = Sides::new(solid);
     let mut grown: Vec<Vec<Piece>> =
         (0..tries(flat.len())).map(|n| grow_all(flat, &sides, n, flat.len())).collect();
     grown.sort_by(|a, b| a.len().cmp(&b.len()).then(area(a).total_cmp(&area(b))));
-    grown.truncate(8);
+    grown.truncate(MOST_GROWN);
     grown
 }
 
@@ -118,7 +129,10 @@ fn usual_hinges(shape: &SolidShape) -> Vec<(usize, Vec<(usize, usize)>)> {
         "tetrahedron" => {
             vec![(3, vec![(3, 0), (3, 1), (3, 2)]), (0, vec![(0, 1), (1, 2), (2, 3)])]
         }
-        "octahedron" => octahedron_hinges(),
+        // Four rows in two columns: a zigzag of the upper faces, the lower ones at its sides.
+        "octahedron" => {
+            vec![(0, vec![(0, 1), (1, 2), (2, 3), (0, 4), (1, 5), (2, 6), (3, 7)])]
+        }
         // A belt of ten, with five teeth above and five below; see `Polyhedron`.
         "icosahedron" => {
             let belt = (0..5).flat_map(|k| {
@@ -131,10 +145,6 @@ fn usual_hinges(shape: &SolidShape) -> Vec<(usize, Vec<(usize, usize)>)> {
         }
         _ => Vec::new(),
     }
-}
-
-fn octahedron_hinges() -> Vec<(usize, Vec<(usize, usize)>)> {
-    vec![(0, vec![(0, 1), (1, 2), (2, 3), (0, 4), (1, 5), (2, 6), (3, 7)])]
 }
 
 /// Lays the faces out as the pairs of parent and child say; `None` where two overlap.
@@ -188,7 +198,10 @@ fn is_free(piece: &[FlatFace], corners: &[DVec2; 3]) -> bool {
     let [x0, y0, x1, y1] = bounds(corners);
     piece.iter().all(|face| {
         let [left, lower, right, upper] = bounds(&face.corners);
-        left > x1 || right < x0 || lower > y1 || upper < y0
+        left > x1
+            || right < x0
+            || lower > y1
+            || upper < y0
             || gap_mm(&face.corners, corners) >= -TOUCHING_MM
     })
 }
@@ -228,7 +241,8 @@ fn grow(
             ((p + q) / 2.0).distance_squared(centre)
         };
         let next = if round {
-            let nearest = open.iter().enumerate().min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));
+            let nearest =
+                open.iter().enumerate().min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));
             nearest.map_or(0, |(index, _)| index)
         } else {
             random.random_range(0..open.len())
@@ -244,4 +258,103 @@ fn grow(
         }
     }
     piece
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::target::net::tabs;
+
+    /// A named solid with its vertices moved; a face keeps its lengths, not its angles.
+    fn dented(shape: &SolidShape, moves: &[[f64; 3]]) -> Polyhedron {
+        let mut solid = match shape {
+            SolidShape::Tetrahedron => Polyhedron::tetrahedron(100.0),
+            SolidShape::Octahedron => Polyhedron::octahedron(100.0),
+            _ => Polyhedron::icosahedron(100.0),
+        };
+        for (vertex, by) in solid.vertices_mm.iter_mut().zip(moves) {
+            *vertex += DVec3::from(*by);
+        }
+        solid
+    }
+
+    fn outlines(solid: &Polyhedron) -> Vec<[DVec2; 3]> {
+        let outline = |face| solid.face(face, 6, 1.0).unwrap().outline_mm.map(DVec2::from);
+        (0..solid.faces.len()).map(outline).collect()
+    }
+
+    /// What makes an unfolding foldable: every face once and with its own lengths, the right side
+    /// up, hinges joined; and printable: nothing overlaps, every cut edge has a tab.
+    fn check(solid: &Polyhedron, pieces: &[Piece]) -> Result<(), TestCaseError> {
+        let mut faces: Vec<usize> = pieces.iter().flatten().map(|face| face.face).collect();
+        faces.sort_unstable();
+        prop_assert_eq!(faces, (0..solid.faces.len()).collect::<Vec<_>>());
+        let sides = Sides::new(solid);
+        let tabs = tabs::place(pieces, &sides).expect("there is room for every tab");
+        let tabbed = tabs.iter().flatten().count();
+        prop_assert_eq!(tabbed, tabs::cut_edges(pieces, &sides).len());
+        for (piece, tabs) in pieces.iter().zip(&tabs) {
+            prop_assert_eq!(piece.iter().filter(|face| face.hinge.is_none()).count(), 1);
+            for face in piece {
+                let space = solid.triangle_mm(face.face);
+                for side in 0..3 {
+                    let [p, q] = face.ends(side);
+                    let length = space[side].distance(space[(side + 1) % 3]);
+                    prop_assert!((p.distance(q) - length).abs() < 1e-9);
+                }
+                let [a, b, c] = face.corners;
+                prop_assert!((b - a).perp_dot(c - a) > 0.0);
+                if let Some((on, own)) = face.hinge {
+                    let on_face = piece.iter().find(|other| other.face == on.face).unwrap();
+                    let [p, q] = on_face.ends(on.side);
+                    prop_assert_eq!(face.ends(own.side), [q, p]);
+                    prop_assert_eq!(sides.partner(on), Some(own));
+                }
+            }
+            let polygons = piece.iter().map(|face| &face.corners[..]);
+            let polygons: Vec<&[DVec2]> =
+                polygons.chain(tabs.iter().map(|tab| &tab.corners[..])).collect();
+            for (n, a) in polygons.iter().enumerate() {
+                for b in &polygons[n + 1..] {
+                    prop_assert!(gap_mm(a, b) >= -2.0 * TOUCHING_MM);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn every_unfolding_can_be_printed_and_folded(
+            shape in 0usize..3,
+            moves in prop::collection::vec(prop::array::uniform3(-12.0f64..12.0), 12),
+        ) {
+            use SolidShape::{Icosahedron, Octahedron, Tetrahedron};
+            let shape = [Tetrahedron, Octahedron, Icosahedron][shape].clone();
+            let solid = dented(&shape, &moves);
+            let flat = outlines(&solid);
+            for net in usual(&solid, &shape, &flat).iter().chain(&grown(&solid, &flat)[..2]) {
+                check(&solid, net)?;
+            }
+            check(&solid, &in_small_pieces(&solid, &flat, 3))?;
+        }
+    }
+
+    #[test]
+    fn regular_solids_have_their_usual_nets_in_one_piece() {
+        for shape in [SolidShape::Tetrahedron, SolidShape::Octahedron, SolidShape::Icosahedron] {
+            let solid = dented(&shape, &[]);
+            let flat = outlines(&solid);
+            for net in usual(&solid, &shape, &flat).iter().chain(&grown(&solid, &flat)) {
+                assert_eq!(net.len(), 1);
+                check(&solid, net).unwrap();
+            }
+            assert!(!usual(&solid, &shape, &flat).is_empty());
+        }
+    }
 }
