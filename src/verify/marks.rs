@@ -37,6 +37,9 @@ const LINE_END_PX: f64 = 1.5;
 /// through pixels and through the width of lines.
 const WINDOW_BLANK_PX: f64 = 3.0;
 
+/// Directions in which a tile is looked for beside a pixel.
+const PROBES: u32 = 24;
+
 /// How finely curves are turned into lines, mm.
 const FLATNESS_MM: f64 = 0.002;
 
@@ -315,10 +318,13 @@ impl<'a> Ground<'a> {
         }
         let edge_mm = self.placed.panel.edge_mm;
         let near = EDGE_PX / page.px_per_mm;
-        let steps = [[0.0, 0.0], [near, 0.0], [-near, 0.0], [0.0, near], [0.0, -near]];
-        let in_tile = steps.iter().any(|[du, dv]| {
+        let reaches = |[du, dv]: [f64; 2]| {
             self.tiles.contains(&tile_at([(u + du) / edge_mm, (v + dv) / edge_mm]))
-        });
+        };
+        // Fine enough that no tip of a tile slips between two directions.
+        let around = (0..PROBES).map(|n| f64::from(n) * std::f64::consts::TAU / f64::from(PROBES));
+        let in_tile = reaches([0.0, 0.0])
+            || around.into_iter().any(|angle| reaches([near * angle.cos(), near * angle.sin()]));
         let undecided = in_tile || (self.inverted() && inside < EDGE_PX);
         if undecided { Some(None) } else { self.inverted().then_some(Some(1.0)) }
     }

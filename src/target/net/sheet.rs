@@ -406,3 +406,108 @@ fn words(
         max_width_mm: room,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::plane::gap_mm;
+    use super::*;
+    use crate::family::Family;
+    use crate::target::{SolidShape, Target, TargetSpec};
+
+    /// The rectangle that a text takes, by estimate.
+    fn text_box(text: &SheetText) -> [DVec2; 4] {
+        let width = width(&text.text, text.cap_height_mm).min(text.max_width_mm);
+        let (at, along) = (DVec2::from(text.at_mm), DVec2::from_angle(text.angle_rad));
+        let up = along.perp() * text.cap_height_mm;
+        [at, at + along * width, at + along * width + up, at + up]
+    }
+
+    /// Page positions of a placed panel's outline.
+    fn triangle(target: &Target, placement: &Placement) -> [DVec2; 3] {
+        let TargetSpec::Solid(spec) = &target.spec else { panic!("a solid") };
+        let index = target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
+        let outline = spec.faces().unwrap()[index].outline_mm;
+        outline.map(|p| DVec2::from(placement.page_from_panel(p)))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        /// Every face once, none on another, all on the sheet; no words on lines, tiles or words;
+        /// on several pages every line is shown, and every cross on two.
+        #[test]
+        fn nothing_on_a_net_meets_anything_else(
+            shape in 0usize..3, edge_mm in 60.0f64..200.0, tiles in 6u32..12, margin_mm in 2.5f64..7.0,
+            paper in 0usize..3,
+        ) {
+            use SolidShape::{Icosahedron, Octahedron, Tetrahedron};
+            let shape = [Tetrahedron, Octahedron, Icosahedron][shape].clone();
+            let mut spec = SolidSpec { edge_mm, tiles, margin_mm, ..SolidSpec::new(shape) };
+            spec.tags.family = "delTag36h11".to_owned();
+            let family = Family::resolve("delTag36h11").unwrap();
+            let size = [None, Some("A4".parse().unwrap()), Some("A2".parse().unwrap())];
+            let paper = PaperSpec { size: size[paper].clone(), ..PaperSpec::default() };
+            let target =
+                Target::build("net", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
+            prop_assert_eq!(&Target::from_json(&target.to_json()).unwrap(), &target);
+            prop_assert_eq!(target.sheets.len(), 1);
+            let sheet = &target.sheets[0];
+            let mut faces: Vec<u32> = sheet.placements.iter().map(|p| p.panel).collect();
+            faces.sort_unstable();
+            prop_assert_eq!(faces, target.panels.iter().map(|p| p.id).collect::<Vec<_>>());
+
+            let triangles: Vec<_> =
+                sheet.placements.iter().map(|p| triangle(&target, p)).collect();
+            for (n, a) in triangles.iter().enumerate() {
+                prop_assert!(a.iter().all(|p| p.x > 0.0 && p.y > 0.0));
+                prop_assert!(a.iter().all(|p| p.x < sheet.width_mm && p.y < sheet.height_mm));
+                prop_assert!(triangles[n + 1..].iter().all(|b| gap_mm(a, b) > -1e-6));
+            }
+            let tiles = sheet.placements.iter().map(|placement| {
+                let panel = target.panels.iter().find(|p| p.id == placement.panel).unwrap();
+                tiles_outline(panel).map(|p| DVec2::from(placement.page_from_panel(p))).to_vec()
+            });
+            let lines =
+                sheet.lines.iter().map(|l| [l.from_mm, l.to_mm].map(DVec2::from).to_vec());
+            let marks: Vec<Vec<DVec2>> = tiles.chain(lines).collect();
+            let boxes: Vec<_> = sheet.texts.iter().map(text_box).collect();
+            for (n, text) in boxes.iter().enumerate() {
+                let words = &sheet.texts[n].text;
+                prop_assert!(marks.iter().all(|mark| gap_mm(text, mark) > 0.2), "{}", words);
+                prop_assert!(boxes[n + 1..].iter().all(|other| gap_mm(text, other) > 0.2), "{}", words);
+            }
+            for line in sheet.lines.iter().filter(|_| !sheet.pages.is_empty()) {
+                let shown = |at: [f64; 2]| {
+                    let on = |page: &&crate::target::SheetPage| {
+                        let [left, lower, right, upper] = page.window_mm;
+                        let [x, y] = [0, 1].map(|i| at[i] + page.sheet_at_mm[i]);
+                        left <= x && x <= right && lower <= y && y <= upper
+                    };
+                    sheet.pages.iter().filter(on).count()
+                };
+                let least = if line.kind == LineKind::Align { 2 } else { 1 };
+                for part in 0..=10 {
+                    let part = f64::from(part) / 10.0;
+                    let at = [0, 1].map(|i| line.from_mm[i] * (1.0 - part) + line.to_mm[i] * part);
+                    prop_assert!(shown(at) >= least, "{:?}", line);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_paper_is_the_smallest_that_takes_the_net() {
+        let family = Family::resolve("delTag25h7").unwrap();
+        let size = |shape| {
+            let spec = TargetSpec::Solid(SolidSpec::new(shape));
+            let paper = PaperSpec::default();
+            let target = Target::build("net", &spec, Some(&family), Some(&paper)).unwrap();
+            [target.sheets[0].width_mm, target.sheets[0].height_mm]
+        };
+        assert_eq!(size(SolidShape::Tetrahedron), [420.0, 297.0]);
+        assert_eq!(size(SolidShape::Octahedron), [420.0, 594.0]);
+        assert_eq!(size(SolidShape::Icosahedron), [841.0, 594.0]);
+    }
+}
