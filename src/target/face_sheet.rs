@@ -31,7 +31,7 @@ pub const BLEED_MM: f64 = 3.0;
 const MARK_MM: [f64; 2] = [BLEED_MM, 9.0];
 /// Distance of a registration cross from its vertex, and length of its arms, mm: it stays clear of
 /// the cutting marks of a face with angles of 60°.
-const CROSS_MM: [f64; 2] = [10.0, 2.5];
+const CROSS_MM: [f64; 2] = [13.0, 2.5];
 /// Width of a cutting mark, mm: a hairline that every printer holds.
 const MARK_WIDTH_MM: f64 = 0.15;
 /// Capital height of the number of a face beside it, mm.

@@ -256,14 +256,14 @@ impl<'a> Verifier<'a> {
     /// all that the windows show, laid together.
     fn verify_pages(&self, sources: &[Source], index: usize) -> (SheetVerdict, Seen) {
         let layout = &self.target.sheets[index];
+        let wish = self.wish_px_per_mm(layout);
         let most = (document::MAX_PIXELS / (layout.width_mm * layout.height_mm)).sqrt();
-        let px_per_mm = self.wish_px_per_mm(layout).min(most);
         let mut pages = Vec::with_capacity(sources.len());
         let mut findings = Vec::new();
         let mut check_bars_mm = Vec::new();
         for (source, SheetPage { label, window_mm, marks, .. }) in sources.iter().zip(&layout.pages)
         {
-            let (page, wrong) = source.render(marks, px_per_mm);
+            let (page, wrong) = source.render(marks, wish);
             let mut verdict = SheetVerdict::new(index, &page, wrong);
             check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
             marks::check(&page, marks, &[], Some(*window_mm), &mut verdict);
@@ -272,9 +272,10 @@ impl<'a> Verifier<'a> {
                 finding: Box::new(finding),
             }));
             check_bars_mm.extend(verdict.check_bars_mm);
-            pages.push(page);
+            // Kept no finer than the sheet is looked at.
+            pages.push(if wish > most { source.render(marks, most).0 } else { page });
         }
-        let (sheet, different) = assemble::assemble(&pages, layout, px_per_mm);
+        let (sheet, different) = assemble::assemble(&pages, layout, wish.min(most));
         let mut verdict = SheetVerdict::new(index, &sheet, different);
         verdict.pages = pages.len();
         let seen = self.verify_sheet(&sheet, layout, &mut verdict);

@@ -345,6 +345,37 @@ mod tests {
         }
     }
 
+    /// A ball of 80 triangles: each face of an icosahedron in four, moved out to the sphere.
+    fn ball() -> Polyhedron {
+        let core = Polyhedron::icosahedron(100.0);
+        let radius = core.vertices_mm[0].length();
+        let mut vertices_mm = core.vertices_mm.clone();
+        let edges = core.edges();
+        vertices_mm.extend(
+            edges
+                .iter()
+                .map(|&[a, b]| (core.vertices_mm[a] + core.vertices_mm[b]).normalize() * radius),
+        );
+        let middle = |a: usize, b: usize| {
+            let edge = [a.min(b), a.max(b)];
+            core.vertices_mm.len() + edges.iter().position(|e| *e == edge).unwrap()
+        };
+        let faces = core.faces.iter().flat_map(|&[a, b, c]| {
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        });
+        Polyhedron { vertices_mm, faces: faces.collect() }
+    }
+
+    #[test]
+    fn a_ball_of_many_faces_is_one_net() {
+        let ball = ball();
+        let flat = outlines(&ball);
+        let nets = grown(&ball, &flat);
+        check(&ball, &nets[0]).unwrap();
+        assert_eq!(nets[0].len(), 1);
+    }
+
     #[test]
     fn regular_solids_have_their_usual_nets_in_one_piece() {
         for shape in [SolidShape::Tetrahedron, SolidShape::Octahedron, SolidShape::Icosahedron] {
