@@ -13,7 +13,7 @@
 //! compared by itself; where a face lies, its corners say. A face that comes to lie in the place of
 //! another, or turned in its own, is named as that.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use glam::{DMat3, DVec2, DVec3};
 use kurbo::Shape as _;
@@ -174,6 +174,8 @@ struct Net {
     along: BTreeMap<[usize; 2], (usize, usize)>,
     /// For each side the one that it is folded against.
     folds: BTreeMap<(usize, usize), (usize, usize)>,
+    /// Sides along which a tab is folded.
+    tabs: BTreeSet<(usize, usize)>,
 }
 
 impl Net {
@@ -187,6 +189,7 @@ impl Net {
             poses: Vec::with_capacity(target.panels.len()),
             along: BTreeMap::new(),
             folds: BTreeMap::new(),
+            tabs: BTreeSet::new(),
         };
         for (index, (panel, face)) in target.panels.iter().zip(&outlines).enumerate() {
             let (sheet, found) =
@@ -236,7 +239,7 @@ impl Net {
         faces.flat_map(|face| (0..3).map(move |side| (face, side)))
     }
 
-    /// Sides of two faces on the same fold line.
+    /// Sides of two faces on the same fold line, and of one where a tab hangs on it.
     fn find_folds(&mut self, sheet: usize, layout: &SheetLayout) {
         let kinds = [LineKind::Fold, LineKind::Valley];
         for line in layout.lines.iter().filter(|line| kinds.contains(&line.kind)) {
@@ -244,12 +247,15 @@ impl Net {
             let near = |[p, q]: [DVec2; 2]| {
                 p.distance(ends[0]) < COMMON_MM && q.distance(ends[1]) < COMMON_MM
             };
+            let along = |side: [DVec2; 2]| ends.iter().all(|&end| distance(end, side) < COMMON_MM);
             let sides: Vec<_> = self.sides_on(sheet).map(|side| (side, self.ends(side))).collect();
             let forward = sides.iter().find(|(_, ends)| near(*ends));
             let backward = sides.iter().find(|(_, [p, q])| near([*q, *p]));
             if let (Some(&(a, _)), Some(&(b, _))) = (forward, backward) {
                 self.folds.insert(a, b);
                 self.folds.insert(b, a);
+            } else if let Some(&(side, _)) = sides.iter().find(|(_, ends)| along(*ends)) {
+                self.tabs.insert(side);
             }
         }
     }
@@ -273,11 +279,7 @@ impl Net {
                 Some(face) => side.0 == face,
                 None => !self.folds.contains_key(side),
             });
-            let distance = |side: &(usize, usize)| {
-                let [p, q] = self.ends(*side);
-                let along = ((at - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
-                at.distance(p + (q - p) * along)
-            };
+            let distance = |side: &(usize, usize)| distance(at, self.ends(*side));
             let nearest = sides.min_by(|a, b| distance(a).total_cmp(&distance(b)));
             if let Some((face, side)) = nearest {
                 self.faces[face].numbers[side].push(number);
@@ -401,7 +403,7 @@ impl Net {
     }
 
     /// How far the two sides of an edge are apart in space, if they belong together: folded
-    /// against each other on the page, or cut and carrying the same number.
+    /// against each other on the page, or cut and carrying the same number, with a tab on one.
     fn check_edge(&self, edge: &Edge, carried: &[Option<SpaceFromPage>]) -> Result<f64, Finding> {
         let [one, other] = edge.sides;
         let panels = [self.faces[one.0].panel, self.faces[other.0].panel];
@@ -418,9 +420,11 @@ impl Net {
         }
         let numbers = edge.sides.map(|(face, side)| self.faces[face].numbers[side].as_slice());
         let folded = self.folds.get(&one) == Some(&other);
+        let tabs = edge.sides.iter().filter(|side| self.tabs.contains(side)).count();
         match numbers {
             [[], []] if folded => Ok(gap_mm),
-            [[a], [b]] if !folded && a == b => Ok(gap_mm),
+            [[a], [b]] if !folded && a == b && tabs == 1 => Ok(gap_mm),
+            [[a], [b]] if !folded && a == b => Err(Finding::EdgeTabs { panels, tabs }),
             _ => Err(Finding::EdgeNumbers { panels, numbers: numbers.map(<[usize]>::to_vec) }),
         }
     }
@@ -433,6 +437,12 @@ impl Net {
         let twice = count.into_iter().filter(|&(_, count)| count > 2);
         twice.map(|(number, sides)| Finding::EdgeNumberAgain { number, sides }).collect()
     }
+}
+
+/// Distance of a point from a segment.
+fn distance(at: DVec2, [p, q]: [DVec2; 2]) -> f64 {
+    let along = ((at - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
+    at.distance(p + (q - p) * along)
 }
 
 /// The number in words such as `edge 7` and `edge 7 · under face 3`.

@@ -258,6 +258,13 @@ pub enum Finding {
         /// The numbers found along each.
         numbers: [Vec<usize>; 2],
     },
+    /// A cut edge has no tab, or two.
+    EdgeTabs {
+        /// Panels of the faces.
+        panels: [u32; 2],
+        /// How many tabs.
+        tabs: usize,
+    },
     /// More than two sides carry a number.
     EdgeNumberAgain {
         /// The number.
@@ -480,6 +487,9 @@ impl fmt::Display for Finding {
                     "the edge between boards {a} and {b} has {one} on the first, {other} on the \
                      second"
                 )
+            }
+            Self::EdgeTabs { panels: [a, b], tabs } => {
+                write!(f, "the edge between boards {a} and {b} has {tabs} tabs instead of one")
             }
             Self::EdgeNumberAgain { number, sides } => {
                 write!(f, "edge number {number} is on {sides} sides")
