@@ -8,7 +8,9 @@ use assert_cmd::Command;
 use deltille::artwork::{self, Artwork, Part};
 use deltille::export::{pdf, png, sheet_file_name, svg};
 use deltille::family::Family;
-use deltille::target::{LineKind, PaperSpec, Placement, SolidShape, SolidSpec, Target, TargetSpec};
+use deltille::target::{
+    LineKind, PaperSpec, Placement, SheetText, SolidShape, SolidSpec, Target, TargetSpec,
+};
 use deltille::verify::{Finding, Verdict, Verifier};
 use kurbo::Affine;
 use predicates::prelude::PredicateBooleanExt;
@@ -120,6 +122,21 @@ fn a_wrong_layout_does_not_fold_into_the_solid() {
     text.text = "edge 9".to_owned();
     assert_fails(&verify(&renumbered, &draw(&renumbered), "pdf"), &["9 on the "]);
 
+    for (from, to, said) in [
+        ("face 1", "face 2", "carries 2 instead of face 1"),
+        (" · under face 2", " · under face 0", "names face 0 instead of 2"),
+    ] {
+        let mut misnamed = whole.clone();
+        let texts = &mut misnamed.sheets[0].texts;
+        // A tab that goes under face 1 ends with that, too.
+        let is_it = |text: &&mut SheetText| match from.starts_with("face") {
+            true => text.text == from,
+            false => text.text.ends_with(from),
+        };
+        let text = texts.iter_mut().find(is_it).unwrap();
+        text.text = text.text.replace(from, to);
+        assert_fails(&verify(&misnamed, &draw(&misnamed), "pdf"), &[said]);
+    }
     let folds = whole.sheets[0].lines.iter().enumerate();
     let folds: Vec<usize> =
         folds.filter(|(_, line)| line.kind == LineKind::Fold).map(|(index, _)| index).collect();

@@ -77,6 +77,9 @@ pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict
         }
         let last = verdicts.len() - 1;
         verdicts[last].findings.extend(net.numbers_used_twice());
+        for (index, face) in net.faces.iter().enumerate() {
+            verdicts[face.sheet].findings.extend(net.check_words(index));
+        }
     }
     for (sheet, verdict) in verdicts.iter_mut().enumerate() {
         let (max_deviation_mm, edges) = (deviations[sheet], edges[sheet]);
@@ -97,6 +100,10 @@ struct PrintedFace {
     corners: Vec<(DVec2, DVec3)>,
     /// Numbers printed along each of its sides.
     numbers: [Vec<usize>; 3],
+    /// Faces that tabs along its sides say that they go under: side and number of the face.
+    under: Vec<(usize, usize)>,
+    /// Numbers of the face that are printed in it.
+    names: Vec<usize>,
 }
 
 /// `page = turn · panel + shift`.
@@ -220,6 +227,8 @@ impl Net {
                 vertices,
                 corners: corners.into_iter().map(|(_, at, space)| (at, space)).collect(),
                 numbers: Default::default(),
+                under: Vec::new(),
+                names: Vec::new(),
             });
         }
         for (sheet, layout) in target.sheets.iter().enumerate() {
@@ -242,13 +251,13 @@ impl Net {
     /// Sides of two faces on the same fold line, and of one where a tab hangs on it.
     fn find_folds(&mut self, sheet: usize, layout: &SheetLayout) {
         let kinds = [LineKind::Fold, LineKind::Valley];
+        let sides: Vec<_> = self.sides_on(sheet).map(|side| (side, self.ends(side))).collect();
         for line in layout.lines.iter().filter(|line| kinds.contains(&line.kind)) {
             let ends = [line.from_mm, line.to_mm].map(DVec2::from);
             let near = |[p, q]: [DVec2; 2]| {
                 p.distance(ends[0]) < COMMON_MM && q.distance(ends[1]) < COMMON_MM
             };
             let along = |side: [DVec2; 2]| ends.iter().all(|&end| distance(end, side) < COMMON_MM);
-            let sides: Vec<_> = self.sides_on(sheet).map(|side| (side, self.ends(side))).collect();
             let forward = sides.iter().find(|(_, ends)| near(*ends));
             let backward = sides.iter().find(|(_, [p, q])| near([*q, *p]));
             if let (Some(&(a, _)), Some(&(b, _))) = (forward, backward) {
@@ -260,11 +269,11 @@ impl Net {
         }
     }
 
-    /// Gives each number to the side that it stands at: in a face to one of that face, else to
-    /// the nearest that is cut.
+    /// Gives each number to the face that it stands in, and to the side that it stands at: in a
+    /// face one of that face, else the nearest that is cut.
     fn read_numbers(&mut self, sheet: usize, layout: &SheetLayout) {
         for text in &layout.texts {
-            let Some(number) = edge_number(&text.text) else { continue };
+            let Some(words) = Words::read(&text.text) else { continue };
             let Ok(outline) = artwork::text_outline(text) else { continue };
             let centre = outline.bounding_box().center();
             let at = DVec2::new(centre.x, centre.y);
@@ -275,6 +284,13 @@ impl Net {
                 })
             };
             let within = self.sides_on(sheet).map(|(face, _)| face).find(|&face| inside(face));
+            let (number, under) = match words {
+                Words::Face(number) => {
+                    within.into_iter().for_each(|face| self.faces[face].names.push(number));
+                    continue;
+                }
+                Words::Edge { number, under } => (number, under),
+            };
             let sides = self.sides_on(sheet).filter(|side| match within {
                 Some(face) => side.0 == face,
                 None => !self.folds.contains_key(side),
@@ -283,6 +299,7 @@ impl Net {
             let nearest = sides.min_by(|a, b| distance(a).total_cmp(&distance(b)));
             if let Some((face, side)) = nearest {
                 self.faces[face].numbers[side].push(number);
+                self.faces[face].under.extend(under.map(|under| (side, under)));
             }
         }
     }
@@ -429,6 +446,24 @@ impl Net {
         }
     }
 
+    /// What is wrong with the name of a face and with the names that its tabs carry.
+    fn check_words(&self, index: usize) -> Vec<Finding> {
+        let face = &self.faces[index];
+        let mut findings = Vec::new();
+        if face.names != [index] {
+            let names = face.names.clone();
+            findings.push(Finding::FaceNumber { panel: face.panel, names, stated: index });
+        }
+        for &(side, named) in &face.under {
+            let [a, b] = [face.vertices[side], face.vertices[(side + 1) % 3]];
+            let beyond = self.along.get(&[b, a]).map(|&(other, _)| other);
+            if let Some(stated) = beyond.filter(|&other| other != named) {
+                findings.push(Finding::TabNames { panel: face.panel, named, stated });
+            }
+        }
+        findings
+    }
+
     /// Numbers that more than two sides carry.
     fn numbers_used_twice(&self) -> Vec<Finding> {
         let mut count = BTreeMap::<usize, usize>::new();
@@ -445,8 +480,24 @@ fn distance(at: DVec2, [p, q]: [DVec2; 2]) -> f64 {
     at.distance(p + (q - p) * along)
 }
 
-/// The number in words such as `edge 7` and `edge 7 · under face 3`.
-fn edge_number(text: &str) -> Option<usize> {
-    let rest = text.strip_prefix("edge ")?;
-    rest.split(' ').next()?.parse().ok()
+/// What is printed on the faces and tabs of a net.
+enum Words {
+    /// `edge 7`, or on a tab `edge 7 · under face 3`.
+    Edge { number: usize, under: Option<usize> },
+    /// `face 3`.
+    Face(usize),
+}
+
+impl Words {
+    fn read(text: &str) -> Option<Self> {
+        if let Some(number) = text.strip_prefix("face ") {
+            return Some(Self::Face(number.parse().ok()?));
+        }
+        let rest = text.strip_prefix("edge ")?;
+        let (number, under) = match rest.split_once(" · under face ") {
+            Some((number, face)) => (number, Some(face.parse().ok()?)),
+            None => (rest, None),
+        };
+        Some(Self::Edge { number: number.parse().ok()?, under })
+    }
 }

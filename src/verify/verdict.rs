@@ -258,6 +258,24 @@ pub enum Finding {
         /// The numbers found along each.
         numbers: [Vec<usize>; 2],
     },
+    /// A face of a net does not carry its number, once.
+    FaceNumber {
+        /// Panel id.
+        panel: u32,
+        /// The numbers found in it.
+        names: Vec<usize>,
+        /// Its number.
+        stated: usize,
+    },
+    /// A tab says that it goes under another face than the one that its edge leads to.
+    TabNames {
+        /// Panel id of the face that it hangs on.
+        panel: u32,
+        /// The face that it names.
+        named: usize,
+        /// The face that it goes under.
+        stated: usize,
+    },
     /// A cut edge has no tab, or two.
     EdgeTabs {
         /// Panels of the faces.
@@ -475,18 +493,18 @@ impl fmt::Display for Finding {
                 write!(f, "the edges of boards {a} and {b} are {gap_mm:.3} mm apart when folded")
             }
             Self::EdgeNumbers { panels: [a, b], numbers } => {
-                let [one, other] = numbers.each_ref().map(|numbers| match &numbers[..] {
-                    [] => "no number".to_owned(),
-                    several => {
-                        let several: Vec<String> = several.iter().map(usize::to_string).collect();
-                        several.join(" and ")
-                    }
-                });
+                let [one, other] = numbers.each_ref().map(|numbers| enumerate(numbers));
                 write!(
                     f,
                     "the edge between boards {a} and {b} has {one} on the first, {other} on the \
                      second"
                 )
+            }
+            Self::FaceNumber { panel, names, stated } => {
+                write!(f, "board {panel} carries {} instead of face {stated}", enumerate(names))
+            }
+            Self::TabNames { panel, named, stated } => {
+                write!(f, "a tab of board {panel} names face {named} instead of {stated}")
             }
             Self::EdgeTabs { panels: [a, b], tabs } => {
                 write!(f, "the edge between boards {a} and {b} has {tabs} tabs instead of one")
@@ -542,6 +560,12 @@ impl fmt::Display for Finding {
             ),
         }
     }
+}
+
+/// Numbers in words.
+fn enumerate(numbers: &[usize]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
+    if numbers.is_empty() { "no number".to_owned() } else { numbers.join(" and ") }
 }
 
 /// Findings named on the line for people; the report has all.
