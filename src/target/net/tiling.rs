@@ -40,8 +40,11 @@ const MOST_PAGES: usize = 120;
 /// Largest sheet, mm²: pictures of it that still resolve its hairlines can be verified.
 const MOST_AREA_MM2: f64 = 4e6;
 
-/// Length of an arm of a cross, and its blank, mm: it stands in the margin of a face.
-const CROSS_MM: (f64, f64) = (1.5, 0.4);
+/// Length of an arm of a cross, and its blank, mm: it has room in a slanted margin of 5 mm.
+const CROSS_MM: (f64, f64) = (1.3, 0.35);
+
+/// Places for crosses are tried in steps of this, mm: less than the room to spare in such a margin.
+const CROSS_STEP_MM: f64 = 0.5;
 
 /// Width of the lines of crosses, and of the overview's, mm.
 const LINE_MM: f64 = 0.15;
@@ -330,9 +333,10 @@ fn crosses(shared: [f64; 4], obstacles: &[Vec<DVec2>]) -> Vec<SheetLine> {
     };
     let at =
         |u: f64, v: f64| middle + if lengthwise == 0 { DVec2::new(u, v) } else { DVec2::new(v, u) };
-    let steps = (2.0 * along) as usize;
+    let steps = (2.0 * along / CROSS_STEP_MM) as usize;
     let from_one_end = |sign: f64| {
-        let places = (0..=steps).flat_map(|n| [0.0, 0.5, -0.5, 1.0, -1.0].map(|v| (n as f64, v)));
+        let places = (0..=steps).map(|n| n as f64 * CROSS_STEP_MM);
+        let places = places.flat_map(|n| [0.0, 0.5, -0.5, 1.0, -1.0].map(|v| (n, v)));
         places.map(|(n, v)| at(sign * (n - along), v * across)).find(|&at| clear(at))
     };
     let mut found: Vec<DVec2> = [1.0, -1.0].into_iter().filter_map(from_one_end).collect();
