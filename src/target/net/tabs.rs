@@ -18,7 +18,8 @@ use super::unfold::{Piece, Side, Sides};
 /// the most is what glue needs.
 const DEPTH: (f64, f64, f64) = (0.15, 4.0, 9.0);
 
-/// Angles between a tab's edge and its legs, tried from the widest tab on, degrees.
+/// Angles between a tab's edge and its legs, degrees: the usual one, flatter ones for narrow gaps,
+/// a steep one for short edges; tried in this order.
 const LEGS_DEG: [f64; 4] = [45.0, 30.0, 20.0, 60.0];
 
 /// By so much the legs of a tab could be steeper without meeting anything, degrees: scissors pass
