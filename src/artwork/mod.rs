@@ -182,7 +182,11 @@ fn subject(target: &Target) -> String {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
     let plural = if tags == 1 { "" } else { "s" };
-    let mut subject = format!("deltille calibration target, {corners} corners, {tags} tag{plural}");
+    let what = match corners {
+        0 => "single DelTags".to_owned(),
+        _ => format!("deltille calibration target, {corners} corners"),
+    };
+    let mut subject = format!("{what}, {tags} tag{plural}");
     if let Some(family) = &target.family {
         subject += &format!(", family {}, fingerprint {}", family.name, family.fingerprint);
     }

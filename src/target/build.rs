@@ -2,7 +2,7 @@ use super::layout::{arrange, label};
 use super::paper::{PaperSpec, SolidSheets};
 use super::{
     BoardSpec, FamilyRef, Panel, SheetLayout, Target, TargetError, TargetSpec, board, face_sheet,
-    net, solid,
+    net, solid, tag_sheet,
 };
 use crate::family::Family;
 
@@ -31,6 +31,14 @@ impl Target {
                     }
                 });
                 (panels, family, sheets.transpose()?.unwrap_or_default())
+            }
+            TargetSpec::Tags(spec) => {
+                let Some(family) = family else {
+                    let (wanted, given) = (spec.family.clone(), "none is given".to_owned());
+                    return Err(TargetError::Family { wanted, given });
+                };
+                let (panels, family, sheets) = tag_sheet::parts(name, spec, family, layout)?;
+                (panels, Some(family), sheets)
             }
             TargetSpec::Listed(_) => {
                 let problem = "a listed target is read from its list, it cannot be made anew";

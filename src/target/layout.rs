@@ -151,18 +151,23 @@ fn fit_turned(
     paper: &PaperSpec,
     turns: &[bool],
 ) -> Result<Option<Arrangement>, TargetError> {
-    let margin = paper.margin_mm;
-    if !(0.0..=100.0).contains(&margin) {
-        let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
-        return Err(TargetError::invalid("--margin", problem));
-    }
-    let margin = margin.max(LEAST_MARGIN_MM);
+    let margin = check_margin(paper)?;
     let sizes: Vec<PaperSize> = match &paper.size {
         Some(size) => vec![size.clone()],
         None => PaperSize::automatic().collect(),
     };
     let fitting = |size| on_size(footprint, size, paper.orientation, margin, turns);
     Ok(sizes.iter().find_map(fitting))
+}
+
+/// The margin asked for, mm, and never less than what must stay blank.
+pub(super) fn check_margin(paper: &PaperSpec) -> Result<f64, TargetError> {
+    let margin = paper.margin_mm;
+    if !(0.0..=100.0).contains(&margin) {
+        let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
+        return Err(TargetError::invalid("--margin", problem));
+    }
+    Ok(margin.max(LEAST_MARGIN_MM))
 }
 
 /// Fits a board on one size of paper.
@@ -186,7 +191,7 @@ fn on_size(
 }
 
 /// Fits a board on one page.
-fn on_page(
+pub(super) fn on_page(
     footprint: &Footprint,
     page: [f64; 2],
     margin: f64,

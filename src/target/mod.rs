@@ -21,6 +21,7 @@ mod polyhedron;
 mod pose;
 mod solid;
 mod spec;
+mod tag_sheet;
 
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +35,9 @@ pub use length::{LengthError, parse_length_mm};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
 pub use polyhedron::{Face, Polyhedron};
 pub(crate) use spec::{BORDER_BITS, MOST_ROWS, SIDES};
-pub use spec::{BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
+pub use spec::{
+    BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSheetSpec, TagSpec, TargetSpec,
+};
 
 /// A target: its panels, and the sheets they are printed on.
 #[derive(Clone, Debug, PartialEq)]

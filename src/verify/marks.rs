@@ -4,6 +4,7 @@
 //! those printed; what is proved is that the sheet has the words of the description.
 
 use std::collections::BTreeSet;
+use std::f64::consts::TAU;
 
 use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape};
 use rayon::prelude::*;
@@ -321,8 +322,8 @@ impl<'a> Ground<'a> {
         let reaches = |[du, dv]: [f64; 2]| {
             self.tiles.contains(&tile_at([(u + du) / edge_mm, (v + dv) / edge_mm]))
         };
-        // Fine enough that no tip of a tile slips between two directions.
-        let around = (0..PROBES).map(|n| f64::from(n) * std::f64::consts::TAU / f64::from(PROBES));
+        // Fine enough that no tip of a tile, also a lone one, slips between two directions.
+        let around = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
         let in_tile = reaches([0.0, 0.0])
             || around.into_iter().any(|angle| reaches([near * angle.cos(), near * angle.sin()]));
         let undecided = in_tile || (self.inverted() && inside < EDGE_PX);

@@ -112,6 +112,11 @@ pub enum Finding {
         /// Stated.
         stated_mm: f64,
     },
+    /// A tag that stands alone is not where it should be.
+    TagMissing {
+        /// Stated id.
+        id: u32,
+    },
     /// The panel was not recognised.
     PanelMissing {
         /// Its id.
@@ -434,6 +439,7 @@ impl fmt::Display for Finding {
                 write!(f, "check bar {bar} measures {found:.3} mm instead of {stated_mm:.3} mm")
             }
             Self::CheckBar { bar, found_mm: None, .. } => write!(f, "check bar {bar} not found"),
+            Self::TagMissing { id } => write!(f, "tag {id} is not where it should be"),
             Self::PanelMissing { panel } => write!(f, "board {panel} not recognised"),
             Self::AnotherBoard { found, stated } => {
                 write!(f, "shows another board: {found} corners instead of {stated}")
@@ -596,7 +602,11 @@ impl fmt::Display for Verdict {
             if pages > 1 {
                 write!(f, "{pages} pages, ")?;
             }
-            write!(f, "{} corners within {deviation:.4} mm, ", sum(|s| s.corners_found))?;
+            let corners = sum(|s| s.corners_found);
+            // A sheet of single tags has none.
+            if corners > 0 {
+                write!(f, "{corners} corners within {deviation:.4} mm, ")?;
+            }
             let folds: Vec<&FoldVerdict> =
                 self.sheets.iter().filter_map(|s| s.fold.as_ref()).collect();
             if !folds.is_empty() {

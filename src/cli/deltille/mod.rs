@@ -3,7 +3,7 @@
 mod board;
 mod detect;
 mod experiment;
-mod files;
+pub(in crate::cli) mod files;
 mod refine;
 mod render;
 mod settings;
