@@ -338,7 +338,7 @@ impl Best {
             seed: self.seed,
         };
         let codes = construction.codes(screen)?;
-        if !self.exchange {
+        if !self.exchange || self.dimension.bits() > super::polish::MAX_BITS {
             return Ok((codes, Construction::Algebraic(construction)));
         }
         let effort = Effort { seed: self.seed, rounds: 50, steps: 400_000 };

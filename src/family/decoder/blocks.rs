@@ -67,7 +67,7 @@ impl Blocks {
                     let found =
                         block.find((key as u32 ^ pattern) as usize, tail, max_errors, |reading| {
                             let errors = (word ^ self.words[reading as usize]).count_ones();
-                            (errors <= max_errors).then(|| Decoded {
+                            (errors <= max_errors).then_some(Decoded {
                                 id: reading / 3,
                                 turns: (reading % 3) as u8,
                                 errors,
