@@ -16,7 +16,9 @@ mod board;
 mod cells;
 mod check_bar;
 mod gallery;
+mod line;
 pub mod text;
+mod window;
 
 use kurbo::BezPath;
 
@@ -27,6 +29,7 @@ pub use atlas::Atlas;
 pub use cells::white_outlines;
 pub use check_bar::STROKE_WIDTH_MM;
 pub use gallery::{GalleryTile, tag_gallery};
+pub use line::strokes_mm;
 
 /// Everything that is drawn of one target.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,7 +38,7 @@ pub struct Artwork {
     pub title: String,
     /// One line on what it is.
     pub subject: String,
-    /// The pages, in the order of the target's sheets.
+    /// The pages, in the order of the target's sheets and of the pages of each.
     pub sheets: Vec<Sheet>,
 }
 
@@ -95,7 +98,7 @@ pub enum Part {
         /// Position in [`SheetLayout::check_bars`](crate::target::SheetLayout::check_bars).
         index: usize,
     },
-    /// A line to cut along, by index.
+    /// A line to cut or to fold along, by index.
     Line {
         /// What it is for.
         kind: LineKind,
@@ -146,12 +149,18 @@ pub enum ArtworkError {
 ///
 /// `family` holds the codes of the tags; it may be `None` for an untagged target only.
 pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, ArtworkError> {
-    let sheets = (0..target.sheets.len()).map(|index| board::sheet(target, family, index));
-    Ok(Artwork {
-        title: target.name.clone(),
-        subject: subject(target),
-        sheets: sheets.collect::<Result<_, _>>()?,
-    })
+    let mut sheets = Vec::with_capacity(target.page_count());
+    for (index, layout) in target.sheets.iter().enumerate() {
+        let sheet = board::sheet(target, family, index)?;
+        if layout.pages.is_empty() {
+            sheets.push(sheet);
+            continue;
+        }
+        for page in &layout.pages {
+            sheets.push(board::page(&sheet, layout, page)?);
+        }
+    }
+    Ok(Artwork { title: target.name.clone(), subject: subject(target), sheets })
 }
 
 /// The tiles of one panel in its own frame.

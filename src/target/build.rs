@@ -1,8 +1,8 @@
 use super::layout::{arrange, label};
-use super::paper::PaperSpec;
+use super::paper::{PaperSpec, SolidSheets};
 use super::{
     BoardSpec, FamilyRef, Panel, SheetLayout, Target, TargetError, TargetSpec, board, face_sheet,
-    solid, tag_sheet,
+    net, solid, tag_sheet,
 };
 use crate::family::Family;
 
@@ -24,8 +24,12 @@ impl Target {
             TargetSpec::Board(board) => board_parts(name, board, family, layout)?,
             TargetSpec::Solid(spec) => {
                 let (panels, family) = solid::panels(spec, family)?;
-                let sheets = layout
-                    .map(|paper| face_sheet::sheets(name, spec, &panels, family.as_ref(), paper));
+                let sheets = layout.map(|paper| match paper.solids {
+                    SolidSheets::Net => net::sheets(name, spec, &panels, family.as_ref(), paper),
+                    SolidSheets::PerFace => {
+                        face_sheet::sheets(name, spec, &panels, family.as_ref(), paper)
+                    }
+                });
                 (panels, family, sheets.transpose()?.unwrap_or_default())
             }
             TargetSpec::Tags(spec) => {

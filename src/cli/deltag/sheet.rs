@@ -77,6 +77,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
             Some(text) => length("--margin", text)?,
             None => DEFAULT_MARGIN_MM,
         },
+        ..PaperSpec::default()
     };
     ensure!(args.dpi.is_none() || args.png, "--dpi: there is no PNG to write: add --png");
     ensure!(
