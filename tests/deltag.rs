@@ -233,7 +233,7 @@ fn a_reader_that_goes_away_is_no_error() {
 #[test]
 fn info_tells_how_many_targets_a_family_covers() {
     deltag().args(["info", "d25h7"]).assert().success().stdout(
-        contains("1199")
+        contains("1208")
             .and(contains("corrects 3 cells"))
             .and(contains("15 of 30 neighbouring pairs"))
             .and(contains("boards of 10 x 11 corners (11 tags each)"))
