@@ -155,8 +155,8 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(exit)
 }
 
-/// Size of a family file, roughly, at most.
-pub(super) const FILE_LIMIT: u64 = 64 << 20;
+/// Size of a family file at most: 64 MiB, of which a little is for what is not codes.
+pub(super) const FILE_LIMIT: u64 = (64 << 20) - (64 << 10);
 
 /// Length of a code's line: four spaces, quotes, 0x, digits, comma, line feed.
 pub(super) fn bytes_per_code(dimension: Dimension) -> u64 {
