@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BoardSpec, Corner, FamilyRef, GridKind, Panel, SheetLayout, TagPlacement, Target, TargetSpec,
-    board,
+    Corner, FamilyRef, GridKind, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board, solid,
 };
 use crate::lattice::Vertex;
 
@@ -136,9 +135,7 @@ pub(crate) fn check(target: &Target) -> Result<(), Problem> {
             return problem("family", "there are tags, so there must be a family");
         }
     }
-    if let TargetSpec::Board(spec) = &target.spec {
-        check_against_spec(target, spec)?;
-    }
+    check_against_spec(target)?;
     for (s, sheet) in target.sheets.iter().enumerate() {
         let sides = [("width_mm", sheet.width_mm), ("height_mm", sheet.height_mm)];
         if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm <= 0.0) {
@@ -154,18 +151,22 @@ pub(crate) fn check(target: &Target) -> Result<(), Problem> {
 
 /// Compares the panels with those that the spec makes: a file in which one of them was changed
 /// contradicts itself. Poses and measured positions may differ.
-fn check_against_spec(target: &Target, spec: &BoardSpec) -> Result<(), Problem> {
-    if let Err(error) = spec.check() {
-        return problem("spec", error.to_string());
-    }
-    let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
-        problem(field, format!("it is {found}, but the board of `spec` has {made}"))
+fn check_against_spec(target: &Target) -> Result<(), Problem> {
+    let (made, tagged) = match &target.spec {
+        TargetSpec::Board(spec) => {
+            (spec.check().map(|()| board::untied_panels(spec)), spec.tags.is_some())
+        }
+        TargetSpec::Solid(spec) => (solid::untied_panels(spec), true),
+        TargetSpec::Listed(_) => return Ok(()),
     };
-    let made = board::untied_panels(spec);
+    let made = made.or_else(|error| problem("spec", error.to_string()))?;
+    let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
+        problem(field, format!("it is {found}, but that of `spec` has {made}"))
+    };
     if target.panels.len() != made.len() {
         return differs("panels.length".to_owned(), &target.panels.len(), &made.len());
     }
-    if target.family.is_some() != spec.tags.is_some() {
+    if target.family.is_some() != tagged {
         return problem("family", "it must be there if, and only if, `spec.tags` is");
     }
     for (p, (panel, made)) in target.panels.iter().zip(&made).enumerate() {
@@ -184,7 +185,7 @@ fn check_against_spec(target: &Target, spec: &BoardSpec) -> Result<(), Problem> 
             ("matrix", panel.matrix == made.matrix),
         ];
         if let Some((key, _)) = plain.iter().find(|(_, same)| !same) {
-            return problem(field(key), "it is not that of the board of `spec`");
+            return problem(field(key), "it is not that of `spec`");
         }
         if panel.corners.len() != made.corners.len() {
             let (found, made) = (panel.corners.len(), made.corners.len());

@@ -1,6 +1,6 @@
 use std::process::ExitCode;
 
-use crate::family::{Family, shipped_names};
+use crate::family::{Family, shipped_names, smallest_shipped};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -17,20 +17,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let needed = u64::from(args.faces) * u64::from(args.tags_per_face);
-    let families: Vec<Family> =
-        shipped_names().into_iter().map(Family::resolve).collect::<Result<_, _>>()?;
-    // Fewest bits give the largest cells; among these the greatest distance is the safest.
-    let best = families
-        .iter()
-        .filter(|f| f.len() as u64 >= needed && f.correctable() >= args.corrects)
-        .min_by_key(|f| (f.dimension().bits(), std::cmp::Reverse(f.distance()), f.len()));
-    let Some(family) = best else {
-        let largest = families
-            .iter()
-            .filter(|f| f.correctable() >= args.corrects)
-            .map(Family::len)
-            .max()
-            .unwrap_or(0);
+    let Some(family) = smallest_shipped(needed, args.corrects) else {
+        let families = shipped_names().into_iter().map(Family::resolve);
+        let families: Vec<Family> = families.collect::<Result<_, _>>()?;
+        let correcting = families.iter().filter(|f| f.correctable() >= args.corrects);
+        let largest = correcting.map(Family::len).max().unwrap_or(0);
         anyhow::bail!(
             "{needed} tags that correct {} cells: the largest shipped family has {largest}; lower \
              --faces, --tags-per-face or --corrects",
