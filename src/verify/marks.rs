@@ -67,7 +67,7 @@ pub(super) fn check(
         let blank = (line.width_mm / 2.0 + BAR_BLANK_MM) * page.px_per_mm;
         cover(pixels(page, spanned(line.from_mm, line.to_mm), blank));
     }
-    spots(page, &known, panels, verdict);
+    verdict.findings.extend(spots(page, &known, panels));
 }
 
 /// The rectangle that two points span: left, lower, right, upper.
@@ -118,7 +118,7 @@ fn has_ink(page: &Page, path: &BezPath, [x0, y0, x1, y1]: [usize; 4]) -> bool {
 }
 
 /// Names each connected spot of wrong pixels outside the tiles and the `known` marks.
-fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel], verdict: &mut SheetVerdict) {
+pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<Finding> {
     let (width, height) = (page.image.width(), page.image.height());
     let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
     let mut wrong = vec![false; width * height];
@@ -137,6 +137,7 @@ fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel], verdict: &mut Shee
                     .is_some_and(|expected| (ink - expected).abs() > MAX_INK_ERROR);
         }
     });
+    let mut spots = Vec::new();
     for start in 0..wrong.len() {
         if !std::mem::take(&mut wrong[start]) {
             continue;
@@ -155,8 +156,9 @@ fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel], verdict: &mut Shee
             }
         }
         let at_mm = page.page_from_px(moment.map(|m| m / count));
-        verdict.findings.push(Finding::Spot { at_mm, area_mm2: count / page.px_per_mm.powi(2) });
+        spots.push(Finding::Spot { at_mm, area_mm2: count / page.px_per_mm.powi(2) });
     }
+    spots
 }
 
 /// The area of a panel on its page.

@@ -26,14 +26,17 @@ pub enum Format {
     Glb,
     /// Wavefront OBJ.
     Obj,
+    /// Binary STL.
+    Stl,
 }
 
 impl Format {
-    /// The kind of mesh that a file name tells.
+    /// The kind of mesh or body that a file name tells.
     pub fn of_mesh(path: &Path) -> Option<Self> {
         match path.extension()?.to_string_lossy().to_lowercase().as_str() {
             "glb" => Some(Self::Glb),
             "obj" => Some(Self::Obj),
+            "stl" => Some(Self::Stl),
             _ => None,
         }
     }
