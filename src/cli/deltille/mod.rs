@@ -1,6 +1,7 @@
 //! `deltille`: make, detect and verify deltille targets.
 
 mod board;
+mod delivery;
 mod detect;
 mod experiment;
 mod files;

@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail};
 
+use super::delivery::Delivery;
 use super::files::{self, File, text_file};
 use super::settings::DEFAULT_DPI;
-use super::{target_file, verify};
 use crate::artwork;
 use crate::export::dsc::{self, Dialect};
 use crate::export::mesh::TexturedMesh;
@@ -105,16 +105,8 @@ pub struct Args {
     /// Stem of the files' names, printed on the sheets [default: the solid's name]
     #[arg(long)]
     name: Option<String>,
-    /// Description of another target to be used together with this one: ids that both have are
-    /// refused; may be repeated
-    #[arg(long, value_name = "FILE")]
-    with: Vec<PathBuf>,
-    /// Folder to write to
-    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
-    output: PathBuf,
-    /// Do not read the written files back to compare them with the description
-    #[arg(long)]
-    no_verify: bool,
+    #[command(flatten)]
+    delivery: Delivery,
 }
 
 /// Arguments of `deltille solid`.
@@ -156,13 +148,15 @@ pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     if inside_out {
         println!("{}: its faces look inwards; they were turned", path.display());
     }
-    if mesh.args.name.is_none() {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        mesh.args.name = Some(stem);
+    let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = mesh.args.name.clone().unwrap_or_else(stem);
+    if mesh.args.obj && mesh.args.delivery.would_replace(&format!("{name}.obj"), path) {
+        bail!("--name: {name}.obj would be written over the mesh: give another name or folder");
     }
     let faces = solid.faces();
     let vertices: Vec<_> = solid.vertices().iter().map(|&v| v * scale).collect();
     let (scaled, _) = ClosedMesh::new(&vertices, faces).with_context(show)?;
+    mesh.args.name = Some(name);
     run(SolidShape::Mesh(scaled), mesh.args)
 }
 
@@ -176,27 +170,9 @@ pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
     let layout = printed.then_some(&paper);
     let solid = TargetSpec::Solid(spec.clone());
     let target = Target::build(&name, &solid, Some(&family), layout)?;
-    for path in &args.with {
-        let other = target_file::read(path).context("--with")?;
-        target.check_beside(&other)?;
-    }
+    args.delivery.check_beside(&target)?;
     let files = args.files(&target, &spec, &family)?;
-    let written = files::write_all(&args.output, &files)?;
-    println!("{}", summary(&target, &spec)?);
-    for path in &written {
-        println!("wrote {}", path.display());
-    }
-    let proved = |path: &PathBuf| {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let texture =
-            path.file_name().is_some_and(|f| f.to_string_lossy() == obj::texture_name(&name));
-        matches!(extension, "pdf" | "svg" | "png" | "glb" | "obj" | "stl") && !texture
-    };
-    let artifacts: Vec<PathBuf> = written.into_iter().filter(proved).collect();
-    if args.no_verify || artifacts.is_empty() {
-        return Ok(ExitCode::SUCCESS);
-    }
-    verify::verify(&target, Some(&family), &artifacts, None)
+    args.delivery.deliver(&target, Some(&family), &files, &summary(&target, &spec)?)
 }
 
 impl Args {
