@@ -268,11 +268,6 @@ fn three_hundred_views_of_an_icosahedron() {
         let (direction, up) = (random(&mut rng), random(&mut rng));
         let pose = Pose::looking_at(direction * distance, DVec3::ZERO, up);
         let light = Light { seed: view, ..Light::default() };
-        if let Ok(only) = std::env::var("VIEW")
-            && only != view.to_string()
-        {
-            continue;
-        }
         let image = eight_bits(&scene.render(&camera, &pose, &light));
         let truth: BTreeMap<u32, _> =
             scene.truth(&camera, &pose, 0.0).corners.into_iter().map(|c| (c.id, c)).collect();
@@ -318,38 +313,6 @@ fn three_hundred_views_of_an_icosahedron() {
                 let nearest = truth.values().min_by(|a, b| distance(a).total_cmp(&distance(b)));
                 if nearest.map(|t| t.id) == corner.id {
                     displaced.push((view, panel, off, good.contains(&panel)));
-                    let t = known.unwrap();
-                    eprintln!(
-                        "DISPLACED {corner:?} truth {} {} grid of {}",
-                        t.x,
-                        t.y,
-                        grid.corners.len()
-                    );
-                    let near: Vec<_> = grid
-                        .corners
-                        .iter()
-                        .filter(|c| {
-                            (c.row - corner.row).abs() <= 1 && (c.col - corner.col).abs() <= 1
-                        })
-                        .map(|c| {
-                            (
-                                c.row,
-                                c.col,
-                                c.x,
-                                c.y,
-                                c.id.and_then(|id| truth.get(&id)).map(|t| (t.x - c.x, t.y - c.y)),
-                            )
-                        })
-                        .collect();
-                    eprintln!("NEAR {near:#?}");
-                    image::save_buffer(
-                        "/tmp/mesh-try/view.png",
-                        image.pixels(),
-                        1600,
-                        1200,
-                        image::ColorType::L8,
-                    )
-                    .unwrap();
                 } else {
                     wrong.push((view, panel, corner.id, corner.x, corner.y));
                 }
