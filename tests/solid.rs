@@ -202,7 +202,7 @@ fn meshes_that_are_no_solids_are_refused() {
         ("crowd", twice, "", "not manifold"),
         ("nan", good.replacen("v ", "v nan ", 1), "", "finite"),
         ("text", "hello".to_owned(), "", "no triangles"),
-        ("index", good.clone() + "f 1 2 99\n", "", "not there"),
+        ("index", good.clone() + "f 1 2 99\n", "", "out of bounds"),
         ("skew", skewed.clone(), "", "give --allow-skew"),
         ("small", good.clone(), "--scale 0.001", "is --scale right?"),
         ("both", good.clone(), "--scale 2 --edge 100mm", "cannot be used with"),
@@ -334,7 +334,8 @@ fn wrong_bodies_are_named() {
     let read = |name: &str| std::fs::read(path.join(name)).unwrap();
     let numbers = |bytes: &mut Vec<u8>, change: &dyn Fn(usize, [f32; 3]) -> [f32; 3]| {
         for at in (84..bytes.len()).step_by(50).flat_map(|t| (0..4).map(move |i| t + 12 * i)) {
-            let number = |i: usize| f32::from_le_bytes(bytes[at + 4 * i..][..4].try_into().unwrap());
+            let number =
+                |i: usize| f32::from_le_bytes(bytes[at + 4 * i..][..4].try_into().unwrap());
             let vector = change((at - 84) % 50 / 12, [0, 1, 2].map(number));
             bytes.splice(at..at + 12, vector.into_iter().flat_map(f32::to_le_bytes));
         }
@@ -433,9 +434,12 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
         ("icosahedron -o /proc/nowhere", "-o: cannot write"),
         ("icosahedron --skeleton --rib 1mm", "--rib: 1 mm leaves no foot"),
         ("icosahedron --skeleton --panel-thickness 12mm", "--face-margin"),
-        ("tetrahedron --skeleton --edge 60mm --tiles 6 --face-margin 6mm --wall 6mm", "a larger --edge"),
+        (
+            "tetrahedron --skeleton --edge 60mm --tiles 6 --face-margin 6mm --wall 6mm",
+            "a larger --edge",
+        ),
         ("icosahedron --wall 4mm", "--skeleton"),
-        ("icosahedron --family delTag16h5", "take --family d25h7"),
+        ("icosahedron --family delTag16h5", "take --family delTag25h7"),
         ("solid", "--mesh"),
     ] {
         let result = deltille(folder.path(), args).code(2);

@@ -374,11 +374,11 @@ mod tests {
         assert_eq!(refused(&vertices, &flat), Flat);
     }
 
-    /// A vertex pushed through the opposite side.
+    /// A vertex pushed through a face on the other side.
     #[test]
     fn a_solid_that_cuts_itself_is_refused() {
         let (mut vertices, faces) = octahedron();
-        vertices[4] = DVec3::new(3.0, 5.0, -90.0);
+        vertices[4] = DVec3::new(40.0, 30.0, -40.0);
         let result = ClosedMesh::new(&vertices, &faces);
         assert!(matches!(result, Err(CutsItself(_, _))), "{result:?}");
     }

@@ -291,7 +291,7 @@ mod tests {
 
     use super::*;
     use crate::family::Family;
-    use crate::target::{PaperSpec, TagSpec};
+    use crate::target::{BoardSpec, PaperSpec, TagSpec};
 
     fn board(rows: u32, cols: u32, edge_mm: f64, tagged: bool, boards: u32) -> Target {
         let tags = tagged.then(TagSpec::default);

@@ -256,7 +256,7 @@ mod tests {
         let spec = SkeletonSpec::default();
         let thin = SkeletonSpec { rib_mm: Some(1.0), ..spec };
         assert!(said(Polyhedron::icosahedron(150.0), thin).contains("--rib: 1 mm leaves no foot"));
-        assert!(said(Polyhedron::tetrahedron(60.0), spec).contains("a larger --edge"));
+        assert!(said(Polyhedron::tetrahedron(50.0), spec).contains("a larger --edge"));
         let none = SkeletonSpec { wall_mm: 0.0, ..spec };
         assert!(said(Polyhedron::icosahedron(150.0), none).contains("--wall"));
     }
