@@ -207,7 +207,7 @@ fn meshes_that_are_no_solids_are_refused() {
         ("small", good.clone(), "--scale 0.001", "is --scale right?"),
         ("both", good.clone(), "--scale 2 --edge 100mm", "cannot be used with"),
         ("zero", good.clone(), "--scale 0", "--scale"),
-        ("ids", good.clone(), "--tag-spacing 1", "raise --tag-spacing to at least 3"),
+        ("ids", good.clone(), "--tag-spacing 1", "raise --tag-spacing to at least 2"),
     ] {
         std::fs::write(path.join(format!("{name}.obj")), text).unwrap();
         let args = format!("solid --mesh {name}.obj -o out {options}");

@@ -87,7 +87,7 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
         let mut texts = vec![face_number(&placement, outline, index)];
         for (i, number) in numbers.into_iter().enumerate() {
             let ends = [outline[i], outline[(i + 1) % 3]];
-            texts.push(edge_text(&placement, ends, number.to_string(), EDGE_GAP_MM));
+            texts.push(edge_text(&placement, ends, engraved(number), EDGE_GAP_MM));
         }
         for text in texts {
             drawing.engrave(super::text_outline(&text)?);
@@ -113,6 +113,13 @@ fn inset_triangle(outline: [[f64; 2]; 3], inset: f64) -> [[f64; 2]; 3] {
     circle.inset(corners, inset, 0.0).map(|v| [v.x, v.y])
 }
 
+/// A number as it is engraved: with a point after it where it reads as another upside down.
+fn engraved(number: usize) -> String {
+    let text = number.to_string();
+    let turns = text.chars().all(|c| "01689".contains(c)) && text.contains(['6', '9']);
+    if turns { text + "." } else { text }
+}
+
 /// The number of a face around the middle of its outline.
 fn face_number(
     placement: &Placement,
@@ -120,7 +127,7 @@ fn face_number(
     index: usize,
 ) -> crate::target::SheetText {
     let circle = crate::target::Incircle::of(outline.map(|[x, y]| DVec3::new(x, y, 0.0)));
-    let text = index.to_string();
+    let text = engraved(index);
     let cap = (FACE_CAP.0 * circle.radius).min(FACE_CAP.1);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
     let at = [circle.centre.x - width / 2.0, circle.centre.y - cap / 2.0];

@@ -118,7 +118,7 @@ impl Skeleton {
                 at(window, thickness + wall),
                 solid.faces[face].map(|vertex| inner[vertex]),
             ];
-            for [outer, next] in loops.array_windows::<2>() {
+            for (outer, next) in loops.iter().zip(&loops[1..]) {
                 for (i, j) in [(0, 1), (1, 2), (2, 0)] {
                     triangles_mm.push([outer[i], outer[j], next[j]]);
                     triangles_mm.push([outer[i], next[j], next[i]]);
