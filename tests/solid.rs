@@ -35,7 +35,7 @@ fn an_icosahedron_needs_no_option() {
 fn every_format_is_written_and_the_dsc_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let args = "tetrahedron --edge 8cm --tiles 7 --face-margin 4mm --obj --stl --gltf --svg --dsc \
-                --name t -o new --first-id 9";
+                --per-face --name t -o new --first-id 9";
     deltille(folder.path(), args)
         .success()
         .stdout(contains("t.glb: verified, 4 faces").and(contains("t.obj: verified, 4 faces")));
@@ -429,8 +429,8 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
         ("icosahedron --first-id 300", "at most 223"),
         ("icosahedron --texture-dpi 100", "--texture-dpi"),
         ("icosahedron --texture-dpi 9000", "lower --texture-dpi"),
-        ("icosahedron --pdf --edge 3m", "even A0"),
-        ("icosahedron --pdf --paper A5", "an --edge of at most "),
+        ("icosahedron --pdf --per-face --edge 3m", "even A0"),
+        ("icosahedron --pdf --per-face --paper A5", "an --edge of at most "),
         ("icosahedron -o /proc/nowhere", "-o: cannot write"),
         ("icosahedron --skeleton --rib 1mm", "--rib: 1 mm leaves no foot"),
         ("icosahedron --skeleton --panel-thickness 12mm", "--face-margin"),

@@ -1,9 +1,9 @@
-use kurbo::{Affine, BezPath, Point};
+use kurbo::{Affine, BezPath, Point, Rect};
 
-use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, text};
+use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_mm, text, window};
 use crate::family::Family;
 use crate::lattice::{ROW_HEIGHT, TagCells, Tile};
-use crate::target::{Panel, Placement, SheetLine, SheetText, Target};
+use crate::target::{Panel, Placement, SheetLayout, SheetPage, SheetText, Target};
 
 /// The shapes of sheet `index` of a target.
 pub(super) fn sheet(
@@ -19,22 +19,59 @@ pub(super) fn sheet(
             panel.ok_or(ArtworkError::NoSuchPanel { sheet: index + 1, panel: placement.panel })?;
         shapes.extend(draw_panel(target, panel, placement, family)?);
     }
+    shapes.extend(marks(layout)?);
+    Ok(Sheet { width_mm: layout.width_mm, height_mm: layout.height_mm, shapes })
+}
+
+/// A page that shows a part of a sheet.
+pub(super) fn page(
+    sheet: &Sheet,
+    layout: &SheetLayout,
+    page: &SheetPage,
+) -> Result<Sheet, ArtworkError> {
+    let [x, y] = page.sheet_at_mm;
+    let page_from_sheet = Affine::translate((x, y));
+    let [x0, y0, x1, y1] = page.window_mm;
+    let in_window = sheet.shapes.iter().filter_map(|shape| {
+        let path = page_from_sheet * &shape.path;
+        window::clip(Shape { path, ..shape.clone() }, Rect::new(x0, y0, x1, y1))
+    });
+    let mut shapes: Vec<Shape> = in_window.collect();
+    // The page's own lines and texts are counted on from those of the sheet.
+    let (lines, texts) = (layout.lines.len(), layout.texts.len());
+    shapes.extend(marks(&page.marks)?.into_iter().map(|shape| {
+        let part = match shape.part {
+            Part::Line { kind, index } => Part::Line { kind, index: index + lines },
+            Part::Label { index } => Part::Label { index: index + texts },
+            part => part,
+        };
+        Shape { part, ..shape }
+    }));
+    let SheetLayout { width_mm, height_mm, .. } = page.marks;
+    Ok(Sheet { width_mm, height_mm, shapes })
+}
+
+/// Check bars, lines and texts.
+fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
+    let mut shapes = Vec::new();
     for (index, bar) in layout.check_bars.iter().enumerate() {
         let path = check_bar::outline(bar);
         shapes.push(Shape { part: Part::CheckBar { index }, paint: Paint::Fill, path });
     }
-    for (index, &SheetLine { kind, from_mm, to_mm, width_mm }) in layout.lines.iter().enumerate() {
+    for (index, line) in layout.lines.iter().enumerate() {
         let mut path = BezPath::new();
-        path.move_to(Point::from((from_mm[0], from_mm[1])));
-        path.line_to(Point::from((to_mm[0], to_mm[1])));
-        let part = Part::Line { kind, index };
-        shapes.push(Shape { part, paint: Paint::Stroke { width_mm }, path });
+        for [from, to] in strokes_mm(line) {
+            path.move_to(Point::from((from[0], from[1])));
+            path.line_to(Point::from((to[0], to[1])));
+        }
+        let part = Part::Line { kind: line.kind, index };
+        shapes.push(Shape { part, paint: Paint::Stroke { width_mm: line.width_mm }, path });
     }
     for (index, label) in layout.texts.iter().enumerate() {
         let path = draw_text(label)?;
         shapes.push(Shape { part: Part::Label { index }, paint: Paint::Fill, path });
     }
-    Ok(Sheet { width_mm: layout.width_mm, height_mm: layout.height_mm, shapes })
+    Ok(shapes)
 }
 
 /// The tiles of a panel on its page: one shape each, or one field on an inverted panel.

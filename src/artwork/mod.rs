@@ -17,7 +17,9 @@ mod cells;
 mod check_bar;
 mod cutting;
 mod gallery;
+mod line;
 pub mod text;
+mod window;
 
 use kurbo::BezPath;
 
@@ -29,6 +31,7 @@ pub use cells::white_outlines;
 pub use check_bar::STROKE_WIDTH_MM;
 pub use cutting::{CutDrawing, CutLayer, CutPath, CuttingError, panels_to_cut};
 pub use gallery::{GalleryTile, tag_gallery};
+pub use line::strokes_mm;
 
 /// Everything that is drawn of one target.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +40,7 @@ pub struct Artwork {
     pub title: String,
     /// One line on what it is.
     pub subject: String,
-    /// The pages, in the order of the target's sheets.
+    /// The pages, in the order of the target's sheets and of the pages of each.
     pub sheets: Vec<Sheet>,
 }
 
@@ -97,7 +100,7 @@ pub enum Part {
         /// Position in [`SheetLayout::check_bars`](crate::target::SheetLayout::check_bars).
         index: usize,
     },
-    /// A line to cut along, by index.
+    /// A line to cut or to fold along, by index.
     Line {
         /// What it is for.
         kind: LineKind,
@@ -148,12 +151,18 @@ pub enum ArtworkError {
 ///
 /// `family` holds the codes of the tags; it may be `None` for an untagged target only.
 pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, ArtworkError> {
-    let sheets = (0..target.sheets.len()).map(|index| board::sheet(target, family, index));
-    Ok(Artwork {
-        title: target.name.clone(),
-        subject: subject(target),
-        sheets: sheets.collect::<Result<_, _>>()?,
-    })
+    let mut sheets = Vec::with_capacity(target.page_count());
+    for (index, layout) in target.sheets.iter().enumerate() {
+        let sheet = board::sheet(target, family, index)?;
+        if layout.pages.is_empty() {
+            sheets.push(sheet);
+            continue;
+        }
+        for page in &layout.pages {
+            sheets.push(board::page(&sheet, layout, page)?);
+        }
+    }
+    Ok(Artwork { title: target.name.clone(), subject: subject(target), sheets })
 }
 
 /// The tiles of one panel in its own frame.
@@ -175,7 +184,11 @@ fn subject(target: &Target) -> String {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
     let plural = if tags == 1 { "" } else { "s" };
-    let mut subject = format!("deltille calibration target, {corners} corners, {tags} tag{plural}");
+    let what = match corners {
+        0 => "single DelTags".to_owned(),
+        _ => format!("deltille calibration target, {corners} corners"),
+    };
+    let mut subject = format!("{what}, {tags} tag{plural}");
     if let Some(family) = &target.family {
         subject += &format!(", family {}, fingerprint {}", family.name, family.fingerprint);
     }

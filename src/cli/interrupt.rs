@@ -3,6 +3,8 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::run::INTERRUPTED;
+
 /// The flag that becomes true on the first Ctrl-C; a second Ctrl-C ends the process at once.
 pub fn flag() -> &'static AtomicBool {
     static FLAG: AtomicBool = AtomicBool::new(false);
@@ -11,7 +13,7 @@ pub fn flag() -> &'static AtomicBool {
         // Without a handler Ctrl-C simply ends the process, which leaves no file either.
         let _ = ctrlc::set_handler(|| {
             if FLAG.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
+                std::process::exit(INTERRUPTED.into());
             }
         });
     });

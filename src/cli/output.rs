@@ -3,18 +3,45 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail, ensure};
 
 use crate::export::atomic;
 
 /// The file that `-o` means: itself when it ends in the extension, else `<stem>.<extension>` in
-/// that folder.
-pub fn file(output: &Path, stem: &str, extension: &str) -> PathBuf {
-    if output.extension().is_some_and(|e| e == extension) {
-        output.to_owned()
-    } else {
-        output.join(format!("{stem}.{extension}"))
+/// that folder. A path that ends in another extension is no folder, unless it is there as one.
+pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBuf> {
+    let shown = output.display();
+    if output.is_dir() {
+        return Ok(output.join(format!("{stem}.{extension}")));
     }
+    if output.is_file() && output.extension().is_none() {
+        bail!("-o {shown}: is a file; name a folder, or a file that ends in .{extension}");
+    }
+    match output.extension() {
+        Some(found) if found == extension => Ok(output.to_owned()),
+        Some(_) if !output.as_os_str().to_string_lossy().ends_with('/') => {
+            let instead = output.with_extension(extension);
+            bail!(
+                "-o {shown}: the file written is a .{extension} file; name it {}, or name a folder",
+                instead.display()
+            )
+        }
+        _ => Ok(output.join(format!("{stem}.{extension}"))),
+    }
+}
+
+/// Finds out before hours of work, and without a trace, whether a file can be written.
+pub fn check_writable(path: &Path) -> anyhow::Result<()> {
+    let context = || format!("-o: {} cannot be written", path.display());
+    let folders = path.ancestors().skip(1);
+    let nearest = folders
+        .map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
+        .find(|folder| folder.exists());
+    if let Some(folder) = nearest {
+        ensure!(folder.is_dir(), "{}: {} is no folder", context(), folder.display());
+        tempfile::tempfile_in(folder).with_context(context)?;
+    }
+    Ok(())
 }
 
 /// Prints a result; a reader that has gone away (`| head`) is not an error.
@@ -25,11 +52,25 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
+/// Prints a line as [`print`] does, and returns from the function where that fails.
+macro_rules! say {
+    ($($argument:tt)*) => {
+        $crate::cli::output::print(&format!("{}\n", format_args!($($argument)*)))?
+    };
+}
+pub(crate) use say;
+
 /// Writes a file whole or not at all, making its folder where there is none.
 pub fn write(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    make_folder_of(path)?;
+    Ok(atomic::write(path, |file| file.write_all(content))?)
+}
+
+/// Makes the folder that a file goes to, where there is none.
+pub fn make_folder_of(path: &Path) -> anyhow::Result<()> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
-    Ok(atomic::write(path, |file| file.write_all(content))?)
+    Ok(())
 }

@@ -8,6 +8,8 @@ use clap::Parser;
 pub const BAD_INPUT: u8 = 2;
 /// Exit code when what was checked does not hold, or some of many inputs failed.
 pub const FAILED: u8 = 1;
+/// Exit code when Ctrl-C came before the work was done, as a shell has it.
+pub const INTERRUPTED: u8 = 130;
 
 /// Parses the arguments and runs a program; errors become one line on standard error.
 pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> ExitCode {

@@ -4,6 +4,7 @@
 //! paper §3.1). The image is smoothed with a cone before the fit; both maps are linear and are
 //! kept as their product, so a fit over offsets within r + 1 reads (4r + 1)² pixels.
 
+use multiversion::multiversion;
 use nalgebra::DMatrix;
 
 use crate::raster::{Gray, Intensity};
@@ -11,14 +12,17 @@ use crate::raster::{Gray, Intensity};
 /// Powers (i, j) of a monomial uⁱvʲ.
 pub type Powers = (i32, i32);
 
+/// Numbers that the widest processors work on at once; rows of kernels are padded to so many.
+const LANES: usize = 16;
+
 /// Kernels of the first N coefficients of a polynomial.
 #[derive(Clone, Debug)]
 pub struct ConeFit<const N: usize> {
     radius: usize,
     /// Side of the window of pixels that is read: 4r + 1.
     side: usize,
-    /// One kernel of side² weights for each coefficient.
-    kernels: [Vec<f32>; N],
+    /// For each row of the window the weights of each coefficient, in groups of lanes.
+    kernels: Vec<[[f32; LANES]; N]>,
 }
 
 impl<const N: usize> ConeFit<N> {
@@ -36,17 +40,18 @@ impl<const N: usize> ConeFit<N> {
         let fit = design.pseudo_inverse(1e-12).expect("a non-negative tolerance");
         let volume: f64 = offsets(r).map(|(u, v)| cone(u, v)).sum();
         let side = 4 * radius + 1;
-        let kernels = std::array::from_fn(|k| {
-            let mut kernel = vec![0.0f64; side * side];
-            for (i, &(u, v)) in points.iter().enumerate() {
-                for (du, dv) in offsets(r) {
-                    let x = (u + du + 2 * r) as usize;
-                    let y = (v + dv + 2 * r) as usize;
-                    kernel[y * side + x] += fit[(k, i)] * cone(du, dv) / volume;
+        let groups = side.div_ceil(LANES);
+        let mut sums = vec![[[0.0f64; LANES]; N]; side * groups];
+        for (i, &(u, v)) in points.iter().enumerate() {
+            for (du, dv) in offsets(r) {
+                let x = (u + du + 2 * r) as usize;
+                let y = (v + dv + 2 * r) as usize;
+                for (k, kernel) in sums[y * groups + x / LANES].iter_mut().enumerate() {
+                    kernel[x % LANES] += fit[(k, i)] * cone(du, dv) / volume;
                 }
             }
-            kernel.into_iter().map(|w| w as f32).collect()
-        });
+        }
+        let kernels = sums.into_iter().map(|row| row.map(|k| k.map(|w| w as f32))).collect();
         Self { radius, side, kernels }
     }
 
@@ -69,50 +74,64 @@ impl<const N: usize> ConeFit<N> {
         if !fits {
             return None;
         }
-        let (left, top) = (x as usize - 2 * self.radius, y as usize - 2 * self.radius);
-        let window = self.window(image, left, top, [x.fract() as f32, y.fract() as f32]);
-        Some(std::array::from_fn(|k| f64::from(dot(&self.kernels[k], &window))))
-    }
-
-    /// Bilinear samples of the window whose first pixel is (left, top), shifted by a fraction.
-    fn window<T: Intensity>(
-        &self,
-        image: &Gray<T>,
-        left: usize,
-        top: usize,
-        [fx, fy]: [f32; 2],
-    ) -> Vec<f32> {
-        // Taking the centre's level away first keeps single precision exact enough at 16 bits.
-        let level = image.at(left + self.side / 2, top + self.side / 2).to_f32();
-        let blend_row = |y: usize, out: &mut Vec<f32>| {
-            let row = &image.row(y)[left..=left + self.side];
-            out.clear();
-            out.extend(row.windows(2).map(|pair| {
-                let (a, b) = (pair[0].to_f32() - level, pair[1].to_f32() - level);
-                a + fx * (b - a)
-            }));
-        };
-        let mut window = Vec::with_capacity(self.side * self.side);
-        let (mut upper, mut lower) = (Vec::with_capacity(self.side), Vec::with_capacity(self.side));
-        blend_row(top, &mut upper);
-        for y in top..top + self.side {
-            blend_row(y + 1, &mut lower);
-            window.extend(upper.iter().zip(&lower).map(|(u, l)| u + fy * (l - u)));
-            std::mem::swap(&mut upper, &mut lower);
-        }
-        window
+        let corner = [x as usize - 2 * self.radius, y as usize - 2 * self.radius];
+        let fraction = [x.fract() as f32, y.fract() as f32];
+        Some(products(&self.kernels, self.side, image, corner, fraction).map(f64::from))
     }
 }
 
-/// Dot product with eight running sums, which the compiler keeps in vector registers.
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f32 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
-    let mut sums = [0.0f32; 8];
-    for (x, y) in a8.zip(b8) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
+/// The products of the kernels with bilinear samples of a window of `side` pixels, whose first
+/// pixel is (left, top), shifted by a fraction.
+#[multiversion(targets = "simd")]
+fn products<const N: usize, T: Intensity>(
+    kernels: &[[[f32; LANES]; N]],
+    side: usize,
+    image: &Gray<T>,
+    [left, top]: [usize; 2],
+    [fx, fy]: [f32; 2],
+) -> [f32; N] {
+    // Taking the centre's level away first keeps single precision exact enough at 16 bits.
+    let level = image.at(left + side / 2, top + side / 2).to_f32();
+    let groups = side.div_ceil(LANES);
+    let mut sums = [[0.0f32; LANES]; N];
+    for group in 0..groups {
+        let column = left + group * LANES;
+        let mut upper = blended(image.row(top), column, fx, level);
+        for (i, kernels) in kernels.iter().skip(group).step_by(groups).enumerate() {
+            let lower = blended(image.row(top + i + 1), column, fx, level);
+            let mut samples = [0.0; LANES];
+            for j in 0..LANES {
+                samples[j] = upper[j] + fy * (lower[j] - upper[j]);
+            }
+            for k in 0..N {
+                for j in 0..LANES {
+                    sums[k][j] += kernels[k][j] * samples[j];
+                }
+            }
+            upper = lower;
         }
     }
-    tail + sums.iter().sum::<f32>()
+    sums.map(|sums| sums.iter().sum())
+}
+
+/// Samples of a row between its pixels, from a column on, minus a level; behind the end of the row,
+/// where kernels have no weight, some number.
+#[inline(always)]
+fn blended<T: Intensity>(row: &[T], column: usize, fx: f32, level: f32) -> [f32; LANES] {
+    let mut padded = [T::default(); LANES + 1];
+    let rest = &row[column..];
+    let pixels = match rest.first_chunk() {
+        Some(pixels) => pixels,
+        None => {
+            padded[..rest.len()].copy_from_slice(rest);
+            &padded
+        }
+    };
+    // Plain loops: a closure handed to the standard library would not be compiled for the target.
+    let mut samples = [0.0; LANES];
+    for i in 0..LANES {
+        let (a, b) = (pixels[i].to_f32() - level, pixels[i + 1].to_f32() - level);
+        samples[i] = a + fx * (b - a);
+    }
+    samples
 }

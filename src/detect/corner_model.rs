@@ -13,6 +13,7 @@
 //! The covariance is σ² (JᵀJ + prior)⁻¹ with the noise σ estimated from the residuals. It is honest
 //! where the noise is white and the window shows nothing but the corner; JPEG's noise is not white.
 
+use multiversion::multiversion;
 use nalgebra::{SMatrix, SVector};
 
 use super::blurred_corner::{Orthant, Shade, deltille};
@@ -21,8 +22,11 @@ use crate::raster::{Gray, Intensity};
 /// Largest radius of a window, px.
 pub const MAX_RADIUS: usize = 15;
 
+/// Numbers that the widest processors work on at once.
+const LANES: usize = 16;
+
 /// Pixels of the largest window, rounded up to whole vectors.
-const MAX_PIXELS: usize = ((2 * MAX_RADIUS + 1) * (2 * MAX_RADIUS + 1)).next_multiple_of(8);
+const MAX_PIXELS: usize = ((2 * MAX_RADIUS + 1) * (2 * MAX_RADIUS + 1)).next_multiple_of(LANES);
 
 /// Parameters of three edges; two leave the last one unused.
 const PARAMS: usize = 10;
@@ -107,7 +111,7 @@ impl Window {
     pub fn new(radius: usize) -> Self {
         let radius = radius.min(MAX_RADIUS);
         let side = 2 * radius + 1;
-        let padded = (side * side).next_multiple_of(8);
+        let padded = (side * side).next_multiple_of(LANES);
         let place = |i: usize| i as f32 - radius as f32;
         Self {
             radius,
@@ -123,13 +127,16 @@ impl Window {
     }
 }
 
+/// One row a parameter, then the residual; a column a pixel.
+type Columns = [[f32; MAX_PIXELS]; PARAMS + 1];
+
 /// Fits corners; holds the work space, so one fitter serves one thread.
 #[derive(Clone, Debug)]
 pub struct CornerFitter {
     /// Pixels of full scale 1.
     pixels: Box<[f32; MAX_PIXELS]>,
     /// Derivatives by the parameters, then the residual.
-    columns: Box<[[f32; MAX_PIXELS]; PARAMS + 1]>,
+    columns: Box<Columns>,
 }
 
 impl Default for CornerFitter {
@@ -245,32 +252,24 @@ impl CornerFitter {
         match K {
             2 => {
                 two.copy_from_slice(&corner.angles);
-                let turn = two[1] - two[0];
-                let orthant = Orthant::new(turn.cos());
-                let by_angle = turn.sin() as f32;
-                let shade = |h| orthant.checker(h);
-                fill(columns, &self.pixels, window, corner, two, [by_angle, -by_angle], shade);
+                fill_checker(columns, &self.pixels, window, corner, two);
             }
             _ => {
                 three.copy_from_slice(&corner.angles);
-                fill(columns, &self.pixels, window, corner, three, [0.0; 3], deltille);
+                fill_deltille(columns, &self.pixels, window, corner, three);
             }
         }
-        for column in columns.iter_mut() {
-            column[window.count..window.u.len()].fill(0.0);
-        }
-        let n = window.u.len();
-        let column = |i: usize| &columns[i][..n];
+        let products = products(columns, ANGLE + K, window.count);
         let mut normal = Normal {
             matrix: SMatrix::identity(),
             gradient: SVector::zeros(),
-            cost: dot(column(PARAMS), column(PARAMS)),
+            cost: products[PARAMS][PARAMS],
         };
-        for i in 0..ANGLE + K {
-            normal.gradient[i] = dot(column(i), column(PARAMS));
-            for j in i..ANGLE + K {
-                normal.matrix[(i, j)] = dot(column(i), column(j));
-                normal.matrix[(j, i)] = normal.matrix[(i, j)];
+        for (i, row) in products.iter().enumerate().take(ANGLE + K) {
+            normal.gradient[i] = row[PARAMS];
+            for (j, &product) in row.iter().enumerate().take(ANGLE + K).skip(i) {
+                normal.matrix[(i, j)] = product;
+                normal.matrix[(j, i)] = product;
             }
         }
         normal
@@ -307,12 +306,40 @@ impl<const K: usize> Corner<K> {
     }
 }
 
+#[multiversion(targets = "simd")]
+fn fill_checker<const C: usize>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    angles: [f64; 2],
+) {
+    let turn = angles[1] - angles[0];
+    let orthant = Orthant::new(turn.cos());
+    let by_angle = turn.sin() as f32;
+    let shade = |h| orthant.checker(h);
+    fill(columns, pixels, window, corner, angles, [by_angle, -by_angle], shade);
+}
+
+#[multiversion(targets = "simd")]
+fn fill_deltille<const C: usize>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    angles: [f64; 3],
+) {
+    // As a closure it is compiled for the target at hand, as a bare function it would not be.
+    let shade = |h| deltille(h);
+    fill(columns, pixels, window, corner, angles, [0.0; 3], shade);
+}
+
 /// Fills the columns of derivatives and residuals.
 ///
 /// `by_angle` is ∂ρ/∂θ_k.
 #[inline(always)]
 fn fill<const K: usize, const C: usize>(
-    columns: &mut [[f32; MAX_PIXELS]; PARAMS + 1],
+    columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
@@ -374,13 +401,27 @@ fn with_prior<const K: usize>(
     (matrix, gradient)
 }
 
-/// Dot product of columns, whose length is a multiple of eight.
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let mut sums = [0.0f32; 8];
-    for (x, y) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
+/// Products of each two of the first `params` columns and the last, over `count` pixels; only the
+/// upper half is filled.
+#[multiversion(targets = "simd")]
+fn products(columns: &mut Columns, params: usize, count: usize) -> [[f64; PARAMS + 1]; PARAMS + 1] {
+    let padded = count.next_multiple_of(LANES).min(MAX_PIXELS);
+    for column in columns.iter_mut() {
+        column[count..padded].fill(0.0);
+    }
+    let mut products = [[0.0; PARAMS + 1]; PARAMS + 1];
+    for i in (0..params).chain([PARAMS]) {
+        for j in (i..params).chain([PARAMS]) {
+            let (a, _) = columns[i][..padded].as_chunks::<LANES>();
+            let (b, _) = columns[j][..padded].as_chunks::<LANES>();
+            let mut sums = [0.0f32; LANES];
+            for (a, b) in a.iter().zip(b) {
+                for k in 0..LANES {
+                    sums[k] += a[k] * b[k];
+                }
+            }
+            products[i][j] = f64::from(sums.iter().sum::<f32>());
         }
     }
-    f64::from(sums.iter().sum::<f32>())
+    products
 }

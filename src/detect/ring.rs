@@ -15,6 +15,8 @@
 //! some level of the pyramid. With twelve samples the third harmonic needs additions only, and the
 //! whole image costs about three nanoseconds a pixel.
 
+use multiversion::multiversion;
+
 use crate::raster::Gray;
 
 /// Offsets of half the ring, near 0°, 30°, …, 150°; the other half is opposite. Radius 3.6 to 4 px:
@@ -69,11 +71,18 @@ fn response_row(image: &Gray<i16>, y: usize, out: &mut [f32]) {
         let row = image.row(y.wrapping_add_signed(dy));
         &row[RADIUS.wrapping_add_signed(dx)..][..n]
     };
-    let p = HALF_RING.map(|(dx, dy)| at(dx, dy));
-    let q = HALF_RING.map(|(dx, dy)| at(-dx, -dy));
+    let ring = HALF_RING.map(|(dx, dy)| [at(dx, dy), at(-dx, -dy)]);
+    responses(ring, out);
+}
+
+/// R of places whose opposite samples are given.
+#[multiversion(targets = "simd")]
+fn responses(ring: [[&[i16]; 2]; 6], out: &mut [f32]) {
+    let n = out.len();
+    let ring = ring.map(|pair| pair.map(|row| &row[..n]));
     for i in 0..n {
-        let odd: [i16; 6] = std::array::from_fn(|k| p[k][i] - q[k][i]);
-        let even: [i16; 6] = std::array::from_fn(|k| p[k][i] + q[k][i]);
+        let odd: [i16; 6] = std::array::from_fn(|k| ring[k][0][i] - ring[k][1][i]);
+        let even: [i16; 6] = std::array::from_fn(|k| ring[k][0][i] + ring[k][1][i]);
         // Third harmonic, 6α, and first harmonic with weights 8·cos 30°k ≈ 8, 7, 4, 0: 48β.
         let c3 = i32::from(odd[0] - odd[2] + odd[4]);
         let s3 = i32::from(odd[1] - odd[3] + odd[5]);
@@ -88,13 +97,25 @@ fn response_row(image: &Gray<i16>, y: usize, out: &mut [f32]) {
     }
 }
 
+/// Whether any value exceeds the threshold.
+#[multiversion(targets = "simd")]
+fn any_above(values: &[f32], threshold: f32) -> bool {
+    values.iter().fold(false, |any, &value| any | (value > threshold))
+}
+
 /// Appends the maxima of row `y`, whose neighbouring rows are all in the window.
 fn maxima_of_row(window: &[Vec<f32>], y: usize, threshold: f32, found: &mut Vec<Candidate>) {
     let rows = window.len();
     let width = window[0].len();
     let centre = &window[y % rows];
     let margin = RADIUS + SUPPRESSION_RADIUS;
-    for (x, &response) in centre.iter().enumerate().take(width - margin).skip(margin) {
+    /// Values looked at in one go; few rows of few images have a candidate among so many.
+    const BLOCK: usize = 64;
+    let blocks =
+        (margin..width - margin).step_by(BLOCK).map(|x| x..(x + BLOCK).min(width - margin));
+    let promising = blocks.filter(|block| any_above(&centre[block.clone()], threshold));
+    for x in promising.flatten() {
+        let response = centre[x];
         if response <= threshold {
             continue;
         }

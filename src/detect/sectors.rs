@@ -16,6 +16,7 @@
 //! ```
 
 use std::f64::consts::{PI, TAU};
+use std::sync::LazyLock;
 
 use super::cubic::CubicSurface;
 use crate::raster::Gray;
@@ -95,10 +96,8 @@ impl Circle {
         if !inside {
             return None;
         }
-        let values: [f64; SAMPLES] = std::array::from_fn(|k| {
-            let (sin, cos) = angle_of(k as f64).sin_cos();
-            f64::from(image.bilinear(x + radius * cos, y + radius * sin))
-        });
+        let values: [f64; SAMPLES] = DIRECTIONS
+            .map(|[cos, sin]| f64::from(image.bilinear(x + radius * cos, y + radius * sin)));
         // Opposite sectors have opposite colours, so the mean is the level of the edges.
         let level = values.iter().sum::<f64>() / SAMPLES as f64;
         Some(Self { level, deviations: values.map(|v| v - level) })
@@ -169,6 +168,14 @@ impl Circle {
         Crossing { angle: angle_of((a + start) as f64 + fraction), rising: to > from }
     }
 }
+
+/// Unit vectors towards the samples.
+static DIRECTIONS: LazyLock<[[f64; 2]; SAMPLES]> = LazyLock::new(|| {
+    std::array::from_fn(|k| {
+        let (sin, cos) = angle_of(k as f64).sin_cos();
+        [cos, sin]
+    })
+});
 
 fn angle_of(sample: f64) -> f64 {
     sample * TAU / SAMPLES as f64

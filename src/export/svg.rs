@@ -9,7 +9,6 @@ use kurbo::{Affine, BezPath, PathEl, Point};
 
 use super::{ExportError, atomic};
 use crate::artwork::{Artwork, Paint, Part, Shape};
-use crate::target::LineKind;
 
 /// Decimals of a coordinate: a tenth of a micrometre.
 const DECIMALS: usize = 4;
@@ -61,7 +60,7 @@ fn name(part: Part) -> String {
         Part::Tile { panel, row, col } => format!("tile-{panel}-r{row}-c{col}"),
         Part::Field { panel } => format!("field-{panel}"),
         Part::CheckBar { index } => format!("check-bar-{index}"),
-        Part::Line { kind: LineKind::Cut, index } => format!("cut-{index}"),
+        Part::Line { kind, index } => format!("{}-{index}", kind.name()),
         Part::Label { index } => format!("label-{index}"),
     }
 }

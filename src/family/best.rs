@@ -17,6 +17,7 @@ use super::algebra::quasicyclic::{Symmetry, random_code};
 use super::algebra::record::has_free_centre;
 use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, residue};
 use super::polish::{Effort, polish};
+use super::search::Search;
 use super::{Construction, Control, Family, FamilyError, Rules, Screen, TagWords};
 use crate::lattice::Dimension;
 
@@ -64,7 +65,9 @@ struct Draw {
 }
 
 impl Best {
-    /// Searches and makes a family of what was found. Progress is reported in thousandths of the time.
+    /// Searches and makes a family of what was found. Progress is reported in thousandths of the
+    /// time. When it is cancelled, the time is over: the family is the best so far, and only where
+    /// nothing was found yet there is none.
     pub fn family(&self, name: &str, control: Control) -> Result<Family, FamilyError> {
         self.rules.check(self.dimension.bits())?;
         let screen = Screen::new(TagWords::new(self.dimension), self.distance, &self.rules);
@@ -74,13 +77,13 @@ impl Best {
         let small = self.exchange && self.dimension.bits() <= super::polish::MAX_BITS;
         let until = |share: f64| start + self.time.mul_f64(share);
         let [sources, arrangements] = if small { [0.3, 0.5] } else { [0.6, 1.0] };
-        let mut candidates = self.sources(until(sources), start, control)?;
-        self.rearrange(&mut candidates, until(arrangements), start, control)?;
+        let mut candidates = self.sources(until(sources), start, control);
+        self.rearrange(&mut candidates, until(arrangements), start, control);
 
         let mut best: Option<(Vec<u64>, Construction)> = None;
         for candidate in candidates {
             let left = until(1.0).saturating_duration_since(Instant::now());
-            if best.is_some() && (left.is_zero() || !small) {
+            if best.is_some() && (left.is_zero() || !small || control.is_cancelled()) {
                 break;
             }
             let end = Instant::now() + left.mul_f64(0.7);
@@ -90,7 +93,6 @@ impl Best {
             }
             control.report(self.thousandths(start), 1000, best.as_ref().map_or(0, |b| b.0.len()));
         }
-        control.check()?;
         let (codes, construction) = match best {
             Some(found) if !found.0.is_empty() => found,
             _ => self.search_alone(&screen, control)?,
@@ -105,12 +107,7 @@ impl Best {
     }
 
     /// Draws unions of cosets until the time is over; the most promising first.
-    fn sources(
-        &self,
-        until: Instant,
-        start: Instant,
-        control: Control,
-    ) -> Result<Vec<Candidate>, FamilyError> {
+    fn sources(&self, until: Instant, start: Instant, control: Control) -> Vec<Candidate> {
         /// Draws between two looks at the clock.
         const BATCH: u64 = 16;
         /// Candidates kept for a thorough arrangement.
@@ -122,10 +119,10 @@ impl Best {
         let mut most_orbits = 0;
         let mut draw = 0;
         loop {
-            control.check()?;
             let most = most_orbits;
             let batch: Vec<Draw> = (draw..draw + BATCH)
                 .into_par_iter()
+                .filter(|_| !control.is_cancelled())
                 .map(|i| self.candidate(self.seed.wrapping_add(i), i, most, &promising))
                 .collect();
             draw += BATCH;
@@ -151,8 +148,8 @@ impl Best {
             promising.truncate(PROMISING);
             let best = kept.first().map_or(0, |c| c.worth as usize);
             control.report(self.thousandths(start), 1000, best);
-            if Instant::now() >= until {
-                return Ok(kept);
+            if Instant::now() >= until || control.is_cancelled() {
+                return kept;
             }
         }
     }
@@ -296,14 +293,14 @@ impl Best {
         until: Instant,
         start: Instant,
         control: Control,
-    ) -> Result<(), FamilyError> {
+    ) {
+        let over = || Instant::now() >= until || control.is_cancelled();
         let arrangers: Vec<Arranger> =
             candidates.iter().map(|c| self.arranger(&c.union, c.union.orbits())).collect();
         let mut steps = 4_000;
         for round in 0.. {
-            control.check()?;
             candidates.par_iter_mut().zip(&arrangers).for_each(|(candidate, arranger)| {
-                if Instant::now() < until {
+                if !over() {
                     let seed = self.seed.wrapping_add(1_000_003 * (round + 1));
                     let (worth, arrangement) = arranger.anneal(seed, steps);
                     if worth > candidate.worth {
@@ -313,13 +310,12 @@ impl Best {
             });
             let best = candidates.iter().map(|c| c.worth as usize).max().unwrap_or(0);
             control.report(self.thousandths(start), 1000, best);
-            if Instant::now() >= until || candidates.is_empty() {
+            if over() || candidates.is_empty() {
                 break;
             }
             steps = (steps * 3 / 2).min(200_000);
         }
         candidates.sort_by(|a, b| b.worth.total_cmp(&a.worth));
-        Ok(())
     }
 
     /// The codes of a candidate, exchanged where that gains some.
@@ -342,7 +338,7 @@ impl Best {
             seed: self.seed,
         };
         let codes = construction.codes(screen)?;
-        if !self.exchange {
+        if !self.exchange || self.dimension.bits() > super::polish::MAX_BITS {
             return Ok((codes, Construction::Algebraic(construction)));
         }
         let effort = Effort { seed: self.seed, rounds: 50, steps: 400_000 };
@@ -360,45 +356,18 @@ impl Best {
         screen: &Screen,
         control: Control,
     ) -> Result<(Vec<u64>, Construction), FamilyError> {
-        let search = Search { seed: self.seed, rounds: 3, steps: 200_000 };
-        let codes = search.codes(screen, control)?;
-        if codes.is_empty() {
-            let problem = format!(
-                "no word of {} bits satisfies the rules at distance {}; loosen them",
-                self.dimension.bits(),
-                self.distance
-            );
-            return Err(FamilyError::field("distance", problem));
+        if self.dimension.bits() > super::polish::MAX_BITS {
+            control.check()?;
+            return Err(FamilyError::field("codes", "none was found"));
         }
-        let Search { seed, rounds, steps } = search;
-        Ok((codes, Construction::Search { seed, rounds, steps }))
+        let search = Search { seed: self.seed, rounds: 3, steps: Search::STEPS };
+        let codes = search.codes(screen, control)?;
+        Ok((codes, search.construction(search.rounds)))
     }
 }
 
 /// Syndromes of up to this many bits are tabulated in a search that draws many codes.
 const SYNDROME_BITS: u32 = if MAX_SYNDROME_BITS < 24 { MAX_SYNDROME_BITS } else { 24 };
-
-/// Local search from nothing; deterministic.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Search {
-    /// Seed of the random choices.
-    pub seed: u64,
-    /// Rounds, each with new candidates.
-    pub rounds: u32,
-    /// Moves in each round.
-    pub steps: u64,
-}
-
-impl Search {
-    /// The codes found; for words of up to 25 bits.
-    pub fn codes(&self, screen: &Screen, control: Control) -> Result<Vec<u64>, FamilyError> {
-        let effort = Effort { seed: self.seed, rounds: self.rounds, steps: self.steps };
-        let mut codes = polish(screen, Vec::new(), effort, control, || false);
-        control.check()?;
-        codes.sort_unstable_by_key(|&code| screen.words().canonical(code));
-        Ok(codes)
-    }
-}
 
 /// Minimum distance of a union of cosets.
 fn min_distance(union: &CosetUnion) -> u32 {

@@ -49,6 +49,14 @@ pub enum FamilyError {
         /// What is wrong and what to do.
         problem: String,
     },
+    /// The file is well formed, and contradicts itself.
+    #[error("field `{field}`: {problem}")]
+    Claim {
+        /// The field.
+        field: String,
+        /// What does not hold.
+        problem: String,
+    },
     /// The search was stopped from outside.
     #[error("interrupted; nothing was written")]
     Cancelled,
@@ -57,5 +65,14 @@ pub enum FamilyError {
 impl FamilyError {
     pub(super) fn field(field: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Field { field: field.into(), problem: problem.into() }
+    }
+
+    /// Whether a file was read whole, and what it claims does not hold.
+    pub fn is_broken_claim(&self) -> bool {
+        match self {
+            Self::Claim { .. } => true,
+            Self::In { error, .. } => error.is_broken_claim(),
+            _ => false,
+        }
     }
 }

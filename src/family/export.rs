@@ -49,7 +49,11 @@ pub fn export(family: &Family, format: ExportFormat) -> String {
         family.distance(),
         family.fingerprint()
     );
-    let identifier: String = family.name().replace('-', "_");
+    let mut identifier: String = family.name().replace('-', "_");
+    // No language takes a digit first, and C keeps names with a line first to itself.
+    if !identifier.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        identifier.insert_str(0, "family_");
+    }
     let upper = identifier.to_uppercase();
     let list = |suffix: &str, indent: &str| {
         family.codes().iter().fold(String::new(), |mut text, &code| {

@@ -30,7 +30,7 @@ pub enum Construction {
     /// A union of cosets of a linear code, arranged on the tag, with some codes exchanged
     /// ([`super::algebra`]).
     Algebraic(AlgebraicConstruction),
-    /// Local search from nothing ([`super::best`]); rerun with the same numbers it gives the same.
+    /// Local search from nothing ([`super::search`]); rerun with the same numbers it gives the same.
     Search {
         /// Seed of the random choices.
         seed: u64,
@@ -94,7 +94,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
              fetch or generate the file anew",
             file.fingerprint
         );
-        return Err(FamilyError::field("fingerprint", problem));
+        return Err(FamilyError::Claim { field: "fingerprint".to_owned(), problem });
     }
     Ok(Family {
         name: file.name,
@@ -163,7 +163,7 @@ pub(super) fn check_form(
             "{} is code {first} again, perhaps turned: remove one",
             words.hex(codes[second])
         );
-        return Err(FamilyError::field(format!("codes[{second}]"), problem));
+        return Err(FamilyError::Claim { field: format!("codes[{second}]"), problem });
     }
     Ok(())
 }

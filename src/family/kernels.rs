@@ -55,15 +55,15 @@ fn any_nearer_portable(word: u64, list: &[u64], distance: u32) -> bool {
 
 for_this_processor! {
     /// Position of the first word of `list` that is nearer to `word` than `distance`.
-    fn first_nearer / first_nearer_portable(word: u64, list: &[u64], distance: u32) -> Option<usize>
+    fn first_nearer / first_nearer_portable(word: u32, list: &[u32], distance: u32) -> Option<usize>
 }
 
 #[inline(always)]
-fn first_nearer_portable(word: u64, list: &[u64], distance: u32) -> Option<usize> {
-    let near = |w: &u64| (word ^ w).count_ones() < distance;
+fn first_nearer_portable(word: u32, list: &[u32], distance: u32) -> Option<usize> {
+    let near = |w: &u32| (word ^ w).count_ones() < distance;
     let (blocks, rest) = list.as_chunks::<32>();
     for (i, block) in blocks.iter().enumerate() {
-        if block.iter().fold(0u64, |n, w| n + u64::from(near(w))) > 0 {
+        if block.iter().fold(0u32, |n, w| n + u32::from(near(w))) > 0 {
             return block.iter().position(near).map(|at| 32 * i + at);
         }
     }
@@ -163,9 +163,10 @@ mod tests {
             for distance in [0, 20, 26, 40] {
                 let near = nearer_portable(word, &list, distance);
                 prop_assert_eq!(nearer(word, &list, distance), near.clone());
-                let first = near.first().map(|&i| i as usize);
-                prop_assert_eq!(first_nearer(word, &list, distance), first);
-                prop_assert_eq!(first_nearer_portable(word, &list, distance), first);
+                let (half, halves) = (word as u32, list.iter().map(|&w| w as u32).collect::<Vec<_>>());
+                let first = halves.iter().position(|w| (half ^ w).count_ones() < distance / 2);
+                prop_assert_eq!(first_nearer(half, &halves, distance / 2), first);
+                prop_assert_eq!(first_nearer_portable(half, &halves, distance / 2), first);
                 prop_assert_eq!(any_nearer(word, &list, distance), !near.is_empty());
                 prop_assert_eq!(any_nearer_portable(word, &list, distance), !near.is_empty());
             }

@@ -33,6 +33,7 @@ mod kernels;
 pub mod lexicode;
 mod polish;
 mod rules;
+pub mod search;
 mod shipped;
 mod statistics;
 mod tagwords;

@@ -34,34 +34,53 @@ pub(super) fn polish(
     codes: Vec<u64>,
     effort: Effort,
     control: Control,
-    stop: impl Fn() -> bool,
+    stop: impl Fn() -> bool + Sync,
 ) -> Vec<u64> {
-    let bits = screen.words().dimension().bits();
-    if bits > MAX_BITS {
+    if screen.words().dimension().bits() > MAX_BITS {
         return codes;
     }
-    let mut random = ChaCha8Rng::seed_from_u64(effort.seed);
     let mut best = codes;
     let halt = || control.is_cancelled() || stop();
-    for round in 0..effort.rounds {
+    for number in 0..effort.rounds {
         if halt() {
             break;
         }
-        let pool = candidates(screen, &best, &mut random);
-        let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
-        let graph = ConflictGraph::new(pool.len(), |i| {
-            let mut near = nearer(pool[i], &turned, screen.distance());
-            near.iter_mut().for_each(|j| *j /= 3);
-            near.dedup();
-            near.retain(|&j| j != i as u32);
-            near
-        });
-        let initial: Vec<u32> = (0..best.len() as u32).collect();
-        let found = graph.search(&initial, random.random(), effort.steps, halt);
-        best = found.into_iter().map(|i| pool[i as usize]).collect();
-        control.report(u64::from(round) + 1, u64::from(effort.rounds), best.len());
+        best = round(screen, &best, effort, number, halt);
+        control.report(u64::from(number) + 1, u64::from(effort.rounds), best.len());
     }
     best
+}
+
+/// One round. It has random numbers of its own, so that the rounds after it do not depend on
+/// whether the search was interrupted in between.
+pub(super) fn round(
+    screen: &Screen,
+    codes: &[u64],
+    effort: Effort,
+    number: u32,
+    halt: impl Fn() -> bool + Sync,
+) -> Vec<u64> {
+    let mut random = ChaCha8Rng::seed_from_u64(effort.seed);
+    random.set_stream(number.into());
+    let pool = candidates(screen, codes, &mut random);
+    let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
+    let graph = ConflictGraph::new(pool.len(), |i| {
+        if halt() {
+            return Vec::new();
+        }
+        let mut near = nearer(pool[i], &turned, screen.distance());
+        near.iter_mut().for_each(|j| *j /= 3);
+        near.dedup();
+        near.retain(|&j| j != i as u32);
+        near
+    });
+    // Without all conflicts nothing can be exchanged.
+    if halt() {
+        return codes.to_vec();
+    }
+    let initial: Vec<u32> = (0..codes.len() as u32).collect();
+    let found = graph.search(&initial, random.random(), effort.steps, halt);
+    found.into_iter().map(|i| pool[i as usize]).collect()
 }
 
 /// The codes, then the words with the fewest conflicts, up to [`POOL`] in all.

@@ -21,7 +21,8 @@ impl Rules {
         Self { min_complexity: 0.5, black_distance: distance, white_distance: 0 }
     }
 
-    pub(super) fn check(&self, bits: u32) -> Result<(), FamilyError> {
+    /// Checks that the numbers make sense for tags of `bits` cells; names the field that does not.
+    pub fn check(&self, bits: u32) -> Result<(), FamilyError> {
         if !(0.0..=1.0).contains(&self.min_complexity) {
             let problem = format!("{} is not between 0 and 1", self.min_complexity);
             return Err(FamilyError::field("min_complexity", problem));

@@ -10,6 +10,7 @@ pub trait Intensity: Copy + Default + Send + Sync + PartialOrd + 'static {
 impl Intensity for u8 {
     const FULL_SCALE: f32 = 255.0;
 
+    #[inline(always)]
     fn to_f32(self) -> f32 {
         f32::from(self)
     }
@@ -18,6 +19,7 @@ impl Intensity for u8 {
 impl Intensity for u16 {
     const FULL_SCALE: f32 = 65535.0;
 
+    #[inline(always)]
     fn to_f32(self) -> f32 {
         f32::from(self)
     }
@@ -26,6 +28,7 @@ impl Intensity for u16 {
 impl Intensity for i16 {
     const FULL_SCALE: f32 = 32767.0;
 
+    #[inline(always)]
     fn to_f32(self) -> f32 {
         f32::from(self)
     }
@@ -34,6 +37,7 @@ impl Intensity for i16 {
 impl Intensity for f32 {
     const FULL_SCALE: f32 = 1.0;
 
+    #[inline(always)]
     fn to_f32(self) -> f32 {
         self
     }
@@ -86,6 +90,7 @@ impl<T: Intensity> Gray<T> {
     }
 
     /// One row.
+    #[inline]
     pub fn row(&self, y: usize) -> &[T] {
         &self.data[y * self.width..(y + 1) * self.width]
     }
@@ -96,6 +101,7 @@ impl<T: Intensity> Gray<T> {
     }
 
     /// The pixel at (x, y), which must lie in the image.
+    #[inline]
     pub fn at(&self, x: usize, y: usize) -> T {
         self.data[y * self.width + x]
     }
@@ -103,6 +109,7 @@ impl<T: Intensity> Gray<T> {
     /// Bilinear interpolation at (x, y); positions outside take the nearest border value.
     ///
     /// An empty image reads 0.
+    #[inline]
     pub fn bilinear(&self, x: f64, y: f64) -> f32 {
         if self.data.is_empty() {
             return 0.0;

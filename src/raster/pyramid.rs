@@ -1,3 +1,5 @@
+use multiversion::multiversion;
+
 use super::{Gray, Intensity};
 
 /// Full scale of a pyramid's pixels: 10 bits leave room for sums of a dozen in 16-bit arithmetic.
@@ -41,7 +43,6 @@ impl Pyramid {
 /// The 3×3 binomial (1 2 1)ᵀ(1 2 1)/16, borders repeated, in 10 bits.
 fn binomial<T: Intensity>(image: &Gray<T>) -> Gray<i16> {
     let (width, height) = (image.width(), image.height());
-    let to_10_bits = PYRAMID_FULL_SCALE / T::FULL_SCALE / 16.0;
     let mut out = Gray::new(width, height);
     if width == 0 || height == 0 {
         return out;
@@ -49,19 +50,32 @@ fn binomial<T: Intensity>(image: &Gray<T>) -> Gray<i16> {
     let mut columns = vec![0.0f32; width + 2];
     for y in 0..height {
         let above = image.row(y.saturating_sub(1));
-        let here = image.row(y);
         let below = image.row((y + 1).min(height - 1));
-        for (x, sum) in columns[1..=width].iter_mut().enumerate() {
-            *sum = above[x].to_f32() + 2.0 * here[x].to_f32() + below[x].to_f32();
-        }
-        columns[0] = columns[1];
-        columns[width + 1] = columns[width];
-        for (x, pixel) in out.row_mut(y).iter_mut().enumerate() {
-            let sum = columns[x] + 2.0 * columns[x + 1] + columns[x + 2];
-            *pixel = (sum * to_10_bits + 0.5) as i16;
-        }
+        binomial_row([above, image.row(y), below], &mut columns, out.row_mut(y));
     }
     out
+}
+
+/// 1.5·2²³: a float of this size has no bits behind the point.
+const ROUND: f32 = 12_582_912.0;
+
+#[multiversion(targets = "simd")]
+fn binomial_row<T: Intensity>(rows: [&[T]; 3], columns: &mut [f32], out: &mut [i16]) {
+    let width = out.len();
+    let [above, here, below] = rows.map(|row| &row[..width]);
+    let sums = &mut columns[1..=width];
+    for x in 0..width {
+        sums[x] = above[x].to_f32() + 2.0 * here[x].to_f32() + below[x].to_f32();
+    }
+    columns[0] = columns[1];
+    columns[width + 1] = columns[width];
+    let to_10_bits = PYRAMID_FULL_SCALE / T::FULL_SCALE / 16.0;
+    let [left, centre, right] = [0, 1, 2].map(|shift| &columns[shift..shift + width]);
+    for x in 0..width {
+        let sum = left[x] + 2.0 * centre[x] + right[x];
+        // Rounded to the low bits of the sum: cheaper than a conversion that looks for NaN.
+        out[x] = (sum * to_10_bits + ROUND).to_bits() as i16;
+    }
 }
 
 /// The mean of each 2×2 block; an odd last row or column is dropped.
@@ -69,13 +83,17 @@ fn half(image: &Gray<i16>) -> Gray<i16> {
     let (width, height) = (image.width() / 2, image.height() / 2);
     let mut out = Gray::new(width, height);
     for y in 0..height {
-        let (upper, lower) = (image.row(2 * y), image.row(2 * y + 1));
-        let blocks = upper.chunks_exact(2).zip(lower.chunks_exact(2));
-        for (pixel, (u, l)) in out.row_mut(y).iter_mut().zip(blocks) {
-            *pixel = (u[0] + u[1] + l[0] + l[1] + 2) >> 2;
-        }
+        half_row([image.row(2 * y), image.row(2 * y + 1)], out.row_mut(y));
     }
     out
+}
+
+#[multiversion(targets = "simd")]
+fn half_row([upper, lower]: [&[i16]; 2], out: &mut [i16]) {
+    let blocks = upper.chunks_exact(2).zip(lower.chunks_exact(2));
+    for (pixel, (u, l)) in out.iter_mut().zip(blocks) {
+        *pixel = (u[0] + u[1] + l[0] + l[1] + 2) >> 2;
+    }
 }
 
 #[cfg(test)]

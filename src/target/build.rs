@@ -1,8 +1,8 @@
 use super::layout::{arrange, label};
-use super::paper::PaperSpec;
+use super::paper::{PaperSpec, SolidSheets};
 use super::{
     BoardSpec, FamilyRef, Panel, SheetLayout, Target, TargetError, TargetSpec, board, face_sheet,
-    solid,
+    net, solid, tag_sheet,
 };
 use crate::family::Family;
 
@@ -24,9 +24,21 @@ impl Target {
             TargetSpec::Board(board) => board_parts(name, board, family, layout)?,
             TargetSpec::Solid(spec) => {
                 let (panels, family) = solid::panels(spec, family)?;
-                let sheets = layout
-                    .map(|paper| face_sheet::sheets(name, spec, &panels, family.as_ref(), paper));
+                let sheets = layout.map(|paper| match paper.solids {
+                    SolidSheets::Net => net::sheets(name, spec, &panels, family.as_ref(), paper),
+                    SolidSheets::PerFace => {
+                        face_sheet::sheets(name, spec, &panels, family.as_ref(), paper)
+                    }
+                });
                 (panels, family, sheets.transpose()?.unwrap_or_default())
+            }
+            TargetSpec::Tags(spec) => {
+                let Some(family) = family else {
+                    let (wanted, given) = (spec.family.clone(), "none is given".to_owned());
+                    return Err(TargetError::Family { wanted, given });
+                };
+                let (panels, family, sheets) = tag_sheet::parts(name, spec, family, layout)?;
+                (panels, Some(family), sheets)
             }
             TargetSpec::Listed(_) => {
                 let problem = "a listed target is read from its list, it cannot be made anew";

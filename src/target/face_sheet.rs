@@ -1,14 +1,20 @@
-//! Sheets of single faces: the panel with the marks to cut it out and to put the solid together.
+//! Sheets of single faces, to be glued on a rigid skeleton: the panel with the marks to cut it out
+//! and to put it in its place.
 //!
 //! ```text
+//!            +
 //!          \   /           Cutting marks extend the edges of the face beyond its vertices, so that
 //!     7     ╲ ╱            a ruler laid on them leaves no line on the panel. Outside each edge its
 //!           ╱ ╲            number is printed: edges of the same number meet. The number of the
 //!        4 ╱   ╲ 9         face is printed beside it and, small, in its lower left end.
 //!         ╱7    ╲
-//!    ── ─╱───────╲─ ──
-//!            3
+//!    ── ─╱───────╲─ ──     Registration crosses lie on the bisectors beyond the vertices, each as
+//!  +         3         +   far from its vertex: a plotter, a jig or a second print is laid on them.
 //! ```
+//!
+//! The margin of a face is white, and so is its bleed: for [`BLEED_MM`] beyond the cut nothing is
+//! printed, so that a cut which is off by less leaves neither a line nor a letter on the panel, and
+//! a panel cut with its bleed can be trimmed after it was glued.
 
 use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit};
 use super::length::format_mm;
@@ -19,16 +25,21 @@ use super::{
     SolidSpec, TargetError,
 };
 
+/// White beyond the edges of a face, mm: what cutting and gluing by hand are off, and some more.
+pub const BLEED_MM: f64 = 3.0;
 /// Cutting marks start this far from a vertex and end that far, mm.
-const MARK_MM: [f64; 2] = [2.0, 8.0];
+const MARK_MM: [f64; 2] = [BLEED_MM, 9.0];
+/// Distance of a registration cross from its vertex, and length of its arms, mm: it stays clear of
+/// the cutting marks of a face with angles of 60°.
+const CROSS_MM: [f64; 2] = [13.0, 2.5];
 /// Width of a cutting mark, mm: a hairline that every printer holds.
 const MARK_WIDTH_MM: f64 = 0.15;
 /// Capital height of the number of a face beside it, mm.
 const FACE_CAP_MM: f64 = 5.0;
 /// Capital height of the numbers of edges, mm.
 const EDGE_CAP_MM: f64 = 2.2;
-/// Blank between an edge and its number, mm.
-const EDGE_GAP_MM: f64 = 1.5;
+/// Blank between what a face prints and the marks along the margins of the page, mm.
+const MARK_BLANK_MM: f64 = 1.5;
 /// Capital height of the number on a face, in widths of its margin, and the most of it, mm.
 const INNER_CAP: (f64, f64) = (0.35, 2.0);
 /// Place of the number on a face, along the bisector of its lower left end, in margins.
@@ -73,7 +84,7 @@ fn bounds(face: &Face) -> [f64; 4] {
     let over = |axis: usize, pick: fn(f64, f64) -> f64, start| {
         face.outline_mm.iter().map(|p| p[axis]).fold(start, pick)
     };
-    let reach = MARK_MM[1];
+    let reach = CROSS_MM[0] + CROSS_MM[1];
     [
         over(0, f64::min, f64::INFINITY) - reach,
         over(1, f64::min, f64::INFINITY) - reach,
@@ -93,7 +104,7 @@ fn arrange(
         width: (right - left) - (right - left - marks) * shrink,
         height: (upper - lower) - (upper - lower - marks) * shrink,
         edge_blank: paper.margin_mm,
-        mark_blank: EDGE_GAP_MM,
+        mark_blank: MARK_BLANK_MM,
     };
     if let Some(arrangement) = fit(&footprint(0.0), paper)? {
         return Ok(arrangement);
@@ -128,7 +139,19 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
             sheet.lines.push(SheetLine { kind, from_mm, to_mm, width_mm: MARK_WIDTH_MM });
         }
         let text = format!("edge {number}");
-        sheet.texts.push(edge_text(&placement, [a, b], text, -(EDGE_GAP_MM + EDGE_CAP_MM)));
+        sheet.texts.push(edge_text(&placement, [a, b], text, -(BLEED_MM + EDGE_CAP_MM)));
+    }
+    for vertex in 0..3 {
+        let [a, b, c] = [0, 1, 2].map(|i| face.outline_mm[(vertex + i) % 3]);
+        let (to_b, to_c) = (along(a, b, [0.0; 2], 1.0), along(a, c, [0.0; 2], 1.0));
+        let inwards = [to_b[0] + to_c[0], to_b[1] + to_c[1]];
+        let middle = along([0.0; 2], inwards, a, -CROSS_MM[0]);
+        for [x, y] in [[CROSS_MM[1], 0.0], [0.0, CROSS_MM[1]]] {
+            let ends = [[middle[0] - x, middle[1] - y], [middle[0] + x, middle[1] + y]];
+            let [from_mm, to_mm] = ends.map(|end| placement.page_from_panel(end));
+            let kind = LineKind::Align;
+            sheet.lines.push(SheetLine { kind, from_mm, to_mm, width_mm: MARK_WIDTH_MM });
+        }
     }
     let [left, _, _, upper] = bounds(face);
     let text = format!("face {index}");
@@ -144,7 +167,7 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
 }
 
 /// The number of a face in its lower left end; none where the margin leaves no room for it.
-pub(super) fn inner_number(
+fn inner_number(
     placement: &Placement,
     spec: &SolidSpec,
     face: &Face,

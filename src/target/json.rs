@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Corner, FamilyRef, GridKind, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board, solid,
+    Corner, FamilyRef, GridKind, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board,
+    solid, tag_sheet,
 };
 use crate::lattice::Vertex;
 
@@ -19,6 +20,9 @@ const SLACK_EDGES: f64 = 0.01;
 
 /// How far an edge may be from that of the spec, mm: what written digits leave.
 const SPEC_SLACK_MM: f64 = 1e-6;
+
+/// Longest side of a sheet, mm: more than any paper, and than the net of any solid that is made.
+const LONGEST_SHEET_MM: f64 = 20_000.0;
 
 /// How far the rotation of a pose may be from orthonormal: what six written digits leave.
 const ROTATION_SLACK: f64 = 1e-5;
@@ -137,9 +141,20 @@ pub(crate) fn check(target: &Target) -> Result<(), Problem> {
     }
     check_against_spec(target)?;
     for (s, sheet) in target.sheets.iter().enumerate() {
-        let sides = [("width_mm", sheet.width_mm), ("height_mm", sheet.height_mm)];
-        if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm <= 0.0) {
-            return problem(format!("sheets[{s}].{side}"), "it must be positive");
+        check_sheet(sheet, &format!("sheets[{s}]"))?;
+        for (p, page) in sheet.pages.iter().enumerate() {
+            let field = format!("sheets[{s}].pages[{p}]");
+            check_sheet(&page.marks, &format!("{field}.marks"))?;
+            if !page.marks.placements.is_empty() || !page.marks.pages.is_empty() {
+                let what = "a page has no panels and no pages of its own, its sheet has them";
+                return problem(format!("{field}.marks"), what);
+            }
+            let [left, lower, right, upper] = page.window_mm;
+            let [width, height] = [page.marks.width_mm, page.marks.height_mm];
+            let on_page = 0.0 <= left && left < right && right <= width;
+            if !(on_page && 0.0 <= lower && lower < upper && upper <= height) {
+                return problem(format!("{field}.window_mm"), "it does not lie on the page");
+            }
         }
         if let Some(placed) = sheet.placements.iter().find(|p| !panels.contains(&p.panel)) {
             let what = format!("there is no panel {}", placed.panel);
@@ -147,6 +162,25 @@ pub(crate) fn check(target: &Target) -> Result<(), Problem> {
         }
     }
     Ok(())
+}
+
+/// Checks the size of a sheet, and that its lines lie on it.
+fn check_sheet(sheet: &SheetLayout, field: &str) -> Result<(), Problem> {
+    let sides = [("width_mm", sheet.width_mm), ("height_mm", sheet.height_mm)];
+    if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm <= 0.0) {
+        return problem(format!("{field}.{side}"), "it must be positive");
+    }
+    if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm > LONGEST_SHEET_MM) {
+        let what = format!("it is more than {LONGEST_SHEET_MM} mm");
+        return problem(format!("{field}.{side}"), what);
+    }
+    let on_sheet = |[x, y]: [f64; 2]| {
+        (0.0..=sheet.width_mm).contains(&x) && (0.0..=sheet.height_mm).contains(&y)
+    };
+    match sheet.lines.iter().position(|l| !on_sheet(l.from_mm) || !on_sheet(l.to_mm)) {
+        Some(line) => problem(format!("{field}.lines[{line}]"), "it does not lie on the sheet"),
+        None => Ok(()),
+    }
 }
 
 /// Compares the panels with those that the spec makes: a file in which one of them was changed
@@ -157,6 +191,7 @@ fn check_against_spec(target: &Target) -> Result<(), Problem> {
             (spec.check().map(|()| board::untied_panels(spec)), spec.tags.is_some())
         }
         TargetSpec::Solid(spec) => (solid::untied_panels(spec), true),
+        TargetSpec::Tags(spec) => (Ok(tag_sheet::panels(spec)), true),
         TargetSpec::Listed(_) => return Ok(()),
     };
     let made = made.or_else(|error| problem("spec", error.to_string()))?;

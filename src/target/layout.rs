@@ -69,6 +69,7 @@ impl Footprint {
 }
 
 /// A sheet before its panel is named: which paper, and where things are.
+#[derive(Clone, Copy)]
 pub(super) struct Arrangement {
     page: [f64; 2],
     margin: f64,
@@ -134,17 +135,39 @@ pub(super) fn fit(
     footprint: &Footprint,
     paper: &PaperSpec,
 ) -> Result<Option<Arrangement>, TargetError> {
+    fit_turned(footprint, paper, &[false, true])
+}
+
+/// Fits a footprint on paper as it stands; `None` where it does not fit.
+pub(super) fn fit_upright(
+    footprint: &Footprint,
+    paper: &PaperSpec,
+) -> Result<Option<Arrangement>, TargetError> {
+    fit_turned(footprint, paper, &[false])
+}
+
+fn fit_turned(
+    footprint: &Footprint,
+    paper: &PaperSpec,
+    turns: &[bool],
+) -> Result<Option<Arrangement>, TargetError> {
+    let margin = check_margin(paper)?;
+    let sizes: Vec<PaperSize> = match &paper.size {
+        Some(size) => vec![size.clone()],
+        None => PaperSize::automatic().collect(),
+    };
+    let fitting = |size| on_size(footprint, size, paper.orientation, margin, turns);
+    Ok(sizes.iter().find_map(fitting))
+}
+
+/// The margin asked for, mm, and never less than what must stay blank.
+pub(super) fn check_margin(paper: &PaperSpec) -> Result<f64, TargetError> {
     let margin = paper.margin_mm;
     if !(0.0..=100.0).contains(&margin) {
         let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
         return Err(TargetError::invalid("--margin", problem));
     }
-    let margin = margin.max(LEAST_MARGIN_MM);
-    let sizes: Vec<PaperSize> = match &paper.size {
-        Some(size) => vec![size.clone()],
-        None => PaperSize::automatic().collect(),
-    };
-    Ok(sizes.iter().find_map(|size| on_size(footprint, size, paper.orientation, margin)))
+    Ok(margin.max(LEAST_MARGIN_MM))
 }
 
 /// Fits a board on one size of paper.
@@ -153,6 +176,7 @@ fn on_size(
     size: &PaperSize,
     orientation: Orientation,
     margin: f64,
+    turns: &[bool],
 ) -> Option<Arrangement> {
     let (portrait, landscape) = (size.portrait_mm(), size.landscape_mm());
     let pages = match orientation {
@@ -161,13 +185,13 @@ fn on_size(
         Orientation::Auto if footprint.width < footprint.height => vec![portrait, landscape],
         Orientation::Auto => vec![landscape, portrait],
     };
-    [false, true]
-        .into_iter()
-        .find_map(|turned| pages.iter().find_map(|&page| on_page(footprint, page, margin, turned)))
+    turns
+        .iter()
+        .find_map(|&turned| pages.iter().find_map(|&page| on_page(footprint, page, margin, turned)))
 }
 
 /// Fits a board on one page.
-fn on_page(
+pub(super) fn on_page(
     footprint: &Footprint,
     page: [f64; 2],
     margin: f64,
@@ -234,7 +258,26 @@ impl Arrangement {
             lines: Vec::new(),
             check_bars,
             texts,
+            pages: Vec::new(),
         }
+    }
+
+    /// Width and height of the page, mm.
+    pub(super) fn page_mm(&self) -> [f64; 2] {
+        self.page
+    }
+
+    /// Lower-left corner of the footprint on the page, mm.
+    pub(super) fn footprint_at_mm(&self) -> [f64; 2] {
+        self.board_at
+    }
+
+    /// What the margins and the marks leave free: left, lower, right, upper end, mm.
+    pub(super) fn clear_mm(&self) -> [f64; 4] {
+        let [lower, right] = self.marks.map(Marks::depth);
+        let [width, height] = self.page;
+        let margin = self.margin;
+        [margin, margin + lower, width - margin - right, height - margin]
     }
 
     fn placement(&self, panel: u32, [left, lower, _, upper]: [f64; 4]) -> Placement {

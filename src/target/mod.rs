@@ -16,6 +16,7 @@ mod face_sheet;
 pub(crate) mod json;
 mod layout;
 mod length;
+mod net;
 mod panel;
 mod paper;
 mod polyhedron;
@@ -23,6 +24,7 @@ mod pose;
 mod skeleton;
 mod solid;
 mod spec;
+mod tag_sheet;
 
 use serde::{Deserialize, Serialize};
 
@@ -35,12 +37,14 @@ pub use json::{SCHEMA, TargetFileError};
 pub use layout::CHECK_BAR_STROKE_MM;
 pub(crate) use layout::id_range;
 pub use length::{LengthError, parse_length_mm};
-pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec};
+pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
 pub use polyhedron::{Face, Polyhedron};
 pub(crate) use skeleton::Incircle;
 pub use skeleton::{Skeleton, SkeletonSpec};
 pub(crate) use spec::{BORDER_BITS, MOST_ROWS, SIDES};
-pub use spec::{BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
+pub use spec::{
+    BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSheetSpec, TagSpec, TargetSpec,
+};
 
 /// A target: its panels, and the sheets they are printed on.
 #[derive(Clone, Debug, PartialEq)]
@@ -178,6 +182,48 @@ pub struct SheetLayout {
     pub lines: Vec<SheetLine>,
     /// The label and the words on the check bars.
     pub texts: Vec<SheetText>,
+    /// The pages that show this sheet in parts, where it is larger than the paper; it is then
+    /// printed on none of its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pages: Vec<SheetPage>,
+}
+
+/// A page that shows a window onto a sheet that is larger than the paper.
+///
+/// ```text
+///    ┌──────────────┐
+///    │┌────────────┐│   in the window the sheet, cut off at its rim: the same
+///    ││            ││   paper position, `sheet_at_mm` less, is that on the sheet;
+///    ││            ││   around it the marks of the page
+///    │└────────────┘│
+///    │ ├──────────┤ │
+///    └──────────────┘
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheetPage {
+    /// Its place among the pages: rows are letters from the top, columns numbers from the left.
+    pub label: String,
+    /// Left, lower, right and upper end of the window on the page, mm.
+    pub window_mm: [f64; 4],
+    /// Position of the sheet's lower-left corner on the page, mm.
+    pub sheet_at_mm: [f64; 2],
+    /// Size of the page, and what is printed around the window.
+    pub marks: SheetLayout,
+}
+
+impl SheetLayout {
+    /// On how many pages it is printed.
+    pub fn page_count(&self) -> usize {
+        self.pages.len().max(1)
+    }
+}
+
+impl Target {
+    /// On how many pages all its sheets are printed.
+    pub fn page_count(&self) -> usize {
+        self.sheets.iter().map(SheetLayout::page_count).sum()
+    }
 }
 
 /// `page = turn(angle) · panel + origin`.
@@ -219,8 +265,27 @@ pub struct SheetLine {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LineKind {
-    /// To cut along.
+    /// To cut along; drawn through.
     Cut,
+    /// To fold along, away from the print; dashed.
+    Fold,
+    /// To fold along, towards the print; dash-dotted.
+    Valley,
+    /// A stroke of a registration cross: pages that share it are laid on one another, single faces
+    /// on their seats; or of the overview of such pages. Drawn through.
+    Align,
+}
+
+impl LineKind {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cut => "cut",
+            Self::Fold => "fold",
+            Self::Valley => "valley",
+            Self::Align => "align",
+        }
+    }
 }
 
 /// A check bar: the distance between the outer edges of its two end strokes is its length.

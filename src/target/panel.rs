@@ -13,6 +13,11 @@ const QUIET_EDGES: f64 = 0.25;
 const QUIET_MIN_MM: f64 = 5.0;
 
 impl Panel {
+    /// Whether it is a single tag, with no corner of the lattice around it.
+    pub fn is_tag_alone(&self) -> bool {
+        self.corners.is_empty() && self.tags.len() == 1
+    }
+
     /// The corner at a vertex.
     pub fn corner_at(&self, vertex: Vertex) -> Option<&Corner> {
         let found = self.corners.binary_search_by_key(&vertex, |c| Vertex::new(c.row, c.col));
@@ -46,6 +51,8 @@ impl Panel {
             let ends = [(-1, -1), (-1, top + 1), (top + 1, -1)];
             anchors.extend(ends.map(|(row, col)| Vertex::new(row, col)));
         }
+        // A tag has a tile, also where it stands alone.
+        anchors.extend(self.tags.iter().map(|tag| Vertex::new(tag.row, tag.col)));
         anchors.into_iter().map(Tile::upright).collect()
     }
 

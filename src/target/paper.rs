@@ -34,11 +34,28 @@ pub struct PaperSpec {
     pub orientation: Orientation,
     /// Width of the strip along the paper's edges that stays blank, mm.
     pub margin_mm: f64,
+    /// How the faces of a solid are printed.
+    pub solids: SolidSheets,
+}
+
+/// How the faces of a solid are printed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SolidSheets {
+    /// As a net, to be folded.
+    #[default]
+    Net,
+    /// Each on a sheet of its own, to be glued on a rigid skeleton.
+    PerFace,
 }
 
 impl Default for PaperSpec {
     fn default() -> Self {
-        Self { size: None, orientation: Orientation::Auto, margin_mm: DEFAULT_MARGIN_MM }
+        Self {
+            size: None,
+            orientation: Orientation::Auto,
+            margin_mm: DEFAULT_MARGIN_MM,
+            solids: SolidSheets::default(),
+        }
     }
 }
 

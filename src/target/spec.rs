@@ -42,6 +42,8 @@ pub enum TargetSpec {
     Board(BoardSpec),
     /// A solid with a board on each face.
     Solid(SolidSpec),
+    /// Single tags, in rows.
+    Tags(TagSheetSpec),
     /// Known only by its corners and tags, as another program listed them.
     Listed(ListedSpec),
 }
@@ -82,6 +84,20 @@ pub struct TagSpec {
     pub first_id: u32,
     /// A tag in every n-th row and column.
     pub spacing: u32,
+    /// Border in bit-widths along the edge.
+    pub border_bits: f64,
+}
+
+/// Single tags on sheets: a panel of one tile without corners for each, whose id is the tag's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TagSheetSpec {
+    /// Family name, or path of a family file.
+    pub family: String,
+    /// Tags in the order of printing, each once.
+    pub ids: Vec<u32>,
+    /// Length of a tag's edge, mm.
+    pub edge_mm: f64,
     /// Border in bit-widths along the edge.
     pub border_bits: f64,
 }

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::document::Page;
 use super::fit::AffineMap;
+use super::fold::Seen;
 use super::tiles::{MAX_INK_ERROR, PlacedPanel};
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
 use crate::detect::{Detection, GridCorner};
@@ -24,13 +25,14 @@ const MAX_MISSING: f64 = 0.25;
 /// Difference of ink below which a sheet is called blank rather than faint.
 const MIN_CONTRAST: f64 = 0.03;
 
-/// Compares all panels of a page, and tells where on the page the first of them lies.
+/// Compares all panels of a page; tells where on the page the first of them lies, and where the
+/// corners of each were found.
 pub(super) fn check(
     verifier: &Verifier,
     page: &Page,
     layout: &SheetLayout,
     verdict: &mut SheetVerdict,
-) -> AffineMap {
+) -> (AffineMap, Seen) {
     let detection = verifier.detector.detect(&page.image, "page");
     // Looked at in a mirror only if need be.
     let mut mirrored: Option<Detection> = None;
@@ -61,8 +63,12 @@ pub(super) fn check(
             None => placed.push(panel),
         }
     }
+    let mut seen = Seen::new();
     for panel in &mut placed {
-        check_panel(verifier, &detection, panel, verdict);
+        let found = check_panel(verifier, &detection, panel, verdict);
+        if !found.is_empty() {
+            seen.insert(panel.panel.id, found);
+        }
     }
     let here: BTreeSet<u32> = layout.placements.iter().map(|p| p.panel).collect();
     let foreign: BTreeSet<u32> =
@@ -73,7 +79,7 @@ pub(super) fn check(
     }
     another_board(&detection, verdict);
     let first = placed.first().map(|panel| panel.found_from_stated);
-    mirror.or(first).unwrap_or(AffineMap::IDENTITY)
+    (mirror.or(first).unwrap_or(AffineMap::IDENTITY), seen)
 }
 
 /// Whether the tiles lie where they should, but are too grey, or black for white.
@@ -102,13 +108,14 @@ fn another_board(detection: &Detection, verdict: &mut SheetVerdict) {
     }
 }
 
-/// Compares one panel: corners, then tiles and tags where the corners say they are.
+/// Compares one panel: corners, then tiles and tags where the corners say they are. Returns where
+/// the corners were found.
 fn check_panel(
     verifier: &Verifier,
     detection: &Detection,
     placed: &mut PlacedPanel,
     verdict: &mut SheetVerdict,
-) {
+) -> BTreeMap<u32, [f64; 2]> {
     let panel = placed.panel;
     let found = found_corners(detection, placed);
     if found.is_empty() {
@@ -130,6 +137,7 @@ fn check_panel(
     } else if !found.is_empty() {
         verdict.findings.push(Finding::PanelMissing { panel: panel.id });
     }
+    found
 }
 
 /// Page positions of the stated corners that were found, by corner id.

@@ -14,6 +14,12 @@
 //! What is wrong is named by its cause where one cause explains it: a scale, a mirror image, a
 //! turn, a shift of the whole board rather than a list of all corners.
 //!
+//! The pages of a sheet that is larger than the paper are laid together by their stated places;
+//! where they overlap they must show the same. The net of a solid is folded: the faces, each with
+//! the pose that its detected corners have on the paper, are turned about the fold lines, and must
+//! come to lie within [`FOLD_TOLERANCE_MM`] of their stated positions in space; the two sides of
+//! each edge must meet, and carry the same number where they are cut.
+//!
 //! A mesh (`.glb`, `.obj`) is loaded, its texture included, and looked at by a camera before each
 //! face; every corner is followed along its ray onto the loaded triangles and must lie within
 //! [`MESH_TOLERANCE_MM`] of its stated position in space. The texture on each face is then laid out
@@ -23,15 +29,18 @@
 //! Limits: words and stray ink are compared only where the boards lie as stated and are recognised;
 //! dirt within a few pixels of a word or a bar counts to it.
 
+mod assemble;
 mod bars;
 mod board;
 mod body;
 mod document;
 mod face_page;
 mod fit;
+mod fold;
 mod marks;
 mod model;
 mod solid;
+mod tags;
 mod tiles;
 mod verdict;
 
@@ -40,13 +49,15 @@ use std::path::{Path, PathBuf};
 use crate::detect::{Detector, DetectorConfig};
 use crate::export::sheet_file_name;
 use crate::family::Family;
-use crate::target::{SheetLayout, Target};
+use crate::target::{SheetLayout, SheetPage, Target};
 use fit::AffineMap;
+use fold::Seen;
 use tiles::PlacedPanel;
 
 pub use document::{Document, DocumentError, Format, Page};
+pub use fold::FOLD_TOLERANCE_MM;
 pub use solid::MESH_TOLERANCE_MM;
-pub use verdict::{BodyVerdict, FaceVerdict, Finding, SheetVerdict, Verdict};
+pub use verdict::{BodyVerdict, FaceVerdict, Finding, FoldVerdict, SheetVerdict, Verdict};
 
 /// Largest deviation of a position or a length, mm: a fifth of what a good printer adds.
 pub const TOLERANCE_MM: f64 = 0.02;
@@ -117,8 +128,23 @@ impl<'a> Verifier<'a> {
         Ok(Self { target, family, detector })
     }
 
+    /// The files that are verified together with one: the pages of a net, each in a file of its
+    /// own, belong together. Any other file is verified by itself.
+    pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
+        let single = Format::of_document(path).is_some_and(|format| format != Format::Pdf);
+        let count = self.target.page_count();
+        if !single || count == 1 || !fold::is_net(self.target) || self.sheet_of(path).is_err() {
+            return vec![path.to_owned()];
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = stem.rsplit_once('-').map_or(&*stem, |(name, _)| name);
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        let file = |index| path.with_file_name(sheet_file_name(name, index, count, &extension));
+        (0..count).map(file).collect()
+    }
+
     /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
-    /// that its name tells.
+    /// that its name tells; for a page of a net all files of [`set_of`](Self::set_of) are read.
     pub fn verify(&self, path: &Path) -> Result<Verdict, VerifyError> {
         match Format::of_mesh(path) {
             Some(Format::Stl) => return Ok(body::verify(self, path)?),
@@ -128,27 +154,59 @@ impl<'a> Verifier<'a> {
         if self.target.sheets.is_empty() {
             return Err(VerifyError::NoSheets(self.target.name.clone()));
         }
-        let document = Document::open(path)?;
-        let sheets = &self.target.sheets;
         let mut findings = Vec::new();
-        let indices: Vec<usize> = match document.format() {
+        let files = self.set_of(path);
+        let documents: Vec<Document> =
+            files.iter().map(|file| Document::open(file)).collect::<Result<_, _>>()?;
+        let format = documents[0].format();
+        let stated = self.target.page_count();
+        // Where each page of the target is to be seen.
+        let sources: Vec<Option<Source>> = match format {
             Format::Pdf => {
-                let (found, stated) = (document.pages(), sheets.len());
+                let found = documents[0].pages();
                 if found != stated {
                     findings.push(Finding::Pages { found, stated });
                 }
-                (0..found.min(stated)).collect()
+                let source =
+                    |page| (page < found).then_some(Source { document: &documents[0], page });
+                (0..stated).map(source).collect()
             }
-            _ => vec![self.sheet_of(path)?],
+            _ if documents.len() > 1 => {
+                documents.iter().map(|document| Some(Source { document, page: 0 })).collect()
+            }
+            _ => {
+                let shown = self.sheet_of(path)?;
+                let source = Source { document: &documents[0], page: 0 };
+                (0..stated).map(|page| (page == shown).then_some(source)).collect()
+            }
         };
-        let mut verdicts = Vec::with_capacity(indices.len());
-        for index in indices {
-            let page = if document.format() == Format::Pdf { index } else { 0 };
-            verdicts.push(self.verify_page(&document, page, index));
+        let (mut verdicts, mut seen) = (Vec::new(), Vec::new());
+        let mut first = 0;
+        for (index, layout) in self.target.sheets.iter().enumerate() {
+            let pages = &sources[first..first + layout.page_count()];
+            first += layout.page_count();
+            let Some(pages) = pages.iter().copied().collect::<Option<Vec<Source>>>() else {
+                continue;
+            };
+            let (verdict, found) = match layout.pages.is_empty() {
+                true => self.verify_page(pages[0], index),
+                false => self.verify_pages(&pages, index),
+            };
+            verdicts.push(verdict);
+            seen.push(found);
         }
+        if fold::is_net(self.target) && verdicts.len() == self.target.sheets.len() {
+            fold::check(self.target, &seen, &mut verdicts);
+        }
+        let name =
+            |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let artifact = match files.as_slice() {
+            [first, .., last] => format!("{} to {}", name(first), name(last)),
+            _ => name(path),
+        };
         Ok(Verdict {
-            artifact: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-            format: document.format(),
+            artifact,
+            format,
             passed: findings.is_empty() && verdicts.iter().all(|s| s.findings.is_empty()),
             findings,
             sheets: verdicts,
@@ -157,9 +215,9 @@ impl<'a> Verifier<'a> {
         })
     }
 
-    /// The sheet that a file of a single page shows, by its name.
+    /// The page that a file of a single page shows, by its name.
     fn sheet_of(&self, path: &Path) -> Result<usize, VerifyError> {
-        let count = self.target.sheets.len();
+        let count = self.target.page_count();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let number = stem.rsplit_once('-').and_then(|(_, number)| number.parse::<usize>().ok());
         match number {
@@ -194,11 +252,100 @@ impl<'a> Verifier<'a> {
         cells_mm.map(|cell_mm| CELL_PX / cell_mm).fold(PRINT_PX_PER_MM, f64::max)
     }
 
-    fn verify_page(&self, document: &Document, page: usize, index: usize) -> SheetVerdict {
+    fn verify_page(&self, source: Source, index: usize) -> (SheetVerdict, Seen) {
         let layout = &self.target.sheets[index];
-        let tolerance_mm = document.size_tolerance_mm();
-        let mut page = document.render(page, self.wish_px_per_mm(layout));
-        let mut verdict = SheetVerdict {
+        let (page, findings) = source.render(layout, self.wish_px_per_mm(layout));
+        let mut verdict = SheetVerdict::new(index, &page, findings);
+        let seen = self.verify_sheet(&page, layout, &mut verdict);
+        (verdict, seen)
+    }
+
+    /// Compares a sheet that is printed on several pages: what is around the window of each, then
+    /// all that the windows show, laid together.
+    fn verify_pages(&self, sources: &[Source], index: usize) -> (SheetVerdict, Seen) {
+        let layout = &self.target.sheets[index];
+        let wish = self.wish_px_per_mm(layout);
+        let most = (document::MAX_PIXELS / (layout.width_mm * layout.height_mm)).sqrt();
+        let mut pages = Vec::with_capacity(sources.len());
+        let mut findings = Vec::new();
+        let mut check_bars_mm = Vec::new();
+        for (source, SheetPage { label, window_mm, marks, .. }) in sources.iter().zip(&layout.pages)
+        {
+            let (page, wrong) = source.render(marks, wish);
+            let mut verdict = SheetVerdict::new(index, &page, wrong);
+            check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
+            marks::check(&page, marks, &[], Some(*window_mm), &mut verdict);
+            findings.extend(verdict.findings.into_iter().map(|finding| Finding::OnPage {
+                page: label.clone(),
+                finding: Box::new(finding),
+            }));
+            check_bars_mm.extend(verdict.check_bars_mm);
+            // Kept no finer than the sheet is looked at.
+            pages.push(if wish > most { source.render(marks, most).0 } else { page });
+        }
+        let (sheet, different) = assemble::assemble(&pages, layout, wish.min(most));
+        let mut verdict = SheetVerdict::new(index, &sheet, different);
+        verdict.pages = pages.len();
+        let seen = self.verify_sheet(&sheet, layout, &mut verdict);
+        verdict.findings.extend(findings);
+        verdict.check_bars_mm = check_bars_mm;
+        (verdict, seen)
+    }
+
+    /// Compares the panels and marks of a whole sheet.
+    fn verify_sheet(&self, page: &Page, layout: &SheetLayout, verdict: &mut SheetVerdict) -> Seen {
+        let placed = self.placed(page, layout);
+        let tags_alone = !placed.is_empty()
+            && placed.len() == layout.placements.len()
+            && placed.iter().all(|p| p.panel.is_tag_alone());
+        let (found_from_stated, seen) = if tags_alone {
+            tags::check(self, page, layout, verdict);
+            (AffineMap::IDENTITY, Seen::new())
+        } else {
+            board::check(self, page, layout, verdict)
+        };
+        let toneless =
+            |f: &Finding| matches!(f, Finding::Inverted { .. } | Finding::Contrast { .. });
+        if verdict.findings.iter().any(toneless) {
+            return seen;
+        }
+        let in_place = verdict.findings.iter().all(Finding::is_local);
+        check_bars(page, layout, &found_from_stated, verdict);
+        if in_place {
+            marks::check(page, layout, &placed, None, verdict);
+        }
+        seen
+    }
+}
+
+/// A page of a document.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    document: &'a Document,
+    page: usize,
+}
+
+impl Source<'_> {
+    /// The page as a picture, and whether it has the stated size.
+    fn render(&self, layout: &SheetLayout, px_per_mm: f64) -> (Page, Vec<Finding>) {
+        let tolerance_mm = self.document.size_tolerance_mm();
+        let mut page = self.document.render(self.page, px_per_mm);
+        let stated_mm = [layout.width_mm, layout.height_mm];
+        let found_mm = [page.width_mm, page.height_mm];
+        if (0..2).any(|i| (found_mm[i] - stated_mm[i]).abs() > tolerance_mm) {
+            return (page, vec![Finding::PageSize { found_mm, stated_mm }]);
+        }
+        // Pictures begin at the upper edge and end with a whole pixel: heights are counted from
+        // the true lower edge, not from the end of the last pixel.
+        page.height_mm = layout.height_mm;
+        (page, Vec::new())
+    }
+}
+
+impl SheetVerdict {
+    /// The verdict on a page of which only its size was looked at.
+    fn new(index: usize, page: &Page, findings: Vec<Finding>) -> Self {
+        Self {
             sheet: index + 1,
             px_per_mm: page.px_per_mm,
             size_mm: [page.width_mm, page.height_mm],
@@ -208,29 +355,10 @@ impl<'a> Verifier<'a> {
             tags: 0,
             tags_exact: 0,
             max_deviation_mm: 0.0,
-            findings: Vec::new(),
-        };
-        let stated_mm = [layout.width_mm, layout.height_mm];
-        let found_mm = verdict.size_mm;
-        if (0..2).any(|i| (found_mm[i] - stated_mm[i]).abs() > tolerance_mm) {
-            verdict.findings.push(Finding::PageSize { found_mm, stated_mm });
-        } else {
-            // Pictures begin at the upper edge and end with a whole pixel: heights are counted
-            // from the true lower edge, not from the end of the last pixel.
-            page.height_mm = layout.height_mm;
+            pages: 1,
+            fold: None,
+            findings,
         }
-        let found_from_stated = board::check(self, &page, layout, &mut verdict);
-        let toneless =
-            |f: &Finding| matches!(f, Finding::Inverted { .. } | Finding::Contrast { .. });
-        if verdict.findings.iter().any(toneless) {
-            return verdict;
-        }
-        let in_place = verdict.findings.iter().all(Finding::is_local);
-        check_bars(&page, layout, &found_from_stated, &mut verdict);
-        if in_place {
-            marks::check(&page, layout, &self.placed(&page, layout), &mut verdict);
-        }
-        verdict
     }
 }
 

@@ -3,6 +3,7 @@
 //! This is independent of detection, and stricter: a cell that decoding would correct, a hairline
 //! or a spot inside a tile is found.
 
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Finding;
@@ -151,7 +152,8 @@ impl PlacedPanel<'_> {
         let looks = family.map(|f| TagLooks::new(f, self.panel.border_bits.unwrap_or_default()));
         let tags: BTreeMap<Vertex, TagPlacement> =
             self.panel.tags.iter().map(|t| (Vertex::new(t.row, t.col), *t)).collect();
-        let decoder = family.map(Decoder::new);
+        // Needed only where something is wrong.
+        let decoder = OnceCell::new();
         let mut report = TileReport::default();
         for tile in self.tiles() {
             let upright = tile.orientation == Orientation::Upright;
@@ -162,7 +164,7 @@ impl PlacedPanel<'_> {
             let expected = Expected { black: upright != self.panel.inverted, tag };
             let tally = self.compare(tile, &expected);
             report.tiles += 1;
-            self.judge(tile, &expected, &tally, family, decoder.as_ref(), &mut report);
+            self.judge(tile, &expected, &tally, family, &decoder, &mut report);
         }
         report
     }
@@ -249,7 +251,7 @@ impl PlacedPanel<'_> {
         expected: &Expected,
         tallies: &BTreeMap<Option<u32>, Tally>,
         family: Option<&Family>,
-        decoder: Option<&Decoder>,
+        decoder: &OnceCell<Decoder>,
         report: &mut TileReport,
     ) {
         let Vertex { row, col } = tile.anchor;
@@ -293,13 +295,14 @@ fn read_tag(
     tag: &ExpectedTag,
     flipped: &[u32],
     family: Option<&Family>,
-    decoder: Option<&Decoder>,
+    decoder: &OnceCell<Decoder>,
 ) -> Option<Finding> {
     let TagPlacement { id, row, col } = tag.placement;
     if flipped.is_empty() {
         return None;
     }
-    let (family, decoder) = (family?, decoder?);
+    let family = family?;
+    let decoder = decoder.get_or_init(|| Decoder::new(family));
     let word = flipped.iter().fold(tag.word, |word, bit| word ^ 1 << bit);
     let bits = flipped.to_vec();
     let decoded = decoder.decode(word, family.correctable());

@@ -3,6 +3,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::document::Format;
+use crate::target::LineKind;
 
 /// What was found in one artifact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -81,8 +82,23 @@ pub struct SheetVerdict {
     pub tags_exact: usize,
     /// Largest distance of a found corner from its stated position, mm.
     pub max_deviation_mm: f64,
+    /// On how many pages the sheet is printed.
+    pub pages: usize,
+    /// What the fold of a net proves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fold: Option<FoldVerdict>,
     /// What is wrong.
     pub findings: Vec<Finding>,
+}
+
+/// What folding the faces found on one sheet of a net shows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FoldVerdict {
+    /// Largest distance of a folded corner from its stated position in space, and of the ends of
+    /// the two sides of an edge from each other, mm.
+    pub max_deviation_mm: f64,
+    /// Edges whose second side is on this sheet and meets the first.
+    pub edges: usize,
 }
 
 /// One way in which an artifact is not what the target says. Lengths in mm in the page frame.
@@ -111,6 +127,11 @@ pub enum Finding {
         found_mm: Option<f64>,
         /// Stated.
         stated_mm: f64,
+    },
+    /// A tag that stands alone is not where it should be.
+    TagMissing {
+        /// Stated id.
+        id: u32,
     },
     /// The panel was not recognised.
     PanelMissing {
@@ -196,6 +217,99 @@ pub enum Finding {
         row: i32,
         /// Lattice column.
         col: i32,
+    },
+    /// Something is wrong on one of the pages that a sheet is printed on.
+    OnPage {
+        /// The page's label.
+        page: String,
+        /// What is wrong.
+        finding: Box<Finding>,
+    },
+    /// Two pages show different things where they overlap.
+    PagesDiffer {
+        /// Labels of the pages.
+        pages: [String; 2],
+        /// Where on the sheet.
+        at_mm: [f64; 2],
+    },
+    /// A line is not there, or a dashed one is drawn through.
+    LineDiffers {
+        /// Which line of the sheet, from 1.
+        line: usize,
+        /// What it is for.
+        purpose: LineKind,
+    },
+    /// A face of a net is printed where another one belongs.
+    FaceElsewhere {
+        /// Panel id.
+        panel: u32,
+        /// Panel that belongs there.
+        instead: u32,
+    },
+    /// A face of a net is turned in its place.
+    FaceTurned {
+        /// Panel id.
+        panel: u32,
+        /// Counter-clockwise.
+        angle_deg: f64,
+    },
+    /// A face of a net hangs on no other.
+    FaceLoose {
+        /// Panel id.
+        panel: u32,
+    },
+    /// Corners of a face, folded, are not where they are stated to be.
+    FoldOff {
+        /// Panel id.
+        panel: u32,
+        /// Largest deviation.
+        by_mm: f64,
+    },
+    /// Two sides that should meet do not.
+    EdgeOpen {
+        /// Panels of the faces.
+        panels: [u32; 2],
+        /// How far they are apart.
+        gap_mm: f64,
+    },
+    /// Two sides that meet do not carry one number, the same.
+    EdgeNumbers {
+        /// Panels of the faces.
+        panels: [u32; 2],
+        /// The numbers found along each.
+        numbers: [Vec<usize>; 2],
+    },
+    /// A face of a net does not carry its number, once.
+    FaceNumber {
+        /// Panel id.
+        panel: u32,
+        /// The numbers found in it.
+        names: Vec<usize>,
+        /// Its number.
+        stated: usize,
+    },
+    /// A tab says that it goes under another face than the one that its edge leads to.
+    TabNames {
+        /// Panel id of the face that it hangs on.
+        panel: u32,
+        /// The face that it names.
+        named: usize,
+        /// The face that it goes under.
+        stated: usize,
+    },
+    /// A cut edge has no tab, or two.
+    EdgeTabs {
+        /// Panels of the faces.
+        panels: [u32; 2],
+        /// How many tabs.
+        tabs: usize,
+    },
+    /// More than two sides carry a number.
+    EdgeNumberAgain {
+        /// The number.
+        number: usize,
+        /// How many sides.
+        sides: usize,
     },
     /// A corner lies elsewhere, all else being right.
     CornerOff {
@@ -346,6 +460,7 @@ impl fmt::Display for Finding {
                 write!(f, "check bar {bar} measures {found:.3} mm instead of {stated_mm:.3} mm")
             }
             Self::CheckBar { bar, found_mm: None, .. } => write!(f, "check bar {bar} not found"),
+            Self::TagMissing { id } => write!(f, "tag {id} is not where it should be"),
             Self::PanelMissing { panel } => write!(f, "board {panel} not recognised"),
             Self::AnotherBoard { found, stated } => {
                 write!(f, "shows another board: {found} corners instead of {stated}")
@@ -383,6 +498,46 @@ impl fmt::Display for Finding {
             }
             Self::CornerMissing { id, row, col } => {
                 write!(f, "corner {id} at row {row} col {col} not found")
+            }
+            Self::OnPage { page, finding } => write!(f, "page {page}: {finding}"),
+            Self::PagesDiffer { pages: [a, b], at_mm: [x, y] } => {
+                write!(f, "pages {a} and {b} differ where they overlap, at ({x:.2}, {y:.2}) mm")
+            }
+            Self::LineDiffers { line, purpose } => {
+                write!(f, "line {line}, to {}, differs from the description", purpose.name())
+            }
+            Self::FaceElsewhere { panel, instead } => {
+                write!(f, "board {panel} is printed where board {instead} belongs")
+            }
+            Self::FaceTurned { panel, angle_deg } => {
+                write!(f, "board {panel} is turned by {angle_deg:.0}° in its place")
+            }
+            Self::FaceLoose { panel } => write!(f, "board {panel} hangs on no other by a fold"),
+            Self::FoldOff { panel, by_mm } => {
+                write!(f, "board {panel}, folded, is off by {by_mm:.3} mm")
+            }
+            Self::EdgeOpen { panels: [a, b], gap_mm } => {
+                write!(f, "the edges of boards {a} and {b} are {gap_mm:.3} mm apart when folded")
+            }
+            Self::EdgeNumbers { panels: [a, b], numbers } => {
+                let [one, other] = numbers.each_ref().map(|numbers| enumerate(numbers));
+                write!(
+                    f,
+                    "the edge between boards {a} and {b} has {one} on the first, {other} on the \
+                     second"
+                )
+            }
+            Self::FaceNumber { panel, names, stated } => {
+                write!(f, "board {panel} carries {} instead of face {stated}", enumerate(names))
+            }
+            Self::TabNames { panel, named, stated } => {
+                write!(f, "a tab of board {panel} names face {named} instead of {stated}")
+            }
+            Self::EdgeTabs { panels: [a, b], tabs } => {
+                write!(f, "the edge between boards {a} and {b} has {tabs} tabs instead of one")
+            }
+            Self::EdgeNumberAgain { number, sides } => {
+                write!(f, "edge number {number} is on {sides} sides")
             }
             Self::CornerOff { id, row, col, by_mm } => {
                 let [x, y] = by_mm.map(micrometres);
@@ -435,6 +590,12 @@ impl fmt::Display for Finding {
     }
 }
 
+/// Numbers in words.
+fn enumerate(numbers: &[usize]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
+    if numbers.is_empty() { "no number".to_owned() } else { numbers.join(" and ") }
+}
+
 /// Findings named on the line for people; the report has all.
 const NAMED: usize = 4;
 
@@ -468,10 +629,22 @@ impl fmt::Display for Verdict {
                 |count: fn(&SheetVerdict) -> usize| self.sheets.iter().map(count).sum::<usize>();
             let deviation = self.sheets.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
             write!(f, "verified, ")?;
-            if self.sheets.len() > 1 {
-                write!(f, "{} pages, ", self.sheets.len())?;
+            let pages = sum(|s| s.pages);
+            if pages > 1 {
+                write!(f, "{pages} pages, ")?;
             }
-            write!(f, "{} corners within {deviation:.4} mm, ", sum(|s| s.corners_found))?;
+            let corners = sum(|s| s.corners_found);
+            // A sheet of single tags has none.
+            if corners > 0 {
+                write!(f, "{corners} corners within {deviation:.4} mm, ")?;
+            }
+            let folds: Vec<&FoldVerdict> =
+                self.sheets.iter().filter_map(|s| s.fold.as_ref()).collect();
+            if !folds.is_empty() {
+                let off = folds.iter().map(|fold| fold.max_deviation_mm).fold(0.0, f64::max);
+                let edges: usize = folds.iter().map(|fold| fold.edges).sum();
+                write!(f, "folds into the solid within {off:.4} mm, {edges} edges matched, ")?;
+            }
             let tags = sum(|s| s.tags_exact);
             write!(f, "{tags} {} exact, ", if tags == 1 { "tag" } else { "tags" })?;
             let bars = self.sheets.iter().flat_map(|s| &s.check_bars_mm);
@@ -488,7 +661,7 @@ impl fmt::Display for Verdict {
         let everywhere = self.findings.iter().map(ToString::to_string);
         let on_sheets = self.sheets.iter().flat_map(|sheet| {
             let page = if self.sheets.len() > 1 {
-                format!("page {}: ", sheet.sheet)
+                format!("{} {}: ", if sheet.pages > 1 { "sheet" } else { "page" }, sheet.sheet)
             } else {
                 String::new()
             };

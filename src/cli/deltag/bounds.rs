@@ -1,6 +1,7 @@
 use std::process::ExitCode;
 
 use super::parameters::Parameters;
+use crate::cli::output::say;
 use crate::family::{Family, bounds::bounds, shipped_names};
 
 #[derive(clap::Args)]
@@ -12,15 +13,15 @@ pub(super) struct Args {
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let bounds = bounds(dimension, distance);
-    println!("no family of {} bits and distance {distance} has more tags than", dimension.bits());
-    println!("{:>12}  by linear programming (Delsarte)", bounds.linear_programming);
-    println!("{:>12}  by sphere packing", bounds.sphere_packing);
+    say!("no family of {} bits and distance {distance} has more tags than", dimension.bits());
+    say!("{:>12}  by linear programming (Delsarte)", bounds.linear_programming);
+    say!("{:>12}  by sphere packing", bounds.sphere_packing);
     let least = bounds.linear_programming.min(bounds.sphere_packing);
     for name in shipped_names() {
         let family = Family::resolve(name)?;
         if family.dimension() == dimension && family.distance() >= distance {
             let share = 100.0 * family.len() as f64 / least as f64;
-            println!("{:>12}  has {name}, {share:.1} % of the tighter bound", family.len());
+            say!("{:>12}  has {name}, {share:.1} % of the tighter bound", family.len());
         }
     }
     Ok(ExitCode::SUCCESS)

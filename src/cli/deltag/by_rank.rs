@@ -3,6 +3,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
+use super::values::whole;
 use crate::cli::output;
 use crate::family::{Construction, Family, Screen, TagWords};
 
@@ -11,10 +12,11 @@ pub(super) struct Args {
     /// A shipped family such as d49h12, or a family file
     family: String,
     /// First number, from 0
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     rank: u64,
     /// How many
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true,
+          value_parser = whole(1..=u64::MAX))]
     count: u64,
 }
 
@@ -25,14 +27,21 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let words = TagWords::new(family.dimension());
     let screen = Screen::new(words.clone(), family.distance(), family.rules());
-    for i in 0..args.count {
-        let rank = args.rank.saturating_add(i);
+    for rank in args.rank..args.rank.saturating_add(args.count) {
         let (word, count) = construction.by_rank(family.dimension(), rank).with_context(|| {
             format!("{}: more than a linear code, its codes have no rank", args.family)
         })?;
         let word = word.with_context(|| {
             format!("--rank {rank}: there are {count}, numbered from 0 to {}", count - 1)
         })?;
+        // Found out at the first one, before anything is printed.
+        let left = count - args.rank;
+        anyhow::ensure!(
+            args.count <= left,
+            "--count {}: from --rank {} on there are {left}",
+            args.count,
+            args.rank
+        );
         let mut line = format!("{rank} {}", words.hex(word));
         if !screen.admits(word) {
             line.push_str(" breaks a rule of the family");

@@ -3,7 +3,8 @@ use std::process::ExitCode;
 
 use clap::ValueEnum;
 
-use crate::cli::output;
+use super::values::name;
+use crate::cli::output::{self, say};
 use crate::family::{ExportFormat, Family, export};
 
 #[derive(clap::Args)]
@@ -16,8 +17,8 @@ pub(super) struct Args {
     /// Folder for the file, or the file itself [default: standard output]
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Stem of the file [default: the family's name]
-    #[arg(long)]
+    /// Stem of the file in the folder of -o [default: the family's name]
+    #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
 }
 
@@ -47,14 +48,18 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         Format::Txt => ExportFormat::Text,
         Format::Opencv => ExportFormat::OpenCv,
     };
+    anyhow::ensure!(
+        args.name.is_none() || args.output.is_some(),
+        "--name: names the file in the folder of -o, which is not given"
+    );
     let text = export(&family, format);
     match args.output {
         None => output::print(&text)?,
         Some(place) => {
             let stem = args.name.as_deref().unwrap_or(family.name());
-            let path = output::file(&place, stem, format.extension());
+            let path = output::file(&place, stem, format.extension())?;
             output::write(&path, text.as_bytes())?;
-            println!("{}", path.display());
+            say!("{}", path.display());
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -1,16 +1,31 @@
-use std::path::{Path, PathBuf};
+//! `deltag gen-family`.
+
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{bail, ensure};
 use clap::ValueEnum;
 
+use super::checkpoint::CheckpointFile;
 use super::parameters::Parameters;
-use crate::cli::{interrupt, output, progress};
-use crate::family::best::{Best, Search};
-use crate::family::lexicode::{Checkpoint, Lexicode};
-use crate::family::{Construction, Control, Family, Progress, Rules, Screen, TagWords};
+use super::rules::RuleArgs;
+use super::values::{name, number, whole};
+use crate::cli::run::INTERRUPTED;
+use crate::cli::{interrupt, output, output::say, progress};
+use crate::family::best::Best;
+use crate::family::lexicode::{self, Lexicode};
+use crate::family::search::{self, Search};
+use crate::family::{Control, Family, FamilyError, Progress, Rules, Screen, TagWords};
 use crate::lattice::Dimension;
+
+/// Told at the end of `--help`.
+pub(super) const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic write \
+    the best family so far (exit code 0). The method search writes what its finished rounds found, \
+    and lexicode nothing (exit code 130); with --resume the same command goes on later and finds \
+    exactly what it would have found without a break. Where nothing was found yet, nothing is \
+    written (130). A second Ctrl-C ends the program at once.";
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -19,46 +34,40 @@ pub(super) struct Args {
     /// How to search
     #[arg(long, value_enum, default_value_t = Method::Best)]
     method: Method,
-    /// Seconds for the methods best and algebraic; more time finds larger families
-    #[arg(long, default_value_t = 60.0)]
-    time: f64,
-    /// Seed of all random choices
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Rounds of the method search
-    #[arg(long, default_value_t = 3)]
-    rounds: u32,
-    /// Share of edge-adjacent cell pairs that must differ in every code, 0 to 1 [default: 0.5]
-    #[arg(long)]
-    min_complexity: Option<f64>,
-    /// White cells that every code must have [default: the distance]
-    #[arg(long)]
-    black_distance: Option<u32>,
-    /// Keep codes at the family's distance from the all-white tile too
-    #[arg(long)]
-    reject_white: bool,
-    /// TOML file with min_complexity, black_distance, white_distance; options given here win
-    #[arg(long)]
-    rules: Option<PathBuf>,
-    /// For a 36-bit lexicode: keep a checkpoint in this file, and go on from it if it is there
-    #[arg(long)]
-    resume: Option<PathBuf>,
+    /// Seconds for the methods best and algebraic, more find larger families [default: 60]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true,
+          value_parser = number(0.001..=1e6))]
+    time: Option<f64>,
+    /// Seed of the random choices of best, algebraic and search [default: 1]
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
+    seed: Option<u64>,
+    /// Rounds of the method search [default: 3]
+    #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=1_000_000u32))]
+    rounds: Option<u32>,
     /// Number of codes at most, for the methods best and algebraic [default: as many as a file of
     /// 64 MiB holds]
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "CODES", allow_negative_numbers = true,
+          value_parser = whole(1..=u64::MAX))]
     limit: Option<u64>,
+    #[command(flatten)]
+    rules: RuleArgs,
+    /// For the methods lexicode and search: keep a checkpoint in this file, and go on from it if
+    /// it is there; removed at the end
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
     /// Name of the family, also the stem of its file [default: as the bits and distance]
-    #[arg(long)]
+    #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
     /// Folder for the file, or the file itself
     #[arg(short, long, default_value = "families")]
     output: PathBuf,
     /// Threads [default: one per processor]
-    #[arg(short = 'j', long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(short = 'j', long, value_name = "N", allow_negative_numbers = true,
+          value_parser = whole(1..=1024u16))]
     threads: Option<u16>,
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Method {
     /// Algebraic codes, arranged and improved by local search, within --time
     Best,
@@ -66,45 +75,49 @@ enum Method {
     Algebraic,
     /// Local search from nothing, up to 25 bits; the same for the same seed and rounds
     Search,
-    /// The construction of the published families
+    /// The construction of the published families, up to 36 bits
     Lexicode,
 }
 
+impl Method {
+    /// The name as it is typed.
+    fn name(self) -> String {
+        format!("{self:?}").to_lowercase()
+    }
+}
+
+/// What became of a search.
+struct Outcome {
+    /// The codes, if there are any to be written.
+    family: Option<Family>,
+    /// What to say of an interruption.
+    interrupted: Option<String>,
+    exit: ExitCode,
+}
+
+impl Outcome {
+    fn whole(family: Family) -> Self {
+        Self { family: Some(family), interrupted: None, exit: ExitCode::SUCCESS }
+    }
+
+    fn interrupted(family: Option<Family>, message: String) -> Self {
+        Self { family, interrupted: Some(message), exit: ExitCode::from(INTERRUPTED) }
+    }
+}
+
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    args.check_options()?;
     let Parameters { dimension, distance } = args.family;
+    let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
+    let path = output::file(&args.output, &name, "json")?;
+    let rules = args.rules.rules(args.family)?;
+    output::check_writable(&path)?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
-    let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
-    let path = output::file(&args.output, &name, "json");
-    let family = search(&args, dimension, distance, &name)?;
-
-    output::write(&path, family.to_json().as_bytes())?;
-    println!(
-        "{}: {} codes of {} bits, distance {}, fingerprint {}",
-        path.display(),
-        family.len(),
-        dimension.bits(),
-        family.distance(),
-        family.fingerprint()
-    );
-    Ok(ExitCode::SUCCESS)
-}
-
-/// Size of a family file, roughly, at most.
-const FILE_LIMIT: u64 = 64 << 20;
-
-/// Length of a code's line: four spaces, quotes, 0x, digits, comma, line feed.
-fn bytes_per_code(dimension: Dimension) -> u64 {
-    u64::from(dimension.bits().div_ceil(4)) + 10
-}
-
-fn search(args: &Args, dimension: Dimension, distance: u32, name: &str) -> anyhow::Result<Family> {
-    let rules = rules(args, distance)?;
-    let lexicode = Lexicode { rules: rules.clone(), ..Lexicode::published(dimension, distance) };
     let (total, unit) = match args.method {
-        Method::Lexicode => (lexicode.candidates, "candidates"),
-        Method::Search => (u64::from(args.rounds), "rounds"),
+        Method::Lexicode => (dimension.mask() + 1, "candidates"),
+        Method::Search => (u64::from(args.rounds()), "rounds"),
         Method::Best | Method::Algebraic => (1000, "‰ of the time"),
     };
     let bar = progress::bar(total, unit);
@@ -113,119 +126,218 @@ fn search(args: &Args, dimension: Dimension, distance: u32, name: &str) -> anyho
         bar.set_message(format!("{} codes", p.codes));
     };
     let control = Control { cancel: Some(interrupt::flag()), report: Some(&report) };
-    let family = match args.method {
-        Method::Lexicode => {
-            const LIMIT: u32 = 36;
-            anyhow::ensure!(
-                dimension.bits() <= LIMIT,
-                "--method lexicode: 2^{} candidates are too many; use best or algebraic",
-                dimension.bits()
-            );
-            lexicode.family_of(name, lexicode_codes(&lexicode, args.resume.as_deref(), control)?)?
-        }
-        Method::Search => {
-            const LIMIT: u32 = 25;
-            anyhow::ensure!(
-                dimension.bits() <= LIMIT,
-                "--method search: works up to {LIMIT} bits; use best or algebraic"
-            );
-            const STEPS: u64 = 200_000;
-            let search = Search { seed: args.seed, rounds: args.rounds, steps: STEPS };
-            let screen = Screen::new(TagWords::new(dimension), distance, &rules);
-            let codes = search.codes(&screen, control)?;
-            let Search { seed, rounds, steps } = search;
-            let construction = Construction::Search { seed, rounds, steps };
-            Family::new(name, dimension, distance, codes, rules, construction)?
-        }
-        Method::Best | Method::Algebraic => {
-            let valid = args.time.is_finite() && args.time > 0.0 && args.time <= 1e6;
-            anyhow::ensure!(valid, "--time {}: give seconds above 0, up to a million", args.time);
-            let time = Duration::from_secs_f64(args.time);
-            let exchange = args.method == Method::Best;
-            let seed = args.seed;
-            let limit = args
-                .limit
-                .or((dimension.bits() > 36).then(|| FILE_LIMIT / bytes_per_code(dimension)));
-            Best { dimension, distance, rules, time, seed, limit, exchange }
-                .family(name, control)?
-        }
+    let file = CheckpointFile::new(args.resume.as_deref(), args.identity(&rules));
+    let outcome = match args.method {
+        Method::Lexicode => args.lexicode(&name, rules, &file, control),
+        Method::Search => args.search(&name, rules, &file, control),
+        Method::Best | Method::Algebraic => args.best(&name, rules, control),
     };
     bar.finish_and_clear();
-    Ok(family)
-}
+    let Outcome { family, interrupted, exit } = outcome?;
 
-/// The rules of the published families, changed by a file, then by options.
-fn rules(args: &Args, distance: u32) -> anyhow::Result<Rules> {
-    let mut rules = Rules::published(distance);
-    if let Some(path) = &args.rules {
-        #[derive(serde::Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct RulesFile {
-            min_complexity: Option<f64>,
-            black_distance: Option<u32>,
-            white_distance: Option<u32>,
-        }
-        let text = std::fs::read_to_string(path)
-            .with_context(|| format!("cannot read {}", path.display()))?;
-        let file: RulesFile = toml::from_str(&text)
-            .map_err(|e| anyhow::anyhow!("{}: {}", path.display(), e.message()))?;
-        rules.min_complexity = file.min_complexity.unwrap_or(rules.min_complexity);
-        rules.black_distance = file.black_distance.unwrap_or(rules.black_distance);
-        rules.white_distance = file.white_distance.unwrap_or(rules.white_distance);
+    if let Some(family) = &family {
+        output::write(&path, family.to_json().as_bytes())?;
     }
-    rules.min_complexity = args.min_complexity.unwrap_or(rules.min_complexity);
-    rules.black_distance = args.black_distance.unwrap_or(rules.black_distance);
-    if args.reject_white {
-        rules.white_distance = distance;
+    match interrupted {
+        Some(message) => eprintln!("interrupted: {message}"),
+        None => file.finish()?,
     }
-    Ok(rules)
-}
-
-/// Runs a lexicode, with a checkpoint file if one is named; the file is removed at the end.
-fn lexicode_codes(
-    lexicode: &Lexicode,
-    path: Option<&Path>,
-    control: Control,
-) -> anyhow::Result<Vec<u64>> {
-    let Some(path) = path else { return Ok(lexicode.codes(control)?) };
-    let mut checkpoint = Checkpoint::default();
-    if path.exists() {
-        let text = std::fs::read_to_string(path)
-            .with_context(|| format!("cannot read {}", path.display()))?;
-        let saved: SavedCheckpoint = serde_json::from_str(&text).with_context(|| {
-            format!("{}: not a checkpoint; remove it to start anew", path.display())
-        })?;
-        anyhow::ensure!(
-            saved.search == format!("{lexicode:?}"),
-            "{}: belongs to another search; remove it, or name another file with --resume",
-            path.display()
+    if let Some(family) = family {
+        say!(
+            "{}: {} codes of {} bits, distance {}, fingerprint {}",
+            path.display(),
+            family.len(),
+            dimension.bits(),
+            family.distance(),
+            family.fingerprint()
         );
-        checkpoint = saved.checkpoint;
     }
-    let failed = std::sync::Mutex::new(None);
-    let save = |checkpoint: &Checkpoint| {
-        let saved =
-            SavedCheckpoint { search: format!("{lexicode:?}"), checkpoint: checkpoint.clone() };
-        let written = serde_json::to_vec(&saved)
-            .map_err(anyhow::Error::from)
-            .and_then(|bytes| output::write(path, &bytes));
-        if let Err(error) = written {
-            failed.lock().expect("no thread panics here").get_or_insert(error);
-        }
-    };
-    let codes = lexicode.resume(&mut checkpoint, &save, control)?;
-    if let Some(error) = failed.into_inner().expect("no thread panics here") {
-        return Err(error);
-    }
-    if path.exists() {
-        std::fs::remove_file(path).with_context(|| format!("cannot remove {}", path.display()))?;
-    }
-    Ok(codes)
+    Ok(exit)
 }
 
-/// A checkpoint, and of which search it is.
-#[derive(serde::Serialize, serde::Deserialize)]
-struct SavedCheckpoint {
-    search: String,
-    checkpoint: Checkpoint,
+/// Size of a family file at most: 64 MiB, of which a little is for what is not codes.
+pub(super) const FILE_LIMIT: u64 = (64 << 20) - (64 << 10);
+
+/// Length of a code's line: four spaces, quotes, 0x, digits, comma, line feed.
+pub(super) fn bytes_per_code(dimension: Dimension) -> u64 {
+    u64::from(dimension.bits().div_ceil(4)) + 10
+}
+
+impl Args {
+    fn rounds(&self) -> u32 {
+        self.rounds.unwrap_or(3)
+    }
+
+    fn seed(&self) -> u64 {
+        self.seed.unwrap_or(1)
+    }
+
+    /// Refuses what the method would ignore or cannot do.
+    fn check_options(&self) -> anyhow::Result<()> {
+        use Method::{Algebraic, Best, Lexicode, Search};
+        let method = self.method;
+        let refuse = |option: &str, given: bool, methods: &[Method]| {
+            if !given || methods.contains(&method) {
+                return Ok(());
+            }
+            let [last, others @ ..] = methods else { return Ok(()) };
+            let others: String = others.iter().map(|m| m.name() + " and ").collect();
+            bail!(
+                "{option}: does nothing with --method {}, only with {others}{}; leave it out",
+                method.name(),
+                last.name()
+            )
+        };
+        refuse("--time", self.time.is_some(), &[Algebraic, Best])?;
+        refuse("--limit", self.limit.is_some(), &[Algebraic, Best])?;
+        refuse("--rounds", self.rounds.is_some(), &[Search])?;
+        ensure!(
+            self.seed.is_none() || method != Lexicode,
+            "--seed: a lexicode has no random choices; leave it out"
+        );
+        ensure!(
+            self.resume.is_none() || matches!(method, Search | Lexicode),
+            "--resume: only the methods search and lexicode keep checkpoints; here Ctrl-C keeps \
+             the best family so far, and more --time finds more"
+        );
+        let bits = self.family.dimension.bits();
+        let limit = match method {
+            Search => 25,
+            Lexicode => 36,
+            Best | Algebraic => bits,
+        };
+        ensure!(
+            bits <= limit,
+            "--method {}: works up to {limit} bits, not with {bits}; use best or algebraic",
+            method.name()
+        );
+        Ok(())
+    }
+
+    /// All that decides what a search with checkpoints finds.
+    fn identity(&self, rules: &Rules) -> String {
+        let Parameters { dimension, distance } = self.family;
+        let seed = if self.method == Method::Search {
+            format!(", seed {}", self.seed())
+        } else {
+            String::new()
+        };
+        let Rules { min_complexity, black_distance, white_distance } = rules;
+        format!(
+            "{:?} d{}h{distance}, complexity {min_complexity}, black {black_distance}, \
+             white {white_distance}{seed}",
+            self.method,
+            dimension.bits()
+        )
+    }
+
+    fn lexicode(
+        &self,
+        name: &str,
+        rules: Rules,
+        file: &CheckpointFile,
+        control: Control,
+    ) -> anyhow::Result<Outcome> {
+        let Parameters { dimension, distance } = self.family;
+        let lexicode = Lexicode { rules, ..Lexicode::published(dimension, distance) };
+        let mut checkpoint: lexicode::Checkpoint = file.load()?;
+        match lexicode.resume(&mut checkpoint, &|c| file.save(c), control) {
+            Ok(codes) => {
+                self.check_found(codes.len())?;
+                Ok(Outcome::whole(lexicode.family_of(name, codes)?))
+            }
+            Err(FamilyError::Cancelled) => {
+                let message = format!("no family was written; {}", file.advice());
+                Ok(Outcome::interrupted(None, message))
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn search(
+        &self,
+        name: &str,
+        rules: Rules,
+        file: &CheckpointFile,
+        control: Control,
+    ) -> anyhow::Result<Outcome> {
+        let Parameters { dimension, distance } = self.family;
+        let search = Search { seed: self.seed(), rounds: self.rounds(), steps: Search::STEPS };
+        let screen = Screen::new(TagWords::new(dimension), distance, &rules);
+        let mut checkpoint: search::Checkpoint = file.load()?;
+        ensure!(
+            checkpoint.rounds_done <= search.rounds,
+            "--rounds: the checkpoint of --resume has {} rounds already",
+            checkpoint.rounds_done
+        );
+        let ended = search.resume(&screen, &mut checkpoint, &|c| file.save(c), control);
+        let rounds = checkpoint.rounds_done;
+        let family = || {
+            let codes = checkpoint.family_codes(&screen);
+            Family::new(name, dimension, distance, codes, rules, search.construction(rounds))
+        };
+        match ended {
+            Ok(()) => {
+                self.check_found(checkpoint.codes.len())?;
+                Ok(Outcome::whole(family()?))
+            }
+            Err(FamilyError::Cancelled) if checkpoint.codes.is_empty() => {
+                let message = format!("no family was written; {}", file.advice());
+                Ok(Outcome::interrupted(None, message))
+            }
+            Err(FamilyError::Cancelled) => {
+                let message = format!(
+                    "kept what {rounds} of {} rounds found; {}",
+                    search.rounds,
+                    file.advice()
+                );
+                Ok(Outcome::interrupted(Some(family()?), message))
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn best(&self, name: &str, rules: Rules, control: Control) -> anyhow::Result<Outcome> {
+        let Parameters { dimension, distance } = self.family;
+        let limit =
+            self.limit.or((dimension.bits() > 36).then(|| FILE_LIMIT / bytes_per_code(dimension)));
+        let best = Best {
+            dimension,
+            distance,
+            rules,
+            time: Duration::from_secs_f64(self.time.unwrap_or(60.0)),
+            seed: self.seed(),
+            limit,
+            exchange: self.method == Method::Best,
+        };
+        let stopped = || interrupt::flag().load(Ordering::Relaxed);
+        match best.family(name, control) {
+            Ok(family) if stopped() => Ok(Outcome {
+                family: Some(family),
+                interrupted: Some("kept the best family so far".to_owned()),
+                exit: ExitCode::SUCCESS,
+            }),
+            Ok(family) => Ok(Outcome::whole(family)),
+            Err(FamilyError::Cancelled) => {
+                let message = "nothing was found yet, and nothing was written".to_owned();
+                Ok(Outcome::interrupted(None, message))
+            }
+            // The name and the rules were checked before: it is the codes that are missing.
+            Err(FamilyError::Field { field, .. }) if field == "codes" => Err(self.none_found()),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn check_found(&self, codes: usize) -> anyhow::Result<()> {
+        if codes == 0 { Err(self.none_found()) } else { Ok(()) }
+    }
+
+    fn none_found(&self) -> anyhow::Error {
+        let Parameters { dimension, distance } = self.family;
+        anyhow::anyhow!(
+            "no word of {} bits was found that satisfies the rules at distance {distance}; take a \
+             smaller distance, or loosen the rules, such as with --min-complexity",
+            dimension.bits()
+        )
+    }
 }

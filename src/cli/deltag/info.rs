@@ -1,6 +1,8 @@
 use std::process::ExitCode;
 
-use crate::family::{Family, bounds::bounds};
+use crate::cli::output::say;
+use crate::family::{Family, TagWords, bounds::bounds};
+use crate::target::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -8,20 +10,29 @@ pub(super) struct Args {
     family: String,
 }
 
-/// Tags on one face of the common targets: a 10 × 11 board, or a face of an icosahedron with 66
-/// corners, when every third tile of every third row carries one.
-const TAGS_PER_FACE: usize = 10;
+/// Rows and columns of the board that coverage is told in, that of the paper.
+const BOARD: [u32; 2] = [10, 11];
+
+/// How many tags a target takes with the settings that `deltille` has by default.
+fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
+    let family = Family::resolve(&TagSpec::default().family)?;
+    let target = Target::build("probe", spec, Some(&family), None)?;
+    Ok(target.panels.iter().map(|panel| panel.tags.len()).sum())
+}
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = Family::resolve(&args.family)?;
     let (bits, rules) = (family.dimension().bits(), family.rules());
-    println!("{}, fingerprint {}", family.name(), family.fingerprint());
-    println!("  codes           {}", family.len());
-    println!("  bits            {bits} in {} rows", family.dimension().rows());
-    println!("  distance        {}, corrects {} cells", family.distance(), family.correctable());
-    println!(
-        "  rules           {} % of neighbours differ, {} white and {} black cells at least",
-        100.0 * rules.min_complexity,
+    let pairs = TagWords::new(family.dimension()).pairs();
+    say!("{}, fingerprint {}", family.name(), family.fingerprint());
+    say!("  codes           {}", family.len());
+    say!("  bits            {bits} in {} rows", family.dimension().rows());
+    say!("  distance        {}, corrects {} cells", family.distance(), family.correctable());
+    say!(
+        "  rules           every code: {} of {} neighbouring pairs of cells differ, {} cells are white, \
+         {} black, at least",
+        (rules.min_complexity * f64::from(pairs) - 1e-9).ceil(),
+        pairs,
         rules.black_distance,
         rules.white_distance
     );
@@ -33,25 +44,46 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         _ => String::new(),
     };
-    println!("  construction    {construction}");
-    println!(
+    say!("  construction    {construction}");
+    say!(
         "  upper bound     {} codes (linear programming)",
         bounds(family.dimension(), family.distance()).linear_programming
     );
-    println!(
-        "  enough for      {} boards or {} icosahedra with {TAGS_PER_FACE} tags a face",
-        family.len() / TAGS_PER_FACE,
-        family.len() / (20 * TAGS_PER_FACE)
+    let [rows, cols] = BOARD;
+    let board = tags_of(&TargetSpec::Board(BoardSpec {
+        rows,
+        cols,
+        edge_mm: 20.0,
+        boards: 1,
+        board_id: 0,
+        tags: Some(TagSpec::default()),
+        inverted: false,
+    }))?;
+    let solid = tags_of(&TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron)))?;
+    say!(
+        "  enough for      {} boards of {rows} x {cols} corners ({board} tags each) or {} icosahedra \
+         ({solid} tags each)",
+        family.len() / board,
+        family.len() / solid
     );
-    println!("  a random pattern is taken for a tag with probability");
+    say!("  a random pattern is taken for a tag with probability");
     for (corrected, rate) in family.false_positive_rates().iter().enumerate() {
-        println!("    {rate:>9.2e}  when {corrected} cells are corrected");
+        let corrected = match corrected {
+            0 => "nothing is".to_owned(),
+            1 => "1 cell is".to_owned(),
+            n => format!("up to {n} cells are"),
+        };
+        say!("    {rate:>9.2e}  when {corrected} corrected");
     }
-    println!("  pairs of words, turns included, at each distance");
+    if family.histogram().is_empty() {
+        say!("  distances       of so many codes are not counted");
+        return Ok(ExitCode::SUCCESS);
+    }
+    say!("  pairs of words, turns included, at each distance");
     let most = family.histogram().values().copied().max().unwrap_or(1) as f64;
     for (distance, pairs) in family.histogram() {
         let bar = "█".repeat((40.0 * *pairs as f64 / most).ceil() as usize);
-        println!("    {distance:>3} {pairs:>12} {bar}");
+        say!("    {distance:>3} {pairs:>12} {bar}");
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,15 +1,16 @@
 use std::process::ExitCode;
 
+use crate::cli::output::say;
 use crate::family::{Family, shipped_names};
 
 #[derive(clap::Args)]
 pub(super) struct Args {}
 
 pub(super) fn run(_: Args) -> anyhow::Result<ExitCode> {
-    println!("{:<12} {:>4} {:>8} {:>8}  fingerprint", "family", "bits", "distance", "codes");
+    say!("{:<12} {:>4} {:>8} {:>8}  fingerprint", "family", "bits", "distance", "codes");
     for name in shipped_names() {
         let family = Family::resolve(name)?;
-        println!(
+        say!(
             "{:<12} {:>4} {:>8} {:>8}  {}",
             family.name(),
             family.dimension().bits(),

@@ -2,13 +2,17 @@
 
 mod bounds;
 mod by_rank;
+mod checkpoint;
 mod export;
 mod gen_family;
 mod info;
 mod list;
 mod parameters;
 mod plan;
+mod rules;
+mod sheet;
 mod show;
+mod values;
 mod verify_family;
 
 use std::process::ExitCode;
@@ -26,8 +30,10 @@ pub struct Deltag {
 #[derive(Subcommand)]
 enum Command {
     /// Search a family such as d25h7 and write its file
+    #[command(after_help = gen_family::HELP)]
     GenFamily(gen_family::Args),
     /// Check every claim of a family file from nothing but its codes
+    #[command(after_help = verify_family::HELP)]
     VerifyFamily(verify_family::Args),
     /// Tell all about a family
     Info(info::Args),
@@ -39,8 +45,10 @@ enum Command {
     ByRank(by_rank::Args),
     /// Write a family for another program
     Export(export::Args),
-    /// Draw tags of a family
+    /// Draw tags of a family on one picture, to look at
     Show(show::Args),
+    /// Print tags of a family to true scale, on as many pages as they take
+    Sheet(sheet::Args),
     /// List the families that come with the program
     List(list::Args),
 }
@@ -56,6 +64,7 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
         Command::ByRank(args) => by_rank::run(args),
         Command::Export(args) => export::run(args),
         Command::Show(args) => show::run(args),
+        Command::Sheet(args) => sheet::run(args),
         Command::List(args) => list::run(args),
     }
 }

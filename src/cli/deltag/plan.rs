@@ -1,40 +1,71 @@
+//! `deltag plan`.
+
 use std::process::ExitCode;
 
+use super::gen_family::{FILE_LIMIT, bytes_per_code};
+use super::values::whole;
+use crate::cli::output::say;
 use crate::family::{Family, shipped_names, smallest_shipped};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
     /// Faces of the target, or boards
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true,
+          value_parser = whole(1..=u32::MAX))]
     faces: u32,
     /// Tags on each
-    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 10, allow_negative_numbers = true,
+          value_parser = whole(1..=u32::MAX))]
     tags_per_face: u32,
-    /// Cells that may be misread in a tag, at least
-    #[arg(long, default_value_t = 0)]
+    /// Misread cells that must be corrected in a tag, at least
+    #[arg(long, value_name = "CELLS", default_value_t = 0, allow_negative_numbers = true,
+          value_parser = whole(0..=24u32))]
     corrects: u32,
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let needed = u64::from(args.faces) * u64::from(args.tags_per_face);
-    let Some(family) = smallest_shipped(needed, args.corrects) else {
-        let families = shipped_names().into_iter().map(Family::resolve);
-        let families: Vec<Family> = families.collect::<Result<_, _>>()?;
-        let correcting = families.iter().filter(|f| f.correctable() >= args.corrects);
-        let largest = correcting.map(Family::len).max().unwrap_or(0);
+    let families = shipped_names().into_iter().map(Family::resolve);
+    let mut families: Vec<Family> = families.collect::<Result<_, _>>()?;
+    families.retain(|family| family.correctable() >= args.corrects);
+    let largest = families.iter().max_by_key(|f| f.len());
+    let Some(largest) = largest else {
+        anyhow::bail!("--corrects {}: no shipped family corrects so many cells", args.corrects);
+    };
+    let Some(best) = smallest_shipped(needed, args.corrects) else {
+        let (name, len) = (largest.name(), largest.len());
+        let listed = FILE_LIMIT / bytes_per_code(largest.dimension());
+        let instead = if largest.dimension().bits() == 49 && needed <= listed / 2 {
+            format!("`deltag gen-family {name}` makes a file with more, or lower")
+        } else {
+            "lower".to_owned()
+        };
+        let (kind, corrects) = match args.corrects {
+            0 => (String::new(), ""),
+            n => (format!(" that correct {n} cells"), " or --corrects"),
+        };
         anyhow::bail!(
-            "{needed} tags that correct {} cells: the largest shipped family has {largest}; lower \
-             --faces, --tags-per-face or --corrects",
-            args.corrects
+            "{needed} tags{kind}: the largest shipped family, {name}, lists {len}; {instead} \
+             --faces or --tags-per-face{corrects}"
         );
     };
-    println!(
-        "{}: {} codes for {needed} tags, {} bits, distance {}, corrects {} cells",
+    say!("{} x {} = {needed} tags: {}", args.faces, args.tags_per_face, about(&best));
+    // What more bits would buy.
+    if let Some(more) = smallest_shipped(needed, best.correctable() + 1) {
+        say!("to correct more, with smaller cells: {}", about(&more));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn about(family: &Family) -> String {
+    let rate = family.false_positive_rates().last().copied().unwrap_or_default();
+    format!(
+        "{}, {} codes of {} bits, distance {}; corrects {} cells, then takes a random pattern for a \
+         tag with probability {rate:.1e}",
         family.name(),
         family.len(),
         family.dimension().bits(),
         family.distance(),
         family.correctable()
-    );
-    Ok(ExitCode::SUCCESS)
+    )
 }

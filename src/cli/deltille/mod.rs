@@ -4,7 +4,7 @@ mod board;
 mod delivery;
 mod detect;
 mod experiment;
-mod files;
+pub(in crate::cli) mod files;
 mod refine;
 mod render;
 mod settings;

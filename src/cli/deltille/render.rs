@@ -137,7 +137,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let scene = scene_of_target(&target, family.as_ref())?;
     let image = scene.render(&camera, &pose, &light);
     let seen = scene.truth(&camera, &pose, 0.0).corners;
-    let path = output::file(&args.output, &format!("{}-view", target.name), "png");
+    let path = output::file(&args.output, &format!("{}-view", target.name), "png")?;
     let truth = Truth {
         schema: "deltille/truth/1",
         image: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),

@@ -201,6 +201,7 @@ impl Settings {
                 None => Default::default(),
             },
             margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
+            ..PaperSpec::default()
         };
         let default = TagSpec::default();
         let tags = (!self.untagged).then(|| TagSpec {

@@ -15,7 +15,7 @@ use crate::export::{dxf, gltf, obj, stl};
 use crate::family::Family;
 use crate::target::{
     ClosedMesh, DEFAULT_MARGIN_MM, NEAR_EQUILATERAL, PaperSpec, Skeleton, SkeletonSpec, SolidShape,
-    SolidSpec, TagSpec, Target, TargetSpec, parse_length_mm,
+    SolidSheets, SolidSpec, TagSpec, Target, TargetSpec, parse_length_mm,
 };
 
 /// Arguments of the commands that make solids.
@@ -74,7 +74,7 @@ pub struct Args {
     /// Resolution of the texture, dots per inch [default: 20 texels per tag bit]
     #[arg(long, value_name = "DPI", allow_negative_numbers = true)]
     texture_dpi: Option<f64>,
-    /// Write <name>.pdf: a page per face with marks to cut and to assemble
+    /// Write <name>.pdf: the net to cut out, fold and glue, or with --per-face a page per face
     #[arg(long)]
     pdf: bool,
     /// Write <name>-<page>.svg
@@ -83,6 +83,9 @@ pub struct Args {
     /// Write <name>-<page>.png
     #[arg(long)]
     png: bool,
+    /// Print each face on a sheet of its own, to be glued on a rigid skeleton, instead of the net
+    #[arg(long)]
+    per_face: bool,
     /// Write <name>.dsc, for the reference detector or its fork
     #[arg(long)]
     dsc: bool,
@@ -92,8 +95,8 @@ pub struct Args {
     /// Resolution of the PNG pages, dots per inch [default: 300]
     #[arg(long, value_parser = clap::value_parser!(u32).range(200..=2400))]
     dpi: Option<u32>,
-    /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm [default: the smallest of A4
-    /// to A0 that takes a face]
+    /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm; a net that is larger is
+    /// printed on several pages [default: the smallest of A4 to A0 that takes it, else A0]
     #[arg(long, value_name = "SIZE")]
     paper: Option<String>,
     /// auto, portrait or landscape [default: auto]
@@ -216,6 +219,7 @@ impl Args {
                 None => Default::default(),
             },
             margin_mm: length("--margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
+            solids: if self.per_face { SolidSheets::PerFace } else { SolidSheets::Net },
         })
     }
 

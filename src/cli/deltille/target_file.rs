@@ -32,6 +32,7 @@ pub fn family(target: &Target, given: Option<&str>) -> anyhow::Result<Option<Fam
     let in_spec = match &target.spec {
         TargetSpec::Board(board) => board.tags.as_ref().map(|tags| tags.family.as_str()),
         TargetSpec::Solid(solid) => Some(solid.tags.family.as_str()),
+        TargetSpec::Tags(tags) => Some(tags.family.as_str()),
         TargetSpec::Listed(_) => None,
     };
     let family = match given {

@@ -1,5 +1,6 @@
 //! `deltille verify`.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -56,7 +57,13 @@ pub fn verify(
 ) -> anyhow::Result<ExitCode> {
     let verifier = Verifier::new(target, family)?;
     let mut verdicts = Vec::with_capacity(artifacts.len());
+    let mut done = BTreeSet::new();
     for path in artifacts {
+        // The pages of a net are verified together.
+        if done.contains(path) {
+            continue;
+        }
+        done.extend(verifier.set_of(path));
         let verdict = verifier.verify(path)?;
         println!("{verdict}");
         verdicts.push(verdict);
@@ -80,7 +87,7 @@ pub fn verify(
 
 /// The artifacts of a target that are in a folder.
 fn artifacts_in(folder: &Path, target: &Target) -> Vec<PathBuf> {
-    let count = target.sheets.len();
+    let count = target.page_count();
     let pages = ["svg", "png"].into_iter().flat_map(|extension| {
         (0..count).map(move |index| sheet_file_name(&target.name, index, count, extension))
     });

@@ -10,7 +10,7 @@ use rand::SeedableRng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::{CycleSpace, Span};
+use super::{CycleSpace, LinearMap, Span};
 
 /// Codes with more than this many bits of syndrome need too large a table.
 pub const MAX_SYNDROME_BITS: u32 = 27;
@@ -43,7 +43,7 @@ pub struct CosetGraph {
     free_bits: Vec<u32>,
     /// Bit s: some word lighter than h has syndrome s.
     marked: Vec<u64>,
-    turn_tables: Vec<[u32; 256]>,
+    turned: LinearMap,
     vertices: Vec<Vertex>,
 }
 
@@ -64,22 +64,16 @@ impl CosetGraph {
         if syndrome_bits > MAX_SYNDROME_BITS {
             return None;
         }
-        let syndrome = |word: u64| compress(code.reduce(word), &free_bits);
-        let columns: Vec<u32> = (0..space.bits()).map(|i| syndrome(1 << i)).collect();
+        let syndromes = code.syndromes(space.bits())?;
+        let columns: Vec<u32> = (0..space.bits()).map(|i| syndromes.apply(1 << i)).collect();
         let mut marked = vec![0u64; (1usize << syndrome_bits).div_ceil(64)];
         if !mark(&columns, 0, distance - 1, &mut marked) {
             return None;
         }
-        let turned: Vec<u32> = free_bits.iter().map(|&i| syndrome(space.turn(1 << i))).collect();
-        let turn_tables = turned
-            .chunks(8)
-            .map(|columns| {
-                std::array::from_fn(|x| {
-                    (0..).zip(columns).filter(|&(i, _)| x >> i & 1 == 1).fold(0, |s, (_, c)| s ^ c)
-                })
-            })
-            .collect();
-        let mut graph = Self { space, code, free_bits, marked, turn_tables, vertices: Vec::new() };
+        let turned: Vec<u32> =
+            free_bits.iter().map(|&i| syndromes.apply(space.turn(1 << i))).collect();
+        let turned = LinearMap::of_columns(&turned);
+        let mut graph = Self { space, code, free_bits, marked, turned, vertices: Vec::new() };
         graph.vertices = graph.find_vertices();
         Some(graph)
     }
@@ -113,10 +107,7 @@ impl CosetGraph {
     }
 
     fn turn(&self, syndrome: u32) -> u32 {
-        self.turn_tables
-            .iter()
-            .enumerate()
-            .fold(0, |turned, (i, table)| turned ^ table[(syndrome >> (8 * i) & 0xff) as usize])
+        self.turned.apply(syndrome.into())
     }
 
     fn adjacent(&self, a: u32, b: u32) -> bool {
@@ -177,10 +168,6 @@ impl CosetGraph {
             .filter(|&(i, _)| syndrome >> i & 1 == 1)
             .fold(0, |word, (_, bit)| word | 1 << bit)
     }
-}
-
-fn compress(word: u64, bits: &[u32]) -> u32 {
-    (0..).zip(bits).fold(0, |packed, (i, bit)| packed | ((word >> bit & 1) as u32) << i)
 }
 
 /// Marks the sums of up to `weight` columns; false when one of one or more is zero.

@@ -14,6 +14,7 @@
 pub mod arrange;
 pub mod cosets;
 mod cycles;
+mod linear_map;
 pub mod quasicyclic;
 pub mod ranked;
 pub(in crate::family) mod record;
@@ -21,5 +22,6 @@ pub mod residue;
 mod span;
 
 pub use cycles::{Arrangement, CycleSpace};
+pub use linear_map::LinearMap;
 pub use record::AlgebraicConstruction;
 pub use span::Span;

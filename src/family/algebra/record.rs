@@ -84,6 +84,28 @@ impl AlgebraicConstruction {
         Some((word, ranked.len()))
     }
 
+    /// The linear code and a word of each of its cosets as they are on the tag, and the central cell
+    /// where no word uses it, else 0. `None` when the family is not of these alone.
+    pub(in crate::family) fn on_the_tag(
+        &self,
+        dimension: Dimension,
+    ) -> Option<(Span, Vec<u64>, u64)> {
+        let space = CycleSpace::of(dimension);
+        if !self.exchanged.is_empty() || !self.arrangement.fits(space) {
+            return None;
+        }
+        let code = Span::of(self.words("basis", &self.basis, dimension).ok()?);
+        let cosets = self.words("cosets", &self.cosets, dimension).ok()?;
+        let union = CosetUnion { space, code, cosets };
+        let centre = self.arrangement.bit_map(dimension).get(3 * space.cycles as usize).copied();
+        let ignored = centre.filter(|_| has_free_centre(&union)).map_or(0, |bit| 1 << bit);
+        let on_tag = |words: &[u64]| self.arrangement.apply(dimension, words);
+        let zero = on_tag(&[0])[0];
+        let code = Span::of(on_tag(union.code.rows()).into_iter().map(|row| row ^ zero));
+        let cosets = on_tag(&union.cosets).into_iter().map(|word| word & !ignored).collect();
+        Some((code, cosets, ignored))
+    }
+
     /// A proof, from the structure of the code, that words of the family and their turns are
     /// `distance` apart; or the reason why it is none. Takes time in proportion to the number of
     /// codes, not to its square.

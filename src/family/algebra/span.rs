@@ -1,3 +1,5 @@
+use super::LinearMap;
+
 /// A binary linear code of length up to 64, by a reduced basis.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Span {
@@ -92,6 +94,17 @@ impl Span {
     pub fn free_bits(&self, length: u32) -> Vec<u32> {
         let leading = self.rows.iter().fold(0u64, |bits, row| bits | 1 << row.ilog2());
         (0..length).filter(|i| leading >> i & 1 == 0).collect()
+    }
+
+    /// Syndromes of words of `length` bits: what a coset has at the free bits, side by side.
+    /// `None` when these are more than 32.
+    pub fn syndromes(&self, length: u32) -> Option<LinearMap> {
+        let free_bits = self.free_bits(length);
+        let syndrome = |word: u64| {
+            (0..).zip(&free_bits).fold(0, |s, (i, bit)| s | ((word >> bit & 1) as u32) << i)
+        };
+        let columns: Vec<u32> = (0..length).map(|i| syndrome(self.reduce(1 << i))).collect();
+        (free_bits.len() <= 32).then(|| LinearMap::of_columns(&columns))
     }
 }
 

@@ -87,25 +87,37 @@ impl Lexicode {
             && self.candidates > FIRST_CANDIDATES
             && self.distance > LEAST_DISTANCE;
         let first = if sweeps { FIRST_CANDIDATES } else { self.candidates };
-        let kept = match checkpoint.first_codes.take() {
-            Some(codes) => Kept::of(codes, &screen),
-            None => self.in_turn(&screen, first, control)?,
-        };
+        let kept = self.in_turn(&screen, first, checkpoint, save, control)?;
         if !sweeps {
             return Ok(kept.codes);
         }
-        checkpoint.first_codes = Some(kept.codes.clone());
-        save(checkpoint);
         self.sweep(&screen, &kept, checkpoint, save, control)?;
         self.take_open(&screen, kept, &checkpoint.open, control)
     }
 
     /// Looks at the first `count` candidates one after the other.
-    fn in_turn(&self, screen: &Screen, count: u64, control: Control) -> Result<Kept, FamilyError> {
-        let mut kept = Kept::of(Vec::new(), screen);
-        let (mut from, mut chunk) = (0, FIRST_CHUNK);
+    fn in_turn(
+        &self,
+        screen: &Screen,
+        count: u64,
+        checkpoint: &mut Checkpoint,
+        save: &dyn Fn(&Checkpoint),
+        control: Control,
+    ) -> Result<Kept, FamilyError> {
+        let mut kept = Kept::of(checkpoint.codes.clone(), screen);
+        let (mut from, mut chunk) = (checkpoint.candidates_done, FIRST_CHUNK);
+        let mut saved = from;
         while from < count {
-            control.check()?;
+            let cancelled = control.is_cancelled();
+            if from > saved && (cancelled || from - saved >= CHECKPOINT_CANDIDATES) {
+                checkpoint.candidates_done = from;
+                checkpoint.codes.clone_from(&kept.codes);
+                save(checkpoint);
+                saved = from;
+            }
+            if cancelled {
+                return Err(FamilyError::Cancelled);
+            }
             let to = (from + chunk).min(count);
             // What earlier chunks forbid is sorted out in parallel, the rest is decided in order.
             let known = kept.turned.len();
@@ -121,6 +133,11 @@ impl Lexicode {
             }
             control.report(to, self.candidates, kept.codes.len());
             (from, chunk) = (to, (2 * chunk).min(LARGEST_CHUNK));
+        }
+        if saved < count {
+            checkpoint.candidates_done = count;
+            checkpoint.codes.clone_from(&kept.codes);
+            save(checkpoint);
         }
         Ok(kept)
     }
@@ -211,12 +228,17 @@ const FIRST_CANDIDATES: u64 = 1 << 27;
 /// At distances up to this the codes so far leave too many words open to list them.
 const LEAST_DISTANCE: u32 = 7;
 
+/// Candidates looked at between two checkpoints: some seconds of work, and some kilobytes of file.
+const CHECKPOINT_CANDIDATES: u64 = 1 << 23;
+
 /// How far a long search has come, to go on from there.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// Codes among the first candidates, once they are done.
-    pub first_codes: Option<Vec<u64>>,
+    /// Candidates that were looked at in turn.
+    pub candidates_done: u64,
+    /// Codes among these.
+    pub codes: Vec<u64>,
     /// Parts of the sweep that are done.
     pub parts_done: usize,
     /// Words found open in these parts.

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use crate::raster::Gray;
 
 /// Largest picture that is drawn for a check, px.
-const MAX_PIXELS: f64 = 60.0e6;
+pub(super) const MAX_PIXELS: f64 = 60.0e6;
 
 /// Which kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -31,6 +31,16 @@ pub enum Format {
 }
 
 impl Format {
+    /// The kind of printed document that a file name tells.
+    pub fn of_document(path: &Path) -> Option<Self> {
+        match path.extension()?.to_string_lossy().to_lowercase().as_str() {
+            "pdf" => Some(Self::Pdf),
+            "svg" => Some(Self::Svg),
+            "png" => Some(Self::Png),
+            _ => None,
+        }
+    }
+
     /// The kind of mesh or body that a file name tells.
     pub fn of_mesh(path: &Path) -> Option<Self> {
         match path.extension()?.to_string_lossy().to_lowercase().as_str() {
@@ -93,12 +103,8 @@ impl Document {
     pub fn open(path: &Path) -> Result<Self, DocumentError> {
         let unreadable =
             |problem: String| DocumentError::Unreadable { path: path.to_owned(), problem };
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let format = match extension.as_deref() {
-            Some("pdf") => Format::Pdf,
-            Some("svg") => Format::Svg,
-            Some("png") => Format::Png,
-            _ => return Err(unreadable("not a .pdf, .svg or .png file".to_owned())),
+        let Some(format) = Format::of_document(path) else {
+            return Err(unreadable("not a .pdf, .svg or .png file".to_owned()));
         };
         let bytes = std::fs::read(path)
             .map_err(|source| DocumentError::Io { path: path.to_owned(), source })?;

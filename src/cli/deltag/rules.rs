@@ -1,0 +1,90 @@
+//! The rules of a search: those of the published families, changed by a file, then by options.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+
+use super::parameters::Parameters;
+use crate::family::{FamilyError, Rules};
+
+#[derive(clap::Args)]
+pub(super) struct RuleArgs {
+    /// Share of edge-adjacent cell pairs that must differ in every code, 0 to 1 [default: 0.5]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true,
+          value_parser = super::values::number(0.0..=1.0))]
+    min_complexity: Option<f64>,
+    /// White cells that every code must have [default: the distance]
+    #[arg(long, value_name = "CELLS", allow_negative_numbers = true,
+          value_parser = super::values::whole(0..=49u32))]
+    black_distance: Option<u32>,
+    /// Keep codes at the family's distance from the all-white tile too
+    #[arg(long)]
+    reject_white: bool,
+    /// TOML file with min_complexity, black_distance, white_distance; options given here win
+    #[arg(long, value_name = "FILE")]
+    rules: Option<PathBuf>,
+}
+
+impl RuleArgs {
+    /// The rules asked for, checked for the bits of the family.
+    pub(super) fn rules(&self, parameters: Parameters) -> anyhow::Result<Rules> {
+        let Parameters { dimension, distance } = parameters;
+        let bits = dimension.bits();
+        let mut rules = Rules::published(distance);
+        if let Some(path) = &self.rules {
+            read(path, &mut rules)?;
+            check(&rules, bits, |field| format!("{}: field `{field}`", path.display()))?;
+        }
+        rules.min_complexity = self.min_complexity.unwrap_or(rules.min_complexity);
+        rules.black_distance = self.black_distance.unwrap_or(rules.black_distance);
+        if self.reject_white {
+            rules.white_distance = distance;
+        }
+        check(&rules, bits, |field| format!("--{}", field.replace('_', "-")))?;
+        Ok(rules)
+    }
+}
+
+fn check(rules: &Rules, bits: u32, place: impl Fn(&str) -> String) -> anyhow::Result<()> {
+    match rules.check(bits) {
+        Err(FamilyError::Field { field, problem }) => bail!("{}: {problem}", place(&field)),
+        other => Ok(other?),
+    }
+}
+
+/// Takes the fields of a rules file.
+fn read(path: &Path, rules: &mut Rules) -> anyhow::Result<()> {
+    let file = path.display();
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("--rules: cannot read {file}"))?;
+    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
+        let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+        let line = 1 + before.matches('\n').count();
+        anyhow::anyhow!(
+            "{file}: line {line} is not TOML ({}): write lines such as min_complexity = 0.5",
+            error.message()
+        )
+    })?;
+    for (field, value) in &table {
+        let cells = || {
+            value.as_integer().and_then(|v| u32::try_from(v).ok()).with_context(|| {
+                format!("{file}: field `{field}`: {value} is not a number of cells such as 7")
+            })
+        };
+        match field.as_str() {
+            "min_complexity" => {
+                let share = value.as_float().or(value.as_integer().map(|v| v as f64));
+                rules.min_complexity = share.with_context(|| {
+                    format!("{file}: field `{field}`: {value} is not a number between 0 and 1")
+                })?;
+            }
+            "black_distance" => rules.black_distance = cells()?,
+            "white_distance" => rules.white_distance = cells()?,
+            _ => bail!(
+                "{file}: unknown field `{field}`: there are min_complexity, black_distance and \
+                 white_distance"
+            ),
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,140 @@
+//! Values of options, with refusals in words that say what to write.
+
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+/// A whole number of a range. The ends of the number's own type go unsaid.
+pub(super) fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone
+where
+    T: FromStr + PartialOrd + Display + Copy + Bounded + Send + Sync + 'static,
+{
+    let (least, most) = (*range.start(), *range.end());
+    let wanted = if most == T::MOST {
+        format!("write a whole number, {least} or more")
+    } else {
+        format!("write a whole number from {least} to {most}")
+    };
+    move |text| {
+        let digits = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+        match text.parse() {
+            Ok(value) if digits && (least..=most).contains(&value) => Ok(value),
+            Err(_) if digits && most == T::MOST => Err(format!("write at most {most}")),
+            _ => Err(wanted.clone()),
+        }
+    }
+}
+
+/// A type of whole numbers with its greatest.
+pub(super) trait Bounded {
+    const MOST: Self;
+}
+
+impl Bounded for u16 {
+    const MOST: Self = Self::MAX;
+}
+
+impl Bounded for u32 {
+    const MOST: Self = Self::MAX;
+}
+
+impl Bounded for u64 {
+    const MOST: Self = Self::MAX;
+}
+
+/// A decimal number of a range.
+pub(super) fn number(
+    range: RangeInclusive<f64>,
+) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    let wanted = format!("write a number from {} to {}", range.start(), range.end());
+    move |text| text.parse().ok().filter(|v| range.contains(v)).ok_or_else(|| wanted.clone())
+}
+
+/// A name that can be the stem of a file and the name of a family.
+pub(super) fn name(text: &str) -> Result<String, String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    match text {
+        "" => Err("write at least one letter or digit".to_owned()),
+        _ if text.len() > 64 => Err("write at most 64 characters".to_owned()),
+        _ if text.starts_with('-') => Err("begin with a letter or digit".to_owned()),
+        _ if !text.chars().all(plain) => {
+            Err("write only letters A-Z and a-z, digits, - and _; -o names the folder".to_owned())
+        }
+        _ => Ok(text.to_owned()),
+    }
+}
+
+/// Ids of tags, in the order given.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Ids(pub(super) Vec<u32>);
+
+impl Ids {
+    /// More are nobody's wish: all tags of the largest family that fits a file.
+    const MOST: usize = 10_000_000;
+
+    /// Refuses ids that a family does not have.
+    pub(super) fn check(&self, family: &crate::family::Family) -> anyhow::Result<()> {
+        match self.0.iter().find(|&&id| family.code(id).is_none()) {
+            None => Ok(()),
+            Some(id) => anyhow::bail!(
+                "--ids: {} has no tag {id}, its ids run from 0 to {}",
+                family.name(),
+                family.len() - 1
+            ),
+        }
+    }
+}
+
+impl FromStr for Ids {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut ids = Vec::new();
+        for part in text.split(',') {
+            let (first, last) = part.split_once('-').unwrap_or((part, part));
+            let number = |s: &str| s.trim().parse::<u32>().ok();
+            let (Some(first), Some(last)) = (number(first), number(last)) else {
+                return Err("write ids and ranges such as 0-9 or 3,7,20-25".to_owned());
+            };
+            if first > last {
+                return Err(format!("the range {first}-{last} runs backwards"));
+            }
+            if ids.len() + (last - first) as usize >= Self::MOST {
+                return Err(format!("more than {} ids are too many", Self::MOST));
+            }
+            ids.extend(first..=last);
+        }
+        let mut sorted = ids.clone();
+        sorted.sort_unstable();
+        match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            Some(pair) => Err(format!("{} is named twice", pair[0])),
+            None => Ok(Self(ids)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_single_or_in_ranges_and_each_is_named_once() {
+        assert_eq!("3,7,20-22".parse::<Ids>().unwrap().0, [3, 7, 20, 21, 22]);
+        for bad in ["", "-", "5-3", "a", "1-99999999", "0-9,,1", "0,0", "1-5,3"] {
+            assert!(bad.parse::<Ids>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_refused_in_words() {
+        let count = whole(1..=9u32);
+        assert_eq!(count("9"), Ok(9));
+        for bad in ["", "0", "10", "-1", "+3", "1.5", "x", "99999999999999999999"] {
+            assert_eq!(count(bad).unwrap_err(), "write a whole number from 1 to 9", "{bad}");
+        }
+        let seed = whole(0..=u64::MAX);
+        assert_eq!(seed("-1").unwrap_err(), "write a whole number, 0 or more");
+        assert_eq!(seed("18446744073709551616").unwrap_err(), "write at most 18446744073709551615");
+        assert!(number(0.0..=1.0)("nan").is_err());
+    }
+}

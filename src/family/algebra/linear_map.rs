@@ -1,0 +1,25 @@
+/// A linear map from words to up to 32 bits, evaluated byte by byte.
+#[derive(Clone, Debug)]
+pub struct LinearMap {
+    /// tables[i][x]: image of the word with byte i = x and all else 0.
+    tables: Vec<[u32; 256]>,
+}
+
+impl LinearMap {
+    /// The map that sends bit i to `columns[i]`.
+    pub fn of_columns(columns: &[u32]) -> Self {
+        let table = |columns: &[u32]| {
+            std::array::from_fn(|x| {
+                (0..).zip(columns).filter(|&(i, _)| x >> i & 1 == 1).fold(0, |sum, (_, c)| sum ^ c)
+            })
+        };
+        Self { tables: columns.chunks(8).map(table).collect() }
+    }
+
+    /// The image of a word.
+    #[inline]
+    pub fn apply(&self, word: u64) -> u32 {
+        let bytes = word.to_le_bytes();
+        self.tables.iter().zip(bytes).fold(0, |sum, (table, byte)| sum ^ table[usize::from(byte)])
+    }
+}

@@ -1,0 +1,25 @@
+//! The unfolded solid: its faces in one plane, to be cut out, folded and glued.
+//!
+//! ```text
+//!           ╱:─╮           ╱ ╲ ─  cut        - - :  fold
+//!          ╱  : ╲
+//!         ╱    : ╲         Every edge that is cut has a number, printed in the margin of the face
+//!        ╱3     :7╲        on one side and on the glue tab of the other: here edge 7 has its tab,
+//!       ╱        : ╲       and edge 3 goes over the tab of another face. Faces have their names
+//!      ╱- face 0 -:─╯      along a fold.
+//!      ╲  face 5  ╱
+//!       ╲        ╱         The panel of a face lies in it as on a single sheet: its placement takes
+//!        ╲      ╱          the face's outline to the triangle of the net.
+//! ```
+//!
+//! Faces never overlap, and tabs overlap neither faces nor each other: see [`plane::gap_mm`]. A
+//! solid whose faces cannot be laid out in one piece is printed in several, each on a sheet of its
+//! own; tabs and numbers then lead from one to the other.
+
+mod plane;
+mod sheet;
+mod tabs;
+mod tiling;
+mod unfold;
+
+pub(super) use sheet::sheets;

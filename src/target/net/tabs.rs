@@ -1,0 +1,148 @@
+//! Glue tabs: a trapezoid on one side of every edge that is cut.
+//!
+//! ```text
+//!        b'──────a'            outside
+//!       ╱          ╲
+//!   ───b────────────a───       the edge; counter-clockwise the face's side runs from a to b
+//!            face
+//! ```
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+
+use super::plane::{TOUCHING_MM, bounds, gap_mm};
+use super::unfold::{Piece, Side, Sides};
+
+/// Depth of a tab in lengths of its edge, and its least and most, mm: the least takes its words,
+/// the most is what glue needs.
+const DEPTH: (f64, f64, f64) = (0.15, 4.0, 9.0);
+
+/// Angles between a tab's edge and its legs, degrees: the usual one, flatter ones for narrow gaps,
+/// a steep one for short edges; tried in this order.
+const LEGS_DEG: [f64; 4] = [45.0, 30.0, 20.0, 60.0];
+
+/// By so much the legs of a tab could be steeper without meeting anything, degrees: scissors pass
+/// between a tab and what lies beside it.
+const SPARE_DEG: f64 = 4.0;
+
+/// Parts of the edge left free at each end, tried in this order.
+const INSETS: [f64; 4] = [0.0, 0.06, 0.15, 0.27];
+
+/// Parts of the full depth, tried in this order.
+const DEPTHS: [f64; 4] = [1.0, 0.8, 0.6, 0.45];
+
+/// Least distance of a tab from faces and tabs that share no vertex with it, mm.
+const CLEARANCE_MM: f64 = 0.5;
+
+/// A tab beside a side of a face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tab {
+    /// The side that it hangs on.
+    pub side: Side,
+    /// Its corners, counter-clockwise: b, a, a', b' of the figure; mm.
+    pub corners: [DVec2; 4],
+    /// Its depth, mm.
+    pub depth_mm: f64,
+}
+
+/// Gives each cut edge of some pieces a tab on one of its sides; `None` where an edge has room on
+/// neither. Each piece is a plane of its own.
+///
+/// The side with the deeper tab gets it; where both take the same, the one with the lower number
+/// in its face, so that the tabs of a regular net all point the same way round.
+pub fn place(pieces: &[Piece], sides: &Sides) -> Option<Vec<Vec<Tab>>> {
+    let mut tabs: Vec<Vec<Tab>> = vec![Vec::new(); pieces.len()];
+    let mut places = BTreeMap::new();
+    for (p, piece) in pieces.iter().enumerate() {
+        places.extend(piece.iter().enumerate().map(|(f, face)| (face.face, (p, f))));
+    }
+    for (own, partner) in cut_edges(pieces, sides) {
+        let best = [own, partner].into_iter().filter_map(|side| {
+            let &(p, f) = places.get(&side.face)?;
+            let tab = largest(&pieces[p], f, side, &tabs[p])?;
+            Some((p, tab))
+        });
+        let (p, tab) = best.max_by(|(_, a), (_, b)| {
+            let order =
+                |tab: &Tab| (std::cmp::Reverse(tab.side.side), std::cmp::Reverse(tab.side.face));
+            a.size().total_cmp(&b.size()).then_with(|| order(a).cmp(&order(b)))
+        })?;
+        tabs[p].push(tab);
+    }
+    Some(tabs)
+}
+
+/// The edges of the solid along which the net is cut, as pairs of sides in the order of faces.
+pub fn cut_edges(pieces: &[Piece], sides: &Sides) -> Vec<(Side, Side)> {
+    let faces = || pieces.iter().flatten();
+    let folded: Vec<(Side, Side)> = faces().filter_map(|face| face.hinge).collect();
+    let mut all: Vec<(Side, Side)> = faces()
+        .flat_map(|face| (0..3).map(|side| Side { face: face.face, side }))
+        .filter_map(|side| Some((side, sides.partner(side)?)))
+        .filter(|(own, partner)| own < partner)
+        .filter(|&(a, b)| !folded.contains(&(a, b)) && !folded.contains(&(b, a)))
+        .collect();
+    all.sort_unstable();
+    all
+}
+
+impl Tab {
+    /// Depth times length, rounded so that sizes of equal tabs are equal.
+    fn size(&self) -> f64 {
+        let [b, a, ..] = self.corners;
+        (self.depth_mm * a.distance(b) * 1e6).round() / 1e6
+    }
+
+    fn new(side: Side, [from, to]: [DVec2; 2], depth: f64, inset: f64, leg_deg: f64) -> Self {
+        let along = (to - from).normalize_or_zero();
+        let outwards = -along.perp();
+        let length = from.distance(to);
+        let (a, b) = (from + along * inset * length, to - along * inset * length);
+        let step = along * (depth / leg_deg.to_radians().tan());
+        let corners = [b, a, a + outwards * depth + step, b + outwards * depth - step];
+        Self { side, corners, depth_mm: depth }
+    }
+
+    /// Whether its far edge is at least half as long as its near one.
+    fn is_wide(&self) -> bool {
+        let [b, a, far_a, far_b] = self.corners;
+        (far_b - far_a).dot(b - a) >= 0.5 * (b - a).length_squared()
+    }
+}
+
+/// The largest tab that a side of face `at` of a piece takes.
+fn largest(piece: &Piece, at: usize, side: Side, tabs: &[Tab]) -> Option<Tab> {
+    let ends = piece[at].ends(side.side);
+    let (part, least, most) = DEPTH;
+    let full = (part * ends[0].distance(ends[1])).clamp(least, most);
+    let depths = DEPTHS.iter().map(|part| (part * full).max(least));
+    let mut shapes = depths.flat_map(|depth| {
+        INSETS.iter().flat_map(move |&inset| LEGS_DEG.iter().map(move |&leg| (depth, inset, leg)))
+    });
+    let obstacles = || {
+        let faces = piece.iter().enumerate().filter(|&(f, _)| f != at);
+        faces.map(|(_, face)| &face.corners[..]).chain(tabs.iter().map(|tab| &tab.corners[..]))
+    };
+    // Only what is near can be met.
+    let [x0, y0, x1, y1] = bounds(&ends);
+    let reach = full + CLEARANCE_MM;
+    let near: Vec<&[DVec2]> = obstacles()
+        .filter(|other| {
+            let [left, lower, right, upper] = bounds(*other);
+            left < x1 + reach && right > x0 - reach && lower < y1 + reach && upper > y0 - reach
+        })
+        .collect();
+    shapes.find_map(|(depth, inset, leg)| {
+        let tab = Tab::new(side, ends, depth, inset, leg);
+        let swept = Tab::new(side, ends, depth, inset, (leg + SPARE_DEG).min(89.0));
+        (tab.is_wide() && near.iter().all(|other| is_clear(&swept, other))).then_some(tab)
+    })
+}
+
+/// Whether a tab keeps clear of a polygon, which may touch an end of its edge.
+fn is_clear(tab: &Tab, other: &[DVec2]) -> bool {
+    let [b, a, ..] = tab.corners;
+    let meet = other.iter().any(|v| v.distance(a).min(v.distance(b)) < TOUCHING_MM);
+    gap_mm(&tab.corners, other) >= if meet { -TOUCHING_MM } else { CLEARANCE_MM }
+}
