@@ -122,6 +122,300 @@ fn wrong_meshes_are_refused_with_the_cause() {
     }
 }
 
+/// The 16 equilateral triangles of a gyroelongated square bipyramid: two pyramids on an antiprism.
+fn bipyramid(edge: f64) -> String {
+    let radius = edge / 2f64.sqrt();
+    let across = 2.0 * radius * (std::f64::consts::FRAC_PI_8).sin();
+    let half = (edge * edge - across * across).sqrt() / 2.0;
+    let mut text = String::new();
+    for k in 0..8 {
+        let (ring, turn) = (k / 4, f64::from(k % 4) + f64::from(k / 4) / 2.0);
+        let (sin, cos) = (turn * std::f64::consts::FRAC_PI_2).sin_cos();
+        let z = if ring == 0 { half } else { -half };
+        text += &format!("v {} {} {z}\n", radius * cos, radius * sin);
+    }
+    let top = half + (edge * edge - radius * radius).sqrt();
+    text += &format!("v 0 0 {top}\nv 0 0 {}\n", -top);
+    for k in 0..4 {
+        let (u, u1, l, l1) = (k + 1, (k + 1) % 4 + 1, k + 5, (k + 1) % 4 + 5);
+        text += &format!("f {u} {u1} 9\nf {u1} {u} {l}\nf {l} {l1} {u1}\nf {l1} {l} 10\n");
+    }
+    text
+}
+
+/// Every output of a solid from a mesh, inside out and in metres, from the file to the proof.
+#[test]
+fn any_closed_mesh_becomes_a_target() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let inside_out: String = bipyramid(0.12)
+        .lines()
+        .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+            ["f", a, b, c] => format!("f {a} {c} {b}\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    std::fs::write(path.join("gyro.obj"), inside_out).unwrap();
+    let args = "solid --mesh gyro.obj --scale 1000 --gltf --obj --stl --skeleton --dxf --svg --dsc \
+                -o new --first-id 5";
+    deltille(path, args)
+        .success()
+        .stdout(contains("they were turned"))
+        .stdout(contains("gyro: mesh of 120 mm edges, 16 faces"))
+        .stdout(contains("gyro.glb: verified, 16 faces").and(contains("gyro.obj: verified")))
+        .stdout(contains("gyro.stl: verified, closed body of 16 triangles"))
+        .stdout(contains("gyro-skeleton.stl: verified").and(contains("16 seats within")));
+    // The description is enough to make the target again.
+    let target = std::fs::read_to_string(path.join("new/gyro.json")).unwrap();
+    let target = Target::from_json(&target).unwrap();
+    let family = deltille::family::Family::resolve("delTag25h7").unwrap();
+    let again = Target::build("gyro", &target.spec, Some(&family), None).unwrap();
+    for (made, read) in again.panels.iter().zip(&target.panels) {
+        assert_eq!((made.id, &made.corners, &made.tags), (read.id, &read.corners, &read.tags));
+    }
+    assert_eq!(again.panels.len(), 16);
+}
+
+/// A mesh is refused in one line that names its file and what is wrong.
+#[test]
+fn meshes_that_are_no_solids_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let good = bipyramid(120.0);
+    let without_last = good.trim_end().rsplit_once('\n').unwrap().0.to_owned();
+    let flattened = good.replace("f 1 2 9\n", "f 1 1 9\n");
+    let quad = good.replace("f 1 2 9\n", "f 1 2 3 9\n");
+    let wound = good.replace("f 1 2 9\n", "f 2 1 9\n");
+    let twice = good.clone() + &good.replace("v 0 0 ", "v 999 0 ");
+    let skewed: String = good
+        .lines()
+        .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+            ["v", x, y, z] => format!("v {x} {y} {}\n", 1.6 * z.parse::<f64>().unwrap()),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    for (name, text, options, said) in [
+        ("open", without_last, "", "it is open"),
+        ("flat", flattened, "", "triangle 1 has no area"),
+        ("quad", quad, "", "face 1 has 4 corners"),
+        ("wound", wound, "", "wound against each other"),
+        ("crowd", twice, "", "not manifold"),
+        ("nan", good.replacen("v ", "v nan ", 1), "", "finite"),
+        ("text", "hello".to_owned(), "", "no triangles"),
+        ("index", good.clone() + "f 1 2 99\n", "", "out of bounds"),
+        ("skew", skewed.clone(), "", "give --allow-skew"),
+        ("small", good.clone(), "--scale 0.001", "is --scale right?"),
+        ("both", good.clone(), "--scale 2 --edge 100mm", "cannot be used with"),
+        ("zero", good.clone(), "--scale 0", "--scale"),
+        ("ids", good.clone(), "--tag-spacing 1", "raise --tag-spacing to at least 2"),
+    ] {
+        std::fs::write(path.join(format!("{name}.obj")), text).unwrap();
+        let args = format!("solid --mesh {name}.obj -o out {options}");
+        let result = deltille(path, &args).code(2);
+        let stderr = String::from_utf8_lossy(&result.get_output().stderr).into_owned();
+        assert!(stderr.starts_with("error: ") && stderr.lines().count() == 1, "{name}: {stderr}");
+        assert!(stderr.contains(said), "{name}: {stderr}");
+        let of_file = options.is_empty();
+        assert!(!of_file || stderr.contains(&format!("{name}.obj")), "{name}: {stderr}");
+    }
+    deltille(path, "solid --mesh both.obj --obj").code(2).stderr(contains("over the mesh"));
+    deltille(path, "solid --mesh nowhere.obj").code(2).stderr(contains("nowhere.obj"));
+    assert!(!path.join("out").exists());
+    // What is skewed on purpose is made.
+    std::fs::write(path.join("skew.obj"), skewed).unwrap();
+    deltille(path, "solid --mesh skew.obj --allow-skew --tiles 7").success();
+}
+
+/// An octahedron from the command to its proof, and to a photograph in which it is found.
+#[test]
+fn an_octahedron_is_made_photographed_and_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    deltille(path, "octahedron --gltf --obj --stl --dxf --skeleton --face-margin 7mm")
+        .success()
+        .stdout(contains("faces meet at 109.47°").and(contains("mitred by 35.26°")))
+        .stdout(contains("verified: 4 files of target octahedron"));
+    let camera = "width: 1600\nheight: 1200\nmodel: pinhole\nfocal_px: [1800, 1800]\n\
+                  centre_px: [799.5, 599.5]\n";
+    std::fs::write(path.join("camera.yaml"), camera).unwrap();
+    let args = "render octahedron.json --camera camera.yaml --eye 250,180,220 --bits 16 --seed 3";
+    deltille(path, args).success().stdout(contains("corners in view"));
+    deltille(path, "detect --target octahedron.json octahedron-view.png -o found").success();
+    let read = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&std::fs::read_to_string(path.join(name)).unwrap()).unwrap()
+    };
+    let (truth, found) = (read("octahedron-view.json"), read("found/octahedron-view.json"));
+    let truth: std::collections::BTreeMap<u64, [f64; 2]> = truth["corners"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| (c["id"].as_u64().unwrap(), ["x", "y"].map(|key| c[key].as_f64().unwrap())))
+        .collect();
+    let grids = found["grids"].as_array().unwrap();
+    let corners = grids.iter().flat_map(|grid| grid["corners"].as_array().unwrap());
+    let mut near = 0;
+    for corner in corners {
+        let [x, y] = truth[&corner["id"].as_u64().unwrap()];
+        let at = ["x", "y"].map(|key| corner[key].as_f64().unwrap());
+        assert!((at[0] - x).hypot(at[1] - y) < 0.2, "{corner}");
+        near += 1;
+    }
+    assert!(near >= 36, "{near}");
+    let picture = image::ImageReader::open(path.join("octahedron-view.png")).unwrap();
+    assert_eq!(picture.decode().unwrap().color(), image::ColorType::L16);
+}
+
+/// What is printed wrong on a mesh is named, also where the detector would not mind.
+#[test]
+fn wrong_marks_on_a_mesh_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    deltille(path, "tetrahedron --edge 80mm --tiles 7 --face-margin 4mm --obj --name t").success();
+    let target = Target::from_json(&std::fs::read_to_string(path.join("t.json")).unwrap()).unwrap();
+    let good = image::open(path.join("t-texture.png")).unwrap().into_luma8();
+    let obj = std::fs::read_to_string(path.join("t.obj")).unwrap();
+    let uv: Vec<[f64; 2]> = obj
+        .lines()
+        .filter_map(|line| line.strip_prefix("vt "))
+        .map(|line| {
+            let (u, v) = line.split_once(' ').unwrap();
+            [u.parse().unwrap(), v.parse().unwrap()]
+        })
+        .collect();
+    // Texels of the first face from millimetres of its panel: its lower edge is horizontal.
+    let (w, h) = (f64::from(good.width()), f64::from(good.height()));
+    let texels_per_mm = (uv[1][0] - uv[0][0]) * w / 80.0;
+    let panel = &target.panels[0];
+    let margin = 4.0;
+    let left = -1.5 * panel.edge_mm - 3f64.sqrt() * margin;
+    let lower = -0.75f64.sqrt() * panel.edge_mm - margin;
+    let texel = |[x, y]: [f64; 2]| {
+        let u = uv[0][0] * w + (x - left) * texels_per_mm;
+        let v = (1.0 - uv[0][1]) * h - (y - lower) * texels_per_mm;
+        [u as i64, v as i64]
+    };
+    let e = panel.edge_mm;
+    let tag = panel.tags[0];
+    let centre = |row: i32, col: i32, third: f64| {
+        let (row, col) = (f64::from(row) + third, f64::from(col) + third);
+        [(col + row / 2.0) * e, row * 0.75f64.sqrt() * e]
+    };
+    // Where, how wide (mm), and what is said of the changed square.
+    let cell = e / 9.5;
+    for (name, at, side, said) in [
+        ("cell", centre(tag.row, tag.col, 1.0 / 3.0), cell * 0.8, "tag 0 at row"),
+        ("tile", centre(-1, 0, 1.0 / 3.0), e, "in the tile at row"),
+        ("white", centre(0, 0, 2.0 / 3.0), e / 4.0, "in the tile at row"),
+        ("margin", [0.0, lower + 1.2], 1.0, "spot of"),
+    ] {
+        let mut changed = good.clone();
+        let [u, v] = texel(at);
+        let half = (side * texels_per_mm / 2.0) as i64;
+        for (x, y) in (v - half..=v + half).flat_map(|y| (u - half..=u + half).map(move |x| (x, y)))
+        {
+            let pixel = changed.get_pixel_mut(x as u32, y as u32);
+            pixel.0[0] = if name == "cell" || name == "tile" { 255 - pixel.0[0] } else { 0 };
+        }
+        changed.save(path.join("t-texture.png")).unwrap();
+        let result = deltille(path, "verify t.json t.obj").code(1);
+        let output = String::from_utf8_lossy(&result.get_output().stdout).into_owned();
+        assert!(output.contains("face 0: ") && output.contains(said), "{name}: {output}");
+    }
+    good.save(path.join("t-texture.png")).unwrap();
+    deltille(path, "verify t.json t.obj").success();
+}
+
+/// Bodies to print that are open, turned or of another size are refused.
+#[test]
+fn wrong_bodies_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    deltille(path, "icosahedron --stl --skeleton --name i").success();
+    let read = |name: &str| std::fs::read(path.join(name)).unwrap();
+    let numbers = |bytes: &mut Vec<u8>, change: &dyn Fn(usize, [f32; 3]) -> [f32; 3]| {
+        for at in (84..bytes.len()).step_by(50).flat_map(|t| (0..4).map(move |i| t + 12 * i)) {
+            let number =
+                |i: usize| f32::from_le_bytes(bytes[at + 4 * i..][..4].try_into().unwrap());
+            let vector = change((at - 84) % 50 / 12, [0, 1, 2].map(number));
+            bytes.splice(at..at + 12, vector.into_iter().flat_map(f32::to_le_bytes));
+        }
+    };
+    let bare = read("i.stl");
+    let mut open = bare[..bare.len() - 50].to_vec();
+    open[80] -= 1;
+    let mut mirrored = bare.clone();
+    numbers(&mut mirrored, &|_, [x, y, z]| [-x, y, z]);
+    let mut scaled = bare.clone();
+    numbers(&mut scaled, &|i, v| if i == 0 { v } else { v.map(|x| x * 1.01) });
+    let mut turned = bare.clone();
+    numbers(&mut turned, &|_, [x, y, z]| [-y, x, z]);
+    let mut thick = read("i-skeleton.stl");
+    numbers(&mut thick, &|i, v| if i == 0 { v } else { v.map(|x| x * 1.002) });
+    for (name, bytes, code, said) in [
+        ("open.stl", open, 1, "it is open"),
+        ("mirrored.stl", mirrored, 1, "inside out"),
+        ("scaled.stl", scaled, 1, "scale 1.0100"),
+        ("turned.stl", turned, 1, "is not there"),
+        ("cut.stl", bare[..300].to_vec(), 2, "not a binary STL"),
+        ("i-skeleton.stl", thick, 1, "below it instead of"),
+    ] {
+        std::fs::write(path.join(name), bytes).unwrap();
+        let result = deltille(path, &format!("verify i.json {name}")).code(code);
+        let output = result.get_output();
+        let all = String::from_utf8_lossy(&[&output.stdout[..], &output.stderr[..]].concat())
+            .into_owned();
+        assert!(all.contains(said), "{name}: {all}");
+    }
+}
+
+/// Outlines to cut have the size of the faces, or of what the seats take.
+#[test]
+fn panels_to_cut_have_their_true_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    for (options, name, edge_mm) in [("", "whole", 150.0), ("--skeleton", "seats", f64::NAN)] {
+        deltille(path, &format!("icosahedron --dxf --name {name} {options}")).success();
+        let text = std::fs::read_to_string(path.join(format!("{name}.dxf"))).unwrap();
+        let outlines = closed_polylines(&text, "CUT");
+        assert_eq!(outlines.len(), 20);
+        for outline in &outlines {
+            assert_eq!(outline.len(), 3);
+            let sides: Vec<f64> = (0..3)
+                .map(|i| {
+                    let (a, b) = (outline[i], outline[(i + 1) % 3]);
+                    (a[0] - b[0]).hypot(a[1] - b[1])
+                })
+                .collect();
+            // Ribs of icosahedra: 3 mm below, faces meet at 138.19°; 0.8 mm of foot, 0.15 of play.
+            let inset = 3.0 / (138.1897f64 / 2.0).to_radians().tan() + 0.8 + 0.15;
+            let stated = if edge_mm.is_nan() { 150.0 - 12f64.sqrt() * inset } else { edge_mm };
+            assert!(sides.iter().all(|side| (side - stated).abs() < 1e-4), "{sides:?} {stated}");
+        }
+        assert!(closed_polylines(&text, "ENGRAVE").len() >= 80);
+    }
+}
+
+/// The closed polylines of a layer of a DXF of release 12.
+fn closed_polylines(text: &str, layer: &str) -> Vec<Vec<[f64; 2]>> {
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let (mut outlines, mut entity, mut on_layer) = (Vec::<Vec<[f64; 2]>>::new(), "", false);
+    for group in lines.chunks_exact(2) {
+        match (group[0], group[1]) {
+            ("0", name) => entity = name,
+            ("8", name) => on_layer = name == layer,
+            ("70", "1") if entity == "POLYLINE" && on_layer => outlines.push(Vec::new()),
+            ("10", x) if entity == "VERTEX" && on_layer => {
+                outlines.last_mut().unwrap().push([x.parse().unwrap(), 0.0]);
+            }
+            ("20", y) if entity == "VERTEX" && on_layer => {
+                outlines.last_mut().unwrap().last_mut().unwrap()[1] = y.parse().unwrap();
+            }
+            _ => {}
+        }
+    }
+    outlines
+}
+
 #[test]
 fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -138,6 +432,15 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
         ("icosahedron --pdf --per-face --edge 3m", "even A0"),
         ("icosahedron --pdf --per-face --paper A5", "an --edge of at most "),
         ("icosahedron -o /proc/nowhere", "-o: cannot write"),
+        ("icosahedron --skeleton --rib 1mm", "--rib: 1 mm leaves no foot"),
+        ("icosahedron --skeleton --panel-thickness 12mm", "--face-margin"),
+        (
+            "tetrahedron --skeleton --edge 60mm --tiles 6 --face-margin 6mm --wall 6mm",
+            "a larger --edge",
+        ),
+        ("icosahedron --wall 4mm", "--skeleton"),
+        ("icosahedron --family delTag16h5", "take --family delTag25h7"),
+        ("solid", "--mesh"),
     ] {
         let result = deltille(folder.path(), args).code(2);
         let stderr = String::from_utf8_lossy(&result.get_output().stderr).into_owned();

@@ -8,7 +8,9 @@ use deltille::family::Family;
 use deltille::lattice::{ROW_HEIGHT, Tile, Vertex};
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, TruthCorner, scene_of_target};
-use deltille::target::{Panel, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use deltille::target::{
+    ClosedMesh, Panel, Polyhedron, SolidShape, SolidSpec, TagSpec, Target, TargetSpec,
+};
 use glam::{DMat2, DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -115,6 +117,101 @@ fn two_solids_in_one_picture_are_told_apart() {
         let corners = labelled.iter().flat_map(|grid| &grid.corners);
         assert!(corners.into_iter().all(|c| (c.x < 1300.0) == left));
     }
+}
+
+/// An octahedron with a tetrahedron on each face: eight spikes, which hide parts of each other.
+fn spikes() -> ClosedMesh {
+    let inner = Polyhedron::octahedron(100.0);
+    let mut vertices = inner.vertices_mm.clone();
+    let mut faces = Vec::new();
+    for (index, face) in inner.faces.iter().enumerate() {
+        let [a, b, c] = inner.triangle_mm(index);
+        let middle = (a + b + c) / 3.0;
+        let apex = middle + middle.normalize() * 100.0 * (2f64 / 3.0).sqrt();
+        faces.extend((0..3).map(|i| [face[i], face[(i + 1) % 3], vertices.len()]));
+        vertices.push(apex);
+    }
+    ClosedMesh::new(&vertices, &faces).unwrap().0
+}
+
+/// Where a ray meets a triangle from its front, in lengths of the ray.
+fn meet(triangle: [DVec3; 3], eye: DVec3, ray: DVec3) -> Option<f64> {
+    let [a, b, c] = triangle;
+    let normal = (b - a).cross(c - a);
+    let t = normal.dot(a - eye) / normal.dot(ray);
+    let p = eye + ray * t;
+    let inside =
+        [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (v - u).cross(p - u).dot(normal) >= 0.0);
+    (normal.dot(ray) < 0.0 && t > 0.0 && inside).then_some(t)
+}
+
+/// What a concave solid hides of itself is neither drawn nor in the truth: rays say the same.
+#[test]
+fn hidden_parts_of_a_concave_solid_are_hidden() {
+    let shape = SolidShape::Mesh(spikes());
+    let (target, _, scene) = solid(shape.clone(), 0, 0);
+    let outline = SolidSpec::new(shape).polyhedron().triangles_mm();
+    let camera = Camera::pinhole(900, 900, 0.5);
+    let light = Light { blur_px: 0.0, noise: 0.0, ..Light::default() };
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let (mut hidden, mut compared) = (0, 0);
+    for _ in 0..4 {
+        let direction = DVec3::from_array([0; 3].map(|_| rng.random_range(-1.0..1.0))).normalize();
+        let eye = direction * 600.0;
+        let pose = Pose::looking_at(eye, DVec3::ZERO, direction.any_orthonormal_vector());
+        let nearest = |ray: DVec3| {
+            let meets = outline.iter().enumerate();
+            let meets = meets.filter_map(|(face, &corners)| Some((meet(corners, eye, ray)?, face)));
+            meets.min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let truth: BTreeSet<u32> =
+            scene.truth(&camera, &pose, 0.0).corners.iter().map(|c| c.id).collect();
+        for (face, panel) in target.panels.iter().enumerate() {
+            for corner in &panel.corners {
+                let seen = nearest(DVec3::from(corner.target_mm) - eye);
+                let expected = seen.is_some_and(|(_, nearest)| nearest == face);
+                assert_eq!(truth.contains(&corner.id), expected, "{corner:?}");
+                let turned = meet(outline[face], eye, DVec3::from(corner.target_mm) - eye);
+                hidden += usize::from(turned.is_some() && !expected);
+            }
+        }
+        let image = scene.render(&camera, &pose, &light);
+        let back = pose.inverse().rotation;
+        for _ in 0..4000 {
+            let [x, y] = [0; 2].map(|_| rng.random_range(10..890));
+            // Level and place of a pixel's corner; `None` on a tag.
+            let level = |dx: f64, dy: f64| {
+                let [u, v] = [f64::from(x) + dx, f64::from(y) + dy];
+                let [fx, fy] = camera.focal_px;
+                let [cx, cy] = camera.centre_px;
+                let ray = back * DVec3::new((u - cx) / fx, (v - cy) / fy, 1.0);
+                let Some((t, face)) = nearest(ray) else { return Some((light.background, None)) };
+                let panel = &target.panels[face];
+                let r = panel.pose.rotation;
+                let p = eye + ray * t - DVec3::from(panel.pose.translation_mm);
+                let along = |i: usize| r[i] * p.x + r[3 + i] * p.y + r[6 + i] * p.z;
+                let row = along(1) / panel.edge_mm / ROW_HEIGHT;
+                let col = along(0) / panel.edge_mm - row / 2.0;
+                let anchor = Vertex::new(row.floor() as i32, col.floor() as i32);
+                let upright = row - row.floor() + col - col.floor() < 1.0;
+                let tile = if upright { Tile::upright(anchor) } else { Tile::inverted(anchor) };
+                let black = panel.upright_tiles().contains(&tile);
+                let tagged = panel.tags.iter().any(|t| Vertex::new(t.row, t.col) == anchor);
+                let value = if black { light.black } else { light.white };
+                (!(black && tagged)).then_some((value, Some((face, tile))))
+            };
+            let around = [(-0.6, -0.6), (0.6, -0.6), (-0.6, 0.6), (0.6, 0.6), (0.0, 0.0)]
+                .map(|(dx, dy)| level(dx, dy));
+            let Some(expected) = around[0].filter(|_| around.iter().all(|l| *l == around[0]))
+            else {
+                continue;
+            };
+            let found = f64::from(image.at(x as usize, y as usize));
+            assert!((found - expected.0).abs() < 1e-4, "{found} {expected:?} at ({x}, {y})");
+            compared += usize::from(expected.1.is_some());
+        }
+    }
+    assert!(hidden > 50 && compared > 500, "{hidden} {compared}");
 }
 
 /// Largest angle between a face's normal and its lines of sight, and the least edge of a tag's bit
@@ -229,6 +326,6 @@ fn three_hundred_views_of_an_icosahedron() {
          {wrong:?}; right labels off by more than 2 px (view, face, px, well seen): {displaced:?}"
     );
     assert_eq!(labelled, due);
-    assert!(wrong.is_empty() && displaced.iter().all(|&(.., well_seen)| !well_seen));
+    assert!(wrong.is_empty() && displaced.is_empty());
     assert!(rms < 0.05);
 }

@@ -69,7 +69,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
         (&["b.json", "absent.png"], "absent.png"),
         (&["b.json", "b.json"], "not a .pdf, .svg or .png"),
         (&["broken.json"], "broken.json"),
-        (&["alone/b.json"], "no b.pdf, .svg or .png beside"),
+        (&["alone/b.json"], "no b.pdf, .svg, .png, .glb, .obj or .stl beside"),
         (&["b.json", "--report", "nowhere/r.json"], "nowhere"),
     ];
     for (arguments, reason) in cases {

@@ -36,44 +36,107 @@ impl Atlas {
     ) -> Result<Atlas, ArtworkError> {
         let mm_per_px = 1e3 / f64::from(px_per_m);
         let padding = PADDING_PX * mm_per_px;
-        let (mut width, mut height) = (0.0f64, 0.0f64);
-        for face in faces {
-            let [a, b, c] = face.outline_mm;
-            width = width.max(b[0] - a[0]);
-            height = height.max(c[1] - a[1]);
-        }
-        // Along the row the slanted edges keep the padding between them.
-        let step = [width / 2.0 + padding / 0.75f64.sqrt(), height + padding];
-        let size_of = |columns: usize| {
-            let rows = faces.len().div_ceil(columns);
-            let across = width + step[0] * (columns - 1) as f64 + 2.0 * padding;
-            [across, step[1] * rows as f64 + padding]
-        };
-        let side = |columns: &usize| {
-            let [w, h] = size_of(*columns);
-            w.max(h)
-        };
-        let columns = (1..=faces.len()).min_by(|a, b| side(a).total_cmp(&side(b))).unwrap_or(1);
-        let size_px = size_of(columns).map(|mm| (mm / mm_per_px).ceil());
+        let packing = Packing::tightest(faces, padding);
+        let size_px = packing.size_mm.map(|mm| (mm / mm_per_px).ceil());
         let [width_mm, height_mm] = size_px.map(|px| px * mm_per_px);
 
         let mut shapes = Vec::new();
         let mut outlines_mm = Vec::with_capacity(faces.len());
-        for (index, (face, panel)) in faces.iter().zip(&target.panels).enumerate() {
-            let (row, column) = (index / columns, index % columns);
-            let left = padding + step[0] * column as f64;
-            let lower = padding + step[1] * row as f64;
-            let [[ax, ay], _, _] = face.outline_mm;
-            let placement = if column % 2 == 0 {
-                Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [left - ax, lower - ay] }
-            } else {
-                let origin_mm = [left + width + ax, lower + height + ay];
-                Placement { panel: panel.id, angle_rad: PI, origin_mm }
-            };
+        for ((face, panel), placement) in faces.iter().zip(&target.panels).zip(packing.placements())
+        {
             shapes.extend(draw_panel(target, panel, &placement, family)?);
             outlines_mm.push(face.outline_mm.map(|p| placement.page_from_panel(p)));
         }
         let sheet = Sheet { width_mm, height_mm, shapes };
         Ok(Atlas { sheet, px_per_m, size_px: size_px.map(|px| px as u32), outlines_mm })
     }
+}
+
+/// Faces in rows of so many, alternately upright and upside down.
+pub(super) struct Packing {
+    pub size_mm: [f64; 2],
+    /// Turns of the panels, and places of their origins.
+    places: Vec<(f64, [f64; 2])>,
+}
+
+impl Packing {
+    /// The rows whose longer side is the shortest.
+    pub fn tightest(faces: &[Face], padding: f64) -> Self {
+        let packings = (1..=faces.len()).map(|columns| Self::new(faces, columns, padding));
+        let side = |packing: &Self| packing.size_mm[0].max(packing.size_mm[1]);
+        let tightest = packings.min_by(|a, b| side(a).total_cmp(&side(b)));
+        tightest.unwrap_or(Self { size_mm: [0.0; 2], places: Vec::new() })
+    }
+
+    /// Where the faces lie.
+    pub fn placements(&self) -> impl Iterator<Item = Placement> {
+        let places = self.places.iter().zip(0..);
+        places.map(|(&(angle_rad, origin_mm), panel)| Placement { panel, angle_rad, origin_mm })
+    }
+
+    fn new(faces: &[Face], columns: usize, padding: f64) -> Self {
+        // Along a row slanted edges keep the padding between them, the flattest one as well.
+        let slants = faces.iter().flat_map(|Face { outline_mm: [a, b, c], .. }| {
+            [a, b].map(|end| (c[1] - end[1]) / (c[0] - end[0]).hypot(c[1] - end[1]))
+        });
+        let gap = padding / slants.fold(1.0, f64::min);
+        let height = |face: &Face| face.outline_mm[2][1] - face.outline_mm[0][1];
+        let row_height = faces.iter().map(height).fold(0.0, f64::max);
+        let mut packing = Self { size_mm: [0.0; 2], places: Vec::with_capacity(faces.len()) };
+        let mut last = None;
+        for (index, face) in faces.iter().enumerate() {
+            if index.is_multiple_of(columns) {
+                packing.size_mm[1] += if index == 0 { padding } else { row_height + padding };
+                last = None;
+            }
+            let upright = (index % columns).is_multiple_of(2);
+            let turn = if upright { 1.0 } else { -1.0 };
+            // The lower edge of an upright face, or the apex of the others, starts the row.
+            let lowest = if upright { face.outline_mm[0][1] } else { -face.outline_mm[2][1] };
+            let y = packing.size_mm[1] - lowest;
+            let shape = face.outline_mm.map(|[px, py]| [turn * px, turn * py + y]);
+            let left = shape.iter().map(|p| p[0]).fold(f64::INFINITY, f64::min);
+            let x = match &last {
+                None => padding - left,
+                Some(before) => shift_beside(before, &shape) + gap,
+            };
+            let shape = shape.map(|[px, py]| [px + x, py]);
+            let right = shape.iter().map(|p| p[0]).fold(0.0, f64::max);
+            packing.size_mm[0] = packing.size_mm[0].max(right + padding);
+            packing.places.push((if upright { 0.0 } else { PI }, [x, y]));
+            last = Some(shape);
+        }
+        packing.size_mm[1] += row_height + padding;
+        packing
+    }
+}
+
+/// How far a triangle must be moved along x to touch another one from the right.
+///
+/// The right outline of one and the left outline of the other are straight between the vertices of
+/// both, so that they touch at the height of a vertex.
+fn shift_beside(before: &[[f64; 2]; 3], shape: &[[f64; 2]; 3]) -> f64 {
+    let heights = before.iter().chain(shape).map(|p| p[1]);
+    let needed = heights.filter_map(|y| {
+        let [_, right] = extent_at(before, y)?;
+        let [left, _] = extent_at(shape, y)?;
+        Some(right - left)
+    });
+    needed.fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Left and right end of a triangle at a height.
+fn extent_at(triangle: &[[f64; 2]; 3], y: f64) -> Option<[f64; 2]> {
+    let mut extent: Option<[f64; 2]> = None;
+    for i in 0..3 {
+        let ([ax, ay], [bx, by]) = (triangle[i], triangle[(i + 1) % 3]);
+        if y < ay.min(by) || y > ay.max(by) {
+            continue;
+        }
+        let at = |t: f64| ax + (bx - ax) * t;
+        let xs = if ay == by { [ax, bx] } else { [at((y - ay) / (by - ay)); 2] };
+        let [left, right] = extent.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+        extent = Some([left.min(xs[0]).min(xs[1]), right.max(xs[0]).max(xs[1])]);
+    }
+    extent
 }

@@ -15,6 +15,7 @@ mod atlas;
 mod board;
 mod cells;
 mod check_bar;
+mod cutting;
 mod gallery;
 mod line;
 pub mod text;
@@ -28,6 +29,7 @@ use crate::target::{LineKind, Panel, Placement, SheetText, Target};
 pub use atlas::Atlas;
 pub use cells::white_outlines;
 pub use check_bar::STROKE_WIDTH_MM;
+pub use cutting::{CutDrawing, CutLayer, CutPath, CuttingError, panels_to_cut};
 pub use gallery::{GalleryTile, tag_gallery};
 pub use line::strokes_mm;
 

@@ -265,11 +265,11 @@ impl CornerFitter {
             gradient: SVector::zeros(),
             cost: products[PARAMS][PARAMS],
         };
-        for i in 0..ANGLE + K {
-            normal.gradient[i] = products[i][PARAMS];
-            for j in i..ANGLE + K {
-                normal.matrix[(i, j)] = products[i][j];
-                normal.matrix[(j, i)] = products[i][j];
+        for (i, row) in products.iter().enumerate().take(ANGLE + K) {
+            normal.gradient[i] = row[PARAMS];
+            for (j, &product) in row.iter().enumerate().take(ANGLE + K).skip(i) {
+                normal.matrix[(i, j)] = product;
+                normal.matrix[(j, i)] = product;
             }
         }
         normal

@@ -111,7 +111,9 @@ impl TexturedMesh {
         if width.max(height) > MAX_TEXTURE_PX {
             let instead = match dpi {
                 Some(_) => "lower --texture-dpi".to_owned(),
-                None => "take fewer --tiles, or a family of fewer bits".to_owned(),
+                None => {
+                    "take fewer --tiles, a family of fewer bits, or no --gltf and --obj".to_owned()
+                }
             };
             return Err(MeshError::Texture { width, height, instead });
         }

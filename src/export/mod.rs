@@ -7,6 +7,7 @@ pub mod atomic;
 pub mod csv;
 pub mod detection;
 pub mod dsc;
+pub mod dxf;
 pub mod gltf;
 pub mod mesh;
 pub mod obj;

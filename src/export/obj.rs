@@ -1,8 +1,52 @@
-//! Wavefront OBJ with its material and texture, in millimetres.
+//! Wavefront OBJ with its material and texture, in millimetres; closed meshes from OBJ.
 
 use std::fmt::Write;
 
+use glam::DVec3;
+
 use super::mesh::TexturedMesh;
+use crate::target::{ClosedMesh, ClosedMeshError};
+
+/// Why an OBJ is not taken for a solid.
+#[derive(Debug, thiserror::Error)]
+pub enum ObjError {
+    /// Not an OBJ.
+    #[error("not a readable OBJ: {0}")]
+    Grammar(#[from] tobj::LoadError),
+    /// A face of more than three corners.
+    #[error("face {face} has {corners} corners: triangles are needed")]
+    NotTriangle {
+        /// The face, counted from 1.
+        face: usize,
+        /// Its corners.
+        corners: u32,
+    },
+    /// Not a closed solid.
+    #[error(transparent)]
+    Mesh(#[from] ClosedMeshError),
+}
+
+/// Reads the triangles of all objects and groups of an OBJ as one solid; lines, points, materials
+/// and texture coordinates do not matter. The second value says whether it was inside out.
+pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
+    let options =
+        tobj::LoadOptions { ignore_lines: true, ignore_points: true, ..Default::default() };
+    let no_materials = |_: &std::path::Path| Ok(Default::default());
+    let (models, _) = tobj::load_obj_buf(&mut &text[..], &options, no_materials)?;
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for mesh in models.iter().map(|model| &model.mesh) {
+        let corners = mesh.face_arities.iter().position(|&n| n != 3);
+        if let Some(face) = corners {
+            let (corners, face) = (mesh.face_arities[face], faces.len() + face + 1);
+            return Err(ObjError::NotTriangle { face, corners });
+        }
+        let first = vertices.len();
+        vertices.extend(mesh.positions.as_chunks::<3>().0.iter().copied().map(DVec3::from));
+        let indices = mesh.indices.as_chunks::<3>().0;
+        faces.extend(indices.iter().map(|face| face.map(|index| first + index as usize)));
+    }
+    Ok(ClosedMesh::new(&vertices, &faces)?)
+}
 
 /// The text of `<name>.obj`; it names `<name>.mtl`.
 pub fn text(mesh: &TexturedMesh) -> String {

@@ -1,18 +1,23 @@
-//! Binary STL of the bare solid, in millimetres.
+//! Binary STL, in millimetres: the bare solid, or its skeleton.
 
-use super::mesh::TexturedMesh;
+use glam::DVec3;
 
-/// The content of `<name>.stl`.
-pub fn to_bytes(mesh: &TexturedMesh) -> Vec<u8> {
-    let mut header = format!("deltille {}, millimetres", mesh.name).into_bytes();
-    header.resize(80, b' ');
-    let mut bytes = header;
-    bytes.extend((mesh.faces.len() as u32).to_le_bytes());
-    for face in &mesh.faces {
-        for v in std::iter::once(face.normal).chain(face.vertices_mm) {
+/// The content of an `.stl` file; triangles counter-clockwise from outside.
+pub fn to_bytes(name: &str, triangles_mm: &[[DVec3; 3]]) -> Vec<u8> {
+    let mut bytes = format!("deltille {name}, millimetres").into_bytes();
+    bytes.resize(80, b' ');
+    bytes.extend((triangles_mm.len() as u32).to_le_bytes());
+    for &[a, b, c] in triangles_mm {
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        for v in [normal, a, b, c] {
             bytes.extend(v.as_vec3().to_array().into_iter().flat_map(f32::to_le_bytes));
         }
         bytes.extend([0, 0]);
     }
     bytes
+}
+
+/// The file name of a skeleton.
+pub fn skeleton_name(name: &str) -> String {
+    format!("{name}-skeleton.stl")
 }

@@ -48,7 +48,7 @@ pub use error::FamilyError;
 pub use export::{ExportFormat, export};
 pub use file::{Construction, SCHEMA};
 pub use rules::{Rules, Screen};
-pub use shipped::shipped_names;
+pub use shipped::{shipped_names, smallest_shipped};
 pub use statistics::{ball, distance_histogram, false_positive_rates};
 pub use tagwords::TagWords;
 

@@ -1,3 +1,5 @@
+use super::Family;
+
 /// Families that come with the crate: file stem and text.
 const SHIPPED: &[(&str, &str)] = &[
     ("d16h5", include_str!("../../families/d16h5.json")),
@@ -16,6 +18,16 @@ const SHIPPED: &[(&str, &str)] = &[
 /// Names of the families that come with the crate.
 pub fn shipped_names() -> Vec<&'static str> {
     SHIPPED.iter().map(|&(name, _)| name).collect()
+}
+
+/// The family that comes with the crate, has at least `needed` codes, corrects at least `corrects`
+/// cells, and is the best of these to print: fewest bits, which makes the largest cells, then the
+/// greatest distance.
+pub fn smallest_shipped(needed: u64, corrects: u32) -> Option<Family> {
+    let families = SHIPPED.iter().filter_map(|&(name, _)| Family::resolve(name).ok());
+    families
+        .filter(|family| family.len() as u64 >= needed && family.correctable() >= corrects)
+        .min_by_key(|f| (f.dimension().bits(), std::cmp::Reverse(f.distance()), f.len()))
 }
 
 pub(super) fn json(name: &str) -> Option<&'static str> {

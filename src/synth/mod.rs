@@ -5,6 +5,7 @@
 //! positions of the corners.
 
 mod corner;
+mod occlusion;
 mod scene;
 mod sheet;
 mod solid;

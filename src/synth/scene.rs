@@ -4,6 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use serde::{Deserialize, Serialize};
 
+use super::occlusion::Shadow;
 use crate::camera::{Camera, Pose};
 use crate::raster::{Coverage, Gray, gaussian};
 
@@ -62,10 +63,11 @@ pub struct Surface {
     pub corners: Vec<(u32, i32, i32, [f64; 2])>,
 }
 
-/// Surfaces of a convex target, seen from their front sides.
+/// Surfaces of solids, seen from their front sides only. They may hide each other, but not cut
+/// through each other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
-    /// The surfaces; none hides another.
+    /// The surfaces; their papers are convex.
     pub surfaces: Vec<Surface>,
 }
 
@@ -100,17 +102,20 @@ impl Scene {
     pub fn render(&self, camera: &Camera, camera_from_target: &Pose, light: &Light) -> Gray<f32> {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let mut coverage = Coverage::new(width, height);
-        for surface in self.seen_from(camera_from_target) {
+        for (surface, shadows) in self.seen_from(camera_from_target) {
             let view =
                 View { camera, camera_from_surface: surface.camera_from(camera_from_target) };
-            if let Some(paper) = view.outline(&surface.paper_mm) {
-                coverage.add(&clockwise(paper, true), light.white - light.background);
-            }
+            let mut add = |outline: &[[f64; 2]], solid: bool, value: f64| {
+                for part in lit(outline, &shadows) {
+                    let Some(part) = view.outline(&part) else { continue };
+                    coverage.add(&clockwise(part, solid), value);
+                }
+            };
+            add(&surface.paper_mm, true, light.white - light.background);
             for area in &surface.black_mm {
                 for (i, outline) in area.iter().enumerate() {
-                    let Some(outline) = view.outline(outline) else { continue };
                     let solid = depth(area, i).is_multiple_of(2);
-                    coverage.add(&clockwise(outline, solid), light.black - light.white);
+                    add(outline, solid, light.black - light.white);
                 }
             }
         }
@@ -134,13 +139,16 @@ impl Scene {
     /// The corners that the camera sees, at least `margin_px` inside the image.
     pub fn truth(&self, camera: &Camera, camera_from_target: &Pose, margin_px: f64) -> Truth {
         let mut truth = Truth::default();
-        for surface in self.seen_from(camera_from_target) {
+        for (surface, shadows) in self.seen_from(camera_from_target) {
             let camera_from_surface = surface.camera_from(camera_from_target);
             // What cannot be projected whole is not drawn either.
             if (View { camera, camera_from_surface }).outline(&surface.paper_mm).is_none() {
                 continue;
             }
             for &(id, row, col, [x, y]) in &surface.corners {
+                if shadows.iter().any(|shadow| shadow.hides([x, y])) {
+                    continue;
+                }
                 let point = DVec3::new(x, y, 0.0);
                 let pixel = camera.project(camera_from_surface.apply(point));
                 let Some([px, py]) = pixel.filter(|&p| camera.sees(p, margin_px)) else { continue };
@@ -152,14 +160,20 @@ impl Scene {
         truth
     }
 
-    /// The surfaces that turn their front to the camera.
-    fn seen_from<'a>(&'a self, camera_from_target: &'a Pose) -> impl Iterator<Item = &'a Surface> {
+    /// The surfaces that turn their front to the camera, with the shadows of the others on them.
+    fn seen_from(&self, camera_from_target: &Pose) -> Vec<(&Surface, Vec<Shadow>)> {
         let eye = camera_from_target.inverse().translation;
-        self.surfaces.iter().filter(move |surface| {
+        let facing = self.surfaces.iter().filter(|surface| {
             let [x, y] = surface.paper_mm.first().copied().unwrap_or_default();
             let on_surface = surface.target_from_surface.apply(DVec3::new(x, y, 0.0));
             (surface.target_from_surface.rotation * DVec3::Z).dot(eye - on_surface) > 0.0
-        })
+        });
+        let facing: Vec<&Surface> = facing.collect();
+        let shadows = |behind: &Surface| {
+            let others = facing.iter().filter(|before| !std::ptr::eq(**before, behind));
+            others.filter_map(|before| Shadow::of(before, behind, eye)).collect()
+        };
+        facing.iter().map(|&surface| (surface, shadows(surface))).collect()
     }
 }
 
@@ -211,6 +225,13 @@ impl View<'_> {
         image.push(seen);
         self.divide([middle, to], [seen, end], divisions - 1, image)
     }
+}
+
+/// The parts of an outline outside all shadows.
+fn lit(outline: &[[f64; 2]], shadows: &[Shadow]) -> Vec<Vec<[f64; 2]>> {
+    shadows.iter().fold(vec![outline.to_vec()], |parts, shadow| {
+        parts.into_iter().flat_map(|part| shadow.cut(part)).collect()
+    })
 }
 
 /// How many of the other outlines of an area enclose outline `i`.

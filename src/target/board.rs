@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use super::capacity::{check_family, wider_spacing};
 use super::{
-    BoardSpec, Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagSpec,
-    TargetError,
+    BoardSpec, Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TargetError,
 };
 use crate::family::Family;
 use crate::lattice::{Tile, Vertex};
@@ -66,11 +66,18 @@ pub(super) fn panels(
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
     spec.check()?;
     let panels = untied_panels(spec);
-    let needed = panels.iter().map(|panel| panel.tags.len()).sum();
-    let instead = "raise --tag-spacing, make fewer or smaller --boards, or take a larger --family";
-    let tags = spec.tags.as_ref();
-    let family = tags.map(|tags| check_family(tags, family, needed, instead)).transpose()?;
-    Ok((panels, family))
+    let Some(tags) = &spec.tags else { return Ok((panels, None)) };
+    let vertices: Vec<Vertex> = zigzag_vertices(spec.rows, spec.cols).collect();
+    let on_each = |spacing| tagged_tiles(&vertices, spacing).len() as u64;
+    let boards = u64::from(spec.boards);
+    let instead = |available: u64| {
+        let wider = wider_spacing(tags, available, |spacing| boards * on_each(spacing));
+        let fewer = available / on_each(tags.spacing).max(1);
+        let fewer = (fewer > 0).then(|| format!("make at most {fewer} --boards"));
+        wider.into_iter().chain(fewer).collect()
+    };
+    let family = check_family(tags, family, boards * on_each(tags.spacing), instead)?;
+    Ok((panels, Some(family)))
 }
 
 /// The panels of a checked spec, whether or not its family has so many tags.
@@ -112,39 +119,12 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
     (0..spec.boards).map(panel).collect()
 }
 
-/// Checks that the family is there and has `needed` codes from the first id on; `instead` says what
-/// else to do where it has not.
-pub(super) fn check_family(
-    tags: &TagSpec,
-    family: Option<&Family>,
-    needed: usize,
-    instead: &'static str,
-) -> Result<FamilyRef, TargetError> {
-    let Some(family) = family else {
-        let given = "and no family was given".to_owned();
-        return Err(TargetError::Family { wanted: tags.family.clone(), given });
-    };
-    let (needed, there) = (needed as u64, family.len() as u64);
-    let last = u64::from(tags.first_id) + needed - 1;
-    if last >= there {
-        return Err(TargetError::IdsRunOut {
-            first: tags.first_id,
-            last,
-            family: family.name().to_owned(),
-            end: there - 1,
-            highest_first: there.checked_sub(needed),
-            instead,
-        });
-    }
-    let (name, fingerprint) = (family.name().to_owned(), family.fingerprint().to_owned());
-    Ok(FamilyRef { name, fingerprint })
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::target::TagSpec;
 
     fn spec(rows: u32, cols: u32, spacing: u32) -> BoardSpec {
         let tags = Some(TagSpec { spacing, ..TagSpec::default() });

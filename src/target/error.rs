@@ -21,9 +21,7 @@ pub enum TargetError {
     },
     /// More tags than codes.
     #[error(
-        "--first-id: tags {first} to {last} are needed, but family {family} ends at {end}: \
-         {}{instead}",
-        match highest_first { Some(id) => format!("lower it to at most {id}, "), None => String::new() }
+        "--first-id: tags {first} to {last} are needed, but family {family} ends at {end}: {instead}"
     )]
     IdsRunOut {
         /// First id needed.
@@ -34,10 +32,8 @@ pub enum TargetError {
         family: String,
         /// Last id that the family has.
         end: u64,
-        /// Highest first id that would do, if any does.
-        highest_first: Option<u64>,
-        /// What else to do.
-        instead: &'static str,
+        /// What would do: a lower first id, fewer tags, a larger family.
+        instead: String,
     },
     /// Targets to be used together share ids.
     #[error("{option}: {what} {first} to {last} overlap those of `{other}`: start at {free}")]

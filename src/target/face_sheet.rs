@@ -71,7 +71,7 @@ pub(super) fn sheets(
 }
 
 /// Numbers of the edges of a face, in the order of its outline.
-pub(super) fn edge_numbers(solid: &Polyhedron, edges: &[[usize; 2]], face: usize) -> [usize; 3] {
+pub(crate) fn edge_numbers(solid: &Polyhedron, edges: &[[usize; 2]], face: usize) -> [usize; 3] {
     let vertices = solid.faces[face];
     [0, 1, 2].map(|i| {
         let (from, to) = (vertices[i], vertices[(i + 1) % 3]);
@@ -98,9 +98,11 @@ fn arrange(
     [left, lower, right, upper]: [f64; 4],
     paper: &PaperSpec,
 ) -> Result<Arrangement, TargetError> {
+    // The marks keep their size when the face shrinks.
+    let marks = 2.0 * MARK_MM[1];
     let footprint = |shrink: f64| Footprint {
-        width: (right - left) - spec.edge_mm * shrink,
-        height: (upper - lower) - spec.edge_mm * shrink * 0.75f64.sqrt(),
+        width: (right - left) - (right - left - marks) * shrink,
+        height: (upper - lower) - (upper - lower - marks) * shrink,
         edge_blank: paper.margin_mm,
         mark_blank: MARK_BLANK_MM,
     };
@@ -197,7 +199,7 @@ fn inner_number(
 }
 
 /// A text along the middle of an edge, its base line `inwards` from it.
-fn edge_text(
+pub(crate) fn edge_text(
     placement: &Placement,
     [a, b]: [[f64; 2]; 2],
     text: String,

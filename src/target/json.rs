@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BoardSpec, Corner, FamilyRef, GridKind, Panel, SheetLayout, TagPlacement, Target, TargetSpec,
-    board,
+    Corner, FamilyRef, GridKind, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board,
+    solid, tag_sheet,
 };
 use crate::lattice::Vertex;
 
@@ -139,9 +139,7 @@ pub(crate) fn check(target: &Target) -> Result<(), Problem> {
             return problem("family", "there are tags, so there must be a family");
         }
     }
-    if let TargetSpec::Board(spec) = &target.spec {
-        check_against_spec(target, spec)?;
-    }
+    check_against_spec(target)?;
     for (s, sheet) in target.sheets.iter().enumerate() {
         check_sheet(sheet, &format!("sheets[{s}]"))?;
         for (p, page) in sheet.pages.iter().enumerate() {
@@ -187,18 +185,23 @@ fn check_sheet(sheet: &SheetLayout, field: &str) -> Result<(), Problem> {
 
 /// Compares the panels with those that the spec makes: a file in which one of them was changed
 /// contradicts itself. Poses and measured positions may differ.
-fn check_against_spec(target: &Target, spec: &BoardSpec) -> Result<(), Problem> {
-    if let Err(error) = spec.check() {
-        return problem("spec", error.to_string());
-    }
-    let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
-        problem(field, format!("it is {found}, but the board of `spec` has {made}"))
+fn check_against_spec(target: &Target) -> Result<(), Problem> {
+    let (made, tagged) = match &target.spec {
+        TargetSpec::Board(spec) => {
+            (spec.check().map(|()| board::untied_panels(spec)), spec.tags.is_some())
+        }
+        TargetSpec::Solid(spec) => (solid::untied_panels(spec), true),
+        TargetSpec::Tags(spec) => (Ok(tag_sheet::panels(spec)), true),
+        TargetSpec::Listed(_) => return Ok(()),
     };
-    let made = board::untied_panels(spec);
+    let made = made.or_else(|error| problem("spec", error.to_string()))?;
+    let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
+        problem(field, format!("it is {found}, but that of `spec` has {made}"))
+    };
     if target.panels.len() != made.len() {
         return differs("panels.length".to_owned(), &target.panels.len(), &made.len());
     }
-    if target.family.is_some() != spec.tags.is_some() {
+    if target.family.is_some() != tagged {
         return problem("family", "it must be there if, and only if, `spec.tags` is");
     }
     for (p, (panel, made)) in target.panels.iter().zip(&made).enumerate() {
@@ -217,7 +220,7 @@ fn check_against_spec(target: &Target, spec: &BoardSpec) -> Result<(), Problem> 
             ("matrix", panel.matrix == made.matrix),
         ];
         if let Some((key, _)) = plain.iter().find(|(_, same)| !same) {
-            return problem(field(key), "it is not that of the board of `spec`");
+            return problem(field(key), "it is not that of `spec`");
         }
         if panel.corners.len() != made.corners.len() {
             let (found, made) = (panel.corners.len(), made.corners.len());
@@ -323,7 +326,7 @@ mod tests {
 
     use super::*;
     use crate::family::Family;
-    use crate::target::{PaperSpec, TagSpec};
+    use crate::target::{BoardSpec, PaperSpec, TagSpec};
 
     fn board(rows: u32, cols: u32, edge_mm: f64, tagged: bool, boards: u32) -> Target {
         let tags = tagged.then(TagSpec::default);

@@ -9,6 +9,8 @@
 
 mod board;
 mod build;
+mod capacity;
+mod closed_mesh;
 mod error;
 mod face_sheet;
 pub(crate) mod json;
@@ -19,6 +21,7 @@ mod panel;
 mod paper;
 mod polyhedron;
 mod pose;
+mod skeleton;
 mod solid;
 mod spec;
 mod tag_sheet;
@@ -27,13 +30,17 @@ use serde::{Deserialize, Serialize};
 
 pub use board::zigzag_vertices;
 pub use build::largest_edge_mm;
+pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
 pub use error::TargetError;
+pub(crate) use face_sheet::{edge_numbers, edge_text};
 pub use json::{SCHEMA, TargetFileError};
 pub use layout::CHECK_BAR_STROKE_MM;
 pub(crate) use layout::id_range;
 pub use length::{LengthError, parse_length_mm};
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
 pub use polyhedron::{Face, Polyhedron};
+pub(crate) use skeleton::Incircle;
+pub use skeleton::{Skeleton, SkeletonSpec};
 pub(crate) use spec::{BORDER_BITS, MOST_ROWS, SIDES};
 pub use spec::{
     BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSheetSpec, TagSpec, TargetSpec,

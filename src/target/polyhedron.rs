@@ -5,7 +5,8 @@ use glam::{DMat3, DVec2, DVec3};
 use super::PanelPose;
 use crate::lattice::ROW_HEIGHT;
 
-/// A closed solid of triangles, its centre in the origin, mm; right-handed.
+/// A closed solid of triangles, mm; right-handed. Regular solids have their centre in the origin,
+/// meshes keep the origin of their file.
 ///
 /// A face lists its vertices counter-clockwise as seen from outside. The first two are the ends of
 /// its lower edge, the third is its apex: printed on the face, x runs along the lower edge, y
@@ -90,12 +91,18 @@ impl Polyhedron {
         self.faces[face].map(|vertex| self.vertices_mm[vertex])
     }
 
+    /// All faces, mm, counter-clockwise from outside.
+    pub fn triangles_mm(&self) -> Vec<[DVec3; 3]> {
+        (0..self.faces.len()).map(|face| self.triangle_mm(face)).collect()
+    }
+
     /// A face with the largest board of `tiles` tiles a side that leaves a margin; `None` where
     /// the margin takes all of it.
     ///
-    /// With its centre on the incentre of the face (inradius r), a vertex of the board of side S
-    /// lies S/√3 away in direction d, and keeps the margin m from the edge with inward normal n
-    /// when r + S/√3 d·n ≥ m.
+    /// The board is equilateral whatever the face is, and its lower side is parallel to that of
+    /// the face. With its centre on the incentre of the face (inradius r), a vertex of the board
+    /// of side S lies S/√3 away in direction d, and keeps the margin m from the edge with inward
+    /// normal n when r + S/√3 d·n ≥ m.
     pub fn face(&self, face: usize, tiles: u32, margin_mm: f64) -> Option<Face> {
         let corners = self.triangle_mm(face);
         let [a, b, c] = corners;

@@ -1,6 +1,7 @@
 //! Solids with a board of tiles on each face.
 
-use super::board::{check_family, tagged_tiles};
+use super::board::tagged_tiles;
+use super::capacity::{check_family, wider_spacing};
 use super::length::format_mm;
 use super::polyhedron::{Face, Polyhedron};
 use super::{
@@ -12,10 +13,15 @@ use crate::lattice::Vertex;
 impl SolidSpec {
     /// The solid.
     pub fn polyhedron(&self) -> Polyhedron {
-        match self.shape {
+        match &self.shape {
             SolidShape::Tetrahedron => Polyhedron::tetrahedron(self.edge_mm),
             SolidShape::Octahedron => Polyhedron::octahedron(self.edge_mm),
             SolidShape::Icosahedron => Polyhedron::icosahedron(self.edge_mm),
+            SolidShape::Mesh(mesh) => {
+                let scale = self.edge_mm / mesh.mean_edge();
+                let vertices_mm = mesh.vertices().iter().map(|&v| v * scale).collect();
+                Polyhedron { vertices_mm, faces: mesh.faces().to_vec() }
+            }
         }
     }
 
@@ -29,14 +35,28 @@ impl SolidSpec {
                 solid
                     .face(index, self.tiles, self.margin_mm)
                     .filter(|face| face.tile_edge_mm >= Self::FINEST_TILE_MM)
-                    .ok_or_else(|| self.too_fine())
+                    .ok_or_else(|| self.too_fine(&solid))
             })
             .collect()
     }
 
-    fn too_fine(&self) -> TargetError {
-        let tiles = f64::from(self.tiles) * Self::FINEST_TILE_MM;
-        let least = (tiles + 2.0 * 3f64.sqrt() * self.margin_mm).ceil();
+    /// Refuses faces without room for their tiles; says with which edge all have it.
+    ///
+    /// Tiles of a bare face grow with the face's edge; a margin takes the same from faces of all
+    /// sizes. So tiles of edge t within a margin need a face (t + taken) / bare times as large.
+    fn too_fine(&self, solid: &Polyhedron) -> TargetError {
+        let edge_of = |margin_mm: f64| {
+            (0..solid.faces.len())
+                .filter_map(move |face| solid.face(face, self.tiles, margin_mm))
+                .map(|face| face.tile_edge_mm)
+        };
+        // What a margin takes is in proportion to it; any face has room for this one.
+        let small = 1e-6 * self.edge_mm;
+        let needed = edge_of(0.0).zip(edge_of(small)).map(|(bare, less)| {
+            let taken = (bare - less) / small * self.margin_mm;
+            (Self::FINEST_TILE_MM + taken) / bare * self.edge_mm
+        });
+        let least = needed.fold(Self::LEAST_EDGE_MM, f64::max).ceil();
         let problem = format!(
             "{} leaves no room for {} tiles of at least {} a side within margins of {}: take an \
              --edge of at least {least} mm, fewer --tiles, or a smaller --face-margin",
@@ -68,11 +88,28 @@ pub(super) fn panels(
     spec: &SolidSpec,
     family: Option<&Family>,
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
+    let panels = untied_panels(spec)?;
+    let faces = panels.len() as u64;
+    let needed =
+        |tiles, spacing| faces * tagged_tiles(&triangle_vertices(tiles), spacing).len() as u64;
+    let instead = |available: u64| {
+        let wider = wider_spacing(&spec.tags, available, |spacing| needed(spec.tiles, spacing));
+        let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)
+            .rev()
+            .find(|&tiles| needed(tiles, spec.tags.spacing) <= available)
+            .map(|tiles| format!("take at most {tiles} --tiles"));
+        wider.into_iter().chain(fewer).collect()
+    };
+    let tags = needed(spec.tiles, spec.tags.spacing);
+    let family = check_family(&spec.tags, family, tags, instead)?;
+    Ok((panels, Some(family)))
+}
+
+/// The panels of a checked spec, whether or not its family has so many tags.
+pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError> {
     let faces = spec.faces()?;
     let vertices = triangle_vertices(spec.tiles);
     let tiles = tagged_tiles(&vertices, spec.tags.spacing);
-    let instead = "raise --tag-spacing, take fewer --tiles, or a larger --family";
-    let family = check_family(&spec.tags, family, faces.len() * tiles.len(), instead)?;
     let panel = |(index, face): (u32, &Face)| Panel {
         id: spec.board_id + index,
         kind: GridKind::Deltille,
@@ -93,11 +130,16 @@ pub(super) fn panels(
             .collect(),
         tags: tiles
             .iter()
-            .zip(spec.tags.first_id + index * tiles.len() as u32..)
-            .map(|(tile, id)| TagPlacement { id, row: tile.row, col: tile.col })
+            .zip(index * tiles.len() as u32..)
+            // No family has so many codes that ids overflow; a spec may ask for them.
+            .map(|(tile, id)| TagPlacement {
+                id: spec.tags.first_id.saturating_add(id),
+                row: tile.row,
+                col: tile.col,
+            })
             .collect(),
     };
-    Ok(((0..).zip(&faces).map(panel).collect(), Some(family)))
+    Ok((0..).zip(&faces).map(panel).collect())
 }
 
 #[cfg(test)]
@@ -137,7 +179,14 @@ mod tests {
         assert!(said.contains("lower it to at most 143"), "{said}");
         spec.tags.family = "delTag16h5".to_owned();
         let said = build(&spec).unwrap_err().to_string();
-        assert!(said.contains("larger --family") && said.contains("--tiles"), "{said}");
+        // Twenty faces with a tag each are more than are left of the family.
+        assert!(said.contains("take --family d25h7 with its"), "{said}");
+        spec.tags.first_id = 0;
+        let said = build(&spec).unwrap_err().to_string();
+        assert!(
+            said.contains("raise --tag-spacing to at least 10, or take at most 6 --tiles"),
+            "{said}"
+        );
         let small = SolidSpec { edge_mm: 20.0, ..SolidSpec::new(SolidShape::Icosahedron) };
         let said = build(&small).unwrap_err().to_string();
         assert!(said.contains("an --edge of at least "), "{said}");

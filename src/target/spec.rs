@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
-use super::TargetError;
 use super::length::format_mm;
+use super::{ClosedMesh, SkeletonSpec, TargetError};
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
 /// anybody prints, and few enough that no number overflows.
@@ -108,7 +108,7 @@ pub struct TagSheetSpec {
 pub struct SolidSpec {
     /// Which solid.
     pub shape: SolidShape,
-    /// Length of the solid's edges, mm.
+    /// Length of the solid's edges, mm; on a mesh their mean, to which it is scaled.
     pub edge_mm: f64,
     /// Black tiles along each side of a face.
     pub tiles: u32,
@@ -118,9 +118,12 @@ pub struct SolidSpec {
     pub board_id: u32,
     /// Tags: faces could not be told apart without.
     pub tags: TagSpec,
+    /// A frame that holds the faces as panels, if one is to be printed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skeleton: Option<SkeletonSpec>,
 }
 
-/// The solids; see [`Polyhedron`](super::Polyhedron) for the order of their faces.
+/// The solids; see [`Polyhedron`](super::Polyhedron) for the order of the faces of regular ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SolidShape {
@@ -130,6 +133,8 @@ pub enum SolidShape {
     Octahedron,
     /// Twenty faces.
     Icosahedron,
+    /// Any other, by its triangles.
+    Mesh(ClosedMesh),
 }
 
 /// Where a listed target comes from.
@@ -166,6 +171,7 @@ impl SolidShape {
             Self::Tetrahedron => "tetrahedron",
             Self::Octahedron => "octahedron",
             Self::Icosahedron => "icosahedron",
+            Self::Mesh(_) => "mesh",
         }
     }
 }
@@ -174,21 +180,41 @@ impl SolidSpec {
     /// Shortest edge, mm.
     pub const LEAST_EDGE_MM: f64 = *SOLID_EDGE_MM.start();
 
+    /// Fewest tiles along a side of a face.
+    pub(crate) const FEWEST_TILES: u32 = *FACE_TILES.start();
+
     /// Finest edge of a tile, mm: what [`BoardSpec`] allows.
     pub const FINEST_TILE_MM: f64 = *EDGE_MM.start();
 
-    /// A solid of 150 mm edges, ten tiles a side (the tags of a face then lie symmetrically) and
-    /// 5 mm of blank along its edges, which leaves room to fold and glue.
+    /// A solid of 150 mm edges, or a mesh in its own size, with ten tiles a side (the tags of a
+    /// face then lie symmetrically) and 5 mm of blank along its edges, which leaves room to fold
+    /// and glue.
     pub fn new(shape: SolidShape) -> Self {
         let tags = TagSpec::default();
-        Self { shape, edge_mm: 150.0, tiles: 10, margin_mm: 5.0, board_id: 0, tags }
+        let edge_mm = match &shape {
+            SolidShape::Mesh(mesh) => mesh.mean_edge(),
+            _ => 150.0,
+        };
+        Self { shape, edge_mm, tiles: 10, margin_mm: 5.0, board_id: 0, tags, skeleton: None }
     }
 
     /// Checks every number by itself.
     pub(super) fn check(&self) -> Result<(), TargetError> {
         if !SOLID_EDGE_MM.contains(&self.edge_mm) {
-            let problem = format!("{} is not between 10 mm and 5000 mm", format_mm(self.edge_mm));
+            let edge = format_mm(self.edge_mm);
+            let problem = match &self.shape {
+                SolidShape::Mesh(_) => {
+                    format!("the mean is {edge}, not between 10 mm and 5000 mm: is --scale right?")
+                }
+                _ => format!("{edge} is not between 10 mm and 5000 mm"),
+            };
             return Err(TargetError::invalid("--edge", problem));
+        }
+        if let SolidShape::Mesh(mesh) = &self.shape
+            && mesh.faces().len() > MOST_FACES as usize
+        {
+            let problem = format!("{} faces are more than {MOST_FACES}", mesh.faces().len());
+            return Err(TargetError::invalid("--mesh", problem));
         }
         if !FACE_TILES.contains(&self.tiles) {
             let problem = format!("{} is not between 6 and 200", self.tiles);

@@ -73,8 +73,7 @@ pub(super) fn parts(
     check(spec, family)?;
     let family_ref =
         FamilyRef { name: family.name().to_owned(), fingerprint: family.fingerprint().to_owned() };
-    let mut panels: Vec<Panel> = spec.ids.iter().map(|&id| panel(spec, id)).collect();
-    panels.sort_by_key(|panel| panel.id);
+    let panels = panels(spec);
     let Some(paper) = paper else { return Ok((panels, family_ref, Vec::new())) };
 
     let blanks = Blanks::new(spec.edge_mm, spec, family);
@@ -86,6 +85,13 @@ pub(super) fn parts(
         page(&blanks, grid, &arrangement, ids, words)
     });
     Ok((panels, family_ref, sheets.collect()))
+}
+
+/// A panel for each tag, by their ids.
+pub(super) fn panels(spec: &TagSheetSpec) -> Vec<Panel> {
+    let mut panels: Vec<Panel> = spec.ids.iter().map(|&id| panel(spec, id)).collect();
+    panels.sort_by_key(|panel| panel.id);
+    panels
 }
 
 fn check(spec: &TagSheetSpec, family: &Family) -> Result<(), TargetError> {

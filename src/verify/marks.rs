@@ -84,7 +84,7 @@ pub(super) fn check(
         }
     }
     window.into_iter().for_each(|window| cover(pixels(page, window, WINDOW_BLANK_PX)));
-    spots(page, &known, panels, verdict);
+    verdict.findings.extend(spots(page, &known, panels));
 }
 
 /// Whether a line is there: ink along its strokes, and none between them.
@@ -234,7 +234,7 @@ impl Words {
 }
 
 /// Names each connected spot of wrong pixels outside the tiles and the `known` marks.
-fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel], verdict: &mut SheetVerdict) {
+pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<Finding> {
     let (width, height) = (page.image.width(), page.image.height());
     let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
     let mut wrong = vec![false; width * height];
@@ -253,6 +253,7 @@ fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel], verdict: &mut Shee
                     .is_some_and(|expected| (ink - expected).abs() > MAX_INK_ERROR);
         }
     });
+    let mut spots = Vec::new();
     for start in 0..wrong.len() {
         if !std::mem::take(&mut wrong[start]) {
             continue;
@@ -271,8 +272,9 @@ fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel], verdict: &mut Shee
             }
         }
         let at_mm = page.page_from_px(moment.map(|m| m / count));
-        verdict.findings.push(Finding::Spot { at_mm, area_mm2: count / page.px_per_mm.powi(2) });
+        spots.push(Finding::Spot { at_mm, area_mm2: count / page.px_per_mm.powi(2) });
     }
+    spots
 }
 
 /// The area of a panel on its page.

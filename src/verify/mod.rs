@@ -22,7 +22,9 @@
 //!
 //! A mesh (`.glb`, `.obj`) is loaded, its texture included, and looked at by a camera before each
 //! face; every corner is followed along its ray onto the loaded triangles and must lie within
-//! [`MESH_TOLERANCE_MM`] of its stated position in space.
+//! [`MESH_TOLERANCE_MM`] of its stated position in space. The texture on each face is then laid out
+//! flat and compared like a sheet: every tile, every cell of every tag, and no other mark. A body
+//! to print (`.stl`) must be closed, outside out, and of the stated shape.
 //!
 //! Limits: words and stray ink are compared only where the boards lie as stated and are recognised;
 //! dirt within a few pixels of a word or a bar counts to it.
@@ -30,7 +32,9 @@
 mod assemble;
 mod bars;
 mod board;
+mod body;
 mod document;
+mod face_page;
 mod fit;
 mod fold;
 mod marks;
@@ -53,7 +57,7 @@ use tiles::PlacedPanel;
 pub use document::{Document, DocumentError, Format, Page};
 pub use fold::FOLD_TOLERANCE_MM;
 pub use solid::MESH_TOLERANCE_MM;
-pub use verdict::{FaceVerdict, Finding, FoldVerdict, SheetVerdict, Verdict};
+pub use verdict::{BodyVerdict, FaceVerdict, Finding, FoldVerdict, SheetVerdict, Verdict};
 
 /// Largest deviation of a position or a length, mm: a fifth of what a good printer adds.
 pub const TOLERANCE_MM: f64 = 0.02;
@@ -142,8 +146,10 @@ impl<'a> Verifier<'a> {
     /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
     /// that its name tells; for a page of a net all files of [`set_of`](Self::set_of) are read.
     pub fn verify(&self, path: &Path) -> Result<Verdict, VerifyError> {
-        if let Some(format) = Format::of_mesh(path) {
-            return Ok(solid::verify(self, path, format)?);
+        match Format::of_mesh(path) {
+            Some(Format::Stl) => return Ok(body::verify(self, path)?),
+            Some(format) => return Ok(solid::verify(self, path, format)?),
+            None => {}
         }
         if self.target.sheets.is_empty() {
             return Err(VerifyError::NoSheets(self.target.name.clone()));
@@ -205,6 +211,7 @@ impl<'a> Verifier<'a> {
             findings,
             sheets: verdicts,
             faces: Vec::new(),
+            body: None,
         })
     }
 

@@ -3,10 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::face_page::face_page;
+use super::fit::AffineMap;
+use super::marks::spots;
 use super::model::{self, Model, View};
+use super::tiles::PlacedPanel;
 use super::{DocumentError, FaceVerdict, Finding, Format, Verdict, Verifier};
 use crate::camera::{Camera, Pose};
 use crate::detect::Detection;
@@ -67,10 +71,11 @@ pub(super) fn verify(
     }
     let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let passed = findings.is_empty() && faces.iter().all(|face| face.findings.is_empty());
-    Ok(Verdict { artifact, format, passed, findings, sheets: Vec::new(), faces })
+    Ok(Verdict { artifact, format, passed, findings, sheets: Vec::new(), faces, body: None })
 }
 
-/// Circumradius of the mesh over that of the target's solid, and the latter, mm.
+/// Largest distance from the origin on the mesh over that on the target's solid, and the latter,
+/// mm.
 fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
     let TargetSpec::Solid(spec) = &verifier.target.spec else { return None };
     let radius = |lengths: &mut dyn Iterator<Item = f64>| lengths.fold(0.0, f64::max);
@@ -80,8 +85,9 @@ fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
     Some((found / stated, stated))
 }
 
-/// A camera before a face, from where the target says that it is.
-fn view(verifier: &Verifier, panel: &Panel) -> (View, f64) {
+/// A camera before a face, from where the target says that it is; on one side of it from where
+/// nothing hides the face, if there is one.
+fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
     let corners = || panel.corners.iter().map(|c| DVec3::from(c.target_mm));
     let centre = corners().sum::<DVec3>() / panel.corners.len() as f64;
     let radius = corners().map(|c| c.distance(centre)).fold(0.0, f64::max) + 2.0 * panel.edge_mm;
@@ -90,15 +96,30 @@ fn view(verifier: &Verifier, panel: &Panel) -> (View, f64) {
     let px_per_mm = (CELL_PX / cell_mm).min(MAX_SIDE_PX / (2.0 * radius));
     let r = panel.pose.rotation;
     let [x, y, z] = [0, 1, 2].map(|i| DVec3::new(r[i], r[3 + i], r[6 + i]));
-    let eye = centre + radius * (DISTANCE * z + ASIDE * x);
     let side = (2.0 * radius * px_per_mm).ceil().max(64.0) as u32;
-    let mut camera = Camera::pinhole(side, side, 1.0);
-    camera.focal_px = [px_per_mm * eye.distance(centre); 2];
-    (View { camera, camera_from_target: Pose::looking_at(eye, centre, y) }, px_per_mm)
+    let from = |aside: DVec3| {
+        let eye = centre + radius * (DISTANCE * z + ASIDE * aside);
+        let mut camera = Camera::pinhole(side, side, 1.0);
+        camera.focal_px = [px_per_mm * eye.distance(centre); 2];
+        View { camera, camera_from_target: Pose::looking_at(eye, centre, y) }
+    };
+    let open = |view: &View| {
+        panel.corners.iter().map(|c| DVec3::from(c.target_mm)).all(|corner| {
+            let pixel = view.camera.project(view.camera_from_target.apply(corner));
+            let met = pixel.and_then(|pixel| view.meet(model, pixel));
+            met.is_some_and(|met| met.distance(corner) < GRAZING_TOLERANCE_MM)
+        })
+    };
+    let first = from(x);
+    if open(&first) {
+        return (first, px_per_mm);
+    }
+    let others = [y, -x, -y, DVec3::ZERO].map(from);
+    (others.into_iter().find(open).unwrap_or(first), px_per_mm)
 }
 
 fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict {
-    let (view, px_per_mm) = view(verifier, panel);
+    let (view, px_per_mm) = view(verifier, model, panel);
     let image = view.render(model);
     let detection = verifier.detector.detect(&image, "face");
     let mut verdict = FaceVerdict {
@@ -120,6 +141,15 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
         return verdict;
     }
     check_corners(verifier, model, panel, &view, &detection, &mut verdict);
+    if verdict.findings.iter().any(|finding| matches!(finding, Finding::CornerOff3d { .. })) {
+        // What else is wrong follows from that.
+        return verdict;
+    }
+    check_print(verifier, model, panel, px_per_mm, &mut verdict);
+    if !verdict.findings.is_empty() {
+        return verdict;
+    }
+    verdict.tags_exact = 0;
     let own = || detection.grids.iter().filter(|grid| grid.panel == Some(panel.id));
     for tag in &panel.tags {
         let same = |found: &&crate::detect::DecodedTag| {
@@ -134,6 +164,52 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
         }
     }
     verdict
+}
+
+/// Compares the texture on the face, tile by tile and cell by cell, and looks for other marks.
+fn check_print(
+    verifier: &Verifier,
+    model: &Model,
+    panel: &Panel,
+    px_per_mm: f64,
+    verdict: &mut FaceVerdict,
+) {
+    let area_mm = verifier.face_area_mm(panel);
+    let (page, placement) = face_page(model, panel, area_mm, px_per_mm);
+    let found_from_stated = AffineMap::IDENTITY;
+    let placed = PlacedPanel { page: &page, panel, placement: &placement, found_from_stated };
+    let report = placed.check_tiles(verifier.family);
+    verdict.tags_exact = report.tags_exact;
+    let known = vec![false; page.image.pixels().len()];
+    let marks = spots(&page, &known, &[placed]);
+    let on_panel = |[x, y]: [f64; 2]| [x + area_mm[0], y + area_mm[1]];
+    verdict.findings.extend(report.findings.into_iter().chain(marks).map(
+        |finding| match finding {
+            Finding::Blemish { row, col, at_mm, area_mm2 } => {
+                Finding::Blemish { row, col, at_mm: on_panel(at_mm), area_mm2 }
+            }
+            Finding::Spot { at_mm, area_mm2 } => Finding::Spot { at_mm: on_panel(at_mm), area_mm2 },
+            other => other,
+        },
+    ));
+}
+
+impl Verifier<'_> {
+    /// The part of a panel's plane that its face takes: left, lower, right, upper end, mm.
+    fn face_area_mm(&self, panel: &Panel) -> [f64; 4] {
+        let TargetSpec::Solid(spec) = &self.target.spec else { return panel.bounds_mm() };
+        let solid = spec.polyhedron();
+        let index = self.target.panels.iter().position(|p| p.id == panel.id);
+        let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
+            return panel.bounds_mm();
+        };
+        let panel_from_target = DMat3::from_cols_array(&panel.pose.rotation);
+        let origin = DVec3::from(panel.pose.translation_mm);
+        let flat = solid.triangle_mm(index).map(|v| panel_from_target * (v - origin));
+        let [a, b, c] = flat.map(DVec3::truncate);
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        [low.x, low.y, high.x, high.y]
+    }
 }
 
 /// Follows every labelled corner back onto the mesh; neighbouring faces in the picture must be

@@ -22,6 +22,22 @@ pub struct Verdict {
     /// The faces of a mesh.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faces: Vec<FaceVerdict>,
+    /// A body to print.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<BodyVerdict>,
+}
+
+/// What was found of a body to print.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BodyVerdict {
+    /// Triangles of its surface.
+    pub triangles: usize,
+    /// Volume, mm³.
+    pub volume_mm3: f64,
+    /// Seats of a skeleton that have their depth and outline.
+    pub seats: usize,
+    /// Largest distance of a vertex, or of the floor of a seat, from its stated position, mm.
+    pub max_deviation_mm: f64,
 }
 
 /// What was found on one face of a mesh.
@@ -317,6 +333,11 @@ pub enum Finding {
         /// Found minus stated position in the target frame.
         by_mm: [f64; 3],
     },
+    /// The surface of a body is not the stated one.
+    Body {
+        /// In which way.
+        problem: String,
+    },
     /// Triangles of a mesh whose normals are not theirs.
     Normals {
         /// How many.
@@ -526,6 +547,7 @@ impl fmt::Display for Finding {
                 let [x, y, z] = by_mm.map(micrometres);
                 write!(f, "corner {id} at row {row} col {col} off by ({x:.3}, {y:.3}, {z:.3}) mm")
             }
+            Self::Body { problem } => write!(f, "{problem}"),
             Self::Normals { triangles } => write!(f, "{triangles} triangles with wrong normals"),
             Self::TagInexact { id, row, col, errors: None } => {
                 write!(f, "tag {id} at row {row} col {col} not read")
@@ -581,6 +603,15 @@ impl fmt::Display for Verdict {
     /// One line: what was proved, or what is wrong.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.artifact)?;
+        if let Some(body) = self.body.as_ref().filter(|_| self.passed) {
+            let BodyVerdict { triangles, volume_mm3, seats, max_deviation_mm } = body;
+            write!(f, "verified, closed body of {triangles} triangles, ")?;
+            write!(f, "{:.1} cm³, ", volume_mm3 / 1e3)?;
+            return match seats {
+                0 => write!(f, "vertices within {max_deviation_mm:.4} mm"),
+                _ => write!(f, "{seats} seats within {max_deviation_mm:.4} mm"),
+            };
+        }
         if self.passed && !self.faces.is_empty() {
             let sum =
                 |count: fn(&FaceVerdict) -> usize| self.faces.iter().map(count).sum::<usize>();

@@ -1,12 +1,11 @@
 //! `deltag plan`.
 
-use std::cmp::Reverse;
 use std::process::ExitCode;
 
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
 use super::values::whole;
 use crate::cli::output::say;
-use crate::family::{Family, shipped_names};
+use crate::family::{Family, shipped_names, smallest_shipped};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -26,17 +25,14 @@ pub(super) struct Args {
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let needed = u64::from(args.faces) * u64::from(args.tags_per_face);
-    let mut families: Vec<Family> =
-        shipped_names().into_iter().map(Family::resolve).collect::<Result<_, _>>()?;
+    let families = shipped_names().into_iter().map(Family::resolve);
+    let mut families: Vec<Family> = families.collect::<Result<_, _>>()?;
     families.retain(|family| family.correctable() >= args.corrects);
     let largest = families.iter().max_by_key(|f| f.len());
     let Some(largest) = largest else {
         anyhow::bail!("--corrects {}: no shipped family corrects so many cells", args.corrects);
     };
-    // Fewest bits give the largest cells; among these the greatest distance is the safest.
-    let order = |f: &&Family| (f.dimension().bits(), Reverse(f.distance()), f.len());
-    let suffice = || families.iter().filter(|f| f.len() as u64 >= needed);
-    let Some(best) = suffice().min_by_key(order) else {
+    let Some(best) = smallest_shipped(needed, args.corrects) else {
         let (name, len) = (largest.name(), largest.len());
         let listed = FILE_LIMIT / bytes_per_code(largest.dimension());
         let instead = if largest.dimension().bits() == 49 && needed <= listed / 2 {
@@ -53,11 +49,10 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
              --faces or --tags-per-face{corrects}"
         );
     };
-    say!("{} x {} = {needed} tags: {}", args.faces, args.tags_per_face, about(best));
+    say!("{} x {} = {needed} tags: {}", args.faces, args.tags_per_face, about(&best));
     // What more bits would buy.
-    let more = suffice().filter(|f| f.correctable() > best.correctable()).min_by_key(order);
-    if let Some(more) = more {
-        say!("to correct more, with smaller cells: {}", about(more));
+    if let Some(more) = smallest_shipped(needed, best.correctable() + 1) {
+        say!("to correct more, with smaller cells: {}", about(&more));
     }
     Ok(ExitCode::SUCCESS)
 }

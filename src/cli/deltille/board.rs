@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use super::files::{File, Formats, drawn, text_file, write_all};
+use super::delivery::Delivery;
+use super::files::{File, Formats, drawn, text_file};
 use super::settings::{Plan, Settings};
-use super::{target_file, verify};
 use crate::artwork::{self, Artwork};
 use crate::export::{atomic, dsc};
 use crate::family::Family;
@@ -24,16 +24,8 @@ pub struct Args {
     /// Write the settings as a TOML file
     #[arg(long, value_name = "FILE")]
     save_template: Option<PathBuf>,
-    /// Description of another target to be used together with this one: ids that both have are
-    /// refused; may be repeated
-    #[arg(long, value_name = "FILE")]
-    with: Vec<PathBuf>,
-    /// Folder to write to
-    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
-    output: PathBuf,
-    /// Do not read the written files back to compare them with the description
-    #[arg(long)]
-    no_verify: bool,
+    #[command(flatten)]
+    delivery: Delivery,
 }
 
 /// Makes a board, writes its files, and verifies what it wrote.
@@ -47,26 +39,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = family.context("--family")?;
     let spec = TargetSpec::Board(plan.spec.clone());
     let target = Target::build(&plan.name, &spec, family.as_ref(), Some(&plan.paper))?;
-    for path in &args.with {
-        let other = target_file::read(path).context("--with")?;
-        target.check_beside(&other)?;
-    }
+    args.delivery.check_beside(&target)?;
     let files = files(&plan, &target, artwork::draw(&target, family.as_ref())?)?;
-    let written = write_all(&args.output, &files)?;
+    let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &summary(&target))?;
     if let Some(path) = &args.save_template {
         let template = settings.with_edge(plan.spec.edge_mm).to_toml();
         atomic::write(path, |out| out.write_all(template.as_bytes()))?;
     }
-    println!("{}", summary(&target));
-    for path in &written {
-        println!("wrote {}", path.display());
-    }
-    if args.no_verify {
-        return Ok(ExitCode::SUCCESS);
-    }
-    let drawn = |path: &PathBuf| path.extension().is_some_and(|e| e != "json" && e != "dsc");
-    let artifacts: Vec<PathBuf> = written.into_iter().filter(drawn).collect();
-    verify::verify(&target, family.as_ref(), &artifacts, None)
+    Ok(delivered)
 }
 
 /// The files of a plan. What can be refused is refused here, before anything is written.

@@ -2,6 +2,7 @@
 
 mod bench;
 mod board;
+mod delivery;
 mod detect;
 mod experiment;
 pub(in crate::cli) mod files;
@@ -38,6 +39,8 @@ enum Command {
     Octahedron(Box<solid::Args>),
     /// Make an icosahedron
     Icosahedron(Box<solid::Args>),
+    /// Make a solid of any closed mesh of equilateral or nearly equilateral triangles
+    Solid(Box<solid::MeshArgs>),
     /// Find a target, or untagged boards, in photographs
     Detect(detect::Args),
     /// Time the stages of detection on this machine
@@ -60,6 +63,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),
         Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),
         Command::Icosahedron(args) => solid::run(SolidShape::Icosahedron, *args),
+        Command::Solid(args) => solid::run_mesh(*args),
         Command::Detect(args) => detect::run(args),
         Command::Experiment(args) => experiment::run(args),
         Command::Refine(args) => refine::run(args),

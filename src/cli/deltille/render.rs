@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 use glam::{DMat3, DQuat, DVec3};
+use image::{DynamicImage, ImageBuffer, Luma};
 use serde::Serialize;
 
 use super::target_file;
@@ -72,6 +73,9 @@ pub struct Args {
     /// Seed of the noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Bits of a pixel: 8 or 16
+    #[arg(long, default_value_t = 8, value_parser = depth)]
+    bits: u8,
     /// Family file, where the target names a family that is not shipped
     #[arg(long)]
     family: Option<String>,
@@ -148,8 +152,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         seed: light.seed,
         corners: seen,
     };
-    let pixels = image.pixels().iter().map(|v| (v * 255.0 + 0.5) as u8).collect();
-    let picture = image::GrayImage::from_raw(camera.width, camera.height, pixels);
+    let picture = match args.bits {
+        8 => picture(&camera, image.pixels().iter().map(|v| (v * 255.0 + 0.5) as u8)),
+        _ => picture(&camera, image.pixels().iter().map(|v| (v * 65535.0 + 0.5) as u16)),
+    };
     let mut png = std::io::Cursor::new(Vec::new());
     picture.context("the picture is empty")?.write_to(&mut png, image::ImageFormat::Png)?;
     let json = crate::json::to_text(&truth, 2);
@@ -157,6 +163,22 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     output::write(&path, &png.into_inner())?;
     println!("{}: {} corners in view", path.display(), truth.corners.len());
     Ok(ExitCode::SUCCESS)
+}
+
+/// The picture of a camera; `None` where it has other than so many pixels.
+fn picture<T>(camera: &Camera, pixels: impl Iterator<Item = T>) -> Option<DynamicImage>
+where
+    T: image::Primitive,
+    Luma<T>: image::Pixel<Subpixel = T>,
+    DynamicImage: From<ImageBuffer<Luma<T>, Vec<T>>>,
+{
+    ImageBuffer::from_raw(camera.width, camera.height, pixels.collect()).map(DynamicImage::from)
+}
+
+/// Reads the depth of a picture.
+fn depth(text: &str) -> Result<u8, String> {
+    let bits = text.parse().ok().filter(|bits| [8, 16].contains(bits));
+    bits.ok_or_else(|| "not 8 or 16".to_owned())
 }
 
 impl Args {

@@ -1,27 +1,28 @@
-//! `deltille tetrahedron`, `octahedron`, `icosahedron`.
+//! `deltille tetrahedron`, `octahedron`, `icosahedron`, `solid --mesh`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail};
 
+use super::delivery::Delivery;
 use super::files::{self, File, text_file};
 use super::settings::DEFAULT_DPI;
-use super::{target_file, verify};
 use crate::artwork;
 use crate::export::dsc::{self, Dialect};
 use crate::export::mesh::TexturedMesh;
-use crate::export::{gltf, obj, stl};
+use crate::export::{dxf, gltf, obj, stl};
 use crate::family::Family;
 use crate::target::{
-    DEFAULT_MARGIN_MM, PaperSpec, SolidShape, SolidSheets, SolidSpec, TagSpec, Target, TargetSpec,
-    parse_length_mm,
+    ClosedMesh, DEFAULT_MARGIN_MM, NEAR_EQUILATERAL, PaperSpec, Skeleton, SkeletonSpec, SolidShape,
+    SolidSheets, SolidSpec, TagSpec, Target, TargetSpec, parse_length_mm,
 };
 
 /// Arguments of the commands that make solids.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Edge of the solid, such as 150mm, 15cm, 6in [default: 150mm]
+    /// Edge of the solid, such as 150mm, 15cm, 6in; of a mesh the mean, to which it is scaled
+    /// [default: 150mm, or as the mesh is]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
     /// Black tiles along each side of a face [default: 10]
@@ -46,7 +47,7 @@ pub struct Args {
     #[arg(long, value_name = "ID", allow_negative_numbers = true)]
     board_id: Option<u32>,
     /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); so it is where no other of gltf,
-    /// obj, stl, pdf, svg, png is asked for
+    /// obj, stl, skeleton, dxf, pdf, svg, png is asked for
     #[arg(long)]
     gltf: bool,
     /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres)
@@ -55,6 +56,21 @@ pub struct Args {
     /// Write <name>.stl, the bare solid (millimetres)
     #[arg(long)]
     stl: bool,
+    /// Write <name>-skeleton.stl, a frame to print with a seat for a panel on each face
+    #[arg(long)]
+    skeleton: bool,
+    /// Thickness of the panels and what is glued on them [default: 3mm]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
+    panel_thickness: Option<String>,
+    /// Thickness of the skeleton below the panels [default: 4mm]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
+    wall: Option<String>,
+    /// Distance of the seats from the edges of the faces [default: the least that stays solid]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
+    rib: Option<String>,
+    /// Write <name>.dxf, the outlines of all panels to cut, in true size (millimetres)
+    #[arg(long)]
+    dxf: bool,
     /// Resolution of the texture, dots per inch [default: 20 texels per tag bit]
     #[arg(long, value_name = "DPI", allow_negative_numbers = true)]
     texture_dpi: Option<f64>,
@@ -92,16 +108,59 @@ pub struct Args {
     /// Stem of the files' names, printed on the sheets [default: the solid's name]
     #[arg(long)]
     name: Option<String>,
-    /// Description of another target to be used together with this one: ids that both have are
-    /// refused; may be repeated
-    #[arg(long, value_name = "FILE")]
-    with: Vec<PathBuf>,
-    /// Folder to write to
-    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
-    output: PathBuf,
-    /// Do not read the written files back to compare them with the description
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+/// Arguments of `deltille solid`.
+#[derive(clap::Args)]
+pub struct MeshArgs {
+    /// A closed mesh of triangles as OBJ, in millimetres; a board is put on each
+    #[arg(long, value_name = "FILE.obj")]
+    mesh: PathBuf,
+    /// Millimetres per unit of the mesh, such as 1000 for metres, 25.4 for inches [default: 1]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, conflicts_with = "edge")]
+    scale: Option<f64>,
+    /// Take faces that are far from equilateral, as long as a board fits
     #[arg(long)]
-    no_verify: bool,
+    allow_skew: bool,
+    #[command(flatten)]
+    args: Args,
+}
+
+/// Makes a solid from a mesh, with the stem of its file for a name.
+pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
+    let (path, scale) = (&mesh.mesh, mesh.scale.unwrap_or(1.0));
+    let show = || format!("--mesh: {}", path.display());
+    if !(scale.is_finite() && scale > 0.0) {
+        bail!("--scale: {scale} is no scale: give millimetres per unit, such as 1000 for metres");
+    }
+    let text = std::fs::read(path).with_context(show)?;
+    let (solid, inside_out) = obj::read(&text).with_context(show)?;
+    let (face, deviation) = solid.most_skewed();
+    if deviation > NEAR_EQUILATERAL && !mesh.allow_skew {
+        bail!(
+            "{}: edges of triangle {} deviate by {:.1} % from their mean, more than {:.0} %: give \
+             --allow-skew to put smaller boards on such faces",
+            show(),
+            face + 1,
+            100.0 * deviation,
+            100.0 * NEAR_EQUILATERAL
+        );
+    }
+    if inside_out {
+        println!("{}: its faces look inwards; they were turned", path.display());
+    }
+    let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = mesh.args.name.clone().unwrap_or_else(stem);
+    if mesh.args.obj && mesh.args.delivery.would_replace(&format!("{name}.obj"), path) {
+        bail!("--name: {name}.obj would be written over the mesh: give another name or folder");
+    }
+    let faces = solid.faces();
+    let vertices: Vec<_> = solid.vertices().iter().map(|&v| v * scale).collect();
+    let (scaled, _) = ClosedMesh::new(&vertices, faces).with_context(show)?;
+    mesh.args.name = Some(name);
+    run(SolidShape::Mesh(scaled), mesh.args)
 }
 
 /// Makes a solid, writes its files, and verifies what it wrote.
@@ -112,28 +171,11 @@ pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
     let name = args.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
     let printed = args.pdf || args.svg || args.png;
     let layout = printed.then_some(&paper);
-    let target = Target::build(&name, &TargetSpec::Solid(spec), Some(&family), layout)?;
-    for path in &args.with {
-        let other = target_file::read(path).context("--with")?;
-        target.check_beside(&other)?;
-    }
-    let files = args.files(&target, &family)?;
-    let written = files::write_all(&args.output, &files)?;
-    println!("{}", summary(&target));
-    for path in &written {
-        println!("wrote {}", path.display());
-    }
-    let proved = |path: &PathBuf| {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let texture =
-            path.file_name().is_some_and(|f| f.to_string_lossy() == obj::texture_name(&name));
-        matches!(extension, "pdf" | "svg" | "png" | "glb" | "obj") && !texture
-    };
-    let artifacts: Vec<PathBuf> = written.into_iter().filter(proved).collect();
-    if args.no_verify || artifacts.is_empty() {
-        return Ok(ExitCode::SUCCESS);
-    }
-    verify::verify(&target, Some(&family), &artifacts, None)
+    let solid = TargetSpec::Solid(spec.clone());
+    let target = Target::build(&name, &solid, Some(&family), layout)?;
+    args.delivery.check_beside(&target)?;
+    let files = args.files(&target, &spec, &family)?;
+    args.delivery.deliver(&target, Some(&family), &files, &summary(&target, &spec)?)
 }
 
 impl Args {
@@ -151,8 +193,22 @@ impl Args {
                 spacing: self.tag_spacing.unwrap_or(tags.spacing),
                 border_bits: self.tag_border.unwrap_or(tags.border_bits),
             },
+            skeleton: self.skeleton()?,
             shape: default.shape,
         })
+    }
+
+    fn skeleton(&self) -> anyhow::Result<Option<SkeletonSpec>> {
+        if !self.skeleton {
+            return Ok(None);
+        }
+        let default = SkeletonSpec::default();
+        let thickness = length("--panel-thickness", &self.panel_thickness)?;
+        Ok(Some(SkeletonSpec {
+            panel_thickness_mm: thickness.unwrap_or(default.panel_thickness_mm),
+            wall_mm: length("--wall", &self.wall)?.unwrap_or(default.wall_mm),
+            rib_mm: length("--rib", &self.rib)?,
+        }))
     }
 
     fn paper(&self) -> anyhow::Result<PaperSpec> {
@@ -168,7 +224,12 @@ impl Args {
     }
 
     /// The files asked for. What can be refused is refused here, before anything is written.
-    fn files(&self, target: &Target, family: &Family) -> anyhow::Result<Vec<File>> {
+    fn files(
+        &self,
+        target: &Target,
+        spec: &SolidSpec,
+        family: &Family,
+    ) -> anyhow::Result<Vec<File>> {
         let name = &target.name;
         let mut files = vec![text_file(format!("{name}.json"), target.to_json())];
         if self.dsc || self.dsc_dialect.is_some() {
@@ -180,17 +241,36 @@ impl Args {
             files.push(text_file(format!("{name}.dsc"), text));
         }
         let printed = self.pdf || self.svg || self.png;
-        let with_gltf = self.gltf || !(self.obj || self.stl || printed);
+        let with_gltf =
+            self.gltf || !(self.obj || self.stl || self.skeleton || self.dxf || printed);
         if self.texture_dpi.is_some_and(|dpi| !(1.0..=1e5).contains(&dpi)) {
             bail!("--texture-dpi: it must be between 1 and 100000");
         }
-        if with_gltf || self.obj || self.stl {
+        if self.stl {
+            let bytes = stl::to_bytes(name, &spec.polyhedron().triangles_mm());
+            files.push(bytes_file(format!("{name}.stl"), bytes));
+        }
+        if let Some(skeleton) = &spec.skeleton {
+            let skeleton = Skeleton::new(&spec.polyhedron(), skeleton)?;
+            if skeleton.panel_inset_mm > spec.margin_mm {
+                bail!(
+                    "--face-margin: tiles {} mm from the edges would lie on the ribs: take at \
+                     least {:.1} mm, or thinner panels",
+                    spec.margin_mm,
+                    (skeleton.panel_inset_mm * 10.0).ceil() / 10.0
+                );
+            }
+            let bytes = stl::to_bytes(name, &skeleton.triangles_mm);
+            files.push(bytes_file(stl::skeleton_name(name), bytes));
+        }
+        if self.dxf {
+            let text = dxf::text(&artwork::panels_to_cut(target)?);
+            files.push(text_file(format!("{name}.dxf"), text));
+        }
+        if with_gltf || self.obj {
             let mesh = TexturedMesh::new(target, Some(family), self.texture_dpi)?;
             if with_gltf {
                 files.push(bytes_file(format!("{name}.glb"), gltf::to_bytes(&mesh)));
-            }
-            if self.stl {
-                files.push(bytes_file(format!("{name}.stl"), stl::to_bytes(&mesh)));
             }
             if self.obj {
                 files.push(text_file(format!("{name}.obj"), obj::text(&mesh)));
@@ -218,20 +298,42 @@ fn length(option: &str, text: &Option<String>) -> anyhow::Result<Option<f64>> {
     text.as_deref().map(parse_length_mm).transpose().with_context(|| option.to_owned())
 }
 
-/// One line on what was made.
-fn summary(target: &Target) -> String {
-    let TargetSpec::Solid(spec) = &target.spec else { return target.name.clone() };
+/// One line on what was made, and one on the panels of a skeleton.
+fn summary(target: &Target, spec: &SolidSpec) -> anyhow::Result<String> {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
     let last = spec.tags.first_id as usize + tags - 1;
-    format!(
-        "{}: {} of {} mm edges, {} faces, {corners} corners, tiles of {:.3} mm, {} ids {}–{last}",
+    let mut text = format!(
+        "{}: {} of {} mm edges, {} faces, {corners} corners, tiles of {} mm, {} ids {}–{last}",
         target.name,
         spec.shape.name(),
-        spec.edge_mm,
+        (spec.edge_mm * 1e3).round() / 1e3,
         target.panels.len(),
-        target.panels[0].edge_mm,
+        range(target.panels.iter().map(|panel| panel.edge_mm), 3),
         target.family.as_ref().map_or("", |family| &family.name),
         spec.tags.first_id,
-    )
+    );
+    if let Some(skeleton) = &spec.skeleton {
+        let solid = spec.polyhedron();
+        let made = Skeleton::new(&solid, skeleton)?;
+        let angles = solid.dihedral_angles_rad().into_iter().map(f64::to_degrees);
+        let angles: Vec<f64> = angles.collect();
+        text += &format!(
+            "\nskeleton: panels of {} mm, cut straight {:.2} mm inside the edges; faces meet at \
+             {}°, so that panels without ribs would need edges mitred by {}°",
+            skeleton.panel_thickness_mm,
+            made.panel_inset_mm,
+            range(angles.iter().copied(), 2),
+            range(angles.iter().map(|angle| 90.0 - angle / 2.0), 2),
+        );
+    }
+    Ok(text)
+}
+
+/// The least and the greatest of some numbers, or the one that all are.
+fn range(numbers: impl Iterator<Item = f64> + Clone, digits: usize) -> String {
+    let least = numbers.clone().fold(f64::INFINITY, f64::min);
+    let most = numbers.fold(f64::NEG_INFINITY, f64::max);
+    let [least, most] = [least, most].map(|number| format!("{number:.digits$}"));
+    if least == most { least } else { format!("{least} to {most}") }
 }

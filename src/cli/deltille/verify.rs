@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::target_file;
 use crate::cli::run::FAILED;
-use crate::export::{atomic, sheet_file_name};
+use crate::export::{atomic, sheet_file_name, stl};
 use crate::family::Family;
 use crate::target::Target;
 use crate::verify::{Verdict, Verifier};
@@ -19,7 +19,7 @@ use crate::verify::{Verdict, Verifier};
 pub struct Args {
     /// Description of the target, as `deltille board` writes it
     target: PathBuf,
-    /// Files to verify; without any, the PDF, SVG and PNG files of the target beside it
+    /// Files to verify; without any, all files of the target beside it
     artifacts: Vec<PathBuf>,
     /// Family of the tags, by name or file; only needed where the target's name for it is not known
     #[arg(long)]
@@ -40,7 +40,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     if artifacts.is_empty() {
         let name = &target.name;
-        bail!("no {name}.pdf, .svg or .png beside {}: name the files", args.target.display());
+        bail!(
+            "no {name}.pdf, .svg, .png, .glb, .obj or .stl beside {}: name the files",
+            args.target.display()
+        );
     }
     verify(&target, family.as_ref(), &artifacts, args.report.as_deref())
 }
@@ -88,9 +91,10 @@ fn artifacts_in(folder: &Path, target: &Target) -> Vec<PathBuf> {
     let pages = ["svg", "png"].into_iter().flat_map(|extension| {
         (0..count).map(move |index| sheet_file_name(&target.name, index, count, extension))
     });
-    ["pdf", "glb", "obj"]
+    ["pdf", "glb", "obj", "stl"]
         .map(|extension| format!("{}.{extension}", target.name))
         .into_iter()
+        .chain([stl::skeleton_name(&target.name)])
         .chain(pages)
         .map(|name| folder.join(name))
         .filter(|path| path.is_file())

@@ -26,6 +26,8 @@ pub enum Format {
     Glb,
     /// Wavefront OBJ.
     Obj,
+    /// Binary STL.
+    Stl,
 }
 
 impl Format {
@@ -39,11 +41,12 @@ impl Format {
         }
     }
 
-    /// The kind of mesh that a file name tells.
+    /// The kind of mesh or body that a file name tells.
     pub fn of_mesh(path: &Path) -> Option<Self> {
         match path.extension()?.to_string_lossy().to_lowercase().as_str() {
             "glb" => Some(Self::Glb),
             "obj" => Some(Self::Obj),
+            "stl" => Some(Self::Stl),
             _ => None,
         }
     }

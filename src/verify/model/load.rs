@@ -74,12 +74,12 @@ fn obj(path: &Path) -> Result<Model, String> {
     let mut triangles = Vec::new();
     let mut texture: Option<PathBuf> = None;
     for mesh in models.iter().map(|model| &model.mesh) {
-        let points = |values: &[f32]| -> Vec<DVec3> {
-            values.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v).as_dvec3()).collect()
+        let points = |values: &[f64]| -> Vec<DVec3> {
+            values.as_chunks::<3>().0.iter().copied().map(DVec3::from).collect()
         };
         // OBJ counts v upwards from the lower edge of the texture.
         let uvs = mesh.texcoords.as_chunks::<2>().0.iter();
-        let uvs: Vec<[f64; 2]> = uvs.map(|&[u, v]| [f64::from(u), 1.0 - f64::from(v)]).collect();
+        let uvs: Vec<[f64; 2]> = uvs.map(|&[u, v]| [u, 1.0 - v]).collect();
         add(
             &mut triangles,
             &mesh.indices,

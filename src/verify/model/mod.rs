@@ -1,6 +1,7 @@
 //! Meshes read back from disk as their users read them, through the gltf and tobj crates.
 
 mod load;
+mod stl;
 mod view;
 
 use glam::DVec3;
@@ -8,6 +9,7 @@ use glam::DVec3;
 use crate::raster::Gray;
 
 pub(super) use load::load;
+pub(super) use stl::{Facet, load_stl};
 pub(super) use view::View;
 
 /// A loaded mesh: textured triangles, mm.

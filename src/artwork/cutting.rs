@@ -1,0 +1,176 @@
+//! What a cutter follows: closed outlines and lines by what is done along them.
+
+use glam::DVec3;
+
+use super::atlas::Packing;
+use super::text::MissingGlyph;
+use crate::target::{
+    Face, Placement, Skeleton, SolidSpec, Target, TargetError, TargetSpec, edge_numbers, edge_text,
+};
+
+/// Blank between panels, mm: more than any cutter is wide.
+const GAP_MM: f64 = 4.0;
+
+/// Height of the number of a face, in inradii, and the most of it, mm.
+const FACE_CAP: (f64, f64) = (0.25, 8.0);
+
+/// Width of a capital with its blank, in its height.
+const ADVANCE_CAPS: f64 = 0.84;
+
+/// Distance of the number of an edge from it, mm.
+const EDGE_GAP_MM: f64 = 1.5;
+
+/// Letters are replaced by chords that leave them by less than this, mm.
+const FLATTENING_MM: f64 = 0.02;
+
+/// What is done along a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum CutLayer {
+    /// Cut through.
+    Cut,
+    /// Fold, after scoring.
+    Fold,
+    /// Engrave.
+    Engrave,
+}
+
+/// A path of straight pieces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CutPath {
+    /// What is done along it.
+    pub layer: CutLayer,
+    /// Whether the last point is joined to the first.
+    pub closed: bool,
+    /// Points, mm, x right, y up.
+    pub points_mm: Vec<[f64; 2]>,
+}
+
+/// A drawing for a cutter.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CutDrawing {
+    /// Its paths.
+    pub paths: Vec<CutPath>,
+}
+
+/// Why there is nothing to cut.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CuttingError {
+    /// No solid.
+    #[error("{0} is no solid made by `deltille`: it has no panels to cut")]
+    NotSolid(String),
+    /// The solid cannot be made.
+    #[error(transparent)]
+    Target(#[from] TargetError),
+    /// A number cannot be written.
+    #[error(transparent)]
+    Text(#[from] MissingGlyph),
+}
+
+/// The panels of a solid side by side, as seen from outside: outlines to cut in true size, with the
+/// numbers of the face and of its edges to engrave. Edges of the same number meet.
+///
+/// Panels are whole faces; with a skeleton in the spec they are what its seats take.
+pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
+    let TargetSpec::Solid(spec) = &target.spec else {
+        return Err(CuttingError::NotSolid(target.name.clone()));
+    };
+    let panels = panels(spec)?;
+    let solid = spec.polyhedron();
+    let edges = solid.edges();
+    let mut drawing = CutDrawing::default();
+    let packing = Packing::tightest(&panels, GAP_MM);
+    for (index, (panel, placement)) in panels.iter().zip(packing.placements()).enumerate() {
+        let outline = panel.outline_mm;
+        let points_mm = outline.map(|p| placement.page_from_panel(p)).to_vec();
+        drawing.paths.push(CutPath { layer: CutLayer::Cut, closed: true, points_mm });
+        let numbers = edge_numbers(&solid, &edges, index);
+        let mut texts = vec![face_number(&placement, outline, index)];
+        for (i, number) in numbers.into_iter().enumerate() {
+            let ends = [outline[i], outline[(i + 1) % 3]];
+            texts.push(edge_text(&placement, ends, engraved(number), EDGE_GAP_MM));
+        }
+        for text in texts {
+            drawing.engrave(super::text_outline(&text)?);
+        }
+    }
+    Ok(drawing)
+}
+
+/// The faces, or what the seats of the skeleton take of them.
+fn panels(spec: &SolidSpec) -> Result<Vec<Face>, TargetError> {
+    let mut faces = spec.faces()?;
+    let Some(skeleton) = &spec.skeleton else { return Ok(faces) };
+    let inset = Skeleton::new(&spec.polyhedron(), skeleton)?.panel_inset_mm;
+    for face in &mut faces {
+        face.outline_mm = inset_triangle(face.outline_mm, inset);
+    }
+    Ok(faces)
+}
+
+fn inset_triangle(outline: [[f64; 2]; 3], inset: f64) -> [[f64; 2]; 3] {
+    let corners = outline.map(|[x, y]| DVec3::new(x, y, 0.0));
+    let circle = crate::target::Incircle::of(corners);
+    circle.inset(corners, inset, 0.0).map(|v| [v.x, v.y])
+}
+
+/// A number as it is engraved: with a point after it where it reads as another upside down.
+fn engraved(number: usize) -> String {
+    let text = number.to_string();
+    let turns = text.chars().all(|c| "01689".contains(c)) && text.contains(['6', '9']);
+    if turns { text + "." } else { text }
+}
+
+/// The number of a face around the middle of its outline.
+fn face_number(
+    placement: &Placement,
+    outline: [[f64; 2]; 3],
+    index: usize,
+) -> crate::target::SheetText {
+    let circle = crate::target::Incircle::of(outline.map(|[x, y]| DVec3::new(x, y, 0.0)));
+    let text = engraved(index);
+    let cap = (FACE_CAP.0 * circle.radius).min(FACE_CAP.1);
+    let width = text.len() as f64 * ADVANCE_CAPS * cap;
+    let at = [circle.centre.x - width / 2.0, circle.centre.y - cap / 2.0];
+    crate::target::SheetText {
+        text,
+        at_mm: placement.page_from_panel(at),
+        angle_rad: placement.angle_rad,
+        cap_height_mm: cap,
+        max_width_mm: circle.radius,
+    }
+}
+
+impl CutDrawing {
+    /// Left, lower, right and upper end, mm; `None` when nothing is drawn.
+    pub fn bounds_mm(&self) -> Option<[f64; 4]> {
+        let points = || self.paths.iter().flat_map(|path| &path.points_mm);
+        points().next()?;
+        let end = |axis: usize, pick: fn(f64, f64) -> f64, start| {
+            points().map(|p| p[axis]).fold(start, pick)
+        };
+        let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
+        Some([
+            end(0, f64::min, low),
+            end(1, f64::min, low),
+            end(0, f64::max, high),
+            end(1, f64::max, high),
+        ])
+    }
+
+    /// Adds the outlines of letters.
+    fn engrave(&mut self, letters: kurbo::BezPath) {
+        kurbo::flatten(letters, FLATTENING_MM, |element| match element {
+            kurbo::PathEl::MoveTo(p) => self.paths.push(CutPath {
+                layer: CutLayer::Engrave,
+                closed: true,
+                points_mm: vec![[p.x, p.y]],
+            }),
+            kurbo::PathEl::LineTo(p) => {
+                if let Some(path) = self.paths.last_mut() {
+                    path.points_mm.push([p.x, p.y]);
+                }
+            }
+            _ => {}
+        });
+    }
+}

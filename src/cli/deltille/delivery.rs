@@ -1,0 +1,74 @@
+//! The end of every command that makes a target: its files are written, told, and proved.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context;
+
+use super::files::{File, write_all};
+use super::{target_file, verify};
+use crate::export::obj;
+use crate::family::Family;
+use crate::target::Target;
+
+/// Where the files of a target go, and what is checked before and after.
+#[derive(clap::Args)]
+pub struct Delivery {
+    /// Description of another target to be used together with this one: ids that both have are
+    /// refused; may be repeated
+    #[arg(long, value_name = "FILE")]
+    with: Vec<PathBuf>,
+    /// Folder to write to
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
+    output: PathBuf,
+    /// Do not read the written files back to compare them with the description
+    #[arg(long)]
+    no_verify: bool,
+}
+
+impl Delivery {
+    /// Refuses a target that cannot be used together with those named.
+    pub fn check_beside(&self, target: &Target) -> anyhow::Result<()> {
+        for path in &self.with {
+            let other = target_file::read(path).context("--with")?;
+            target.check_beside(&other)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a file of that name would be written over another one.
+    pub fn would_replace(&self, name: &str, other: &Path) -> bool {
+        let [here, there] =
+            [&self.output.join(name), other].map(|path| std::fs::canonicalize(path).ok());
+        here.is_some() && here == there
+    }
+
+    /// Writes all files or none, says so after `summary`, and compares them with the target.
+    pub fn deliver(
+        &self,
+        target: &Target,
+        family: Option<&Family>,
+        files: &[File],
+        summary: &str,
+    ) -> anyhow::Result<ExitCode> {
+        let written = write_all(&self.output, files)?;
+        println!("{summary}");
+        for path in &written {
+            println!("wrote {}", path.display());
+        }
+        let texture = obj::texture_name(&target.name);
+        let artifacts: Vec<PathBuf> =
+            written.into_iter().filter(|path| is_proved(path, &texture)).collect();
+        if self.no_verify || artifacts.is_empty() {
+            return Ok(ExitCode::SUCCESS);
+        }
+        verify::verify(target, family, &artifacts, None)
+    }
+}
+
+/// Whether a file is compared by itself; a texture is with its mesh.
+fn is_proved(path: &Path, texture: &str) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    let proved = ["pdf", "svg", "png", "glb", "obj", "stl"].contains(&extension);
+    proved && path.file_name().is_none_or(|name| name != texture)
+}

@@ -1,0 +1,96 @@
+//! What surfaces hide of each other.
+//!
+//! Seen from an eye, a plane convex piece hides what is inside the pyramid of sight over its
+//! outline and beyond its plane. On another plane each side of that shadow is a straight line, so
+//! that the visible part of a polygon comes of cutting along lines, exactly, whatever the lens.
+
+use glam::{DVec2, DVec3};
+
+use super::Surface;
+
+/// A piece hides nothing of a plane above which it rises by less than this, mm: faces that meet in
+/// an edge.
+const ABOVE_MM: f64 = 1e-6;
+
+/// The side of a line on which n·p + c ≥ 0.
+#[derive(Clone, Copy, Debug)]
+struct Half {
+    n: DVec2,
+    c: f64,
+}
+
+impl Half {
+    fn at(&self, p: DVec2) -> f64 {
+        self.n.dot(p) + self.c
+    }
+}
+
+/// The shadow of one surface on the plane of another: where all halves hold.
+#[derive(Clone, Debug)]
+pub(super) struct Shadow {
+    halves: Vec<Half>,
+}
+
+impl Shadow {
+    /// The shadow of `before` on the plane of `behind`, both with their fronts to the eye (in the
+    /// target frame); `None` where `before` does not rise above that plane.
+    pub fn of(before: &Surface, behind: &Surface, eye: DVec3) -> Option<Self> {
+        let surface_from_target = behind.target_from_surface.inverse();
+        let outline: Vec<DVec3> = before
+            .paper_mm
+            .iter()
+            .map(|&[x, y]| before.target_from_surface.apply(DVec3::new(x, y, 0.0)))
+            .map(|p| surface_from_target.apply(p))
+            .collect();
+        if outline.iter().all(|p| p.z <= ABOVE_MM) {
+            return None;
+        }
+        let eye = surface_from_target.apply(eye);
+        let half =
+            |normal: DVec3, through: DVec3| Half { n: normal.truncate(), c: -normal.dot(through) };
+        // The outline is counter-clockwise as the eye sees it.
+        let n = outline.len();
+        let sides = (0..n).map(|i| half((outline[(i + 1) % n] - eye).cross(outline[i] - eye), eye));
+        let front = surface_from_target.rotation * before.target_from_surface.rotation * DVec3::Z;
+        let beyond = half(-front, outline[0]);
+        Some(Self { halves: sides.chain([beyond]).collect() })
+    }
+
+    /// Whether a point of the plane is hidden.
+    pub fn hides(&self, p: [f64; 2]) -> bool {
+        self.halves.iter().all(|half| half.at(DVec2::from(p)) > 0.0)
+    }
+
+    /// The parts of a polygon outside the shadow. An outline and its holes may be cut one by one:
+    /// what the cuts add to one they add to the other.
+    pub fn cut(&self, polygon: Vec<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
+        let mut visible = Vec::new();
+        let mut rest = polygon;
+        for half in &self.halves {
+            let outside = clip(&rest, Half { n: -half.n, c: -half.c });
+            rest = clip(&rest, *half);
+            visible.extend((outside.len() > 2).then_some(outside));
+            if rest.len() < 3 {
+                break;
+            }
+        }
+        visible
+    }
+}
+
+/// The part of a polygon on one side of a line (Sutherland and Hodgman 1974). Where the polygon is
+/// not convex, parts stay joined along the line, where they enclose nothing.
+fn clip(polygon: &[[f64; 2]], half: Half) -> Vec<[f64; 2]> {
+    let mut kept = Vec::with_capacity(polygon.len() + 2);
+    for (i, &from) in polygon.iter().enumerate() {
+        let (p, q) = (DVec2::from(from), DVec2::from(polygon[(i + 1) % polygon.len()]));
+        let (at_p, at_q) = (half.at(p), half.at(q));
+        if at_p >= 0.0 {
+            kept.push(from);
+        }
+        if (at_p > 0.0 && at_q < 0.0) || (at_p < 0.0 && at_q > 0.0) {
+            kept.push((p + (q - p) * (at_p / (at_p - at_q))).to_array());
+        }
+    }
+    kept
+}

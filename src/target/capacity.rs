@@ -1,0 +1,53 @@
+//! What to do where a family has too few codes for a target.
+
+use super::{FamilyRef, TagSpec, TargetError};
+use crate::family::{Family, smallest_shipped};
+
+/// Spacings beyond this are not proposed: a tag in twenty tiles is easily hidden.
+const SPARSEST: u32 = 20;
+
+/// Checks that the family is there and has `needed` codes from the first id on; `instead` lists
+/// what other than ids and family to change, given how many codes there are from the first id on.
+pub(super) fn check_family(
+    tags: &TagSpec,
+    family: Option<&Family>,
+    needed: u64,
+    instead: impl FnOnce(u64) -> Vec<String>,
+) -> Result<FamilyRef, TargetError> {
+    let Some(family) = family else {
+        let given = "and no family was given".to_owned();
+        return Err(TargetError::Family { wanted: tags.family.clone(), given });
+    };
+    let there = family.len() as u64;
+    let first = u64::from(tags.first_id);
+    if first + needed <= there {
+        let (name, fingerprint) = (family.name().to_owned(), family.fingerprint().to_owned());
+        return Ok(FamilyRef { name, fingerprint });
+    }
+    let mut proposals = Vec::new();
+    if let Some(highest) = there.checked_sub(needed) {
+        proposals.push(format!("lower it to at most {highest}"));
+    }
+    proposals.extend(instead(there.saturating_sub(first)));
+    if let Some(larger) = smallest_shipped(first + needed, 0) {
+        let (name, len) = (larger.name(), larger.len());
+        proposals.push(format!("take --family {name} with its {len} codes"));
+    }
+    Err(TargetError::IdsRunOut {
+        first: tags.first_id,
+        last: first + needed - 1,
+        family: family.name().to_owned(),
+        end: there - 1,
+        instead: proposals.join(", or "),
+    })
+}
+
+/// The closest spacing above that of `tags` with which `count` tags are enough, as a proposal.
+pub(super) fn wider_spacing(
+    tags: &TagSpec,
+    available: u64,
+    count: impl Fn(u32) -> u64,
+) -> Option<String> {
+    let spacing = (tags.spacing + 1..=SPARSEST).find(|&spacing| count(spacing) <= available)?;
+    Some(format!("raise --tag-spacing to at least {spacing}"))
+}

@@ -1,0 +1,208 @@
+//! Bodies to print, as STL: closed, outside out, of the stated shape.
+//!
+//! The bare solid is compared face by face. A skeleton is felt from outside with rays: on the ribs
+//! they meet the planes of the faces, in the seats they stop at the thickness of a panel below, and
+//! in the windows they pass.
+
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::model::{Facet, load_stl};
+use super::{BodyVerdict, DocumentError, Finding, Format, MESH_TOLERANCE_MM, Verdict, Verifier};
+use crate::export::stl::skeleton_name;
+use crate::target::{ClosedMesh, Incircle, Polyhedron, Skeleton, SkeletonSpec, TargetSpec};
+
+/// How far a unit normal may be from that of its triangle: single precision on small triangles.
+const NORMAL_SLACK: f64 = 1e-3;
+
+/// Relative difference of volumes: single precision.
+const VOLUME_SLACK: f64 = 1e-4;
+
+/// Rays start this far above a face, mm, and are sent down this far beside the line where ribs,
+/// seats and windows meet.
+const ABOVE_MM: f64 = 0.5;
+const BESIDE_MM: f64 = 0.02;
+
+/// Places along a side of a face at which it is felt.
+const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
+
+/// Reads an STL from disk and compares it with the target.
+pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
+    let unreadable = |problem: &str| DocumentError::Unreadable {
+        path: path.to_owned(),
+        problem: problem.to_owned(),
+    };
+    let target = verifier.target;
+    let TargetSpec::Solid(spec) = &target.spec else {
+        return Err(unreadable("the target is no solid"));
+    };
+    let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let facets = load_stl(path)?;
+    let solid = spec.polyhedron();
+    let mut body = BodyVerdict {
+        triangles: facets.len(),
+        volume_mm3: volume(facets.iter().map(|facet| facet.vertices_mm)),
+        seats: 0,
+        max_deviation_mm: 0.0,
+    };
+    let mut findings = check_surface(&facets);
+    let is_skeleton = artifact.ends_with(&skeleton_name(""));
+    match spec.skeleton.as_ref().filter(|_| is_skeleton) {
+        Some(skeleton) => check_seats(&facets, &solid, skeleton, &mut body, &mut findings),
+        None if is_skeleton => return Err(unreadable("the target has no skeleton")),
+        None => check_faces(&facets, &solid, &mut body, &mut findings),
+    }
+    Ok(Verdict {
+        artifact,
+        format: Format::Stl,
+        passed: findings.is_empty(),
+        findings,
+        sheets: Vec::new(),
+        faces: Vec::new(),
+        body: Some(body),
+    })
+}
+
+/// Closed, one piece, outside out, normals those of the triangles.
+fn check_surface(facets: &[Facet]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let vertices: Vec<DVec3> = facets.iter().flat_map(|facet| facet.vertices_mm).collect();
+    let indices: Vec<[usize; 3]> =
+        (0..facets.len()).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let problem = match ClosedMesh::new(&vertices, &indices) {
+        Ok((_, false)) => None,
+        Ok((_, true)) => Some("it is inside out".to_owned()),
+        Err(error) => Some(error.to_string()),
+    };
+    findings.extend(problem.map(|problem| Finding::Body { problem }));
+    let wrong = facets.iter().filter(|facet| {
+        let [a, b, c] = facet.vertices_mm;
+        facet.normal.distance((b - a).cross(c - a).normalize_or_zero()) > NORMAL_SLACK
+    });
+    let triangles = wrong.count();
+    if triangles > 0 {
+        findings.push(Finding::Normals { triangles });
+    }
+    findings
+}
+
+/// Every stated face is there once, and nothing else.
+fn check_faces(
+    facets: &[Facet],
+    solid: &Polyhedron,
+    body: &mut BodyVerdict,
+    findings: &mut Vec<Finding>,
+) {
+    let stated = solid.triangles_mm();
+    let volume_mm3 = volume(stated.iter().copied());
+    if (body.volume_mm3 / volume_mm3 - 1.0).abs() > VOLUME_SLACK {
+        let [found, stated] = [body.volume_mm3, volume_mm3].map(|mm3| mm3 / 1e3);
+        let scale = (found / stated).cbrt();
+        let problem =
+            format!("volume of {found:.1} cm³ instead of {stated:.1} cm³, as of scale {scale:.4}");
+        findings.push(Finding::Body { problem });
+        return;
+    }
+    let (found, number) = (facets.len(), stated.len());
+    if found != number {
+        findings.push(Finding::Body { problem: format!("{found} triangles instead of {number}") });
+    }
+    let deviation = |facet: &Facet, face: &[DVec3; 3]| {
+        let turned = |turn: usize| {
+            let apart = (0..3).map(|i| facet.vertices_mm[(i + turn) % 3].distance(face[i]));
+            apart.fold(0.0, f64::max)
+        };
+        (0..3).map(turned).fold(f64::INFINITY, f64::min)
+    };
+    for (index, face) in stated.iter().enumerate() {
+        let nearest = facets.iter().map(|facet| deviation(facet, face));
+        let nearest = nearest.fold(f64::INFINITY, f64::min);
+        if nearest > MESH_TOLERANCE_MM {
+            let problem =
+                format!("face {index} is not there, the nearest is off by {nearest:.3} mm");
+            findings.push(Finding::Body { problem });
+        } else {
+            body.max_deviation_mm = body.max_deviation_mm.max(nearest);
+        }
+    }
+}
+
+/// Every seat has its depth and its outline.
+fn check_seats(
+    facets: &[Facet],
+    solid: &Polyhedron,
+    spec: &SkeletonSpec,
+    body: &mut BodyVerdict,
+    findings: &mut Vec<Finding>,
+) {
+    let skeleton = match Skeleton::new(solid, spec) {
+        Ok(skeleton) => skeleton,
+        Err(error) => return findings.push(Finding::Body { problem: error.to_string() }),
+    };
+    let (thickness, through) = (spec.panel_thickness_mm, spec.panel_thickness_mm + spec.wall_mm);
+    let (rib, window) = (skeleton.rib_mm, skeleton.window_mm);
+    // Distance from the edges, and the depth there; `None` in the window.
+    let felt = [
+        (rib / 2.0, Some(0.0)),
+        (rib - BESIDE_MM, Some(0.0)),
+        (rib + BESIDE_MM, Some(thickness)),
+        ((rib + window) / 2.0, Some(thickness)),
+        (window - BESIDE_MM, Some(thickness)),
+        (window + BESIDE_MM, None),
+    ];
+    let faces: Vec<(usize, f64, Option<String>)> = (0..solid.faces.len())
+        .into_par_iter()
+        .map(|face| {
+            let corners = solid.triangle_mm(face);
+            let circle = Incircle::of(corners);
+            let mut most = 0.0f64;
+            for (inset, stated) in felt {
+                let [a, b, c] = circle.inset(corners, inset, -ABOVE_MM);
+                let places = [(a, b), (b, c), (c, a)].into_iter();
+                for at in places.flat_map(|(from, to)| PLACES.map(|part| from.lerp(to, part))) {
+                    let found = depth(facets, at, -circle.normal) - ABOVE_MM;
+                    let off = match stated {
+                        Some(stated) => (found - stated).abs(),
+                        None => (through - found).max(0.0),
+                    };
+                    if off > MESH_TOLERANCE_MM {
+                        let below = stated.map_or("open".to_owned(), |mm| format!("{mm:.3} mm"));
+                        let problem = format!(
+                            "face {face}: {inset:.2} mm from its edge the skeleton is {found:.3} \
+                             mm below it instead of {below}"
+                        );
+                        return (face, most, Some(problem));
+                    }
+                    most = most.max(off);
+                }
+            }
+            (face, most, None)
+        })
+        .collect();
+    for (_, off, problem) in faces {
+        body.seats += usize::from(problem.is_none());
+        body.max_deviation_mm = body.max_deviation_mm.max(off);
+        findings.extend(problem.map(|problem| Finding::Body { problem }));
+    }
+}
+
+/// How far a ray gets, mm.
+fn depth(facets: &[Facet], from: DVec3, direction: DVec3) -> f64 {
+    let meets = facets.iter().filter_map(|facet| {
+        let [a, b, c] = facet.vertices_mm;
+        let normal = (b - a).cross(c - a);
+        let t = normal.dot(a - from) / normal.dot(direction);
+        let p = from + direction * t;
+        let inside =
+            [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (v - u).cross(p - u).dot(normal) >= 0.0);
+        (t >= 0.0 && inside).then_some(t)
+    });
+    meets.fold(f64::INFINITY, f64::min)
+}
+
+/// The volume inside a closed surface, by the divergence theorem.
+fn volume(triangles: impl Iterator<Item = [DVec3; 3]>) -> f64 {
+    triangles.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+}
