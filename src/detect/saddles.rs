@@ -101,11 +101,9 @@ impl SaddleFinder {
         all
     }
 
-    /// The saddle that the fit reaches from `start` at full resolution.
-    pub fn at(&self, pyramid: &Pyramid, start: [f64; 2]) -> Option<Saddle> {
-        let image = &pyramid.levels()[0];
-        let umbilic = self.fit.refine(image, start, FIT_ITERATIONS)?;
-        let sectors = Sectors::read(image, umbilic.position, &umbilic.surface)?;
+    /// What a fit at full resolution has reached, if it is a corner.
+    fn describe(&self, pyramid: &Pyramid, umbilic: &Umbilic) -> Option<Saddle> {
+        let sectors = Sectors::read(&pyramid.levels()[0], umbilic.position, &umbilic.surface)?;
         let saddle = Saddle { position: umbilic.position, sectors };
         self.is_stable(pyramid, umbilic.position).then_some(saddle)
     }
@@ -119,16 +117,29 @@ impl SaddleFinder {
     /// The first saddle that the fit reaches from starts ever further from `place`, if it lies
     /// within `reach_px` of it.
     pub fn near(&self, pyramid: &Pyramid, place: [f64; 2], reach_px: f64) -> Option<Saddle> {
+        let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         let rings = ((reach_px / START_STEP_PX).ceil() as i32).clamp(1, MAX_START_RINGS);
         let step = reach_px / f64::from(rings);
         let starts = (-rings..=rings).flat_map(|v| (-rings..=rings).map(move |u| (u, v)));
-        let mut starts: Vec<(i32, i32)> = starts.collect();
+        let mut starts: Vec<(i32, i32)> =
+            starts.filter(|&(u, v)| u * u + v * v <= rings * rings).collect();
         starts.sort_by_key(|&(u, v)| (u * u + v * v, v, u));
+        // Many starts lead to the same place, which is looked at once.
+        let mut refused: Vec<[f64; 2]> = Vec::new();
         starts.into_iter().find_map(|(u, v)| {
             let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
-            let saddle = self.at(pyramid, start)?;
-            let [x, y] = saddle.position;
-            ((x - place[0]).hypot(y - place[1]) <= reach_px).then_some(saddle)
+            let umbilic = self.fit.refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
+            let position = umbilic.position;
+            if distance(position, place) > reach_px
+                || refused.iter().any(|&other| distance(position, other) < STABLE_PX)
+            {
+                return None;
+            }
+            let saddle = self.describe(pyramid, &umbilic);
+            if saddle.is_none() {
+                refused.push(position);
+            }
+            saddle
         })
     }
 }
