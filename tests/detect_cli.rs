@@ -90,6 +90,53 @@ fn unreadable_images_are_counted_and_the_rest_go_on() {
 }
 
 #[test]
+fn folders_patterns_and_lists_are_taken_in_order_and_what_is_done_is_skipped() {
+    let folder = board();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::create_dir(path("day")).unwrap();
+    for name in ["b.png", "a.PNG", "c.png"] {
+        std::fs::copy(path("sheet/board.png"), path("day").join(name)).unwrap();
+    }
+    std::fs::write(path("day/notes.txt"), "not a photograph").unwrap();
+    let names = |output: &std::process::Output| {
+        let said = String::from_utf8(output.stdout.clone()).unwrap();
+        said.lines().map(|l| l.split(':').next().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let all = deltille(folder.path(), "detect --grid deltille day -o out");
+    assert_eq!(names(&all), ["day/a.PNG", "day/b.png", "day/c.png"]);
+    let pattern = deltille(folder.path(), "detect --grid deltille day/*.png -o out2");
+    assert_eq!(names(&pattern), ["day/b.png", "day/c.png"]);
+
+    std::fs::remove_file(path("out/b.json")).unwrap();
+    let rest = deltille(folder.path(), "detect --grid deltille day -o out --skip-existing");
+    assert_eq!(names(&rest), ["day/b.png"]);
+    assert!(String::from_utf8(rest.stderr).unwrap().contains("2 of 3 images skipped"));
+
+    let mut listed = Command::cargo_bin("deltille").unwrap();
+    listed.current_dir(folder.path()).args(["detect", "--grid", "deltille", "-", "--stream"]);
+    let listed = listed.write_stdin("day/c.png\n\nday/missing.png\nday/b.png\n").output().unwrap();
+    assert_eq!(listed.status.code(), Some(1));
+    assert!(String::from_utf8(listed.stderr).unwrap().contains("missing.png"));
+    let lines = String::from_utf8(listed.stdout).unwrap();
+    let found: Vec<_> = lines.lines().map(|line| detection::read(line).unwrap()).collect();
+    assert_eq!(found.iter().map(|f| f.image.as_str()).collect::<Vec<_>>(), ["c.png", "b.png"]);
+    assert!(found.iter().all(|f| f.grids[0].corners.len() == 42));
+    assert!(!path("c.json").exists(), "a stream writes no files by itself");
+}
+
+#[test]
+fn a_benchmark_tells_every_stage() {
+    let folder = board();
+    let output = deltille(folder.path(), "bench detect --target board.json sheet --repeat 2");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success());
+    assert!(said.starts_with("1 images, 3.87 Mpx and 42.0 corners each"), "{said}");
+    for stage in ["pyramid", "saddles", "grids", "labels", "refine", "all"] {
+        assert!(said.contains(&format!("\n{stage} ")), "{said}");
+    }
+}
+
+#[test]
 fn bad_input_is_one_line_and_exit_code_2() {
     let folder = board();
     let json = std::fs::read_to_string(folder.path().join("board.json")).unwrap();
@@ -114,6 +161,9 @@ fn bad_input_is_one_line_and_exit_code_2() {
         ("detect --grid deltille sheet/board.png -j 0", "-j"),
         ("detect --grid deltille sheet/board.png other/board.png", "board.json"),
         ("detect --grid deltille empty.dsc", "empty.dsc"),
+        ("detect --grid deltille other/*.jpg", "other/*.jpg"),
+        ("detect --grid deltille - -", "named twice"),
+        ("detect --grid deltille sheet --stream --skip-existing", "--skip-existing"),
     ] {
         let output = deltille(folder.path(), args);
         let said = String::from_utf8(output.stderr).unwrap();

@@ -35,9 +35,19 @@ struct DetectionFile {
 
 /// The text of the JSON file of one image, a corner a line.
 pub fn write(detection: &Detection) -> String {
-    let Detection { image, width, height, grids, timing_ms } = detection.clone();
-    let file = DetectionFile { schema: SCHEMA.to_owned(), image, width, height, grids, timing_ms };
-    crate::json::to_text(&file, 4)
+    crate::json::to_text(&DetectionFile::of(detection), 4)
+}
+
+/// The same as a single line, which it ends, for streams of detections.
+pub fn write_line(detection: &Detection) -> String {
+    crate::json::to_text(&DetectionFile::of(detection), 0)
+}
+
+impl DetectionFile {
+    fn of(detection: &Detection) -> Self {
+        let Detection { image, width, height, grids, timing_ms } = detection.clone();
+        Self { schema: SCHEMA.to_owned(), image, width, height, grids, timing_ms }
+    }
 }
 
 /// Reads the text of a detection file.

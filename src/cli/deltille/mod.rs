@@ -1,10 +1,13 @@
 //! `deltille`: make, detect and verify deltille targets.
 
+mod bench;
 mod board;
 mod delivery;
 mod detect;
 mod experiment;
 pub(in crate::cli) mod files;
+mod finder;
+mod images;
 mod refine;
 mod render;
 mod settings;
@@ -40,6 +43,8 @@ enum Command {
     Solid(Box<solid::MeshArgs>),
     /// Find a target, or untagged boards, in photographs
     Detect(detect::Args),
+    /// Time the stages of detection on this machine
+    Bench(bench::Args),
     /// Measure the library on simulated images
     Experiment(experiment::Args),
     /// Refine given positions of corners
@@ -53,6 +58,7 @@ enum Command {
 /// Runs the program.
 pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
+        Command::Bench(args) => bench::run(args),
         Command::Board(args) => board::run(*args),
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),
         Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),

@@ -1,0 +1,68 @@
+//! Every stage of detection, on a synthetic photograph of a tagged board.
+//!
+//! `cargo bench --bench detect`; each figure is the time for one image of 1600 × 1200 pixels on one
+//! thread, with either refinement. On photographs: `deltille bench detect IMAGES…`.
+
+use std::time::Duration;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use deltille::artwork;
+use deltille::camera::{Camera, Pose};
+use deltille::detect::{Detector, DetectorConfig, Refinement};
+use deltille::family::Family;
+use deltille::raster::Gray;
+use deltille::synth::{Light, scene_of_sheet};
+use deltille::target::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use glam::DVec3;
+
+/// A board of 10 × 11 corners with tags, seen at 35°.
+fn photograph() -> (Target, Family, Gray<u8>) {
+    let tags = TagSpec::default();
+    let family = Family::resolve(&tags.family).expect("a shipped family");
+    let spec = BoardSpec {
+        rows: 10,
+        cols: 11,
+        edge_mm: 20.0,
+        boards: 1,
+        board_id: 0,
+        tags: Some(tags),
+        inverted: false,
+    };
+    let spec = TargetSpec::Board(spec);
+    let target = Target::build("board", &spec, Some(&family), Some(&PaperSpec::default()))
+        .expect("a board that fits A3");
+    let sheets = artwork::draw(&target, Some(&family)).expect("a board that can be drawn").sheets;
+    let scene = scene_of_sheet(&target, &sheets[0], 0);
+    let corners = &target.panels[0].corners;
+    let centre =
+        corners.iter().map(|c| DVec3::from(c.target_mm)).sum::<DVec3>() / corners.len() as f64;
+    let eye = centre + 420.0 * DVec3::new(0.4, -0.41, 0.82);
+    let pose = Pose::looking_at(eye, centre, DVec3::Y);
+    let light = Light { blur_px: 0.8, noise: 0.01, seed: 1, ..Light::default() };
+    let image = scene.render(&Camera::pinhole(1600, 1200, 75f64.to_radians()), &pose, &light);
+    (target, family, image.map(|v| (v * 255.0 + 0.5) as u8))
+}
+
+fn detect(criterion: &mut Criterion) {
+    let (target, family, image) = photograph();
+    for (name, refinement) in [("polynomial", Refinement::Polynomial), ("model", Refinement::Model)]
+    {
+        let config = DetectorConfig { refinement, ..DetectorConfig::default() };
+        let detector = Detector::for_target(&target, Some(&family), config);
+        let stages: Vec<String> = detector.detect(&image, "").timing_ms.into_keys().collect();
+        let mut group = criterion.benchmark_group(format!("detect, {name}"));
+        for stage in stages {
+            group.bench_function(&stage, |bencher| {
+                bencher.iter_custom(|times| {
+                    let ms: f64 =
+                        (0..times).map(|_| detector.detect(&image, "").timing_ms[&stage]).sum();
+                    Duration::from_secs_f64(ms / 1e3)
+                });
+            });
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(benches, detect);
+criterion_main!(benches);

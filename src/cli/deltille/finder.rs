@@ -1,0 +1,79 @@
+//! What to look for, and how: the options that `detect` and `bench detect` share.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+
+use super::refine::Method;
+use super::target_file;
+use crate::detect::{Detector, DetectorConfig};
+use crate::target::{GridKind, Target};
+
+/// Options that say what to look for.
+#[derive(clap::Args)]
+pub struct FinderArgs {
+    /// Description of the target: the .json of `deltille board`, or a .dsc
+    #[arg(long, value_name = "FILE", conflicts_with = "grid")]
+    pub target: Option<PathBuf>,
+    /// Find untagged boards of this tiling instead
+    #[arg(long, value_name = "KIND")]
+    grid: Option<Kind>,
+    /// Rows of corners of the untagged board: labels boards seen whole from their lower left
+    #[arg(long, conflicts_with = "target", requires = "cols", value_parser = side())]
+    rows: Option<u32>,
+    /// Corners in each row of the untagged board
+    #[arg(long, conflicts_with = "target", requires = "rows", value_parser = side())]
+    cols: Option<u32>,
+    /// Family file, where the target names a family that is not shipped
+    #[arg(long, conflicts_with = "grid")]
+    family: Option<String>,
+    /// Most bits of a tag that may be corrected [default: ⌊(h−1)/2⌋ of its family]
+    #[arg(long, value_name = "BITS", conflicts_with = "grid")]
+    max_errors: Option<u32>,
+    /// How corners are refined
+    #[arg(long, value_name = "METHOD", default_value = "model")]
+    refine: Method,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Kind {
+    /// Triangles
+    Deltille,
+}
+
+/// A range that boards have.
+fn side() -> clap::builder::RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(2..=500)
+}
+
+impl FinderArgs {
+    /// The target, where one is named, and the detector.
+    pub fn detector(&self) -> anyhow::Result<(Option<Target>, Detector)> {
+        if self.target.is_none() && self.grid.is_none() {
+            bail!("give --target FILE, or --grid deltille for untagged boards");
+        }
+        let config =
+            DetectorConfig { max_bit_errors: self.max_errors, refinement: self.refine.into() };
+        let Some(path) = &self.target else {
+            let size = self.rows.zip(self.cols);
+            return Ok((None, Detector::for_grid(GridKind::Deltille, size, config)));
+        };
+        let target = target_file::read(path).context("--target")?;
+        let family = target_file::family(&target, self.family.as_deref())?;
+        if let (Some(limit), Some(family)) = (self.max_errors, &family)
+            && limit > family.correctable()
+        {
+            bail!(
+                "--max-errors: {limit} is more than the {} bits that {} can correct",
+                family.correctable(),
+                family.name()
+            );
+        }
+        if target.panels.iter().any(|panel| panel.kind != GridKind::Deltille) {
+            bail!("--target: {} has checkerboards, which cannot be detected yet", target.name);
+        }
+        let detector = Detector::for_target(&target, family.as_ref(), config);
+        Ok((Some(target), detector))
+    }
+}

@@ -1,0 +1,119 @@
+//! Which images a command works on: files, folders, patterns, and lists on standard input.
+
+use std::collections::BTreeMap;
+use std::io::BufRead;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+
+/// Endings of the files that are taken from a folder; files named outright may end in anything.
+const EXTENSIONS: [&str; 11] =
+    ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pgm", "ppm", "pnm", "pbm", "webp"];
+
+/// Images in the order of the arguments; those listed on standard input are read as they come.
+pub struct Images {
+    named: Vec<PathBuf>,
+    /// The position in `named` before which the list on standard input comes.
+    listed: Option<usize>,
+}
+
+impl Images {
+    /// Looks up folders and patterns.
+    pub fn of(arguments: &[PathBuf]) -> anyhow::Result<Self> {
+        let mut images = Self { named: Vec::new(), listed: None };
+        for argument in arguments {
+            if argument.as_os_str() == "-" {
+                if images.listed.replace(images.named.len()).is_some() {
+                    bail!("-: standard input is named twice");
+                }
+            } else if argument.is_dir() {
+                images.named.extend(in_folder(argument)?);
+            } else if argument.exists() {
+                images.named.push(argument.clone());
+            } else {
+                images.named.extend(matching(argument)?);
+            }
+        }
+        Ok(images)
+    }
+
+    /// The images that are known before any is looked at.
+    pub fn named(&self) -> &[PathBuf] {
+        &self.named
+    }
+
+    /// How many there are, where that is known.
+    pub fn count(&self) -> Option<usize> {
+        self.listed.is_none().then_some(self.named.len())
+    }
+
+    /// All images; a line that cannot be read ends the list with an error.
+    pub fn iter(&self) -> impl Iterator<Item = anyhow::Result<PathBuf>> + Send + '_ {
+        let (before, after) = self.named.split_at(self.listed.unwrap_or(0));
+        let lines = self.listed.map(|_| std::io::BufReader::new(std::io::stdin()).lines());
+        let listed = lines.into_iter().flatten().filter_map(|line| match line {
+            Ok(line) if line.trim().is_empty() => None,
+            Ok(line) => Some(Ok(PathBuf::from(line.trim_end_matches('\r')))),
+            Err(error) => Some(Err(error).context("-: the list on standard input")),
+        });
+        before.iter().cloned().map(Ok).chain(listed).chain(after.iter().cloned().map(Ok))
+    }
+}
+
+/// The images right inside a folder, by name.
+fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder);
+    let entries = entries.with_context(|| format!("cannot read {}", folder.display()))?;
+    let mut images = Vec::new();
+    for entry in entries {
+        let path = entry.with_context(|| format!("cannot read {}", folder.display()))?.path();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        // Pictures that an earlier run drew are no photographs.
+        let drawn = path.to_string_lossy().ends_with(".overlay.png");
+        if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) && !drawn && path.is_file() {
+            images.push(path);
+        }
+    }
+    if images.is_empty() {
+        bail!("{}: no PNG, JPEG, TIFF, BMP, PGM or WebP file in this folder", folder.display());
+    }
+    images.sort();
+    Ok(images)
+}
+
+/// The files that a pattern with `*`, `?` or `[…]` matches; what is no pattern stays as it is, to be
+/// reported when it is opened.
+fn matching(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let Some(pattern) = argument.to_str().filter(|text| text.contains(['*', '?', '['])) else {
+        return Ok(vec![argument.to_owned()]);
+    };
+    let paths = glob::glob(pattern).with_context(|| format!("{pattern}: not a pattern"))?;
+    let images: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file()).collect();
+    if images.is_empty() {
+        bail!("{pattern}: no file matches");
+    }
+    Ok(images)
+}
+
+/// Names of results, one per image.
+#[derive(Default)]
+pub struct Stems {
+    taken: BTreeMap<String, PathBuf>,
+}
+
+impl Stems {
+    /// The stem of an image's results, which no other image may have.
+    pub fn claim(&mut self, image: &Path) -> anyhow::Result<String> {
+        let Some(stem) = image.file_stem().map(|stem| stem.to_string_lossy().into_owned()) else {
+            bail!("{} is not a file name", image.display());
+        };
+        if let Some(other) = self.taken.insert(stem.clone(), image.to_owned()) {
+            bail!(
+                "{} and {} would both write {stem}.json: detect them into different folders with -o",
+                other.display(),
+                image.display()
+            );
+        }
+        Ok(stem)
+    }
+}
