@@ -270,7 +270,7 @@ fn spikes() -> String {
         }
     }
     for octant in 0..8 {
-        let signs = [0, 1, 2].map(|axis| octant >> axis & 1);
+        let signs = [0, 1, 2].map(|axis| (octant >> axis) & 1);
         let [x, y, z] = signs.map(|sign| if sign == 0 { reach } else { -reach });
         text += &format!("v {x} {y} {z}\n");
         let mut base = [0, 1, 2].map(|axis| 2 * axis + signs[axis] + 1);
