@@ -256,3 +256,60 @@ fn nets_that_cannot_be_made_are_refused_in_one_line() {
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+/// An octahedron of unit edges with a tetrahedron on each face, as OBJ: 24 equilateral triangles,
+/// concave along the edges of the octahedron.
+fn spikes() -> String {
+    let reach = 0.5f64.sqrt();
+    let mut text = String::new();
+    for axis in 0..3 {
+        for sign in [1.0, -1.0] {
+            let mut vertex = [0.0; 3];
+            vertex[axis] = sign * reach;
+            text += &format!("v {} {} {}\n", vertex[0], vertex[1], vertex[2]);
+        }
+    }
+    for octant in 0..8 {
+        let signs = [0, 1, 2].map(|axis| (octant >> axis) & 1);
+        let [x, y, z] = signs.map(|sign| if sign == 0 { reach } else { -reach });
+        text += &format!("v {x} {y} {z}\n");
+        let mut base = [0, 1, 2].map(|axis| 2 * axis + signs[axis] + 1);
+        if signs.iter().sum::<usize>() % 2 == 1 {
+            base.swap(1, 2);
+        }
+        for side in 0..3 {
+            text += &format!("f {} {} {}\n", base[side], base[(side + 1) % 3], 7 + octant);
+        }
+    }
+    text
+}
+
+/// A concave mesh: its net folds both ways, on paper and for a cutter.
+#[test]
+fn a_concave_mesh_prints_as_a_net_and_as_single_faces() {
+    let folder = tempfile::tempdir().unwrap();
+    // A name that is no name of a shape.
+    std::fs::write(folder.path().join("icosahedron.obj"), spikes()).unwrap();
+    let mesh = "solid --mesh icosahedron.obj --edge 60mm --tiles 7 --face-margin 4mm";
+    let said = "folds into the solid within";
+    deltille(folder.path(), &format!("{mesh} --pdf --dxf"))
+        .success()
+        .stdout(contains("360 corners within"))
+        .stdout(contains(said).and(contains("36 edges matched")));
+    let json = std::fs::read_to_string(folder.path().join("icosahedron.json")).unwrap();
+    let target = Target::from_json(&json).unwrap();
+    let count = |kind| {
+        let lines = target.sheets.iter().flat_map(|sheet| &sheet.lines);
+        lines.filter(|line| line.kind == kind).count()
+    };
+    let (folds, valleys) = (count(LineKind::Fold), count(LineKind::Valley));
+    // The 12 edges of the octahedron are valleys, whether they join faces or tabs.
+    assert_eq!((folds, valleys), (24, 12));
+    let dxf = std::fs::read_to_string(folder.path().join("icosahedron-net.dxf")).unwrap();
+    let lines = |layer: &str| dxf.matches(&format!("\nLINE\n  8\n{layer}\n")).count();
+    assert_eq!((lines("FOLD"), lines("VALLEY")), (folds, valleys));
+
+    deltille(folder.path(), &format!("{mesh} --pdf --per-face --name faces"))
+        .success()
+        .stdout(contains("faces.pdf: verified, 24 pages"));
+}

@@ -62,7 +62,7 @@ fn images_of_any_shape_without_a_target_show_none() {
 #[test]
 #[ignore = "an image of a hundred megapixels"]
 fn a_hundred_megapixels_are_searched() {
-    let noise = |x: usize, y: usize| ((x * 31 + y * 17) ^ (x * y >> 3)) as u8 & 63;
+    let noise = |x: usize, y: usize| ((x * 31 + y * 17) ^ ((x * y) >> 3)) as u8 & 63;
     let image = Gray::from_fn(12_000, 8_400, noise);
     let found = detectors()[1].detect(&image, "");
     assert!(found.grids.iter().all(|grid| grid.panel.is_none()));

@@ -375,7 +375,7 @@ fn panels_to_cut_have_their_true_size() {
     let path = folder.path();
     for (options, name, edge_mm) in [("", "whole", 150.0), ("--skeleton", "seats", f64::NAN)] {
         deltille(path, &format!("icosahedron --dxf --name {name} {options}")).success();
-        let text = std::fs::read_to_string(path.join(format!("{name}.dxf"))).unwrap();
+        let text = std::fs::read_to_string(path.join(format!("{name}-panels.dxf"))).unwrap();
         let outlines = closed_polylines(&text, "CUT");
         assert_eq!(outlines.len(), 20);
         for outline in &outlines {
@@ -393,6 +393,37 @@ fn panels_to_cut_have_their_true_size() {
         }
         assert!(closed_polylines(&text, "ENGRAVE").len() >= 80);
     }
+}
+
+/// The net is one outline around all faces and tabs, with a line to fold for each edge between two
+/// faces and for each tab.
+#[test]
+fn the_net_to_cut_holds_all_faces_and_tabs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    for (options, name, printed) in [("", "bare", false), ("--paper A4 --svg", "tiled", true)] {
+        let args = "icosahedron --edge 60mm --tiles 7 --face-margin 4mm --dxf --no-verify";
+        deltille(path, &format!("{args} --name {name} {options}")).success();
+        assert_eq!(path.join(format!("{name}-2.svg")).exists(), printed);
+        let text = std::fs::read_to_string(path.join(format!("{name}-net.dxf"))).unwrap();
+        let outlines = closed_polylines(&text, "CUT");
+        assert_eq!(outlines.len(), 1);
+        let outline = &outlines[0];
+        let next = |i: usize| outline[(i + 1) % outline.len()];
+        let twice: f64 =
+            outline.iter().enumerate().map(|(i, a)| a[0] * next(i)[1] - a[1] * next(i)[0]).sum();
+        let faces_mm2 = 20.0 * 60.0 * 60.0 * 0.75f64.sqrt() / 2.0;
+        let tab_mm2 = (twice / 2.0 - faces_mm2) / 11.0;
+        assert!((60.0..900.0).contains(&tab_mm2), "{tab_mm2}");
+        // 19 edges join faces, the other 11 have tabs.
+        let folds = text.matches("LINE\n  8\nFOLD\n").count();
+        assert_eq!(folds, 19 + 11);
+        let texts = closed_polylines(&text, "ENGRAVE").len();
+        assert!((100..600).contains(&texts), "{texts}");
+    }
+    deltille(path, "tetrahedron --dxf --per-face --pdf --no-verify").success();
+    assert!(path.join("tetrahedron-panels.dxf").exists());
+    assert!(!path.join("tetrahedron-net.dxf").exists());
 }
 
 /// The closed polylines of a layer of a DXF of release 12.

@@ -1,11 +1,14 @@
 //! What a cutter follows: closed outlines and lines by what is done along them.
 
+use std::f64::consts::TAU;
+
 use glam::DVec3;
 
 use super::atlas::Packing;
 use super::text::MissingGlyph;
 use crate::target::{
-    Face, Placement, Skeleton, SolidSpec, Target, TargetError, TargetSpec, edge_numbers, edge_text,
+    Face, LineKind, Placement, SheetLayout, Skeleton, SolidSpec, Target, TargetError, TargetSpec,
+    edge_numbers, edge_text,
 };
 
 /// Blank between panels, mm: more than any cutter is wide.
@@ -23,13 +26,19 @@ const EDGE_GAP_MM: f64 = 1.5;
 /// Letters are replaced by chords that leave them by less than this, mm.
 const FLATTENING_MM: f64 = 0.02;
 
+/// Lines of an outline that end and begin this near to each other are joined, mm: between a face
+/// and its tab pieces shorter than the width of a line are left out.
+const JOIN_MM: f64 = 0.2;
+
 /// What is done along a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum CutLayer {
     /// Cut through.
     Cut,
-    /// Fold, after scoring.
+    /// Fold away from the print, after scoring.
     Fold,
+    /// Fold towards the print, after scoring from the back.
+    Valley,
     /// Engrave.
     Engrave,
 }
@@ -58,6 +67,9 @@ pub enum CuttingError {
     /// No solid.
     #[error("{0} is no solid made by `deltille`: it has no panels to cut")]
     NotSolid(String),
+    /// The sheets of the solid are not those of its net, or there are none.
+    #[error("{0} is not laid out as a net: there is no net to cut")]
+    NotNet(String),
     /// The solid cannot be made.
     #[error(transparent)]
     Target(#[from] TargetError),
@@ -94,6 +106,81 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
         }
     }
     Ok(drawing)
+}
+
+/// The net of a solid to cut, score and fold, as its sheets have it, however many pages these are
+/// printed on: the outline of each piece with its tabs, the lines to fold, and the numbers of faces
+/// and edges to engrave. Pieces lie side by side.
+pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
+    let no_net = || CuttingError::NotNet(target.name.clone());
+    let mut drawing = CutDrawing::default();
+    let mut right_mm = 0.0;
+    for sheet in &target.sheets {
+        let mut piece = CutDrawing::default();
+        for points_mm in outlines(sheet).ok_or_else(no_net)? {
+            piece.paths.push(CutPath { layer: CutLayer::Cut, closed: true, points_mm });
+        }
+        for line in &sheet.lines {
+            let layer = match line.kind {
+                LineKind::Fold => CutLayer::Fold,
+                LineKind::Valley => CutLayer::Valley,
+                LineKind::Cut | LineKind::Align => continue,
+            };
+            let points_mm = vec![line.from_mm, line.to_mm];
+            piece.paths.push(CutPath { layer, closed: false, points_mm });
+        }
+        // Instructions and the label stay on the paper.
+        let names = ["face ", "edge "];
+        for text in sheet.texts.iter().filter(|t| names.iter().any(|n| t.text.starts_with(n))) {
+            piece.engrave(super::text_outline(text)?);
+        }
+        let [left, lower, right, _] = piece.bounds_mm().ok_or_else(no_net)?;
+        let points = piece.paths.iter_mut().flat_map(|path| &mut path.points_mm);
+        points.for_each(|[x, y]| (*x, *y) = (*x - left + right_mm, *y - lower));
+        right_mm += right - left + GAP_MM;
+        drawing.paths.append(&mut piece.paths);
+    }
+    if drawing.paths.is_empty() { Err(no_net()) } else { Ok(drawing) }
+}
+
+/// The closed outlines that the lines to cut of a net's sheet make; `None` when they make none.
+///
+/// Every line runs with the paper on its left. Where an outline touches itself more than one line
+/// begins; it goes on with the one that leaves the least angle of paper between, which no other
+/// line can divide.
+fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<[f64; 2]>>> {
+    let cuts = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut);
+    let mut left: Vec<[[f64; 2]; 2]> = cuts.map(|line| [line.from_mm, line.to_mm]).collect();
+    let mut outlines = Vec::new();
+    while let Some(first) = left.pop() {
+        let mut outline = vec![first[0]];
+        let mut last = first;
+        loop {
+            let paper_rad = |[from, to]: [[f64; 2]; 2]| {
+                let back = (last[0][1] - last[1][1]).atan2(last[0][0] - last[1][0]);
+                let on = (to[1] - from[1]).atan2(to[0] - from[0]);
+                // Lines one on the other leave a whole turn, not none.
+                TAU - (on - back).rem_euclid(TAU)
+            };
+            let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < JOIN_MM;
+            let next = (0..left.len())
+                .filter(|&n| near(left[n][0], last[1]))
+                .min_by(|&a, &b| paper_rad(left[a]).total_cmp(&paper_rad(left[b])));
+            // The outline may also be back where it began.
+            let closing = near(first[0], last[1]).then(|| paper_rad(first));
+            let next = next.filter(|&n| closing.is_none_or(|angle| paper_rad(left[n]) < angle));
+            match next {
+                Some(next) => {
+                    last = left.swap_remove(next);
+                    outline.push(last[0]);
+                }
+                None if closing.is_some() => break,
+                None => return None,
+            }
+        }
+        outlines.push(outline);
+    }
+    Some(outlines)
 }
 
 /// The faces, or what the seats of the skeleton take of them.

@@ -29,7 +29,7 @@ use crate::target::{LineKind, Panel, Placement, SheetText, Target};
 pub use atlas::Atlas;
 pub use cells::white_outlines;
 pub use check_bar::STROKE_WIDTH_MM;
-pub use cutting::{CutDrawing, CutLayer, CutPath, CuttingError, panels_to_cut};
+pub use cutting::{CutDrawing, CutLayer, CutPath, CuttingError, net_to_cut, panels_to_cut};
 pub use gallery::{GalleryTile, tag_gallery};
 pub use line::strokes_mm;
 

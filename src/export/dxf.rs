@@ -1,15 +1,19 @@
 //! DXF of AutoCAD release 12, as text, in millimetres: the dialect that every cutter reads.
 //!
-//! Closed paths are closed `POLYLINE`s, others are `LINE`s; layers `CUT`, `FOLD` and `ENGRAVE` have
-//! colours of their own, by which cutters tell what to do.
+//! Closed paths are closed `POLYLINE`s, others are `LINE`s; layers `CUT`, `FOLD`, `VALLEY`
+//! and `ENGRAVE` have colours of their own, by which cutters tell what to do.
 
 use std::fmt::Write;
 
 use crate::artwork::{CutDrawing, CutLayer, CutPath};
 
-/// Layers with their colours: red, green, blue.
-const LAYERS: [(CutLayer, &str, u8); 3] =
-    [(CutLayer::Cut, "CUT", 1), (CutLayer::Fold, "FOLD", 3), (CutLayer::Engrave, "ENGRAVE", 5)];
+/// Layers with their colours: red, green, magenta, blue.
+const LAYERS: [(CutLayer, &str, u8); 4] = [
+    (CutLayer::Cut, "CUT", 1),
+    (CutLayer::Fold, "FOLD", 3),
+    (CutLayer::Valley, "VALLEY", 6),
+    (CutLayer::Engrave, "ENGRAVE", 5),
+];
 
 /// The text of a `.dxf` file.
 pub fn text(drawing: &CutDrawing) -> String {

@@ -35,6 +35,7 @@ mod board;
 mod body;
 mod document;
 mod face_page;
+mod finding;
 mod fit;
 mod fold;
 mod marks;
@@ -55,9 +56,10 @@ use fold::Seen;
 use tiles::PlacedPanel;
 
 pub use document::{Document, DocumentError, Format, Page};
+pub use finding::Finding;
 pub use fold::FOLD_TOLERANCE_MM;
 pub use solid::MESH_TOLERANCE_MM;
-pub use verdict::{BodyVerdict, FaceVerdict, Finding, FoldVerdict, SheetVerdict, Verdict};
+pub use verdict::{BodyVerdict, FaceVerdict, FoldVerdict, SheetVerdict, Verdict};
 
 /// Largest deviation of a position or a length, mm: a fifth of what a good printer adds.
 pub const TOLERANCE_MM: f64 = 0.02;

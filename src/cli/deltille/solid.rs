@@ -9,6 +9,7 @@ use super::delivery::Delivery;
 use super::files::{self, File, text_file};
 use super::settings::DEFAULT_DPI;
 use crate::artwork;
+use crate::cli::output::say;
 use crate::export::dsc::{self, Dialect};
 use crate::export::mesh::TexturedMesh;
 use crate::export::{dxf, gltf, obj, stl};
@@ -68,7 +69,9 @@ pub struct Args {
     /// Distance of the seats from the edges of the faces [default: the least that stays solid]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
     rib: Option<String>,
-    /// Write <name>.dxf, the outlines of all panels to cut, in true size (millimetres)
+    /// Write <name>-panels.dxf, the outlines of all faces to cut, or of what the seats of the
+    /// skeleton take, and without --per-face <name>-net.dxf, the net to cut, score and fold
+    /// (millimetres)
     #[arg(long)]
     dxf: bool,
     /// Resolution of the texture, dots per inch [default: 20 texels per tag bit]
@@ -149,7 +152,7 @@ pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
         );
     }
     if inside_out {
-        println!("{}: its faces look inwards; they were turned", path.display());
+        say!("{}: its faces look inwards; they were turned", path.display());
     }
     let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = mesh.args.name.clone().unwrap_or_else(stem);
@@ -174,7 +177,13 @@ pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
     let solid = TargetSpec::Solid(spec.clone());
     let target = Target::build(&name, &solid, Some(&family), layout)?;
     args.delivery.check_beside(&target)?;
-    let files = args.files(&target, &spec, &family)?;
+    // What is cut is the net that is printed, or would be.
+    let net = match args.dxf && !args.per_face {
+        true if printed => Some(target.clone()),
+        true => Some(Target::build(&name, &solid, Some(&family), Some(&paper))?),
+        false => None,
+    };
+    let files = args.files(&target, net.as_ref(), &spec, &family)?;
     args.delivery.deliver(&target, Some(&family), &files, &summary(&target, &spec)?)
 }
 
@@ -227,6 +236,7 @@ impl Args {
     fn files(
         &self,
         target: &Target,
+        net: Option<&Target>,
         spec: &SolidSpec,
         family: &Family,
     ) -> anyhow::Result<Vec<File>> {
@@ -265,7 +275,11 @@ impl Args {
         }
         if self.dxf {
             let text = dxf::text(&artwork::panels_to_cut(target)?);
-            files.push(text_file(format!("{name}.dxf"), text));
+            files.push(text_file(format!("{name}-panels.dxf"), text));
+        }
+        if let Some(net) = net {
+            let text = dxf::text(&artwork::net_to_cut(net)?);
+            files.push(text_file(format!("{name}-net.dxf"), text));
         }
         if with_gltf || self.obj {
             let mesh = TexturedMesh::new(target, Some(family), self.texture_dpi)?;

@@ -129,10 +129,12 @@ fn nets(solid: &Polyhedron, spec: &SolidSpec, faces: &[Face], sides: &Sides) -> 
         return nets;
     }
     // A single face has room for all of its tabs.
-    let halves = std::iter::successors(Some(flat.len() / 2), |most| Some(most / 2));
-    let halves = halves.take_while(|&most| most > 0);
-    let mut small = halves.map(|most| unfold::in_small_pieces(solid, &flat, most));
-    small.find_map(with_tabs).into_iter().collect()
+    let sizes = std::iter::successors(Some(flat.len()), |most| Some(most * 3 / 4));
+    let mut fewest = sizes.take_while(|&most| most > 0).filter_map(|most| {
+        let small = unfold::in_small_pieces(solid, &flat, most).filter_map(with_tabs);
+        small.min_by_key(|net| net.pieces.len())
+    });
+    fewest.next().into_iter().collect()
 }
 
 /// The triangle that the tiles of a face fill, in the panel frame, mm.
