@@ -178,7 +178,7 @@ pub(super) fn check_form(
 }
 
 /// A name such as d25h7 or delTag25h7 must not speak of other bits or another distance.
-pub(super) fn check_name(
+pub(crate) fn check_name(
     name: &str,
     dimension: Dimension,
     distance: u32,

@@ -46,6 +46,7 @@ pub use control::{Control, Progress};
 pub use decoder::{Decoded, Decoder};
 pub use error::FamilyError;
 pub use export::{ExportFormat, export};
+pub(crate) use file::check_name;
 pub use file::{Construction, SCHEMA};
 pub use rules::{Rules, Screen};
 pub use shipped::{shipped_names, smallest_shipped};
