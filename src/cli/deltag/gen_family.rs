@@ -17,9 +17,7 @@ use crate::cli::{interrupt, output, output::say, progress};
 use crate::family::best::Best;
 use crate::family::lexicode::{self, Lexicode};
 use crate::family::search::{self, Search};
-use crate::family::{
-    Control, Family, FamilyError, Progress, Rules, Screen, TagWords, check_name,
-};
+use crate::family::{Control, Family, FamilyError, Progress, Rules, Screen, TagWords, check_name};
 use crate::lattice::Dimension;
 
 /// Told at the end of `--help`.

@@ -149,12 +149,7 @@ impl Arranger {
 
     /// Anneals from a random arrangement; the same for the same seed and number of steps, unless
     /// `halt` ends it early. Returns what the best arrangement is worth, and it.
-    pub fn anneal(
-        &self,
-        seed: u64,
-        steps: u32,
-        halt: impl Fn() -> bool,
-    ) -> (f64, Arrangement) {
+    pub fn anneal(&self, seed: u64, steps: u32, halt: impl Fn() -> bool) -> (f64, Arrangement) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let n = self.space.cycles as usize;
         let flips = self.space.cycles + u32::from(self.space.centre && !self.free_centre);
