@@ -76,11 +76,12 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
 /// that is a matter of a second, and a word is said where they are not what the file claims.
 fn resolve(name_or_path: &str) -> Result<Family, FamilyError> {
     let family = Family::resolve(name_or_path)?;
-    if !shipped_names().contains(&name_or_path) && family.len() <= PAIRS_COUNTED {
-        if let Some(failure) = certify_codes(&family).failures.first() {
-            let file = Path::new(name_or_path).display();
-            eprintln!("warning: {file} is not what it claims: {failure}");
-        }
+    if !shipped_names().contains(&name_or_path)
+        && family.len() <= PAIRS_COUNTED
+        && let Some(failure) = certify_codes(&family).failures.first()
+    {
+        let file = Path::new(name_or_path).display();
+        eprintln!("warning: {file} is not what it claims: {failure}");
     }
     Ok(family)
 }
