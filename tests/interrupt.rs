@@ -148,6 +148,21 @@ fn an_interrupted_best_search_keeps_the_best_so_far() {
     }
 }
 
+/// The pages are there whole; not all were compared.
+#[test]
+fn an_interrupted_sheet_ends_between_pages() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_deltag"));
+    command.args(["sheet", "d25h7", "-o"]).arg(folder.path());
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for("the signal handler", || handles_interrupts(&mut child));
+    wait_for("the file", || names(folder.path()) == ["d25h7-sheet.pdf"]);
+    let output = interrupt(child);
+    assert_eq!(output.status.code(), Some(130));
+    assert!(text(&output.stderr).starts_with("interrupted: "), "{}", text(&output.stderr));
+    assert_eq!(names(folder.path()), ["d25h7-sheet.pdf"]);
+}
+
 /// Whether a process has come to where Ctrl-C no longer just ends it.
 fn handles_interrupts(child: &mut Child) -> bool {
     assert!(child.try_wait().unwrap().is_none(), "it has ended");

@@ -37,6 +37,11 @@ fn a_whole_family_takes_several_pages() {
         .stdout(contains("d16h5-sheet-3.svg: verified").and(contains("tags exact").count(3)));
     let text = std::fs::read_to_string(folder.path().join("d16h5-sheet-1.svg")).unwrap();
     assert!(text.contains("fingerprint"), "the fingerprint is in the metadata");
+    let nowhere = folder.path().join("nowhere");
+    sheet("d16h5", &["--png", "--paper", "3000x3000mm", "--dpi", "2400"], &nowhere)
+        .code(2)
+        .stderr(contains("--dpi").and(contains(".deltille-").not()));
+    assert!(!nowhere.exists());
     let pdf = tempfile::tempdir().unwrap();
     sheet("d16h5", &["--edge", "15mm"], pdf.path()).success().stdout(contains("78 tags exact"));
 }

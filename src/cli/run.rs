@@ -11,6 +11,11 @@ pub const FAILED: u8 = 1;
 /// Exit code when Ctrl-C came before the work was done, as a shell has it.
 pub const INTERRUPTED: u8 = 130;
 
+/// Ctrl-C came, and this is how things stand. Ends a program with the exit code [`INTERRUPTED`].
+#[derive(Debug, thiserror::Error)]
+#[error("interrupted: {0}")]
+pub struct Interrupted(pub &'static str);
+
 /// Parses the arguments and runs a program; errors become one line on standard error.
 pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> ExitCode {
     let result = match A::try_parse() {
@@ -23,14 +28,23 @@ pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> Ex
         }
     };
     result.unwrap_or_else(|error| {
+        if let Some(interrupted) = error.downcast_ref::<Interrupted>() {
+            eprintln!("{interrupted}");
+            return ExitCode::from(INTERRUPTED);
+        }
         report(&error);
         ExitCode::from(BAD_INPUT)
     })
 }
 
-/// Prints an error and its causes on one line; a cause that the message above it tells already is
-/// left out.
+/// Prints an error and its causes on one line.
 pub fn report(error: &anyhow::Error) {
+    eprintln!("error: {}", message(error));
+}
+
+/// An error and its causes on one line; a cause that the message above it tells already is left
+/// out.
+pub fn message(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain().map(ToString::to_string) {
         if text.is_empty() {
@@ -39,11 +53,19 @@ pub fn report(error: &anyhow::Error) {
             text = format!("{text}: {cause}");
         }
     }
-    eprintln!("error: {}", text.replace('\n', " "));
+    text.replace('\n', " ")
 }
 
 /// The first paragraph of a message of clap, and its tip, on one line.
 fn one_line(error: &clap::Error) -> String {
+    if error.kind() == clap::error::ErrorKind::InvalidUtf8 {
+        let arguments = (1..).zip(std::env::args_os().skip(1));
+        let wrong: Vec<String> = arguments
+            .filter(|(_, argument)| argument.to_str().is_none())
+            .map(|(i, argument)| format!("{i} (`{}`)", argument.to_string_lossy()))
+            .collect();
+        return format!("argument {} is not UTF-8 text", wrong.join(" or "));
+    }
     let text = error.to_string();
     let mut paragraphs = text
         .split("\n\n")

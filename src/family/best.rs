@@ -16,6 +16,7 @@ use super::algebra::cosets::{CosetGraph, CosetUnion, MAX_SYNDROME_BITS};
 use super::algebra::quasicyclic::{Symmetry, random_code};
 use super::algebra::record::has_free_centre;
 use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, residue};
+use super::bounds::bounds;
 use super::polish::{Effort, polish};
 use super::search::Search;
 use super::{Construction, Control, Family, FamilyError, Rules, Screen, TagWords};
@@ -73,17 +74,23 @@ impl Best {
         let screen = Screen::new(TagWords::new(self.dimension), self.distance, &self.rules);
         let start = Instant::now();
         // Most of the gain comes from good sources and arrangements, at 25 bits and fewer also
-        // from exchanging codes.
+        // from exchanging codes, where there is time for it.
         let small = self.exchange && self.dimension.bits() <= super::polish::MAX_BITS;
         let until = |share: f64| start + self.time.mul_f64(share);
-        let [sources, arrangements] = if small { [0.3, 0.5] } else { [0.6, 1.0] };
+        let [sources, arrangements] = match (small, self.exchange_pays()) {
+            (false, _) => [0.6, 1.0],
+            (true, false) => [0.6, 0.9],
+            (true, true) => [0.3, 0.5],
+        };
+        let most = self.most();
         let mut candidates = self.sources(until(sources), start, control);
         self.rearrange(&mut candidates, until(arrangements), start, control);
 
         let mut best: Option<(Vec<u64>, Construction)> = None;
         for candidate in candidates {
             let left = until(1.0).saturating_duration_since(Instant::now());
-            if best.is_some() && (left.is_zero() || !small || control.is_cancelled()) {
+            let over = left.is_zero() || !small || control.is_cancelled();
+            if best.as_ref().is_some_and(|(codes, _)| over || codes.len() >= most) {
                 break;
             }
             let end = Instant::now() + left.mul_f64(0.7);
@@ -99,6 +106,19 @@ impl Best {
         };
         let rules = self.rules.clone();
         Family::new(name, self.dimension, self.distance, codes, rules, construction)
+    }
+
+    /// Whether there is time to gain more by exchanging codes than better sources gain: in a few
+    /// seconds not even the conflicts are counted.
+    fn exchange_pays(&self) -> bool {
+        const LEAST: Duration = Duration::from_secs(20);
+        self.exchange && self.time >= LEAST
+    }
+
+    /// No family is larger; once there are so many codes, the search is over.
+    fn most(&self) -> usize {
+        let bounds = bounds(self.dimension, self.distance);
+        bounds.linear_programming.min(bounds.sphere_packing) as usize
     }
 
     fn thousandths(&self, start: Instant) -> u64 {
@@ -117,13 +137,16 @@ impl Best {
         let mut kept: Vec<Candidate> = Vec::new();
         let mut promising: Vec<(usize, Shape)> = Vec::new();
         let mut most_orbits = 0;
+        let enough = self.most();
+        let halt = || Instant::now() >= until || control.is_cancelled();
         let mut draw = 0;
         loop {
             let most = most_orbits;
             let batch: Vec<Draw> = (draw..draw + BATCH)
                 .into_par_iter()
-                .filter(|_| !control.is_cancelled())
-                .map(|i| self.candidate(self.seed.wrapping_add(i), i, most, &promising))
+                // However short the time is, there are some draws.
+                .filter(|&i| !control.is_cancelled() && (i < BATCH || !halt()))
+                .map(|i| self.candidate(self.seed.wrapping_add(i), i, most, &promising, &halt))
                 .collect();
             draw += BATCH;
             for Draw { orbits, shape, candidate } in batch {
@@ -148,7 +171,7 @@ impl Best {
             promising.truncate(PROMISING);
             let best = kept.first().map_or(0, |c| c.worth as usize);
             control.report(self.thousandths(start), 1000, best);
-            if Instant::now() >= until || control.is_cancelled() {
+            if halt() || best >= enough {
                 return kept;
             }
         }
@@ -161,6 +184,7 @@ impl Best {
         draw: u64,
         most_orbits: usize,
         promising: &[(usize, Shape)],
+        halt: &(dyn Fn() -> bool + Sync),
     ) -> Draw {
         /// Share of the most orbits seen from which on an arrangement is tried. Small codes differ
         /// more in how many of their words pass, and are arranged quickly.
@@ -172,7 +196,7 @@ impl Best {
         let Some((source, code, shape)) = self.linear_code(draw, promising, &mut random) else {
             return Draw { orbits: 0, shape: None, candidate: None };
         };
-        let union = self.with_cosets(code, &mut random);
+        let union = self.with_cosets(code, &mut random, halt);
         let orbits = union.orbits();
         let count = orbits.len();
         let share = WORTH_A_TRY[usize::from(most_orbits > MANY_ORBITS)];
@@ -180,7 +204,7 @@ impl Best {
             return Draw { orbits: count, shape, candidate: None };
         }
         let arranger = self.arranger(&union, orbits);
-        let (worth, arrangement) = arranger.anneal(random.random(), STEPS);
+        let (worth, arrangement) = arranger.anneal(random.random(), STEPS, halt);
         let candidate = Some(Candidate { source, union, arrangement, worth });
         Draw { orbits: count, shape, candidate }
     }
@@ -197,7 +221,7 @@ impl Best {
         let orbits = orbits.into_iter().step_by(step.max(1)).collect();
         let arranger =
             Arranger::new(self.dimension, self.distance, &self.rules, orbits, free_centre);
-        if self.exchange
+        if self.exchange_pays()
             && self.rules.min_complexity > 0.0
             && self.dimension.bits() <= super::polish::MAX_BITS
             && min_distance(union) > self.distance
@@ -267,7 +291,12 @@ impl Best {
         (code.dimension() > 0).then_some((source, code, Some(shape)))
     }
 
-    fn with_cosets(&self, code: Span, random: &mut ChaCha8Rng) -> CosetUnion {
+    fn with_cosets(
+        &self,
+        code: Span,
+        random: &mut ChaCha8Rng,
+        halt: &(dyn Fn() -> bool + Sync),
+    ) -> CosetUnion {
         /// Random starts of the clique search; in small spaces they cost next to nothing.
         const STARTS: [u64; 2] = [40, 8];
         let space = CycleSpace::of(self.dimension);
@@ -275,13 +304,14 @@ impl Best {
         if space.bits() - code.dimension() > SYNDROME_BITS {
             return alone;
         }
-        let Some(graph) = CosetGraph::new(space, code, self.distance) else { return alone };
+        let Some(graph) = CosetGraph::new(space, code, self.distance, halt) else { return alone };
         if graph.vertices() == 0 {
             return alone;
         }
         let first: u64 = random.random();
         (0..STARTS[usize::from(space.bits() > 16)])
-            .map(|i| graph.grow(first.wrapping_add(i)))
+            .take_while(|&i| i == 0 || !halt())
+            .map(|i| graph.grow(first.wrapping_add(i), halt))
             .max_by_key(|union| union.orbits().len())
             .unwrap_or(alone)
     }
@@ -297,12 +327,13 @@ impl Best {
         let over = || Instant::now() >= until || control.is_cancelled();
         let arrangers: Vec<Arranger> =
             candidates.iter().map(|c| self.arranger(&c.union, c.union.orbits())).collect();
+        let enough = self.most();
         let mut steps = 4_000;
         for round in 0.. {
             candidates.par_iter_mut().zip(&arrangers).for_each(|(candidate, arranger)| {
                 if !over() {
                     let seed = self.seed.wrapping_add(1_000_003 * (round + 1));
-                    let (worth, arrangement) = arranger.anneal(seed, steps);
+                    let (worth, arrangement) = arranger.anneal(seed, steps, over);
                     if worth > candidate.worth {
                         (candidate.worth, candidate.arrangement) = (worth, arrangement);
                     }
@@ -310,7 +341,7 @@ impl Best {
             });
             let best = candidates.iter().map(|c| c.worth as usize).max().unwrap_or(0);
             control.report(self.thousandths(start), 1000, best);
-            if over() || candidates.is_empty() {
+            if over() || candidates.is_empty() || best >= enough {
                 break;
             }
             steps = (steps * 3 / 2).min(200_000);
@@ -341,7 +372,7 @@ impl Best {
         if !self.exchange || self.dimension.bits() > super::polish::MAX_BITS {
             return Ok((codes, Construction::Algebraic(construction)));
         }
-        let effort = Effort { seed: self.seed, rounds: 50, steps: 400_000 };
+        let effort = Effort { seed: self.seed, rounds: 50, steps: 400_000, most: self.most() };
         let quiet = Control { report: None, ..control };
         let polished = polish(screen, codes.clone(), effort, quiet, || Instant::now() >= end);
         let exchanged: Vec<u64> =

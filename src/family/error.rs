@@ -29,8 +29,11 @@ pub enum FamilyError {
         error: Box<FamilyError>,
     },
     /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
-    #[error("not a family file: {0}; generate it anew with `deltag gen-family`")]
+    #[error("not a family file ({}); generate it anew with `deltag gen-family`", plain(.0))]
     Json(#[from] serde_json::Error),
+    /// Not even text.
+    #[error("not a family file (it is not UTF-8 text); name a .json family file")]
+    NotText,
     /// Another schema, or another version of it.
     #[error(
         "field `schema` is `{found}`, this version reads `{}`: generate the file anew with \
@@ -75,4 +78,20 @@ impl FamilyError {
             _ => false,
         }
     }
+}
+
+/// Where a text is no family file, and why, in words that are not Rust's.
+fn plain(error: &serde_json::Error) -> String {
+    use serde_json::error::Category;
+    let text = error.to_string();
+    let named = ["unknown field", "missing field", "duplicate field"];
+    let problem = match error.classify() {
+        Category::Data if named.iter().any(|start| text.starts_with(start)) => {
+            text.split([',', ' ']).take(3).collect::<Vec<_>>().join(" ")
+        }
+        Category::Data => "there is a value of the wrong kind".to_owned(),
+        Category::Eof => "the text ends too early".to_owned(),
+        Category::Syntax | Category::Io => "the text is not JSON".to_owned(),
+    };
+    format!("line {}, column {}: {problem}", error.line(), error.column())
 }

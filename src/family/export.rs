@@ -17,10 +17,9 @@ pub enum ExportFormat {
     Json,
     /// One hexadecimal word a line.
     Text,
-    /// A dictionary in OpenCV's FileStorage YAML (`nmarkers`, `markersize`, `marker_0`, …): each
-    /// marker is its bits from the most significant, so row by row from the apex down, since row
-    /// by row the cells are counted. OpenCV's own detector looks for squares and will not find
-    /// DelTags; the file carries the codes to programs built on its types.
+    /// YAML for `cv::FileStorage`: name, bits, distance, size, fingerprint and the codes as
+    /// hexadecimal texts. No ArUco dictionary: those are of squares that turn by 90°, and OpenCV's
+    /// detector would neither find triangular tags nor keep their distance.
     OpenCv,
 }
 
@@ -89,18 +88,16 @@ pub fn export(family: &Family, format: ExportFormat) -> String {
         ExportFormat::Json => family.to_json(),
         ExportFormat::Text => family.codes().iter().map(|&c| words.hex(c) + "\n").collect(),
         ExportFormat::OpenCv => {
-            let markers: String = (0..)
-                .zip(family.codes())
-                .map(|(id, code)| {
-                    format!("marker_{id}: \"{code:0width$b}\"\n", width = bits as usize)
-                })
-                .collect();
+            let codes: String =
+                family.codes().iter().map(|&c| format!("   - \"{}\"\n", words.hex(c))).collect();
             format!(
-                "%YAML:1.0\n---\n# {about}\nnmarkers: {}\nmarkersize: {}\n\
-                 maxCorrectionBits: {}\n{markers}",
+                "%YAML:1.0\n---\n# {about}\n# triangular tags: not an ArUco dictionary\n\
+                 name: \"{}\"\nbits: {bits}\ndistance: {}\nsize: {}\n\
+                 fingerprint: \"{}\"\ncodes:\n{codes}",
+                family.name(),
+                family.distance(),
                 family.len(),
-                family.dimension().rows(),
-                family.correctable()
+                family.fingerprint()
             )
         }
     }

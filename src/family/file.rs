@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::algebra::AlgebraicConstruction;
-use super::{Family, FamilyError, Rules, TagWords};
+use super::{Family, FamilyError, Rules, TagWords, false_positive_rates};
 use crate::lattice::Dimension;
 
 /// Schema and version that this crate writes and reads.
@@ -87,6 +87,14 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
             FamilyError::field(format!("codes[{id}]"), problem)
         })?;
     check_form(&file.name, dimension, file.distance, &codes, &file.rules)?;
+    let rates = false_positive_rates(dimension, file.distance, codes.len());
+    let same = |(stated, rate): (&f64, &f64)| (stated - rate).abs() <= 1e-9 * rate;
+    if rates.len() != file.false_positive_rate.len()
+        || !file.false_positive_rate.iter().zip(&rates).all(same)
+    {
+        let problem = format!("not that of {} such codes, {rates:?}", codes.len());
+        return Err(FamilyError::Claim { field: "false_positive_rate".to_owned(), problem });
+    }
     let fingerprint = fingerprint(dimension, file.distance, &codes);
     if fingerprint != file.fingerprint {
         let problem = format!(
@@ -145,6 +153,7 @@ pub(super) fn check_form(
         let problem = format!("{distance} is not between 1 and the {bits} bits of a tag");
         return Err(FamilyError::field("distance", problem));
     }
+    check_name(name, dimension, distance)?;
     rules.check(bits)?;
     if codes.is_empty() {
         return Err(FamilyError::field("codes", "there is no code"));
@@ -166,6 +175,31 @@ pub(super) fn check_form(
         return Err(FamilyError::Claim { field: format!("codes[{second}]"), problem });
     }
     Ok(())
+}
+
+/// A name such as d25h7 or delTag25h7 must not speak of other bits or another distance.
+pub(crate) fn check_name(
+    name: &str,
+    dimension: Dimension,
+    distance: u32,
+) -> Result<(), FamilyError> {
+    let rest = name.strip_prefix("delTag").or_else(|| name.strip_prefix('d'));
+    let number = |text: &str| text.parse::<u32>().ok();
+    let said = rest.and_then(|rest| rest.split_once('h'));
+    let said = said.and_then(|(bits, distance)| Some((number(bits)?, number(distance)?)));
+    match said {
+        Some(said) if said != (dimension.bits(), distance) => {
+            let problem = format!(
+                "`{name}` speaks of {} bits and distance {}, the family has {} bits and distance \
+                 {distance}",
+                said.0,
+                said.1,
+                dimension.bits()
+            );
+            Err(FamilyError::Claim { field: "name".to_owned(), problem })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// See [`Family::fingerprint`].

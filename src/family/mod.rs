@@ -41,11 +41,12 @@ mod tagwords;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-pub use certificate::{Certificate, certify};
+pub use certificate::{Certificate, certify, certify_codes};
 pub use control::{Control, Progress};
 pub use decoder::{Decoded, Decoder};
 pub use error::FamilyError;
 pub use export::{ExportFormat, export};
+pub(crate) use file::check_name;
 pub use file::{Construction, SCHEMA};
 pub use rules::{Rules, Screen};
 pub use shipped::{shipped_names, smallest_shipped};
@@ -74,7 +75,8 @@ impl Family {
     /// A family of `codes`, in the order of their ids.
     ///
     /// Checks the form (name, code width, no code twice in any turn) but not the distance, which
-    /// [`certify`] proves. The distance histogram is counted here.
+    /// [`certify`] proves. The distance histogram is counted here. A name that speaks of bits and a
+    /// distance, such as d25h7 or delTag25h7, must speak of these.
     pub fn new(
         name: &str,
         dimension: Dimension,
@@ -108,9 +110,10 @@ impl Family {
 
     /// Reads a family file.
     pub fn read(path: &Path) -> Result<Self, FamilyError> {
-        let json = std::fs::read_to_string(path)
+        let bytes = std::fs::read(path)
             .map_err(|source| FamilyError::Read { path: path.to_owned(), source })?;
-        Self::from_json(&json)
+        let json = String::from_utf8(bytes).map_err(|_| FamilyError::NotText);
+        json.and_then(|json| Self::from_json(&json))
             .map_err(|error| FamilyError::In { path: path.to_owned(), error: Box::new(error) })
     }
 

@@ -25,6 +25,8 @@ pub(super) struct Effort {
     pub(super) rounds: u32,
     /// Moves of the local search in a round.
     pub(super) steps: u64,
+    /// So many codes are enough.
+    pub(super) most: usize,
 }
 
 /// A family at least as large as `codes`, which has to be valid. Every code of the result is
@@ -42,7 +44,7 @@ pub(super) fn polish(
     let mut best = codes;
     let halt = || control.is_cancelled() || stop();
     for number in 0..effort.rounds {
-        if halt() {
+        if halt() || best.len() >= effort.most {
             break;
         }
         best = round(screen, &best, effort, number, halt);
@@ -62,7 +64,7 @@ pub(super) fn round(
 ) -> Vec<u64> {
     let mut random = ChaCha8Rng::seed_from_u64(effort.seed);
     random.set_stream(number.into());
-    let pool = candidates(screen, codes, &mut random);
+    let Some(pool) = candidates(screen, codes, &mut random, &halt) else { return codes.to_vec() };
     let turned: Vec<u64> = pool.iter().flat_map(|&w| screen.words().turns(w)).collect();
     let graph = ConflictGraph::new(pool.len(), |i| {
         if halt() {
@@ -83,12 +85,21 @@ pub(super) fn round(
     found.into_iter().map(|i| pool[i as usize]).collect()
 }
 
-/// The codes, then the words with the fewest conflicts, up to [`POOL`] in all.
-fn candidates(screen: &Screen, codes: &[u64], random: &mut ChaCha8Rng) -> Vec<u64> {
+/// The codes, then the words with the fewest conflicts, up to [`POOL`] in all; nothing where `halt`
+/// came first.
+fn candidates(
+    screen: &Screen,
+    codes: &[u64],
+    random: &mut ChaCha8Rng,
+    halt: impl Fn() -> bool,
+) -> Option<Vec<u64>> {
     let words = screen.words();
     let bits = words.dimension().bits();
     let mut conflicts = vec![0u8; 1 << bits];
     for &code in codes {
+        if halt() {
+            return None;
+        }
         for word in words.turns(code) {
             count_ball(&mut conflicts, word as usize, bits, screen.distance() - 1);
         }
@@ -117,7 +128,7 @@ fn candidates(screen: &Screen, codes: &[u64], random: &mut ChaCha8Rng) -> Vec<u6
             break;
         }
     }
-    pool
+    Some(pool)
 }
 
 /// Adds one to the count of every word within `radius` of `word`.

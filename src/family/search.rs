@@ -54,7 +54,8 @@ impl Search {
             let problem = format!("local search works up to {MAX_BITS} bits, not with {bits}");
             return Err(FamilyError::field("bits", problem));
         }
-        let effort = Effort { seed: self.seed, rounds: self.rounds, steps: self.steps };
+        let effort =
+            Effort { seed: self.seed, rounds: self.rounds, steps: self.steps, most: usize::MAX };
         let halt = || control.is_cancelled();
         while checkpoint.rounds_done < self.rounds {
             control.check()?;

@@ -46,6 +46,7 @@ mod tiles;
 mod verdict;
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::detect::{Detector, DetectorConfig};
 use crate::export::sheet_file_name;
@@ -76,6 +77,9 @@ pub enum VerifyError {
     /// The artifact cannot be read.
     #[error(transparent)]
     Document(#[from] DocumentError),
+    /// The comparison was stopped from outside.
+    #[error("interrupted before all was compared")]
+    Cancelled,
     /// The target says nothing about paper.
     #[error("target {0} has no sheets: it was not laid out on paper")]
     NoSheets(String),
@@ -104,6 +108,7 @@ pub struct Verifier<'a> {
     target: &'a Target,
     family: Option<&'a Family>,
     detector: Detector,
+    cancel: Option<&'a AtomicBool>,
 }
 
 impl<'a> Verifier<'a> {
@@ -127,7 +132,13 @@ impl<'a> Verifier<'a> {
             }
         }
         let detector = Detector::for_target(target, family, DetectorConfig::default());
-        Ok(Self { target, family, detector })
+        Ok(Self { target, family, detector, cancel: None })
+    }
+
+    /// The same, and looking at `flag` before each page: once it is set, [`verify`](Self::verify)
+    /// ends with [`VerifyError::Cancelled`].
+    pub fn stopped_by(self, flag: &'a AtomicBool) -> Self {
+        Self { cancel: Some(flag), ..self }
     }
 
     /// The files that are verified together with one: the pages of a net, each in a file of its
@@ -185,6 +196,9 @@ impl<'a> Verifier<'a> {
         let (mut verdicts, mut seen) = (Vec::new(), Vec::new());
         let mut first = 0;
         for (index, layout) in self.target.sheets.iter().enumerate() {
+            if self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                return Err(VerifyError::Cancelled);
+            }
             let pages = &sources[first..first + layout.page_count()];
             first += layout.page_count();
             let Some(pages) = pages.iter().copied().collect::<Option<Vec<Source>>>() else {

@@ -27,7 +27,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let words = TagWords::new(family.dimension());
     let screen = Screen::new(words.clone(), family.distance(), family.rules());
-    for rank in args.rank..args.rank.saturating_add(args.count) {
+    for rank in args.rank..=args.rank.saturating_add(args.count - 1) {
         let (word, count) = construction.by_rank(family.dimension(), rank).with_context(|| {
             format!("{}: more than a linear code, its codes have no rank", args.family)
         })?;

@@ -1,11 +1,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use anyhow::Context;
 use clap::ValueEnum;
 
 use super::values::name;
 use crate::cli::output::{self, say};
-use crate::family::{ExportFormat, Family, export};
+use crate::family::{ExportFormat, export};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -34,12 +35,13 @@ enum Format {
     Json,
     /// One hexadecimal word a line
     Txt,
-    /// OpenCV FileStorage YAML
+    /// YAML for cv::FileStorage, with the codes as texts; not an ArUco dictionary, the tags are
+    /// triangular
     Opencv,
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = Family::resolve(&args.family)?;
+    let family = super::resolve(&args.family)?;
     let format = match args.format {
         Format::C => ExportFormat::C,
         Format::Rust => ExportFormat::Rust,
@@ -58,7 +60,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some(place) => {
             let stem = args.name.as_deref().unwrap_or(family.name());
             let path = output::file(&place, stem, format.extension())?;
-            output::write(&path, text.as_bytes())?;
+            output::write(&path, text.as_bytes()).context("-o")?;
             say!("{}", path.display());
         }
     }

@@ -1,6 +1,6 @@
 //! `deltag gen-family`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -12,12 +12,12 @@ use super::checkpoint::CheckpointFile;
 use super::parameters::Parameters;
 use super::rules::RuleArgs;
 use super::values::{name, number, whole};
-use crate::cli::run::INTERRUPTED;
+use crate::cli::run::{FAILED, INTERRUPTED};
 use crate::cli::{interrupt, output, output::say, progress};
 use crate::family::best::Best;
 use crate::family::lexicode::{self, Lexicode};
 use crate::family::search::{self, Search};
-use crate::family::{Control, Family, FamilyError, Progress, Rules, Screen, TagWords};
+use crate::family::{Control, Family, FamilyError, Progress, Rules, Screen, TagWords, check_name};
 use crate::lattice::Dimension;
 
 /// Told at the end of `--help`.
@@ -61,6 +61,9 @@ pub(super) struct Args {
     /// Folder for the file, or the file itself
     #[arg(short, long, default_value = "families")]
     output: PathBuf,
+    /// Replace a family file also by one with fewer codes, other bits or another distance
+    #[arg(long)]
+    force: bool,
     /// Threads [default: one per processor]
     #[arg(short = 'j', long, value_name = "N", allow_negative_numbers = true,
           value_parser = whole(1..=1024u16))]
@@ -110,7 +113,11 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
     let path = output::file(&args.output, &name, "json")?;
+    if let Err(FamilyError::Claim { problem, .. }) = check_name(&name, dimension, distance) {
+        bail!("--name: {problem}");
+    }
     let rules = args.rules.rules(args.family)?;
+    args.check_replaced(&path)?;
     output::check_writable(&path)?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
@@ -133,9 +140,24 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         Method::Best | Method::Algebraic => args.best(&name, rules, control),
     };
     bar.finish_and_clear();
-    let Outcome { family, interrupted, exit } = outcome?;
+    let Outcome { family, interrupted, mut exit } = outcome?;
 
+    let mut path = path;
     if let Some(family) = &family {
+        // What took hours is not lost, and neither is what was there.
+        if let Some(there) = there(&path).filter(|f| !args.force && f.len() > family.len()) {
+            let beside = free_name(&path);
+            eprintln!(
+                "error: {} keeps its {} codes, more than these {}, which go to {}; --force replaces \
+                 it, -o names another place",
+                path.display(),
+                there.len(),
+                family.len(),
+                beside.display()
+            );
+            path = beside;
+            exit = ExitCode::from(FAILED);
+        }
         output::write(&path, family.to_json().as_bytes())?;
     }
     match interrupted {
@@ -155,6 +177,18 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(exit)
 }
 
+/// The family that a file holds, if it holds one.
+fn there(path: &Path) -> Option<Family> {
+    path.exists().then(|| Family::read(path).ok()).flatten()
+}
+
+/// A name beside that of a file, with a number, that nothing has yet.
+fn free_name(path: &Path) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let numbered = (2u32..).map(|n| path.with_file_name(format!("{stem}-{n}.json")));
+    numbered.into_iter().find(|path| !path.exists()).unwrap_or_else(|| path.to_owned())
+}
+
 /// Size of a family file at most: 64 MiB, of which a little is for what is not codes.
 pub(super) const FILE_LIMIT: u64 = (64 << 20) - (64 << 10);
 
@@ -170,6 +204,28 @@ impl Args {
 
     fn seed(&self) -> u64 {
         self.seed.unwrap_or(1)
+    }
+
+    /// Refuses to lose a file of other tags, or one that is no family file at all.
+    fn check_replaced(&self, path: &Path) -> anyhow::Result<()> {
+        if self.force || !path.exists() {
+            return Ok(());
+        }
+        let Parameters { dimension, distance } = self.family;
+        let file = path.display();
+        match there(path) {
+            Some(family) if family.dimension() == dimension && family.distance() == distance => {
+                Ok(())
+            }
+            Some(family) => bail!(
+                "-o: {file} holds {} codes of {} bits, distance {}; --force replaces it, --name \
+                 gives another name",
+                family.len(),
+                family.dimension().bits(),
+                family.distance()
+            ),
+            None => bail!("-o: {file} is no family file; --force replaces it"),
+        }
     }
 
     /// Refuses what the method would ignore or cannot do.

@@ -21,7 +21,7 @@ fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = Family::resolve(&args.family)?;
+    let family = super::resolve(&args.family)?;
     let (bits, rules) = (family.dimension().bits(), family.rules());
     let pairs = TagWords::new(family.dimension()).pairs();
     say!("{}, fingerprint {}", family.name(), family.fingerprint());

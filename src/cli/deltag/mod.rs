@@ -15,9 +15,12 @@ mod show;
 mod values;
 mod verify_family;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::family::{Family, FamilyError, PAIRS_COUNTED, certify_codes, shipped_names};
 
 /// Search, check, list and draw DelTag code families.
 #[derive(Parser)]
@@ -32,7 +35,7 @@ enum Command {
     /// Search a family such as d25h7 and write its file
     #[command(after_help = gen_family::HELP)]
     GenFamily(gen_family::Args),
-    /// Check every claim of a family file from nothing but its codes
+    /// Check what a family file claims from nothing but its codes
     #[command(after_help = verify_family::HELP)]
     VerifyFamily(verify_family::Args),
     /// Tell all about a family
@@ -67,4 +70,18 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
         Command::Sheet(args) => sheet::run(args),
         Command::List(args) => list::run(args),
     }
+}
+
+/// A family to make something of. The codes of a file that comes from elsewhere are compared where
+/// that is a matter of a second, and a word is said where they are not what the file claims.
+fn resolve(name_or_path: &str) -> Result<Family, FamilyError> {
+    let family = Family::resolve(name_or_path)?;
+    if !shipped_names().contains(&name_or_path)
+        && family.len() <= PAIRS_COUNTED
+        && let Some(failure) = certify_codes(&family).failures.first()
+    {
+        let file = Path::new(name_or_path).display();
+        eprintln!("warning: {file} is not what it claims: {failure}");
+    }
+    Ok(family)
 }

@@ -18,6 +18,11 @@ impl FromStr for Parameters {
             .and_then(|rest| rest.split_once('h'))
             .and_then(|(b, h)| Some((b.parse().ok()?, h.parse().ok()?)))
             .ok_or("write bits and distance such as d25h7")?;
+        if format!("d{bits}h{distance}") != text {
+            return Err(
+                "write bits and distance without signs and leading zeros, such as d25h7".to_owned()
+            );
+        }
         let dimension = Dimension::from_bits(bits).map_err(|e| e.to_string())?;
         if !(1..=bits).contains(&distance) {
             return Err(format!("the distance must be between 1 and the {bits} bits"));

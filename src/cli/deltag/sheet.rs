@@ -8,13 +8,13 @@ use anyhow::{Context, ensure};
 use super::values::{Ids, name, whole};
 use crate::artwork;
 use crate::cli::deltille::files::{Formats, drawn, write_all};
+use crate::cli::interrupt;
 use crate::cli::output::say;
-use crate::cli::run::FAILED;
-use crate::family::Family;
+use crate::cli::run::{FAILED, Interrupted};
 use crate::target::{
     DEFAULT_MARGIN_MM, PaperSpec, TagSheetSpec, Target, TargetSpec, parse_length_mm,
 };
-use crate::verify::Verifier;
+use crate::verify::{Verifier, VerifyError};
 
 /// More pages at once are a mistake.
 const MOST_PAGES: usize = 200;
@@ -67,7 +67,7 @@ pub(super) struct Args {
 
 /// Lays out the tags, writes the pages, and verifies what it wrote.
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = Family::resolve(&args.family)?;
+    let family = super::resolve(&args.family)?;
     let length =
         |option: &'static str, text: &str| parse_length_mm(text).with_context(|| option.to_owned());
     let paper = PaperSpec {
@@ -119,10 +119,15 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.no_verify {
         return Ok(ExitCode::SUCCESS);
     }
-    let verifier = Verifier::new(&target, Some(&family))?;
+    let verifier = Verifier::new(&target, Some(&family))?.stopped_by(interrupt::flag());
     let mut passed = true;
     for path in &written {
-        let verdict = verifier.verify(path)?;
+        let verdict = match verifier.verify(path) {
+            Err(VerifyError::Cancelled) => {
+                return Err(Interrupted("the files are whole, but were not all compared").into());
+            }
+            verdict => verdict?,
+        };
         say!("{verdict}");
         passed &= verdict.passed;
     }

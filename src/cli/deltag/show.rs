@@ -1,11 +1,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use anyhow::Context;
+
 use super::values::{Ids, name, whole};
 use crate::artwork::{Artwork, GalleryTile, tag_gallery};
 use crate::cli::output::{self, say};
 use crate::export::{png, svg};
-use crate::family::Family;
 
 /// Most tags on one picture: a sheet of A0 size at the default edge.
 const MOST_TAGS: usize = 600;
@@ -14,9 +15,9 @@ const MOST_TAGS: usize = 600;
 pub(super) struct Args {
     /// A name from `deltag list`, or a family file
     family: String,
-    /// Which tags: ids and ranges such as 0-9 or 3,7,20-25
-    #[arg(long, default_value = "0-9", allow_hyphen_values = true)]
-    ids: Ids,
+    /// Which tags: ids and ranges such as 0-9 or 3,7,20-25 [default: the first ten]
+    #[arg(long, allow_hyphen_values = true)]
+    ids: Option<Ids>,
     /// Write an SVG; so it is where --png is not asked for
     #[arg(long)]
     svg: bool,
@@ -39,9 +40,10 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = Family::resolve(&args.family)?;
-    args.ids.check(&family)?;
-    let Ids(ids) = args.ids;
+    let family = super::resolve(&args.family)?;
+    let ids = args.ids.unwrap_or_else(|| Ids((0..10).take(family.len()).collect()));
+    ids.check(&family)?;
+    let Ids(ids) = ids;
     anyhow::ensure!(
         ids.len() <= MOST_TAGS,
         "--ids: more than {MOST_TAGS} tags do not fit on one picture; `deltag sheet` takes more"
@@ -57,14 +59,14 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let title = format!("DelTags of family {}", family.name());
     let mut written = Vec::new();
     if let Some(path) = png_path {
-        output::make_folder_of(&path)?;
-        png::write(&sheet, &title, &path, f64::from(args.dpi.unwrap_or(200)))?;
+        output::make_folder_of(&path).context("-o")?;
+        png::write(&sheet, &title, &path, f64::from(args.dpi.unwrap_or(200))).context("-o")?;
         written.push(path);
     }
     if let Some(path) = svg_path {
-        output::make_folder_of(&path)?;
+        output::make_folder_of(&path).context("-o")?;
         let subject = format!("fingerprint {}", family.fingerprint());
-        svg::write(&Artwork { title, subject, sheets: vec![sheet] }, 0, &path)?;
+        svg::write(&Artwork { title, subject, sheets: vec![sheet] }, 0, &path).context("-o")?;
         written.push(path);
     }
     for path in written {

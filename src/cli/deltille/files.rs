@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow};
 
 use crate::artwork::Artwork;
 use crate::cli::interrupt;
+use crate::cli::run::{Interrupted, message};
 use crate::export::{atomic, pdf, png, sheet_file_name, svg};
 
 /// Writes one file to a path.
@@ -69,17 +70,37 @@ pub fn drawn(name: &str, artwork: Artwork, formats: Formats, dpi: u32) -> Vec<Fi
 
 /// Writes all files into a folder beside their places, then moves them there: all or none.
 pub fn write_all(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
+    let missing: Vec<&Path> =
+        folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).collect();
+    let written = write_here(folder, files);
+    if written.is_err() {
+        for folder in missing {
+            // Only a folder that is still empty goes.
+            let _ = fs::remove_dir(folder);
+        }
+    }
+    written
+}
+
+fn write_here(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
     let interrupted = interrupt::flag();
+    let check = || match interrupted.load(Ordering::Relaxed) {
+        true => Err(Interrupted("nothing was written")),
+        false => Ok(()),
+    };
     let context = || format!("-o: cannot write to {}", folder.display());
     fs::create_dir_all(folder).with_context(context)?;
     let staging = tempfile::Builder::new().prefix(".deltille-").tempdir_in(folder);
     let staging = staging.with_context(context)?;
     for file in files {
-        if interrupted.load(Ordering::Relaxed) {
-            bail!("interrupted; nothing was written");
-        }
-        (file.write)(&staging.path().join(&file.name))?;
+        check()?;
+        (file.write)(&staging.path().join(&file.name)).map_err(|error| {
+            // The name of the temporary folder means nothing to the user.
+            let staged = staging.path().display().to_string();
+            anyhow!(message(&error).replace(&staged, &folder.display().to_string()))
+        })?;
     }
+    check()?;
     files
         .iter()
         .map(|file| {

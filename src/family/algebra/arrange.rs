@@ -147,9 +147,9 @@ impl Arranger {
             .sum()
     }
 
-    /// Anneals from a random arrangement; the same for the same seed and number of steps. Returns
-    /// what the best arrangement is worth, and it.
-    pub fn anneal(&self, seed: u64, steps: u32) -> (f64, Arrangement) {
+    /// Anneals from a random arrangement; the same for the same seed and number of steps, unless
+    /// `halt` ends it early. Returns what the best arrangement is worth, and it.
+    pub fn anneal(&self, seed: u64, steps: u32, halt: impl Fn() -> bool) -> (f64, Arrangement) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let n = self.space.cycles as usize;
         let flips = self.space.cycles + u32::from(self.space.centre && !self.free_centre);
@@ -163,6 +163,9 @@ impl Arranger {
         // From a spread of scores as large as chance makes it down to single words.
         let hot = (self.words.len() as f64).sqrt().max(2.0) * 0.5;
         for step in 0..steps {
+            if halt() {
+                break;
+            }
             let temperature = hot * (0.3 / hot).powf(f64::from(step) / f64::from(steps));
             let mut next = now.clone();
             match random.random_range(0..10) {
@@ -251,7 +254,7 @@ mod tests {
             let rules = Rules::published(distance);
             let screen = Screen::new(TagWords::new(dimension), distance, &rules);
             let arranger = Arranger::new(dimension, distance, &rules, words.clone(), false);
-            let (score, arrangement) = arranger.anneal(3, 20);
+            let (score, arrangement) = arranger.anneal(3, 20, || false);
             let score = score as usize;
             let fine = |words: &[u64]| words.iter().filter(|&&w| screen.look_is_fine(w)).count();
             assert_eq!(score, fine(&arrangement.apply(dimension, &words)));

@@ -57,8 +57,13 @@ struct Vertex {
 
 impl CosetGraph {
     /// The graph of `code` for `distance`; `None` when the code itself is not that good, or its
-    /// syndromes have more than [`MAX_SYNDROME_BITS`] bits.
-    pub fn new(space: CycleSpace, code: Span, distance: u32) -> Option<Self> {
+    /// syndromes have more than [`MAX_SYNDROME_BITS`] bits, or `halt` ends the work early.
+    pub fn new(
+        space: CycleSpace,
+        code: Span,
+        distance: u32,
+        halt: &dyn Fn() -> bool,
+    ) -> Option<Self> {
         let free_bits = code.free_bits(space.bits());
         let syndrome_bits = free_bits.len() as u32;
         if syndrome_bits > MAX_SYNDROME_BITS {
@@ -67,7 +72,7 @@ impl CosetGraph {
         let syndromes = code.syndromes(space.bits())?;
         let columns: Vec<u32> = (0..space.bits()).map(|i| syndromes.apply(1 << i)).collect();
         let mut marked = vec![0u64; (1usize << syndrome_bits).div_ceil(64)];
-        if !mark(&columns, 0, distance - 1, &mut marked) {
+        if !mark(&columns, 0, distance - 1, &mut marked, halt) {
             return None;
         }
         let turned: Vec<u32> =
@@ -116,14 +121,15 @@ impl CosetGraph {
     }
 
     /// A large union found from one random start: vertices are added one by one, each the one, of
-    /// a few looked at, that leaves most of the others possible.
-    pub fn grow(&self, seed: u64) -> CosetUnion {
+    /// a few looked at, that leaves most of the others possible. It grows until nothing fits any
+    /// more, or `halt` ends it.
+    pub fn grow(&self, seed: u64, halt: impl Fn() -> bool) -> CosetUnion {
         /// Vertices looked at before each choice.
         const LOOK_AT: usize = 12;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut chosen: Vec<Vertex> = Vec::new();
         let mut open = self.vertices.clone();
-        while !open.is_empty() {
+        while !open.is_empty() && !halt() {
             let tries = if open.len() > 50_000 { 1 } else { LOOK_AT.min(open.len()) };
             let best = (0..tries)
                 .map(|_| {
@@ -170,13 +176,25 @@ impl CosetGraph {
     }
 }
 
-/// Marks the sums of up to `weight` columns; false when one of one or more is zero.
-fn mark(columns: &[u32], sum: u32, weight: u32, marked: &mut [u64]) -> bool {
+/// Marks the sums of up to `weight` columns; false when one of one or more is zero, or when `halt`
+/// came first.
+fn mark(
+    columns: &[u32],
+    sum: u32,
+    weight: u32,
+    marked: &mut [u64],
+    halt: &dyn Fn() -> bool,
+) -> bool {
+    /// Some ten thousand sums between two looks at the clock.
+    const LOOK_AT: u32 = 4;
     marked[sum as usize / 64] |= 1 << (sum % 64);
     if weight == 0 {
         return true;
     }
+    if weight == LOOK_AT && halt() {
+        return false;
+    }
     columns.iter().enumerate().all(|(i, column)| {
-        sum != *column && mark(&columns[i + 1..], sum ^ column, weight - 1, marked)
+        sum != *column && mark(&columns[i + 1..], sum ^ column, weight - 1, marked, halt)
     })
 }
