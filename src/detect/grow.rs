@@ -235,9 +235,7 @@ fn corner_near(
 ) -> Option<PlacedSaddle> {
     let image = &pyramid.levels()[0];
     let reach = (MAX_SURPRISE * edge_px).max(1.0);
-    // Where a corner is known to be, anything that passes for one would be taken for it.
-    let stable = |saddle: &Saddle| finder.is_stable(pyramid, saddle);
-    let saddle = finder.near(pyramid, position, reach, stable)?;
+    let saddle = finder.near(pyramid, position, reach)?;
     // The turn that the neighbours agree on.
     let mut votes = [0usize; 6];
     for (step, neighbour) in vertex.neighbours().into_iter().enumerate() {

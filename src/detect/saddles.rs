@@ -85,9 +85,9 @@ impl SaddleFinder {
                 // What a coarse level shows is looked for again at full resolution; a corner that
                 // is too blurred for that stays as it was found.
                 let saddle = match n {
-                    0 => Some(described),
+                    0 => Some(described).filter(|_| self.is_stable(pyramid, coarse)),
                     _ => self
-                        .near(pyramid, coarse, f64::from(1u32 << n), |_| true)
+                        .near(pyramid, coarse, f64::from(1u32 << n))
                         .or_else(|| is_blurred(pyramid, &described).then_some(described)),
                 };
                 saddles.extend(saddle);
@@ -106,25 +106,19 @@ impl SaddleFinder {
         let image = &pyramid.levels()[0];
         let umbilic = self.fit.refine(image, start, FIT_ITERATIONS)?;
         let sectors = Sectors::read(image, umbilic.position, &umbilic.surface)?;
-        Some(Saddle { position: umbilic.position, sectors })
+        let saddle = Saddle { position: umbilic.position, sectors };
+        self.is_stable(pyramid, umbilic.position).then_some(saddle)
     }
 
-    /// Whether a saddle stays where it is when the window grows by one.
-    pub fn is_stable(&self, pyramid: &Pyramid, saddle: &Saddle) -> bool {
-        let [x, y] = saddle.position;
+    /// Whether the fit finds a corner of full resolution in the same place when its window grows.
+    fn is_stable(&self, pyramid: &Pyramid, [x, y]: [f64; 2]) -> bool {
         let wider = self.wider.refine(&pyramid.levels()[0], [x, y], FIT_ITERATIONS);
         wider.is_some_and(|Umbilic { position: [u, v], .. }| (u - x).hypot(v - y) < STABLE_PX)
     }
 
     /// The first saddle that the fit reaches from starts ever further from `place`, if it lies
-    /// within `reach_px` of it and is accepted.
-    pub fn near(
-        &self,
-        pyramid: &Pyramid,
-        place: [f64; 2],
-        reach_px: f64,
-        accept: impl Fn(&Saddle) -> bool,
-    ) -> Option<Saddle> {
+    /// within `reach_px` of it.
+    pub fn near(&self, pyramid: &Pyramid, place: [f64; 2], reach_px: f64) -> Option<Saddle> {
         let rings = ((reach_px / START_STEP_PX).ceil() as i32).clamp(1, MAX_START_RINGS);
         let step = reach_px / f64::from(rings);
         let starts = (-rings..=rings).flat_map(|v| (-rings..=rings).map(move |u| (u, v)));
@@ -134,8 +128,7 @@ impl SaddleFinder {
             let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
             let saddle = self.at(pyramid, start)?;
             let [x, y] = saddle.position;
-            let reached = (x - place[0]).hypot(y - place[1]) <= reach_px;
-            (reached && accept(&saddle)).then_some(saddle)
+            ((x - place[0]).hypot(y - place[1]) <= reach_px).then_some(saddle)
         })
     }
 }
