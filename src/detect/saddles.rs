@@ -2,37 +2,35 @@
 
 use rstar::RTree;
 
-use super::cubic::{CubicFit, Umbilic};
+use super::polynomial::Polynomial;
 use super::ring::candidates;
 use super::sectors::{Sectors, contrast_around};
+use super::tiling::kind;
 use crate::raster::{Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
 
 /// Radius of the fit that decides what is a corner, px; the reference detector's choice.
 const FIT_RADIUS: usize = 3;
 
-/// Iterations of the fit; the paper's.
-const FIT_ITERATIONS: usize = 5;
-
 /// Finer and coarser candidates of one corner converge to points closer than this, px.
 const MERGE_PX: f64 = 1.5;
 
-/// The weakest third harmonic searched for, of 1023: a contrast of 3 grey levels in 8 bits, where
+/// The weakest harmonic searched for, of 1023: a contrast of 3 grey levels in 8 bits, where
 /// rounding itself begins to draw shapes.
 const MIN_AMPLITUDE: f32 = 6.0;
 
-/// Noise of the third harmonic over that of a pixel: twelve binomially smoothed samples.
+/// Noise of the harmonic over that of a pixel: twelve binomially smoothed samples.
 const HARMONIC_NOISE: f32 = 0.153;
 
 /// Candidates must stand above the noise by this factor; at five, one pixel in a million passes.
 const NOISE_FACTOR: f32 = 5.0;
 
-/// A monkey saddle in the image.
+/// A corner with N rays in the image: a monkey saddle, or a saddle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Saddle {
+pub struct Saddle<const N: usize> {
     /// Position, px.
     pub position: [f64; 2],
     /// Its edges and brightness.
-    pub sectors: Sectors,
+    pub sectors: Sectors<N>,
 }
 
 /// A blurred corner shows less than this part of its contrast on the smallest circle: half of it
@@ -52,33 +50,36 @@ const STABLE_PX: f64 = 0.3;
 
 /// Finds and describes saddles in a pyramid.
 #[derive(Clone, Debug)]
-pub struct SaddleFinder {
-    fit: CubicFit,
-    wider: CubicFit,
+pub struct SaddleFinder<const N: usize> {
+    fit: Polynomial,
+    wider: Polynomial,
+    iterations: usize,
 }
 
-impl SaddleFinder {
+impl<const N: usize> SaddleFinder<N> {
     /// A finder; computes the pseudo-inverses of its fits once.
     pub fn new() -> Self {
-        Self { fit: CubicFit::new(FIT_RADIUS), wider: CubicFit::new(FIT_RADIUS + 1) }
+        let fit = Polynomial::new(kind::<N>(), FIT_RADIUS);
+        let wider = Polynomial::new(kind::<N>(), FIT_RADIUS + 1);
+        let iterations = fit.usual_iterations();
+        Self { fit, wider, iterations }
     }
 
     /// All saddles of an image whose noise is `sigma` (of 1023), in reading order.
-    pub fn find(&self, pyramid: &Pyramid, sigma: f32) -> Vec<Saddle> {
+    pub fn find(&self, pyramid: &Pyramid, sigma: f32) -> Vec<Saddle<N>> {
         let min_amplitude = MIN_AMPLITUDE.max(NOISE_FACTOR * HARMONIC_NOISE * sigma);
-        let mut saddles = Merged::default();
+        let mut saddles = Merged::<N>::default();
         for (n, level) in pyramid.levels().iter().enumerate() {
-            for candidate in candidates(level, min_amplitude) {
+            for candidate in candidates::<N>(level, min_amplitude) {
                 let start = [candidate.x as f64, candidate.y as f64];
-                let Some(on_level) = self.fit.refine(level, start, FIT_ITERATIONS) else {
+                let Some(on_level) = self.fit.refine(level, start, self.iterations) else {
                     continue;
                 };
                 let coarse = Pyramid::to_level_0(n, on_level.position);
                 if !saddles.is_free(coarse) {
                     continue;
                 }
-                let Some(sectors) = Sectors::read(level, on_level.position, &on_level.surface)
-                else {
+                let Some(sectors) = Sectors::read(level, on_level.position, &on_level.form) else {
                     continue;
                 };
                 let described = Saddle { position: coarse, sectors };
@@ -95,30 +96,31 @@ impl SaddleFinder {
         }
         let mut all = saddles.all;
         all.sort_by(|a, b| {
-            let key = |s: &Saddle| [s.position[1], s.position[0]];
+            let key = |s: &Saddle<N>| [s.position[1], s.position[0]];
             key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
         });
         all
     }
 
     /// The saddle that the fit reaches from `start` at full resolution.
-    pub fn at(&self, pyramid: &Pyramid, start: [f64; 2]) -> Option<Saddle> {
+    pub fn at(&self, pyramid: &Pyramid, start: [f64; 2]) -> Option<Saddle<N>> {
         let image = &pyramid.levels()[0];
-        let umbilic = self.fit.refine(image, start, FIT_ITERATIONS)?;
-        let sectors = Sectors::read(image, umbilic.position, &umbilic.surface)?;
-        let saddle = Saddle { position: umbilic.position, sectors };
-        self.is_stable(pyramid, umbilic.position).then_some(saddle)
+        let corner = self.fit.refine(image, start, self.iterations)?;
+        let sectors = Sectors::read(image, corner.position, &corner.form)?;
+        let saddle = Saddle { position: corner.position, sectors };
+        self.is_stable(pyramid, corner.position).then_some(saddle)
     }
 
     /// Whether the fit finds a corner of full resolution in the same place when its window grows.
     fn is_stable(&self, pyramid: &Pyramid, [x, y]: [f64; 2]) -> bool {
-        let wider = self.wider.refine(&pyramid.levels()[0], [x, y], FIT_ITERATIONS);
-        wider.is_some_and(|Umbilic { position: [u, v], .. }| (u - x).hypot(v - y) < STABLE_PX)
+        let wider = self.wider.refine(&pyramid.levels()[0], [x, y], self.iterations);
+        let moved = wider.map(|corner| (corner.position[0] - x).hypot(corner.position[1] - y));
+        moved.is_some_and(|moved_px| moved_px < STABLE_PX)
     }
 
     /// The first saddle that the fit reaches from starts ever further from `place`, if it lies
     /// within `reach_px` of it.
-    pub fn near(&self, pyramid: &Pyramid, place: [f64; 2], reach_px: f64) -> Option<Saddle> {
+    pub fn near(&self, pyramid: &Pyramid, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
         let rings = ((reach_px / START_STEP_PX).ceil() as i32).clamp(1, MAX_START_RINGS);
         let step = reach_px / f64::from(rings);
         let starts = (-rings..=rings).flat_map(|v| (-rings..=rings).map(move |u| (u, v)));
@@ -135,24 +137,29 @@ impl SaddleFinder {
 
 /// Whether full resolution shows next to nothing where a coarse level shows a corner. What is sharp
 /// there, and no corner, is none on a coarse level either: a thin line beside an edge, say.
-fn is_blurred(pyramid: &Pyramid, coarse: &Saddle) -> bool {
-    let fine = contrast_around(&pyramid.levels()[0], coarse.position);
+fn is_blurred<const N: usize>(pyramid: &Pyramid, coarse: &Saddle<N>) -> bool {
+    let fine = contrast_around::<N>(&pyramid.levels()[0], coarse.position);
     fine.is_some_and(|amplitude| amplitude < MAX_BLURRED_CONTRAST * coarse.sectors.amplitude)
 }
 
 /// Saddles with an index of their places, so that a corner found twice is kept once.
-#[derive(Default)]
-struct Merged {
-    all: Vec<Saddle>,
+struct Merged<const N: usize> {
+    all: Vec<Saddle<N>>,
     places: RTree<[f64; 2]>,
 }
 
-impl Merged {
+impl<const N: usize> Default for Merged<N> {
+    fn default() -> Self {
+        Self { all: Vec::new(), places: RTree::new() }
+    }
+}
+
+impl<const N: usize> Merged<N> {
     fn is_free(&self, position: [f64; 2]) -> bool {
         self.places.locate_within_distance(position, MERGE_PX * MERGE_PX).next().is_none()
     }
 
-    fn extend(&mut self, saddle: Option<Saddle>) {
+    fn extend(&mut self, saddle: Option<Saddle<N>>) {
         if let Some(saddle) = saddle.filter(|saddle| self.is_free(saddle.position)) {
             self.places.insert(saddle.position);
             self.all.push(saddle);
