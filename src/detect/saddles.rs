@@ -7,9 +7,16 @@ use super::ring::candidates;
 use super::sectors::{Sectors, contrast_around};
 use super::tiling::kind;
 use crate::raster::{Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
+use crate::target::GridKind;
 
-/// Radius of the fit that decides what is a corner, px; the reference detector's choice.
-const FIT_RADIUS: usize = 3;
+/// Radii of the fits, px. The middle one decides what is a corner; the reference detector's choice.
+const FIT_RADII: [usize; 3] = [2, 3, 4];
+
+/// Index of the usual fit.
+const USUAL: usize = 1;
+
+/// Iterations of the fit; the paper's.
+const FIT_ITERATIONS: usize = 5;
 
 /// Finer and coarser candidates of one corner converge to points closer than this, px.
 const MERGE_PX: f64 = 1.5;
@@ -51,18 +58,14 @@ const STABLE_PX: f64 = 0.3;
 /// Finds and describes saddles in a pyramid.
 #[derive(Clone, Debug)]
 pub struct SaddleFinder<const N: usize> {
-    fit: Polynomial,
-    wider: Polynomial,
-    iterations: usize,
+    /// By rising radius.
+    fits: [Polynomial; FIT_RADII.len()],
 }
 
 impl<const N: usize> SaddleFinder<N> {
     /// A finder; computes the pseudo-inverses of its fits once.
     pub fn new() -> Self {
-        let fit = Polynomial::new(kind::<N>(), FIT_RADIUS);
-        let wider = Polynomial::new(kind::<N>(), FIT_RADIUS + 1);
-        let iterations = fit.usual_iterations();
-        Self { fit, wider, iterations }
+        Self { fits: FIT_RADII.map(|radius| Polynomial::new(kind::<N>(), radius)) }
     }
 
     /// All saddles of an image whose noise is `sigma` (of 1023), in reading order.
@@ -72,7 +75,8 @@ impl<const N: usize> SaddleFinder<N> {
         for (n, level) in pyramid.levels().iter().enumerate() {
             for candidate in candidates::<N>(level, min_amplitude) {
                 let start = [candidate.x as f64, candidate.y as f64];
-                let Some(on_level) = self.fit.refine(level, start, self.iterations) else {
+                let fit = &self.fits[USUAL];
+                let Some(on_level) = fit.refine(level, start, FIT_ITERATIONS) else {
                     continue;
                 };
                 let coarse = Pyramid::to_level_0(n, on_level.position);
@@ -86,7 +90,8 @@ impl<const N: usize> SaddleFinder<N> {
                 // What a coarse level shows is looked for again at full resolution; a corner that
                 // is too blurred for that stays as it was found.
                 let saddle = match n {
-                    0 => Some(described).filter(|_| self.is_stable(pyramid, coarse)),
+                    0 if self.is_stable(pyramid, coarse, USUAL) => Some(described),
+                    0 => self.narrow(pyramid, start),
                     _ => self
                         .near(pyramid, coarse, f64::from(1u32 << n))
                         .or_else(|| is_blurred(pyramid, &described).then_some(described)),
@@ -102,18 +107,31 @@ impl<const N: usize> SaddleFinder<N> {
         all
     }
 
-    /// The saddle that the fit reaches from `start` at full resolution.
+    /// The saddle that the usual fit reaches from `start` at full resolution.
     pub fn at(&self, pyramid: &Pyramid, start: [f64; 2]) -> Option<Saddle<N>> {
-        let image = &pyramid.levels()[0];
-        let corner = self.fit.refine(image, start, self.iterations)?;
-        let sectors = Sectors::read(image, corner.position, &corner.form)?;
-        let saddle = Saddle { position: corner.position, sectors };
-        self.is_stable(pyramid, corner.position).then_some(saddle)
+        self.at_size(pyramid, start, USUAL)
     }
 
-    /// Whether the fit finds a corner of full resolution in the same place when its window grows.
-    fn is_stable(&self, pyramid: &Pyramid, [x, y]: [f64; 2]) -> bool {
-        let wider = self.wider.refine(&pyramid.levels()[0], [x, y], self.iterations);
+    /// The saddle of a checkerboard that a narrower fit reaches: squares seen at the rim of a
+    /// fisheye lens are no wider than the usual window. (Six sectors do not fit into the smaller.)
+    fn narrow(&self, pyramid: &Pyramid, start: [f64; 2]) -> Option<Saddle<N>> {
+        match kind::<N>() {
+            GridKind::Deltille => None,
+            GridKind::Checker => self.at_size(pyramid, start, USUAL - 1),
+        }
+    }
+
+    fn at_size(&self, pyramid: &Pyramid, start: [f64; 2], size: usize) -> Option<Saddle<N>> {
+        let image = &pyramid.levels()[0];
+        let corner = self.fits[size].refine(image, start, FIT_ITERATIONS)?;
+        let sectors = Sectors::read(image, corner.position, &corner.form)?;
+        let saddle = Saddle { position: corner.position, sectors };
+        self.is_stable(pyramid, corner.position, size).then_some(saddle)
+    }
+
+    /// Whether the next wider fit finds a corner of full resolution in the same place.
+    fn is_stable(&self, pyramid: &Pyramid, [x, y]: [f64; 2], size: usize) -> bool {
+        let wider = self.fits[size + 1].refine(&pyramid.levels()[0], [x, y], FIT_ITERATIONS);
         let moved = wider.map(|corner| (corner.position[0] - x).hypot(corner.position[1] - y));
         moved.is_some_and(|moved_px| moved_px < STABLE_PX)
     }
@@ -128,7 +146,7 @@ impl<const N: usize> SaddleFinder<N> {
         starts.sort_by_key(|&(u, v)| (u * u + v * v, v, u));
         starts.into_iter().find_map(|(u, v)| {
             let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
-            let saddle = self.at(pyramid, start)?;
+            let saddle = self.at(pyramid, start).or_else(|| self.narrow(pyramid, start))?;
             let [x, y] = saddle.position;
             ((x - place[0]).hypot(y - place[1]) <= reach_px).then_some(saddle)
         })
