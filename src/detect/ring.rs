@@ -220,7 +220,7 @@ mod tests {
             }
             // Around a deltille corner there are two edges with sectors beside them: weaker
             // candidates, which have no four sectors.
-            for (sectors, part) in [(2.0, 0.125), (6.0, 0.5)] {
+            for (sectors, part) in [(2.0, 0.125), (6.0, 0.75)] {
                 let other = strongest::<4>(&star(sectors));
                 assert!(other < part * checker, "{sectors} sectors: {other} of {checker}");
             }
