@@ -32,7 +32,13 @@ const ALLOWED_FAILURES: usize = 1;
 ///
 /// The edge is taken as the cubic through both corners with the directions of both rays, which is
 /// the circular arc of the paper where the rays agree with one.
-pub fn is_clean(image: &Gray<i16>, a: &Saddle, i: usize, b: &Saddle, j: usize) -> bool {
+pub fn is_clean<const N: usize>(
+    image: &Gray<i16>,
+    a: &Saddle<N>,
+    i: usize,
+    b: &Saddle<N>,
+    j: usize,
+) -> bool {
     let [ax, ay] = a.position;
     let (dx, dy) = (b.position[0] - ax, b.position[1] - ay);
     let length = dx.hypot(dy);
@@ -43,13 +49,15 @@ pub fn is_clean(image: &Gray<i16>, a: &Saddle, i: usize, b: &Saddle, j: usize) -
     // Rays run to the left, counter-clockwise on the print, so the tile on the left lies between
     // ray i and i + 1 here, between j and j − 1 there.
     let side = |at_a: usize, at_b: usize| {
-        let cot = |saddle: &Saddle, p: usize, q: usize| {
+        let cot = |saddle: &Saddle<N>, p: usize, q: usize| {
             1.0 / turn(saddle.sectors.rays[p], saddle.sectors.rays[q]).abs().tan()
         };
-        let height = length / (cot(a, i, at_a) + cot(b, j, at_b));
-        (SIDE * height.clamp(0.0, length)).max(MIN_SIDE_PX)
+        // Where the rays do not come together, as those of a square, it counts as high as long.
+        let height = length / (cot(a, i, at_a) + cot(b, j, at_b)).max(1.0);
+        (SIDE * height).max(MIN_SIDE_PX)
     };
-    let (left_side, right_side) = (side((i + 1) % 6, (j + 5) % 6), side((i + 5) % 6, (j + 1) % 6));
+    let (left_side, right_side) =
+        (side((i + 1) % N, (j + N - 1) % N), side((i + N - 1) % N, (j + 1) % N));
     // Unit vectors along the chord and to its left on the print.
     let (along, left) = ([dx / length, dy / length], [dy / length, -dx / length]);
     let dark_left = i.is_multiple_of(2);
@@ -82,7 +90,7 @@ mod tests {
     use super::*;
 
     /// Dark above the arc y = 50 + bulge, bright below; corners at x = 20 and x = 80.
-    fn scene(bulge: f64) -> (Gray<i16>, Saddle, Saddle) {
+    fn scene(bulge: f64) -> (Gray<i16>, Saddle<6>, Saddle<6>) {
         let image = Gray::from_fn(100, 100, |x, y| {
             let t = (x as f64 - 20.0) / 60.0;
             if (y as f64) < 50.0 + 4.0 * bulge * t * (1.0 - t) { 100 } else { 700 }
