@@ -151,15 +151,15 @@ impl<const N: usize> SaddleFinder<N> {
         };
         // Many starts lead to the same place, which is looked at once with each fit.
         let mut refused: Vec<([f64; 2], usize)> = Vec::new();
-        starts.into_iter().flat_map(|start| sizes.iter().map(move |&size| (start, size))).find_map(
-            |((u, v), size)| {
-                let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
+        starts.into_iter().find_map(|(u, v)| {
+            let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
+            let saddle = sizes.iter().find_map(|&size| {
                 let corner = self.fits[size].refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
                 let position = corner.position;
                 let same = |&(other, with): &([f64; 2], usize)| {
                     with == size && distance(position, other) < STABLE_PX
                 };
-                if distance(position, place) > reach_px || refused.iter().any(same) {
+                if refused.iter().any(same) {
                     return None;
                 }
                 let saddle = self.describe(pyramid, &corner, size);
@@ -167,8 +167,9 @@ impl<const N: usize> SaddleFinder<N> {
                     refused.push((position, size));
                 }
                 saddle
-            },
-        )
+            })?;
+            (distance(saddle.position, place) <= reach_px).then_some(saddle)
+        })
     }
 }
 
