@@ -82,8 +82,9 @@ fn squares_are_consistent(grid: &Grid) -> bool {
             let (a, b) = ([q[0] - p[0], q[1] - p[1]], [p[0] - r[0], p[1] - r[1]]);
             let cos = (a[0] * b[0] + a[1] * b[1]) / (a[0].hypot(a[1]) * b[0].hypot(b[1]));
             let ratio = a[0].hypot(a[1]) / b[0].hypot(b[1]);
-            // A row turns by less than 45° at a corner; no square is twice as long as the next.
-            cos > 0.7 && (0.5..2.0).contains(&ratio)
+            // A row turns by less than 45° at a corner, and even at the rim no square is three times
+            // as long as the next.
+            cos > 0.7 && (1.0 / 3.0..3.0).contains(&ratio)
         });
         let handed = match (near(0, 1), near(1, 0)) {
             (Some(q), Some(r)) => {

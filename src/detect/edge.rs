@@ -2,7 +2,9 @@
 
 use super::saddles::Saddle;
 use super::sectors::turn;
+use super::tiling::kind;
 use crate::raster::Gray;
+use crate::target::GridKind;
 
 /// Largest angle between the chord of an edge and the rays at its ends. Over one tile a fisheye
 /// bends an edge by up to 20°, half of it at either end; the rays add a few degrees of noise.
@@ -17,6 +19,10 @@ const END: f64 = 0.15;
 /// Distance of the samples from the edge, as a part of the height of the tile on that side: well
 /// inside the border of a tag (0.16 at 1.5 bits of 25) and beyond the blur on all but tiny tiles.
 const SIDE: f64 = 0.08;
+
+/// The same for squares, as a part of the edge: a neighbouring square seen at the rim of a fisheye
+/// lens may be ten times as long as wide, and the samples stay on its near half.
+const SQUARE_SIDE: f64 = 0.04;
 
 /// The least distance of the samples from the edge, px.
 const MIN_SIDE_PX: f64 = 1.2;
@@ -52,9 +58,16 @@ pub fn is_clean<const N: usize>(
         let cot = |saddle: &Saddle<N>, p: usize, q: usize| {
             1.0 / turn(saddle.sectors.rays[p], saddle.sectors.rays[q]).abs().tan()
         };
-        // Where the rays do not come together, as those of a square, it counts as high as long.
-        let height = length / (cot(a, i, at_a) + cot(b, j, at_b)).max(1.0);
-        (SIDE * height).max(MIN_SIDE_PX)
+        let side = match kind::<N>() {
+            GridKind::Deltille => SIDE * length / (cot(a, i, at_a) + cot(b, j, at_b)).max(1.0),
+            GridKind::Checker => {
+                let sin = |saddle: &Saddle<N>, p: usize, q: usize| {
+                    turn(saddle.sectors.rays[p], saddle.sectors.rays[q]).abs().sin()
+                };
+                SQUARE_SIDE * length * sin(a, i, at_a).min(sin(b, j, at_b))
+            }
+        };
+        side.max(MIN_SIDE_PX)
     };
     let (left_side, right_side) =
         (side((i + 1) % N, (j + N - 1) % N), side((i + N - 1) % N, (j + 1) % N));
