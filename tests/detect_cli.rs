@@ -73,6 +73,33 @@ fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
 }
 
 #[test]
+fn a_plain_checkerboard_is_found_and_numbered_by_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    // 3 × 4 corners of squares of 40 px; the square up and right of the lower left corner is dark.
+    let corner = |row: usize, col: usize| [79.5 + 40.0 * col as f64, 159.5 - 40.0 * row as f64];
+    let board = deltille::raster::Gray::<u8>::from_fn(280, 240, |x, y| {
+        let inside = (40..240).contains(&x) && (40..200).contains(&y);
+        if inside && (x / 40 + y / 40) % 2 == 1 { 30 } else { 220 }
+    });
+    let pixels = image::GrayImage::from_raw(280, 240, board.pixels().to_vec()).unwrap();
+    pixels.save(folder.path().join("board.png")).unwrap();
+    let args = "detect --grid checker --rows 3 --cols 4 board.png --format json,orpc --overlay";
+    let output = deltille(folder.path(), args);
+    assert_eq!(output.status.code(), Some(0), "{:?}", String::from_utf8(output.stderr));
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("1 grid, 12 corners"), "{said}");
+    let json = std::fs::read_to_string(folder.path().join("board.json")).unwrap();
+    let found = detection::read(&json).unwrap();
+    for (i, found) in found.grids[0].corners.iter().enumerate() {
+        let [x, y] = corner(i / 4, i % 4);
+        assert_eq!((found.row, found.col), (i as i32 / 4, i as i32 % 4));
+        assert!((found.x - x).hypot(found.y - y) < 0.05, "{found:?} at {x}, {y}");
+    }
+    let orpc = std::fs::read_to_string(folder.path().join("board.orpc")).unwrap();
+    assert!(orpc.lines().nth(16).unwrap().starts_with("-1,11,0,"), "{orpc}");
+}
+
+#[test]
 fn unreadable_images_are_counted_and_the_rest_go_on() {
     let folder = board();
     let png = std::fs::read(folder.path().join("sheet/board.png")).unwrap();

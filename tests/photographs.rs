@@ -71,6 +71,69 @@ fn checkerboards_and_lamps_are_no_deltille_grids() {
     }
 }
 
+/// Rows and columns of a checkerboard are straight for a few squares, and unmirrored.
+fn squares_are_consistent(grid: &Grid) -> bool {
+    let at: BTreeMap<(i32, i32), [f64; 2]> =
+        grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+    at.iter().all(|(&(row, col), p)| {
+        let near = |dr: i32, dc: i32| at.get(&(row + dr, col + dc));
+        let straight = [(0, 1), (1, 0)].into_iter().all(|(dr, dc)| {
+            let (Some(q), Some(r)) = (near(dr, dc), near(-dr, -dc)) else { return true };
+            let (a, b) = ([q[0] - p[0], q[1] - p[1]], [p[0] - r[0], p[1] - r[1]]);
+            let cos = (a[0] * b[0] + a[1] * b[1]) / (a[0].hypot(a[1]) * b[0].hypot(b[1]));
+            let ratio = a[0].hypot(a[1]) / b[0].hypot(b[1]);
+            // A row turns by less than 45° at a corner, and even at the rim no square is three times
+            // as long as the next.
+            cos > 0.7 && (1.0 / 3.0..3.0).contains(&ratio)
+        });
+        let handed = match (near(0, 1), near(1, 0)) {
+            (Some(q), Some(r)) => {
+                (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0
+            }
+            _ => true,
+        };
+        straight && handed
+    })
+}
+
+#[test]
+fn corners_of_the_fisheye_photographs() {
+    let Some(images) = images("fisheye") else { return };
+    let detector = Detector::for_grid(GridKind::Checker, Some((8, 11)), DetectorConfig::default());
+    let mut found = 0;
+    for path in &images {
+        let detection = detector.detect_any(&raster::read(path).unwrap(), "photograph");
+        assert_eq!(detection.grids.len(), 1, "a false grid in {}", path.display());
+        let grid = &detection.grids[0];
+        assert!(squares_are_consistent(grid), "wrong topology in {}", path.display());
+        let span = |of: fn(&deltille::detect::GridCorner) -> i32| {
+            let values = grid.corners.iter().map(of);
+            values.clone().max().unwrap() - values.min().unwrap() + 1
+        };
+        let mut size = [span(|c| c.row), span(|c| c.col)];
+        size.sort();
+        assert!(size[0] <= 8 && size[1] <= 11, "{size:?} in {}", path.display());
+        if grid.corners.len() == 88 {
+            let last = grid.corners.last().map(|c| (c.row, c.col));
+            assert_eq!(last, Some((7, 10)), "labels of {}", path.display());
+        }
+        found += grid.corners.len();
+    }
+    let all = 88 * images.len();
+    println!("{found} of {all} corners");
+    assert!(found * 1000 >= all * 990, "{found} of {all} corners");
+}
+
+#[test]
+fn deltille_boards_are_no_checkerboards() {
+    let Some(images) = images("robot-hand") else { return };
+    let detector = Detector::for_grid(GridKind::Checker, None, DetectorConfig::default());
+    for path in images.iter().step_by(4) {
+        let detection = detector.detect_any(&raster::read(path).unwrap(), "photograph");
+        assert!(detection.grids.is_empty(), "a false grid in {}", path.display());
+    }
+}
+
 #[test]
 fn published_targets_decode_completely() {
     for (name, corners, tags) in [("a4_deltille", 76, 8), ("ico_deltille", 66, 10)] {

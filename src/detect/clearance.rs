@@ -7,13 +7,18 @@
 //!      ╲          ╱
 //!     4 ╲────────╱ 5
 //! ```
+//!
+//! On a checkerboard the four squares around a corner are bounded by its eight neighbours.
 
 use std::collections::BTreeMap;
 
 use super::detection::{Grid, GridCorner};
+use crate::target::GridKind;
 
-/// Steps to the neighbours in turn.
-const STEPS: [(i32, i32); 6] = [(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)];
+/// Steps to the neighbours in turn, by the tiling.
+const HEXAGON: [(i32, i32); 6] = [(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)];
+const SQUARE: [(i32, i32); 8] =
+    [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)];
 
 /// Blur of the next edges reaches this far into the clear, px: two standard deviations at 1 px.
 const BLUR_MARGIN_PX: f64 = 2.0;
@@ -23,6 +28,10 @@ const BLUR_MARGIN_PX: f64 = 2.0;
 /// `part` is the part of the way to the far side of a tile where its tag begins, 1 without tags.
 /// A corner with no two neighbours in turn has none: 0.
 pub fn clear_squares(grid: &Grid, part: f64) -> Vec<f64> {
+    let steps: &[(i32, i32)] = match grid.kind {
+        GridKind::Deltille => &HEXAGON,
+        GridKind::Checker => &SQUARE,
+    };
     let places: BTreeMap<(i32, i32), [f64; 2]> =
         grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
     let square = |&GridCorner { row, col, x, y, .. }: &GridCorner| {
@@ -32,8 +41,8 @@ pub fn clear_squares(grid: &Grid, part: f64) -> Vec<f64> {
         let neighbour = |(dr, dc): (i32, i32)| {
             seen((dr, dc)).or_else(|| seen((-dr, -dc)).map(|p| [-p[0], -p[1]]))
         };
-        let sides = (0..STEPS.len()).filter_map(|i| {
-            Some(distance(neighbour(STEPS[i])?, neighbour(STEPS[(i + 1) % STEPS.len()])?))
+        let sides = (0..steps.len()).filter_map(|i| {
+            Some(distance(neighbour(steps[i])?, neighbour(steps[(i + 1) % steps.len()])?))
         });
         let clear = sides.min_by(f64::total_cmp).unwrap_or(0.0);
         (part * clear - BLUR_MARGIN_PX).max(0.0) * std::f64::consts::FRAC_1_SQRT_2

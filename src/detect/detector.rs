@@ -7,9 +7,11 @@ use super::clearance::clear_squares;
 use super::corner_model::CornerFitter;
 use super::detection::{DecodedTag, Detection, Grid, GridCorner};
 use super::grow::{SaddleGrid, grids};
-use super::label::{Labelled, TagLabeller, fit_outline};
+use super::label::{Labelled, TagLabeller};
+use super::outline::{fit_outline, fit_rectangle};
 use super::refine::{Refinement, Refiner};
 use super::saddles::{SaddleFinder, noise};
+use super::tiling::{CHECKER, DELTILLE, kind};
 use crate::family::Family;
 use crate::lattice::{TagCells, Vertex};
 use crate::raster::{AnyGray, Gray, Intensity, Pyramid};
@@ -21,9 +23,14 @@ const PYRAMID_LEVELS: usize = 3;
 /// A level narrower than this shows no grid.
 const MIN_LEVEL_SIDE: usize = 24;
 
-/// Fewest corners of a grid that no tag vouches for: a hexagon of tiles. A quad or two of random
-/// texture may pass for tiles, seven corners with twelve clean edges between them do not.
-const MIN_UNTAGGED_CORNERS: usize = 7;
+/// Fewest corners of a grid that no tag vouches for: a hexagon of triangles, or four squares. A quad
+/// or two of random texture may pass for tiles, twelve clean edges between so few corners do not.
+const fn min_untagged_corners(kind: GridKind) -> usize {
+    match kind {
+        GridKind::Deltille => 7,
+        GridKind::Checker => 9,
+    }
+}
 
 /// Options of a detector.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,11 +61,18 @@ const MODEL_RADIUS: usize = 10;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Detector {
-    finder: SaddleFinder,
+    finder: Finder,
     refiner: Refiner,
     /// Part of the way across a tile where its tag begins; 1 without tags.
     clear_part: f64,
     labels: Labels,
+}
+
+/// Finds the corners of a tiling.
+#[derive(Clone, Debug)]
+enum Finder {
+    Deltille(SaddleFinder<DELTILLE>),
+    Checker(SaddleFinder<CHECKER>),
 }
 
 /// How corners get absolute labels.
@@ -68,6 +82,8 @@ enum Labels {
     None,
     /// By the outline of a board that is seen whole.
     Outline(BTreeSet<Vertex>),
+    /// By the rows and columns of a checkerboard that is seen whole.
+    Rectangle((u32, u32)),
     /// By the tags of a target, or by the outlines of its untagged panels.
     Target { tags: Option<TagLabeller>, panels: Vec<TargetPanel> },
 }
@@ -84,19 +100,24 @@ struct TargetPanel {
 impl Detector {
     /// A detector of grids whatever they belong to.
     ///
-    /// With `size`, the rows and columns of corners of a zigzag board, a grid that shows the whole
-    /// board is labelled from its lower left corner; all other grids have relative labels.
+    /// With `size`, the rows and columns of corners of a zigzag board or of a checkerboard, a grid
+    /// that shows the whole board is labelled from its lower left corner; all other grids have
+    /// relative labels. On a checkerboard that is the corner whose upper right square is dark when
+    /// the print is turned so that it is the lower left one. A board whose rows + columns is even
+    /// looks the same after half a turn; the lowest such corner in the image is then taken.
     pub fn for_grid(kind: GridKind, size: Option<(u32, u32)>, config: DetectorConfig) -> Self {
-        let labels = match size {
-            Some((rows, cols)) => Labels::Outline(zigzag_vertices(rows, cols).collect()),
-            None => Labels::None,
+        let labels = match (size, kind) {
+            (Some((rows, cols)), GridKind::Deltille) => {
+                Labels::Outline(zigzag_vertices(rows, cols).collect())
+            }
+            (Some(size), GridKind::Checker) => Labels::Rectangle(size),
+            (None, _) => Labels::None,
         };
-        Self {
-            finder: SaddleFinder::new(),
-            refiner: refiner(kind, config),
-            clear_part: 1.0,
-            labels,
-        }
+        let finder = match kind {
+            GridKind::Deltille => Finder::Deltille(SaddleFinder::new()),
+            GridKind::Checker => Finder::Checker(SaddleFinder::new()),
+        };
+        Self { finder, refiner: refiner(kind, config), clear_part: 1.0, labels }
     }
 
     /// A detector of a target; `family` is the family that the target names.
@@ -114,22 +135,37 @@ impl Detector {
         let labels = Labels::Target { tags, panels: panels.collect() };
         let clear_part = family.map_or(1.0, |family| clear_part(target, family));
         let refiner = refiner(GridKind::Deltille, config);
-        Self { finder: SaddleFinder::new(), refiner, clear_part, labels }
+        let finder = Finder::Deltille(SaddleFinder::new());
+        Self { finder, refiner, clear_part, labels }
     }
 
     /// Finds grids in one image; `name` is only noted in the result.
     pub fn detect<T: Intensity>(&self, image: &Gray<T>, name: &str) -> Detection {
+        match &self.finder {
+            Finder::Deltille(finder) => self.detect_with(finder, image, name),
+            Finder::Checker(finder) => self.detect_with(finder, image, name),
+        }
+    }
+
+    fn detect_with<const N: usize, T: Intensity>(
+        &self,
+        finder: &SaddleFinder<N>,
+        image: &Gray<T>,
+        name: &str,
+    ) -> Detection {
         let mut timing = Timing::start();
         let pyramid = Pyramid::new(image, PYRAMID_LEVELS, MIN_LEVEL_SIDE);
         let sigma = noise(image);
         timing.lap("pyramid");
-        let saddles = self.finder.find(&pyramid, sigma);
+        let saddles = finder.find(&pyramid, sigma);
         timing.lap("saddles");
-        let found = grids(&self.finder, &pyramid, &saddles);
+        let found = grids(finder, &pyramid, &saddles);
         timing.lap("grids");
         let mut grids: Vec<Grid> =
             found.iter().flat_map(|grid| self.labelled_grids(image, grid)).collect();
-        grids.retain(|grid| !grid.tags.is_empty() || grid.corners.len() >= MIN_UNTAGGED_CORNERS);
+        let least = min_untagged_corners(kind::<N>());
+        grids.retain(|grid| !grid.tags.is_empty() || grid.corners.len() >= least);
+        grids.iter_mut().for_each(|grid| grid.kind = kind::<N>());
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
         grids.sort_by_key(|grid| grid.panel.unwrap_or(u32::MAX));
         timing.lap("labels");
@@ -168,6 +204,10 @@ impl Detector {
                 Some(map) => {
                     vec![relabelled(grid, |v| Some((map.apply(v), None)), None, Vec::new())]
                 }
+                None => vec![unlabelled(grid)],
+            },
+            Labels::Rectangle(size) => match fit_rectangle(grid, *size) {
+                Some(map) => vec![relabelled(grid, |v| Some((map(v), None)), None, Vec::new())],
                 None => vec![unlabelled(grid)],
             },
             Labels::Target { tags, panels } => {
@@ -240,7 +280,7 @@ fn relabelled(
         .iter()
         .filter_map(|(&vertex, placed)| {
             let (Vertex { row, col }, id) = label(vertex)?;
-            let [x, y] = placed.saddle.position;
+            let [x, y] = placed.position;
             Some(GridCorner { row, col, id, x, y, cov: None })
         })
         .collect();

@@ -2,7 +2,9 @@
 
 use super::saddles::Saddle;
 use super::sectors::turn;
+use super::tiling::kind;
 use crate::raster::Gray;
+use crate::target::GridKind;
 
 /// Largest angle between the chord of an edge and the rays at its ends. Over one tile a fisheye
 /// bends an edge by up to 20°, half of it at either end; the rays add a few degrees of noise.
@@ -18,6 +20,10 @@ const END: f64 = 0.15;
 /// inside the border of a tag (0.16 at 1.5 bits of 25) and beyond the blur on all but tiny tiles.
 const SIDE: f64 = 0.08;
 
+/// The same for squares, as a part of the edge: a neighbouring square seen at the rim of a fisheye
+/// lens may be ten times as long as wide, and the samples stay on its near half.
+const SQUARE_SIDE: f64 = 0.04;
+
 /// The least distance of the samples from the edge, px.
 const MIN_SIDE_PX: f64 = 1.2;
 
@@ -32,7 +38,13 @@ const ALLOWED_FAILURES: usize = 1;
 ///
 /// The edge is taken as the cubic through both corners with the directions of both rays, which is
 /// the circular arc of the paper where the rays agree with one.
-pub fn is_clean(image: &Gray<i16>, a: &Saddle, i: usize, b: &Saddle, j: usize) -> bool {
+pub fn is_clean<const N: usize>(
+    image: &Gray<i16>,
+    a: &Saddle<N>,
+    i: usize,
+    b: &Saddle<N>,
+    j: usize,
+) -> bool {
     let [ax, ay] = a.position;
     let (dx, dy) = (b.position[0] - ax, b.position[1] - ay);
     let length = dx.hypot(dy);
@@ -43,13 +55,22 @@ pub fn is_clean(image: &Gray<i16>, a: &Saddle, i: usize, b: &Saddle, j: usize) -
     // Rays run to the left, counter-clockwise on the print, so the tile on the left lies between
     // ray i and i + 1 here, between j and j − 1 there.
     let side = |at_a: usize, at_b: usize| {
-        let cot = |saddle: &Saddle, p: usize, q: usize| {
+        let cot = |saddle: &Saddle<N>, p: usize, q: usize| {
             1.0 / turn(saddle.sectors.rays[p], saddle.sectors.rays[q]).abs().tan()
         };
-        let height = length / (cot(a, i, at_a) + cot(b, j, at_b));
-        (SIDE * height.clamp(0.0, length)).max(MIN_SIDE_PX)
+        let side = match kind::<N>() {
+            GridKind::Deltille => SIDE * length / (cot(a, i, at_a) + cot(b, j, at_b)).max(1.0),
+            GridKind::Checker => {
+                let sin = |saddle: &Saddle<N>, p: usize, q: usize| {
+                    turn(saddle.sectors.rays[p], saddle.sectors.rays[q]).abs().sin()
+                };
+                SQUARE_SIDE * length * sin(a, i, at_a).min(sin(b, j, at_b))
+            }
+        };
+        side.max(MIN_SIDE_PX)
     };
-    let (left_side, right_side) = (side((i + 1) % 6, (j + 5) % 6), side((i + 5) % 6, (j + 1) % 6));
+    let (left_side, right_side) =
+        (side((i + 1) % N, (j + N - 1) % N), side((i + N - 1) % N, (j + 1) % N));
     // Unit vectors along the chord and to its left on the print.
     let (along, left) = ([dx / length, dy / length], [dy / length, -dx / length]);
     let dark_left = i.is_multiple_of(2);
@@ -82,7 +103,7 @@ mod tests {
     use super::*;
 
     /// Dark above the arc y = 50 + bulge, bright below; corners at x = 20 and x = 80.
-    fn scene(bulge: f64) -> (Gray<i16>, Saddle, Saddle) {
+    fn scene(bulge: f64) -> (Gray<i16>, Saddle<6>, Saddle<6>) {
         let image = Gray::from_fn(100, 100, |x, y| {
             let t = (x as f64 - 20.0) / 60.0;
             if (y as f64) < 50.0 + 4.0 * bulge * t * (1.0 - t) { 100 } else { 700 }

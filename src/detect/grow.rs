@@ -1,17 +1,20 @@
 //! From linked corners to grids: initial quads, then breadth-first growth, then the gaps.
 //!
 //! Every corner of a grid has a lattice vertex and a *turn*: ray k of the corner points along step
-//! `k + turn` of [`Vertex::STEPS`]. Even rays begin dark sectors, so turns are even, and in every
-//! grid the upright tiles are the dark ones, whatever the board's colours.
+//! `k + turn` of the lattice ([`step`]). Even rays begin dark sectors. On a deltille grid turns are
+//! even, and the upright tiles are the dark ones, whatever the board's colours. On a checkerboard
+//! the turn is even where row + column is, and there the square up and right is dark.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use super::edge::is_clean;
-use super::links::{Link, facing_ray, links};
+use super::edge::{MAX_CHORD_RAD, is_clean};
+use super::links::{Link, Links, facing_ray, links};
 use super::saddles::{Saddle, SaddleFinder};
 use super::sectors::turn;
-use crate::lattice::{Tile, Vertex};
+use super::tiling::{kind, neighbours, step, tiles_at};
+use crate::lattice::Vertex;
 use crate::raster::Pyramid;
+use crate::target::GridKind;
 
 /// Largest distance of a corner from where its neighbours predict it, over the edge length.
 const MAX_SURPRISE: f64 = 0.2;
@@ -23,166 +26,237 @@ struct Place {
     turn: usize,
 }
 
-/// A corner in a grid.
+/// What the later stages know of a corner of either tiling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedSaddle {
-    /// The corner.
-    pub saddle: Saddle,
-    /// Its ray k points along step `k + turn` (mod 6) of the lattice.
-    pub turn: usize,
+    /// Position, px.
+    pub position: [f64; 2],
+    /// Half the contrast around it.
+    pub amplitude: f64,
 }
 
 /// Corners by lattice vertex.
 pub type SaddleGrid = BTreeMap<Vertex, PlacedSaddle>;
 
+/// A corner in a grid while it grows.
+#[derive(Clone, Copy, Debug)]
+struct GrownSaddle<const N: usize> {
+    saddle: Saddle<N>,
+    /// Ray k points along step `k + turn` (mod N) of the lattice.
+    turn: usize,
+}
+
+impl<const N: usize> GrownSaddle<N> {
+    /// The ray along step `k` of the lattice.
+    fn ray(&self, k: usize) -> usize {
+        (k + N - self.turn) % N
+    }
+}
+
+type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
+
 /// All grids among the saddles, largest first.
-pub fn grids(finder: &SaddleFinder, pyramid: &Pyramid, saddles: &[Saddle]) -> Vec<SaddleGrid> {
+pub fn grids<const N: usize>(
+    finder: &SaddleFinder<N>,
+    pyramid: &Pyramid,
+    saddles: &[Saddle<N>],
+) -> Vec<SaddleGrid> {
     let image = &pyramid.levels()[0];
     let links = links(image, saddles);
     let mut taken = vec![false; saddles.len()];
     let mut grids = Vec::new();
-    for seed in quads(&links) {
+    for seed in seeds(&links) {
         if seed.iter().any(|&(corner, _)| taken[corner]) {
             continue;
         }
         let places = grow(&links, &seed, &taken);
-        let mut grid: SaddleGrid = places
+        let mut grid: Growing<N> = places
             .iter()
             .map(|(&corner, place)| {
                 taken[corner] = true;
-                (place.vertex, PlacedSaddle { saddle: saddles[corner], turn: place.turn })
+                (place.vertex, GrownSaddle { saddle: saddles[corner], turn: place.turn })
             })
             .collect();
         fill_gaps(finder, pyramid, &mut grid);
-        grids.push(grid);
+        let plain = |grown: GrownSaddle<N>| PlacedSaddle {
+            position: grown.saddle.position,
+            amplitude: grown.saddle.sectors.amplitude,
+        };
+        grids.push(grid.into_iter().map(|(v, grown)| (v, plain(grown))).collect());
     }
-    grids.sort_by_key(|grid| std::cmp::Reverse(grid.len()));
-    without_tag_cells(grids)
+    grids.sort_by_key(|grid: &SaddleGrid| std::cmp::Reverse(grid.len()));
+    without_tag_cells::<N>(grids)
 }
 
 /// Drops grids that lie within one tile of a larger grid: the cells of a tag are a tiling too.
-fn without_tag_cells(grids: Vec<SaddleGrid>) -> Vec<SaddleGrid> {
+fn without_tag_cells<const N: usize>(grids: Vec<SaddleGrid>) -> Vec<SaddleGrid> {
     let mut kept: Vec<SaddleGrid> = Vec::new();
     for grid in grids {
-        if !kept.iter().any(|larger| in_one_tile(larger, &grid)) {
+        if !kept.iter().any(|larger| in_one_tile::<N>(larger, &grid)) {
             kept.push(grid);
         }
     }
     kept
 }
 
-fn in_one_tile(larger: &SaddleGrid, grid: &SaddleGrid) -> bool {
-    let tiles = larger.keys().flat_map(|&v| [Tile::upright(v), Tile::inverted(v)]);
-    let mut triangles = tiles.filter_map(|tile| {
-        let [a, b, c] = tile.vertices().map(|v| larger.get(&v).map(|p| p.saddle.position));
-        Some([a?, b?, c?])
+fn in_one_tile<const N: usize>(larger: &SaddleGrid, grid: &SaddleGrid) -> bool {
+    let mut tiles = larger.keys().flat_map(|&v| tiles_at::<N>(v)).filter_map(|tile| {
+        tile.into_iter().map(|v| larger.get(&v).map(|p| p.position)).collect::<Option<Vec<_>>>()
     });
-    let inside = |[a, b, c]: [[f64; 2]; 3], p: [f64; 2]| {
-        let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
-            (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0
-        };
+    let inside = |tile: &[[f64; 2]], p: [f64; 2]| {
         // Counter-clockwise on the print is clockwise in the image's axes.
-        side(a, b, p) && side(b, c, p) && side(c, a, p)
+        (0..tile.len()).all(|i| {
+            let (a, b) = (tile[i], tile[(i + 1) % tile.len()]);
+            (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) < 0.0
+        })
     };
-    triangles.any(|t| grid.values().all(|placed| inside(t, placed.saddle.position)))
+    tiles.any(|tile| grid.values().all(|placed| inside(&tile, placed.position)))
 }
 
-/// Four corners of two tiles that share an edge, with their places.
-type Quad = [(usize, Place); 4];
+/// A corner with its place.
+type Placed = (usize, Place);
 
-/// The initial quads, those with the most complete surroundings first.
+/// The four corners from which a grid grows.
+type Seed = [Placed; 4];
+
+/// The seeds, those with the most complete surroundings first.
 ///
 /// ```text
-///     C ─────── B'       A at (0,0), B at (0,1), C at (1,0), and D at (1,−1) or B' … : the two
-///      ╲███████╱ ╲       tiles A B C and A C D, all five edges linked both ways
+///     D ───── C          A at (0,0), B at (0,1), C at (1,0), D at (1,−1): the two tiles A B C and
+///      ╲ ░░░ ╱█╲         A C D share an edge
+///       ╲ ░ ╱███╲
+///        A ───── B       on a checkerboard C at (1,1) and D at (1,0): the one dark square A B C D
 /// ```
-fn quads(links: &[[Option<Link>; 6]]) -> Vec<Quad> {
-    let origin = Vertex::new(0, 0);
-    let mut quads: Vec<(usize, Quad)> = Vec::new();
-    for (a, rays) in links.iter().enumerate() {
-        let root = Place { vertex: origin, turn: 0 };
-        let neighbour =
-            |step: usize| rays[step].map(|link| (link.corner, across(root, step, link)));
-        let Some(quad) = (|| {
-            let [b, c, d] = [neighbour(0)?, neighbour(1)?, neighbour(2)?];
-            let joined = |p: (usize, Place), q: (usize, Place), step: usize| {
-                let link = links[p.0][(step + 6 - p.1.turn) % 6];
-                link.is_some_and(|link| link.corner == q.0 && across(p.1, step, link) == q.1)
-            };
-            (joined(b, c, 2) && joined(c, d, 3)).then_some([(a, root), b, c, d])
-        })() else {
-            continue;
+///
+/// All five edges, or four, are linked both ways.
+fn seeds<const N: usize>(links: &[Links<N>]) -> Vec<Seed> {
+    let root = Place { vertex: Vertex::new(0, 0), turn: 0 };
+    let mut seeds: Vec<(usize, Seed)> = Vec::new();
+    for a in 0..links.len() {
+        let a = (a, root);
+        let seed = match kind::<N>() {
+            GridKind::Deltille => (|| {
+                let [b, c, d] = [0, 1, 2].map(|k| follow(links, a, k));
+                let (b, c, d) = (b?, c?, d?);
+                let closed = follow(links, b, 2) == Some(c) && follow(links, c, 3) == Some(d);
+                closed.then_some([a, b, c, d])
+            })(),
+            GridKind::Checker => square(links, a, 0, 1),
         };
-        let complete = quad.iter().map(|&(i, _)| links[i].iter().flatten().count()).sum();
-        quads.push((complete, quad));
+        let Some(seed) = seed else { continue };
+        let complete = seed.iter().map(|&(i, _)| links[i].iter().flatten().count()).sum();
+        seeds.push((complete, seed));
     }
-    quads.sort_by_key(|(complete, quad)| (std::cmp::Reverse(*complete), quad[0].0));
-    quads.into_iter().map(|(_, quad)| quad).collect()
+    seeds.sort_by_key(|(complete, seed)| (std::cmp::Reverse(*complete), seed[0].0));
+    seeds.into_iter().map(|(_, seed)| seed).collect()
 }
 
-/// The place at the far end of the link that leaves `from` along lattice step `step`.
-fn across(from: Place, step: usize, link: Link) -> Place {
+/// The corner that is linked to `from` along step `k` of the lattice.
+fn follow<const N: usize>(links: &[Links<N>], (corner, place): Placed, k: usize) -> Option<Placed> {
+    let link = links[corner][(k + N - place.turn) % N]?;
+    Some((link.corner, across::<N>(place, k, link)))
+}
+
+/// The corners of the square that steps `k` and `l` span at `a`, when all four edges are linked.
+fn square<const N: usize>(links: &[Links<N>], a: Placed, k: usize, l: usize) -> Option<Seed> {
+    let (b, d) = (follow(links, a, k)?, follow(links, a, l)?);
+    let c = follow(links, b, l)?;
+    (follow(links, d, k) == Some(c)).then_some([a, b, c, d])
+}
+
+/// The place at the far end of the link that leaves `from` along step `k` of the lattice.
+fn across<const N: usize>(from: Place, k: usize, link: Link) -> Place {
     // The ray that looks back points along the opposite step.
-    Place { vertex: from.vertex + Vertex::STEPS[step], turn: (step + 3 + 6 - link.ray) % 6 }
+    Place { vertex: from.vertex + step::<N>(k), turn: (k + N / 2 + N - link.ray) % N }
 }
 
-/// Breadth-first growth: a corner joins when two corners of the grid agree on its place.
-fn grow(links: &[[Option<Link>; 6]], seed: &Quad, taken: &[bool]) -> BTreeMap<usize, Place> {
-    let mut places: BTreeMap<usize, Place> = seed.iter().copied().collect();
-    let mut occupied: BTreeMap<Vertex, usize> =
-        seed.iter().map(|&(corner, place)| (place.vertex, corner)).collect();
-    let mut queue: VecDeque<usize> = seed.iter().map(|&(corner, _)| corner).collect();
-    while let Some(corner) = queue.pop_front() {
-        for (step, link) in steps_of(links, corner, places[&corner]) {
-            let next = link.corner;
-            if taken[next] || places.contains_key(&next) {
+/// A grid that grows along links.
+struct Growth<'a, const N: usize> {
+    links: &'a [Links<N>],
+    /// Corners of other grids.
+    taken: &'a [bool],
+    places: BTreeMap<usize, Place>,
+    occupied: BTreeSet<Vertex>,
+    queue: VecDeque<usize>,
+}
+
+/// Breadth-first growth: corners join when they close a tile with the grid.
+///
+/// A corner closes a triangle, or a corner that a row bends around closes a square, when two of the
+/// grid agree on its place. A square on a straight side is closed by two new corners at once.
+fn grow<const N: usize>(links: &[Links<N>], seed: &Seed, taken: &[bool]) -> BTreeMap<usize, Place> {
+    let mut growth = Growth {
+        links,
+        taken,
+        places: seed.iter().copied().collect(),
+        occupied: seed.iter().map(|&(_, place)| place.vertex).collect(),
+        queue: seed.iter().map(|&(corner, _)| corner).collect(),
+    };
+    while let Some(corner) = growth.queue.pop_front() {
+        let at = (corner, growth.places[&corner]);
+        for k in 0..N {
+            let Some(next) = follow(links, at, k).filter(|&next| growth.is_free(next)) else {
                 continue;
-            }
-            let place = across(places[&corner], step, link);
-            if occupied.contains_key(&place.vertex) {
-                continue;
-            }
-            let (mut agree, mut disagree) = (0, 0);
-            for (back, link) in steps_of(links, next, place) {
-                match places.get(&link.corner) {
-                    Some(known) if *known == across(place, back, link) => agree += 1,
-                    Some(_) => disagree += 1,
-                    None => {}
-                }
-            }
-            if agree >= 2 && disagree == 0 {
-                places.insert(next, place);
-                occupied.insert(place.vertex, next);
-                queue.push_back(next);
-                // Corners that were one vote short may now have it.
-                queue.extend(
-                    steps_of(links, next, place)
-                        .filter(|(_, l)| places.contains_key(&l.corner))
-                        .map(|(_, l)| l.corner),
-                );
+            };
+            match growth.votes(next) {
+                Some(2..) => growth.join(next),
+                Some(1) if kind::<N>() == GridKind::Checker => growth.join_by_square(at, k),
+                _ => {}
             }
         }
     }
-    places
+    growth.places
 }
 
-/// The links of a corner with the lattice steps that they follow.
-fn steps_of(
-    links: &[[Option<Link>; 6]],
-    corner: usize,
-    place: Place,
-) -> impl Iterator<Item = (usize, Link)> {
-    let rays = links[corner];
-    (0..6).filter_map(move |ray| rays[ray].map(|link| ((ray + place.turn) % 6, link)))
+impl<const N: usize> Growth<'_, N> {
+    /// Whether neither the corner nor its vertex belongs to a grid.
+    fn is_free(&self, (corner, place): Placed) -> bool {
+        !self.taken[corner]
+            && !self.places.contains_key(&corner)
+            && !self.occupied.contains(&place.vertex)
+    }
+
+    /// Number of corners of the grid that link to `next` at its place; `None` when one links to it
+    /// as if it were elsewhere.
+    fn votes(&self, next: Placed) -> Option<usize> {
+        let linked = (0..N).filter_map(|k| follow(self.links, next, k));
+        let mut known =
+            linked.filter_map(|(corner, place)| Some(*self.places.get(&corner)? == place));
+        known.try_fold(0, |votes, agrees| agrees.then_some(votes + 1))
+    }
+
+    fn join(&mut self, next: Placed) {
+        self.places.insert(next.0, next.1);
+        self.occupied.insert(next.1.vertex);
+        self.queue.push_back(next.0);
+        // Corners that were one vote short may now have it.
+        let linked = (0..N).filter_map(|k| follow(self.links, next, k)).map(|(corner, _)| corner);
+        self.queue.extend(linked.filter(|corner| self.places.contains_key(corner)));
+    }
+
+    /// The corner that follows `at` along step `k` joins together with the next one beside it.
+    fn join_by_square(&mut self, at: Placed, k: usize) {
+        for side in [k + 1, k + N - 1] {
+            let Some([_, next, beside, known]) = square(self.links, at, k, side % N) else {
+                continue;
+            };
+            let in_grid = self.places.get(&known.0) == Some(&known.1);
+            if in_grid && self.is_free(beside) && self.votes(beside) == Some(1) {
+                self.join(next);
+                self.join(beside);
+                return;
+            }
+        }
+    }
 }
 
 /// Looks for missing corners where their neighbours predict them, until none is found.
-fn fill_gaps(finder: &SaddleFinder, pyramid: &Pyramid, grid: &mut SaddleGrid) {
+fn fill_gaps<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid, grid: &mut Growing<N>) {
     let mut tried = BTreeSet::new();
     loop {
         let empty: BTreeSet<Vertex> = grid
             .keys()
-            .flat_map(|v| v.neighbours())
+            .flat_map(|&v| neighbours::<N>(v))
             .filter(|v| !grid.contains_key(v) && !tried.contains(v))
             .collect();
         let mut grown = false;
@@ -192,7 +266,7 @@ fn fill_gaps(finder: &SaddleFinder, pyramid: &Pyramid, grid: &mut SaddleGrid) {
                 grid.insert(vertex, placed);
                 grown = true;
                 // What this corner's surroundings predict has changed.
-                tried.retain(|v: &Vertex| !vertex.neighbours().contains(v));
+                tried.retain(|v: &Vertex| !neighbours::<N>(vertex).contains(v));
             } else {
                 tried.insert(vertex);
             }
@@ -205,11 +279,11 @@ fn fill_gaps(finder: &SaddleFinder, pyramid: &Pyramid, grid: &mut SaddleGrid) {
 
 /// Where the straight (or evenly bent) rows through `vertex` continue to, and the length of an
 /// edge there; `None` unless two rows predict it.
-fn predict(grid: &SaddleGrid, vertex: Vertex) -> Option<([f64; 2], f64)> {
-    let at = |v: Vertex| grid.get(&v).map(|placed| placed.saddle.position);
+fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<([f64; 2], f64)> {
+    let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
     let mut sum = [0.0; 2];
     let (mut count, mut edge) = (0.0, 0.0);
-    for step in Vertex::STEPS {
+    for step in (0..N).map(step::<N>) {
         let first = vertex + step;
         let second = first + step;
         let (Some(p), Some(q)) = (at(first), at(second)) else { continue };
@@ -225,46 +299,41 @@ fn predict(grid: &SaddleGrid, vertex: Vertex) -> Option<([f64; 2], f64)> {
 }
 
 /// The corner at `vertex`, if one is found near `position` with clean edges to two neighbours.
-fn corner_near(
-    finder: &SaddleFinder,
+fn corner_near<const N: usize>(
+    finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
-    grid: &SaddleGrid,
+    grid: &Growing<N>,
     vertex: Vertex,
     position: [f64; 2],
     edge_px: f64,
-) -> Option<PlacedSaddle> {
+) -> Option<GrownSaddle<N>> {
     let image = &pyramid.levels()[0];
     let reach = (MAX_SURPRISE * edge_px).max(1.0);
     let saddle = finder.near(pyramid, position, reach)?;
     // The turn that the neighbours agree on.
-    let mut votes = [0usize; 6];
-    for (step, neighbour) in vertex.neighbours().into_iter().enumerate() {
+    let mut votes = [0usize; N];
+    for (k, neighbour) in neighbours::<N>(vertex).into_iter().enumerate() {
         let Some(other) = grid.get(&neighbour) else { continue };
-        let back = (step + 3 + 6 - other.turn) % 6;
+        let back = other.ray(k + N / 2);
         if let Some(ray) = facing_ray(&other.saddle, back, &saddle)
             && is_clean(image, &other.saddle, back, &saddle, ray)
         {
-            votes[(step + 6 - ray) % 6] += 1;
+            votes[(k + N - ray) % N] += 1;
         }
     }
-    let turn = (0..6).max_by_key(|&t| votes[t])?;
-    (votes[turn] >= 2 && parallel_to_neighbours(grid, vertex, &saddle, turn))
-        .then_some(PlacedSaddle { saddle, turn })
+    let turn = (0..N).max_by_key(|&t| votes[t])?;
+    let grown = GrownSaddle { saddle, turn };
+    (votes[turn] >= 2 && parallel_to_neighbours(grid, vertex, &grown)).then_some(grown)
 }
 
-/// Whether all six rays point where those of each neighbour do, within what one tile may bend.
-fn parallel_to_neighbours(
-    grid: &SaddleGrid,
+/// Whether all rays point where those of each neighbour do, within what one tile may bend.
+fn parallel_to_neighbours<const N: usize>(
+    grid: &Growing<N>,
     vertex: Vertex,
-    saddle: &Saddle,
-    own_turn: usize,
+    grown: &GrownSaddle<N>,
 ) -> bool {
-    use super::edge::MAX_CHORD_RAD;
-    vertex.neighbours().iter().filter_map(|v| grid.get(v)).all(|other| {
-        (0..6).all(|step| {
-            let own = saddle.sectors.rays[(step + 6 - own_turn) % 6];
-            let theirs = other.saddle.sectors.rays[(step + 6 - other.turn) % 6];
-            turn(own, theirs).abs() <= 2.0 * MAX_CHORD_RAD
-        })
+    let along = |corner: &GrownSaddle<N>, k: usize| corner.saddle.sectors.rays[corner.ray(k)];
+    neighbours::<N>(vertex).iter().filter_map(|v| grid.get(v)).all(|other| {
+        (0..N).all(|k| turn(along(grown, k), along(other, k)).abs() <= 2.0 * MAX_CHORD_RAD)
     })
 }

@@ -222,25 +222,3 @@ fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
     let from = on_grid.vertices()[usize::from(turns)];
     LatticeMap::taking(from, tile.anchor, -(2 * i32::from(turns) + half_turn))
 }
-
-/// The motion that puts a whole grid exactly onto an outline, if just one does. `inverted` boards
-/// show their upright tiles bright, so they lie half a turn round.
-pub fn fit_outline(
-    grid: &SaddleGrid,
-    outline: &BTreeSet<Vertex>,
-    inverted: bool,
-) -> Option<LatticeMap> {
-    if grid.len() != outline.len() {
-        return None;
-    }
-    let half_turn = if inverted { 3 } else { 0 };
-    let mut fitting = [0, 2, 4].into_iter().filter_map(|turns| {
-        let turned = LatticeMap::new(turns + half_turn, Vertex::new(0, 0));
-        // Lowest-leftmost corners must coincide.
-        let lowest = grid.keys().map(|&v| turned.apply(v)).min()?;
-        let map = LatticeMap::new(turns + half_turn, *outline.first()? - lowest);
-        grid.keys().all(|&v| outline.contains(&map.apply(v))).then_some(map)
-    });
-    let map = fitting.next()?;
-    fitting.next().is_none().then_some(map)
-}

@@ -1,4 +1,4 @@
-//! Which corner follows which along each of the six rays.
+//! Which corner follows which along each of the rays.
 
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
@@ -8,7 +8,7 @@ use super::saddles::Saddle;
 use super::sectors::turn;
 use crate::raster::Gray;
 
-/// Nearest corners looked at: the six neighbours, the twelve behind them, and as many strangers.
+/// Nearest corners looked at: up to six neighbours, the twelve behind them, and as many strangers.
 const NEAREST: usize = 36;
 
 /// Contrasts of neighbouring corners differ by less than this factor: light falls off slowly, and
@@ -24,11 +24,14 @@ pub struct Link {
     pub ray: usize,
 }
 
-/// For every corner the links along its six rays; links are mutual.
-pub fn links(image: &Gray<i16>, saddles: &[Saddle]) -> Vec<[Option<Link>; 6]> {
+/// The links of a corner along its rays.
+pub type Links<const N: usize> = [Option<Link>; N];
+
+/// For every corner the links along its N rays; links are mutual.
+pub fn links<const N: usize>(image: &Gray<i16>, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
     let places = saddles.iter().enumerate().map(|(i, s)| GeomWithData::new(s.position, i));
     let tree = RTree::bulk_load(places.collect());
-    let mut found: Vec<[Option<Link>; 6]> = saddles
+    let mut found: Vec<Links<N>> = saddles
         .iter()
         .enumerate()
         .map(|(index, saddle)| {
@@ -42,7 +45,7 @@ pub fn links(image: &Gray<i16>, saddles: &[Saddle]) -> Vec<[Option<Link>; 6]> {
         })
         .collect();
     for a in 0..found.len() {
-        for i in 0..6 {
+        for i in 0..N {
             if let Some(Link { corner, ray }) = found[a][i]
                 && found[corner][ray] != Some(Link { corner: a, ray: i })
             {
@@ -54,10 +57,10 @@ pub fn links(image: &Gray<i16>, saddles: &[Saddle]) -> Vec<[Option<Link>; 6]> {
 }
 
 /// The nearest corner that a clean edge joins to ray `i` of `saddle`.
-fn nearest_along(
+fn nearest_along<const N: usize>(
     image: &Gray<i16>,
-    saddles: &[Saddle],
-    saddle: &Saddle,
+    saddles: &[Saddle<N>],
+    saddle: &Saddle<N>,
     i: usize,
     near: &[usize],
 ) -> Option<Link> {
@@ -72,7 +75,7 @@ fn nearest_along(
 ///
 /// Opposite ends of an edge see its dark side on opposite hands, so the rays differ in parity, and
 /// their contrasts are alike.
-pub fn facing_ray(a: &Saddle, i: usize, b: &Saddle) -> Option<usize> {
+pub fn facing_ray<const N: usize>(a: &Saddle<N>, i: usize, b: &Saddle<N>) -> Option<usize> {
     let (ours, theirs) = (a.sectors.amplitude, b.sectors.amplitude);
     if ours.max(theirs) > MAX_CONTRAST_RATIO * ours.min(theirs) {
         return None;
@@ -84,6 +87,6 @@ pub fn facing_ray(a: &Saddle, i: usize, b: &Saddle) -> Option<usize> {
     }
     let back = chord + std::f64::consts::PI;
     let off = |j: usize| turn(back, b.sectors.rays[j]).abs();
-    let j = (0..6).filter(|j| j % 2 != i % 2).min_by(|&p, &q| off(p).total_cmp(&off(q)))?;
+    let j = (0..N).filter(|j| j % 2 != i % 2).min_by(|&p, &q| off(p).total_cmp(&off(q)))?;
     (off(j) <= MAX_CHORD_RAD).then_some(j)
 }

@@ -2,13 +2,17 @@
 //!
 //! The stages, each in its file, each from the paper (§3) with what measurements added:
 //!
-//! 1. `ring` finds candidates: pixels around which dark and bright alternate three times.
+//! 1. `ring` finds candidates: pixels around which dark and bright alternate three times, or twice
+//!    on checkerboards.
 //! 2. `cubic` fits cubic surfaces and walks to the umbilic point; J < 0 or it is no corner.
-//! 3. `sectors` reads the six half-edges with their colours.
+//!    `quadric` does so for the saddles of checkerboards.
+//! 3. `sectors` reads the six or four half-edges with their colours.
 //! 4. `links` joins corners along clean edges (`edge`).
-//! 5. `grow` starts from quads of tiles, grows breadth-first and fills the gaps.
+//! 5. `grow` starts from four corners, grows tile by tile and fills the gaps.
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns.
 //! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`.
+//!
+//! Both tilings go the same way; `tiling` says where they differ.
 
 mod blurred_corner;
 mod clearance;
@@ -22,6 +26,8 @@ mod edge;
 mod grow;
 mod label;
 mod links;
+mod outline;
+mod polynomial;
 mod quadric;
 mod refine;
 mod ring;
@@ -29,6 +35,7 @@ mod saddles;
 mod sectors;
 mod tags;
 mod tile_map;
+mod tiling;
 
 pub use corner_model::SLOPE_PRIOR;
 pub use detection::{DecodedTag, Detection, Grid, GridCorner};

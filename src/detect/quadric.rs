@@ -16,6 +16,15 @@ const MONOMIALS: [Powers; 6] = [(2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0)];
 /// A step shorter than this ends the iteration, px.
 const CONVERGED_PX: f64 = 0.001;
 
+/// A saddle found by iterating the fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuadricSaddle {
+    /// Position, px.
+    pub position: [f64; 2],
+    /// c1 … c3 of the last surface.
+    pub form: [f64; 3],
+}
+
 /// Fits quadrics in one fixed window.
 #[derive(Clone, Debug)]
 pub struct QuadricFit {
@@ -35,22 +44,24 @@ impl QuadricFit {
         image: &Gray<T>,
         start: [f64; 2],
         iterations: usize,
-    ) -> Option<[f64; 2]> {
+    ) -> Option<QuadricSaddle> {
         let radius = self.fit.radius() as f64;
         let mut position = start;
-        for _ in 0..iterations {
-            let [dx, dy] = stationary_point(self.fit.coefficients(image, position)?)?;
+        for iteration in 1.. {
+            let coefficients = self.fit.coefficients(image, position)?;
+            let [dx, dy] = stationary_point(coefficients)?;
             position = [position[0] + dx, position[1] + dy];
             let way = (position[0] - start[0]).hypot(position[1] - start[1]);
             let step = dx.hypot(dy);
             if step > radius || way > radius {
                 return None;
             }
-            if step < CONVERGED_PX {
-                break;
+            if step < CONVERGED_PX || iteration >= iterations {
+                let [c1, c2, c3, ..] = coefficients;
+                return Some(QuadricSaddle { position, form: [c1, c2, c3] });
             }
         }
-        Some(position)
+        None
     }
 }
 
@@ -72,7 +83,7 @@ mod tests {
     #[test]
     fn a_saddle_is_found_exactly_in_two_steps() {
         let saddle = surface(|u, v| 0.01 * (u * u - 2.0 * v * v + 0.5 * u * v) + 3.0);
-        let [x, y] = QuadricFit::new(5).refine(&saddle, [20.0, 20.0], 2).unwrap();
+        let [x, y] = QuadricFit::new(5).refine(&saddle, [20.0, 20.0], 2).unwrap().position;
         assert!((x - 20.3).hypot(y - 18.9) < 1e-3, "{x} {y}");
     }
 

@@ -15,8 +15,7 @@
 
 use super::corner_model::{CornerFitter, MAX_RADIUS, Window};
 use super::corner_start::start;
-use super::cubic::CubicFit;
-use super::quadric::QuadricFit;
+use super::polynomial::Polynomial;
 use crate::raster::{Gray, Intensity};
 use crate::target::GridKind;
 
@@ -25,10 +24,6 @@ pub const MIN_MODEL_RADIUS: usize = 3;
 
 /// Largest side of a window, px.
 pub const MAX_WINDOW_PX: usize = 2 * MAX_RADIUS + 1;
-
-/// Iterations of the polynomial fits; the reference detector's.
-const CUBIC_ITERATIONS: usize = 5;
-const QUADRIC_ITERATIONS: usize = 20;
 
 /// How positions are refined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,12 +57,6 @@ pub struct Refined {
     pub status: RefineStatus,
 }
 
-#[derive(Clone, Debug)]
-enum Polynomial {
-    Cubic(CubicFit),
-    Quadric(QuadricFit),
-}
-
 /// Refines corners of one kind.
 #[derive(Clone, Debug)]
 pub struct Refiner {
@@ -93,14 +82,8 @@ impl Refiner {
         polynomial_radius: usize,
         model_radius: usize,
     ) -> Self {
-        let (polynomial, iterations) = match kind {
-            GridKind::Deltille => {
-                (Polynomial::Cubic(CubicFit::new(polynomial_radius)), CUBIC_ITERATIONS)
-            }
-            GridKind::Checker => {
-                (Polynomial::Quadric(QuadricFit::new(polynomial_radius)), QUADRIC_ITERATIONS)
-            }
-        };
+        let polynomial = Polynomial::new(kind, polynomial_radius);
+        let iterations = polynomial.usual_iterations();
         let windows = (MIN_MODEL_RADIUS..=model_radius.min(MAX_RADIUS)).map(Window::new).collect();
         Self { polynomial, iterations, method, windows }
     }
@@ -124,12 +107,8 @@ impl Refiner {
         start: [f64; 2],
         clear_px: f64,
     ) -> Refined {
-        let polynomial = match &self.polynomial {
-            Polynomial::Cubic(fit) => {
-                fit.refine(image, start, self.iterations).map(|umbilic| umbilic.position)
-            }
-            Polynomial::Quadric(fit) => fit.refine(image, start, self.iterations),
-        };
+        let found = self.polynomial.refine(image, start, self.iterations);
+        let polynomial = found.map(|corner| corner.position);
         if self.method == Refinement::Model
             && let Some(refined) = self.model(fitter, image, polynomial.unwrap_or(start), clear_px)
         {

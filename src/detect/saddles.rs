@@ -2,13 +2,18 @@
 
 use rstar::RTree;
 
-use super::cubic::{CubicFit, Umbilic};
+use super::polynomial::{FittedCorner, Polynomial};
 use super::ring::candidates;
 use super::sectors::{Sectors, contrast_around};
+use super::tiling::kind;
 use crate::raster::{Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
+use crate::target::GridKind;
 
-/// Radius of the fit that decides what is a corner, px; the reference detector's choice.
-const FIT_RADIUS: usize = 3;
+/// Radii of the fits, px. The middle one decides what is a corner; the reference detector's choice.
+const FIT_RADII: [usize; 3] = [2, 3, 4];
+
+/// Index of the usual fit.
+const USUAL: usize = 1;
 
 /// Iterations of the fit; the paper's.
 const FIT_ITERATIONS: usize = 5;
@@ -16,23 +21,23 @@ const FIT_ITERATIONS: usize = 5;
 /// Finer and coarser candidates of one corner converge to points closer than this, px.
 const MERGE_PX: f64 = 1.5;
 
-/// The weakest third harmonic searched for, of 1023: a contrast of 3 grey levels in 8 bits, where
+/// The weakest harmonic searched for, of 1023: a contrast of 3 grey levels in 8 bits, where
 /// rounding itself begins to draw shapes.
 const MIN_AMPLITUDE: f32 = 6.0;
 
-/// Noise of the third harmonic over that of a pixel: twelve binomially smoothed samples.
+/// Noise of the harmonic over that of a pixel: twelve binomially smoothed samples.
 const HARMONIC_NOISE: f32 = 0.153;
 
 /// Candidates must stand above the noise by this factor; at five, one pixel in a million passes.
 const NOISE_FACTOR: f32 = 5.0;
 
-/// A monkey saddle in the image.
+/// A corner with N rays in the image: a monkey saddle, or a saddle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Saddle {
+pub struct Saddle<const N: usize> {
     /// Position, px.
     pub position: [f64; 2],
     /// Its edges and brightness.
-    pub sectors: Sectors,
+    pub sectors: Sectors<N>,
 }
 
 /// A blurred corner shows less than this part of its contrast on the smallest circle: half of it
@@ -52,40 +57,41 @@ const STABLE_PX: f64 = 0.3;
 
 /// Finds and describes saddles in a pyramid.
 #[derive(Clone, Debug)]
-pub struct SaddleFinder {
-    fit: CubicFit,
-    wider: CubicFit,
+pub struct SaddleFinder<const N: usize> {
+    /// By rising radius.
+    fits: [Polynomial; FIT_RADII.len()],
 }
 
-impl SaddleFinder {
+impl<const N: usize> SaddleFinder<N> {
     /// A finder; computes the pseudo-inverses of its fits once.
     pub fn new() -> Self {
-        Self { fit: CubicFit::new(FIT_RADIUS), wider: CubicFit::new(FIT_RADIUS + 1) }
+        Self { fits: FIT_RADII.map(|radius| Polynomial::new(kind::<N>(), radius)) }
     }
 
     /// All saddles of an image whose noise is `sigma` (of 1023), in reading order.
-    pub fn find(&self, pyramid: &Pyramid, sigma: f32) -> Vec<Saddle> {
+    pub fn find(&self, pyramid: &Pyramid, sigma: f32) -> Vec<Saddle<N>> {
         let min_amplitude = MIN_AMPLITUDE.max(NOISE_FACTOR * HARMONIC_NOISE * sigma);
-        let mut saddles = Merged::default();
+        let mut saddles = Merged::<N>::default();
         for (n, level) in pyramid.levels().iter().enumerate() {
-            for candidate in candidates(level, min_amplitude) {
+            for candidate in candidates::<N>(level, min_amplitude) {
                 let start = [candidate.x as f64, candidate.y as f64];
-                let Some(on_level) = self.fit.refine(level, start, FIT_ITERATIONS) else {
+                let fit = &self.fits[USUAL];
+                let Some(on_level) = fit.refine(level, start, FIT_ITERATIONS) else {
                     continue;
                 };
                 let coarse = Pyramid::to_level_0(n, on_level.position);
                 if !saddles.is_free(coarse) {
                     continue;
                 }
-                let Some(sectors) = Sectors::read(level, on_level.position, &on_level.surface)
-                else {
+                let Some(sectors) = Sectors::read(level, on_level.position, &on_level.form) else {
                     continue;
                 };
                 let described = Saddle { position: coarse, sectors };
                 // What a coarse level shows is looked for again at full resolution; a corner that
                 // is too blurred for that stays as it was found.
                 let saddle = match n {
-                    0 => Some(described).filter(|_| self.is_stable(pyramid, coarse)),
+                    0 if self.is_stable(pyramid, coarse, USUAL) => Some(described),
+                    0 => self.narrow(pyramid, start),
                     _ => self
                         .near(pyramid, coarse, f64::from(1u32 << n))
                         .or_else(|| is_blurred(pyramid, &described).then_some(described)),
@@ -95,28 +101,43 @@ impl SaddleFinder {
         }
         let mut all = saddles.all;
         all.sort_by(|a, b| {
-            let key = |s: &Saddle| [s.position[1], s.position[0]];
+            let key = |s: &Saddle<N>| [s.position[1], s.position[0]];
             key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
         });
         all
     }
 
-    /// What a fit at full resolution has reached, if it is a corner.
-    fn describe(&self, pyramid: &Pyramid, umbilic: &Umbilic) -> Option<Saddle> {
-        let sectors = Sectors::read(&pyramid.levels()[0], umbilic.position, &umbilic.surface)?;
-        let saddle = Saddle { position: umbilic.position, sectors };
-        self.is_stable(pyramid, umbilic.position).then_some(saddle)
+    /// The saddle of a checkerboard that a narrower fit reaches: squares seen at the rim of a
+    /// fisheye lens are no wider than the usual window. (Six sectors do not fit into the smaller.)
+    fn narrow(&self, pyramid: &Pyramid, start: [f64; 2]) -> Option<Saddle<N>> {
+        match kind::<N>() {
+            GridKind::Deltille => None,
+            GridKind::Checker => self.at_size(pyramid, start, USUAL - 1),
+        }
     }
 
-    /// Whether the fit finds a corner of full resolution in the same place when its window grows.
-    fn is_stable(&self, pyramid: &Pyramid, [x, y]: [f64; 2]) -> bool {
-        let wider = self.wider.refine(&pyramid.levels()[0], [x, y], FIT_ITERATIONS);
-        wider.is_some_and(|Umbilic { position: [u, v], .. }| (u - x).hypot(v - y) < STABLE_PX)
+    fn at_size(&self, pyramid: &Pyramid, start: [f64; 2], size: usize) -> Option<Saddle<N>> {
+        let corner = self.fits[size].refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
+        self.describe(pyramid, &corner, size)
+    }
+
+    /// What a fit at full resolution has reached, if it is a corner.
+    fn describe(&self, pyramid: &Pyramid, corner: &FittedCorner, size: usize) -> Option<Saddle<N>> {
+        let sectors = Sectors::read(&pyramid.levels()[0], corner.position, &corner.form)?;
+        let saddle = Saddle { position: corner.position, sectors };
+        self.is_stable(pyramid, corner.position, size).then_some(saddle)
+    }
+
+    /// Whether the next wider fit finds a corner of full resolution in the same place.
+    fn is_stable(&self, pyramid: &Pyramid, [x, y]: [f64; 2], size: usize) -> bool {
+        let wider = self.fits[size + 1].refine(&pyramid.levels()[0], [x, y], FIT_ITERATIONS);
+        let moved = wider.map(|corner| (corner.position[0] - x).hypot(corner.position[1] - y));
+        moved.is_some_and(|moved_px| moved_px < STABLE_PX)
     }
 
     /// The first saddle that the fit reaches from starts ever further from `place`, if it lies
     /// within `reach_px` of it.
-    pub fn near(&self, pyramid: &Pyramid, place: [f64; 2], reach_px: f64) -> Option<Saddle> {
+    pub fn near(&self, pyramid: &Pyramid, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
         let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         let rings = ((reach_px / START_STEP_PX).ceil() as i32).clamp(1, MAX_START_RINGS);
         let step = reach_px / f64::from(rings);
@@ -124,46 +145,59 @@ impl SaddleFinder {
         let mut starts: Vec<(i32, i32)> =
             starts.filter(|&(u, v)| u * u + v * v <= rings * rings).collect();
         starts.sort_by_key(|&(u, v)| (u * u + v * v, v, u));
-        // Many starts lead to the same place, which is looked at once.
-        let mut refused: Vec<[f64; 2]> = Vec::new();
+        let sizes: &[usize] = match kind::<N>() {
+            GridKind::Deltille => &[USUAL],
+            GridKind::Checker => &[USUAL, USUAL - 1],
+        };
+        // Many starts lead to the same place, which is looked at once with each fit.
+        let mut refused: Vec<([f64; 2], usize)> = Vec::new();
         starts.into_iter().find_map(|(u, v)| {
             let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
-            let umbilic = self.fit.refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
-            let position = umbilic.position;
-            if distance(position, place) > reach_px
-                || refused.iter().any(|&other| distance(position, other) < STABLE_PX)
-            {
-                return None;
-            }
-            let saddle = self.describe(pyramid, &umbilic);
-            if saddle.is_none() {
-                refused.push(position);
-            }
-            saddle
+            let saddle = sizes.iter().find_map(|&size| {
+                let corner = self.fits[size].refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
+                let position = corner.position;
+                let same = |&(other, with): &([f64; 2], usize)| {
+                    with == size && distance(position, other) < STABLE_PX
+                };
+                if refused.iter().any(same) {
+                    return None;
+                }
+                let saddle = self.describe(pyramid, &corner, size);
+                if saddle.is_none() {
+                    refused.push((position, size));
+                }
+                saddle
+            })?;
+            (distance(saddle.position, place) <= reach_px).then_some(saddle)
         })
     }
 }
 
 /// Whether full resolution shows next to nothing where a coarse level shows a corner. What is sharp
 /// there, and no corner, is none on a coarse level either: a thin line beside an edge, say.
-fn is_blurred(pyramid: &Pyramid, coarse: &Saddle) -> bool {
-    let fine = contrast_around(&pyramid.levels()[0], coarse.position);
+fn is_blurred<const N: usize>(pyramid: &Pyramid, coarse: &Saddle<N>) -> bool {
+    let fine = contrast_around::<N>(&pyramid.levels()[0], coarse.position);
     fine.is_some_and(|amplitude| amplitude < MAX_BLURRED_CONTRAST * coarse.sectors.amplitude)
 }
 
 /// Saddles with an index of their places, so that a corner found twice is kept once.
-#[derive(Default)]
-struct Merged {
-    all: Vec<Saddle>,
+struct Merged<const N: usize> {
+    all: Vec<Saddle<N>>,
     places: RTree<[f64; 2]>,
 }
 
-impl Merged {
+impl<const N: usize> Default for Merged<N> {
+    fn default() -> Self {
+        Self { all: Vec::new(), places: RTree::new() }
+    }
+}
+
+impl<const N: usize> Merged<N> {
     fn is_free(&self, position: [f64; 2]) -> bool {
         self.places.locate_within_distance(position, MERGE_PX * MERGE_PX).next().is_none()
     }
 
-    fn extend(&mut self, saddle: Option<Saddle>) {
+    fn extend(&mut self, saddle: Option<Saddle<N>>) {
         if let Some(saddle) = saddle.filter(|saddle| self.is_free(saddle.position)) {
             self.places.insert(saddle.position);
             self.all.push(saddle);

@@ -1,9 +1,9 @@
-//! The six edges that meet at a corner, as directions with a sign.
+//! The edges that meet at a corner, six or four, as directions with a sign.
 //!
-//! The paper takes three polarities from the roots of the cubic form. A circle around the corner
-//! tells more: each of the six half-edges by itself, so that perspective and distortion may bend
-//! them, and proof that dark and bright really alternate. The cubic's roots serve where the circle
-//! is too noisy to read.
+//! The paper takes the polarities from the roots of the cubic or quadratic form. A circle around
+//! the corner tells more: each of the N half-edges by itself, so that perspective and distortion
+//! may bend them, and proof that dark and bright really alternate. The form's roots serve where the
+//! circle is too noisy to read.
 //!
 //! ```text
 //!          ray 2   ray 1            rays run counter-clockwise on the print (image angles fall,
@@ -14,12 +14,16 @@
 //!             ╱█████╲
 //!          ray 4   ray 5
 //! ```
+//!
+//! With four rays opposite sectors have the same colour, and those of one colour may be narrow.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
-use super::cubic::CubicSurface;
+use super::polynomial::Form;
+use super::tiling::kind;
 use crate::raster::Gray;
+use crate::target::GridKind;
 
 /// Samples on a circle. A sector seen at 75° is 17° wide; 7.5° steps put two samples into it.
 const SAMPLES: usize = 48;
@@ -31,7 +35,7 @@ const RADII_PX: [f64; 4] = [6.0, 4.5, 8.0, 3.5];
 /// Samples within this part of the largest deviation from the mean count for neither side.
 const DEAD_BAND: f64 = 0.12;
 
-/// Where the cubic's roots give the rays, every sector must leave the level by this part of the
+/// Where the form's roots give the rays, every sector must leave the level by this part of the
 /// circle's amplitude: half of what an evenly divided circle shows under its own noise.
 const MIN_SECTOR: f64 = 0.3;
 
@@ -39,22 +43,33 @@ const MIN_SECTOR: f64 = 0.3;
 /// within a circle of 8 px no lens bends them by more than a few degrees, noise and blur add some.
 const MAX_BEND_RAD: f64 = 20.0 * PI / 180.0;
 
+/// The middle of a checkerboard corner leaves the mean around it by less than this part of the
+/// circle's amplitude. Blur makes it that mean, but ink spreads or squares stop short, and the middle
+/// may be dark or bright, off by the amplitude. A bar across the circle, which looks like a corner
+/// there, has its own brightness in its middle, off by up to twice the amplitude.
+const MAX_CENTRE: f64 = 1.2;
+
+/// Steps of the search for the level between two classes of unequal size; it settles in two.
+const LEVEL_STEPS: usize = 4;
+
 /// Directions and brightness around a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sectors {
-    /// Image angles of the six half-edges, counter-clockwise on the print, starting with one that
+pub struct Sectors<const N: usize> {
+    /// Image angles of the N half-edges, counter-clockwise on the print, starting with one that
     /// has a dark sector on its counter-clockwise side. Radians.
-    pub rays: [f64; 6],
-    /// Mean brightness, which is half-way between dark and bright.
+    pub rays: [f64; N],
+    /// Brightness half-way between dark and bright.
     pub level: f64,
     /// Mean deviation from it: half the contrast.
     pub amplitude: f64,
 }
 
-impl Sectors {
-    /// Reads the sectors around `position`, from circles or else from the cubic's roots.
-    pub fn read(image: &Gray<i16>, position: [f64; 2], surface: &CubicSurface) -> Option<Self> {
-        let circles = RADII_PX.iter().filter_map(|&radius| Circle::sample(image, position, radius));
+impl<const N: usize> Sectors<N> {
+    /// Reads the sectors around `position`, from circles or else from the form's roots.
+    pub fn read(image: &Gray<i16>, position: [f64; 2], form: &Form) -> Option<Self> {
+        let circles = RADII_PX.iter().filter_map(|&radius| {
+            Circle::<N>::sample(image, position, radius).filter(Circle::has_its_mean_in_the_middle)
+        });
         let mut first = None;
         for circle in circles {
             if let Some(rays) = circle.crossings().and_then(|c| ordered_rays(&c)) {
@@ -62,15 +77,15 @@ impl Sectors {
             }
             first.get_or_insert(circle);
         }
-        let rays = ordered_rays(&roots(surface)?)?;
+        let rays = ordered_rays(&roots(form)?)?;
         first.filter(|circle| circle.alternates(&rays)).map(|circle| circle.sectors(rays))
     }
 }
 
 /// Mean deviation from the mean on the smallest circle around a place; `None` at the border.
-pub fn contrast_around(image: &Gray<i16>, position: [f64; 2]) -> Option<f64> {
+pub fn contrast_around<const N: usize>(image: &Gray<i16>, position: [f64; 2]) -> Option<f64> {
     let smallest = RADII_PX.into_iter().fold(f64::INFINITY, f64::min);
-    Circle::sample(image, position, smallest).map(|circle| circle.amplitude())
+    Circle::<N>::sample(image, position, smallest).map(|circle| circle.amplitude())
 }
 
 /// A sign change at an image angle; `rising` when brightness grows with the angle.
@@ -80,13 +95,15 @@ struct Crossing {
     rising: bool,
 }
 
-/// Brightness on a circle, by rising image angle.
-struct Circle {
+/// Brightness on a circle around a corner with N rays, by rising image angle.
+struct Circle<const N: usize> {
     level: f64,
     deviations: [f64; SAMPLES],
+    /// Brightness of the middle minus the mean of the circle.
+    centre: f64,
 }
 
-impl Circle {
+impl<const N: usize> Circle<N> {
     /// `None` when the circle leaves the image.
     fn sample(image: &Gray<i16>, [x, y]: [f64; 2], radius: f64) -> Option<Self> {
         let inside = x - radius >= 0.0
@@ -98,9 +115,22 @@ impl Circle {
         }
         let values: [f64; SAMPLES] = DIRECTIONS
             .map(|[cos, sin]| f64::from(image.bilinear(x + radius * cos, y + radius * sin)));
-        // Opposite sectors have opposite colours, so the mean is the level of the edges.
-        let level = values.iter().sum::<f64>() / SAMPLES as f64;
-        Some(Self { level, deviations: values.map(|v| v - level) })
+        let mean = values.iter().sum::<f64>() / SAMPLES as f64;
+        let level = match kind::<N>() {
+            // Opposite sectors have opposite colours, so the mean is the level of the edges.
+            GridKind::Deltille => mean,
+            GridKind::Checker => between_classes(&values, mean),
+        };
+        let centre = f64::from(image.bilinear(x, y)) - mean;
+        Some(Self { level, deviations: values.map(|v| v - level), centre })
+    }
+
+    /// Whether what is in the middle may be a corner; odd ones have proved it by their oddness.
+    fn has_its_mean_in_the_middle(&self) -> bool {
+        match kind::<N>() {
+            GridKind::Deltille => true,
+            GridKind::Checker => self.centre.abs() < MAX_CENTRE * self.amplitude(),
+        }
     }
 
     /// Mean deviation from the level.
@@ -108,15 +138,15 @@ impl Circle {
         self.deviations.iter().map(|d| d.abs()).sum::<f64>() / SAMPLES as f64
     }
 
-    fn sectors(&self, rays: [f64; 6]) -> Sectors {
+    fn sectors(&self, rays: [f64; N]) -> Sectors<N> {
         Sectors { rays, level: self.level, amplitude: self.amplitude() }
     }
 
     /// Whether the sectors between given rays are dark and bright in turn, on the average.
-    fn alternates(&self, rays: &[f64; 6]) -> bool {
+    fn alternates(&self, rays: &[f64; N]) -> bool {
         let amplitude = self.amplitude();
-        (0..6).all(|i| {
-            let width = -turn(rays[i], rays[(i + 1) % 6]);
+        (0..N).all(|i| {
+            let width = -turn(rays[i], rays[(i + 1) % N]);
             let inside = (0..SAMPLES).filter(|&k| {
                 let behind = (rays[i] - angle_of(k as f64)).rem_euclid(TAU);
                 behind > 0.0 && behind < width
@@ -131,8 +161,8 @@ impl Circle {
         })
     }
 
-    /// The six sign changes; `None` unless there are exactly six.
-    fn crossings(&self) -> Option<[Crossing; 6]> {
+    /// The N sign changes; `None` unless there are exactly so many.
+    fn crossings(&self) -> Option<[Crossing; N]> {
         let largest = self.deviations.iter().fold(0.0f64, |m, d| m.max(d.abs()));
         let dead = DEAD_BAND * largest;
         let clear: Vec<usize> = (0..SAMPLES).filter(|&k| self.deviations[k].abs() > dead).collect();
@@ -140,7 +170,7 @@ impl Circle {
         for (n, &a) in clear.iter().enumerate() {
             let b = clear[(n + 1) % clear.len()];
             if (self.deviations[a] > 0.0) != (self.deviations[b] > 0.0) {
-                if crossings.len() == 6 {
+                if crossings.len() == N {
                     return None;
                 }
                 crossings.push(self.crossing_between(a, b));
@@ -181,10 +211,28 @@ fn angle_of(sample: f64) -> f64 {
     sample * TAU / SAMPLES as f64
 }
 
-/// The zeros of the cubic form around the circle; `None` unless all three roots are real.
-fn roots(surface: &CubicSurface) -> Option<[Crossing; 6]> {
-    let values: [f64; SAMPLES] = std::array::from_fn(|k| surface.form(angle_of(k as f64)));
-    let mut crossings = Vec::with_capacity(6);
+/// The level half-way between the means of what is above and of what is below it.
+fn between_classes(values: &[f64; SAMPLES], mean: f64) -> f64 {
+    let mut level = mean;
+    for _ in 0..LEVEL_STEPS {
+        let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+        for &value in values {
+            let class = usize::from(value > level);
+            sums[class] += value;
+            counts[class] += 1.0;
+        }
+        if counts.contains(&0.0) {
+            return mean;
+        }
+        level = (sums[0] / counts[0] + sums[1] / counts[1]) / 2.0;
+    }
+    level
+}
+
+/// The zeros of the form around the circle; `None` unless all roots are real.
+fn roots<const N: usize>(form: &Form) -> Option<[Crossing; N]> {
+    let values: [f64; SAMPLES] = std::array::from_fn(|k| form.at(angle_of(k as f64)));
+    let mut crossings = Vec::with_capacity(N);
     for k in 0..SAMPLES {
         let (from, to) = (values[k], values[(k + 1) % SAMPLES]);
         if (from > 0.0) != (to > 0.0) && from != to {
@@ -196,16 +244,16 @@ fn roots(surface: &CubicSurface) -> Option<[Crossing; 6]> {
 }
 
 /// Rays in the order of [`Sectors::rays`]; `None` when opposite ones are not in line.
-fn ordered_rays(crossings: &[Crossing; 6]) -> Option<[f64; 6]> {
-    let straight =
-        (0..3).all(|k| turn(crossings[k].angle, crossings[k + 3].angle + PI).abs() <= MAX_BEND_RAD);
+fn ordered_rays<const N: usize>(crossings: &[Crossing; N]) -> Option<[f64; N]> {
+    let bend = |k: usize| turn(crossings[k].angle, crossings[k + N / 2].angle + PI).abs();
+    let straight = (0..N / 2).all(|k| bend(k) <= MAX_BEND_RAD);
     if !straight {
         return None;
     }
     // Falling image angle is counter-clockwise on the print. Going that way, a crossing that rises
     // with the angle leads from bright to… dark: its counter-clockwise sector is dark.
     let start = crossings.iter().position(|c| c.rising)?;
-    Some(std::array::from_fn(|k| crossings[(start + 6 - k) % 6].angle))
+    Some(std::array::from_fn(|k| crossings[(start + N - k) % N].angle))
 }
 
 /// The turn from `from` to `to`, −π to π.
@@ -218,51 +266,81 @@ pub fn turn(from: f64, to: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// A corner whose black tile lies between image angles −60°+tilt and 0°+tilt: upright on the
-    /// print, right of the corner.
-    fn corner(tilt: f64) -> Gray<i16> {
+    const FLAT: Form = Form::Cubic([0.0; 4]);
+
+    /// A corner of N rays whose black tile lies between image angles −360°/N + tilt and tilt:
+    /// upright on the print, right of the corner.
+    fn corner<const N: usize>(tilt: f64) -> Gray<i16> {
         Gray::from_fn(41, 41, |x, y| {
             let theta = (y as f64 - 20.0).atan2(x as f64 - 20.0) - tilt;
-            if (3.0 * theta).sin() < 0.0 { 100 } else { 700 }
+            match (0.5 * N as f64 * theta).sin() {
+                _ if (x, y) == (20, 20) => 400,
+                s if s < 0.0 => 100,
+                _ => 700,
+            }
         })
     }
 
     #[test]
     fn rays_follow_the_print_and_even_ones_have_black_on_their_left() {
+        rays_are_in_order::<6>();
+        rays_are_in_order::<4>();
+    }
+
+    fn rays_are_in_order<const N: usize>() {
+        let sector = TAU / N as f64;
         for k in 0..20 {
             let tilt = 0.3 * f64::from(k);
-            let flat = CubicSurface { c: [0.0; 7] };
-            let sectors = Sectors::read(&corner(tilt), [20.0, 20.0], &flat).unwrap();
+            let image = corner::<N>(tilt);
+            let sectors = Sectors::<N>::read(&image, [20.0, 20.0], &FLAT).unwrap();
             assert!((sectors.level - 400.0).abs() < 20.0 && sectors.amplitude > 250.0);
             for (i, &ray) in sectors.rays.iter().enumerate() {
-                let next = sectors.rays[(i + 1) % 6];
-                assert!((turn(ray, next) + PI / 3.0).abs() < 0.25, "60° apart, image angles fall");
-                let nearest = (0..6)
-                    .map(|n| turn(ray, tilt - f64::from(n) * PI / 3.0))
+                let next = sectors.rays[(i + 1) % N];
+                assert!((turn(ray, next) + sector).abs() < 0.25, "evenly, image angles fall");
+                let nearest = (0..N)
+                    .map(|n| turn(ray, tilt - n as f64 * sector))
                     .min_by(|a, b| a.abs().total_cmp(&b.abs()));
                 assert!(nearest.unwrap().abs() < 0.12);
             }
             // Half a sector counter-clockwise of ray 0 the image is dark.
-            let middle = sectors.rays[0] - PI / 6.0;
-            let value = corner(tilt).bilinear(20.0 + 6.0 * middle.cos(), 20.0 + 6.0 * middle.sin());
+            let middle = sectors.rays[0] - sector / 2.0;
+            let value = image.bilinear(20.0 + 6.0 * middle.cos(), 20.0 + 6.0 * middle.sin());
             assert!(value < 400.0);
         }
     }
 
     #[test]
-    fn four_sectors_and_flat_images_have_no_rays() {
-        let flat = CubicSurface { c: [0.0; 7] };
-        let checker = Gray::from_fn(41, 41, |x, y| if (x < 20) == (y < 20) { 100 } else { 700 });
-        assert!(Sectors::read(&checker, [19.5, 19.5], &flat).is_none());
-        assert!(Sectors::read(&Gray::new(41, 41), [20.0, 20.0], &flat).is_none());
-        assert!(Sectors::read(&Gray::new(3, 3), [1.0, 1.0], &flat).is_none());
+    fn corners_of_the_other_kind_and_flat_images_have_no_rays() {
+        let place = [20.0, 20.0];
+        assert!(Sectors::<6>::read(&corner::<4>(0.2), place, &FLAT).is_none());
+        assert!(Sectors::<4>::read(&corner::<6>(0.2), place, &FLAT).is_none());
+        assert!(Sectors::<6>::read(&Gray::new(41, 41), place, &FLAT).is_none());
+        assert!(Sectors::<4>::read(&Gray::new(41, 41), place, &FLAT).is_none());
+        assert!(Sectors::<6>::read(&Gray::new(3, 3), [1.0, 1.0], &FLAT).is_none());
     }
 
     #[test]
-    fn the_cubics_roots_serve_as_rays() {
-        let monkey = CubicSurface { c: [1.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0] };
-        let rays = ordered_rays(&roots(&monkey).unwrap()).unwrap();
+    fn a_bar_across_the_circle_is_no_corner() {
+        for half_width in [1.0, 2.0] {
+            let bar = |value: i16| {
+                Gray::from_fn(41, 41, |_, y| {
+                    if (y as f64 - 20.0).abs() < half_width { value } else { 400 }
+                })
+            };
+            assert!(Sectors::<4>::read(&bar(100), [20.0, 20.0], &FLAT).is_none());
+            assert!(Sectors::<4>::read(&bar(700), [20.0, 20.0], &FLAT).is_none());
+        }
+    }
+
+    #[test]
+    fn the_forms_roots_serve_as_rays() {
+        let monkey = Form::Cubic([1.0, 0.0, -3.0, 0.0]);
+        let rays: [f64; 6] = ordered_rays(&roots(&monkey).unwrap()).unwrap();
         assert!(turn(rays[0], rays[3] + PI).abs() < 1e-9);
-        assert!(monkey.form(rays[0] - 0.3) < 0.0, "dark after an even ray");
+        assert!(monkey.at(rays[0] - 0.3) < 0.0, "dark after an even ray");
+        let saddle = Form::Quadratic([1.0, 0.0, -1.0]);
+        let rays: [f64; 4] = ordered_rays(&roots(&saddle).unwrap()).unwrap();
+        assert!(turn(rays[0], rays[2] + PI).abs() < 1e-9);
+        assert!(saddle.at(rays[0] - 0.3) < 0.0, "dark after an even ray");
     }
 }

@@ -116,7 +116,7 @@ fn edge_points(inside: f64) -> impl Iterator<Item = [f64; 2]> {
 /// Contrast between dark and bright around the corners of a tile, in units of the image.
 fn corner_contrast<T: Intensity>(grid: &SaddleGrid, tile: Tile) -> f64 {
     let amplitudes = tile.vertices().into_iter().filter_map(|v| grid.get(&v));
-    let least = amplitudes.map(|p| p.saddle.sectors.amplitude).fold(f64::INFINITY, f64::min);
+    let least = amplitudes.map(|p| p.amplitude).fold(f64::INFINITY, f64::min);
     2.0 * least * f64::from(T::FULL_SCALE / crate::raster::PYRAMID_FULL_SCALE)
 }
 

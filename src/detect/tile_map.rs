@@ -27,7 +27,7 @@ impl TileMap {
         let mut around: Vec<Vertex> = own.iter().flat_map(|v| v.neighbours()).collect();
         around.sort();
         around.dedup();
-        let at = |v: &Vertex| grid.get(v).map(|placed| placed.saddle.position);
+        let at = |v: &Vertex| grid.get(v).map(|placed| placed.position);
         for vertex in &own {
             at(vertex)?;
         }

@@ -19,7 +19,8 @@ pub struct FinderArgs {
     /// Find untagged boards of this tiling instead
     #[arg(long, value_name = "KIND")]
     grid: Option<Kind>,
-    /// Rows of corners of the untagged board: labels boards seen whole from their lower left
+    /// Rows of corners of the untagged board: labels boards seen whole from their lower left, on a
+    /// checkerboard the corner whose square is dark
     #[arg(long, conflicts_with = "target", requires = "cols", value_parser = side())]
     rows: Option<u32>,
     /// Corners in each row of the untagged board
@@ -40,6 +41,8 @@ pub struct FinderArgs {
 enum Kind {
     /// Triangles
     Deltille,
+    /// Squares
+    Checker,
 }
 
 /// A range that boards have.
@@ -51,13 +54,17 @@ impl FinderArgs {
     /// The target, where one is named, and the detector.
     pub fn detector(&self) -> anyhow::Result<(Option<Target>, Detector)> {
         if self.target.is_none() && self.grid.is_none() {
-            bail!("give --target FILE, or --grid deltille for untagged boards");
+            bail!("give --target FILE, or --grid deltille or checker for untagged boards");
         }
         let config =
             DetectorConfig { max_bit_errors: self.max_errors, refinement: self.refine.into() };
         let Some(path) = &self.target else {
+            let kind = match self.grid {
+                Some(Kind::Checker) => GridKind::Checker,
+                _ => GridKind::Deltille,
+            };
             let size = self.rows.zip(self.cols);
-            return Ok((None, Detector::for_grid(GridKind::Deltille, size, config)));
+            return Ok((None, Detector::for_grid(kind, size, config)));
         };
         let target = target_file::read(path).context("--target")?;
         let family = target_file::family(&target, self.family.as_deref())?;
