@@ -177,6 +177,33 @@ fn any_closed_mesh_becomes_a_target() {
 }
 
 /// A mesh is refused in one line that names its file and what is wrong.
+/// Faces that lie in one plane do not see each other's print; a material that hides it is refused.
+#[test]
+fn a_tetrahedron_with_each_face_cut_in_four_is_sixteen_faces() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]].map(|v| v.map(|x| 60 * x));
+    let middle = |i: usize, j: usize| [0, 1, 2].map(|k| (corners[i][k] + corners[j][k]) / 2);
+    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let vertices = corners.into_iter().chain(pairs.map(|(i, j)| middle(i, j)));
+    let mut text: String = vertices.map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    let number = |i: usize, j: usize| {
+        5 + pairs.iter().position(|&pair| pair == (i.min(j), i.max(j))).unwrap()
+    };
+    for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]] {
+        let [ab, bc, ca] = [number(a, b), number(b, c), number(c, a)];
+        let [a, b, c] = [a + 1, b + 1, c + 1];
+        text += &format!("f {a} {ab} {ca}\nf {ab} {b} {bc}\nf {ca} {bc} {c}\nf {ab} {bc} {ca}\n");
+    }
+    std::fs::write(path.join("cut.obj"), text).unwrap();
+    deltille(path, "solid --mesh cut.obj --gltf --obj --tiles 6 --name t")
+        .success()
+        .stdout(contains("t.glb: verified, 16 faces").and(contains("t.obj: verified, 16 faces")));
+    let material = std::fs::read_to_string(path.join("t.mtl")).unwrap();
+    std::fs::write(path.join("t.mtl"), material.replace("Kd 1 1 1", "Kd 0 0 0")).unwrap();
+    deltille(path, "verify t.json t.obj").code(2).stderr(contains("Kd 1 1 1"));
+}
+
 #[test]
 fn meshes_that_are_no_solids_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -13,13 +13,15 @@ const IN_PLANE_MM: f64 = 0.25;
 /// Samples per pixel and axis.
 const SAMPLES: usize = 2;
 
-/// What the texture of a loaded mesh shows on the plane of a panel, seen from its front, and where
-/// the panel lies on that page; white where the mesh has no triangle in the plane.
+/// What the texture of a loaded mesh shows on the face of a panel, seen from its front, and where
+/// the panel lies on that page; white where the mesh has no triangle in the face.
 ///
-/// `area_mm` is the left, lower, right and upper end of the page in the panel frame.
+/// `outline` is that of the face, counter-clockwise in the panel frame, mm: triangles that lie in its
+/// plane beside it belong to another face. `area_mm` is the left, lower, right and upper end of the page in the panel frame.
 pub(super) fn face_page(
     model: &Model,
     panel: &Panel,
+    outline: [DVec2; 3],
     area_mm: [f64; 4],
     px_per_mm: f64,
 ) -> (Page, Placement) {
@@ -35,7 +37,12 @@ pub(super) fn face_page(
     let mut shades = vec![u8::MAX; width * height];
     for triangle in &model.triangles {
         let flat = triangle.vertices_mm.map(|v| panel_from_target * (v - origin));
-        if flat.iter().any(|p| p.z.abs() > IN_PLANE_MM) {
+        let middle = flat.iter().sum::<DVec3>().truncate() / 3.0;
+        let inside = |i: usize| {
+            let (from, to) = (outline[i], outline[(i + 1) % 3]);
+            (to - from).perp_dot(middle - from) > 0.0
+        };
+        if flat.iter().any(|p| p.z.abs() > IN_PLANE_MM) || !(0..3).all(inside) {
             continue;
         }
         // Sample positions, y down.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::face_page::face_page;
@@ -174,8 +174,11 @@ fn check_print(
     px_per_mm: f64,
     verdict: &mut FaceVerdict,
 ) {
-    let area_mm = verifier.face_area_mm(panel);
-    let (page, placement) = face_page(model, panel, area_mm, px_per_mm);
+    let outline = verifier.face_outline_mm(panel);
+    let [a, b, c] = outline;
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    let area_mm = [low.x, low.y, high.x, high.y];
+    let (page, placement) = face_page(model, panel, outline, area_mm, px_per_mm);
     let found_from_stated = AffineMap::IDENTITY;
     let placed = PlacedPanel { page: &page, panel, placement: &placement, found_from_stated };
     let report = placed.check_tiles(verifier.family);
@@ -195,20 +198,24 @@ fn check_print(
 }
 
 impl Verifier<'_> {
-    /// The part of a panel's plane that its face takes: left, lower, right, upper end, mm.
-    fn face_area_mm(&self, panel: &Panel) -> [f64; 4] {
-        let TargetSpec::Solid(spec) = &self.target.spec else { return panel.bounds_mm() };
+    /// The outline of a panel's face in the panel frame, mm.
+    fn face_outline_mm(&self, panel: &Panel) -> [DVec2; 3] {
+        let of_panel = || {
+            // Large enough for all that is printed.
+            let [left, lower, right, upper] = panel.bounds_mm();
+            let (width, height) = (right - left, upper - lower);
+            let corner = DVec2::new(left, lower);
+            [corner, corner + DVec2::new(2.0 * width, 0.0), corner + DVec2::new(0.0, 2.0 * height)]
+        };
+        let TargetSpec::Solid(spec) = &self.target.spec else { return of_panel() };
         let solid = spec.polyhedron();
         let index = self.target.panels.iter().position(|p| p.id == panel.id);
         let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
-            return panel.bounds_mm();
+            return of_panel();
         };
         let panel_from_target = DMat3::from_cols_array(&panel.pose.rotation);
         let origin = DVec3::from(panel.pose.translation_mm);
-        let flat = solid.triangle_mm(index).map(|v| panel_from_target * (v - origin));
-        let [a, b, c] = flat.map(DVec3::truncate);
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        [low.x, low.y, high.x, high.y]
+        solid.triangle_mm(index).map(|v| (panel_from_target * (v - origin)).truncate())
     }
 }
 

@@ -88,6 +88,15 @@ fn obj(path: &Path) -> Result<Model, String> {
             (&mesh.texcoord_indices, &uvs),
         )?;
         let material = mesh.material_id.and_then(|id| materials.get(id));
+        if let Some(material) = material
+            && (material.diffuse.is_some_and(|kd| kd != [1.0; 3])
+                || material.dissolve.is_some_and(|d| d != 1.0))
+        {
+            return Err(
+                "its material tints or hides the texture: Kd 1 1 1 and d 1 show it as it is"
+                    .to_owned(),
+            );
+        }
         let name = material.and_then(|material| material.diffuse_texture.as_ref());
         texture = name.map(|name| path.with_file_name(name)).or(texture);
     }
