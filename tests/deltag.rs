@@ -19,6 +19,19 @@ fn altered(edit: impl Fn(&str) -> String) -> tempfile::NamedTempFile {
 }
 
 #[test]
+fn a_search_ends_after_the_round_in_which_its_time_is_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("f.json");
+    deltag()
+        .args(["gen-family", "d9h4", "--method", "search", "--time", "0.001", "-o"])
+        .arg(&path)
+        .assert()
+        .success();
+    let family = std::fs::read_to_string(&path).unwrap();
+    assert!(family.contains("\"rounds\": 1"), "{family}");
+}
+
+#[test]
 fn the_published_lexicode_is_written_as_shipped() {
     let folder = tempfile::tempdir().unwrap();
     deltag()
@@ -142,7 +155,6 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
     gen_family(&["--method", "lexicode", "--seed", "3"], "--seed");
     gen_family(&["--method", "lexicode", "--time", "3"], "--time");
     gen_family(&["--method", "lexicode", "--limit", "3"], "--limit");
-    gen_family(&["--method", "search", "--time", "3"], "--time");
     refused(&["verify-family", "no-such-family"], "no-such-family");
     refused(&["verify-family", "/no/such/file.json"], "/no/such/file.json");
     refused(&["verify-family"], "FAMILIES");

@@ -36,17 +36,17 @@ impl Search {
     /// The codes found, in the order of a family.
     pub fn codes(&self, screen: &Screen, control: Control) -> Result<Vec<u64>, FamilyError> {
         let mut checkpoint = Checkpoint::default();
-        self.resume(screen, &mut checkpoint, &|_| {}, control)?;
+        self.resume(screen, &mut checkpoint, &|_| true, control)?;
         Ok(checkpoint.family_codes(screen))
     }
 
-    /// Does the rounds that a checkpoint lacks; `save` is called after each. When it is cancelled,
-    /// the checkpoint holds the rounds that were finished.
+    /// Does the rounds that a checkpoint lacks; `save` is called after each, and tells whether to
+    /// go on. When it is cancelled, the checkpoint holds the rounds that were finished.
     pub fn resume(
         &self,
         screen: &Screen,
         checkpoint: &mut Checkpoint,
-        save: &dyn Fn(&Checkpoint),
+        save: &dyn Fn(&Checkpoint) -> bool,
         control: Control,
     ) -> Result<(), FamilyError> {
         let bits = screen.words().dimension().bits();
@@ -64,9 +64,12 @@ impl Search {
             control.check()?;
             checkpoint.codes = codes;
             checkpoint.rounds_done += 1;
-            save(checkpoint);
+            let go_on = save(checkpoint);
             let (done, found) = (checkpoint.rounds_done, checkpoint.codes.len());
             control.report(done.into(), self.rounds.into(), found);
+            if !go_on {
+                break;
+            }
         }
         Ok(())
     }
@@ -104,11 +107,14 @@ mod tests {
         let cancel = AtomicBool::new(false);
         let control = Control { cancel: Some(&cancel), report: None };
         let mut checkpoint = Checkpoint::default();
-        let stop = |c: &Checkpoint| cancel.store(c.rounds_done == 2, Ordering::Relaxed);
+        let stop = |c: &Checkpoint| {
+            cancel.store(c.rounds_done == 2, Ordering::Relaxed);
+            true
+        };
         let stopped = search.resume(&screen, &mut checkpoint, &stop, control);
         assert!(matches!(stopped, Err(FamilyError::Cancelled)));
         assert_eq!(checkpoint.rounds_done, 2);
-        search.resume(&screen, &mut checkpoint, &|_| {}, Control::default()).unwrap();
+        search.resume(&screen, &mut checkpoint, &|_| true, Control::default()).unwrap();
         assert_eq!(checkpoint.family_codes(&screen), whole);
     }
 }

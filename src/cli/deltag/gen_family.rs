@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{bail, ensure};
 use clap::ValueEnum;
@@ -34,14 +34,15 @@ pub(super) struct Args {
     /// How to search
     #[arg(long, value_enum, default_value_t = Method::Best)]
     method: Method,
-    /// Seconds for the methods best and algebraic, more find larger families [default: 60]
+    /// Seconds for the methods best and algebraic, more find larger families [default: 60]; search
+    /// begins no round after them
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true,
           value_parser = number(0.001..=1e6))]
     time: Option<f64>,
     /// Seed of the random choices of best, algebraic and search [default: 1]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     seed: Option<u64>,
-    /// Rounds of the method search [default: 3]
+    /// Rounds of the method search, at most [default: 3; with --time as many as it gives]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(1..=1_000_000u32))]
     rounds: Option<u32>,
     /// Number of codes at most, for the methods best and algebraic [default: as many as a file of
@@ -199,7 +200,7 @@ pub(super) fn bytes_per_code(dimension: Dimension) -> u64 {
 
 impl Args {
     fn rounds(&self) -> u32 {
-        self.rounds.unwrap_or(3)
+        self.rounds.unwrap_or(if self.time.is_some() { 1_000_000 } else { 3 })
     }
 
     fn seed(&self) -> u64 {
@@ -244,7 +245,7 @@ impl Args {
                 last.name()
             )
         };
-        refuse("--time", self.time.is_some(), &[Algebraic, Best])?;
+        refuse("--time", self.time.is_some(), &[Algebraic, Best, Search])?;
         refuse("--limit", self.limit.is_some(), &[Algebraic, Best])?;
         refuse("--rounds", self.rounds.is_some(), &[Search])?;
         ensure!(
@@ -326,7 +327,12 @@ impl Args {
             "--rounds: the checkpoint of --resume has {} rounds already",
             checkpoint.rounds_done
         );
-        let ended = search.resume(&screen, &mut checkpoint, &|c| file.save(c), control);
+        let start = Instant::now();
+        let save = |c: &search::Checkpoint| {
+            file.save(c);
+            self.time.is_none_or(|time| start.elapsed().as_secs_f64() < time)
+        };
+        let ended = search.resume(&screen, &mut checkpoint, &save, control);
         let rounds = checkpoint.rounds_done;
         let family = || {
             let codes = checkpoint.family_codes(&screen);
