@@ -137,7 +137,7 @@ fn whole_boards_are_labelled_from_their_dark_corner_up_to_60_degrees() {
 fn a_fisheye_lens_bends_the_rows_but_not_the_labels() {
     let mut camera = Camera::pinhole(1600, 1200, 1.2);
     camera.focal_px = [420.0; 2];
-    camera.lens = Lens::KannalaBrandt(KannalaBrandt { k: [-0.02, 0.002, 0.0, 0.0] });
+    camera.lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![-0.02, 0.002, 0.0, 0.0] });
     let scene = board(false);
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut all = Vec::new();

@@ -110,7 +110,7 @@ fn every_corner_of_a_tagged_board_is_labelled_up_to_60_degrees() {
 fn a_fisheye_view_and_an_inverted_board_are_labelled_too() {
     let mut camera = Camera::pinhole(1600, 1200, 1.2);
     camera.focal_px = [420.0; 2];
-    camera.lens = Lens::KannalaBrandt(KannalaBrandt { k: [-0.02, 0.002, 0.0, 0.0] });
+    camera.lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![-0.02, 0.002, 0.0, 0.0] });
     for inverted in [false, true] {
         let board = board(Some(TagSpec::default()), inverted);
         let mut rng = ChaCha8Rng::seed_from_u64(2);

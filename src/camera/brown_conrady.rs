@@ -1,45 +1,186 @@
 use glam::DVec3;
 
+use super::lens::{Imaged, LensLaw, Ray};
+
 /// Points nearer to the image plane than this part of their distance are not projected: beyond
 /// 89.9° from the axis perspective loses its meaning.
 const MIN_FORWARD: f64 = 0.002;
 
-/// Perspective with radial and tangential distortion (Brown 1966, Conrady 1919), as in OpenCV:
+/// Steps of the radius in which the way back from the image looks for the undistorted point, in
+/// focal lengths: far less than the length over which any usable polynomial folds back.
+const RADIUS_STEP: f64 = 0.02;
+
+/// Newton's iterations from a start within [`RADIUS_STEP`]; five reach the last bit.
+const ITERATIONS: usize = 20;
+
+/// Perspective with radial, tangential and thin-prism distortion (Brown 1966, Conrady 1919), as in
+/// OpenCV:
 ///
 /// ```text
 ///     x = X/Z, y = Y/Z, r² = x² + y²
-///     x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 xy + p2 (r² + 2x²)
-///     y' = y (1 + k1 r² + k2 r⁴ + k3 r⁶) + p1 (r² + 2y²) + 2 p2 xy
+///     ρ = (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶)
+///     x' = x ρ + 2 p1 xy + p2 (r² + 2x²) + s1 r² + s2 r⁴
+///     y' = y ρ + p1 (r² + 2y²) + 2 p2 xy + s3 r² + s4 r⁴
 /// ```
 ///
-/// Valid where the radial term still grows with r.
+/// Valid less than 89.9° from the axis, where the denominator is positive and r ρ still grows with
+/// r. Parameters in OpenCV's order: k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BrownConrady {
     /// k1, k2, k3.
     pub radial: [f64; 3],
     /// p1, p2.
     pub tangential: [f64; 2],
+    /// k4, k5, k6.
+    pub denominator: [f64; 3],
+    /// s1, s2, s3, s4.
+    pub prism: [f64; 4],
+}
+
+/// The radial factor at r² = q.
+struct Radial {
+    /// ρ.
+    rho: f64,
+    /// ∂ρ/∂q.
+    slope: f64,
+    /// Its denominator.
+    below: f64,
 }
 
 impl BrownConrady {
-    /// Normalised image point of a camera point; `None` behind the camera or where distortion
-    /// folds back.
-    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+    /// `None` where the model is not valid.
+    fn radial(&self, q: f64) -> Option<Radial> {
+        let [k1, k2, k3] = self.radial;
+        let [k4, k5, k6] = self.denominator;
+        let above = 1.0 + q * (k1 + q * (k2 + q * k3));
+        let below = 1.0 + q * (k4 + q * (k5 + q * k6));
+        let rho = above / below;
+        let above_slope = k1 + q * (2.0 * k2 + q * 3.0 * k3);
+        let below_slope = k4 + q * (2.0 * k5 + q * 3.0 * k6);
+        let slope = (above_slope - rho * below_slope) / below;
+        (below > 0.0 && rho + 2.0 * q * slope > 0.0).then_some(Radial { rho, slope, below })
+    }
+
+    /// x', y' and ∂(x', y')/∂(x, y).
+    fn distort(&self, [x, y]: [f64; 2], radial: &Radial) -> ([f64; 2], [[f64; 2]; 2]) {
+        let q = x * x + y * y;
+        let Radial { rho, slope, .. } = *radial;
+        let ([p1, p2], [s1, s2, s3, s4]) = (self.tangential, self.prism);
+        let at = [
+            x * rho + 2.0 * p1 * x * y + p2 * (q + 2.0 * x * x) + q * (s1 + q * s2),
+            y * rho + p1 * (q + 2.0 * y * y) + 2.0 * p2 * x * y + q * (s3 + q * s4),
+        ];
+        let (along_x, along_y) = (2.0 * (s1 + 2.0 * s2 * q), 2.0 * (s3 + 2.0 * s4 * q));
+        let mixed = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
+        let by_plane = [
+            [
+                rho + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x + x * along_x,
+                mixed + y * along_x,
+            ],
+            [
+                mixed + x * along_y,
+                rho + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x + y * along_y,
+            ],
+        ];
+        (at, by_plane)
+    }
+
+    /// The radius r with r ρ(r) = `distorted`, to within a step.
+    fn undistorted_radius(&self, distorted: f64) -> Option<f64> {
+        let farthest = 1.0 / MIN_FORWARD;
+        let (mut r, mut reached) = (0.0, 0.0);
+        while r < farthest {
+            let step = RADIUS_STEP * (1.0 + r);
+            let next = r + step;
+            let radial = self.radial(next * next);
+            let value = radial.map_or(f64::INFINITY, |radial| next * radial.rho);
+            if value >= distorted {
+                let part = if value.is_finite() {
+                    (distorted - reached) / (value - reached)
+                } else {
+                    0.0
+                };
+                return Some(r + step * part);
+            }
+            (r, reached) = (next, value);
+        }
+        None
+    }
+}
+
+impl LensLaw for BrownConrady {
+    fn names(&self) -> Vec<String> {
+        ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"]
+            .map(str::to_owned)
+            .to_vec()
+    }
+
+    fn parameters(&self) -> Vec<f64> {
+        let ([k1, k2, k3], [p1, p2]) = (self.radial, self.tangential);
+        [[k1, k2, p1, p2, k3].as_slice(), &self.denominator, &self.prism].concat()
+    }
+
+    fn set_parameters(&mut self, values: &[f64]) {
+        self.radial = [values[0], values[1], values[4]];
+        self.tangential = [values[2], values[3]];
+        self.denominator.copy_from_slice(&values[5..8]);
+        self.prism.copy_from_slice(&values[8..12]);
+    }
+
+    fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
         if point.z <= MIN_FORWARD * point.length() {
             return None;
         }
         let (x, y) = (point.x / point.z, point.y / point.z);
-        let r2 = x * x + y * y;
-        let [k1, k2, k3] = self.radial;
-        let [p1, p2] = self.tangential;
-        let slope = 1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3));
-        if slope <= 0.0 {
-            return None;
-        }
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        Some([
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        ])
+        let q = x * x + y * y;
+        let radial = self.radial(q)?;
+        let (at, plane) = self.distort([x, y], &radial);
+        let by_point = plane.map(|[by_x, by_y]| {
+            [by_x / point.z, by_y / point.z, -(x * by_x + y * by_y) / point.z]
+        });
+        let Radial { rho, below, .. } = radial;
+        let up = |power: f64| [x * power / below, y * power / below];
+        let down = |power: f64| up(-rho * power);
+        by_parameters[..12].copy_from_slice(&[
+            up(q),
+            up(q * q),
+            [2.0 * x * y, q + 2.0 * y * y],
+            [q + 2.0 * x * x, 2.0 * x * y],
+            up(q * q * q),
+            down(q),
+            down(q * q),
+            down(q * q * q),
+            [q, 0.0],
+            [q * q, 0.0],
+            [0.0, q],
+            [0.0, q * q],
+        ]);
+        Some(Imaged { at, by_point })
     }
+
+    fn ray(&self, at: [f64; 2]) -> Option<Ray> {
+        let distorted = at[0].hypot(at[1]);
+        if distorted == 0.0 {
+            return Ray::central(DVec3::Z);
+        }
+        let part = self.undistorted_radius(distorted)? / distorted;
+        let mut plane = [at[0] * part, at[1] * part];
+        for _ in 0..ITERATIONS {
+            let radial = self.radial(plane[0] * plane[0] + plane[1] * plane[1])?;
+            let (image, by_plane) = self.distort(plane, &radial);
+            let step = solve(by_plane, [at[0] - image[0], at[1] - image[1]])?;
+            plane = [plane[0] + step[0], plane[1] + step[1]];
+            if step[0].hypot(step[1]) <= 1e-15 * (1.0 + distorted) {
+                break;
+            }
+        }
+        Ray::central(DVec3::new(plane[0], plane[1], 1.0))
+    }
+}
+
+/// The solution of two linear equations.
+pub(super) fn solve([[a, b], [c, d]]: [[f64; 2]; 2], [u, v]: [f64; 2]) -> Option<[f64; 2]> {
+    let determinant = a * d - b * c;
+    let solution = [(d * u - b * v) / determinant, (a * v - c * u) / determinant];
+    solution.iter().all(|v| v.is_finite()).then_some(solution)
 }

@@ -1,4 +1,5 @@
-//! Camera files: the project's own YAML, and those of ROS and OpenCV.
+//! Camera files: the project's own YAML (or JSON), which carries every model, and those of ROS and
+//! OpenCV, which are read.
 //!
 //! ```
 //! let text = "
@@ -6,25 +7,41 @@
 //! height: 960
 //! focal_px: [1100, 1100]
 //! centre_px: [639.5, 479.5]
-//! model: pinhole                        # or fisheye
-//! distortion: [-0.1, 0.02, 0, 0, 0]     # k1 k2 p1 p2 k3; of a fisheye k1 k2 k3 k4; optional
+//! model: pinhole
+//! distortion: [-0.1, 0.02]
 //! ";
 //! let camera = deltille::camera::Camera::from_yaml(text)?;
 //! assert_eq!(camera.width, 1280);
+//! assert_eq!(deltille::camera::Camera::from_yaml(&camera.to_yaml())?, camera);
 //! # Ok::<(), deltille::camera::CameraFileError>(())
 //! ```
 //!
-//! A ROS or OpenCV file has `image_width`, `image_height`, `camera_matrix`, `distortion_model`
-//! (`plumb_bob`, `equidistant`; OpenCV names none) and `distortion_coefficients` instead.
+//! | `model` | `distortion` |
+//! |---|---|
+//! | `pinhole` | k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4; what is left out at the end is zero |
+//! | `fisheye` | k1 k2 k3 k4 or more; what is left out is zero |
+//! | `eucm` | α β |
+//! | `double-sphere` | ξ α |
+//! | `pupil` | k1 k2 k3 k4 k5 p1 p2 e1 e2 e3 |
 //!
-//! Limits: the rational and thin-prism terms of OpenCV are refused unless they are zero.
+//! A ROS or OpenCV file has `image_width`, `image_height`, `camera_matrix`, `distortion_model`
+//! (`plumb_bob`, `rational_polynomial`, `equidistant`; OpenCV names none) and
+//! `distortion_coefficients` instead.
+//!
+//! Limits: the tilted sensor of OpenCV is refused unless its angles are zero.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use super::{BrownConrady, Camera, KannalaBrandt, Lens};
+use super::{
+    BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens,
+    MAX_LENS_PARAMETERS, Pupil,
+};
 
 /// Largest side of an image, px.
 const MAX_SIDE: u32 = 50_000;
+
+/// Terms of a fisheye's polynomial that are there even when a file has fewer.
+const LEAST_TERMS: usize = 4;
 
 /// What is wrong with a camera file.
 #[derive(Debug, thiserror::Error)]
@@ -43,7 +60,7 @@ pub enum CameraFileError {
     },
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Own {
     width: u32,
@@ -56,12 +73,15 @@ struct Own {
     distortion: Vec<f64>,
 }
 
-#[derive(Clone, Copy, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 enum Model {
     #[default]
     Pinhole,
     Fisheye,
+    Eucm,
+    DoubleSphere,
+    Pupil,
 }
 
 #[derive(Deserialize)]
@@ -79,37 +99,84 @@ struct Matrix {
     data: Vec<f64>,
 }
 
+impl Model {
+    fn of(lens: &Lens) -> Self {
+        match lens {
+            Lens::BrownConrady(_) => Self::Pinhole,
+            Lens::KannalaBrandt(_) => Self::Fisheye,
+            Lens::ExtendedUnified(_) => Self::Eucm,
+            Lens::DoubleSphere(_) => Self::DoubleSphere,
+            Lens::Pupil(_) => Self::Pupil,
+        }
+    }
+
+    /// A lens of this model that has `count` parameters, or as many as it always has.
+    fn lens(self, count: usize) -> Lens {
+        match self {
+            Self::Pinhole => Lens::BrownConrady(BrownConrady::default()),
+            Self::Fisheye => {
+                let terms = count.clamp(LEAST_TERMS, MAX_LENS_PARAMETERS);
+                Lens::KannalaBrandt(KannalaBrandt { k: vec![0.0; terms] })
+            }
+            Self::Eucm => Lens::ExtendedUnified(ExtendedUnified::default()),
+            Self::DoubleSphere => Lens::DoubleSphere(DoubleSphere::default()),
+            Self::Pupil => Lens::Pupil(Pupil::default()),
+        }
+    }
+
+    /// Whether coefficients that are left out at the end of the list are zero.
+    fn ends_early(self) -> bool {
+        matches!(self, Self::Pinhole | Self::Fisheye)
+    }
+}
+
 impl Camera {
     /// Reads the text of a camera file.
     pub fn from_yaml(text: &str) -> Result<Camera, CameraFileError> {
         // OpenCV writes a version directive and a tag that no other reader of YAML knows.
         let foreign = text.contains("camera_matrix");
         let own = if foreign { from_foreign(text)? } else { parse(text)? };
-        let key = |key, problem: &str| CameraFileError::Key { key, problem: problem.to_owned() };
-        if !(1..=MAX_SIDE).contains(&own.width) || !(1..=MAX_SIDE).contains(&own.height) {
-            return Err(key("width", "width and height must be between 1 and 50000"));
+        let Own { width, height, focal_px, centre_px, model, mut distortion } = own;
+        let key = |key, problem: String| CameraFileError::Key { key, problem };
+        for (name, side) in [("width", width), ("height", height)] {
+            if !(1..=MAX_SIDE).contains(&side) {
+                return Err(key(name, format!("{side} is not between 1 and {MAX_SIDE}")));
+            }
         }
-        if own.focal_px.iter().any(|&f| !(f > 0.0 && f.is_finite())) {
-            return Err(key("focal_px", "it must be positive"));
+        if focal_px.iter().any(|&f| !(f > 0.0 && f.is_finite())) {
+            return Err(key("focal_px", "it must be positive".to_owned()));
         }
-        let numbers = own.centre_px.iter().chain(&own.distortion);
-        if numbers.into_iter().any(|v| !v.is_finite()) {
-            return Err(key("distortion", "it must be finite"));
+        for (name, values) in [("centre_px", centre_px.as_slice()), ("distortion", &distortion)] {
+            if values.iter().any(|v| !v.is_finite()) {
+                return Err(key(name, "it must be finite".to_owned()));
+            }
         }
-        let most = if matches!(own.model, Model::Fisheye) { 4 } else { 5 };
-        if own.distortion.iter().skip(most).any(|&k| k != 0.0) {
-            return Err(key("distortion", "there are more coefficients than the model has"));
+        let lens = model.lens(distortion.len());
+        let count = lens.names().len();
+        while distortion.len() > count && distortion.last() == Some(&0.0) {
+            distortion.pop();
         }
-        let k = |i: usize| own.distortion.get(i).copied().unwrap_or(0.0);
-        let lens = match own.model {
-            Model::Pinhole => Lens::BrownConrady(BrownConrady {
-                radial: [k(0), k(1), k(4)],
-                tangential: [k(2), k(3)],
-            }),
-            Model::Fisheye => Lens::KannalaBrandt(KannalaBrandt { k: [k(0), k(1), k(2), k(3)] }),
-        };
-        let Own { width, height, focal_px, centre_px, .. } = own;
+        if distortion.len() > count || distortion.len() < count && !model.ends_early() {
+            let names = lens.names().join(" ");
+            let problem = format!("there are {} numbers, the model has {names}", distortion.len());
+            return Err(key("distortion", problem));
+        }
+        distortion.resize(count, 0.0);
+        let lens = lens.with_parameters(&distortion);
         Ok(Camera { width, height, focal_px, centre_px, lens })
+    }
+
+    /// The text of the project's own camera file, with every digit.
+    pub fn to_yaml(&self) -> String {
+        let model = Model::of(&self.lens);
+        let mut distortion = self.lens.parameters();
+        let least = if model == Model::Fisheye { LEAST_TERMS } else { 0 };
+        while model.ends_early() && distortion.len() > least && distortion.last() == Some(&0.0) {
+            distortion.pop();
+        }
+        let Camera { width, height, focal_px, centre_px, .. } = *self;
+        let own = Own { width, height, focal_px, centre_px, model, distortion };
+        serde_yaml_ng::to_string(&own).expect("plain data has a YAML form")
     }
 }
 
@@ -142,6 +209,34 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_model_is_written_and_read() {
+        for (model, values) in [
+            (Model::Pinhole, vec![-0.1, 0.02, 1e-4, -2e-4, 0.1, 0.2, 0.0, 0.3]),
+            (Model::Fisheye, vec![0.1, -0.02, 0.0, 0.0]),
+            (Model::Fisheye, vec![0.1, -0.02, 0.0, 0.0, 1.0 / 3.0]),
+            (Model::Eucm, vec![0.6, 1.1]),
+            (Model::DoubleSphere, vec![-0.2, 0.6]),
+            (Model::Pupil, (1..=10).map(|i| f64::from(i) / 7.0).collect()),
+        ] {
+            let lens = model.lens(values.len());
+            let mut all = values.clone();
+            all.resize(lens.names().len(), 0.0);
+            let camera = Camera::centred(640, 480, 321.0, lens.with_parameters(&all));
+            let text = camera.to_yaml();
+            assert_eq!(Camera::from_yaml(&text).unwrap(), camera, "{text}");
+            let short = format!("{text}- 1.0\n").replace("- 1.0\n", "- .nan\n");
+            assert!(Camera::from_yaml(&short).is_err());
+        }
+        let tilted = "image_width: 640\nimage_height: 480\n\
+                      camera_matrix: {data: [500, 0, 320, 0, 501, 240, 0, 0, 1]}\n\
+                      distortion_coefficients: {data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 2, TAU, 0]}\n";
+        let camera = Camera::from_yaml(&tilted.replace("TAU", "0")).unwrap();
+        assert_eq!(camera.lens.parameters()[11], 2.0);
+        let said = Camera::from_yaml(&tilted.replace("TAU", "0.1")).unwrap_err().to_string();
+        assert!(said.contains("s3 s4"), "{said}");
+    }
 
     #[test]
     fn three_ways_to_say_the_same() {

@@ -1,34 +1,59 @@
 use glam::DVec3;
 
-/// Equidistant fisheye polynomial (Kannala and Brandt 2006), as in OpenCV's fisheye module:
+use super::equidistant::{self, Angle};
+use super::lens::{Imaged, LensLaw, Ray};
+
+/// Equidistant fisheye polynomial (Kannala and Brandt 2006), with four terms as in OpenCV's
+/// fisheye module, or more:
 ///
 /// ```text
-///     θ = ∠(point, axis),  θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)
-///     (x', y') = θ_d · (X, Y)/‖(X, Y)‖
+///     θ = ∠(point, axis),  r = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸ + …)
+///     (x', y') = r · (X, Y)/‖(X, Y)‖
 /// ```
 ///
-/// Valid up to θ = π, where θ_d still grows with θ.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Valid up to θ = π, where r still grows with θ.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct KannalaBrandt {
-    /// k1 … k4.
-    pub k: [f64; 4],
+    /// k1, k2, …, at most [`MAX_LENS_PARAMETERS`](super::MAX_LENS_PARAMETERS).
+    pub k: Vec<f64>,
 }
 
-impl KannalaBrandt {
-    /// Normalised image point of a camera point; `None` where the polynomial folds back.
-    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+impl LensLaw for KannalaBrandt {
+    fn names(&self) -> Vec<String> {
+        (1..=self.k.len()).map(|i| format!("k{i}")).collect()
+    }
+
+    fn parameters(&self) -> Vec<f64> {
+        self.k.clone()
+    }
+
+    fn set_parameters(&mut self, values: &[f64]) {
+        self.k.copy_from_slice(values);
+    }
+
+    fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
         let radius = point.x.hypot(point.y);
-        if radius == 0.0 {
-            return (point.z > 0.0).then_some([0.0, 0.0]);
-        }
-        let theta = radius.atan2(point.z);
-        let t2 = theta * theta;
-        let [k1, k2, k3, k4] = self.k;
-        let slope = 1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * (7.0 * k3 + t2 * 9.0 * k4)));
-        if slope <= 0.0 {
+        let squared = radius * radius + point.z * point.z;
+        if radius == 0.0 && point.z <= 0.0 {
             return None;
         }
-        let distorted = theta * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))));
-        Some([distorted * point.x / radius, distorted * point.y / radius])
+        let theta = radius.atan2(point.z);
+        let angle = Angle { theta, by_radius: point.z / squared, by_z: -radius / squared };
+        let (cos, sin) = equidistant::direction(point);
+        let mut power = theta;
+        for by in &mut by_parameters[..self.k.len()] {
+            power *= theta * theta;
+            *by = [power * cos, power * sin];
+        }
+        equidistant::image(&self.k, point, &angle)
+    }
+
+    fn ray(&self, [x, y]: [f64; 2]) -> Option<Ray> {
+        let r = x.hypot(y);
+        if r == 0.0 {
+            return Ray::central(DVec3::Z);
+        }
+        let (sin, cos) = equidistant::angle(&self.k, r)?.sin_cos();
+        Ray::central(DVec3::new(sin * x / r, sin * y / r, cos))
     }
 }

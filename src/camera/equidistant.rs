@@ -1,0 +1,85 @@
+//! What the equidistant models share: an odd polynomial of the angle from the axis, and the image
+//! of a point at that angle.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use super::lens::Imaged;
+
+/// Steps of the angle in which the way back looks for a root, rad: polynomials of the few terms
+/// in use do not turn twice within it.
+const ANGLE_STEP: f64 = 0.02;
+
+/// Newton's iterations from a start within [`ANGLE_STEP`].
+const ITERATIONS: usize = 8;
+
+/// r = θ (1 + k1 θ² + k2 θ⁴ + …) and ∂r/∂θ.
+pub(super) fn radius(k: &[f64], theta: f64) -> (f64, f64) {
+    let t2 = theta * theta;
+    let (mut sum, mut slope) = (0.0, 0.0);
+    for (i, &k) in k.iter().enumerate().rev() {
+        sum = (sum + k) * t2;
+        slope = (slope + (2 * i + 3) as f64 * k) * t2;
+    }
+    (theta * (1.0 + sum), 1.0 + slope)
+}
+
+/// The least θ up to π with r(θ) = `wanted`, while the polynomial grows.
+pub(super) fn angle(k: &[f64], wanted: f64) -> Option<f64> {
+    let mut low = 0.0;
+    loop {
+        let high = f64::min(low + ANGLE_STEP, PI);
+        let (value, slope) = radius(k, high);
+        if value >= wanted {
+            break;
+        }
+        if slope <= 0.0 || high >= PI {
+            return None;
+        }
+        low = high;
+    }
+    let mut theta = low + ANGLE_STEP / 2.0;
+    for _ in 0..ITERATIONS {
+        let (value, slope) = radius(k, theta);
+        theta -= (value - wanted) / slope;
+    }
+    (0.0..=PI).contains(&theta).then_some(theta)
+}
+
+/// How the angle of a point changes with its place.
+pub(super) struct Angle {
+    pub theta: f64,
+    /// ∂θ/∂R, with R = ‖(X, Y)‖.
+    pub by_radius: f64,
+    /// ∂θ/∂Z.
+    pub by_z: f64,
+}
+
+/// The image (u, v) = r(θ) · (X, Y)/R of a point; `None` where r does not grow with θ.
+pub(super) fn image(k: &[f64], point: DVec3, angle: &Angle) -> Option<Imaged> {
+    let (r, slope) = radius(k, angle.theta);
+    if slope <= 0.0 {
+        return None;
+    }
+    let big_r = point.x.hypot(point.y);
+    // On the axis r/R takes its limit, which is the slope there.
+    let (cos, sin) = direction(point);
+    let across = if big_r > 0.0 { r / big_r } else { angle.by_radius };
+    let along = slope * angle.by_radius;
+    let mixed = cos * sin * (along - across);
+    let forward = slope * angle.by_z;
+    Some(Imaged {
+        at: [r * cos, r * sin],
+        by_point: [
+            [cos * cos * along + sin * sin * across, mixed, cos * forward],
+            [mixed, sin * sin * along + cos * cos * across, sin * forward],
+        ],
+    })
+}
+
+/// cos φ and sin φ of a point's direction around the axis.
+pub(super) fn direction(point: DVec3) -> (f64, f64) {
+    let big_r = point.x.hypot(point.y);
+    if big_r > 0.0 { (point.x / big_r, point.y / big_r) } else { (1.0, 0.0) }
+}

@@ -1,0 +1,87 @@
+use glam::DVec3;
+
+use super::lens::{Imaged, LensLaw, Ray};
+
+/// Extended unified camera model, EUCM (Khomutenko, Garcia and Martinet 2016):
+///
+/// ```text
+///     d = √(β (X² + Y²) + Z²),   h = α d + (1 − α) Z
+///     (x', y') = (X, Y)/h
+/// ```
+///
+/// Valid for 0 ≤ α ≤ 1 and β > 0, where Z > −w d with w = α/(1 − α) up to α = ½, (1 − α)/α above.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExtendedUnified {
+    /// α.
+    pub alpha: f64,
+    /// β.
+    pub beta: f64,
+}
+
+impl Default for ExtendedUnified {
+    /// The stereographic lens, from which fisheyes of all kinds are a small way.
+    fn default() -> Self {
+        Self { alpha: 0.5, beta: 1.0 }
+    }
+}
+
+impl LensLaw for ExtendedUnified {
+    fn names(&self) -> Vec<String> {
+        ["alpha", "beta"].map(str::to_owned).to_vec()
+    }
+
+    fn parameters(&self) -> Vec<f64> {
+        vec![self.alpha, self.beta]
+    }
+
+    fn set_parameters(&mut self, values: &[f64]) {
+        [self.alpha, self.beta] = [values[0], values[1]];
+    }
+
+    fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
+        let Self { alpha, beta } = *self;
+        let DVec3 { x, y, z } = point;
+        let across = x * x + y * y;
+        let d = (beta * across + z * z).sqrt();
+        let valid = (0.0..=1.0).contains(&alpha) && beta > 0.0 && z > -limit(alpha) * d;
+        if !valid {
+            return None;
+        }
+        let h = alpha * d + (1.0 - alpha) * z;
+        let h_point =
+            [alpha * beta * x / d, alpha * beta * y / d, alpha * z / d + (1.0 - alpha)];
+        by_parameters[0] = by_height(point, h, d - z);
+        by_parameters[1] = by_height(point, h, alpha * across / (2.0 * d));
+        quotient(point, h, h_point)
+    }
+
+    fn ray(&self, [x, y]: [f64; 2]) -> Option<Ray> {
+        let Self { alpha, beta } = *self;
+        let r2 = x * x + y * y;
+        let under = 1.0 - (2.0 * alpha - 1.0) * beta * r2;
+        if under < 0.0 {
+            return None;
+        }
+        let z = (1.0 - beta * alpha * alpha * r2) / (alpha * under.sqrt() + 1.0 - alpha);
+        Ray::central(DVec3::new(x, y, z))
+    }
+}
+
+/// w: beyond it two points of a ray's line would have one image.
+pub(super) fn limit(alpha: f64) -> f64 {
+    if alpha <= 0.5 { alpha / (1.0 - alpha) } else { (1.0 - alpha) / alpha }
+}
+
+/// (X, Y)/h with its derivatives, from those of h.
+pub(super) fn quotient(point: DVec3, h: f64, h_point: [f64; 3]) -> Option<Imaged> {
+    let at = [point.x / h, point.y / h];
+    let mut by_point = at.map(|v| h_point.map(|h_i| -v * h_i / h));
+    by_point[0][0] += 1.0 / h;
+    by_point[1][1] += 1.0 / h;
+    (h > 0.0).then_some(Imaged { at, by_point })
+}
+
+/// The derivatives of (X, Y)/h by a parameter, from that of h.
+pub(super) fn by_height(point: DVec3, h: f64, h_parameter: f64) -> [f64; 2] {
+    [-point.x * h_parameter / (h * h), -point.y * h_parameter / (h * h)]
+}

@@ -1,0 +1,116 @@
+use glam::DVec3;
+
+use super::{BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Pupil};
+
+/// Most parameters that a lens has.
+pub const MAX_LENS_PARAMETERS: usize = 12;
+
+/// How a point of the camera frame becomes a point of the normalised image plane.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Lens {
+    /// Perspective with polynomial or rational distortion; sees less than 180°.
+    BrownConrady(BrownConrady),
+    /// Equidistant polynomial; sees more than 180° where its polynomial grows.
+    KannalaBrandt(KannalaBrandt),
+    /// Extended unified model; sees more than 180°.
+    ExtendedUnified(ExtendedUnified),
+    /// Double sphere; sees more than 180°.
+    DoubleSphere(DoubleSphere),
+    /// Equidistant polynomial with a moving entrance pupil: not central.
+    Pupil(Pupil),
+}
+
+/// A half-line in the camera frame, along which a pixel looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts, mm: zero unless the lens is not central.
+    pub origin: DVec3,
+    /// Its direction, of length 1.
+    pub direction: DVec3,
+}
+
+impl Ray {
+    pub(super) fn central(direction: DVec3) -> Option<Self> {
+        let direction = direction.try_normalize()?;
+        Some(Self { origin: DVec3::ZERO, direction })
+    }
+}
+
+/// A point of the normalised image plane with its derivatives by the point of the camera frame:
+/// rows x', y'; columns X, Y, Z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Imaged {
+    /// x', y'.
+    pub at: [f64; 2],
+    /// ∂(x', y')/∂(X, Y, Z).
+    pub by_point: [[f64; 3]; 2],
+}
+
+/// What each model says about itself. Parameters are in the order of their names, everywhere.
+pub trait LensLaw {
+    /// The parameters' names, such as `k1`.
+    fn names(&self) -> Vec<String>;
+
+    /// Their values.
+    fn parameters(&self) -> Vec<f64>;
+
+    /// Takes other values, as many as there are names.
+    fn set_parameters(&mut self, values: &[f64]);
+
+    /// The image of a point, and in `by_parameters` the derivatives of x', y' by each parameter;
+    /// `None` outside the domain of the model.
+    fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged>;
+
+    /// The ray that is imaged at a point of the normalised plane; `None` where there is none.
+    fn ray(&self, at: [f64; 2]) -> Option<Ray>;
+}
+
+impl Lens {
+    fn law(&self) -> &dyn LensLaw {
+        match self {
+            Self::BrownConrady(lens) => lens,
+            Self::KannalaBrandt(lens) => lens,
+            Self::ExtendedUnified(lens) => lens,
+            Self::DoubleSphere(lens) => lens,
+            Self::Pupil(lens) => lens,
+        }
+    }
+
+    fn law_mut(&mut self) -> &mut dyn LensLaw {
+        match self {
+            Self::BrownConrady(lens) => lens,
+            Self::KannalaBrandt(lens) => lens,
+            Self::ExtendedUnified(lens) => lens,
+            Self::DoubleSphere(lens) => lens,
+            Self::Pupil(lens) => lens,
+        }
+    }
+
+    /// Its parameters' names, in the order of [`Self::parameters`].
+    pub fn names(&self) -> Vec<String> {
+        self.law().names()
+    }
+
+    /// Its parameters.
+    pub fn parameters(&self) -> Vec<f64> {
+        self.law().parameters()
+    }
+
+    /// The same lens with other values of its parameters; `values` are as many as it has.
+    pub fn with_parameters(&self, values: &[f64]) -> Self {
+        let mut lens = self.clone();
+        lens.law_mut().set_parameters(values);
+        lens
+    }
+
+    /// The image of a point of the camera frame with all derivatives; `by_parameters` takes one
+    /// pair for each parameter. `None` outside the domain of the model.
+    pub fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
+        self.law().image(point, by_parameters)
+    }
+
+    /// The ray that is imaged at a point of the normalised plane; `None` where there is none.
+    pub fn ray(&self, at: [f64; 2]) -> Option<Ray> {
+        self.law().ray(at)
+    }
+}

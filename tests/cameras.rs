@@ -1,0 +1,115 @@
+//! Laws that every camera model obeys.
+
+use deltille::camera::{
+    BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, Pupil,
+};
+use glam::DVec3;
+use proptest::prelude::*;
+
+/// A camera of each model with lenses as they are met, and how far from the axis it is tried, rad.
+fn cameras() -> Vec<(Camera, f64)> {
+    let rational = BrownConrady {
+        radial: [0.4, -0.1, 0.002],
+        tangential: [3e-4, -5e-4],
+        denominator: [0.7, 0.05, 0.01],
+        prism: [1e-3, -2e-4, -5e-4, 1e-4],
+    };
+    let radtan = BrownConrady {
+        radial: [-0.2, 0.05, -0.004],
+        tangential: [-4e-4, 3e-4],
+        ..BrownConrady::default()
+    };
+    let fisheye = |k: &[f64]| Lens::KannalaBrandt(KannalaBrandt { k: k.to_vec() });
+    let pupil = Pupil {
+        k: [-0.02, 0.003, -5e-4, 1e-4, -1e-5],
+        tangential: [2e-4, -3e-4],
+        shift_mm: [0.8, -0.2, 0.05],
+    };
+    let lenses = [
+        (Lens::BrownConrady(BrownConrady::default()), 1.2),
+        (Lens::BrownConrady(radtan), 0.9),
+        (Lens::BrownConrady(rational), 0.8),
+        (fisheye(&[-0.02, 0.002, -1e-4, 1e-5]), 1.9),
+        (fisheye(&[-0.02, 0.002, -1e-4, 1e-5, 1e-6, -1e-7]), 1.9),
+        (Lens::ExtendedUnified(ExtendedUnified { alpha: 0.6, beta: 1.1 }), 1.9),
+        (Lens::ExtendedUnified(ExtendedUnified { alpha: 0.4, beta: 0.9 }), 1.5),
+        (Lens::DoubleSphere(DoubleSphere { xi: -0.2, alpha: 0.6 }), 1.9),
+        (Lens::DoubleSphere(DoubleSphere { xi: 0.3, alpha: 0.3 }), 1.5),
+        (Lens::Pupil(pupil), 1.9),
+    ];
+    let camera = |lens| Camera { focal_px: [501.0, 497.0], ..Camera::centred(1600, 1200, 1.0, lens) };
+    lenses.into_iter().map(|(lens, reach)| (camera(lens), reach)).collect()
+}
+
+/// A point at an angle from the axis, a turn around it, and a distance.
+fn point(theta: f64, phi: f64, distance: f64) -> DVec3 {
+    distance * DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
+}
+
+proptest! {
+    #[test]
+    fn derivatives_are_those_of_the_projection(
+        part in 0.0f64..1.0, phi in -3.2f64..3.2, distance in 50.0f64..2000.0,
+    ) {
+        for (camera, reach) in cameras() {
+            let point = point(part * reach, phi, distance);
+            let at = camera.project_with_derivatives(point);
+            prop_assert!(at.is_some(), "{camera:?}");
+            let at = at.unwrap();
+            prop_assert_eq!(Some(at.pixel), camera.project(point));
+            // Central differences: an error of h² in the formula, of 1e-13/h in the digits.
+            let differences = |high: Option<[f64; 2]>, low: Option<[f64; 2]>, h: f64| {
+                let (high, low) = (high.unwrap(), low.unwrap());
+                [0, 1].map(|i| (high[i] - low[i]) / (2.0 * h))
+            };
+            for axis in 0..3 {
+                let h = 1e-5 * distance;
+                let step = h * DVec3::AXES[axis];
+                let expected =
+                    differences(camera.project(point + step), camera.project(point - step), h);
+                for i in 0..2 {
+                    let off = (at.by_point[i][axis] - expected[i]).abs() * distance;
+                    prop_assert!(off < 1e-4, "{:?} axis {axis}: {off}", camera.lens);
+                }
+            }
+            let values = camera.parameters();
+            for (k, name) in camera.parameter_names().iter().enumerate() {
+                let h = 1e-6 * values[k].abs().max(1.0);
+                let moved = |by: f64| {
+                    let mut values = values.clone();
+                    values[k] += by;
+                    camera.with_parameters(&values).project(point)
+                };
+                let expected = differences(moved(h), moved(-h), h);
+                for i in 0..2 {
+                    let off = (at.by_parameters[k][i] - expected[i]).abs();
+                    let size = 1.0 + expected[i].abs();
+                    prop_assert!(off < 1e-5 * size, "{:?} {name}: {off}", camera.lens);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_ray_of_a_pixel_passes_the_point_that_is_seen_there(
+        part in 0.0f64..1.0, phi in -3.2f64..3.2, distance in 50.0f64..2000.0,
+    ) {
+        for (camera, reach) in cameras() {
+            let point = point(part * reach, phi, distance);
+            let ray = camera.unproject(camera.project(point).unwrap()).unwrap();
+            let along = (point - ray.origin).dot(ray.direction);
+            let off = (ray.origin + along * ray.direction - point).length();
+            prop_assert!(along > 0.0 && off < 1e-9 * distance, "{:?}: {off} mm", camera.lens);
+            prop_assert!((ray.direction.length() - 1.0).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn what_lies_outside_the_domain_is_not_seen() {
+    for (camera, _) in cameras() {
+        assert_eq!(camera.project(DVec3::new(0.0, 0.0, -100.0)), None, "{:?}", camera.lens);
+        assert!(camera.project(DVec3::new(0.0, 0.0, 100.0)).is_some());
+        assert!(camera.unproject([1e9, 1e9]).is_none_or(|ray| ray.direction.is_finite()));
+    }
+}
