@@ -18,6 +18,7 @@
 //! | 4 | [`detect`] | from pixels to labelled corners |
 //! | 5 | [`export`] | artwork and targets to files and back |
 //! | 5 | [`synth`] | a target seen by a camera, as an image |
+//! | 5 | [`calibrate`] | from detections to calibrated cameras |
 //! | 6 | [`verify`] | an artifact read back from disk and compared with its target |
 //! | 6 | [`experiment`] | simulations that measure the library itself |
 //! | 7 | `cli` | the programs' arguments, progress and messages |
@@ -26,6 +27,7 @@
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
 pub mod artwork;
+pub mod calibrate;
 pub mod camera;
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -37,7 +37,8 @@ fn cameras() -> Vec<(Camera, f64)> {
         (Lens::DoubleSphere(DoubleSphere { xi: 0.3, alpha: 0.3 }), 1.5),
         (Lens::Pupil(pupil), 1.9),
     ];
-    let camera = |lens| Camera { focal_px: [501.0, 497.0], ..Camera::centred(1600, 1200, 1.0, lens) };
+    let camera =
+        |lens| Camera { focal_px: [501.0, 497.0], ..Camera::centred(1600, 1200, 1.0, lens) };
     lenses.into_iter().map(|(lens, reach)| (camera(lens), reach)).collect()
 }
 

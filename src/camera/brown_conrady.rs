@@ -95,11 +95,8 @@ impl BrownConrady {
             let radial = self.radial(next * next);
             let value = radial.map_or(f64::INFINITY, |radial| next * radial.rho);
             if value >= distorted {
-                let part = if value.is_finite() {
-                    (distorted - reached) / (value - reached)
-                } else {
-                    0.0
-                };
+                let part =
+                    if value.is_finite() { (distorted - reached) / (value - reached) } else { 0.0 };
                 return Some(r + step * part);
             }
             (r, reached) = (next, value);
@@ -135,9 +132,8 @@ impl LensLaw for BrownConrady {
         let q = x * x + y * y;
         let radial = self.radial(q)?;
         let (at, plane) = self.distort([x, y], &radial);
-        let by_point = plane.map(|[by_x, by_y]| {
-            [by_x / point.z, by_y / point.z, -(x * by_x + y * by_y) / point.z]
-        });
+        let by_point = plane
+            .map(|[by_x, by_y]| [by_x / point.z, by_y / point.z, -(x * by_x + y * by_y) / point.z]);
         let Radial { rho, below, .. } = radial;
         let up = |power: f64| [x * power / below, y * power / below];
         let down = |power: f64| up(-rho * power);

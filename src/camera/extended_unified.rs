@@ -48,8 +48,7 @@ impl LensLaw for ExtendedUnified {
             return None;
         }
         let h = alpha * d + (1.0 - alpha) * z;
-        let h_point =
-            [alpha * beta * x / d, alpha * beta * y / d, alpha * z / d + (1.0 - alpha)];
+        let h_point = [alpha * beta * x / d, alpha * beta * y / d, alpha * z / d + (1.0 - alpha)];
         by_parameters[0] = by_height(point, h, d - z);
         by_parameters[1] = by_height(point, h, alpha * across / (2.0 * d));
         quotient(point, h, h_point)

@@ -33,8 +33,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens,
-    MAX_LENS_PARAMETERS, Pupil,
+    BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
+    Pupil,
 };
 
 /// Largest side of an image, px.

@@ -41,10 +41,7 @@ impl Pupil {
     fn shift(&self, theta: f64) -> (f64, f64) {
         let [e1, e2, e3] = self.shift_mm;
         let t2 = theta * theta;
-        (
-            t2 * (e1 + t2 * (e2 + t2 * e3)),
-            theta * (2.0 * e1 + t2 * (4.0 * e2 + t2 * 6.0 * e3)),
-        )
+        (t2 * (e1 + t2 * (e2 + t2 * e3)), theta * (2.0 * e1 + t2 * (4.0 * e2 + t2 * 6.0 * e3)))
     }
 
     /// The angle of the ray through a point. With g = R cos θ − (Z − E) sin θ, ∂θ/∂a = −g_a / g_θ.

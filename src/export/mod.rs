@@ -4,6 +4,7 @@
 //! targets and detections make text. Files appear whole or not at all, see [`atomic`].
 
 pub mod atomic;
+pub mod calibration;
 pub mod csv;
 pub mod detection;
 pub mod dsc;

@@ -2,6 +2,7 @@
 
 mod bench;
 mod board;
+mod calibrate;
 mod delivery;
 mod detect;
 mod experiment;
@@ -11,6 +12,7 @@ mod images;
 mod refine;
 mod render;
 mod settings;
+mod sightings;
 mod solid;
 mod target_file;
 mod verify;
@@ -43,6 +45,8 @@ enum Command {
     Solid(Box<solid::MeshArgs>),
     /// Find a target, or untagged boards, in photographs
     Detect(detect::Args),
+    /// Find a camera from detections
+    Calibrate(calibrate::Args),
     /// Time the stages of detection on this machine
     Bench(bench::Args),
     /// Measure the library on simulated images
@@ -59,6 +63,7 @@ enum Command {
 pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Bench(args) => bench::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
         Command::Board(args) => board::run(*args),
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),
         Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),

@@ -1,0 +1,86 @@
+/// Why a camera was not calibrated. Messages say what to do about it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrationError {
+    /// Images of different sizes.
+    #[error(
+        "{first} is {} × {} px, {other} is {} × {} px: calibrate one camera in one mode at a time",
+        first_px[0], first_px[1], other_px[0], other_px[1]
+    )]
+    MixedSizes {
+        /// A view.
+        first: String,
+        /// Its size.
+        first_px: [u32; 2],
+        /// A view of another size.
+        other: String,
+        /// Its size.
+        other_px: [u32; 2],
+    },
+    /// A detection that was made with another target.
+    #[error("{view}: {problem}; the target does not belong to this detection")]
+    NotOfTarget {
+        /// The view.
+        view: String,
+        /// What differs.
+        problem: String,
+    },
+    /// A detection of an untagged board of other size.
+    #[error("{view}: {problem}")]
+    NotTheBoard {
+        /// The view.
+        view: String,
+        /// What differs.
+        problem: String,
+    },
+    /// Labels that run the wrong way round.
+    #[error(
+        "{view}: the labels are mirrored: rows and columns are exchanged, or the image was flipped \
+         (and so {more} more of {all} views)"
+    )]
+    Mirrored {
+        /// A view.
+        view: String,
+        /// How many others.
+        more: usize,
+        /// Of how many.
+        all: usize,
+    },
+    /// Not enough views.
+    #[error(
+        "{found} usable views of {all}: a calibration needs at least {needed}, tilted differently \
+         (20 or more are better)"
+    )]
+    TooFewViews {
+        /// How many can be used.
+        found: usize,
+        /// How many there are.
+        all: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// The board was never tilted.
+    #[error(
+        "all views are parallel (the board's tilt differs by at most {spread_deg:.1}°): focal \
+         length and distance cannot be told apart; tilt the board by 20° to 45° in some views"
+    )]
+    Parallel {
+        /// The largest angle between a view's board and the mean, degrees.
+        spread_deg: f64,
+    },
+    /// No focal length explains the views.
+    #[error(
+        "no camera explains the views: most corners must be wrongly labelled, or the target is not \
+         the one that was photographed"
+    )]
+    NoStart,
+    /// The views leave parameters open.
+    #[error(
+        "the views do not determine {parameters}: tilt the board more, fill the corners of the \
+         image, or choose a model with fewer parameters"
+    )]
+    Undetermined {
+        /// The parameters' names.
+        parameters: String,
+    },
+}

@@ -1,0 +1,55 @@
+use super::loss::Loss;
+use super::normal::{Layout, Normal};
+use super::problem::Problem;
+use super::weights::Whitening;
+
+/// Accepted steps at most; problems that have a minimum take ten to forty.
+const MOST_STEPS: usize = 200;
+
+/// Damping at the start, and the factors by which it falls and grows (Marquardt 1963).
+const DAMPING: f64 = 1e-4;
+const EASE: f64 = 0.1;
+const STIFFEN: f64 = 10.0;
+
+/// Beyond this damping no step is left that would help.
+const MOST_DAMPING: f64 = 1e12;
+
+/// A step that is expected to lower the cost by less than this part of it ends the search: unknowns
+/// then move by less than a hundred-thousandth of their standard deviations in any usable problem.
+const CONVERGED: f64 = 1e-13;
+
+/// Where the search ended.
+pub(super) struct Minimum {
+    pub problem: Problem,
+    pub normal: Normal,
+    pub layout: Layout,
+    pub steps: usize,
+}
+
+/// Walks from the problem's values to the next minimum of the cost (Levenberg–Marquardt); `None`
+/// where a corner is out of its camera's reach at the start.
+pub(super) fn minimise(problem: Problem, whitening: &Whitening, loss: Loss) -> Option<Minimum> {
+    let layout = Layout::of(&problem);
+    let normal = Normal::of(&problem, &layout, whitening, loss)?;
+    let mut best = Minimum { problem, normal, layout, steps: 0 };
+    let mut damping = DAMPING;
+    while best.steps < MOST_STEPS && damping < MOST_DAMPING {
+        let Some(step) = best.normal.step(damping) else {
+            damping *= STIFFEN;
+            continue;
+        };
+        if best.normal.predicted(&step) <= CONVERGED * best.normal.cost {
+            break;
+        }
+        let problem = best.problem.after(&best.layout, &step);
+        match Normal::of(&problem, &best.layout, whitening, loss) {
+            Some(normal) if normal.cost < best.normal.cost => {
+                (best.problem, best.normal) = (problem, normal);
+                best.steps += 1;
+                damping *= EASE;
+            }
+            _ => damping *= STIFFEN,
+        }
+    }
+    Some(best)
+}

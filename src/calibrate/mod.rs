@@ -1,0 +1,45 @@
+//! From detections to calibrated cameras.
+//!
+//! ```text
+//!   detections ─ view ─→ views ─ start ─→ problem ─ minimise ─→ solution
+//!     target ──┘          (first focal length, poses)   (bundle adjustment)
+//! ```
+//!
+//! A pixel is predicted through a chain of frames,
+//!
+//! ```text
+//!   pixel = camera( camera_from_rig · rig_from_target(frame) · target_from_panel · corner )
+//! ```
+//!
+//! and each link may be unknown. One camera with one target is a rig of one camera that is the rig
+//! frame, and panels that stay where the target's file has them. That fixes the *gauge*: camera 0
+//! is the rig, and the target frame is that of its file; every pose is relative to these.
+//!
+//! A small change of a pose is (ω, τ): the rotation turns by exp(ω), seen from the frame that the
+//! pose leads to, and the translation grows by τ. Standard deviations of poses are those of ω (rad)
+//! and τ (mm).
+
+mod error;
+mod grid;
+mod loss;
+mod minimise;
+mod model;
+mod normal;
+mod pose;
+mod problem;
+mod solution;
+mod solve;
+mod start;
+mod view;
+mod weights;
+
+pub use error::CalibrationError;
+pub use grid::UntaggedGrid;
+pub use loss::Loss;
+pub use model::{Model, ModelError};
+pub use pose::estimate_pose;
+pub use problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem};
+pub use solution::{Corner, Parameter, Solution, ViewSolution};
+pub use solve::{Options, calibrate, poses};
+pub use view::{Reference, Sighting, View, views};
+pub use weights::Weights;

@@ -1,0 +1,116 @@
+use std::fmt;
+use std::str::FromStr;
+
+use crate::camera::{
+    BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
+    PROJECTION_PARAMETERS, Pupil,
+};
+
+/// Terms of a Kannala–Brandt polynomial unless said otherwise.
+const TERMS: usize = 4;
+
+/// What is to be found of a camera, beside fx, fy, cx and cy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Model {
+    /// Perspective with k1, k2, p1, p2.
+    Radtan,
+    /// The same and k3.
+    Radtan5,
+    /// The same and k4, k5, k6.
+    Rational,
+    /// The same and s1, s2, s3, s4.
+    ThinPrism,
+    /// Equidistant polynomial of so many terms.
+    KannalaBrandt(usize),
+    /// Extended unified model.
+    Eucm,
+    /// Double sphere.
+    DoubleSphere,
+    /// Equidistant polynomial with a moving entrance pupil.
+    Pupil,
+}
+
+/// A text that is no model.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` is no model: radtan, radtan5, rational, thin-prism, kannala-brandt (with 4 terms; \
+     kannala-brandt-5 and so on up to 12), eucm, double-sphere or pupil"
+)]
+pub struct ModelError(String);
+
+impl Model {
+    const NAMED: [(&str, Model); 8] = [
+        ("radtan", Self::Radtan),
+        ("radtan5", Self::Radtan5),
+        ("rational", Self::Rational),
+        ("thin-prism", Self::ThinPrism),
+        ("kannala-brandt", Self::KannalaBrandt(TERMS)),
+        ("eucm", Self::Eucm),
+        ("double-sphere", Self::DoubleSphere),
+        ("pupil", Self::Pupil),
+    ];
+
+    /// A lens of this model to start from: near the axis its radius is that of the angle.
+    pub fn lens(self) -> Lens {
+        match self {
+            Self::Radtan | Self::Radtan5 | Self::Rational | Self::ThinPrism => {
+                Lens::BrownConrady(BrownConrady::default())
+            }
+            Self::KannalaBrandt(terms) => {
+                Lens::KannalaBrandt(KannalaBrandt { k: vec![0.0; terms] })
+            }
+            Self::Eucm => Lens::ExtendedUnified(ExtendedUnified::default()),
+            Self::DoubleSphere => Lens::DoubleSphere(DoubleSphere::default()),
+            Self::Pupil => Lens::Pupil(Pupil::default()),
+        }
+    }
+
+    /// Which of the camera's parameters it has.
+    pub fn free(self) -> Vec<bool> {
+        let lens = match self {
+            Self::Radtan => 4,
+            Self::Radtan5 => 5,
+            Self::Rational => 8,
+            _ => self.lens().names().len(),
+        };
+        let count = PROJECTION_PARAMETERS.len();
+        (0..count + self.lens().names().len()).map(|i| i < count + lens).collect()
+    }
+
+    /// The parameters that are found first, while poses are rough: focal lengths and the two
+    /// coarsest of the lens.
+    pub(super) fn coarse(self) -> Vec<bool> {
+        let coarse = |i: usize| matches!(i, 0 | 1 | 4 | 5);
+        (0..self.free().len()).map(coarse).collect()
+    }
+
+    /// Whether it sees no more than a half-space.
+    pub(super) fn is_perspective(self) -> bool {
+        matches!(self.lens(), Lens::BrownConrady(_))
+    }
+}
+
+impl FromStr for Model {
+    type Err = ModelError;
+
+    fn from_str(text: &str) -> Result<Self, ModelError> {
+        if let Some(&(_, model)) = Self::NAMED.iter().find(|(name, _)| *name == text) {
+            return Ok(model);
+        }
+        let terms = text.strip_prefix("kannala-brandt-").and_then(|terms| terms.parse().ok());
+        match terms.filter(|terms| (TERMS..=MAX_LENS_PARAMETERS).contains(terms)) {
+            Some(terms) => Ok(Self::KannalaBrandt(terms)),
+            None => Err(ModelError(text.to_owned())),
+        }
+    }
+}
+
+impl fmt::Display for Model {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match (Self::NAMED.iter().find(|(_, model)| model == self), self) {
+            (Some((name, _)), _) => f.write_str(name),
+            (None, Self::KannalaBrandt(terms)) => write!(f, "kannala-brandt-{terms}"),
+            (None, other) => write!(f, "{other:?}"),
+        }
+    }
+}

@@ -1,0 +1,325 @@
+//! Normal equations of a problem, with the poses of the frames eliminated.
+//!
+//! ```text
+//!     ⎡ A   B ⎤ ⎡ shared ⎤   ⎡ a ⎤      A: cameras and panels, dense
+//!     ⎣ Bᵀ  C ⎦ ⎣ frames ⎦ = ⎣ c ⎦      C: a 6 × 6 block for each frame
+//!
+//!     (A − Σ B C⁻¹ Bᵀ) shared = a − Σ B C⁻¹ c,     frame = C⁻¹ (c − Bᵀ shared)
+//! ```
+
+use glam::{DMat3, DVec3};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+
+use super::loss::Loss;
+use super::problem::{Block, Problem, moved};
+use super::weights::Whitening;
+
+/// Which column of the shared unknowns belongs to what.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Layout {
+    /// For each camera the parameters that are unknown, and their columns.
+    pub parameters: Vec<Vec<(usize, usize)>>,
+    /// First of the six columns of a camera's pose.
+    pub cameras: Vec<Option<usize>>,
+    /// First of the six columns of a panel's pose.
+    pub panels: Vec<Option<usize>>,
+    /// Number of columns.
+    pub count: usize,
+}
+
+impl Layout {
+    pub(super) fn of(problem: &Problem) -> Self {
+        let mut count = 0;
+        let mut take = |columns: usize| {
+            count += columns;
+            count - columns
+        };
+        let mut parameters = Vec::new();
+        let mut cameras = Vec::new();
+        for camera in &problem.cameras {
+            let free = (0..camera.free.len()).filter(|&i| camera.free[i]);
+            parameters.push(free.map(|i| (i, take(1))).collect());
+            cameras.push(camera.pose_free.then(|| take(6)));
+        }
+        let panels = problem.panels.iter().map(|p| p.pose_free.then(|| take(6))).collect();
+        Self { parameters, cameras, panels, count }
+    }
+}
+
+/// The part of the equations that belongs to a frame.
+#[derive(Clone, Debug)]
+struct Frame {
+    b: DMatrix<f64>,
+    c: Matrix6<f64>,
+    right: Vector6<f64>,
+}
+
+/// The normal equations at a point, and what the residuals cost there.
+#[derive(Clone, Debug)]
+pub(super) struct Normal {
+    pub cost: f64,
+    a: DMatrix<f64>,
+    right: DVector<f64>,
+    frames: Vec<Frame>,
+}
+
+/// A step of all unknowns.
+pub(super) struct Step {
+    shared: DVector<f64>,
+    frames: Vec<Vector6<f64>>,
+}
+
+/// The covariance of all unknowns for residuals of variance 1: of the shared ones, and of each
+/// frame's pose.
+pub(super) struct Covariances {
+    pub shared: DMatrix<f64>,
+    pub frames: Vec<Matrix6<f64>>,
+}
+
+impl Normal {
+    /// `None` where a corner is out of its camera's reach.
+    pub(super) fn of(
+        problem: &Problem,
+        layout: &Layout,
+        whitening: &Whitening,
+        loss: Loss,
+    ) -> Option<Self> {
+        let n = layout.count;
+        let frame = Frame { b: DMatrix::zeros(n, 6), c: Matrix6::zeros(), right: Vector6::zeros() };
+        let mut normal = Self {
+            cost: 0.0,
+            a: DMatrix::zeros(n, n),
+            right: DVector::zeros(n),
+            frames: vec![frame; problem.frames.len()],
+        };
+        for (block, whitening_of) in problem.blocks.iter().zip(&whitening.blocks) {
+            let local = Local::of(problem, layout, block, whitening_of, loss, whitening.sigma)?;
+            normal.add(&local, block.frame);
+        }
+        normal.cost.is_finite().then_some(normal)
+    }
+
+    /// Adds a block: its last six columns are those of the frame's pose.
+    fn add(&mut self, local: &Local, frame: usize) {
+        self.cost += local.cost;
+        let frame = &mut self.frames[frame];
+        let shared = local.columns.len();
+        for (i, &row) in local.columns.iter().enumerate() {
+            for (j, &column) in local.columns.iter().enumerate() {
+                self.a[(row, column)] += local.matrix[(i, j)];
+            }
+            for j in 0..6 {
+                frame.b[(row, j)] += local.matrix[(i, shared + j)];
+            }
+            self.right[row] += local.right[i];
+        }
+        for i in 0..6 {
+            for j in 0..6 {
+                frame.c[(i, j)] += local.matrix[(shared + i, shared + j)];
+            }
+            frame.right[i] += local.right[shared + i];
+        }
+    }
+
+    /// The step of Levenberg and Marquardt: diagonals grow by the factor 1 + `damping`. `None`
+    /// where the equations have no unique solution.
+    pub(super) fn step(&self, damping: f64) -> Option<Step> {
+        let grown = |diagonal: f64| diagonal * (1.0 + damping);
+        let mut reduced = self.a.clone();
+        for i in 0..reduced.nrows() {
+            reduced[(i, i)] = grown(reduced[(i, i)]);
+        }
+        let mut right = self.right.clone();
+        let mut solved = Vec::with_capacity(self.frames.len());
+        for Frame { b, c, right: of_frame } in &self.frames {
+            let mut c = *c;
+            for i in 0..6 {
+                c[(i, i)] = grown(c[(i, i)]);
+            }
+            let inverse = c.cholesky()?.inverse();
+            let through = b * inverse;
+            reduced -= &through * b.transpose();
+            right -= &through * of_frame;
+            solved.push(inverse);
+        }
+        let shared = solve_scaled(reduced, right)?;
+        let frames = self.frames.iter().zip(solved);
+        let frames = frames.map(|(f, inverse)| inverse * (f.right - f.b.tr_mul(&shared)));
+        let step = Step { frames: frames.collect(), shared };
+        step.shared.iter().all(|v| v.is_finite()).then_some(step)
+    }
+
+    /// By how much the cost falls along a step if the equations hold.
+    pub(super) fn predicted(&self, step: &Step) -> f64 {
+        let frames = self.frames.iter().zip(&step.frames);
+        self.right.dot(&step.shared) + frames.map(|(f, step)| f.right.dot(step)).sum::<f64>()
+    }
+
+    /// The inverse of the equations; an error is the direction that nothing determines, in units
+    /// of each shared unknown's own precision.
+    pub(super) fn covariances(&self) -> Result<Covariances, DVector<f64>> {
+        let n = self.a.nrows();
+        let mut reduced = self.a.clone();
+        let mut inverses = Vec::with_capacity(self.frames.len());
+        for Frame { b, c, .. } in &self.frames {
+            let inverse = c.cholesky().ok_or_else(|| DVector::zeros(n))?.inverse();
+            reduced -= b * inverse * b.transpose();
+            inverses.push(inverse);
+        }
+        let scale = DVector::from_fn(n, |i, _| 1.0 / self.a[(i, i)].max(f64::MIN_POSITIVE).sqrt());
+        let scaled = DMatrix::from_fn(n, n, |i, j| reduced[(i, j)] * scale[i] * scale[j]);
+        let eigen = scaled.clone().symmetric_eigen();
+        if n > 0 && eigen.eigenvalues.min() <= SINGULAR {
+            return Err(eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned());
+        }
+        let inverse = match n {
+            0 => scaled,
+            _ => scaled.cholesky().ok_or_else(|| DVector::zeros(n))?.inverse(),
+        };
+        let shared = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let frames = self.frames.iter().zip(inverses).map(|(frame, inverse)| {
+            let through = &frame.b * inverse;
+            let carried = through.tr_mul(&shared) * &through;
+            inverse + Matrix6::from_fn(|i, j| carried[(i, j)])
+        });
+        Ok(Covariances { frames: frames.collect(), shared })
+    }
+}
+
+/// The least eigenvalue of the reduced equations, scaled by the diagonal that they would have if
+/// poses were known, that counts as determined: what rounding leaves of zero after elimination.
+const SINGULAR: f64 = 1e-13;
+
+/// Solves symmetric equations after scaling their diagonal to 1.
+fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64>> {
+    let n = matrix.nrows();
+    if n == 0 {
+        return Some(right);
+    }
+    let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt());
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let solution = scaled.cholesky()?.solve(&right.component_mul(&scale));
+    Some(solution.component_mul(&scale))
+}
+
+/// The normal equations of one block, with only the columns that it has.
+struct Local {
+    cost: f64,
+    /// Shared columns; those of the frame's pose follow.
+    columns: Vec<usize>,
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl Local {
+    fn of(
+        problem: &Problem,
+        layout: &Layout,
+        block: &Block,
+        whitening: &[[f64; 3]],
+        loss: Loss,
+        sigma: f64,
+    ) -> Option<Self> {
+        let camera = &problem.cameras[block.camera];
+        let (rig, target) = (&problem.frames[block.frame], &problem.panels[block.panel]);
+        let rig_from_camera = DMat3::from_quat(camera.camera_from_rig.rotation.conjugate());
+        let target_from_rig = DMat3::from_quat(rig.rotation.conjugate());
+        let free = &layout.parameters[block.camera];
+        let (of_camera, of_panel) = (layout.cameras[block.camera], layout.panels[block.panel]);
+        let poses = of_camera.into_iter().chain(of_panel).flat_map(|first| first..first + 6);
+        let columns: Vec<usize> = free.iter().map(|&(_, column)| column).chain(poses).collect();
+        let n = columns.len() + 6;
+        let mut local =
+            Self { cost: 0.0, columns, matrix: DMatrix::zeros(n, n), right: DVector::zeros(n) };
+        let mut rows = [vec![0.0; n], vec![0.0; n]];
+        for (seen, &w) in block.observations.iter().zip(whitening) {
+            let turned_panel = target.target_from_panel.rotation * seen.panel_mm;
+            let in_target = turned_panel + target.target_from_panel.translation;
+            let turned_target = rig.rotation * in_target;
+            let in_rig = turned_target + rig.translation;
+            let turned_rig = camera.camera_from_rig.rotation * in_rig;
+            let in_camera = turned_rig + camera.camera_from_rig.translation;
+            let at = camera.camera.project_with_derivatives(in_camera)?;
+            for (i, row) in rows.iter_mut().enumerate() {
+                let mut next = 0;
+                let mut push = |value: f64| {
+                    row[next] = value;
+                    next += 1;
+                };
+                for &(parameter, _) in free {
+                    push(at.by_parameters[parameter][i]);
+                }
+                // For y = exp(ω) a + t + τ a derivative j by y is a × j by ω, and j by τ.
+                let mut pose = |arm: DVec3, by: DVec3| {
+                    arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(&mut push);
+                };
+                let by_camera = DVec3::from(at.by_point[i]);
+                let by_rig = rig_from_camera * by_camera;
+                if of_camera.is_some() {
+                    pose(turned_rig, by_camera);
+                }
+                if of_panel.is_some() {
+                    pose(turned_panel, target_from_rig * by_rig);
+                }
+                pose(turned_target, by_rig);
+            }
+            let residual = [seen.pixel[0] - at.pixel[0], seen.pixel[1] - at.pixel[1]];
+            local.add(&rows, residual, w, loss, sigma);
+        }
+        Some(local)
+    }
+
+    /// Adds a corner's two rows.
+    fn add(
+        &mut self,
+        rows: &[Vec<f64>; 2],
+        residual: [f64; 2],
+        w: [f64; 3],
+        loss: Loss,
+        sigma: f64,
+    ) {
+        let [r0, r1] = Whitening::apply(w, residual);
+        let (cost, weight) = loss.of(r0 * r0 + r1 * r1, sigma);
+        self.cost += cost;
+        let [a, b, c] = w;
+        let n = rows[0].len();
+        for i in 0..n {
+            let (x, y) = (a * rows[0][i], b * rows[0][i] + c * rows[1][i]);
+            let (x, y) = (weight * x, weight * y);
+            self.right[i] += x * r0 + y * r1;
+            // Column-major: the inner loop runs down a column.
+            let (by_x, by_y) = (a * x + b * y, c * y);
+            for (j, value) in self.matrix.column_mut(i).iter_mut().enumerate() {
+                *value += by_x * rows[0][j] + by_y * rows[1][j];
+            }
+        }
+    }
+}
+
+impl Problem {
+    /// The problem after a step.
+    pub(super) fn after(&self, layout: &Layout, step: &Step) -> Problem {
+        let mut problem = self.clone();
+        for (i, camera) in problem.cameras.iter_mut().enumerate() {
+            let mut values = camera.camera.parameters();
+            for &(parameter, column) in &layout.parameters[i] {
+                values[parameter] += step.shared[column];
+            }
+            camera.camera = camera.camera.with_parameters(&values);
+            if let Some(first) = layout.cameras[i] {
+                let change = &step.shared.as_slice()[first..first + 6];
+                camera.camera_from_rig = moved(&camera.camera_from_rig, change);
+            }
+        }
+        for (panel, first) in problem.panels.iter_mut().zip(&layout.panels) {
+            if let Some(first) = *first {
+                let change = &step.shared.as_slice()[first..first + 6];
+                panel.target_from_panel = moved(&panel.target_from_panel, change);
+            }
+        }
+        for (frame, step) in problem.frames.iter_mut().zip(&step.frames) {
+            *frame = moved(frame, step.as_slice());
+        }
+        problem
+    }
+}

@@ -1,0 +1,335 @@
+use glam::DVec3;
+
+use super::error::CalibrationError;
+use super::loss::Loss;
+use super::minimise::{Minimum, minimise};
+use super::model::Model;
+use super::normal::Covariances;
+use super::pose::{blocks, estimate_pose, fixed};
+use super::problem::{CameraUnknowns, Problem};
+use super::solution::{Corner, Parameter, Solution, ViewSolution, rms_px};
+use super::start::first_camera;
+use super::view::View;
+use super::weights::{Weights, Whitening, median};
+use crate::camera::{Camera, Pose};
+
+/// Two views of a plane determine focal lengths and principal point if nothing is off; a third
+/// shows whether something is.
+const LEAST_VIEWS: usize = 3;
+
+/// A view does not belong with the others when its median error is so many times that of the
+/// median view, and more than so many pixels: labels that are off put corners a tile away.
+const WRONG_VIEW_RATIO: f64 = 10.0;
+const WRONG_VIEW_PX: f64 = 1.0;
+
+/// Boards whose normals differ by less count as parallel. A corner's noise of a twentieth of a
+/// pixel on a board of 500 px already looks like a tilt of one degree.
+const PARALLEL_RAD: f64 = 0.05;
+
+/// A focal length that is known no better than to this part is not determined.
+const LOOSE_FOCAL: f64 = 0.1;
+
+/// A corner is an outlier beyond so many standard deviations: of a million corners with normal
+/// errors four are.
+const OUTLIER_SIGMA: f64 = 5.0;
+
+/// Rounds in which weights and solution are fitted to one another; the third changes no digit that
+/// matters.
+const WEIGHT_ROUNDS: usize = 3;
+
+/// How a camera is calibrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// What is to be found.
+    pub model: Model,
+    /// How corners far off count.
+    pub loss: Loss,
+    /// How corners are weighted.
+    pub weights: Weights,
+}
+
+/// Finds a camera and the poses of its views; `panels` are the poses of the target's panels on it,
+/// see [`Reference::panels`](super::Reference::panels).
+pub fn calibrate(
+    views: &[View],
+    panels: &[Pose],
+    options: Options,
+) -> Result<Solution, CalibrationError> {
+    enough(views.len(), views.len())?;
+    let ideal = first_camera(views, options.model).ok_or(CalibrationError::NoStart)?;
+    let [width, height] = views[0].size_px;
+    let camera = Camera::centred(width, height, ideal.focal_px[0], options.model.lens());
+    let poses = views.iter().map(|view| estimate_pose(&ideal, panels, &view.sightings)).collect();
+    let mut search = Search { views, panels, camera, poses };
+    search.adjust(options.model.coarse())?;
+    search.adjust(options.model.free())?;
+    search.look_again();
+    search.adjust(options.model.free())?;
+    if panels.len() == 1 {
+        check_tilts(&search.poses)?;
+    }
+    let solution = search.finish(options.model.free(), options.loss, options.weights)?;
+    check_focal(&solution)?;
+    Ok(solution)
+}
+
+/// Finds only the poses of the views of a known camera.
+pub fn poses(
+    views: &[View],
+    panels: &[Pose],
+    camera: &Camera,
+    loss: Loss,
+    weights: Weights,
+) -> Result<Solution, CalibrationError> {
+    if let Some(view) = views.iter().find(|view| view.size_px != [camera.width, camera.height]) {
+        return Err(CalibrationError::MixedSizes {
+            first: "the camera".to_owned(),
+            first_px: [camera.width, camera.height],
+            other: view.name.clone(),
+            other_px: view.size_px,
+        });
+    }
+    let poses = views.iter().map(|view| estimate_pose(camera, panels, &view.sightings)).collect();
+    let search = Search { views, panels, camera: camera.clone(), poses };
+    search.finish(vec![false; camera.parameters().len()], loss, weights)
+}
+
+fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
+    match found < LEAST_VIEWS {
+        true => Err(CalibrationError::TooFewViews { found, all, needed: LEAST_VIEWS }),
+        false => Ok(()),
+    }
+}
+
+/// The camera and the poses on the way.
+struct Search<'a> {
+    views: &'a [View],
+    panels: &'a [Pose],
+    camera: Camera,
+    /// `None` where a view has no pose that the camera can have seen, or does not belong.
+    poses: Vec<Option<Pose>>,
+}
+
+impl Search<'_> {
+    /// The views that have a pose and are within the camera's reach, and their problem.
+    fn problem(&self, free: Vec<bool>) -> (Vec<usize>, Problem) {
+        let mut problem = Problem {
+            cameras: vec![CameraUnknowns::alone(self.camera.clone(), free)],
+            panels: fixed(self.panels),
+            ..Problem::default()
+        };
+        let mut used = Vec::new();
+        for (index, (view, pose)) in self.views.iter().zip(&self.poses).enumerate() {
+            let Some(pose) = pose else { continue };
+            problem.frames.push(*pose);
+            let first = problem.blocks.len();
+            problem.blocks.extend(blocks(&view.sightings, used.len()));
+            if problem.blocks[first..].iter().all(|block| problem.residuals(block).is_some()) {
+                used.push(index);
+            } else {
+                problem.blocks.truncate(first);
+                problem.frames.pop();
+            }
+        }
+        (used, problem)
+    }
+
+    /// Bundle adjustment in which wrong corners and wrong views hardly count.
+    fn adjust(&mut self, free: Vec<bool>) -> Result<(), CalibrationError> {
+        let (used, problem) = self.problem(free);
+        enough(used.len(), self.views.len())?;
+        let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
+        let minimum =
+            minimise(problem, &whitening, Loss::Cauchy).ok_or(CalibrationError::NoStart)?;
+        self.camera = minimum.problem.cameras[0].camera.clone();
+        for (index, pose) in used.into_iter().zip(minimum.problem.frames) {
+            self.poses[index] = Some(pose);
+        }
+        Ok(())
+    }
+
+    /// Estimates the pose of every view anew, now that the camera is nearly known, and keeps the
+    /// better one.
+    fn look_again(&mut self) {
+        for (view, pose) in self.views.iter().zip(&mut self.poses) {
+            let again = estimate_pose(&self.camera, self.panels, &view.sightings);
+            let error = |pose: &Option<Pose>| {
+                pose.map_or(f64::INFINITY, |pose| {
+                    view_error_px(&self.camera, self.panels, view, pose)
+                })
+            };
+            if error(&again) < error(pose) {
+                *pose = again;
+            }
+        }
+    }
+
+    /// Leaves out views that do not belong, and solves for what is asked.
+    fn finish(
+        &self,
+        free: Vec<bool>,
+        loss: Loss,
+        weights: Weights,
+    ) -> Result<Solution, CalibrationError> {
+        let calibrating = free.contains(&true);
+        let (used, all) = self.problem(free);
+        let residuals_of_all = residuals(&all);
+        let medians: Vec<f64> = (0..used.len())
+            .map(|frame| {
+                let of_frame = all.blocks.iter().zip(&residuals_of_all);
+                let of_frame = of_frame.filter(|(block, _)| block.frame == frame);
+                median(of_frame.flat_map(|(_, r)| r).map(|[x, y]| x.hypot(*y)).collect())
+            })
+            .collect();
+        let limit = f64::max(WRONG_VIEW_RATIO * median(medians.clone()), WRONG_VIEW_PX);
+        let belongs = |frame: usize| medians[frame] <= limit;
+        let problem = all.with_frames(belongs);
+        let kept: Vec<usize> = (0..used.len()).filter(|&f| belongs(f)).map(|f| used[f]).collect();
+        if calibrating {
+            enough(kept.len(), self.views.len())?;
+        }
+        let excluded = self.views.iter().enumerate().filter(|(index, _)| !kept.contains(index));
+        let excluded = excluded.map(|(index, view)| {
+            let why = match used.iter().position(|used| *used == index) {
+                Some(frame) => format!(
+                    "its corners are off by {:.1} px where those of other views are by {:.2} px: \
+                     wrong labels, or another target",
+                    medians[frame],
+                    median(medians.clone())
+                ),
+                None => "no pose explains its corners: wrong labels, or another target".to_owned(),
+            };
+            (view.name.clone(), why)
+        });
+        let excluded = excluded.collect();
+
+        let mut whitening = Whitening::fit(&problem, weights, &residuals(&problem));
+        let mut minimum = minimise(problem, &whitening, loss).ok_or(CalibrationError::NoStart)?;
+        // Where corners are alike and losses square, weights change nothing.
+        let rounds = match (whitening.common_px, loss) {
+            (None, Loss::Squared) => 1,
+            _ => WEIGHT_ROUNDS,
+        };
+        for _ in 1..rounds {
+            let residuals = residuals(&minimum.problem);
+            whitening = Whitening::fit(&minimum.problem, weights, &residuals);
+            minimum =
+                minimise(minimum.problem, &whitening, loss).ok_or(CalibrationError::NoStart)?;
+        }
+        self.solution(&kept, excluded, &minimum, &whitening)
+    }
+
+    fn solution(
+        &self,
+        kept: &[usize],
+        excluded: Vec<(String, String)>,
+        minimum: &Minimum,
+        whitening: &Whitening,
+    ) -> Result<Solution, CalibrationError> {
+        let Minimum { problem, normal, layout, steps } = minimum;
+        let CameraUnknowns { camera, free, .. } = &problem.cameras[0];
+        let names = camera.parameter_names();
+        let Covariances { shared, frames } = normal.covariances().map_err(|direction| {
+            let most = direction.amax();
+            let involved = layout.parameters[0]
+                .iter()
+                .filter(|(_, column)| direction[*column].abs() >= 0.3 * most);
+            let names: Vec<&str> = involved.map(|&(i, _)| names[i].as_str()).collect();
+            CalibrationError::Undetermined { parameters: names.join(", ") }
+        })?;
+        // The a-posteriori variance: what the residuals cost for each of their degrees of freedom.
+        let unknowns = layout.count + 6 * problem.frames.len();
+        let freedom = (2 * problem.count()).saturating_sub(unknowns).max(1);
+        let variance = normal.cost / freedom as f64;
+        let covariance = shared * variance;
+        let mut sds = (0..layout.count).map(|i| covariance[(i, i)].sqrt());
+        let values = camera.parameters();
+        let parameters = names.iter().zip(values).zip(free).map(|((name, value), &free)| {
+            let sd = if free { sds.next() } else { None };
+            Parameter { name: name.clone(), value, sd }
+        });
+        let parameters = parameters.collect();
+
+        let residuals = residuals(problem);
+        let mut views: Vec<ViewSolution> = kept
+            .iter()
+            .zip(&problem.frames)
+            .zip(&frames)
+            .map(|((&index, pose), covariance)| ViewSolution {
+                name: self.views[index].name.clone(),
+                pose: *pose,
+                pose_sd: std::array::from_fn(|i| (covariance[(i, i)] * variance).sqrt()),
+                rms_px: 0.0,
+                corners: Vec::new(),
+            })
+            .collect();
+        for ((block, residuals), weights) in
+            problem.blocks.iter().zip(&residuals).zip(&whitening.blocks)
+        {
+            let corners = block.observations.iter().zip(residuals).zip(weights);
+            views[block.frame].corners.extend(corners.map(|((seen, &residual), &w)| {
+                let [x, y] = Whitening::apply(w, residual);
+                let outlier = x.hypot(y) > OUTLIER_SIGMA * whitening.sigma;
+                let (row, col, pixel) = (seen.row, seen.col, seen.pixel);
+                Corner { panel: block.panel, row, col, pixel, residual, outlier }
+            }));
+        }
+        for view in &mut views {
+            view.rms_px = rms_px(view.corners.iter().map(|corner| &corner.residual));
+        }
+        Ok(Solution {
+            camera: camera.clone(),
+            parameters,
+            covariance,
+            rms_px: rms_px(residuals.iter().flatten()),
+            views,
+            excluded,
+            common_px: whitening.common_px,
+            sigma: variance.sqrt(),
+            steps: *steps,
+        })
+    }
+}
+
+/// Seen less predicted positions; empty blocks where a corner is out of reach, which the callers'
+/// problems do not have.
+fn residuals(problem: &Problem) -> Vec<Vec<[f64; 2]>> {
+    problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
+}
+
+/// Median error of a view's corners at a pose, px.
+fn view_error_px(camera: &Camera, panels: &[Pose], view: &View, pose: Pose) -> f64 {
+    let errors = view.sightings.iter().flat_map(|sighting| {
+        let camera_from_panel = pose.after(&panels[sighting.panel]);
+        sighting.observations.iter().map(move |seen| {
+            match camera.project(camera_from_panel.apply(seen.panel_mm)) {
+                Some([x, y]) => (seen.pixel[0] - x).hypot(seen.pixel[1] - y),
+                None => f64::INFINITY,
+            }
+        })
+    });
+    median(errors.collect())
+}
+
+/// Refuses views of a board that was never tilted.
+fn check_tilts(poses: &[Option<Pose>]) -> Result<(), CalibrationError> {
+    let normals = || poses.iter().flatten().map(|pose| pose.rotation * DVec3::Z);
+    let mean = normals().sum::<DVec3>().normalize_or(DVec3::Z);
+    let spread = normals().map(|normal| normal.angle_between(mean)).fold(0.0, f64::max);
+    match spread < PARALLEL_RAD {
+        true => Err(CalibrationError::Parallel { spread_deg: spread.to_degrees() }),
+        false => Ok(()),
+    }
+}
+
+/// Refuses a camera that the views leave open.
+fn check_focal(solution: &Solution) -> Result<(), CalibrationError> {
+    let loose = solution.parameters[..2]
+        .iter()
+        .filter(|p| p.sd.is_some_and(|sd| sd.is_nan() || sd > LOOSE_FOCAL * p.value));
+    let loose: Vec<&str> = loose.map(|p| p.name.as_str()).collect();
+    match loose.is_empty() {
+        true => Ok(()),
+        false => Err(CalibrationError::Undetermined { parameters: loose.join(", ") }),
+    }
+}

@@ -1,0 +1,73 @@
+//! A first camera without any guess.
+//!
+//! Of ideal cameras, perspective and equidistant, over all focal lengths, with the principal point
+//! in the middle, the one is taken under which the views look most like views of planes. Half of the
+//! views may be wrong.
+
+use super::model::Model;
+use super::pose::planar_pose;
+use super::problem::Observation;
+use super::view::View;
+use super::weights::median;
+use crate::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
+
+/// Focal lengths that are tried, in image widths: from lenses that show all around to those that
+/// show a degree.
+const SHORTEST: f64 = 0.12;
+const LONGEST: f64 = 60.0;
+
+/// Ratio of one focal length to the one before; bundle adjustment converges from much farther.
+const RATIO: f64 = 1.1;
+
+/// Views that are looked at, evenly over the sequence; and corners in each.
+const MOST_VIEWS: usize = 15;
+const MOST_CORNERS: usize = 40;
+
+/// The ideal camera that explains the views best.
+pub(super) fn first_camera(views: &[View], model: Model) -> Option<Camera> {
+    let [width, height] = views.first()?.size_px;
+    let samples: Vec<Vec<Observation>> =
+        evenly(views, MOST_VIEWS).filter_map(largest_panel).collect();
+    let perspective = Lens::BrownConrady(BrownConrady::default());
+    let equidistant = Lens::KannalaBrandt(KannalaBrandt::default());
+    // A strongly distorted perspective lens is nearer to an equidistant one.
+    let lenses =
+        if model.is_perspective() { vec![perspective, equidistant] } else { vec![equidistant] };
+    let mut best: Option<(f64, Camera)> = None;
+    for lens in lenses {
+        let mut part = SHORTEST;
+        while part < LONGEST {
+            let camera = Camera::centred(width, height, part * f64::from(width), lens.clone());
+            let errors = samples.iter().map(|view| error_px(&camera, view)).collect();
+            let error = median(errors);
+            if error.is_finite() && best.as_ref().is_none_or(|(least, _)| error < *least) {
+                best = Some((error, camera));
+            }
+            part *= RATIO;
+        }
+    }
+    best.map(|(_, camera)| camera)
+}
+
+/// Root mean square error of a view under a camera, px.
+fn error_px(camera: &Camera, view: &[Observation]) -> f64 {
+    let Some(pose) = planar_pose(camera, view) else { return f64::INFINITY };
+    let squares = view.iter().map(|seen| squared_px(camera, &pose, seen));
+    (squares.sum::<f64>() / view.len() as f64).sqrt()
+}
+
+fn squared_px(camera: &Camera, pose: &Pose, seen: &Observation) -> f64 {
+    let Some([x, y]) = camera.project(pose.apply(seen.panel_mm)) else { return f64::INFINITY };
+    (seen.pixel[0] - x).powi(2) + (seen.pixel[1] - y).powi(2)
+}
+
+fn largest_panel(view: &View) -> Option<Vec<Observation>> {
+    let largest = view.sightings.iter().max_by_key(|sighting| sighting.observations.len())?;
+    Some(evenly(&largest.observations, MOST_CORNERS).copied().collect())
+}
+
+/// At most so many of the items, evenly over their sequence.
+fn evenly<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
+    let count = items.len().min(most);
+    (0..count).map(move |i| &items[i * items.len() / count])
+}

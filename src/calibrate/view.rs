@@ -1,0 +1,242 @@
+use std::collections::BTreeMap;
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::error::CalibrationError;
+use super::grid::UntaggedGrid;
+use super::problem::Observation;
+use crate::camera::Pose;
+use crate::detect::{Detection, Grid};
+use crate::target::{Panel, PanelPose, Target, TargetSpec};
+
+/// Corners that a panel needs in a view, so that a few wrong ones show.
+const LEAST_CORNERS: usize = 6;
+
+/// What was photographed.
+#[derive(Clone, Copy, Debug)]
+pub enum Reference<'a> {
+    /// A target that its file describes.
+    Target(&'a Target),
+    /// An untagged board.
+    Grid(UntaggedGrid),
+}
+
+/// What one picture shows of one rigid target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// Name, such as that of the detection's file.
+    pub name: String,
+    /// Width and height of the picture, px.
+    pub size_px: [u32; 2],
+    /// The panels that were found.
+    pub sightings: Vec<Sighting>,
+}
+
+/// A panel in a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sighting {
+    /// Index of the panel.
+    pub panel: usize,
+    /// Its corners.
+    pub observations: Vec<Observation>,
+}
+
+impl Reference<'_> {
+    /// target_from_panel of every panel.
+    pub fn panels(&self) -> Vec<Pose> {
+        match self {
+            Self::Grid(_) => vec![Pose::IDENTITY],
+            Self::Target(target) => target.panels.iter().map(|p| pose(&p.pose)).collect(),
+        }
+    }
+
+    /// Whether its panels are boards that lie about, each for itself.
+    fn is_loose(&self) -> bool {
+        match self {
+            Self::Grid(_) => false,
+            Self::Target(target) => {
+                target.panels.len() > 1
+                    && !matches!(target.spec, TargetSpec::Solid(_) | TargetSpec::Listed(_))
+            }
+        }
+    }
+
+    fn sightings(&self, detection: &Detection) -> Result<Vec<Sighting>, String> {
+        match self {
+            Self::Grid(board) => {
+                let of_kind = detection.grids.iter().filter(|grid| grid.kind == board.kind);
+                let Some(grid) = of_kind.max_by_key(|grid| grid.corners.len()) else {
+                    return Ok(Vec::new());
+                };
+                board.check(grid)?;
+                let at = |row, col| board.place(row, col);
+                Ok(vec![Sighting { panel: 0, observations: observations(grid, at) }])
+            }
+            Self::Target(target) => {
+                let grids = detection.grids.iter();
+                let found = grids.filter_map(|grid| on_target(target, grid).transpose());
+                found.collect()
+            }
+        }
+    }
+}
+
+/// The views of all detections, each with its name: one for each picture, or for each board in it
+/// where several lie about. Pictures in which nothing was found give none.
+pub fn views(
+    detections: &[(String, Detection)],
+    reference: &Reference,
+) -> Result<Vec<View>, CalibrationError> {
+    let mut views = Vec::new();
+    for (name, detection) in detections {
+        let size_px = [detection.width, detection.height];
+        if let Some((first, other)) = detections.first()
+            && size_px != [other.width, other.height]
+        {
+            return Err(CalibrationError::MixedSizes {
+                first: first.clone(),
+                first_px: [other.width, other.height],
+                other: name.clone(),
+                other_px: size_px,
+            });
+        }
+        let view = name.clone();
+        let mut sightings = reference.sightings(detection).map_err(|problem| match reference {
+            Reference::Grid(_) => CalibrationError::NotTheBoard { view, problem },
+            Reference::Target(_) => CalibrationError::NotOfTarget { view, problem },
+        })?;
+        sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
+        if reference.is_loose() {
+            views.extend(sightings.into_iter().map(|sighting| {
+                let name = format!("{name} board {}", sighting.panel);
+                View { name, size_px, sightings: vec![sighting] }
+            }));
+        } else if !sightings.is_empty() {
+            views.push(View { name: name.clone(), size_px, sightings });
+        }
+    }
+    check_labels(&views)?;
+    Ok(views)
+}
+
+/// The corners of a grid on its panel; `None` where it was not labelled and the target has several.
+fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
+    let index = match grid.panel {
+        Some(id) => target.panels.iter().position(|panel| panel.id == id),
+        None if target.panels.len() == 1 && target.panels[0].tags.is_empty() => Some(0),
+        None => return Ok(None),
+    };
+    let Some(index) = index else {
+        let id = grid.panel.unwrap_or_default();
+        return Err(format!("panel {id} is not on the target {}", target.name));
+    };
+    let panel = &target.panels[index];
+    check_panel(target, panel, grid)?;
+    let from_target = pose(&panel.pose).inverse();
+    let places: BTreeMap<(i32, i32), DVec3> = panel
+        .corners
+        .iter()
+        .map(|corner| ((corner.row, corner.col), from_target.apply(corner.target_mm.into())))
+        .collect();
+    let mut found = Vec::new();
+    for corner in &grid.corners {
+        match places.get(&(corner.row, corner.col)) {
+            Some(&place) => found.push((corner.row, corner.col, place)),
+            None => {
+                let swapped = places.contains_key(&(corner.col, corner.row));
+                let hint = if swapped { " (rows and columns exchanged?)" } else { "" };
+                return Err(format!(
+                    "{} has no corner in row {}, column {}{hint}",
+                    target.name, corner.row, corner.col
+                ));
+            }
+        }
+    }
+    let at = |row, col| places[&(row, col)];
+    Ok(Some(Sighting { panel: index, observations: observations(grid, at) }))
+}
+
+/// Compares what a detection says of a panel with the target.
+fn check_panel(target: &Target, panel: &Panel, grid: &Grid) -> Result<(), String> {
+    if panel.kind != grid.kind {
+        return Err(format!("panel {} has another tiling on {}", panel.id, target.name));
+    }
+    for corner in &grid.corners {
+        let Some(id) = corner.id else { continue };
+        let of_target = panel.corners.iter().find(|of_target| of_target.id == id);
+        if let Some(of_target) = of_target
+            && (of_target.row, of_target.col) != (corner.row, corner.col)
+        {
+            let swapped = (of_target.col, of_target.row) == (corner.row, corner.col);
+            return Err(format!(
+                "corner {id} is in row {}, column {}, but on {} in row {}, column {}{}",
+                corner.row,
+                corner.col,
+                target.name,
+                of_target.row,
+                of_target.col,
+                if swapped { " (rows and columns exchanged?)" } else { "" }
+            ));
+        }
+        if of_target.is_none() {
+            return Err(format!("corner {id} is not on {}", target.name));
+        }
+    }
+    for tag in &grid.tags {
+        let same = panel.tags.iter().any(|t| (t.id, t.row, t.col) == (tag.id, tag.row, tag.col));
+        let family = target.family.as_ref().map(|family| family.name.as_str());
+        if !same || family != Some(tag.family.as_str()) {
+            return Err(format!(
+                "tag {} of {} in row {}, column {} is not on {}",
+                tag.id, tag.family, tag.row, tag.col, target.name
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn observations(grid: &Grid, at: impl Fn(i32, i32) -> DVec3) -> Vec<Observation> {
+    let seen = grid.corners.iter().map(|corner| Observation {
+        row: corner.row,
+        col: corner.col,
+        panel_mm: at(corner.row, corner.col),
+        pixel: [corner.x, corner.y],
+        cov: corner.cov,
+    });
+    seen.collect()
+}
+
+/// In a picture, y down, rows and columns that run as on the print turn clockwise.
+fn check_labels(views: &[View]) -> Result<(), CalibrationError> {
+    let mirrored: Vec<&View> =
+        views.iter().filter(|view| view.sightings.iter().any(is_mirrored)).collect();
+    match mirrored.first() {
+        None => Ok(()),
+        Some(view) => Err(CalibrationError::Mirrored {
+            view: view.name.clone(),
+            more: mirrored.len() - 1,
+            all: views.len(),
+        }),
+    }
+}
+
+/// Whether most corners with two neighbours are mirrored.
+fn is_mirrored(sighting: &Sighting) -> bool {
+    let places: BTreeMap<(i32, i32), [f64; 2]> =
+        sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();
+    let turns = places.iter().filter_map(|(&(row, col), &[x, y])| {
+        let [ax, ay] = places.get(&(row, col + 1))?;
+        let [bx, by] = places.get(&(row + 1, col))?;
+        Some(((ax - x) * (by - y) - (ay - y) * (bx - x)).signum())
+    });
+    turns.sum::<f64>() > 0.0
+}
+
+/// The pose of a panel.
+fn pose(panel: &PanelPose) -> Pose {
+    let rotation = DMat3::from_cols_array(&panel.rotation).transpose();
+    Pose {
+        rotation: DQuat::from_mat3(&rotation).normalize(),
+        translation: panel.translation_mm.into(),
+    }
+}

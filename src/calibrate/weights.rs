@@ -1,0 +1,110 @@
+//! How far each corner is to be trusted.
+
+use super::problem::Problem;
+
+/// The median of a squared distance in the plane whose coordinates have variance 1: 2 ln 2.
+const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
+
+/// Halvings of the interval in which the common deviation is sought: to 1e-9 of its upper end.
+const HALVINGS: usize = 30;
+
+/// What is known of the corners' precision.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Weights {
+    /// All corners alike.
+    Equal,
+    /// By their covariances, and a common deviation beside them: a covariance tells what the noise
+    /// of the image does, not what the print, the paper and the lens do, which is the same for all.
+    /// The common deviation is found from the residuals. Without covariances all corners are alike.
+    #[default]
+    Covariance,
+}
+
+/// For each corner the lower triangle a, b, c of W, with WᵀW = Σ⁻¹.
+#[derive(Clone, Debug)]
+pub(super) struct Whitening {
+    pub blocks: Vec<Vec<[f64; 3]>>,
+    /// The common deviation beside the covariances, px; `None` where corners count alike.
+    pub common_px: Option<f64>,
+    /// Standard deviation of a whitened coordinate, by the median.
+    pub sigma: f64,
+}
+
+impl Whitening {
+    /// W r.
+    pub(super) fn apply([a, b, c]: [f64; 3], [x, y]: [f64; 2]) -> [f64; 2] {
+        [a * x, b * x + c * y]
+    }
+
+    /// Every corner alike.
+    fn equal(problem: &Problem, residuals: &[Vec<[f64; 2]>]) -> Self {
+        let alike = |n: usize| vec![[1.0, 0.0, 1.0]; n];
+        let blocks = problem.blocks.iter().map(|block| alike(block.observations.len())).collect();
+        let mut whitening = Self { blocks, common_px: None, sigma: 1.0 };
+        whitening.sigma = whitening.median_sigma(residuals);
+        whitening
+    }
+
+    /// Weights that fit the residuals at hand.
+    pub(super) fn fit(problem: &Problem, weights: Weights, residuals: &[Vec<[f64; 2]>]) -> Self {
+        let covariances = match weights {
+            Weights::Equal => None,
+            Weights::Covariance => covariances(problem),
+        };
+        let Some(covariances) = covariances else { return Self::equal(problem, residuals) };
+        let with = |common: f64| {
+            let whiten = |cov: &[f64; 3]| triangle(*cov, common * common);
+            let blocks = covariances.iter().map(|block| block.iter().map(whiten).collect());
+            let mut whitening =
+                Self { blocks: blocks.collect(), common_px: Some(common), sigma: 1.0 };
+            whitening.sigma = whitening.median_sigma(residuals);
+            whitening
+        };
+        let alone = with(0.0);
+        if alone.sigma <= 1.0 {
+            return alone;
+        }
+        // With the deviation of all residuals as the common one, sigma is below 1.
+        let (mut low, mut high) = (0.0, Self::equal(problem, residuals).sigma);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            *(if with(middle).sigma > 1.0 { &mut low } else { &mut high }) = middle;
+        }
+        with(high)
+    }
+
+    fn median_sigma(&self, residuals: &[Vec<[f64; 2]>]) -> f64 {
+        let whitened = self.blocks.iter().flatten().zip(residuals.iter().flatten());
+        let squares = whitened.map(|(&w, &r)| {
+            let [x, y] = Self::apply(w, r);
+            x * x + y * y
+        });
+        (median(squares.collect()) / MEDIAN_OF_CHI_SQUARED_2).sqrt()
+    }
+}
+
+/// The covariances of all corners, `None` where no corner has one. A corner without one among
+/// others that have one was the hardest to refine: it gets the largest variance of all.
+fn covariances(problem: &Problem) -> Option<Vec<Vec<[f64; 3]>>> {
+    let all = || problem.blocks.iter().flat_map(|block| &block.observations);
+    let largest = all().filter_map(|o| o.cov).map(|[xx, _, yy]| xx.max(yy)).fold(0.0, f64::max);
+    let of = |block: &super::Block| {
+        block.observations.iter().map(|o| o.cov.unwrap_or([largest, 0.0, largest])).collect()
+    };
+    (largest > 0.0).then(|| problem.blocks.iter().map(of).collect())
+}
+
+/// W of a covariance with `common` added to both variances.
+fn triangle([xx, xy, yy]: [f64; 3], common: f64) -> [f64; 3] {
+    // Σ = L Lᵀ with L = [[l, 0], [m, n]], W = L⁻¹.
+    let l = (xx + common).sqrt();
+    let m = xy / l;
+    let n = (yy + common - m * m).sqrt();
+    [1.0 / l, -m / (l * n), 1.0 / n]
+}
+
+/// The middle value; zero of none.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,121 @@
+//! What was photographed, and the detections of it: the options of commands that calibrate.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail, ensure};
+use clap::ValueEnum;
+
+use super::target_file;
+use crate::calibrate::{Reference, UntaggedGrid, View, views};
+use crate::camera::Pose;
+use crate::detect::Detection;
+use crate::export::detection;
+use crate::target::{GridKind, Target, parse_length_mm};
+
+/// Detections and what they show.
+#[derive(clap::Args)]
+pub struct SightingsArgs {
+    /// Detections, the .json files of `deltille detect`, or folders of them
+    #[arg(required = true, value_name = "DETECTIONS")]
+    detections: Vec<PathBuf>,
+    /// Description of the target: the .json of `deltille board`, or a .dsc
+    #[arg(long, value_name = "FILE", conflicts_with = "grid")]
+    target: Option<PathBuf>,
+    /// An untagged board of this tiling instead; --edge says how large
+    #[arg(long, value_name = "KIND", requires = "edge")]
+    grid: Option<Kind>,
+    /// Rows of corners of the untagged board
+    #[arg(long, requires_all = ["grid", "cols"], value_parser = clap::value_parser!(u32).range(2..=500))]
+    rows: Option<u32>,
+    /// Corners in each row of the untagged board
+    #[arg(long, requires_all = ["grid", "rows"], value_parser = clap::value_parser!(u32).range(2..=500))]
+    cols: Option<u32>,
+    /// Length of a tile's edge of the untagged board, such as 20mm
+    #[arg(long, requires = "grid", value_name = "LENGTH", value_parser = length)]
+    edge: Option<f64>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Kind {
+    /// Triangles
+    Deltille,
+    /// Squares
+    Checker,
+}
+
+/// Views, and the panels that they show.
+pub struct Sightings {
+    pub views: Vec<View>,
+    /// target_from_panel of each panel.
+    pub panels: Vec<Pose>,
+    /// Pictures in which no view was found.
+    pub empty: usize,
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
+    if mm > 0.0 { Ok(mm) } else { Err("it must be positive".to_owned()) }
+}
+
+impl SightingsArgs {
+    /// Reads everything.
+    pub fn read(&self) -> anyhow::Result<Sightings> {
+        let target: Option<Target> =
+            self.target.as_deref().map(target_file::read).transpose().context("--target")?;
+        let reference = match (&target, self.grid, self.edge) {
+            (Some(target), ..) => Reference::Target(target),
+            (None, Some(kind), Some(edge_mm)) => {
+                let kind = match kind {
+                    Kind::Deltille => GridKind::Deltille,
+                    Kind::Checker => GridKind::Checker,
+                };
+                let size = self.rows.zip(self.cols).map(|(rows, cols)| [rows, cols]);
+                Reference::Grid(UntaggedGrid { kind, edge_mm, size })
+            }
+            _ => bail!(
+                "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
+            ),
+        };
+        let mut detections = Vec::new();
+        for path in self.files()? {
+            let show = || path.display().to_string();
+            let text = std::fs::read_to_string(&path)
+                .with_context(|| format!("cannot read {}", show()))?;
+            let found: Detection = detection::read(&text).with_context(show)?;
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            detections.push((name, found));
+        }
+        let views = views(&detections, &reference)?;
+        let pictures = detections.iter();
+        let seen = |name: &str| views.iter().any(|view| view.name.starts_with(name));
+        let empty = pictures.filter(|(name, _)| !seen(name)).count();
+        Ok(Sightings { panels: reference.panels(), views, empty })
+    }
+
+    fn files(&self) -> anyhow::Result<Vec<PathBuf>> {
+        let mut files = Vec::new();
+        for path in &self.detections {
+            if path.is_dir() {
+                files.extend(in_folder(path)?);
+            } else {
+                files.push(path.clone());
+            }
+        }
+        Ok(files)
+    }
+}
+
+/// The JSON files of a folder, in the order of their names.
+fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let show = || format!("cannot read {}", folder.display());
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(show)? {
+        let path = entry.with_context(show)?.path();
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json")) {
+            files.push(path);
+        }
+    }
+    ensure!(!files.is_empty(), "{}: no .json file in this folder", folder.display());
+    files.sort();
+    Ok(files)
+}

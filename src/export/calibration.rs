@@ -1,0 +1,121 @@
+//! Calibrations as JSON, schema `deltille/calibration/1`: the camera with standard deviations and
+//! correlations, and every view with its pose and residuals.
+
+use glam::DMat3;
+use serde::Serialize;
+
+use crate::calibrate::Solution;
+
+/// Schema and version that this crate writes.
+pub const SCHEMA: &str = "deltille/calibration/1";
+
+#[derive(Serialize)]
+struct CalibrationFile {
+    schema: &'static str,
+    model: String,
+    width: u32,
+    height: u32,
+    parameters: Vec<Parameter>,
+    correlations: Vec<Vec<f64>>,
+    rms_px: f64,
+    sigma: f64,
+    common_px: Option<f64>,
+    views: Vec<View>,
+    excluded: Vec<Excluded>,
+}
+
+#[derive(Serialize)]
+struct Parameter {
+    name: String,
+    value: f64,
+    sd: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct View {
+    name: String,
+    rms_px: f64,
+    outliers: usize,
+    camera_from_target: Motion,
+    /// Row, column, x, y, dx, dy of each corner, by panel.
+    corners: Vec<Corner>,
+}
+
+#[derive(Serialize)]
+struct Motion {
+    /// Row-major.
+    rotation: [f64; 9],
+    translation_mm: [f64; 3],
+    rotation_sd_rad: [f64; 3],
+    translation_sd_mm: [f64; 3],
+}
+
+#[derive(Serialize)]
+struct Corner {
+    panel: usize,
+    row: i32,
+    col: i32,
+    x: f64,
+    y: f64,
+    dx: f64,
+    dy: f64,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    outlier: bool,
+}
+
+#[derive(Serialize)]
+struct Excluded {
+    name: String,
+    why: String,
+}
+
+/// The text of the file; `model` is the name of what was calibrated.
+pub fn write(solution: &Solution, model: &str) -> String {
+    let found = solution.found().count();
+    let correlations =
+        (0..found).map(|i| (0..found).map(|j| solution.correlation(i, j)).collect()).collect();
+    let parameters = solution.parameters.iter();
+    let excluded = solution.excluded.iter().cloned();
+    let file = CalibrationFile {
+        schema: SCHEMA,
+        model: model.to_owned(),
+        width: solution.camera.width,
+        height: solution.camera.height,
+        parameters: parameters
+            .map(|p| Parameter { name: p.name.clone(), value: p.value, sd: p.sd })
+            .collect(),
+        correlations,
+        rms_px: solution.rms_px,
+        sigma: solution.sigma,
+        common_px: solution.common_px,
+        views: solution.views.iter().map(view).collect(),
+        excluded: excluded.map(|(name, why)| Excluded { name, why }).collect(),
+    };
+    crate::json::to_text(&file, 4)
+}
+
+fn view(view: &crate::calibrate::ViewSolution) -> View {
+    let [rx, ry, rz, tx, ty, tz] = view.pose_sd;
+    let corners = view.corners.iter().map(|corner| Corner {
+        panel: corner.panel,
+        row: corner.row,
+        col: corner.col,
+        x: corner.pixel[0],
+        y: corner.pixel[1],
+        dx: corner.residual[0],
+        dy: corner.residual[1],
+        outlier: corner.outlier,
+    });
+    View {
+        name: view.name.clone(),
+        rms_px: view.rms_px,
+        outliers: view.outlier_count(),
+        camera_from_target: Motion {
+            rotation: DMat3::from_quat(view.pose.rotation).transpose().to_cols_array(),
+            translation_mm: view.pose.translation.to_array(),
+            rotation_sd_rad: [rx, ry, rz],
+            translation_sd_mm: [tx, ty, tz],
+        },
+        corners: corners.collect(),
+    }
+}
