@@ -38,6 +38,7 @@ pub mod family;
 mod json;
 pub mod lattice;
 pub mod raster;
+pub mod report;
 pub mod synth;
 pub mod target;
 pub mod verify;
