@@ -68,6 +68,28 @@ pub enum CalibrationError {
         /// The largest angle between a view's board and the mean, degrees.
         spread_deg: f64,
     },
+    /// A camera of a rig by itself.
+    #[error("camera {camera}: {error}")]
+    OfCamera {
+        /// Its name.
+        camera: String,
+        /// Why it was not calibrated.
+        error: Box<CalibrationError>,
+    },
+    /// Cameras that nothing ties to the others.
+    #[error(
+        "{cameras}: no more than {shared} frames show the target in these and in another camera, \
+         {needed} are needed: pictures of one moment must have the same file name in each folder, \
+         and some must show the target in both cameras"
+    )]
+    Apart {
+        /// Their names.
+        cameras: String,
+        /// How many frames are shared.
+        shared: usize,
+        /// How many are needed.
+        needed: usize,
+    },
     /// No focal length explains the views.
     #[error(
         "no camera explains the views: most corners must be wrongly labelled, or the target is not \

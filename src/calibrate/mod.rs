@@ -27,6 +27,8 @@ mod model;
 mod normal;
 mod pose;
 mod problem;
+mod rig;
+mod settle;
 mod solution;
 mod solve;
 mod start;
@@ -39,6 +41,9 @@ pub use loss::Loss;
 pub use model::{Model, ModelError};
 pub use pose::estimate_pose;
 pub use problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem};
+pub use rig::{
+    RefinedPanel, RigCamera, RigFrame, RigOptions, RigSolution, RigViews, calibrate_rig,
+};
 pub use solution::{Corner, Parameter, Solution, ViewSolution};
 pub use solve::{Options, calibrate, poses};
 pub use view::{Reference, Sighting, View, views};

@@ -1,0 +1,178 @@
+//! Several cameras that are fixed to each other.
+//!
+//! ```text
+//!   each camera by itself ─→ camera_from_target in its own views
+//!   two cameras, one frame ─→ camera_from_camera: the middle one of all such frames
+//!   from camera 0 on to all others ─→ camera_from_rig, rig_from_target(frame)
+//!   all together ─→ bundle adjustment
+//! ```
+//!
+//! Gauge: the rig frame is that of camera 0. The target frame is that of its file, held by the
+//! panel that was seen most, which stays; where panels are refined, all others move against it.
+//! Lengths are those of the panels, which are taken to be true in themselves.
+
+mod solution;
+mod start;
+
+use std::collections::BTreeSet;
+
+use super::error::CalibrationError;
+use super::loss::Loss;
+use super::minimise::minimise;
+use super::model::Model;
+use super::problem::{Block, CameraUnknowns, PanelUnknowns, Problem};
+use super::settle::{residuals, settle};
+use super::solve::{self, Options};
+use super::view::View;
+use super::weights::{Weights, Whitening, median};
+use crate::camera::{Camera, Pose};
+use start::Start;
+
+pub use solution::{RefinedPanel, RigCamera, RigFrame, RigSolution};
+
+/// What a camera of a rig saw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigViews {
+    /// Name of the camera.
+    pub name: String,
+    /// Its views; those of the same name in different cameras were taken at the same moment.
+    pub views: Vec<View>,
+    /// The camera, where it is known and to be kept.
+    pub known: Option<Camera>,
+}
+
+/// How a rig is calibrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RigOptions {
+    /// What is to be found of cameras that are not known.
+    pub model: Model,
+    /// How corners far off count.
+    pub loss: Loss,
+    /// How corners are weighted.
+    pub weights: Weights,
+    /// Whether the poses of the target's panels are found too.
+    pub refine_target: bool,
+}
+
+/// A frame does not belong when a camera's corners in it are off so many times as much as usual, and
+/// more than so many pixels: the pictures were not taken at the same moment.
+const WRONG_FRAME_RATIO: f64 = 10.0;
+const WRONG_FRAME_PX: f64 = 1.0;
+
+/// Finds the cameras, where they are to each other, where the target was, and on request where its
+/// panels are on it. `panels` are the stated poses of these.
+pub fn calibrate_rig(
+    cameras: &[RigViews],
+    panels: &[Pose],
+    options: RigOptions,
+) -> Result<RigSolution, CalibrationError> {
+    let start = Start::new(cameras, panels, options)?;
+    let mut excluded = start.excluded.clone();
+    let problem = start.problem(cameras, panels, options);
+    // A first pass in which frames that were not taken at one moment hardly count.
+    let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
+    let first = minimise(problem, &whitening, Loss::Cauchy).ok_or(CalibrationError::NoStart)?;
+    let wrong = wrong_frames(&first.problem);
+    for (&frame, (camera, off_px)) in &wrong {
+        let why = format!(
+            "the corners of camera {} are off by {off_px:.1} px: not taken at the same moment, or \
+             wrong labels",
+            cameras[*camera].name
+        );
+        excluded.push((start.frames[frame].clone(), why));
+    }
+    let kept: Vec<usize> =
+        (0..start.frames.len()).filter(|frame| !wrong.contains_key(frame)).collect();
+    let problem = first.problem.with_frames(|frame| !wrong.contains_key(&frame));
+    let (minimum, whitening) = settle(problem, options.weights, options.loss)?;
+    let names = |index: usize| start.frames[kept[index]].clone();
+    let solution = RigSolution::new(cameras, names, &minimum, &whitening)?;
+    Ok(RigSolution { excluded, ..solution })
+}
+
+/// Frames that do not belong, each with the camera that shows it and by how much.
+fn wrong_frames(problem: &Problem) -> std::collections::BTreeMap<usize, (usize, f64)> {
+    let off =
+        |residuals: &Vec<[f64; 2]>| median(residuals.iter().map(|[x, y]| x.hypot(*y)).collect());
+    let medians: Vec<f64> = residuals(problem).iter().map(off).collect();
+    let limit = f64::max(WRONG_FRAME_RATIO * median(medians.clone()), WRONG_FRAME_PX);
+    let mut wrong = std::collections::BTreeMap::new();
+    for (block, off_px) in problem.blocks.iter().zip(medians).filter(|(_, off)| *off > limit) {
+        let worst = wrong.entry(block.frame).or_insert((block.camera, off_px));
+        if off_px > worst.1 {
+            *worst = (block.camera, off_px);
+        }
+    }
+    wrong
+}
+
+/// The panels that can be found against the one seen most: those that hang together with it by
+/// frames in which both were seen. The first value is that panel.
+fn connected_panels(blocks: &[Block], count: usize) -> (usize, BTreeSet<usize>) {
+    let mut corners = vec![0; count];
+    let mut frames = vec![BTreeSet::new(); count];
+    for block in blocks {
+        corners[block.panel] += block.observations.len();
+        frames[block.panel].insert(block.frame);
+    }
+    let most = (0..count).max_by_key(|&panel| (corners[panel], std::cmp::Reverse(panel)));
+    let most = most.unwrap_or_default();
+    let (mut found, mut open) = (BTreeSet::from([most]), vec![most]);
+    while let Some(panel) = open.pop() {
+        for other in 0..count {
+            if !found.contains(&other) && !frames[other].is_disjoint(&frames[panel]) {
+                found.insert(other);
+                open.push(other);
+            }
+        }
+    }
+    (most, found)
+}
+
+/// A camera by itself: as it is known, or as its views have it.
+fn alone(
+    views: &RigViews,
+    panels: &[Pose],
+    options: RigOptions,
+) -> Result<super::Solution, CalibrationError> {
+    let RigOptions { model, loss, weights, .. } = options;
+    let found = match &views.known {
+        Some(camera) => solve::poses(&views.views, panels, camera, loss, weights),
+        None => solve::calibrate(&views.views, panels, Options { model, loss, weights }),
+    };
+    found.map_err(|error| CalibrationError::OfCamera {
+        camera: views.name.clone(),
+        error: Box::new(error),
+    })
+}
+
+/// What is unknown of the cameras: the poses of all but the first.
+fn camera_unknowns(
+    views: &[RigViews],
+    cameras: &[Camera],
+    camera_from_rig: &[Pose],
+    options: RigOptions,
+) -> Vec<CameraUnknowns> {
+    let unknowns = views.iter().zip(cameras).zip(camera_from_rig).enumerate();
+    unknowns
+        .map(|(index, ((views, camera), pose))| CameraUnknowns {
+            camera: camera.clone(),
+            free: match views.known {
+                Some(_) => vec![false; camera.parameters().len()],
+                None => options.model.free(),
+            },
+            camera_from_rig: *pose,
+            pose_free: index > 0,
+        })
+        .collect()
+}
+
+/// What is unknown of the panels.
+fn panel_unknowns(blocks: &[Block], panels: &[Pose], refine: bool) -> Vec<PanelUnknowns> {
+    let (held, connected) = connected_panels(blocks, panels.len());
+    let unknown = |(index, pose): (usize, &Pose)| PanelUnknowns {
+        target_from_panel: *pose,
+        pose_free: refine && index != held && connected.contains(&index),
+    };
+    panels.iter().enumerate().map(unknown).collect()
+}

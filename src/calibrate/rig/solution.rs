@@ -1,0 +1,162 @@
+use nalgebra::DMatrix;
+
+use super::RigViews;
+use crate::calibrate::error::CalibrationError;
+use crate::calibrate::minimise::Minimum;
+use crate::calibrate::normal::Covariances;
+use crate::calibrate::settle::{residuals, variance};
+use crate::calibrate::solution::{Parameter, rms_px};
+use crate::calibrate::weights::Whitening;
+use crate::camera::{Camera, Pose};
+
+/// Cameras fixed to each other, as their views have them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigSolution {
+    /// The cameras, in the order given.
+    pub cameras: Vec<RigCamera>,
+    /// The frames, by name.
+    pub frames: Vec<RigFrame>,
+    /// The panels of the target.
+    pub panels: Vec<RefinedPanel>,
+    /// Views and frames that took no part, and why.
+    pub excluded: Vec<(String, String)>,
+    /// Root mean square error of a coordinate over all corners, px.
+    pub rms_px: f64,
+    /// The deviation that was added to every corner's covariance, px; see [`super::Weights`].
+    pub common_px: Option<f64>,
+    /// A-posteriori standard deviation of a coordinate, see [`super::super::Solution::sigma`].
+    pub sigma: f64,
+}
+
+/// A camera of a rig.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigCamera {
+    /// Its name.
+    pub name: String,
+    /// The camera.
+    pub camera: Camera,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// Where it is on the rig.
+    pub camera_from_rig: Pose,
+    /// Standard deviations of that: of a turn (rad) and a move (mm) along the camera's axes; `None`
+    /// for camera 0, which is the rig.
+    pub pose_sd: Option<[f64; 6]>,
+    /// Root mean square error of a coordinate, px.
+    pub rms_px: f64,
+    /// How many corners it saw.
+    pub corners: usize,
+}
+
+/// A moment at which pictures were taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigFrame {
+    /// Its name.
+    pub name: String,
+    /// Where the target was.
+    pub rig_from_target: Pose,
+    /// Standard deviations of that: of a turn (rad) and a move (mm) along the rig's axes.
+    pub pose_sd: [f64; 6],
+    /// Root mean square error of a coordinate over all cameras, px.
+    pub rms_px: f64,
+}
+
+/// A panel of the target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RefinedPanel {
+    /// Where it is on the target.
+    pub target_from_panel: Pose,
+    /// Covariance of a turn (rad) and a move (mm) along the target's axes; `None` where the panel was
+    /// kept where it was stated to be.
+    pub covariance: Option<[[f64; 6]; 6]>,
+}
+
+impl RigSolution {
+    pub(super) fn new(
+        views: &[RigViews],
+        frame_name: impl Fn(usize) -> String,
+        minimum: &Minimum,
+        whitening: &Whitening,
+    ) -> Result<Self, CalibrationError> {
+        let Minimum { problem, normal, layout, .. } = minimum;
+        let Covariances { shared, frames } = normal.covariances().map_err(|direction| {
+            let most = direction.amax();
+            let large = |column: usize| direction[column].abs() >= 0.3 * most;
+            let mut parameters = Vec::new();
+            for (camera, (of_camera, pose)) in
+                layout.parameters.iter().zip(&layout.cameras).enumerate()
+            {
+                let names = problem.cameras[camera].camera.parameter_names();
+                let found = of_camera.iter().filter(|(_, column)| large(*column));
+                parameters
+                    .extend(found.map(|&(i, _)| format!("{} of {}", names[i], views[camera].name)));
+                if pose.is_some_and(|first| (first..first + 6).any(large)) {
+                    parameters.push(format!("the pose of {}", views[camera].name));
+                }
+            }
+            for (panel, first) in layout.panels.iter().enumerate() {
+                if first.is_some_and(|first| (first..first + 6).any(large)) {
+                    parameters.push(format!("the pose of panel {panel}"));
+                }
+            }
+            CalibrationError::Undetermined { parameters: parameters.join(", ") }
+        })?;
+        let variance = variance(minimum);
+        let covariance = shared * variance;
+        let residuals = residuals(problem);
+        let rms_of = |belongs: &dyn Fn(&super::Block) -> bool| {
+            let of_blocks =
+                problem.blocks.iter().zip(&residuals).filter(|(block, _)| belongs(block));
+            rms_px(of_blocks.flat_map(|(_, residuals)| residuals))
+        };
+        let cameras =
+            views.iter().zip(&problem.cameras).enumerate().map(|(index, (views, found))| {
+                let mut columns = layout.parameters[index].iter().map(|&(_, column)| column);
+                let names = found.camera.parameter_names().into_iter();
+                let values = names.zip(found.camera.parameters()).zip(&found.free);
+                let parameters = values.map(|((name, value), &free)| {
+                    let column = if free { columns.next() } else { None };
+                    Parameter { name, value, sd: column.map(|c| covariance[(c, c)].sqrt()) }
+                });
+                let of_camera = |block: &&super::Block| block.camera == index;
+                let blocks = problem.blocks.iter().filter(of_camera);
+                RigCamera {
+                    name: views.name.clone(),
+                    camera: found.camera.clone(),
+                    parameters: parameters.collect(),
+                    camera_from_rig: found.camera_from_rig,
+                    pose_sd: layout.cameras[index].map(|first| deviations(&covariance, first)),
+                    rms_px: rms_of(&|block| block.camera == index),
+                    corners: blocks.map(|block| block.observations.len()).sum(),
+                }
+            });
+        let cameras = cameras.collect();
+        let of_frames = problem.frames.iter().zip(&frames).enumerate();
+        let of_frames = of_frames.map(|(index, (pose, own))| RigFrame {
+            name: frame_name(index),
+            rig_from_target: *pose,
+            pose_sd: std::array::from_fn(|i| (own[(i, i)] * variance).sqrt()),
+            rms_px: rms_of(&|block| block.frame == index),
+        });
+        let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| RefinedPanel {
+            target_from_panel: panel.target_from_panel,
+            covariance: first.map(|first| {
+                std::array::from_fn(|i| std::array::from_fn(|j| covariance[(first + i, first + j)]))
+            }),
+        });
+        Ok(Self {
+            cameras,
+            frames: of_frames.collect(),
+            panels: panels.collect(),
+            excluded: Vec::new(),
+            rms_px: rms_px(residuals.iter().flatten()),
+            common_px: whitening.common_px,
+            sigma: variance.sqrt(),
+        })
+    }
+}
+
+/// Standard deviations of six unknowns.
+fn deviations(covariance: &DMatrix<f64>, first: usize) -> [f64; 6] {
+    std::array::from_fn(|i| covariance[(first + i, first + i)].sqrt())
+}
