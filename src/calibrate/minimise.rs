@@ -14,9 +14,25 @@ const STIFFEN: f64 = 10.0;
 /// Beyond this damping no step is left that would help.
 const MOST_DAMPING: f64 = 1e12;
 
-/// A step that is expected to lower the cost by less than this part of it ends the search: unknowns
-/// then move by less than a hundred-thousandth of their standard deviations in any usable problem.
-const CONVERGED: f64 = 1e-13;
+/// How far the search goes on: a step that is expected to lower the cost by less than this part of
+/// it ends it. With ten thousand corners, unknowns then move by less than a tenth of their standard
+/// deviations, or a ten-thousandth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Until {
+    /// Good enough to go on with more unknowns or other weights.
+    Rough,
+    /// Good enough to be told.
+    Fine,
+}
+
+impl Until {
+    fn part(self) -> f64 {
+        match self {
+            Self::Rough => 1e-6,
+            Self::Fine => 1e-12,
+        }
+    }
+}
 
 /// Where the search ended.
 pub(super) struct Minimum {
@@ -28,7 +44,12 @@ pub(super) struct Minimum {
 
 /// Walks from the problem's values to the next minimum of the cost (Levenberg–Marquardt); `None`
 /// where a corner is out of its camera's reach at the start.
-pub(super) fn minimise(problem: Problem, whitening: &Whitening, loss: Loss) -> Option<Minimum> {
+pub(super) fn minimise(
+    problem: Problem,
+    whitening: &Whitening,
+    loss: Loss,
+    until: Until,
+) -> Option<Minimum> {
     let layout = Layout::of(&problem);
     let normal = Normal::of(&problem, &layout, whitening, loss)?;
     let mut best = Minimum { problem, normal, layout, steps: 0 };
@@ -38,7 +59,7 @@ pub(super) fn minimise(problem: Problem, whitening: &Whitening, loss: Loss) -> O
             damping *= STIFFEN;
             continue;
         };
-        if best.normal.predicted(&step) <= CONVERGED * best.normal.cost {
+        if best.normal.predicted(&step) <= until.part() * best.normal.cost {
             break;
         }
         let problem = best.problem.after(&best.layout, &step);

@@ -166,23 +166,28 @@ impl Normal {
             reduced -= b * inverse * b.transpose();
             inverses.push(inverse);
         }
-        let scale = DVector::from_fn(n, |i, _| 1.0 / self.a[(i, i)].max(f64::MIN_POSITIVE).sqrt());
-        let scaled = DMatrix::from_fn(n, n, |i, j| reduced[(i, j)] * scale[i] * scale[j]);
-        let eigen = scaled.clone().symmetric_eigen();
-        if n > 0 && eigen.eigenvalues.min() <= SINGULAR {
-            return Err(eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned());
-        }
-        let inverse = match n {
-            0 => scaled,
-            _ => scaled.cholesky().ok_or_else(|| DVector::zeros(n))?.inverse(),
-        };
-        let shared = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let shared = self.invert_reduced(reduced)?;
         let frames = self.frames.iter().zip(inverses).map(|(frame, inverse)| {
             let through = &frame.b * inverse;
             let carried = through.tr_mul(&shared) * &through;
             inverse + Matrix6::from_fn(|i, j| carried[(i, j)])
         });
         Ok(Covariances { frames: frames.collect(), shared })
+    }
+
+    fn invert_reduced(&self, reduced: DMatrix<f64>) -> Result<DMatrix<f64>, DVector<f64>> {
+        let n = reduced.nrows();
+        if n == 0 {
+            return Ok(reduced);
+        }
+        let scale = DVector::from_fn(n, |i, _| 1.0 / self.a[(i, i)].max(f64::MIN_POSITIVE).sqrt());
+        let scaled = DMatrix::from_fn(n, n, |i, j| reduced[(i, j)] * scale[i] * scale[j]);
+        let eigen = scaled.clone().symmetric_eigen();
+        if eigen.eigenvalues.min() <= SINGULAR {
+            return Err(eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned());
+        }
+        let inverse = scaled.cholesky().ok_or_else(|| DVector::zeros(n))?.inverse();
+        Ok(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
     }
 }
 

@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, SMatrix};
 
 use super::loss::Loss;
-use super::minimise::minimise;
+use super::minimise::{Until, minimise};
 use super::problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem};
 use super::view::Sighting;
 use super::weights::{Weights, Whitening};
@@ -101,7 +101,7 @@ fn refine(
     let residuals: Option<Vec<_>> =
         problem.blocks.iter().map(|block| problem.residuals(block)).collect();
     let whitening = Whitening::fit(&problem, Weights::Equal, &residuals?);
-    let minimum = minimise(problem, &whitening, Loss::Squared)?;
+    let minimum = minimise(problem, &whitening, Loss::Squared, Until::Rough)?;
     Some((minimum.problem.frames[0], minimum.normal.cost))
 }
 

@@ -97,6 +97,11 @@ impl Problem {
         self.blocks.iter().map(|block| block.observations.len()).sum()
     }
 
+    /// Whether any corner has a covariance.
+    pub(super) fn has_covariances(&self) -> bool {
+        self.blocks.iter().flat_map(|block| &block.observations).any(|seen| seen.cov.is_some())
+    }
+
     /// The same with the frames for which `keep` holds, and their observations.
     pub(super) fn with_frames(&self, keep: impl Fn(usize) -> bool) -> Problem {
         let mut places = vec![None; self.frames.len()];

@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use super::error::CalibrationError;
 use super::loss::Loss;
-use super::minimise::{Minimum, minimise};
+use super::minimise::{Minimum, Until, minimise};
 use super::model::Model;
 use super::normal::Covariances;
 use super::pose::{blocks, estimate_pose, fixed};
@@ -140,7 +140,7 @@ impl Search<'_> {
         enough(used.len(), self.views.len())?;
         let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
         let minimum =
-            minimise(problem, &whitening, Loss::Cauchy).ok_or(CalibrationError::NoStart)?;
+            minimise(problem, &whitening, Loss::Cauchy, Until::Rough).ok_or(CalibrationError::NoStart)?;
         self.camera = minimum.problem.cameras[0].camera.clone();
         for (index, pose) in used.into_iter().zip(minimum.problem.frames) {
             self.poses[index] = Some(pose);
@@ -203,19 +203,20 @@ impl Search<'_> {
         });
         let excluded = excluded.collect();
 
-        let mut whitening = Whitening::fit(&problem, weights, &residuals(&problem));
-        let mut minimum = minimise(problem, &whitening, loss).ok_or(CalibrationError::NoStart)?;
         // Where corners are alike and losses square, weights change nothing.
-        let rounds = match (whitening.common_px, loss) {
-            (None, Loss::Squared) => 1,
-            _ => WEIGHT_ROUNDS,
-        };
-        for _ in 1..rounds {
-            let residuals = residuals(&minimum.problem);
-            whitening = Whitening::fit(&minimum.problem, weights, &residuals);
-            minimum =
-                minimise(minimum.problem, &whitening, loss).ok_or(CalibrationError::NoStart)?;
+        let mut problem = problem;
+        let weighted = problem.has_covariances() && weights == Weights::Covariance;
+        if weighted || loss != Loss::Squared {
+            for _ in 1..WEIGHT_ROUNDS {
+                let whitening = Whitening::fit(&problem, weights, &residuals(&problem));
+                problem = minimise(problem, &whitening, loss, Until::Rough)
+                    .ok_or(CalibrationError::NoStart)?
+                    .problem;
+            }
         }
+        let whitening = Whitening::fit(&problem, weights, &residuals(&problem));
+        let minimum = minimise(problem, &whitening, loss, Until::Fine)
+            .ok_or(CalibrationError::NoStart)?;
         self.solution(&kept, excluded, &minimum, &whitening)
     }
 

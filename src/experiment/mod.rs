@@ -1,5 +1,6 @@
-//! Simulations that measure the library itself.
+//! Simulations and protocols that measure the library itself.
 
 mod bound;
 pub mod corners;
 pub mod plot;
+pub mod table2;

@@ -7,8 +7,9 @@ use std::sync::atomic::Ordering;
 use anyhow::{Context, bail};
 use clap::Subcommand;
 
+use super::images::Images;
 use crate::cli::{interrupt, output, progress};
-use crate::experiment::{corners, plot};
+use crate::experiment::{corners, plot, table2};
 
 /// Arguments of `deltille experiment`.
 #[derive(clap::Args)]
@@ -22,6 +23,15 @@ enum Experiment {
     /// Precision of refined corners against blur, noise and tilt, with the Cramér–Rao bound:
     /// corners.csv, corners.svg and corners.png
     Corners(CornersArgs),
+    /// The paper's Table 2: calibrate on the first half of a sequence of photographs, find poses
+    /// on the second
+    Table2(Table2Args),
+}
+
+#[derive(clap::Args)]
+struct Table2Args {
+    /// Folder with the photographs of the paper's 10 × 11 board, in the order of their names
+    folder: PathBuf,
 }
 
 #[derive(clap::Args)]
@@ -43,7 +53,17 @@ struct CornersArgs {
 
 /// Runs an experiment; nothing is written when it is interrupted.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let Experiment::Corners(args) = args.experiment;
+    match args.experiment {
+        Experiment::Corners(args) => run_corners(args),
+        Experiment::Table2(args) => {
+            let images = Images::of(&[args.folder])?;
+            output::print(&table2::text(&table2::run(images.named())?))?;
+            Ok(ExitCode::SUCCESS)
+        }
+    }
+}
+
+fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
     let bar = progress::bar(corners::rows_count() as u64, "rows");
     let interrupted = interrupt::flag();
     let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());

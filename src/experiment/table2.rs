@@ -1,0 +1,110 @@
+//! Table 2 of the paper on photographs: a camera is calibrated on the first half of a sequence; on
+//! the second half only the poses are found.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::calibrate::{
+    CalibrationError, Loss, Model, Options, Reference, UntaggedGrid, View, Weights, calibrate,
+    poses, views,
+};
+use crate::detect::{Detector, DetectorConfig, Refinement};
+use crate::raster::{self, ImageError};
+use crate::target::GridKind;
+
+/// Rows and columns of the board of the paper's sequence, and its edges.
+const SIZE: [u32; 2] = [10, 11];
+const EDGE_MM: f64 = 20.0;
+
+/// A line of the table: root mean square errors of a coordinate, px.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// How corners were refined.
+    pub refinement: Refinement,
+    /// What was calibrated.
+    pub model: Model,
+    /// Views of the first half, and their error.
+    pub training: (usize, f64),
+    /// Views of the second half, and their error with the first half's camera.
+    pub test: (usize, f64),
+}
+
+/// Why the table was not made.
+#[derive(Debug, thiserror::Error)]
+pub enum Table2Error {
+    /// An image that cannot be read.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// Views that do not make a camera.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+}
+
+/// Detects in all images, which are in the order of the sequence, and makes the table. Errors are
+/// plain: all corners count alike and in full.
+pub fn run(images: &[impl AsRef<Path> + Sync]) -> Result<Vec<Row>, Table2Error> {
+    let mut rows = Vec::new();
+    for refinement in [Refinement::Polynomial, Refinement::Model] {
+        let views = detect(images, refinement)?;
+        let (first, second) = views.split_at(views.len() / 2);
+        for model in [Model::Radtan, Model::Radtan5, Model::Rational] {
+            let (loss, weights) = (Loss::Squared, Weights::Equal);
+            let panels = reference().panels();
+            let training = calibrate(first, &panels, Options { model, loss, weights })?;
+            let test = poses(second, &panels, &training.camera, loss, weights)?;
+            rows.push(Row {
+                refinement,
+                model,
+                training: (training.views.len(), training.rms_px),
+                test: (test.views.len(), test.rms_px),
+            });
+        }
+    }
+    Ok(rows)
+}
+
+fn reference() -> Reference<'static> {
+    let kind = GridKind::Deltille;
+    Reference::Grid(UntaggedGrid { kind, edge_mm: EDGE_MM, size: Some(SIZE) })
+}
+
+fn detect(
+    images: &[impl AsRef<Path> + Sync],
+    refinement: Refinement,
+) -> Result<Vec<View>, Table2Error> {
+    let config = DetectorConfig { refinement, ..DetectorConfig::default() };
+    let detector = Detector::for_grid(GridKind::Deltille, Some((SIZE[0], SIZE[1])), config);
+    let found = images.par_iter().map(|path| {
+        let name = path.as_ref().file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let image = raster::read(path.as_ref())?;
+        Ok((name.clone(), detector.detect_any(&image, &name)))
+    });
+    let found = found.collect::<Result<Vec<_>, ImageError>>()?;
+    Ok(views(&found, &reference())?)
+}
+
+/// The table as text; beside it what the paper's corners give on the whole sequence.
+pub fn text(rows: &[Row]) -> String {
+    let mut text = "refinement  model     views       calibrated  pose only\n".to_owned();
+    for row in rows {
+        let refinement = match row.refinement {
+            Refinement::Polynomial => "polynomial",
+            Refinement::Model => "model",
+        };
+        let ((n, training), (m, test)) = (row.training, row.test);
+        let (model, views) = (row.model.to_string(), format!("{n} + {m}"));
+        text += &format!(
+            "{refinement:11} {model:9} {views:11} {training:.4} px   {test:.4} px\n"
+        );
+    }
+    for (model, training, test) in
+        [("radtan", 0.1005, 0.1160), ("radtan5", 0.0958, 0.1075), ("rational", 0.0934, 0.1024)]
+    {
+        text += &format!(
+            "reference   {model:9} {:11} {training:.4} px   {test:.4} px\n",
+            "54 + 55"
+        );
+    }
+    text
+}
