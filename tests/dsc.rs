@@ -117,6 +117,7 @@ fn faces_come_back_in_both_dialects_from_any_pose() {
     let turned = PanelPose {
         rotation: [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
         translation_mm: [3.0, -4.0, 5.5],
+        covariance: None,
     };
     for pose in [PanelPose::IDENTITY, turned] {
         let target = face(6, pose);

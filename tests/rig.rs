@@ -1,8 +1,8 @@
 //! Rigs of simulated cameras: what is found is what was put in, and the stated deviations are true.
 
 use deltille::calibrate::{
-    CalibrationError, Loss, Model, Observation, RigOptions, RigSolution, RigViews, Sighting, View,
-    Weights, calibrate_rig,
+    CalibrationError, Loss, Model, Observation, PanelPlace, RigOptions, RigSolution, RigViews,
+    Sighting, View, Weights, calibrate_rig,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::family::Family;
@@ -21,7 +21,7 @@ const PLACED_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
 /// Cameras around an icosahedron, and what they saw of it.
 struct Simulated {
-    stated: Vec<Pose>,
+    stated: Vec<PanelPlace>,
     /// Where the panels really are.
     panels: Vec<Pose>,
     cameras: Vec<Camera>,
@@ -32,10 +32,7 @@ struct Simulated {
 fn small_pose(random: &mut ChaCha8Rng, turn_rad: f64, move_mm: f64) -> Pose {
     let normal = Normal::new(0.0, 1.0).unwrap();
     let mut vector = || DVec3::from_fn(|_| normal.sample(random));
-    Pose {
-        rotation: DQuat::from_scaled_axis(vector() * turn_rad),
-        translation: vector() * move_mm,
-    }
+    Pose { rotation: DQuat::from_scaled_axis(vector() * turn_rad), translation: vector() * move_mm }
 }
 
 trait FromFn {
@@ -57,9 +54,7 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
         .panels
         .iter()
         .map(|panel| Pose {
-            rotation: DQuat::from_mat3(
-                &DMat3::from_cols_array(&panel.pose.rotation).transpose(),
-            ),
+            rotation: DQuat::from_mat3(&DMat3::from_cols_array(&panel.pose.rotation).transpose()),
             translation: panel.pose.translation_mm.into(),
         })
         .collect();
@@ -73,6 +68,8 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
             }
         })
         .collect();
+    let as_stated = |&target_from_panel: &Pose| PanelPlace { target_from_panel, covariance: None };
+    let stated = stated.iter().map(as_stated).collect();
     let cameras: Vec<Camera> = (0..3)
         .map(|_| {
             let lens = BrownConrady {
@@ -165,7 +162,7 @@ fn normalised_errors(truth: &Simulated, found: &RigSolution) -> Vec<f64> {
     }
     let held = found.panels.iter().position(|panel| panel.covariance.is_none()).unwrap();
     // The true poses of the panels in a frame in which the held one is where it is stated to be.
-    let frame = truth.stated[held].after(&truth.panels[held].inverse());
+    let frame = truth.stated[held].target_from_panel.after(&truth.panels[held].inverse());
     for (panel, truth) in found.panels.iter().zip(&truth.panels) {
         if let Some(covariance) = panel.covariance {
             let sd = std::array::from_fn(|i| covariance[i][i].sqrt());
@@ -207,6 +204,31 @@ fn fifty_rigs_are_found_within_their_deviations() {
     let part = honest(0..50, 40);
     println!("within three deviations: {:.4}", part);
     assert!(part >= 0.99, "{part}");
+}
+
+/// What one calibration found of the target helps the next, which sees little of it.
+#[test]
+fn a_refined_target_is_known_in_the_next_calibration() {
+    let truth = simulated(11, 40);
+    let first = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
+    let few = |views: &RigViews| {
+        let mut views = views.clone();
+        views.views.truncate(8);
+        views
+    };
+    let few: Vec<RigViews> = truth.views.iter().map(few).collect();
+    let alone = calibrate_rig(&few, &truth.stated, options(true)).unwrap();
+    let with = calibrate_rig(&few, &first.panels, options(true)).unwrap();
+    let deviation = |solution: &RigSolution| {
+        let of = |panel: &PanelPlace| panel.covariance.map(|c| c[3][3] + c[4][4] + c[5][5]);
+        let all: Vec<f64> = solution.panels.iter().filter_map(of).collect();
+        (all.iter().sum::<f64>() / all.len() as f64).sqrt()
+    };
+    let [first, alone, with] = [&first, &alone, &with].map(deviation);
+    assert!(with < 1.05 * first && with < 0.7 * alone, "{first} {alone} {with}");
+    let within =
+        normalised_errors(&truth, &calibrate_rig(&few, &truth.stated, options(true)).unwrap());
+    assert!(within.iter().filter(|e| e.abs() < 3.0).count() as f64 > 0.97 * within.len() as f64);
 }
 
 #[test]

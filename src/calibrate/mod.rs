@@ -40,10 +40,8 @@ pub use grid::UntaggedGrid;
 pub use loss::Loss;
 pub use model::{Model, ModelError};
 pub use pose::estimate_pose;
-pub use problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem};
-pub use rig::{
-    RefinedPanel, RigCamera, RigFrame, RigOptions, RigSolution, RigViews, calibrate_rig,
-};
+pub use problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Prior, Problem};
+pub use rig::{PanelPlace, RigCamera, RigFrame, RigOptions, RigSolution, RigViews, calibrate_rig};
 pub use solution::{Corner, Parameter, Solution, ViewSolution};
 pub use solve::{Options, calibrate, poses};
 pub use view::{Reference, Sighting, View, views};

@@ -96,7 +96,31 @@ impl Normal {
             let local = Local::of(problem, layout, block, whitening_of, loss, whitening.sigma)?;
             normal.add(&local, block.frame);
         }
+        for (panel, first) in problem.panels.iter().zip(&layout.panels) {
+            if let (Some(prior), Some(first)) = (&panel.prior, *first) {
+                normal.add_prior(prior.off(&panel.target_from_panel), first, whitening.sigma);
+            }
+        }
         normal.cost.is_finite().then_some(normal)
+    }
+
+    /// Adds what is known of a pose beforehand; `sigma` is the deviation of a whitened coordinate,
+    /// the unit in which costs are counted.
+    fn add_prior(
+        &mut self,
+        (off, information): (Vector6<f64>, Matrix6<f64>),
+        first: usize,
+        sigma: f64,
+    ) {
+        let information = information * (sigma * sigma);
+        let pull = information * off;
+        self.cost += off.dot(&pull);
+        for i in 0..6 {
+            for j in 0..6 {
+                self.a[(first + i, first + j)] += information[(i, j)];
+            }
+            self.right[first + i] -= pull[i];
+        }
     }
 
     /// Adds a block: its last six columns are those of the frame's pose.

@@ -107,7 +107,8 @@ fn refine(
 
 /// Panels that stay where they are.
 pub(super) fn fixed(panels: &[Pose]) -> Vec<PanelUnknowns> {
-    let fixed = |&target_from_panel| PanelUnknowns { target_from_panel, pose_free: false };
+    let fixed =
+        |&target_from_panel| PanelUnknowns { target_from_panel, pose_free: false, prior: None };
     panels.iter().map(fixed).collect()
 }
 

@@ -1,4 +1,5 @@
 use glam::DVec3;
+use nalgebra::{Matrix6, Vector6};
 
 use crate::camera::{Camera, Pose, Projection};
 
@@ -37,6 +38,37 @@ pub struct PanelUnknowns {
     pub target_from_panel: Pose,
     /// Whether that is unknown; one panel must stay where it is.
     pub pose_free: bool,
+    /// What is known of it beforehand.
+    pub prior: Option<Prior>,
+}
+
+/// A pose that was measured before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    pose: Pose,
+    /// Inverse of the covariance of (ω, τ).
+    information: Matrix6<f64>,
+}
+
+impl Prior {
+    /// A measured pose; `None` where the covariance has no inverse.
+    pub fn new(pose: Pose, covariance: [[f64; 6]; 6]) -> Option<Self> {
+        let covariance = Matrix6::from_fn(|i, j| covariance[i][j]);
+        // Turns and moves have different units: their scale must not look like a lack of rank.
+        let scale = Vector6::from_fn(|i, _| covariance[(i, i)].sqrt().recip());
+        let scaled = Matrix6::from_fn(|i, j| covariance[(i, j)] * scale[i] * scale[j]);
+        let inverse = scaled.cholesky()?.inverse();
+        let information = Matrix6::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        information.iter().all(|v| v.is_finite()).then_some(Self { pose, information })
+    }
+
+    /// How far a pose is from the measured one, as (ω, τ), and the inverse covariance of that.
+    pub(super) fn off(&self, pose: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
+        let turn = (pose.rotation * self.pose.rotation.conjugate()).to_scaled_axis();
+        let moved = pose.translation - self.pose.translation;
+        let off = Vector6::new(turn.x, turn.y, turn.z, moved.x, moved.y, moved.z);
+        (off, self.information)
+    }
 }
 
 /// What one camera saw of one panel in one frame.

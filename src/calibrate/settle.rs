@@ -1,6 +1,6 @@
 use super::error::CalibrationError;
 use super::loss::Loss;
-use super::minimise::{Minimum, minimise};
+use super::minimise::{Minimum, Until, minimise};
 use super::problem::Problem;
 use super::weights::{Weights, Whitening};
 
@@ -20,17 +20,19 @@ pub(super) fn settle(
     weights: Weights,
     loss: Loss,
 ) -> Result<(Minimum, Whitening), CalibrationError> {
+    let mut problem = problem;
     let mut whitening = Whitening::fit(&problem, weights, &residuals(&problem));
-    let mut minimum = minimise(problem, &whitening, loss).ok_or(CalibrationError::NoStart)?;
     // Where corners are alike and losses square, weights change nothing.
-    let rounds = match (whitening.common_px, loss) {
-        (None, Loss::Squared) => 1,
-        _ => WEIGHT_ROUNDS,
-    };
-    for _ in 1..rounds {
-        whitening = Whitening::fit(&minimum.problem, weights, &residuals(&minimum.problem));
-        minimum = minimise(minimum.problem, &whitening, loss).ok_or(CalibrationError::NoStart)?;
+    if whitening.common_px.is_some() || loss != Loss::Squared {
+        for _ in 1..WEIGHT_ROUNDS {
+            problem = minimise(problem, &whitening, loss, Until::Rough)
+                .ok_or(CalibrationError::NoStart)?
+                .problem;
+            whitening = Whitening::fit(&problem, weights, &residuals(&problem));
+        }
     }
+    let minimum =
+        minimise(problem, &whitening, loss, Until::Fine).ok_or(CalibrationError::NoStart)?;
     Ok((minimum, whitening))
 }
 

@@ -139,8 +139,8 @@ impl Search<'_> {
         let (used, problem) = self.problem(free);
         enough(used.len(), self.views.len())?;
         let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
-        let minimum =
-            minimise(problem, &whitening, Loss::Cauchy, Until::Rough).ok_or(CalibrationError::NoStart)?;
+        let minimum = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
+            .ok_or(CalibrationError::NoStart)?;
         self.camera = minimum.problem.cameras[0].camera.clone();
         for (index, pose) in used.into_iter().zip(minimum.problem.frames) {
             self.poses[index] = Some(pose);
@@ -215,8 +215,8 @@ impl Search<'_> {
             }
         }
         let whitening = Whitening::fit(&problem, weights, &residuals(&problem));
-        let minimum = minimise(problem, &whitening, loss, Until::Fine)
-            .ok_or(CalibrationError::NoStart)?;
+        let minimum =
+            minimise(problem, &whitening, loss, Until::Fine).ok_or(CalibrationError::NoStart)?;
         self.solution(&kept, excluded, &minimum, &whitening)
     }
 

@@ -133,6 +133,10 @@ pub struct PanelPose {
     pub rotation: [f64; 9],
     /// Translation, mm.
     pub translation_mm: [f64; 3],
+    /// Covariance of a small turn (rad) and move (mm) along the target's axes, where the pose was
+    /// measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<[[f64; 6]; 6]>,
 }
 
 /// A vertex of a panel where all tiles meet (six of a deltille, four of a checkerboard).
@@ -220,6 +224,19 @@ impl SheetLayout {
 }
 
 impl Target {
+    /// The same target with its panels in other places, as they were measured; `poses` are as many
+    /// as it has panels.
+    pub fn with_poses(&self, poses: &[PanelPose]) -> Self {
+        let mut target = self.clone();
+        for (panel, pose) in target.panels.iter_mut().zip(poses) {
+            panel.pose = *pose;
+            for corner in &mut panel.corners {
+                corner.target_mm = pose.target_from_panel(corner.panel_mm);
+            }
+        }
+        target
+    }
+
     /// On how many pages all its sheets are printed.
     pub fn page_count(&self) -> usize {
         self.sheets.iter().map(SheetLayout::page_count).sum()

@@ -136,7 +136,11 @@ impl Polyhedron {
         rows.copy_from_slice(&rotation.transpose().to_cols_array());
         Some(Face {
             outline_mm: outline.map(|p| (p - origin).to_array()),
-            pose: PanelPose { rotation: rows, translation_mm: translation.to_array() },
+            pose: PanelPose {
+                rotation: rows,
+                translation_mm: translation.to_array(),
+                covariance: None,
+            },
             tile_edge_mm,
         })
     }

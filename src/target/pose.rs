@@ -14,6 +14,7 @@ impl PanelPose {
     pub const IDENTITY: PanelPose = PanelPose {
         rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         translation_mm: [0.0; 3],
+        covariance: None,
     };
 
     /// The target position of a point of the panel's plane, mm.
@@ -55,7 +56,7 @@ impl PanelPose {
         let t = if flat { t.map(|v| if v.abs() <= FLAT * extent { 0.0 } else { v }) } else { t };
         let mut rotation = [0.0; 9];
         rotation.copy_from_slice(r.transpose().as_slice());
-        Some(PanelPose { rotation, translation_mm: t.into() })
+        Some(PanelPose { rotation, translation_mm: t.into(), covariance: None })
     }
 }
 

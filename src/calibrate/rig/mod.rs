@@ -18,9 +18,9 @@ use std::collections::BTreeSet;
 
 use super::error::CalibrationError;
 use super::loss::Loss;
-use super::minimise::minimise;
+use super::minimise::{Until, minimise};
 use super::model::Model;
-use super::problem::{Block, CameraUnknowns, PanelUnknowns, Problem};
+use super::problem::{Block, CameraUnknowns, PanelUnknowns, Prior, Problem};
 use super::settle::{residuals, settle};
 use super::solve::{self, Options};
 use super::view::View;
@@ -28,7 +28,7 @@ use super::weights::{Weights, Whitening, median};
 use crate::camera::{Camera, Pose};
 use start::Start;
 
-pub use solution::{RefinedPanel, RigCamera, RigFrame, RigSolution};
+pub use solution::{RigCamera, RigFrame, RigSolution};
 
 /// What a camera of a rig saw.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,16 +54,26 @@ pub struct RigOptions {
     pub refine_target: bool,
 }
 
+/// Where a panel is on its target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PanelPlace {
+    /// target_from_panel.
+    pub target_from_panel: Pose,
+    /// Covariance of a turn (rad) and a move (mm) along the target's axes, where it was measured;
+    /// `None` where it is as stated.
+    pub covariance: Option<[[f64; 6]; 6]>,
+}
+
 /// A frame does not belong when a camera's corners in it are off so many times as much as usual, and
 /// more than so many pixels: the pictures were not taken at the same moment.
 const WRONG_FRAME_RATIO: f64 = 10.0;
 const WRONG_FRAME_PX: f64 = 1.0;
 
 /// Finds the cameras, where they are to each other, where the target was, and on request where its
-/// panels are on it. `panels` are the stated poses of these.
+/// panels are on it. What an earlier measurement says of these counts as an observation.
 pub fn calibrate_rig(
     cameras: &[RigViews],
-    panels: &[Pose],
+    panels: &[PanelPlace],
     options: RigOptions,
 ) -> Result<RigSolution, CalibrationError> {
     let start = Start::new(cameras, panels, options)?;
@@ -71,7 +81,8 @@ pub fn calibrate_rig(
     let problem = start.problem(cameras, panels, options);
     // A first pass in which frames that were not taken at one moment hardly count.
     let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
-    let first = minimise(problem, &whitening, Loss::Cauchy).ok_or(CalibrationError::NoStart)?;
+    let first = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
+        .ok_or(CalibrationError::NoStart)?;
     let wrong = wrong_frames(&first.problem);
     for (&frame, (camera, off_px)) in &wrong {
         let why = format!(
@@ -106,18 +117,20 @@ fn wrong_frames(problem: &Problem) -> std::collections::BTreeMap<usize, (usize, 
     wrong
 }
 
-/// The panels that can be found against the one seen most: those that hang together with it by
-/// frames in which both were seen. The first value is that panel.
-fn connected_panels(blocks: &[Block], count: usize) -> (usize, BTreeSet<usize>) {
+/// The panel to be held: the one seen most of those that no measurement moves, which an earlier
+/// refinement held too; and those that hang together with it by frames in which both were seen.
+fn connected_panels(blocks: &[Block], panels: &[PanelPlace]) -> (usize, BTreeSet<usize>) {
+    let count = panels.len();
     let mut corners = vec![0; count];
     let mut frames = vec![BTreeSet::new(); count];
     for block in blocks {
         corners[block.panel] += block.observations.len();
         frames[block.panel].insert(block.frame);
     }
-    let most = (0..count).max_by_key(|&panel| (corners[panel], std::cmp::Reverse(panel)));
-    let most = most.unwrap_or_default();
-    let (mut found, mut open) = (BTreeSet::from([most]), vec![most]);
+    let stated = |panel: usize| corners[panel] > 0 && panels[panel].covariance.is_none();
+    let rank = |&panel: &usize| (stated(panel), corners[panel], std::cmp::Reverse(panel));
+    let held = (0..count).max_by_key(rank).unwrap_or_default();
+    let (mut found, mut open) = (BTreeSet::from([held]), vec![held]);
     while let Some(panel) = open.pop() {
         for other in 0..count {
             if !found.contains(&other) && !frames[other].is_disjoint(&frames[panel]) {
@@ -126,19 +139,20 @@ fn connected_panels(blocks: &[Block], count: usize) -> (usize, BTreeSet<usize>) 
             }
         }
     }
-    (most, found)
+    (held, found)
 }
 
 /// A camera by itself: as it is known, or as its views have it.
 fn alone(
     views: &RigViews,
-    panels: &[Pose],
+    panels: &[PanelPlace],
     options: RigOptions,
 ) -> Result<super::Solution, CalibrationError> {
     let RigOptions { model, loss, weights, .. } = options;
+    let panels: Vec<Pose> = panels.iter().map(|panel| panel.target_from_panel).collect();
     let found = match &views.known {
-        Some(camera) => solve::poses(&views.views, panels, camera, loss, weights),
-        None => solve::calibrate(&views.views, panels, Options { model, loss, weights }),
+        Some(camera) => solve::poses(&views.views, &panels, camera, loss, weights),
+        None => solve::calibrate(&views.views, &panels, Options { model, loss, weights }),
     };
     found.map_err(|error| CalibrationError::OfCamera {
         camera: views.name.clone(),
@@ -168,11 +182,15 @@ fn camera_unknowns(
 }
 
 /// What is unknown of the panels.
-fn panel_unknowns(blocks: &[Block], panels: &[Pose], refine: bool) -> Vec<PanelUnknowns> {
-    let (held, connected) = connected_panels(blocks, panels.len());
-    let unknown = |(index, pose): (usize, &Pose)| PanelUnknowns {
-        target_from_panel: *pose,
-        pose_free: refine && index != held && connected.contains(&index),
+fn panel_unknowns(blocks: &[Block], panels: &[PanelPlace], refine: bool) -> Vec<PanelUnknowns> {
+    let (held, connected) = connected_panels(blocks, panels);
+    let unknown = |(index, place): (usize, &PanelPlace)| {
+        let pose_free = refine && index != held && connected.contains(&index);
+        let prior = place
+            .covariance
+            .filter(|_| pose_free)
+            .and_then(|covariance| Prior::new(place.target_from_panel, covariance));
+        PanelUnknowns { target_from_panel: place.target_from_panel, pose_free, prior }
     };
     panels.iter().enumerate().map(unknown).collect()
 }

@@ -1,6 +1,6 @@
 use nalgebra::DMatrix;
 
-use super::RigViews;
+use super::{PanelPlace, RigViews};
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::minimise::Minimum;
 use crate::calibrate::normal::Covariances;
@@ -17,7 +17,7 @@ pub struct RigSolution {
     /// The frames, by name.
     pub frames: Vec<RigFrame>,
     /// The panels of the target.
-    pub panels: Vec<RefinedPanel>,
+    pub panels: Vec<PanelPlace>,
     /// Views and frames that took no part, and why.
     pub excluded: Vec<(String, String)>,
     /// Root mean square error of a coordinate over all corners, px.
@@ -59,16 +59,6 @@ pub struct RigFrame {
     pub pose_sd: [f64; 6],
     /// Root mean square error of a coordinate over all cameras, px.
     pub rms_px: f64,
-}
-
-/// A panel of the target.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RefinedPanel {
-    /// Where it is on the target.
-    pub target_from_panel: Pose,
-    /// Covariance of a turn (rad) and a move (mm) along the target's axes; `None` where the panel was
-    /// kept where it was stated to be.
-    pub covariance: Option<[[f64; 6]; 6]>,
 }
 
 impl RigSolution {
@@ -138,7 +128,7 @@ impl RigSolution {
             pose_sd: std::array::from_fn(|i| (own[(i, i)] * variance).sqrt()),
             rms_px: rms_of(&|block| block.frame == index),
         });
-        let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| RefinedPanel {
+        let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| PanelPlace {
             target_from_panel: panel.target_from_panel,
             covariance: first.map(|first| {
                 std::array::from_fn(|i| std::array::from_fn(|j| covariance[(first + i, first + j)]))

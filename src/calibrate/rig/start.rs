@@ -1,6 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{RigOptions, RigViews, alone, camera_unknowns, panel_unknowns};
+use super::{PanelPlace, RigOptions, RigViews, alone, camera_unknowns, panel_unknowns};
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::problem::{Block, Problem};
 use crate::calibrate::weights::median;
@@ -25,7 +25,7 @@ pub(super) struct Start {
 impl Start {
     pub(super) fn new(
         views: &[RigViews],
-        panels: &[Pose],
+        panels: &[PanelPlace],
         options: RigOptions,
     ) -> Result<Self, CalibrationError> {
         let mut cameras = Vec::with_capacity(views.len());
@@ -78,7 +78,7 @@ impl Start {
     pub(super) fn problem(
         &self,
         views: &[RigViews],
-        panels: &[Pose],
+        panels: &[PanelPlace],
         options: RigOptions,
     ) -> Problem {
         let mut blocks = Vec::new();

@@ -1,0 +1,166 @@
+//! `deltille rig`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use glam::{DMat3, DQuat};
+
+use super::calibrate::{Robust, Weighting};
+use super::files::{text_file, write_all};
+use super::{sightings, target_file};
+use crate::calibrate::{
+    Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews, calibrate_rig,
+};
+use crate::camera::{Camera, Pose};
+use crate::cli::output::say;
+use crate::export::rig;
+use crate::target::{PanelPose, Target};
+
+/// Arguments of `deltille rig`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A camera and the folder of its detections, such as left=corners/left; once for each, the
+    /// first is the rig's frame. Pictures of one moment have the same file name in each folder
+    #[arg(long, required = true, value_name = "NAME=FOLDER", value_parser = named)]
+    camera: Vec<(String, PathBuf)>,
+    /// Description of the target: the .json that was written with it
+    #[arg(long, value_name = "FILE")]
+    target: PathBuf,
+    /// What is to be found of each camera, see `deltille calibrate`
+    #[arg(long, default_value = "radtan")]
+    model: Model,
+    /// A camera that is known already and kept, with its file
+    #[arg(long, value_name = "NAME=FILE", value_parser = named)]
+    known: Vec<(String, PathBuf)>,
+    /// Find where the target's panels are on it, and write that as <target>-refined.json
+    #[arg(long)]
+    refine_target: bool,
+    /// How corners far off their prediction count
+    #[arg(long, default_value = "huber")]
+    robust: Robust,
+    /// How corners are weighted
+    #[arg(long, default_value = "covariance")]
+    weights: Weighting,
+    /// Folder for rig.json, <camera>.yaml and the refined target
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
+    output: PathBuf,
+}
+
+fn named(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, path)) if !name.is_empty() && !path.is_empty() => {
+            Ok((name.to_owned(), path.into()))
+        }
+        _ => Err("give a name and a path, such as left=corners/left".to_owned()),
+    }
+}
+
+/// Calibrates a rig and writes it.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.camera.len() < 2 {
+        bail!("--camera: a rig has at least two; `deltille calibrate` takes one");
+    }
+    let mut names: Vec<&str> = args.camera.iter().map(|(name, _)| name.as_str()).collect();
+    names.sort_unstable();
+    if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        bail!("--camera: {} is named twice", twice[0]);
+    }
+    let bad = |name: &str| name.contains(['/', '\\']) || name.starts_with('.') || name == "rig";
+    if let Some(name) = names.iter().find(|name| bad(name)) {
+        bail!("--camera: {name} cannot be the name of a file");
+    }
+    let target = target_file::read(&args.target).context("--target")?;
+    let reference = Reference::Target(&target);
+    let mut cameras = Vec::with_capacity(args.camera.len());
+    for (name, folder) in &args.camera {
+        let read = sightings::read(std::slice::from_ref(folder), &reference);
+        let (views, _) = read.with_context(|| format!("--camera {name}"))?;
+        cameras.push(RigViews { name: name.clone(), views, known: args.known(name)? });
+    }
+    if let Some((name, _)) = args.known.iter().find(|(name, _)| !names.contains(&name.as_str())) {
+        bail!("--known: there is no --camera {name}");
+    }
+    let panels: Vec<PanelPlace> = target.panels.iter().map(|panel| place(&panel.pose)).collect();
+    let options = RigOptions {
+        model: args.model,
+        loss: args.robust.into(),
+        weights: args.weights.into(),
+        refine_target: args.refine_target,
+    };
+    let solution = calibrate_rig(&cameras, &panels, options)?;
+    let mut files = vec![text_file("rig.json".to_owned(), rig::write(&solution, &args.model.to_string()))];
+    for camera in &solution.cameras {
+        files.push(text_file(format!("{}.yaml", camera.name), camera.camera.to_yaml()));
+    }
+    if args.refine_target {
+        let refined = refined(&target, &solution);
+        files.push(text_file(format!("{}.json", refined.name), refined.to_json()));
+    }
+    let written = write_all(&args.output, &files)?;
+    say!("{}", summary(&solution));
+    for path in written {
+        say!("wrote {}", path.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Args {
+    fn known(&self, name: &str) -> anyhow::Result<Option<Camera>> {
+        let Some((_, path)) = self.known.iter().find(|(known, _)| known == name) else {
+            return Ok(None);
+        };
+        let show = || format!("--known: {}", path.display());
+        let text = std::fs::read_to_string(path).with_context(show)?;
+        Ok(Some(Camera::from_yaml(&text).with_context(show)?))
+    }
+}
+
+fn place(pose: &PanelPose) -> PanelPlace {
+    let rotation = DMat3::from_cols_array(&pose.rotation).transpose();
+    let rotation = DQuat::from_mat3(&rotation).normalize();
+    let target_from_panel = Pose { rotation, translation: pose.translation_mm.into() };
+    PanelPlace { target_from_panel, covariance: pose.covariance }
+}
+
+/// The target with its panels where they were found.
+fn refined(target: &Target, solution: &RigSolution) -> Target {
+    let pose = |panel: &PanelPlace| PanelPose {
+        rotation: DMat3::from_quat(panel.target_from_panel.rotation).transpose().to_cols_array(),
+        translation_mm: panel.target_from_panel.translation.to_array(),
+        covariance: panel.covariance,
+    };
+    let poses: Vec<PanelPose> = solution.panels.iter().map(pose).collect();
+    let name = format!("{}-refined", target.name.trim_end_matches("-refined"));
+    Target { name, ..target.with_poses(&poses) }
+}
+
+fn summary(solution: &RigSolution) -> String {
+    let mut text = format!(
+        "{} cameras, {} frames, rms {:.4} px\n",
+        solution.cameras.len(),
+        solution.frames.len(),
+        solution.rms_px
+    );
+    for camera in &solution.cameras {
+        let [fx, fy] = camera.camera.focal_px;
+        let at = camera.camera_from_rig.inverse().translation;
+        text += &format!(
+            "{}: {} corners, rms {:.4} px, fx {fx:.2}, fy {fy:.2}; at ({:.2}, {:.2}, {:.2}) mm",
+            camera.name, camera.corners, camera.rms_px, at.x, at.y, at.z
+        );
+        if let Some(sd) = camera.pose_sd {
+            let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
+            text += &format!(
+                " ± {:.3} mm, {:.4}°",
+                largest(&sd[3..]),
+                largest(&sd[..3]).to_degrees()
+            );
+        }
+        text.push('\n');
+    }
+    for (view, why) in &solution.excluded {
+        text += &format!("left out {view}: {why}\n");
+    }
+    text.trim_end().to_owned()
+}

@@ -1,0 +1,87 @@
+//! Rigs as JSON, schema `deltille/rig/1`: every camera with its place, every frame with that of the
+//! target.
+
+use serde::Serialize;
+
+use super::motion::Motion;
+use crate::calibrate::{Parameter, RigSolution};
+
+/// Schema and version that this crate writes.
+pub const SCHEMA: &str = "deltille/rig/1";
+
+#[derive(Serialize)]
+struct RigFile<'a> {
+    schema: &'static str,
+    model: &'a str,
+    rms_px: f64,
+    sigma: f64,
+    common_px: Option<f64>,
+    cameras: Vec<Camera<'a>>,
+    frames: Vec<Frame<'a>>,
+    excluded: Vec<Excluded<'a>>,
+}
+
+#[derive(Serialize)]
+struct Camera<'a> {
+    name: &'a str,
+    width: u32,
+    height: u32,
+    rms_px: f64,
+    corners: usize,
+    parameters: Vec<Value<'a>>,
+    camera_from_rig: Motion,
+}
+
+#[derive(Serialize)]
+struct Value<'a> {
+    name: &'a str,
+    value: f64,
+    sd: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Frame<'a> {
+    name: &'a str,
+    rms_px: f64,
+    rig_from_target: Motion,
+}
+
+#[derive(Serialize)]
+struct Excluded<'a> {
+    view: &'a str,
+    why: &'a str,
+}
+
+/// The text of a rig's file.
+pub fn write(solution: &RigSolution, model: &str) -> String {
+    let cameras = solution.cameras.iter().map(|camera| Camera {
+        name: &camera.name,
+        width: camera.camera.width,
+        height: camera.camera.height,
+        rms_px: camera.rms_px,
+        corners: camera.corners,
+        parameters: camera.parameters.iter().map(value).collect(),
+        camera_from_rig: Motion::new(&camera.camera_from_rig, camera.pose_sd),
+    });
+    let frames = solution.frames.iter().map(|frame| Frame {
+        name: &frame.name,
+        rms_px: frame.rms_px,
+        rig_from_target: Motion::new(&frame.rig_from_target, Some(frame.pose_sd)),
+    });
+    let excluded = solution.excluded.iter().map(|(view, why)| Excluded { view, why });
+    let file = RigFile {
+        schema: SCHEMA,
+        model,
+        rms_px: solution.rms_px,
+        sigma: solution.sigma,
+        common_px: solution.common_px,
+        cameras: cameras.collect(),
+        frames: frames.collect(),
+        excluded: excluded.collect(),
+    };
+    crate::json::to_text(&file, 4)
+}
+
+fn value(parameter: &Parameter) -> Value<'_> {
+    Value { name: &parameter.name, value: parameter.value, sd: parameter.sd }
+}
