@@ -139,8 +139,8 @@ impl Search<'_> {
         let (used, problem) = self.problem(free);
         enough(used.len(), self.views.len())?;
         let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
-        let minimum =
-            minimise(problem, &whitening, Loss::Cauchy, Until::Rough).ok_or(CalibrationError::NoStart)?;
+        let minimum = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
+            .ok_or(CalibrationError::NoStart)?;
         self.camera = minimum.problem.cameras[0].camera.clone();
         for (index, pose) in used.into_iter().zip(minimum.problem.frames) {
             self.poses[index] = Some(pose);
@@ -197,7 +197,9 @@ impl Search<'_> {
                     medians[frame],
                     median(medians.clone())
                 ),
-                None => "no pose explains its corners: wrong labels, or another target".to_owned(),
+                None => "no pose explains its corners: wrong labels, another target, or corners \
+                         where the lens model has ended"
+                    .to_owned(),
             };
             (view.name.clone(), why)
         });
@@ -215,8 +217,8 @@ impl Search<'_> {
             }
         }
         let whitening = Whitening::fit(&problem, weights, &residuals(&problem));
-        let minimum = minimise(problem, &whitening, loss, Until::Fine)
-            .ok_or(CalibrationError::NoStart)?;
+        let minimum =
+            minimise(problem, &whitening, loss, Until::Fine).ok_or(CalibrationError::NoStart)?;
         self.solution(&kept, excluded, &minimum, &whitening)
     }
 
@@ -258,6 +260,7 @@ impl Search<'_> {
             .zip(&frames)
             .map(|((&index, pose), covariance)| ViewSolution {
                 name: self.views[index].name.clone(),
+                image: self.views[index].image.clone(),
                 pose: *pose,
                 pose_sd: std::array::from_fn(|i| (covariance[(i, i)] * variance).sqrt()),
                 rms_px: 0.0,

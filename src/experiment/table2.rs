@@ -94,17 +94,13 @@ pub fn text(rows: &[Row]) -> String {
         };
         let ((n, training), (m, test)) = (row.training, row.test);
         let (model, views) = (row.model.to_string(), format!("{n} + {m}"));
-        text += &format!(
-            "{refinement:11} {model:9} {views:11} {training:.4} px   {test:.4} px\n"
-        );
+        text += &format!("{refinement:11} {model:9} {views:11} {training:.4} px   {test:.4} px\n");
     }
     for (model, training, test) in
         [("radtan", 0.1005, 0.1160), ("radtan5", 0.0958, 0.1075), ("rational", 0.0934, 0.1024)]
     {
-        text += &format!(
-            "reference   {model:9} {:11} {training:.4} px   {test:.4} px\n",
-            "54 + 55"
-        );
+        text +=
+            &format!("reference   {model:9} {:11} {training:.4} px   {test:.4} px\n", "54 + 55");
     }
     text
 }
