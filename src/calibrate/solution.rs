@@ -43,6 +43,8 @@ pub struct Parameter {
 pub struct ViewSolution {
     /// Name of the view.
     pub name: String,
+    /// File name of its picture.
+    pub image: String,
     /// camera_from_target.
     pub pose: Pose,
     /// Standard deviations of the pose: of a turn (rad) and a move (mm) along the axes of the camera.

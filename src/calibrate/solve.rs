@@ -197,7 +197,9 @@ impl Search<'_> {
                     medians[frame],
                     median(medians.clone())
                 ),
-                None => "no pose explains its corners: wrong labels, or another target".to_owned(),
+                None => "no pose explains its corners: wrong labels, another target, or corners \
+                         where the lens model has ended"
+                    .to_owned(),
             };
             (view.name.clone(), why)
         });
@@ -258,6 +260,7 @@ impl Search<'_> {
             .zip(&frames)
             .map(|((&index, pose), covariance)| ViewSolution {
                 name: self.views[index].name.clone(),
+                image: self.views[index].image.clone(),
                 pose: *pose,
                 pose_sd: std::array::from_fn(|i| (covariance[(i, i)] * variance).sqrt()),
                 rms_px: 0.0,

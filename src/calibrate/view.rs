@@ -26,6 +26,8 @@ pub enum Reference<'a> {
 pub struct View {
     /// Name, such as that of the detection's file.
     pub name: String,
+    /// File name of the picture.
+    pub image: String,
     /// Width and height of the picture, px.
     pub size_px: [u32; 2],
     /// The panels that were found.
@@ -100,7 +102,7 @@ pub fn views(
                 other_px: size_px,
             });
         }
-        let view = name.clone();
+        let (view, image) = (name.clone(), detection.image.clone());
         let mut sightings = reference.sightings(detection).map_err(|problem| match reference {
             Reference::Grid(_) => CalibrationError::NotTheBoard { view, problem },
             Reference::Target(_) => CalibrationError::NotOfTarget { view, problem },
@@ -109,10 +111,10 @@ pub fn views(
         if reference.is_loose() {
             views.extend(sightings.into_iter().map(|sighting| {
                 let name = format!("{name} board {}", sighting.panel);
-                View { name, size_px, sightings: vec![sighting] }
+                View { name, image: image.clone(), size_px, sightings: vec![sighting] }
             }));
         } else if !sightings.is_empty() {
-            views.push(View { name: name.clone(), size_px, sightings });
+            views.push(View { name: name.clone(), image, size_px, sightings });
         }
     }
     check_labels(&views)?;

@@ -34,6 +34,7 @@ struct Parameter {
 #[derive(Serialize)]
 struct View {
     name: String,
+    image: String,
     rms_px: f64,
     outliers: usize,
     camera_from_target: Motion,
@@ -108,6 +109,7 @@ fn view(view: &crate::calibrate::ViewSolution) -> View {
     });
     View {
         name: view.name.clone(),
+        image: view.image.clone(),
         rms_px: view.rms_px,
         outliers: view.outlier_count(),
         camera_from_target: Motion {

@@ -5,6 +5,7 @@
 
 pub mod atomic;
 pub mod calibration;
+pub mod camera;
 pub mod csv;
 pub mod detection;
 pub mod dsc;

@@ -1,16 +1,22 @@
 //! `deltille calibrate`.
 
-use std::path::PathBuf;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
+use super::files::{self, File};
 use super::sightings::{Sightings, SightingsArgs};
-use crate::calibrate::{self, Loss, Model, Options, Solution, Weights};
-use crate::camera::Camera;
-use crate::cli::output::{self, say};
+use crate::calibrate::{self, Loss, Model, Options, Solution, View, Weights};
+use crate::camera::{Camera, Pose};
+use crate::cli::output;
 use crate::export::calibration;
+use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
+
+/// Correlations from here on are told: such parameters are hardly told apart.
+const STRONG_CORRELATION: f64 = 0.98;
 
 /// Arguments of `deltille calibrate`.
 #[derive(clap::Args)]
@@ -22,27 +28,32 @@ pub struct Args {
     /// eucm, double-sphere, or pupil (fisheye with a moving entrance pupil)
     #[arg(long, required_unless_present = "fixed_intrinsics")]
     model: Option<Model>,
-    /// Find only the poses of this camera
+    /// Find only the poses of this camera: its file, as written by this command, ROS or OpenCV
     #[arg(long, value_name = "CAMERA", conflicts_with = "model")]
     fixed_intrinsics: Option<PathBuf>,
-    /// Keep every N-th view out of the calibration and tell the error there
+    /// Keep every N-th view (the N-th, 2N-th, …) out of the calibration and tell the error there,
+    /// where only poses are found
     #[arg(long, value_name = "N", conflicts_with = "fixed_intrinsics",
           value_parser = clap::value_parser!(u32).range(2..))]
     holdout: Option<u32>,
     /// How corners far off their prediction count
-    #[arg(long, default_value = "huber")]
+    #[arg(long, value_name = "LOSS", default_value = "huber")]
     robust: Robust,
     /// How corners are weighted
-    #[arg(long, default_value = "covariance")]
+    #[arg(long, value_name = "BY", default_value = "covariance")]
     weights: Weighting,
-    /// The camera file, .yaml, or a folder for camera.yaml; what belongs to it is written beside it
+    /// What to write; several may be given, separated by commas
+    #[arg(long, value_delimiter = ',', default_value = "own")]
+    format: Vec<Format>,
+    /// The camera file, .yaml, or a folder for camera.yaml; other files are written beside it and
+    /// named after it
     #[arg(short, long, value_name = "FILE", default_value = "camera.yaml")]
     output: PathBuf,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Robust {
-    /// Least squares: every corner counts in full
+    /// In full: least squares
     None,
     /// Beyond three standard deviations with a constant force
     Huber,
@@ -58,61 +69,162 @@ enum Weighting {
     Covariance,
 }
 
-/// Calibrates and writes the camera.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// <name>.yaml, which every command here reads, and <name>.json with uncertainties, poses and
+    /// residuals
+    Own,
+    /// <name>-opencv.yaml
+    Opencv,
+    /// <name>-ros.yaml
+    Ros,
+    /// <name>-camchain.yaml
+    Kalibr,
+    /// <name>-cameras.txt
+    Colmap,
+    /// <name>-transforms.json
+    Nerfstudio,
+}
+
+/// Calibrates, writes the camera, and tells how good it is.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = output::file(&args.output, "camera", "yaml")?;
     let Sightings { views, panels, empty } = args.sightings.read()?;
-    if empty > 0 {
-        eprintln!("{empty} pictures show no board");
+    for picture in &empty {
+        eprintln!("{picture}: no board, left out");
     }
-    let loss = match args.robust {
-        Robust::None => Loss::Squared,
-        Robust::Huber => Loss::Huber,
-        Robust::Cauchy => Loss::Cauchy,
-    };
-    let weights = match args.weights {
-        Weighting::Equal => Weights::Equal,
-        Weighting::Covariance => Weights::Covariance,
-    };
-    let (solution, name) = match (&args.fixed_intrinsics, args.model) {
-        (Some(camera), _) => {
-            let show = || format!("--fixed-intrinsics: {}", camera.display());
-            let text = std::fs::read_to_string(camera).with_context(show)?;
-            let camera = Camera::from_yaml(&text).with_context(show)?;
-            (calibrate::poses(&views, &panels, &camera, loss, weights)?, "fixed".to_owned())
-        }
-        (None, Some(model)) => {
-            let options = Options { model, loss, weights };
-            (calibrate::calibrate(&views, &panels, options)?, model.to_string())
-        }
-        (None, None) => unreachable!("clap requires one"),
-    };
-    output::write(&path, solution.camera.to_yaml().as_bytes())?;
-    let json = calibration::write(&solution, &name);
-    output::write(&path.with_extension("json"), json.as_bytes())?;
-    say!("{}", table(&solution));
+    let solution = args.solve(&views, &panels)?;
+    for (name, why) in &solution.calibrated.excluded {
+        eprintln!("{name}: left out: {why}");
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let texts = args.format.iter().map(|&format| format.texts(&stem, &solution));
+    let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let written: Vec<File> =
+        texts.into_iter().flatten().map(|(name, text)| files::text_file(name, text)).collect();
+    let written = files::write_all(folder.unwrap_or(Path::new(".")), &written)?;
+    let mut text = table(&solution.calibrated);
+    if let Some(test) = &solution.held_out {
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "held out: {} views, {} corners, rms {:.4} px a coordinate",
+            test.views.len(),
+            test.corner_count(),
+            test.rms_px
+        );
+    }
+    for path in written {
+        let _ = writeln!(text, "{}", path.display());
+    }
+    output::print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
+/// What came of a command.
+struct Solved {
+    /// Name of the model, or `fixed`.
+    model: String,
+    calibrated: Solution,
+    held_out: Option<Solution>,
+}
+
+impl Args {
+    fn solve(&self, views: &[View], panels: &[Pose]) -> anyhow::Result<Solved> {
+        let loss = match self.robust {
+            Robust::None => Loss::Squared,
+            Robust::Huber => Loss::Huber,
+            Robust::Cauchy => Loss::Cauchy,
+        };
+        let weights = match self.weights {
+            Weighting::Equal => Weights::Equal,
+            Weighting::Covariance => Weights::Covariance,
+        };
+        let Some(model) = self.model else {
+            let path = self.fixed_intrinsics.as_deref().unwrap_or(Path::new(""));
+            let show = || format!("--fixed-intrinsics: {}", path.display());
+            let text = std::fs::read_to_string(path).with_context(show)?;
+            let camera = Camera::from_yaml(&text).with_context(show)?;
+            let calibrated = calibrate::poses(views, panels, &camera, loss, weights)?;
+            ensure!(
+                !calibrated.views.is_empty(),
+                "no view shows the target as this camera sees it"
+            );
+            return Ok(Solved { model: "fixed".to_owned(), calibrated, held_out: None });
+        };
+        let options = Options { model, loss, weights };
+        let every = self.holdout.map(|n| n as usize);
+        let is_held_out = |index: usize| every.is_some_and(|n| (index + 1).is_multiple_of(n));
+        let part = |held_out: bool| -> Vec<View> {
+            let views = views.iter().enumerate();
+            views.filter(|(i, _)| is_held_out(*i) == held_out).map(|(_, v)| v.clone()).collect()
+        };
+        let calibrated = calibrate::calibrate(&part(false), panels, options)?;
+        let test = part(true);
+        let held_out = match test.is_empty() {
+            true => None,
+            false => Some(calibrate::poses(&test, panels, &calibrated.camera, loss, weights)?),
+        };
+        Ok(Solved { model: model.to_string(), calibrated, held_out })
+    }
+}
+
+impl Format {
+    /// The names and texts of its files.
+    fn texts(self, stem: &str, solved: &Solved) -> anyhow::Result<Vec<(String, String)>> {
+        let solution = &solved.calibrated;
+        let camera = &solution.camera;
+        let one = |end: &str, text: String| vec![(format!("{stem}{end}"), text)];
+        Ok(match self {
+            Self::Own => vec![
+                (format!("{stem}.yaml"), camera.to_yaml()),
+                (format!("{stem}.json"), calibration::write(solution, &solved.model)),
+            ],
+            Self::Opencv => one("-opencv.yaml", opencv(camera)?),
+            Self::Ros => one("-ros.yaml", ros(camera, stem)?),
+            Self::Kalibr => one("-camchain.yaml", kalibr(camera)?),
+            Self::Colmap => one("-cameras.txt", colmap(camera)?),
+            Self::Nerfstudio => {
+                let views = solution.views.iter().map(|view| (view.image.as_str(), view.pose));
+                let views: Vec<_> = views.collect();
+                one("-transforms.json", nerfstudio(camera, &views)?)
+            }
+        })
+    }
+}
+
+/// Parameters with their deviations, views with their errors.
 fn table(solution: &Solution) -> String {
     let mut text = String::new();
-    for p in &solution.parameters {
-        text += &format!("{:6} {:>14.6}", p.name, p.value);
-        if let Some(sd) = p.sd {
-            text += &format!(" ± {sd:.6}");
+    for parameter in solution.parameters.iter() {
+        let Some(sd) = parameter.sd else { continue };
+        // As many places as two digits of the deviation need.
+        let places = (1.0 - sd.log10().floor()).clamp(1.0, 12.0) as usize;
+        let _ =
+            writeln!(text, "{:5} {:>14.places$} ± {sd:.places$}", parameter.name, parameter.value);
+    }
+    let found: Vec<&str> = solution.found().collect();
+    for i in 0..found.len() {
+        for j in i + 1..found.len() {
+            let correlation = solution.correlation(i, j);
+            if correlation.abs() >= STRONG_CORRELATION {
+                let _ =
+                    writeln!(text, "{} and {}: correlation {correlation:.3}", found[i], found[j]);
+            }
         }
-        text.push('\n');
     }
-    text += &format!(
-        "rms {:.4} px, sigma {:.4}, common {:?}, {} views, steps {}\n",
-        solution.rms_px,
-        solution.sigma,
-        solution.common_px,
+    let _ = writeln!(text, "view             corners  rms px  outliers");
+    for view in &solution.views {
+        let (corners, outliers) = (view.corners.len(), view.outlier_count());
+        let _ = writeln!(text, "{:16} {corners:7}  {:.4}  {outliers:8}", view.name, view.rms_px);
+    }
+    let _ = writeln!(
+        text,
+        "{} views, {} corners, rms {:.4} px a coordinate",
         solution.views.len(),
-        solution.steps
+        solution.corner_count(),
+        solution.rms_px
     );
-    for (n, w) in &solution.excluded {
-        text += &format!("{n}: {w}\n");
-    }
     text
 }

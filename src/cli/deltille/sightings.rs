@@ -1,5 +1,6 @@
 //! What was photographed, and the detections of it: the options of commands that calibrate.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
@@ -48,8 +49,8 @@ pub struct Sightings {
     pub views: Vec<View>,
     /// target_from_panel of each panel.
     pub panels: Vec<Pose>,
-    /// Pictures in which no view was found.
-    pub empty: usize,
+    /// Names of the pictures in which no view was found.
+    pub empty: Vec<String>,
 }
 
 fn length(text: &str) -> Result<f64, String> {
@@ -86,9 +87,9 @@ impl SightingsArgs {
             detections.push((name, found));
         }
         let views = views(&detections, &reference)?;
-        let pictures = detections.iter();
-        let seen = |name: &str| views.iter().any(|view| view.name.starts_with(name));
-        let empty = pictures.filter(|(name, _)| !seen(name)).count();
+        let seen: BTreeSet<&str> = views.iter().map(|view| view.image.as_str()).collect();
+        let unseen = detections.iter().filter(|(_, found)| !seen.contains(found.image.as_str()));
+        let empty = unseen.map(|(name, _)| name.clone()).collect();
         Ok(Sightings { panels: reference.panels(), views, empty })
     }
 
