@@ -130,7 +130,12 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
             });
             let sightings: Vec<Sighting> = sightings.collect();
             let name = format!("{frame:03}");
-            (!sightings.is_empty()).then(|| View { name, size_px: [2000, 1500], sightings })
+            (!sightings.is_empty()).then(|| View {
+                name: name.clone(),
+                image: name,
+                size_px: [2000, 1500],
+                sightings,
+            })
         });
         RigViews { name: format!("c{index}"), views: views.collect(), known: None }
     });

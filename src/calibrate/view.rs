@@ -43,6 +43,18 @@ pub struct Sighting {
     pub observations: Vec<Observation>,
 }
 
+impl Sighting {
+    /// Moves the corners to where a print has them that is stretched across and up its sheet;
+    /// the panel is turned by `angle_rad` on it.
+    pub fn stretch(&mut self, [across, up]: [f64; 2], angle_rad: f64) {
+        let turn = DQuat::from_rotation_z(angle_rad);
+        for seen in &mut self.observations {
+            let on_sheet = turn * seen.panel_mm * DVec3::new(across, up, 1.0);
+            seen.panel_mm = turn.conjugate() * on_sheet;
+        }
+    }
+}
+
 impl Reference<'_> {
     /// target_from_panel of every panel.
     pub fn panels(&self) -> Vec<Pose> {

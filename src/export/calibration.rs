@@ -1,9 +1,9 @@
 //! Calibrations as JSON, schema `deltille/calibration/1`: the camera with standard deviations and
 //! correlations, and every view with its pose and residuals.
 
-use glam::DMat3;
 use serde::Serialize;
 
+use super::motion::Motion;
 use crate::calibrate::Solution;
 
 /// Schema and version that this crate writes.
@@ -40,15 +40,6 @@ struct View {
     camera_from_target: Motion,
     /// Row, column, x, y, dx, dy of each corner, by panel.
     corners: Vec<Corner>,
-}
-
-#[derive(Serialize)]
-struct Motion {
-    /// Row-major.
-    rotation: [f64; 9],
-    translation_mm: [f64; 3],
-    rotation_sd_rad: [f64; 3],
-    translation_sd_mm: [f64; 3],
 }
 
 #[derive(Serialize)]
@@ -96,7 +87,6 @@ pub fn write(solution: &Solution, model: &str) -> String {
 }
 
 fn view(view: &crate::calibrate::ViewSolution) -> View {
-    let [rx, ry, rz, tx, ty, tz] = view.pose_sd;
     let corners = view.corners.iter().map(|corner| Corner {
         panel: corner.panel,
         row: corner.row,
@@ -112,12 +102,7 @@ fn view(view: &crate::calibrate::ViewSolution) -> View {
         image: view.image.clone(),
         rms_px: view.rms_px,
         outliers: view.outlier_count(),
-        camera_from_target: Motion {
-            rotation: DMat3::from_quat(view.pose.rotation).transpose().to_cols_array(),
-            translation_mm: view.pose.translation.to_array(),
-            rotation_sd_rad: [rx, ry, rz],
-            translation_sd_mm: [tx, ty, tz],
-        },
+        camera_from_target: Motion::new(&view.pose, Some(view.pose_sd)),
         corners: corners.collect(),
     }
 }

@@ -121,8 +121,29 @@ pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
     ))
 }
 
-/// Kalibr's camera chain, of one camera.
-pub fn kalibr(camera: &Camera) -> Result<String, FormatError> {
+/// Kalibr's camera chain: cameras, each with its camera_from_rig.
+pub fn kalibr(cameras: &[(&Camera, Pose)]) -> Result<String, FormatError> {
+    let mut text = String::new();
+    for (n, (camera, camera_from_rig)) in cameras.iter().enumerate() {
+        // Writing to a String cannot fail.
+        let _ = write!(text, "cam{n}:\n{}", kalibr_camera(camera)?);
+        if let Some((_, before_from_rig)) = n.checked_sub(1).map(|before| cameras[before]) {
+            let motion = camera_from_rig.after(&before_from_rig.inverse());
+            text += "  T_cn_cnm1:\n";
+            let rotation = DMat3::from_quat(motion.rotation);
+            // Kalibr's lengths are metres.
+            let shift = motion.translation / 1000.0;
+            for i in 0..3 {
+                let row = rotation.row(i).to_array();
+                let _ = writeln!(text, "  - [{}]", list(&[&row[..], &[shift[i]]].concat()));
+            }
+            text += "  - [0.0, 0.0, 0.0, 1.0]\n";
+        }
+    }
+    Ok(text)
+}
+
+fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
     let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.centre_px);
     let ends = [fx, fy, cx, cy];
@@ -137,7 +158,7 @@ pub fn kalibr(camera: &Camera) -> Result<String, FormatError> {
         },
     };
     Ok(format!(
-        "cam0:\n  camera_model: {model}\n  intrinsics: [{}]\n  distortion_model: {distortion}\n  \
+        "  camera_model: {model}\n  intrinsics: [{}]\n  distortion_model: {distortion}\n  \
          distortion_coeffs: [{}]\n  resolution: [{}, {}]\n",
         list(&intrinsics),
         list(&coefficients),
@@ -146,8 +167,45 @@ pub fn kalibr(camera: &Camera) -> Result<String, FormatError> {
     ))
 }
 
-/// COLMAP's cameras.txt, of one camera.
-pub fn colmap(camera: &Camera) -> Result<String, FormatError> {
+/// COLMAP's cameras.txt, of cameras numbered from 1.
+pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
+    let mut text = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n".to_owned();
+    for (n, camera) in (1..).zip(cameras) {
+        let (model, parameters) = colmap_camera(camera)?;
+        let _ = write!(text, "{n} {model} {} {}", camera.width, camera.height);
+        for value in parameters {
+            let _ = write!(text, " {value:?}");
+        }
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+/// COLMAP's rig_config.json: cameras by name, each with its camera_from_rig; pictures lie in a folder
+/// of the camera's name. The first camera is the rig.
+pub fn colmap_rig(cameras: &[(&str, &Camera, Pose)]) -> Result<String, FormatError> {
+    let mut entries = Vec::with_capacity(cameras.len());
+    for (n, (name, camera, camera_from_rig)) in cameras.iter().enumerate() {
+        let (model, parameters) = colmap_camera(camera)?;
+        let mut entry = json!({
+            "image_prefix": format!("{name}/"),
+            "camera_model_name": model,
+            "camera_params": parameters,
+        });
+        if n == 0 {
+            entry["ref_sensor"] = json!(true);
+        } else {
+            let [x, y, z, w] = camera_from_rig.rotation.to_array();
+            entry["cam_from_rig_rotation"] = json!([w, x, y, z]);
+            entry["cam_from_rig_translation"] = json!(camera_from_rig.translation.to_array());
+        }
+        entries.push(entry);
+    }
+    Ok(crate::json::to_text(&json!([{ "cameras": entries }]), 3))
+}
+
+/// Name and parameters of a COLMAP camera.
+fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatError> {
     let parameters = camera.lens.parameters();
     let (model, coefficients) = match Shared::of(camera, &parameters) {
         Shared::Perspective(k, 0..=4) => ("OPENCV", &k[..4]),
@@ -156,12 +214,7 @@ pub fn colmap(camera: &Camera) -> Result<String, FormatError> {
         _ => return refuse(camera, "colmap", "radtan, rational, kannala-brandt"),
     };
     let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.centre_px.map(|c| c + 0.5));
-    let mut line = format!("1 {model} {} {}", camera.width, camera.height);
-    for value in [fx, fy, cx, cy].iter().chain(coefficients) {
-        // Writing to a String cannot fail.
-        let _ = write!(line, " {value:?}");
-    }
-    Ok(format!("# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n{line}\n"))
+    Ok((model, [&[fx, fy, cx, cy], coefficients].concat()))
 }
 
 /// nerfstudio's transforms.json: the camera, and for each image its camera_from_target, with lengths
@@ -262,26 +315,45 @@ mod tests {
             let texts = [
                 opencv(&camera),
                 ros(&camera, "camera"),
-                kalibr(&camera),
-                colmap(&camera),
+                kalibr(&[(&camera, Pose::IDENTITY)]),
+                colmap(&[&camera]),
                 nerfstudio(&camera, &[("a.png", Pose::IDENTITY)]),
             ];
             assert_eq!(texts.map(|text| text.is_ok()), carried, "{model}");
         }
-        let said = kalibr(&camera(Model::Radtan5, 5)).unwrap_err().to_string();
+        let said = kalibr(&[(&camera(Model::Radtan5, 5), Pose::IDENTITY)]).unwrap_err().to_string();
         assert!(said.starts_with("kalibr cannot carry a perspective lens with k1 k2 p1 p2 k3"));
+    }
+
+    #[test]
+    fn a_rig_says_where_its_cameras_are() {
+        let radtan = camera(Model::Radtan, 4);
+        let turn = glam::DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2);
+        let beside = Pose { rotation: turn, translation: glam::DVec3::new(-120.0, 0.0, 0.0) };
+        let text = kalibr(&[(&radtan, Pose::IDENTITY), (&radtan, beside)]).unwrap();
+        assert!(text.contains("\ncam1:\n") && text.contains("  T_cn_cnm1:\n  - ["), "{text}");
+        let last = text.lines().nth_back(3).unwrap();
+        assert!(last.ends_with(", -0.12]"), "{text}");
+        let text = colmap_rig(&[("l", &radtan, Pose::IDENTITY), ("r", &radtan, beside)]).unwrap();
+        let file: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let right = &file[0]["cameras"][1];
+        assert_eq!(file[0]["cameras"][0]["ref_sensor"], json!(true));
+        assert_eq!(right["image_prefix"], json!("r/"));
+        assert_eq!(right["cam_from_rig_translation"], json!([-120.0, 0.0, 0.0]));
+        assert_eq!(right["cam_from_rig_rotation"][0], json!(turn.w));
+        assert_eq!(colmap(&[&radtan, &radtan]).unwrap().lines().count(), 3);
     }
 
     #[test]
     fn texts_are_those_that_the_programs_document() {
         let radtan = camera(Model::Radtan, 4);
         assert_eq!(
-            kalibr(&radtan).unwrap(),
-            "cam0:\n  camera_model: pinhole\n  intrinsics: [500.0, 500.0, 319.5, 239.5]\n  \
+            kalibr(&[(&radtan, Pose::IDENTITY)]).unwrap(),
+            "  camera_model: pinhole\n  intrinsics: [500.0, 500.0, 319.5, 239.5]\n  \
              distortion_model: radtan\n  distortion_coeffs: [0.25, 1.0e-5, -1.0e-7, 0.125]\n  \
              resolution: [640, 480]\n"
         );
-        let text = colmap(&radtan).unwrap();
+        let text = colmap(&[&radtan]).unwrap();
         let last = text.lines().last().unwrap();
         assert_eq!(last, "1 OPENCV 640 480 500.0 500.0 320.0 240.0 0.25 1e-5 -1e-7 0.125");
         let text = nerfstudio(&radtan, &[("a.png", Pose::IDENTITY)]).unwrap();

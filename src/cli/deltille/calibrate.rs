@@ -1,5 +1,6 @@
 //! `deltille calibrate`.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -14,6 +15,8 @@ use crate::camera::{Camera, Pose};
 use crate::cli::output;
 use crate::export::calibration;
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
+use crate::raster::{self, AnyGray};
+use crate::report::{Report, thumbnail};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
 const STRONG_CORRELATION: f64 = 0.98;
@@ -45,14 +48,21 @@ pub struct Args {
     /// What to write; several may be given, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "own")]
     format: Vec<Format>,
+    /// Write a page that shows what the calibration is worth, and what would make it better
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Folder of the photographs, for small pictures on the page
+    #[arg(long, value_name = "FOLDER", requires = "report")]
+    images: Option<PathBuf>,
     /// The camera file, .yaml, or a folder for camera.yaml; other files are written beside it and
     /// named after it
     #[arg(short, long, value_name = "FILE", default_value = "camera.yaml")]
     output: PathBuf,
 }
 
+/// How corners far off count.
 #[derive(Clone, Copy, ValueEnum)]
-enum Robust {
+pub enum Robust {
     /// In full: least squares
     None,
     /// Beyond three standard deviations with a constant force
@@ -61,12 +71,32 @@ enum Robust {
     Cauchy,
 }
 
+/// How corners are weighted.
 #[derive(Clone, Copy, ValueEnum)]
-enum Weighting {
+pub enum Weighting {
     /// All corners alike
     Equal,
     /// By the detections' covariances, with a common deviation found beside them
     Covariance,
+}
+
+impl From<Robust> for Loss {
+    fn from(robust: Robust) -> Self {
+        match robust {
+            Robust::None => Self::Squared,
+            Robust::Huber => Self::Huber,
+            Robust::Cauchy => Self::Cauchy,
+        }
+    }
+}
+
+impl From<Weighting> for Weights {
+    fn from(weighting: Weighting) -> Self {
+        match weighting {
+            Weighting::Equal => Self::Equal,
+            Weighting::Covariance => Self::Covariance,
+        }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -104,6 +134,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let written: Vec<File> =
         texts.into_iter().flatten().map(|(name, text)| files::text_file(name, text)).collect();
     let written = files::write_all(folder.unwrap_or(Path::new(".")), &written)?;
+    let mut written = written;
+    if let Some(page) = &args.report {
+        let page = output::file(page, &format!("{stem}-report"), "html")?;
+        output::write(&page, args.page(&stem, &solution).as_bytes())?;
+        written.push(page);
+    }
     let mut text = table(&solution.calibrated);
     if let Some(test) = &solution.held_out {
         // Writing to a String cannot fail.
@@ -131,16 +167,33 @@ struct Solved {
 }
 
 impl Args {
+    /// The page of a calibration.
+    fn page(&self, stem: &str, solved: &Solved) -> String {
+        let mut thumbnails = BTreeMap::new();
+        for view in &solved.calibrated.views {
+            let Some(path) = self.images.as_ref().map(|folder| folder.join(&view.image)) else {
+                break;
+            };
+            // A picture that is not there leaves its place to the corners.
+            let picture = raster::io::read(&path).ok().and_then(|image| match image {
+                AnyGray::U8(image) => thumbnail(&image),
+                AnyGray::U16(image) => thumbnail(&image.map(|v| (v >> 8) as u8)),
+            });
+            thumbnails.extend(picture.map(|picture| (view.name.clone(), picture)));
+        }
+        let report = Report {
+            title: stem,
+            model: &solved.model,
+            solution: &solved.calibrated,
+            holdout: solved.held_out.as_ref(),
+            scale_measured: self.sightings.scale_measured(),
+            thumbnails,
+        };
+        report.html()
+    }
+
     fn solve(&self, views: &[View], panels: &[Pose]) -> anyhow::Result<Solved> {
-        let loss = match self.robust {
-            Robust::None => Loss::Squared,
-            Robust::Huber => Loss::Huber,
-            Robust::Cauchy => Loss::Cauchy,
-        };
-        let weights = match self.weights {
-            Weighting::Equal => Weights::Equal,
-            Weighting::Covariance => Weights::Covariance,
-        };
+        let (loss, weights) = (self.robust.into(), self.weights.into());
         let Some(model) = self.model else {
             let path = self.fixed_intrinsics.as_deref().unwrap_or(Path::new(""));
             let show = || format!("--fixed-intrinsics: {}", path.display());
@@ -183,8 +236,8 @@ impl Format {
             ],
             Self::Opencv => one("-opencv.yaml", opencv(camera)?),
             Self::Ros => one("-ros.yaml", ros(camera, stem)?),
-            Self::Kalibr => one("-camchain.yaml", kalibr(camera)?),
-            Self::Colmap => one("-cameras.txt", colmap(camera)?),
+            Self::Kalibr => one("-camchain.yaml", kalibr(&[(camera, Pose::IDENTITY)])?),
+            Self::Colmap => one("-cameras.txt", colmap(&[camera])?),
             Self::Nerfstudio => {
                 let views = solution.views.iter().map(|view| (view.image.as_str(), view.pose));
                 let views: Vec<_> = views.collect();

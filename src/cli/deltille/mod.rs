@@ -9,8 +9,10 @@ mod experiment;
 pub(in crate::cli) mod files;
 mod finder;
 mod images;
+mod pose;
 mod refine;
 mod render;
+mod rig;
 mod settings;
 mod sightings;
 mod solid;
@@ -53,6 +55,10 @@ enum Command {
     Experiment(experiment::Args),
     /// Refine given positions of corners
     Refine(refine::Args),
+    /// Say where a target is in photographs of a known camera
+    Pose(pose::Args),
+    /// Find the cameras of a rig, and where they are to each other, from detections
+    Rig(rig::Args),
     /// Take a synthetic photograph of a target, with the true positions of its corners
     Render(render::Args),
     /// Compare the files of a target with its description
@@ -72,6 +78,8 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Detect(args) => detect::run(args),
         Command::Experiment(args) => experiment::run(args),
         Command::Refine(args) => refine::run(args),
+        Command::Pose(args) => pose::run(args),
+        Command::Rig(args) => rig::run(args),
         Command::Render(args) => render::run(args),
         Command::Verify(args) => verify::run(args),
     }

@@ -1,19 +1,21 @@
 //! `deltille rig`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
+use clap::ValueEnum;
 use glam::{DMat3, DQuat};
 
 use super::calibrate::{Robust, Weighting};
-use super::files::{text_file, write_all};
+use super::files::{File, text_file, write_all};
 use super::{sightings, target_file};
 use crate::calibrate::{
     Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews, calibrate_rig,
 };
 use crate::camera::{Camera, Pose};
 use crate::cli::output::say;
+use crate::export::camera::{colmap, colmap_rig, kalibr};
 use crate::export::rig;
 use crate::target::{PanelPose, Target};
 
@@ -42,9 +44,20 @@ pub struct Args {
     /// How corners are weighted
     #[arg(long, default_value = "covariance")]
     weights: Weighting,
+    /// What to write beside rig.json and <camera>.yaml; several may be given, separated by commas
+    #[arg(long, value_delimiter = ',')]
+    format: Vec<Format>,
     /// Folder for rig.json, <camera>.yaml and the refined target
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// camchain.yaml
+    Kalibr,
+    /// cameras.txt and rig_config.json
+    Colmap,
 }
 
 fn named(text: &str) -> Result<(String, PathBuf), String> {
@@ -89,9 +102,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         refine_target: args.refine_target,
     };
     let solution = calibrate_rig(&cameras, &panels, options)?;
-    let mut files = vec![text_file("rig.json".to_owned(), rig::write(&solution, &args.model.to_string()))];
+    let mut files =
+        vec![text_file("rig.json".to_owned(), rig::write(&solution, &args.model.to_string()))];
     for camera in &solution.cameras {
         files.push(text_file(format!("{}.yaml", camera.name), camera.camera.to_yaml()));
+    }
+    for format in &args.format {
+        files.extend(format.files(&solution).context("--format")?);
     }
     if args.refine_target {
         let refined = refined(&target, &solution);
@@ -113,6 +130,23 @@ impl Args {
         let show = || format!("--known: {}", path.display());
         let text = std::fs::read_to_string(path).with_context(show)?;
         Ok(Some(Camera::from_yaml(&text).with_context(show)?))
+    }
+}
+
+impl Format {
+    fn files(self, solution: &RigSolution) -> anyhow::Result<Vec<File>> {
+        let cameras = solution.cameras.iter();
+        let cameras: Vec<(&str, &Camera, Pose)> =
+            cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig)).collect();
+        let alone: Vec<&Camera> = cameras.iter().map(|(_, camera, _)| *camera).collect();
+        let placed: Vec<(&Camera, Pose)> = cameras.iter().map(|(_, c, pose)| (*c, *pose)).collect();
+        Ok(match self {
+            Self::Kalibr => vec![text_file("camchain.yaml".to_owned(), kalibr(&placed)?)],
+            Self::Colmap => vec![
+                text_file("cameras.txt".to_owned(), colmap(&alone)?),
+                text_file("rig_config.json".to_owned(), colmap_rig(&cameras)?),
+            ],
+        })
     }
 }
 
@@ -151,11 +185,8 @@ fn summary(solution: &RigSolution) -> String {
         );
         if let Some(sd) = camera.pose_sd {
             let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
-            text += &format!(
-                " ± {:.3} mm, {:.4}°",
-                largest(&sd[3..]),
-                largest(&sd[..3]).to_degrees()
-            );
+            text +=
+                &format!(" ± {:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees());
         }
         text.push('\n');
     }

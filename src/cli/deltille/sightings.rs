@@ -11,7 +11,7 @@ use crate::calibrate::{Reference, UntaggedGrid, View, views};
 use crate::camera::Pose;
 use crate::detect::Detection;
 use crate::export::detection;
-use crate::target::{GridKind, Target, parse_length_mm};
+use crate::target::{GridKind, Target, TargetSpec, parse_length_mm};
 
 /// Detections and what they show.
 #[derive(clap::Args)]
@@ -34,6 +34,26 @@ pub struct SightingsArgs {
     /// Length of a tile's edge of the untagged board, such as 20mm
     #[arg(long, requires = "grid", value_name = "LENGTH", value_parser = length)]
     edge: Option<f64>,
+    /// How the print came out, measured length over stated length of the check bars: across and up
+    /// the sheet, such as 0.9973,0.9981
+    #[arg(long, value_name = "ACROSS,UP", value_parser = scale)]
+    print_scale: Option<[f64; 2]>,
+}
+
+/// A print farther from its size was not printed by mistake alone: the bars were misread.
+const PRINT_SCALE: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+
+fn scale(text: &str) -> Result<[f64; 2], String> {
+    let parts: Vec<&str> = text.split(',').collect();
+    let number = |part: &str| {
+        let value = part.trim().parse::<f64>().ok().filter(|value| PRINT_SCALE.contains(value));
+        value.ok_or_else(|| format!("`{part}` is no measured length over stated length, near 1"))
+    };
+    match parts.as_slice() {
+        [both] => Ok([number(both)?; 2]),
+        [across, up] => Ok([number(across)?, number(up)?]),
+        _ => Err("give one number, or two: across and up the sheet".to_owned()),
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -59,6 +79,11 @@ fn length(text: &str) -> Result<f64, String> {
 }
 
 impl SightingsArgs {
+    /// Whether the scale of the print is given.
+    pub fn scale_measured(&self) -> bool {
+        self.print_scale.is_some()
+    }
+
     /// Reads everything.
     pub fn read(&self) -> anyhow::Result<Sightings> {
         let target: Option<Target> =
@@ -77,33 +102,56 @@ impl SightingsArgs {
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
-        let mut detections = Vec::new();
-        for path in self.files()? {
-            let show = || path.display().to_string();
-            let text = std::fs::read_to_string(&path)
-                .with_context(|| format!("cannot read {}", show()))?;
-            let found: Detection = detection::read(&text).with_context(show)?;
-            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            detections.push((name, found));
-        }
-        let views = views(&detections, &reference)?;
-        let seen: BTreeSet<&str> = views.iter().map(|view| view.image.as_str()).collect();
-        let unseen = detections.iter().filter(|(_, found)| !seen.contains(found.image.as_str()));
-        let empty = unseen.map(|(name, _)| name.clone()).collect();
-        Ok(Sightings { panels: reference.panels(), views, empty })
-    }
-
-    fn files(&self) -> anyhow::Result<Vec<PathBuf>> {
-        let mut files = Vec::new();
-        for path in &self.detections {
-            if path.is_dir() {
-                files.extend(in_folder(path)?);
-            } else {
-                files.push(path.clone());
+        let (mut views, empty) = read(&self.detections, &reference)?;
+        if let Some(scale) = self.print_scale {
+            let target = target.as_ref();
+            if target.is_some_and(|target| matches!(target.spec, TargetSpec::Solid(_))) {
+                bail!("--print-scale: the faces of a solid are measured by `rig --refine-target`");
+            }
+            for sighting in views.iter_mut().flat_map(|view| &mut view.sightings) {
+                let angle_rad = target.map_or(0.0, |target| angle_on_sheet(target, sighting.panel));
+                sighting.stretch(scale, angle_rad);
             }
         }
-        Ok(files)
+        Ok(Sightings { panels: reference.panels(), views, empty })
     }
+}
+
+/// How a panel is turned on its sheet, rad; 0 where no sheet is described.
+fn angle_on_sheet(target: &Target, panel: usize) -> f64 {
+    let id = target.panels[panel].id;
+    let mut placements = target.sheets.iter().flat_map(|sheet| &sheet.placements);
+    placements.find(|placement| placement.panel == id).map_or(0.0, |placement| placement.angle_rad)
+}
+
+/// The views that detections show, files or folders of them, and the names of those that show none.
+pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<(Vec<View>, Vec<String>)> {
+    let mut detections = Vec::new();
+    for path in files(paths)? {
+        let show = || path.display().to_string();
+        let text =
+            std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", show()))?;
+        let found: Detection = detection::read(&text).with_context(show)?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        detections.push((name, found));
+    }
+    let views = views(&detections, reference)?;
+    let seen: BTreeSet<&str> = views.iter().map(|view| view.image.as_str()).collect();
+    let unseen = detections.iter().filter(|(_, found)| !seen.contains(found.image.as_str()));
+    let empty = unseen.map(|(name, _)| name.clone()).collect();
+    Ok((views, empty))
+}
+
+fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            files.extend(in_folder(path)?);
+        } else {
+            files.push(path.clone());
+        }
+    }
+    Ok(files)
 }
 
 /// The JSON files of a folder, in the order of their names.

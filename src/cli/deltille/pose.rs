@@ -1,0 +1,80 @@
+//! `deltille pose`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+
+use super::images::Images;
+use super::target_file;
+use crate::calibrate::{self, Loss, Reference, Weights, views};
+use crate::camera::Camera;
+use crate::cli::output::{self, say};
+use crate::cli::run::FAILED;
+use crate::detect::{Detector, DetectorConfig};
+use crate::export::pose;
+use crate::raster;
+
+/// Arguments of `deltille pose`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Photographs: files, folders, patterns, or - for a list on standard input
+    #[arg(required = true, value_name = "IMAGES")]
+    images: Vec<PathBuf>,
+    /// Description of the target: the .json that was written with it, or a .dsc
+    #[arg(long, value_name = "FILE")]
+    target: PathBuf,
+    /// The camera, as `deltille calibrate`, ROS or OpenCV write it
+    #[arg(long, value_name = "FILE")]
+    camera: PathBuf,
+    /// Family file, where the target names a family that is not shipped
+    #[arg(long)]
+    family: Option<String>,
+    /// Write the lines to a file instead of standard output
+    #[arg(short, long, value_name = "FILE.ndjson")]
+    output: Option<PathBuf>,
+}
+
+/// Finds the target in each image and says where it is, a line of JSON each.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let target = target_file::read(&args.target).context("--target")?;
+    let family = target_file::family(&target, args.family.as_deref())?;
+    let show = || format!("--camera: {}", args.camera.display());
+    let text = std::fs::read_to_string(&args.camera).with_context(show)?;
+    let camera = Camera::from_yaml(&text).with_context(show)?;
+    let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
+    let reference = Reference::Target(&target);
+    let path =
+        args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
+    let (mut lines, mut all, mut without) = (String::new(), 0, 0);
+    for image in Images::of(&args.images)?.iter() {
+        let image = image?;
+        all += 1;
+        let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let found = detector.detect_any(&raster::read(&image)?, &name);
+        let shown = views(&[(name, found)], &reference)?;
+        let (loss, weights) = (Loss::default(), Weights::default());
+        let solution = calibrate::poses(&shown, &reference.panels(), &camera, loss, weights)
+            .with_context(|| image.display().to_string())?;
+        if solution.views.is_empty() {
+            without += 1;
+            let why = solution.excluded.first().map_or("no target in it", |(_, why)| why);
+            eprintln!("{}: {why}", image.display());
+        }
+        for view in &solution.views {
+            let line = pose::write_line(view, &target.name);
+            match path {
+                Some(_) => lines += &(line + "\n"),
+                None => say!("{line}"),
+            }
+        }
+    }
+    if all == 0 {
+        bail!("there is no image");
+    }
+    if let Some(path) = &path {
+        output::write(path, lines.as_bytes())?;
+        say!("{}: {} of {all} images show the target", path.display(), all - without);
+    }
+    Ok(if without > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
+}
