@@ -90,6 +90,17 @@ pub enum CalibrationError {
         /// How many are needed.
         needed: usize,
     },
+    /// Cameras that moved against each other.
+    #[error(
+        "in {wrong} of {all} frames the cameras do not agree where the target is: they moved against \
+         each other, or pictures of the same name were not taken at the same moment"
+    )]
+    NotRigid {
+        /// Frames that do not fit.
+        wrong: usize,
+        /// All frames.
+        all: usize,
+    },
     /// No focal length explains the views.
     #[error(
         "no camera explains the views: most corners must be wrongly labelled, or the target is not \

@@ -92,9 +92,19 @@ pub fn calibrate_rig(
         );
         excluded.push((start.frames[frame].clone(), why));
     }
-    let kept: Vec<usize> =
-        (0..start.frames.len()).filter(|frame| !wrong.contains_key(frame)).collect();
-    let problem = first.problem.with_frames(|frame| !wrong.contains_key(&frame));
+    let all = start.frames.len();
+    if 2 * wrong.len() > all {
+        return Err(CalibrationError::NotRigid { wrong: wrong.len(), all });
+    }
+    let kept: Vec<usize> = (0..all).filter(|frame| !wrong.contains_key(frame)).collect();
+    let mut problem = first.problem.with_frames(|frame| !wrong.contains_key(&frame));
+    let unknowns = panel_unknowns(&problem.blocks, panels, options.refine_target);
+    for (panel, unknown) in problem.panels.iter_mut().zip(unknowns) {
+        // Where frames went, a panel may hang together with no other, or another be held.
+        if panel.pose_free != unknown.pose_free {
+            *panel = unknown;
+        }
+    }
     let (minimum, whitening) = settle(problem, options.weights, options.loss)?;
     let names = |index: usize| start.frames[kept[index]].clone();
     let solution = RigSolution::new(cameras, names, &minimum, &whitening)?;
