@@ -236,9 +236,9 @@ fn meshes_that_are_no_solids_are_refused() {
         .collect();
     let shifted: String = good
         .lines()
-        .map(|line| match line.strip_prefix("v ") {
-            Some(at) => format!("v {}\n", at.replacen(' ', "e9 ", 1)),
-            None => format!("{line}\n"),
+        .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+            ["v", x, y, z] => format!("v {} {y} {z}\n", 1e9 + x.parse::<f64>().unwrap()),
+            _ => format!("{line}\n"),
         })
         .collect();
     for (name, text, options, said) in [
