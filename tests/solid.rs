@@ -248,7 +248,7 @@ fn meshes_that_are_no_solids_are_refused() {
         ("wound", wound, "", "wound against each other"),
         ("crowd", twice, "", "not manifold"),
         ("nan", good.replacen("v ", "v nan ", 1), "", "vertex 1: its coordinates"),
-        ("far", shifted, "", "move it nearer"),
+        ("far", shifted, "--tiles 7", "--mesh: it reaches"),
         ("text", "hello".to_owned(), "", "no triangles"),
         ("index", good.clone() + "f 1 2 99\n", "", "out of bounds"),
         ("skew", skewed.clone(), "", "give --allow-skew"),
