@@ -5,7 +5,6 @@ use deltille::calibrate::{
 };
 use deltille::camera::{Camera, Pose};
 use glam::{DQuat, DVec3};
-use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -108,10 +107,12 @@ fn options(model: Model) -> Options {
 /// How many parameters of cameras and poses lie within three standard deviations of the truth, and
 /// of how many.
 fn within_3_sigma(model: Model, seed: u64) -> (usize, usize) {
+    eprintln!("{model} {seed}");
     let truth = camera(model);
     let (views, poses) = simulated(&truth, 25, 0.8, seed);
     let found = calibrate(&views, &[Pose::IDENTITY], options(model)).unwrap();
-    assert!(found.excluded.is_empty() && (found.rms_px / NOISE_PX - 1.0).abs() < 0.1);
+    assert!(found.excluded.is_empty(), "{model}: {:?}", found.excluded);
+    assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.1, "{model}: {} px", found.rms_px);
     let mut errors = Vec::new();
     for (parameter, value) in found.parameters.iter().zip(truth.parameters()) {
         errors.extend(parameter.sd.map(|sd| (parameter.value - value) / sd));
@@ -162,7 +163,9 @@ fn wrong_views_and_wrong_corners_are_named_and_do_no_harm() {
     let outliers: Vec<_> = found
         .views
         .iter()
-        .flat_map(|view| view.corners.iter().filter(|c| c.outlier).map(|c| (&*view.name, c.row, c.col)))
+        .flat_map(|view| {
+            view.corners.iter().filter(|c| c.outlier).map(|c| (&*view.name, c.row, c.col))
+        })
         .collect();
     assert_eq!(outliers, [("6", 3, 7)]);
     for (parameter, value) in found.parameters.iter().zip(truth.parameters()) {
@@ -207,15 +210,13 @@ fn views_that_determine_no_camera_are_refused() {
     assert!(matches!(said, CalibrationError::Parallel { .. }), "{said}");
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(20))]
-
-    #[test]
-    fn any_focal_length_is_found(focal in 300.0f64..20_000.0, seed in 0u64..1000) {
-        let mut truth = camera(Model::Radtan);
-        truth = truth.with_parameters(&[focal, focal * 1.01, 790.0, 610.0, 0.0, 0.0, 0.0, 0.0,
-            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+#[test]
+fn any_focal_length_is_found() {
+    for (seed, focal) in [300.0, 1000.0, 4000.0, 20_000.0].into_iter().enumerate() {
+        let mut values = [0.0; 16];
+        values[..4].copy_from_slice(&[focal, focal * 1.01, 790.0, 610.0]);
+        let truth = camera(Model::Radtan).with_parameters(&values);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed as u64);
         let mut views = Vec::new();
         let mut noise = || 0.0;
         while views.len() < 12 {
@@ -223,6 +224,7 @@ proptest! {
             views.extend(view(&truth, &pose, "", &mut noise));
         }
         let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Radtan)).unwrap();
-        prop_assert!((found.camera.focal_px[0] / focal - 1.0).abs() < 1e-4, "{:?}", found.camera);
+        let ratio = found.camera.focal_px[0] / focal;
+        assert!((ratio - 1.0).abs() < 1e-4, "{focal}: {ratio}");
     }
 }
