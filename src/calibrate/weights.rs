@@ -8,6 +8,10 @@ const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
 /// Halvings of the interval in which the common deviation is sought: to 1e-9 of its upper end.
 const HALVINGS: usize = 30;
 
+/// The least deviation that residuals are said to have: far below any corner's, so that exact data
+/// does not divide by zero.
+const LEAST_SIGMA: f64 = 1e-6;
+
 /// What is known of the corners' precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weights {
@@ -79,7 +83,7 @@ impl Whitening {
             let [x, y] = Self::apply(w, r);
             x * x + y * y
         });
-        (median(squares.collect()) / MEDIAN_OF_CHI_SQUARED_2).sqrt()
+        (median(squares.collect()) / MEDIAN_OF_CHI_SQUARED_2).sqrt().max(LEAST_SIGMA)
     }
 }
 

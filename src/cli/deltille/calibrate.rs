@@ -21,6 +21,10 @@ use crate::report::{Report, thumbnail};
 /// Correlations from here on are told: such parameters are hardly told apart.
 const STRONG_CORRELATION: f64 = 0.98;
 
+/// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
+/// have the lens of the model.
+const POOR_RMS_PX: f64 = 1.0;
+
 /// Arguments of `deltille calibrate`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -120,12 +124,20 @@ enum Format {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = output::file(&args.output, "camera", "yaml")?;
     let Sightings { views, panels, empty } = args.sightings.read()?;
+    ensure!(!views.is_empty(), "none of {} pictures shows a board of this kind", empty.len());
     for picture in &empty {
         eprintln!("{picture}: no board, left out");
     }
     let solution = args.solve(&views, &panels)?;
     for (name, why) in &solution.calibrated.excluded {
         eprintln!("{name}: left out: {why}");
+    }
+    if solution.calibrated.rms_px > POOR_RMS_PX {
+        eprintln!(
+            "warning: corners are off by {:.1} px: the lens is not one of this model (see --model), \
+             or labels are wrong",
+            solution.calibrated.rms_px
+        );
     }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let texts = args.format.iter().map(|&format| format.texts(&stem, &solution));
