@@ -92,10 +92,10 @@ impl<const N: usize> SaddleFinder<N> {
                 // What a coarse level shows is looked for again at full resolution; a corner that
                 // is too blurred for that stays as it was found.
                 let saddle = match n {
-                    0 if self.is_stable(pyramid, coarse, USUAL) => Some(described),
+                    0 if self.is_stable(level, coarse, USUAL) => Some(described),
                     0 => self.narrow(pyramid, start),
                     _ => self
-                        .near(pyramid, coarse, f64::from(1u32 << n))
+                        .near(&pyramid.levels()[0], coarse, f64::from(1u32 << n))
                         .or_else(|| is_blurred(pyramid, &described).then_some(described)),
                 };
                 saddles.extend(saddle);
@@ -120,26 +120,36 @@ impl<const N: usize> SaddleFinder<N> {
 
     fn at_size(&self, pyramid: &Pyramid, start: [f64; 2], size: usize) -> Option<Saddle<N>> {
         let corner = self.fits[size].refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
-        self.describe(pyramid, &corner, size)
+        self.describe(&pyramid.levels()[0], &corner, size)
     }
 
     /// What a fit at full resolution has reached, if it is a corner.
-    fn describe(&self, pyramid: &Pyramid, corner: &FittedCorner, size: usize) -> Option<Saddle<N>> {
-        let sectors = Sectors::read(&pyramid.levels()[0], corner.position, &corner.form)?;
+    fn describe(
+        &self,
+        image: &Gray<i16>,
+        corner: &FittedCorner,
+        size: usize,
+    ) -> Option<Saddle<N>> {
+        let sectors = Sectors::read(image, corner.position, &corner.form)?;
         let saddle = Saddle { position: corner.position, sectors };
-        self.is_stable(pyramid, corner.position, size).then_some(saddle)
+        self.is_stable(image, corner.position, size).then_some(saddle)
     }
 
-    /// Whether the next wider fit finds a corner of full resolution in the same place.
-    fn is_stable(&self, pyramid: &Pyramid, [x, y]: [f64; 2], size: usize) -> bool {
-        let wider = self.fits[size + 1].refine(&pyramid.levels()[0], [x, y], FIT_ITERATIONS);
+    /// Whether the next wider fit finds a corner in the same place.
+    fn is_stable(&self, image: &Gray<i16>, [x, y]: [f64; 2], size: usize) -> bool {
+        let wider = self.fits[size + 1].refine(image, [x, y], FIT_ITERATIONS);
         let moved = wider.map(|corner| (corner.position[0] - x).hypot(corner.position[1] - y));
         moved.is_some_and(|moved_px| moved_px < STABLE_PX)
     }
 
     /// The first saddle that the fit reaches from starts ever further from `place`, if it lies
     /// within `reach_px` of it.
-    pub fn near(&self, pyramid: &Pyramid, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
+    pub fn near(
+        &self,
+        image: &Gray<i16>,
+        place: [f64; 2],
+        reach_px: f64,
+    ) -> Option<Saddle<N>> {
         let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         let rings = ((reach_px / START_STEP_PX).ceil() as i32).clamp(1, MAX_START_RINGS);
         let step = reach_px / f64::from(rings);
@@ -156,7 +166,7 @@ impl<const N: usize> SaddleFinder<N> {
         starts.into_iter().find_map(|(u, v)| {
             let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
             let saddle = sizes.iter().find_map(|&size| {
-                let corner = self.fits[size].refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
+                let corner = self.fits[size].refine(image, start, FIT_ITERATIONS)?;
                 let position = corner.position;
                 let same = |&(other, with): &([f64; 2], usize)| {
                     with == size && distance(position, other) < STABLE_PX
@@ -164,7 +174,7 @@ impl<const N: usize> SaddleFinder<N> {
                 if refused.iter().any(same) {
                     return None;
                 }
-                let saddle = self.describe(pyramid, &corner, size);
+                let saddle = self.describe(image, &corner, size);
                 if saddle.is_none() {
                     refused.push((position, size));
                 }
