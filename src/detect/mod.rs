@@ -35,6 +35,7 @@ mod refine;
 mod ring;
 mod saddles;
 mod sectors;
+mod small_cells;
 mod tags;
 mod tile_map;
 mod tiling;

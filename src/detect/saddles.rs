@@ -124,12 +124,7 @@ impl<const N: usize> SaddleFinder<N> {
     }
 
     /// What a fit at full resolution has reached, if it is a corner.
-    fn describe(
-        &self,
-        image: &Gray<i16>,
-        corner: &FittedCorner,
-        size: usize,
-    ) -> Option<Saddle<N>> {
+    fn describe(&self, image: &Gray<i16>, corner: &FittedCorner, size: usize) -> Option<Saddle<N>> {
         let sectors = Sectors::read(image, corner.position, &corner.form)?;
         let saddle = Saddle { position: corner.position, sectors };
         self.is_stable(image, corner.position, size).then_some(saddle)
@@ -144,12 +139,7 @@ impl<const N: usize> SaddleFinder<N> {
 
     /// The first saddle that the fit reaches from starts ever further from `place`, if it lies
     /// within `reach_px` of it.
-    pub fn near(
-        &self,
-        image: &Gray<i16>,
-        place: [f64; 2],
-        reach_px: f64,
-    ) -> Option<Saddle<N>> {
+    pub fn near(&self, image: &Gray<i16>, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
         let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         let rings = ((reach_px / START_STEP_PX).ceil() as i32).clamp(1, MAX_START_RINGS);
         let step = reach_px / f64::from(rings);
@@ -195,8 +185,7 @@ fn drop_noise(candidates: &mut Vec<Candidate>, min_amplitude: f32) {
         return;
     }
     let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
-    let (_, &mut ninth, _) =
-        responses.select_nth_unstable_by(STRONGEST - 1, |a, b| b.total_cmp(a));
+    let (_, &mut ninth, _) = responses.select_nth_unstable_by(STRONGEST - 1, |a, b| b.total_cmp(a));
     let threshold = (4.5 * min_amplitude * min_amplitude).min(PART * PART * ninth);
     candidates.retain(|candidate| candidate.response > threshold);
 }
