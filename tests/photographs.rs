@@ -58,7 +58,7 @@ fn all_110_corners_of_the_robot_hand_photographs() {
         complete += usize::from(grid.corners.len() == 110 && labelled);
     }
     println!("{complete} of {} photographs complete", images.len());
-    assert!(complete + 1 >= images.len());
+    assert_eq!(complete, images.len());
 }
 
 #[test]
@@ -121,7 +121,7 @@ fn corners_of_the_fisheye_photographs() {
     }
     let all = 88 * images.len();
     println!("{found} of {all} corners");
-    assert!(found * 1000 >= all * 990, "{found} of {all} corners");
+    assert!(found * 1000 >= all * 997, "{found} of {all} corners");
 }
 
 #[test]

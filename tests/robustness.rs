@@ -34,11 +34,12 @@ fn finite(found: &Detection) -> bool {
     })
 }
 
-fn detectors() -> [Detector; 2] {
+fn detectors() -> [Detector; 3] {
     let (target, family) = board();
     [
         Detector::for_grid(GridKind::Deltille, Some((5, 6)), DetectorConfig::default()),
         Detector::for_target(&target, Some(&family), DetectorConfig::default()),
+        Detector::for_grid(GridKind::Checker, None, DetectorConfig::default()),
     ]
 }
 
@@ -155,13 +156,15 @@ proptest! {
     #[test]
     fn damaged_images_are_refused_or_read(
         at in any::<prop::sample::Index>(), byte: u8, cut in any::<prop::sample::Index>(),
-        format in 0..4usize,
+        format in 0..6usize,
     ) {
         let formats = [
             image::ImageFormat::Png,
             image::ImageFormat::Jpeg,
             image::ImageFormat::Tiff,
             image::ImageFormat::Bmp,
+            image::ImageFormat::Pnm,
+            image::ImageFormat::WebP,
         ];
         let picture = image::GrayImage::from_fn(40, 30, |x, y| image::Luma([(x * y) as u8]));
         let mut bytes = std::io::Cursor::new(Vec::new());
@@ -173,7 +176,7 @@ proptest! {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), bytes).unwrap();
         if let Ok(image) = raster::read(file.path()) {
-            detectors()[0].detect_any(&image, "");
+            detectors().iter().for_each(|detector| drop(detector.detect_any(&image, "")));
         }
     }
 }

@@ -10,7 +10,7 @@ use super::grow::{SaddleGrid, grids};
 use super::label::{Labelled, TagLabeller};
 use super::outline::{fit_outline, fit_rectangle};
 use super::refine::{Refinement, Refiner};
-use super::saddles::{SaddleFinder, noise};
+use super::saddles::SaddleFinder;
 use super::tiling::{CHECKER, DELTILLE, kind};
 use crate::family::Family;
 use crate::lattice::{TagCells, Vertex};
@@ -31,6 +31,10 @@ const fn min_untagged_corners(kind: GridKind) -> usize {
         GridKind::Checker => 9,
     }
 }
+
+/// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
+/// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
+const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;
 
 /// Options of a detector.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -155,17 +159,19 @@ impl Detector {
     ) -> Detection {
         let mut timing = Timing::start();
         let pyramid = Pyramid::new(image, PYRAMID_LEVELS, MIN_LEVEL_SIDE);
-        let sigma = noise(image);
         timing.lap("pyramid");
-        let saddles = finder.find(&pyramid, sigma);
+        let saddles = finder.find(&pyramid);
         timing.lap("saddles");
         let found = grids(finder, &pyramid, &saddles);
         timing.lap("grids");
         let mut grids: Vec<Grid> =
             found.iter().flat_map(|grid| self.labelled_grids(image, grid)).collect();
-        let least = min_untagged_corners(kind::<N>());
-        grids.retain(|grid| !grid.tags.is_empty() || grid.corners.len() >= least);
         grids.iter_mut().for_each(|grid| grid.kind = kind::<N>());
+        let least = min_untagged_corners(kind::<N>());
+        grids.retain(|grid| {
+            let plausible = grid.corners.len() >= least && !self.labels.exceeded_by(grid);
+            !grid.tags.is_empty() || plausible && median_edge_px(grid) >= MIN_UNTAGGED_EDGE_PX
+        });
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
         grids.sort_by_key(|grid| grid.panel.unwrap_or(u32::MAX));
         timing.lap("labels");
@@ -221,6 +227,38 @@ impl Detector {
             }
         }
     }
+}
+
+impl Labels {
+    /// Whether a grid that no tag vouches for has more corners than anything that is looked for: a
+    /// halftone, a fabric or a tiled floor is as regular as a board, but seldom as small.
+    fn exceeded_by(&self, grid: &Grid) -> bool {
+        let most = match self {
+            Self::None => usize::MAX,
+            Self::Outline(outline) => outline.len(),
+            Self::Rectangle((rows, cols)) => *rows as usize * *cols as usize,
+            Self::Target { panels, .. } => {
+                panels.iter().map(|panel| panel.corner_ids.len()).max().unwrap_or(0)
+            }
+        };
+        grid.corners.len() > most
+    }
+}
+
+/// Median distance of corners that follow each other in a row or column, px.
+fn median_edge_px(grid: &Grid) -> f64 {
+    let places: BTreeMap<(i32, i32), [f64; 2]> =
+        grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+    let edges = grid.corners.iter().flat_map(|c| {
+        let next = [(c.row, c.col + 1), (c.row + 1, c.col)];
+        next.into_iter().filter_map(|v| places.get(&v)).map(|[x, y]| (c.x - x).hypot(c.y - y))
+    });
+    let mut edges: Vec<f64> = edges.collect();
+    if edges.is_empty() {
+        return 0.0;
+    }
+    let middle = edges.len() / 2;
+    *edges.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn refiner(kind: GridKind, config: DetectorConfig) -> Refiner {

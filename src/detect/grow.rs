@@ -9,11 +9,12 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use super::edge::{MAX_CHORD_RAD, is_clean};
 use super::links::{Link, Links, facing_ray, links};
+use super::rectified::Rectified;
 use super::saddles::{Saddle, SaddleFinder};
 use super::sectors::turn;
 use super::tiling::{kind, neighbours, step, tiles_at};
 use crate::lattice::Vertex;
-use crate::raster::Pyramid;
+use crate::raster::{Gray, Pyramid};
 use crate::target::GridKind;
 
 /// Largest distance of a corner from where its neighbours predict it, over the edge length.
@@ -298,7 +299,8 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<([f64; 2
     (count >= 2.0).then(|| ([sum[0] / count, sum[1] / count], edge / count))
 }
 
-/// The corner at `vertex`, if one is found near `position` with clean edges to two neighbours.
+/// The corner at `vertex`, if one is found near `position`, as the image shows it or in the frame of
+/// its neighbours.
 fn corner_near<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -307,9 +309,27 @@ fn corner_near<const N: usize>(
     position: [f64; 2],
     edge_px: f64,
 ) -> Option<GrownSaddle<N>> {
-    let image = &pyramid.levels()[0];
     let reach = (MAX_SURPRISE * edge_px).max(1.0);
-    let saddle = finder.near(pyramid, position, reach)?;
+    let image = &pyramid.levels()[0];
+    let at_place = |saddle| placed_at(image, grid, vertex, saddle);
+    finder.near(image, position, reach).and_then(at_place).or_else(|| {
+        let seen = |k: usize| grid.get(&(vertex + step::<N>(k))).map(|g| g.saddle.position);
+        let edge = |k: usize| seen(k).map(|p| [p[0] - position[0], p[1] - position[1]]);
+        (0..N).find_map(|k| {
+            Rectified::new::<N>(position, k, [edge(k)?, edge(k + 1)?])?
+                .find(finder, image)
+                .and_then(at_place)
+        })
+    })
+}
+
+/// A corner at `vertex` of a grid, if it has clean edges to two neighbours that agree on its turn.
+fn placed_at<const N: usize>(
+    image: &Gray<i16>,
+    grid: &Growing<N>,
+    vertex: Vertex,
+    saddle: Saddle<N>,
+) -> Option<GrownSaddle<N>> {
     // The turn that the neighbours agree on.
     let mut votes = [0usize; N];
     for (k, neighbour) in neighbours::<N>(vertex).into_iter().enumerate() {

@@ -8,7 +8,8 @@
 //!    `quadric` does so for the saddles of checkerboards.
 //! 3. `sectors` reads the six or four half-edges with their colours.
 //! 4. `links` joins corners along clean edges (`edge`).
-//! 5. `grow` starts from four corners, grows tile by tile and fills the gaps.
+//! 5. `grow` starts from four corners, grows tile by tile and fills the gaps, where tiles are narrow
+//!    in the frame of their neighbours (`rectified`).
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns.
 //! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`.
 //!
@@ -29,10 +30,12 @@ mod links;
 mod outline;
 mod polynomial;
 mod quadric;
+mod rectified;
 mod refine;
 mod ring;
 mod saddles;
 mod sectors;
+mod small_cells;
 mod tags;
 mod tile_map;
 mod tiling;

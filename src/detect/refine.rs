@@ -22,6 +22,10 @@ use crate::target::GridKind;
 /// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
 pub const MIN_MODEL_RADIUS: usize = 3;
 
+/// Half the side of the square around a corner that must be clear for the polynomial, px: a third of
+/// what its usual window reads, where nearly all of its weight lies.
+const MIN_POLYNOMIAL_CLEAR_PX: f64 = 2.0;
+
 /// Largest side of a window, px.
 pub const MAX_WINDOW_PX: usize = 2 * MAX_RADIUS + 1;
 
@@ -107,7 +111,11 @@ impl Refiner {
         start: [f64; 2],
         clear_px: f64,
     ) -> Refined {
-        let found = self.polynomial.refine(image, start, self.iterations);
+        // Where other edges are this near, they would draw the polynomial away from a start that the
+        // finder has taken care of.
+        let found = (clear_px >= MIN_POLYNOMIAL_CLEAR_PX)
+            .then(|| self.polynomial.refine(image, start, self.iterations))
+            .flatten();
         let polynomial = found.map(|corner| corner.position);
         if self.method == Refinement::Model
             && let Some(refined) = self.model(fitter, image, polynomial.unwrap_or(start), clear_px)

@@ -3,10 +3,10 @@
 use rstar::RTree;
 
 use super::polynomial::{FittedCorner, Polynomial};
-use super::ring::candidates;
+use super::ring::{Candidate, candidates};
 use super::sectors::{Sectors, contrast_around};
 use super::tiling::kind;
-use crate::raster::{Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
+use crate::raster::{Gray, Pyramid};
 use crate::target::GridKind;
 
 /// Radii of the fits, px. The middle one decides what is a corner; the reference detector's choice.
@@ -25,8 +25,8 @@ const MERGE_PX: f64 = 1.5;
 /// rounding itself begins to draw shapes.
 const MIN_AMPLITUDE: f32 = 6.0;
 
-/// Noise of the harmonic over that of a pixel: twelve binomially smoothed samples.
-const HARMONIC_NOISE: f32 = 0.153;
+/// Noise of the harmonic over that of a sample: the mean of twelve, times √2.
+const HARMONIC_NOISE: f32 = 0.408;
 
 /// Candidates must stand above the noise by this factor; at five, one pixel in a million passes.
 const NOISE_FACTOR: f32 = 5.0;
@@ -68,12 +68,14 @@ impl<const N: usize> SaddleFinder<N> {
         Self { fits: FIT_RADII.map(|radius| Polynomial::new(kind::<N>(), radius)) }
     }
 
-    /// All saddles of an image whose noise is `sigma` (of 1023), in reading order.
-    pub fn find(&self, pyramid: &Pyramid, sigma: f32) -> Vec<Saddle<N>> {
-        let min_amplitude = MIN_AMPLITUDE.max(NOISE_FACTOR * HARMONIC_NOISE * sigma);
+    /// All saddles of an image, in reading order.
+    pub fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
+        let noise = HARMONIC_NOISE * sample_noise(&pyramid.levels()[0]);
         let mut saddles = Merged::<N>::default();
         for (n, level) in pyramid.levels().iter().enumerate() {
-            for candidate in candidates::<N>(level, min_amplitude) {
+            let mut candidates = candidates::<N>(level, MIN_AMPLITUDE);
+            drop_noise(&mut candidates, NOISE_FACTOR * noise);
+            for candidate in candidates {
                 let start = [candidate.x as f64, candidate.y as f64];
                 let fit = &self.fits[USUAL];
                 let Some(on_level) = fit.refine(level, start, FIT_ITERATIONS) else {
@@ -90,10 +92,10 @@ impl<const N: usize> SaddleFinder<N> {
                 // What a coarse level shows is looked for again at full resolution; a corner that
                 // is too blurred for that stays as it was found.
                 let saddle = match n {
-                    0 if self.is_stable(pyramid, coarse, USUAL) => Some(described),
+                    0 if self.is_stable(level, coarse, USUAL) => Some(described),
                     0 => self.narrow(pyramid, start),
                     _ => self
-                        .near(pyramid, coarse, f64::from(1u32 << n))
+                        .near(&pyramid.levels()[0], coarse, f64::from(1u32 << n))
                         .or_else(|| is_blurred(pyramid, &described).then_some(described)),
                 };
                 saddles.extend(saddle);
@@ -118,26 +120,26 @@ impl<const N: usize> SaddleFinder<N> {
 
     fn at_size(&self, pyramid: &Pyramid, start: [f64; 2], size: usize) -> Option<Saddle<N>> {
         let corner = self.fits[size].refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
-        self.describe(pyramid, &corner, size)
+        self.describe(&pyramid.levels()[0], &corner, size)
     }
 
     /// What a fit at full resolution has reached, if it is a corner.
-    fn describe(&self, pyramid: &Pyramid, corner: &FittedCorner, size: usize) -> Option<Saddle<N>> {
-        let sectors = Sectors::read(&pyramid.levels()[0], corner.position, &corner.form)?;
+    fn describe(&self, image: &Gray<i16>, corner: &FittedCorner, size: usize) -> Option<Saddle<N>> {
+        let sectors = Sectors::read(image, corner.position, &corner.form)?;
         let saddle = Saddle { position: corner.position, sectors };
-        self.is_stable(pyramid, corner.position, size).then_some(saddle)
+        self.is_stable(image, corner.position, size).then_some(saddle)
     }
 
-    /// Whether the next wider fit finds a corner of full resolution in the same place.
-    fn is_stable(&self, pyramid: &Pyramid, [x, y]: [f64; 2], size: usize) -> bool {
-        let wider = self.fits[size + 1].refine(&pyramid.levels()[0], [x, y], FIT_ITERATIONS);
+    /// Whether the next wider fit finds a corner in the same place.
+    fn is_stable(&self, image: &Gray<i16>, [x, y]: [f64; 2], size: usize) -> bool {
+        let wider = self.fits[size + 1].refine(image, [x, y], FIT_ITERATIONS);
         let moved = wider.map(|corner| (corner.position[0] - x).hypot(corner.position[1] - y));
         moved.is_some_and(|moved_px| moved_px < STABLE_PX)
     }
 
     /// The first saddle that the fit reaches from starts ever further from `place`, if it lies
     /// within `reach_px` of it.
-    pub fn near(&self, pyramid: &Pyramid, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
+    pub fn near(&self, image: &Gray<i16>, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
         let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         let rings = ((reach_px / START_STEP_PX).ceil() as i32).clamp(1, MAX_START_RINGS);
         let step = reach_px / f64::from(rings);
@@ -154,7 +156,7 @@ impl<const N: usize> SaddleFinder<N> {
         starts.into_iter().find_map(|(u, v)| {
             let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
             let saddle = sizes.iter().find_map(|&size| {
-                let corner = self.fits[size].refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
+                let corner = self.fits[size].refine(image, start, FIT_ITERATIONS)?;
                 let position = corner.position;
                 let same = |&(other, with): &([f64; 2], usize)| {
                     with == size && distance(position, other) < STABLE_PX
@@ -162,7 +164,7 @@ impl<const N: usize> SaddleFinder<N> {
                 if refused.iter().any(same) {
                     return None;
                 }
-                let saddle = self.describe(pyramid, &corner, size);
+                let saddle = self.describe(image, &corner, size);
                 if saddle.is_none() {
                     refused.push((position, size));
                 }
@@ -171,6 +173,21 @@ impl<const N: usize> SaddleFinder<N> {
             (distance(saddle.position, place) <= reach_px).then_some(saddle)
         })
     }
+}
+
+/// Drops candidates whose harmonic is weaker than `min_amplitude`, or than a quarter of that of the
+/// ninth strongest where this is less: an image that is all board has no plain part to tell its noise
+/// from, but then it has at least as many corners as a grid.
+fn drop_noise(candidates: &mut Vec<Candidate>, min_amplitude: f32) {
+    const STRONGEST: usize = 9;
+    const PART: f32 = 0.25;
+    if candidates.len() < STRONGEST {
+        return;
+    }
+    let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
+    let (_, &mut ninth, _) = responses.select_nth_unstable_by(STRONGEST - 1, |a, b| b.total_cmp(a));
+    let threshold = (4.5 * min_amplitude * min_amplitude).min(PART * PART * ninth);
+    candidates.retain(|candidate| candidate.response > threshold);
 }
 
 /// Whether full resolution shows next to nothing where a coarse level shows a corner. What is sharp
@@ -205,30 +222,39 @@ impl<const N: usize> Merged<N> {
     }
 }
 
-/// Standard deviation of the noise on a scale of 1023, robust against texture.
+/// Standard deviation of what a sample of the ring shows beside a corner, of 1023: noise, and grain
+/// smoothed by a camera's demosaicing or by enlarging, which pixels next to each other share.
 ///
-/// The median of |Laplacian| over a sparse raster, with the mask of Immerkær, "Fast noise variance
-/// estimation" (1996), which vanishes on planes and weakly curved surfaces.
-pub fn noise<T: Intensity>(image: &Gray<T>) -> f32 {
-    /// One pixel in 64 is plenty for a median.
+/// From |Laplacian| over a sparse raster, with the mask of Immerkær, "Fast noise variance
+/// estimation" (1996), which vanishes on planes and weakly curved surfaces, drawn out so that its
+/// nine samples are as far apart as those of the ring.
+fn sample_noise(image: &Gray<i16>) -> f32 {
+    /// One pixel in 64 is plenty for a quantile.
     const STRIDE: usize = 8;
-    /// Median of |x| over the standard deviation, for Gaussian noise.
-    const MEDIAN_TO_SIGMA: f32 = 1.4826;
+    /// Distance of the mask's samples: the ring's radius.
+    const STEP: usize = 4;
+    /// The part of the image that is taken to be plain, and the quantile of |x| there for Gaussian
+    /// noise: boards and houses leave little without an edge.
+    const QUIET: f64 = 0.1;
+    const QUIET_TO_SIGMA: f32 = 1.0 / 0.1257;
     /// The mask's gain: √(1+4+1+4+16+4+1+4+1).
     const GAIN: f32 = 6.0;
     let (width, height) = (image.width(), image.height());
-    if width < 3 || height < 3 {
-        return 0.0;
-    }
     let mut magnitudes = Vec::with_capacity((width / STRIDE + 1) * (height / STRIDE + 1));
-    for y in (1..height - 1).step_by(STRIDE) {
-        let rows = [image.row(y - 1), image.row(y), image.row(y + 1)];
-        for x in (1..width - 1).step_by(STRIDE) {
-            let sum = |row: &[T]| row[x - 1].to_f32() - 2.0 * row[x].to_f32() + row[x + 1].to_f32();
-            magnitudes.push((sum(rows[0]) - 2.0 * sum(rows[1]) + sum(rows[2])).abs());
+    for y in (STEP..height.saturating_sub(STEP)).step_by(STRIDE) {
+        let rows = [image.row(y - STEP), image.row(y), image.row(y + STEP)];
+        for x in (STEP..width.saturating_sub(STEP)).step_by(STRIDE) {
+            let sum = |row: &[i16]| {
+                i32::from(row[x - STEP]) - 2 * i32::from(row[x]) + i32::from(row[x + STEP])
+            };
+            magnitudes.push((sum(rows[0]) - 2 * sum(rows[1]) + sum(rows[2])).abs());
         }
     }
-    let middle = magnitudes.len() / 2;
-    let (_, median, _) = magnitudes.select_nth_unstable_by(middle, f32::total_cmp);
-    *median * MEDIAN_TO_SIGMA / GAIN * (PYRAMID_FULL_SCALE / T::FULL_SCALE)
+    if magnitudes.is_empty() {
+        return 0.0;
+    }
+    let quiet = (QUIET * magnitudes.len() as f64) as usize;
+    let (_, &mut magnitude, _) = magnitudes.select_nth_unstable(quiet);
+    // Half a step of the quantisation more than nothing.
+    (magnitude as f32 + 0.5) * QUIET_TO_SIGMA / GAIN
 }

@@ -108,20 +108,20 @@ impl<const N: usize> Circle<N> {
     fn sample(image: &Gray<i16>, [x, y]: [f64; 2], radius: f64) -> Option<Self> {
         let inside = x - radius >= 0.0
             && y - radius >= 0.0
-            && x + radius <= (image.width() - 1) as f64
-            && y + radius <= (image.height() - 1) as f64;
+            && x + radius + 1.0 < image.width() as f64
+            && y + radius + 1.0 < image.height() as f64;
         if !inside {
             return None;
         }
-        let values: [f64; SAMPLES] = DIRECTIONS
-            .map(|[cos, sin]| f64::from(image.bilinear(x + radius * cos, y + radius * sin)));
+        let at = |[cos, sin]: [f64; 2]| inside_sample(image, x + radius * cos, y + radius * sin);
+        let values: [f64; SAMPLES] = DIRECTIONS.map(at);
         let mean = values.iter().sum::<f64>() / SAMPLES as f64;
         let level = match kind::<N>() {
             // Opposite sectors have opposite colours, so the mean is the level of the edges.
             GridKind::Deltille => mean,
             GridKind::Checker => between_classes(&values, mean),
         };
-        let centre = f64::from(image.bilinear(x, y)) - mean;
+        let centre = inside_sample(image, x, y) - mean;
         Some(Self { level, deviations: values.map(|v| v - level), centre })
     }
 
@@ -165,18 +165,22 @@ impl<const N: usize> Circle<N> {
     fn crossings(&self) -> Option<[Crossing; N]> {
         let largest = self.deviations.iter().fold(0.0f64, |m, d| m.max(d.abs()));
         let dead = DEAD_BAND * largest;
-        let clear: Vec<usize> = (0..SAMPLES).filter(|&k| self.deviations[k].abs() > dead).collect();
-        let mut crossings = Vec::with_capacity(8);
-        for (n, &a) in clear.iter().enumerate() {
-            let b = clear[(n + 1) % clear.len()];
+        let is_clear = |k: &usize| self.deviations[*k].abs() > dead;
+        let mut a = (0..SAMPLES).rfind(is_clear)?;
+        let mut crossings = [Crossing { angle: 0.0, rising: false }; N];
+        let mut count = 0;
+        for b in (0..SAMPLES).filter(is_clear) {
             if (self.deviations[a] > 0.0) != (self.deviations[b] > 0.0) {
-                if crossings.len() == N {
-                    return None;
-                }
-                crossings.push(self.crossing_between(a, b));
+                *crossings.get_mut(count)? = self.crossing_between(a, b);
+                count += 1;
             }
+            a = b;
         }
-        crossings.try_into().ok()
+        // From before the first sample to after it is the last crossing of the circle.
+        if crossings[0].angle > crossings[N - 1].angle {
+            crossings.rotate_left(1);
+        }
+        (count == N).then_some(crossings)
     }
 
     /// Zero of the straight line through the clear samples a and b (b after a, round the circle).
@@ -197,6 +201,17 @@ impl<const N: usize> Circle<N> {
         let fraction = if low == high { 0.5 } else { low / (low - high) };
         Crossing { angle: angle_of((a + start) as f64 + fraction), rising: to > from }
     }
+}
+
+/// [`Gray::bilinear`] of a place that is known to lie in the image, less its last row and column.
+fn inside_sample(image: &Gray<i16>, x: f64, y: f64) -> f64 {
+    let (left, top) = (x as usize, y as usize);
+    let (fx, fy) = (x - left as f64, y - top as f64);
+    let at = |row: &[i16]| {
+        let pair = &row[left..left + 2];
+        f64::from(pair[0]) * (1.0 - fx) + f64::from(pair[1]) * fx
+    };
+    at(image.row(top)) * (1.0 - fy) + at(image.row(top + 1)) * fy
 }
 
 /// Unit vectors towards the samples.
@@ -224,7 +239,11 @@ fn between_classes(values: &[f64; SAMPLES], mean: f64) -> f64 {
         if counts.contains(&0.0) {
             return mean;
         }
-        level = (sums[0] / counts[0] + sums[1] / counts[1]) / 2.0;
+        let next = (sums[0] / counts[0] + sums[1] / counts[1]) / 2.0;
+        if next == level {
+            break;
+        }
+        level = next;
     }
     level
 }

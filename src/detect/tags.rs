@@ -1,6 +1,7 @@
 //! Reading tags out of tiles.
 
 use super::grow::SaddleGrid;
+use super::small_cells;
 use super::tile_map::TileMap;
 use crate::family::{Decoded, Decoder, Family};
 use crate::lattice::{Orientation, TagCells, Tile};
@@ -17,6 +18,13 @@ const MIN_CONTRAST: f64 = 0.5;
 
 /// Points of a cell that are averaged: its centre, and half-way from there to its corners.
 const CELL_POINTS: usize = 4;
+
+/// Cells with shorter sides than this are read together where one by one they make no code, px:
+/// larger ones show their own brightness in the middle.
+const SMALL_CELL_PX: f64 = 5.0;
+
+/// Blurs that are tried then, px: that of a sharp photograph, and with some motion or defocus.
+const SMALL_CELL_BLURS_PX: [f64; 2] = [0.8, 1.2];
 
 /// The cells of a tile, read as a word.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,8 +108,25 @@ impl TagReader {
             let one = sign * (sum / CELL_POINTS as f64 - threshold) > 0.0;
             word |= u64::from(one) << bit;
         }
-        Some(Reading { tile, word, decoded: self.decoder.decode(word, self.max_errors) })
+        let decode = |word| self.decoder.decode(word, self.max_errors);
+        let mut reading = Reading { tile, word, decoded: decode(word) };
+        if reading.decoded.is_none() && longest_side_px(&map) / width < SMALL_CELL_PX {
+            let levels = |point: [f64; 2]| [border.at(point), around.at(point)];
+            let words = SMALL_CELL_BLURS_PX.into_iter().filter_map(|blur_px| {
+                small_cells::word(image, &map, &self.cells, self.border_bits, blur_px, levels)
+            });
+            let readings = words.map(|word| Reading { tile, word, decoded: decode(word) });
+            reading = readings.into_iter().find(|r| r.decoded.is_some()).unwrap_or(reading);
+        }
+        Some(reading)
     }
+}
+
+/// The longest side of a tile, px.
+fn longest_side_px(map: &TileMap) -> f64 {
+    let [a, b, c] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|point| map.image_from_tile(point));
+    let sides = [[a, b], [b, c], [c, a]].map(|[p, q]| (p[0] - q[0]).hypot(p[1] - q[1]));
+    sides.into_iter().fold(0.0, f64::max)
 }
 
 /// Points along the three edges of a tile, `inside` it in barycentric units (negative: outside).

@@ -1,0 +1,88 @@
+//! A corner looked for in the frame of its neighbours.
+//!
+//! Seen at the rim of a fisheye lens, tiles become strips a few pixels wide that meet at 15°. No
+//! circle around such a corner shows its sectors and nothing else. The two edges that its
+//! neighbours predict do: resampled so that these are as long and as far apart as on the print, the
+//! corner looks like any other.
+//!
+//! ```text
+//!      ╱░░╱██╱                          ░░│██
+//!     ╱░░·██╱     patch_from_image      ──·──
+//!    ╱██╱░░╱      ───────────────→      ██│░░
+//! ```
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::saddles::{Saddle, SaddleFinder};
+use super::sectors::Sectors;
+use crate::raster::Gray;
+
+/// Length of an edge in the patch, px: the widest fit of the finder reaches eight and stays within
+/// the tiles around the corner.
+const EDGE_PX: f64 = 16.0;
+
+/// Largest distance of a corner from where its neighbours predict it, as a part of an edge: where
+/// tiles shrink to a third from one to the next, rows continued evenly are off by so much, and still
+/// no other corner is as near.
+const MAX_WAY: f64 = 0.4;
+
+/// Half the side of the patch, px: that reach, and the way.
+const HALF_SIDE: usize = 16;
+
+/// An affine view of the surroundings of a place.
+pub struct Rectified {
+    place: Vector2<f64>,
+    image_from_patch: Matrix2<f64>,
+}
+
+impl Rectified {
+    /// The view around `place` in which edge `k` of the lattice, seen along `edges[0]`, and the next
+    /// one counter-clockwise, along `edges[1]`, lie as on the print. `None` when they are in line.
+    pub fn new<const N: usize>(place: [f64; 2], k: usize, edges: [[f64; 2]; 2]) -> Option<Self> {
+        // Image angles fall counter-clockwise on the print.
+        let direction = |k: usize| {
+            let angle = -TAU * k as f64 / N as f64;
+            EDGE_PX * Vector2::new(angle.cos(), angle.sin())
+        };
+        let patch = Matrix2::from_columns(&[direction(k), direction(k + 1)]);
+        let image = Matrix2::from_columns(&edges.map(Vector2::from));
+        let image_from_patch = image * patch.try_inverse()?;
+        // A mirrored view is no view of this print.
+        (image_from_patch.determinant() > 0.0)
+            .then_some(Self { place: place.into(), image_from_patch })
+    }
+
+    /// The corner that lies nearest to the place.
+    pub fn find<const N: usize>(
+        &self,
+        finder: &SaddleFinder<N>,
+        image: &Gray<i16>,
+    ) -> Option<Saddle<N>> {
+        let centre = Vector2::repeat(HALF_SIDE as f64);
+        let in_image = |at: Vector2<f64>| self.place + self.image_from_patch * (at - centre);
+        let side = 2 * HALF_SIDE + 1;
+        let inside = [[0, 0], [side, 0], [0, side], [side, side]].into_iter().all(|[x, y]| {
+            let at = in_image(Vector2::new(x as f64, y as f64));
+            at.x >= 0.0
+                && at.y >= 0.0
+                && at.x <= (image.width() - 1) as f64
+                && at.y <= (image.height() - 1) as f64
+        });
+        if !inside {
+            return None;
+        }
+        let patch = Gray::from_fn(side, side, |x, y| {
+            let at = in_image(Vector2::new(x as f64, y as f64));
+            (image.bilinear(at.x, at.y) + 0.5) as i16
+        });
+        let found = finder.near(&patch, centre.into(), MAX_WAY * EDGE_PX)?;
+        let turned = |ray: f64| {
+            let along = self.image_from_patch * Vector2::new(ray.cos(), ray.sin());
+            along.y.atan2(along.x)
+        };
+        let sectors = Sectors { rays: found.sectors.rays.map(turned), ..found.sectors };
+        Some(Saddle { position: in_image(found.position.into()).into(), sectors })
+    }
+}
