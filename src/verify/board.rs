@@ -8,7 +8,6 @@ use super::fold::Seen;
 use super::tiles::{MAX_INK_ERROR, PlacedPanel};
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
 use crate::detect::{Detection, GridCorner};
-use crate::lattice::{Tile, Vertex};
 use crate::target::{Corner, Panel, SheetLayout};
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
@@ -285,13 +284,14 @@ fn extra_corners(detection: &Detection, placed: &[PlacedPanel], verdict: &mut Sh
 fn in_tag(placed: &PlacedPanel, at_mm: [f64; 2]) -> bool {
     let panel = placed.panel;
     panel.tags.iter().any(|tag| {
-        let [a, b, c] = Tile::upright(Vertex::new(tag.row, tag.col)).vertices().map(|v| {
-            let stated = placed.page_from_panel(v.position().map(|x| x * panel.edge_mm));
+        let vertices = panel.tag_tile(tag).vertices().map(|v| {
+            let stated = placed.page_from_panel(panel.lattice_mm(v));
             placed.found_from_stated.apply(stated)
         });
         let left = |p: [f64; 2], q: [f64; 2]| {
             (q[0] - p[0]) * (at_mm[1] - p[1]) - (q[1] - p[1]) * (at_mm[0] - p[0]) > 0.0
         };
-        left(a, b) && left(b, c) && left(c, a)
+        let next = vertices.clone().cycle().skip(1);
+        vertices.zip(next).all(|(p, q)| left(p, q))
     })
 }
