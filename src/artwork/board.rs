@@ -5,7 +5,9 @@ use kurbo::{Affine, BezPath, Point, Rect};
 use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_mm, text, window};
 use crate::family::Family;
 use crate::lattice::{TagCells, Tile};
-use crate::target::{Panel, Placement, SheetLayout, SheetPage, SheetText, TagPlacement, TagsIn, Target};
+use crate::target::{
+    Panel, Placement, SheetLayout, SheetPage, SheetText, TagPlacement, TagsIn, Target,
+};
 
 /// The shapes of sheet `index` of a target.
 pub(super) fn sheet(
@@ -146,9 +148,8 @@ fn tile_outline(panel: &Panel, tile: Tile, inside: f64) -> BezPath {
     let [u, v] = panel.kind.middle();
     let left = 1.0 - panel.kind.insets() * inside;
     let corners = tile.vertices().map(|vertex| vertex - tile.anchor);
-    let moved = corners.map(|c| {
-        [u + left * (f64::from(c.col) - u), v + left * (f64::from(c.row) - v)]
-    });
+    let moved =
+        corners.map(|c| [u + left * (f64::from(c.col) - u), v + left * (f64::from(c.row) - v)]);
     in_tile(panel, tile, moved)
 }
 

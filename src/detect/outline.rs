@@ -20,7 +20,8 @@ pub fn fit_outline(
         let turned = LatticeMap::new(GridKind::Deltille, turns + half_turn, Vertex::new(0, 0));
         // Lowest-leftmost corners must coincide.
         let lowest = grid.keys().map(|&v| turned.apply(v)).min()?;
-        let map = LatticeMap::new(GridKind::Deltille, turns + half_turn, *outline.first()? - lowest);
+        let map =
+            LatticeMap::new(GridKind::Deltille, turns + half_turn, *outline.first()? - lowest);
         grid.keys().all(|&v| outline.contains(&map.apply(v))).then_some(map)
     });
     let map = fitting.next()?;

@@ -124,9 +124,7 @@ impl TagCells {
             let Cell { row, col, upright } = cell;
             let beside: &[(u32, u32)] = match kind {
                 // The cell's own rhombus, the one to the right, and the one above share an edge.
-                GridKind::Deltille if !upright => {
-                    &[(row, col), (row, col + 1), (row + 1, col)]
-                }
+                GridKind::Deltille if !upright => &[(row, col), (row, col + 1), (row + 1, col)],
                 GridKind::Deltille => &[],
                 GridKind::Checker => &[(row, col + 1), (row + 1, col)],
             };

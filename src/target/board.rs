@@ -70,7 +70,8 @@ pub(super) fn tagged_tiles(
     let corners: std::collections::BTreeSet<Vertex> = corners.iter().copied().collect();
     let carries = |&v: &Vertex| {
         let tile = kind.tag_tile(v);
-        tile.is_dark() == (tags_in == TagsIn::Black) && tile.vertices().all(|v| corners.contains(&v))
+        tile.is_dark() == (tags_in == TagsIn::Black)
+            && tile.vertices().all(|v| corners.contains(&v))
     };
     let spacing = spacing as i32;
     let mut by_start = BTreeMap::<(i32, i32), Vec<Vertex>>::new();
@@ -106,8 +107,7 @@ pub(super) fn panels(
     let panels = untied_panels(spec);
     let Some(tags) = &spec.tags else { return Ok((panels, None)) };
     let vertices = vertices(spec);
-    let on_each =
-        |spacing| tagged_tiles(spec.grid, &vertices, spacing, tags.tags_in).len() as u64;
+    let on_each = |spacing| tagged_tiles(spec.grid, &vertices, spacing, tags.tags_in).len() as u64;
     let boards = u64::from(spec.boards);
     let instead = |available: u64| {
         let wider = wider_spacing(tags, available, |spacing| boards * on_each(spacing));
@@ -124,8 +124,7 @@ pub(super) fn panels(
 pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
     let first_tag = spec.tags.as_ref().map_or(0, |tags| tags.first_id);
     let vertices = vertices(spec);
-    let tagged =
-        |tags: &TagSpec| tagged_tiles(spec.grid, &vertices, tags.spacing, tags.tags_in);
+    let tagged = |tags: &TagSpec| tagged_tiles(spec.grid, &vertices, tags.spacing, tags.tags_in);
     let tiles = spec.tags.as_ref().map_or_else(Vec::new, tagged);
     let matrix = [vertices.iter().map(|v| v.col as u32 + 1).max().unwrap_or(0), spec.rows];
     let panel = |board: u32| Panel {

@@ -22,10 +22,14 @@ pub(super) fn check_family(
     };
     if family.kind() != kind {
         let problem = match kind {
-            GridKind::Deltille => "has square tags, deltille tiles need triangular ones: take one \
-                                   of `deltag list`",
-            GridKind::Checker => "has triangular tags, squares need one of aprilTag36h11, \
-                                  aprilTag25h9, aprilTag16h5",
+            GridKind::Deltille => {
+                "has square tags, deltille tiles need triangular ones: take one \
+                                   of `deltag list`"
+            }
+            GridKind::Checker => {
+                "has triangular tags, squares need one of aprilTag36h11, \
+                                  aprilTag25h9, aprilTag16h5"
+            }
         };
         return Err(TargetError::invalid("--family", format!("{} {problem}", family.name())));
     }

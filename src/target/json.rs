@@ -302,8 +302,8 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
         previous = Some(vertex);
         let corner = |v: &Vertex| panel.corner_at(*v).is_some();
         // Other programs put tags into the outermost squares as well.
-        let complete = panel.kind == GridKind::Checker
-            || panel.tag_tile(tag).vertices().all(|v| corner(&v));
+        let complete =
+            panel.kind == GridKind::Checker || panel.tag_tile(tag).vertices().all(|v| corner(&v));
         if !complete {
             let what = "its tile does not lie between three corners";
             return problem(format!("{field}.tags[{i}].row"), what);

@@ -88,7 +88,9 @@ impl Panel {
     /// Bounding box of the drawn tiles in the panel frame, mm: left, lower, right and upper end.
     pub fn bounds_mm(&self) -> [f64; 4] {
         let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
-        for [x, y] in self.dark_tiles().iter().flat_map(|t| t.vertices()).map(|v| self.lattice_mm(v)) {
+        for [x, y] in
+            self.dark_tiles().iter().flat_map(|t| t.vertices()).map(|v| self.lattice_mm(v))
+        {
             bounds[0] = bounds[0].min(x);
             bounds[1] = bounds[1].min(y);
             bounds[2] = bounds[2].max(x);

@@ -5,8 +5,8 @@ use super::capacity::{check_family, wider_spacing};
 use super::length::format_mm;
 use super::polyhedron::{Face, Polyhedron};
 use super::{
-    Corner, FamilyRef, GridKind, Outline, Panel, SolidShape, SolidSpec, TagPlacement,
-    TagsIn, TargetError,
+    Corner, FamilyRef, GridKind, Outline, Panel, SolidShape, SolidSpec, TagPlacement, TagsIn,
+    TargetError,
 };
 use crate::family::Family;
 use crate::lattice::Vertex;
@@ -91,11 +91,10 @@ pub(super) fn panels(
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
     let panels = untied_panels(spec)?;
     let faces = panels.len() as u64;
-    let needed =
-        |tiles, spacing| {
-            let vertices = triangle_vertices(tiles);
-            faces * tagged_tiles(GridKind::Deltille, &vertices, spacing, TagsIn::Black).len() as u64
-        };
+    let needed = |tiles, spacing| {
+        let vertices = triangle_vertices(tiles);
+        faces * tagged_tiles(GridKind::Deltille, &vertices, spacing, TagsIn::Black).len() as u64
+    };
     let instead = |available: u64| {
         let wider = wider_spacing(&spec.tags, available, |spacing| needed(spec.tiles, spacing));
         let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)

@@ -32,7 +32,7 @@ pub(super) fn check(
     layout: &SheetLayout,
     verdict: &mut SheetVerdict,
 ) -> (AffineMap, Seen) {
-    let detection = verifier.detector.detect(&page.image, "page");
+    let detection = verifier.detector.detect(&page.blurred(), "page");
     // Looked at in a mirror only if need be.
     let mut mirrored: Option<Detection> = None;
     let mut mirror = None;
@@ -46,8 +46,9 @@ pub(super) fn check(
         verdict.corners += panel.corners.len();
         verdict.tags += panel.tags.len();
         if !detection.grids.iter().any(|grid| grid.panel == Some(id)) {
-            let mirrored = mirrored
-                .get_or_insert_with(|| verifier.detector.detect(&page.mirrored().image, "mirror"));
+            let mirrored = mirrored.get_or_insert_with(|| {
+                verifier.detector.detect(&page.mirrored().blurred(), "mirror")
+            });
             if mirrored.grids.iter().any(|grid| grid.panel == Some(id)) {
                 verdict.findings.push(Finding::Mirrored { panel: id });
                 let linear = [[-1.0, 0.0], [0.0, 1.0]];
