@@ -4,7 +4,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use deltille::export::dsc;
-use deltille::target::Target;
+use deltille::target::{LineKind, Target};
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 
@@ -199,6 +199,19 @@ fn a_tetrahedron_with_each_face_cut_in_four_is_sixteen_faces() {
     deltille(path, "solid --mesh cut.obj --gltf --obj --tiles 6 --name t")
         .success()
         .stdout(contains("t.glb: verified, 16 faces").and(contains("t.obj: verified, 16 faces")));
+    // The faces of a quarter lie in one plane: its three inner edges are not folded.
+    deltille(path, "solid --mesh cut.obj --pdf --dxf --tiles 6 --name flat")
+        .success()
+        .stdout(contains("24 edges matched"));
+    let json = std::fs::read_to_string(path.join("flat.json")).unwrap();
+    let sheets = Target::from_json(&json).unwrap().sheets;
+    let lines = || sheets.iter().flat_map(|sheet| &sheet.lines);
+    let count = |kind| lines().filter(|line| line.kind == kind).count();
+    assert_eq!((count(LineKind::Flat), count(LineKind::Fold)), (12, 12));
+    let words = || sheets.iter().flat_map(|sheet| &sheet.texts);
+    assert!(words().any(|text| text.text.contains("Do not fold dotted lines.")));
+    let dxf = std::fs::read_to_string(path.join("flat-net.dxf")).unwrap();
+    assert_eq!(dxf.matches("LINE\n  8\nFOLD\n").count(), 12);
     let material = std::fs::read_to_string(path.join("t.mtl")).unwrap();
     std::fs::write(path.join("t.mtl"), material.replace("Kd 1 1 1", "Kd 0 0 0")).unwrap();
     deltille(path, "verify t.json t.obj").code(2).stderr(contains("Kd 1 1 1"));
@@ -221,13 +234,21 @@ fn meshes_that_are_no_solids_are_refused() {
             _ => format!("{line}\n"),
         })
         .collect();
+    let shifted: String = good
+        .lines()
+        .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+            ["v", x, y, z] => format!("v {} {y} {z}\n", 1e9 + x.parse::<f64>().unwrap()),
+            _ => format!("{line}\n"),
+        })
+        .collect();
     for (name, text, options, said) in [
         ("open", without_last, "", "it is open"),
         ("flat", flattened, "", "triangle 1 has no area"),
         ("quad", quad, "", "face 1 has 4 corners"),
         ("wound", wound, "", "wound against each other"),
         ("crowd", twice, "", "not manifold"),
-        ("nan", good.replacen("v ", "v nan ", 1), "", "finite"),
+        ("nan", good.replacen("v ", "v nan ", 1), "", "vertex 1: its coordinates"),
+        ("far", shifted, "--tiles 7", "--mesh: it reaches"),
         ("text", "hello".to_owned(), "", "no triangles"),
         ("index", good.clone() + "f 1 2 99\n", "", "out of bounds"),
         ("skew", skewed.clone(), "", "give --allow-skew"),
@@ -422,6 +443,26 @@ fn panels_to_cut_have_their_true_size() {
     }
 }
 
+/// The sheets of single faces are cut to what the seats take, by default with room around the tiles.
+#[test]
+fn single_faces_are_cut_to_the_seats_of_the_skeleton() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    deltille(path, "tetrahedron --skeleton --per-face --svg --dxf").success();
+    let json = std::fs::read_to_string(path.join("tetrahedron.json")).unwrap();
+    let sheet = &Target::from_json(&json).unwrap().sheets[0];
+    // Two marks at each vertex; the lines through those along an edge make the outline.
+    let cuts: Vec<_> = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut).collect();
+    let length = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let between = length(cuts[0].from_mm, cuts[1].from_mm);
+    let text = std::fs::read_to_string(path.join("tetrahedron-panels.dxf")).unwrap();
+    let outline = &closed_polylines(&text, "CUT")[0];
+    let edge = length(outline[0], outline[1]);
+    // Marks begin 3 mm beyond the vertices.
+    assert!((between - edge - 6.0).abs() < 1e-4, "{between} {edge}");
+    assert!(sheet.texts.iter().any(|text| text.text == "edge 0 · face 3"));
+}
+
 /// The net is one outline around all faces and tabs, with a line to fold for each edge between two
 /// faces and for each tab.
 #[test]
@@ -491,7 +532,9 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
         ("icosahedron --pdf --per-face --paper A5", "an --edge of at most "),
         ("icosahedron -o /proc/nowhere", "-o: cannot write"),
         ("icosahedron --skeleton --rib 1mm", "--rib: 1 mm leaves no foot"),
-        ("icosahedron --skeleton --panel-thickness 12mm", "--face-margin"),
+        ("icosahedron --skeleton --panel-thickness 12mm --face-margin 5mm", "--face-margin"),
+        ("icosahedron --stl --paper A4", "--paper: it says nothing without"),
+        ("icosahedron --stl --texture-dpi 300", "--texture-dpi: it says nothing without"),
         (
             "tetrahedron --skeleton --edge 60mm --tiles 6 --face-margin 6mm --wall 6mm",
             "a larger --edge",
@@ -506,4 +549,8 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
         assert!(stderr.contains(said), "{args}: {stderr}");
     }
     assert!(names(folder.path()).is_empty());
+    // A file that cannot be replaced keeps the others from being written.
+    std::fs::create_dir(folder.path().join("octahedron.stl")).unwrap();
+    deltille(folder.path(), "octahedron --stl").code(2).stderr(contains("octahedron.stl"));
+    assert_eq!(names(folder.path()), ["octahedron.stl"]);
 }

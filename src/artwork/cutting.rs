@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::atlas::Packing;
 use super::text::MissingGlyph;
 use crate::target::{
-    Face, LineKind, Placement, SheetLayout, Skeleton, SolidSpec, Target, TargetError, TargetSpec,
-    edge_numbers, edge_text,
+    LineKind, Placement, SheetLayout, Target, TargetError, TargetSpec, edge_numbers, edge_text,
+    upright_number,
 };
 
 /// Blank between panels, mm: more than any cutter is wide.
@@ -86,7 +86,7 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     let TargetSpec::Solid(spec) = &target.spec else {
         return Err(CuttingError::NotSolid(target.name.clone()));
     };
-    let panels = panels(spec)?;
+    let panels = spec.panel_faces()?;
     let solid = spec.polyhedron();
     let edges = solid.edges();
     let mut drawing = CutDrawing::default();
@@ -99,7 +99,7 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
         let mut texts = vec![face_number(&placement, outline, index)];
         for (i, number) in numbers.into_iter().enumerate() {
             let ends = [outline[i], outline[(i + 1) % 3]];
-            texts.push(edge_text(&placement, ends, engraved(number), EDGE_GAP_MM));
+            texts.push(edge_text(&placement, ends, upright_number(number), EDGE_GAP_MM));
         }
         for text in texts {
             drawing.engrave(super::text_outline(&text)?);
@@ -124,7 +124,7 @@ pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
             let layer = match line.kind {
                 LineKind::Fold => CutLayer::Fold,
                 LineKind::Valley => CutLayer::Valley,
-                LineKind::Cut | LineKind::Align => continue,
+                LineKind::Cut | LineKind::Flat | LineKind::Align => continue,
             };
             let points_mm = vec![line.from_mm, line.to_mm];
             piece.paths.push(CutPath { layer, closed: false, points_mm });
@@ -183,30 +183,6 @@ fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<[f64; 2]>>> {
     Some(outlines)
 }
 
-/// The faces, or what the seats of the skeleton take of them.
-fn panels(spec: &SolidSpec) -> Result<Vec<Face>, TargetError> {
-    let mut faces = spec.faces()?;
-    let Some(skeleton) = &spec.skeleton else { return Ok(faces) };
-    let inset = Skeleton::new(&spec.polyhedron(), skeleton)?.panel_inset_mm;
-    for face in &mut faces {
-        face.outline_mm = inset_triangle(face.outline_mm, inset);
-    }
-    Ok(faces)
-}
-
-fn inset_triangle(outline: [[f64; 2]; 3], inset: f64) -> [[f64; 2]; 3] {
-    let corners = outline.map(|[x, y]| DVec3::new(x, y, 0.0));
-    let circle = crate::target::Incircle::of(corners);
-    circle.inset(corners, inset, 0.0).map(|v| [v.x, v.y])
-}
-
-/// A number as it is engraved: with a point after it where it reads as another upside down.
-fn engraved(number: usize) -> String {
-    let text = number.to_string();
-    let turns = text.chars().all(|c| "01689".contains(c)) && text.contains(['6', '9']);
-    if turns { text + "." } else { text }
-}
-
 /// The number of a face around the middle of its outline.
 fn face_number(
     placement: &Placement,
@@ -214,7 +190,7 @@ fn face_number(
     index: usize,
 ) -> crate::target::SheetText {
     let circle = crate::target::Incircle::of(outline.map(|[x, y]| DVec3::new(x, y, 0.0)));
-    let text = engraved(index);
+    let text = upright_number(index);
     let cap = (FACE_CAP.0 * circle.radius).min(FACE_CAP.1);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
     let at = [circle.centre.x - width / 2.0, circle.centre.y - cap / 2.0];

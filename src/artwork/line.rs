@@ -7,10 +7,14 @@ const DASH_MM: [f64; 2] = [3.0, 2.0];
 /// Dash, gap, dot and gap of a valley fold, mm.
 const DASH_DOT_MM: [f64; 4] = [3.0, 1.2, 0.6, 1.2];
 
+/// Dots between faces in one plane, and the gaps between them, mm.
+const DOT_MM: [f64; 2] = [0.6, 3.0];
+
 /// The strokes that a line is drawn of, mm.
 ///
 /// ```text
 ///   cut, align  ────────────────    fold  ──── ──── ────    valley  ──── · ──── · ────
+///   flat  ·   ·   ·   ·
 /// ```
 ///
 /// The period of a pattern is stretched so that a whole number of them and a last dash fill the
@@ -20,6 +24,7 @@ pub fn strokes_mm(line: &SheetLine) -> Vec<[[f64; 2]; 2]> {
         LineKind::Cut | LineKind::Align => return vec![[line.from_mm, line.to_mm]],
         LineKind::Fold => &DASH_MM[..],
         LineKind::Valley => &DASH_DOT_MM[..],
+        LineKind::Flat => &DOT_MM[..],
     };
     let [dx, dy] = [0, 1].map(|i| line.to_mm[i] - line.from_mm[i]);
     let length = dx.hypot(dy);
@@ -48,7 +53,7 @@ mod tests {
 
     #[test]
     fn dashes_begin_and_end_with_the_line() {
-        for kind in [LineKind::Fold, LineKind::Valley] {
+        for kind in [LineKind::Fold, LineKind::Valley, LineKind::Flat] {
             for length in [1.0, 3.0, 7.9, 150.0] {
                 let (from_mm, to_mm) = ([2.0, 1.0], [2.0, 1.0 + length]);
                 let strokes = strokes_mm(&SheetLine { kind, from_mm, to_mm, width_mm: 0.1 });

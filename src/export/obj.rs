@@ -45,7 +45,21 @@ pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
         let indices = mesh.indices.as_chunks::<3>().0;
         faces.extend(indices.iter().map(|face| face.map(|index| first + index as usize)));
     }
-    Ok(ClosedMesh::new(&vertices, &faces)?)
+    ClosedMesh::new(&vertices, &faces).map_err(|error| match error {
+        // The reader numbers vertices as faces name them, the user as the file lists them.
+        ClosedMeshError::NotFinite(used) => {
+            ClosedMeshError::NotFinite(first_not_finite(text).unwrap_or(used)).into()
+        }
+        other => other.into(),
+    })
+}
+
+/// Number of the first `v` line with a number that is not finite.
+fn first_not_finite(text: &[u8]) -> Option<usize> {
+    let text = String::from_utf8_lossy(text);
+    let finite = |word: &str| word.parse::<f64>().is_ok_and(f64::is_finite);
+    let mut lines = text.lines().filter_map(|line| line.trim_start().strip_prefix("v "));
+    lines.position(|line| !line.split_whitespace().all(finite)).map(|index| index + 1)
 }
 
 /// The text of `<name>.obj`; it names `<name>.mtl`.

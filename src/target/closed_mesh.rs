@@ -44,9 +44,9 @@ pub enum ClosedMeshError {
     /// Two neighbours that turn different sides outwards.
     #[error("triangles {0} and {1} are neighbours but wound against each other")]
     Winding(usize, usize),
-    /// Solids that touch in a vertex.
-    #[error("it is not manifold: parts of it touch in vertex {0} only")]
-    Pinched(usize),
+    /// Solids that touch in a vertex, at these coordinates.
+    #[error("it is not manifold: parts of it touch only in the vertex at {0}")]
+    Pinched(DVec3),
     /// More than one solid.
     #[error(
         "it has {0} separate pieces: make a target of each, with --first-id and --board-id so that \
@@ -228,7 +228,7 @@ impl ClosedMesh {
                 (at, steps) = (ring[&at], steps + 1);
             }
             if steps < ring.len() {
-                return Err(ClosedMeshError::Pinched(vertex + 1));
+                return Err(ClosedMeshError::Pinched(self.vertices[vertex]));
             }
         }
         let mut pieces = 0;

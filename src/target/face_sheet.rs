@@ -1,12 +1,12 @@
 //! Sheets of single faces, to be glued on a rigid skeleton: the panel with the marks to cut it out
-//! and to put it in its place.
+//! and to put it in its place. With a skeleton in the spec the panel is as large as its seat takes.
 //!
 //! ```text
 //!            +
-//!          \   /           Cutting marks extend the edges of the face beyond its vertices, so that
-//!     7     ╲ ╱            a ruler laid on them leaves no line on the panel. Outside each edge its
-//!           ╱ ╲            number is printed: edges of the same number meet. The number of the
-//!        4 ╱   ╲ 9         face is printed beside it and, small, in its lower left end.
+//!          \   /           Cutting marks extend the edges of the panel beyond its vertices, so that
+//!     7     ╲ ╱            a ruler laid on them leaves no line on it. Outside each edge its number
+//!           ╱ ╲            and the face beyond it are printed: edges of the same number meet. The
+//!        4 ╱   ╲ 9         number of the face is printed beside it and, small, in its lower left end.
 //!         ╱7    ╲
 //!    ── ─╱───────╲─ ──     Registration crosses lie on the bisectors beyond the vertices, each as
 //!  +         3         +   far from its vertex: a plotter, a jig or a second print is laid on them.
@@ -18,6 +18,7 @@
 
 use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit};
 use super::length::format_mm;
+use super::net::{Side, Sides};
 use super::paper::PaperSpec;
 use super::polyhedron::Face;
 use super::{
@@ -38,6 +39,10 @@ const MARK_WIDTH_MM: f64 = 0.15;
 const FACE_CAP_MM: f64 = 5.0;
 /// Capital height of the numbers of edges, mm.
 const EDGE_CAP_MM: f64 = 2.2;
+/// Capital height and line spacing of the instructions, mm.
+const WORDS_MM: [f64; 2] = [2.0, 3.4];
+/// How to use a sheet, below the number of its face.
+const WORDS: [&str; 3] = ["Cut from mark to mark.", "Edges of the same", "number meet."];
 /// Blank between what a face prints and the marks along the margins of the page, mm.
 const MARK_BLANK_MM: f64 = 1.5;
 /// Capital height of the number on a face, in widths of its margin, and the most of it, mm.
@@ -54,17 +59,23 @@ pub(super) fn sheets(
     paper: &PaperSpec,
 ) -> Result<Vec<SheetLayout>, TargetError> {
     let solid = spec.polyhedron();
-    let edges = solid.edges();
-    let faces = spec.faces()?;
-    let numbered = faces.iter().zip(panels).enumerate();
+    let (edges, sides) = (solid.edges(), Sides::new(&solid));
+    let margin_mm = spec.margin_mm - spec.panel_inset_mm()?;
+    let numbered = spec.panel_faces()?.into_iter().zip(panels).enumerate();
     numbered
         .map(|(index, (face, panel))| {
-            let ink = bounds(face);
+            let ink = bounds(&face);
             let arrangement = arrange(spec, ink, paper)?;
             let words = label(name, spec, index, panel, family);
             let mut sheet = arrangement.sheet(panel.id, ink, words);
             let numbers = edge_numbers(&solid, &edges, index);
-            mark(&mut sheet, spec, face, index, numbers);
+            let edge_words = [0, 1, 2].map(|side| {
+                let beyond = sides.partner(Side { face: index, side }).map(|other| other.face);
+                let beyond = beyond.map_or(String::new(), |face| format!(" · face {face}"));
+                format!("edge {}{beyond}", numbers[side])
+            });
+            mark(&mut sheet, spec, &face, index, edge_words);
+            sheet.texts.extend(inner_number(&sheet.placements[0], margin_mm, &face, index));
             Ok(sheet)
         })
         .collect()
@@ -127,10 +138,10 @@ fn arrange(
     Err(TargetError::invalid("--paper", problem))
 }
 
-/// Adds cutting marks and numbers.
-fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, edges: [usize; 3]) {
+/// Adds cutting marks, numbers and instructions.
+fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, edges: [String; 3]) {
     let placement = sheet.placements[0];
-    for (i, number) in edges.into_iter().enumerate() {
+    for (i, text) in edges.into_iter().enumerate() {
         let (a, b) = (face.outline_mm[i], face.outline_mm[(i + 1) % 3]);
         for (end, outwards) in [(a, -1.0), (b, 1.0)] {
             let [from_mm, to_mm] =
@@ -138,7 +149,6 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
             let kind = LineKind::Cut;
             sheet.lines.push(SheetLine { kind, from_mm, to_mm, width_mm: MARK_WIDTH_MM });
         }
-        let text = format!("edge {number}");
         sheet.texts.push(edge_text(&placement, [a, b], text, -(BLEED_MM + EDGE_CAP_MM)));
     }
     for vertex in 0..3 {
@@ -154,30 +164,33 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
         }
     }
     let [left, _, _, upper] = bounds(face);
-    let text = format!("face {index}");
-    let at_mm = placement.page_from_panel([left, upper - FACE_CAP_MM]);
-    sheet.texts.push(SheetText {
-        text,
-        at_mm,
-        angle_rad: placement.angle_rad,
-        cap_height_mm: FACE_CAP_MM,
-        max_width_mm: spec.edge_mm / 4.0,
-    });
-    sheet.texts.extend(inner_number(&placement, spec, face, index));
+    let max_width_mm = spec.edge_mm / 4.0;
+    let mut add = |text: String, y: f64, cap_height_mm: f64| {
+        let at_mm = placement.page_from_panel([left, y]);
+        let angle_rad = placement.angle_rad;
+        sheet.texts.push(SheetText { text, at_mm, angle_rad, cap_height_mm, max_width_mm });
+    };
+    let mut y = upper - FACE_CAP_MM;
+    add(format!("face {index}"), y, FACE_CAP_MM);
+    y -= WORDS_MM[0] / 2.0;
+    for words in WORDS {
+        y -= WORDS_MM[1];
+        add(words.to_owned(), y, WORDS_MM[0]);
+    }
 }
 
 /// The number of a face in its lower left end; none where the margin leaves no room for it.
 fn inner_number(
     placement: &Placement,
-    spec: &SolidSpec,
+    margin_mm: f64,
     face: &Face,
     index: usize,
 ) -> Option<SheetText> {
-    let cap = (INNER_CAP.0 * spec.margin_mm).min(INNER_CAP.1);
+    let cap = (INNER_CAP.0 * margin_mm).min(INNER_CAP.1);
     if cap < 0.8 {
         return None;
     }
-    let text = index.to_string();
+    let text = upright_number(index);
     let [[ax, ay], b, c] = face.outline_mm;
     let unit = |[x, y]: [f64; 2]| {
         let length = (x - ax).hypot(y - ay);
@@ -187,7 +200,7 @@ fn inner_number(
     let sum = [b[0] + c[0], b[1] + c[1]];
     let length = sum[0].hypot(sum[1]);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
-    let reach = INNER_PLACE * spec.margin_mm / length;
+    let reach = INNER_PLACE * margin_mm / length;
     let at = [ax + sum[0] * reach - width / 2.0, ay + sum[1] * reach - cap / 2.0];
     Some(SheetText {
         text,
@@ -196,6 +209,13 @@ fn inner_number(
         cap_height_mm: cap,
         max_width_mm: 2.0 * width,
     })
+}
+
+/// A number that stands alone: with a point after it where it reads as another upside down.
+pub(crate) fn upright_number(number: usize) -> String {
+    let text = number.to_string();
+    let turns = text.chars().all(|c| "01689".contains(c)) && text.contains(['6', '9']);
+    if turns { text + "." } else { text }
 }
 
 /// A text along the middle of an edge, its base line `inwards` from it.
@@ -207,7 +227,7 @@ pub(crate) fn edge_text(
 ) -> SheetText {
     let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
     let length = dx.hypot(dy);
-    let width = (text.len() as f64 * ADVANCE_CAPS * EDGE_CAP_MM).min(length);
+    let width = (text.chars().count() as f64 * ADVANCE_CAPS * EDGE_CAP_MM).min(length);
     let middle = along(a, b, a, (length - width) / 2.0);
     let at = [middle[0] - dy / length * inwards, middle[1] + dx / length * inwards];
     SheetText {

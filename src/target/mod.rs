@@ -33,7 +33,7 @@ pub use board::zigzag_vertices;
 pub use build::largest_edge_mm;
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
 pub use error::TargetError;
-pub(crate) use face_sheet::{edge_numbers, edge_text};
+pub(crate) use face_sheet::{edge_numbers, edge_text, upright_number};
 pub use json::{SCHEMA, TargetFileError};
 pub use layout::CHECK_BAR_STROKE_MM;
 pub(crate) use layout::id_range;
@@ -283,18 +283,26 @@ pub enum LineKind {
     Fold,
     /// To fold along, towards the print; dash-dotted.
     Valley,
+    /// Between two faces in one plane, not to be folded; dotted.
+    Flat,
     /// A stroke of a registration cross: pages that share it are laid on one another, single faces
     /// on their seats; or of the overview of such pages. Drawn through.
     Align,
 }
 
 impl LineKind {
+    /// Whether paper goes on beyond it, to another face or to a tab.
+    pub fn joins_faces(self) -> bool {
+        matches!(self, Self::Fold | Self::Valley | Self::Flat)
+    }
+
     /// Its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cut => "cut",
             Self::Fold => "fold",
             Self::Valley => "valley",
+            Self::Flat => "flat",
             Self::Align => "align",
         }
     }

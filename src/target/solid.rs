@@ -1,15 +1,21 @@
 //! Solids with a board of tiles on each face.
 
+use glam::DVec3;
+
 use super::board::tagged_tiles;
 use super::capacity::{check_family, wider_spacing};
 use super::length::format_mm;
 use super::polyhedron::{Face, Polyhedron};
 use super::{
-    Corner, FamilyRef, GridKind, Outline, Panel, SolidShape, SolidSpec, TagPlacement, TagsIn,
-    TargetError,
+    Corner, FamilyRef, GridKind, Incircle, Outline, Panel, Skeleton, SolidShape, SolidSpec,
+    TagPlacement, TagsIn, TargetError,
 };
 use crate::family::Family;
 use crate::lattice::Vertex;
+
+/// Least blank along the edges of a panel in a skeleton, mm: room for the number of its face, and
+/// for a cut that is off.
+const LEAST_PANEL_MARGIN_MM: f64 = 3.0;
 
 impl SolidSpec {
     /// The solid.
@@ -39,6 +45,43 @@ impl SolidSpec {
                     .ok_or_else(|| self.too_fine(&solid))
             })
             .collect()
+    }
+
+    /// The faces as they are cut to panels: whole, or as much as the seats of the skeleton take.
+    pub fn panel_faces(&self) -> Result<Vec<Face>, TargetError> {
+        let (mut faces, inset_mm) = (self.faces()?, self.panel_inset_mm()?);
+        for face in &mut faces {
+            let corners = face.outline_mm.map(|[x, y]| DVec3::new(x, y, 0.0));
+            let inner = Incircle::of(corners).inset(corners, inset_mm, 0.0);
+            face.outline_mm = inner.map(|v| [v.x, v.y]);
+        }
+        Ok(faces)
+    }
+
+    /// A margin with room for numbers and glue: that of [`Self::new`], or more where the panels of
+    /// the skeleton need it, in whole millimetres.
+    pub fn comfortable_margin_mm(&self) -> Result<f64, TargetError> {
+        let usual = Self::new(self.shape.clone()).margin_mm;
+        let Some(skeleton) = &self.skeleton else { return Ok(usual) };
+        let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;
+        Ok(usual.max((inset_mm + LEAST_PANEL_MARGIN_MM).ceil()))
+    }
+
+    /// Distance of the edges of panels from those of their faces, mm: 0 without a skeleton. Refused
+    /// where it is more than the margin.
+    pub fn panel_inset_mm(&self) -> Result<f64, TargetError> {
+        let Some(skeleton) = &self.skeleton else { return Ok(0.0) };
+        let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;
+        if inset_mm > self.margin_mm {
+            let problem = format!(
+                "tiles {} from the edges would lie on the ribs: take at least {:.1} mm, or thinner \
+                 panels",
+                format_mm(self.margin_mm),
+                (inset_mm * 10.0).ceil() / 10.0
+            );
+            return Err(TargetError::invalid("--face-margin", problem));
+        }
+        Ok(inset_mm)
     }
 
     /// Refuses faces without room for their tiles; says with which edge all have it.

@@ -1,3 +1,4 @@
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
@@ -35,6 +36,10 @@ const SOLID_EDGE_MM: std::ops::RangeInclusive<f64> = 10.0..=5000.0;
 /// Range of tiles along a side of a face: with fewer than six a face has at most six corners,
 /// and the detector takes so few for no grid.
 const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
+
+/// Farthest a mesh may lie from its origin, mm: meshes and bodies are written in single precision,
+/// which at 100 m leaves 0.01 mm.
+const FARTHEST_MM: f64 = 1e5;
 
 /// Most faces of a solid.
 const MOST_FACES: u32 = 10_000;
@@ -252,6 +257,19 @@ impl SolidSpec {
         {
             let problem = format!("{} faces are more than {MOST_FACES}", mesh.faces().len());
             return Err(TargetError::invalid("--mesh", problem));
+        }
+        if let SolidShape::Mesh(mesh) = &self.shape {
+            let scale = self.edge_mm / mesh.mean_edge();
+            let far = |v: &DVec3| v.abs().max_element() * scale;
+            let farthest = mesh.vertices().iter().map(far).fold(0.0, f64::max);
+            if farthest > FARTHEST_MM {
+                let problem = format!(
+                    "it reaches {} from the origin, more than {}: move it nearer",
+                    format_mm(farthest),
+                    format_mm(FARTHEST_MM)
+                );
+                return Err(TargetError::invalid("--mesh", problem));
+            }
         }
         if !FACE_TILES.contains(&self.tiles) {
             let problem = format!("{} is not between 6 and 200", self.tiles);

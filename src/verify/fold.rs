@@ -20,7 +20,7 @@ use kurbo::Shape as _;
 
 use super::{Finding, FoldVerdict, SheetVerdict};
 use crate::artwork;
-use crate::target::{LineKind, SheetLayout, Target, TargetSpec};
+use crate::target::{SheetLayout, Target, TargetSpec};
 
 /// Largest distance of a folded corner, or of an end of an edge, from where it belongs, mm: that
 /// of meshes, see [`MESH_TOLERANCE_MM`](super::MESH_TOLERANCE_MM).
@@ -38,9 +38,7 @@ pub(super) type Seen = BTreeMap<u32, BTreeMap<u32, [f64; 2]>>;
 
 /// Whether a target's sheets are those of a net.
 pub(super) fn is_net(target: &Target) -> bool {
-    let folds = |sheet: &SheetLayout| {
-        sheet.lines.iter().any(|line| matches!(line.kind, LineKind::Fold | LineKind::Valley))
-    };
+    let folds = |sheet: &SheetLayout| sheet.lines.iter().any(|line| line.kind.joins_faces());
     matches!(target.spec, TargetSpec::Solid(_)) && target.sheets.iter().any(folds)
 }
 
@@ -250,9 +248,8 @@ impl Net {
 
     /// Sides of two faces on the same fold line, and of one where a tab hangs on it.
     fn find_folds(&mut self, sheet: usize, layout: &SheetLayout) {
-        let kinds = [LineKind::Fold, LineKind::Valley];
         let sides: Vec<_> = self.sides_on(sheet).map(|side| (side, self.ends(side))).collect();
-        for line in layout.lines.iter().filter(|line| kinds.contains(&line.kind)) {
+        for line in layout.lines.iter().filter(|line| line.kind.joins_faces()) {
             let ends = [line.from_mm, line.to_mm].map(DVec2::from);
             let near = |[p, q]: [DVec2; 2]| {
                 p.distance(ends[0]) < COMMON_MM && q.distance(ends[1]) < COMMON_MM

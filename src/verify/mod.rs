@@ -81,8 +81,22 @@ pub enum VerifyError {
     #[error("interrupted before all was compared")]
     Cancelled,
     /// The target says nothing about paper.
-    #[error("target {0} has no sheets: it was not laid out on paper")]
-    NoSheets(String),
+    #[error("{}: target {target} has no sheets: it was not laid out on paper", path.display())]
+    NoSheets {
+        /// The file.
+        path: PathBuf,
+        /// Name of the target.
+        target: String,
+    },
+    /// A file of another kind.
+    #[error(
+        "{}: only .pdf, .svg, .png, .glb, .obj and .stl files are compared with their target",
+        path.display()
+    )]
+    OtherKind {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file name does not tell which sheet is on it.
     #[error("{}: the target has {sheets} sheets; name the file {example} for the first", path.display())]
     WhichSheet {
@@ -164,8 +178,12 @@ impl<'a> Verifier<'a> {
             Some(format) => return Ok(solid::verify(self, path, format)?),
             None => {}
         }
+        if Format::of_document(path).is_none() {
+            return Err(VerifyError::OtherKind { path: path.to_owned() });
+        }
         if self.target.sheets.is_empty() {
-            return Err(VerifyError::NoSheets(self.target.name.clone()));
+            let (path, target) = (path.to_owned(), self.target.name.clone());
+            return Err(VerifyError::NoSheets { path, target });
         }
         let mut findings = Vec::new();
         let files = self.set_of(path);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 
 use crate::artwork::Artwork;
 use crate::cli::interrupt;
@@ -90,6 +90,10 @@ fn write_here(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
     };
     let context = || format!("-o: cannot write to {}", folder.display());
     fs::create_dir_all(folder).with_context(context)?;
+    let paths: Vec<PathBuf> = files.iter().map(|file| folder.join(&file.name)).collect();
+    if let Some(path) = paths.iter().find(|path| path.is_dir()) {
+        bail!("cannot write {}: there is a folder of that name", path.display());
+    }
     let staging = tempfile::Builder::new().prefix(".deltille-").tempdir_in(folder);
     let staging = staging.with_context(context)?;
     for file in files {
@@ -101,13 +105,9 @@ fn write_here(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
         })?;
     }
     check()?;
-    files
-        .iter()
-        .map(|file| {
-            let path = folder.join(&file.name);
-            fs::rename(staging.path().join(&file.name), &path)
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            Ok(path)
-        })
-        .collect()
+    for (file, path) in files.iter().zip(&paths) {
+        fs::rename(staging.path().join(&file.name), path)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(paths)
 }

@@ -30,8 +30,7 @@ pub struct Args {
         value_name = "RX,RY,RZ,TX,TY,TZ",
         value_parser = numbers::<6>,
         allow_hyphen_values = true,
-        conflicts_with = "eye",
-        required_unless_present = "eye"
+        conflicts_with = "eye"
     )]
     pose: Option<[f64; 6]>,
     /// Where the camera stands in the target frame, mm, instead of --pose
@@ -61,10 +60,10 @@ pub struct Args {
     )]
     up: Option<[f64; 3]>,
     /// Standard deviation of the blur, px
-    #[arg(long, default_value_t = 0.8, value_name = "PX")]
+    #[arg(long, default_value_t = 0.8, value_name = "PX", allow_negative_numbers = true)]
     blur: f64,
     /// Standard deviation of the noise, percent of full scale
-    #[arg(long, default_value_t = 1.0, value_name = "PERCENT")]
+    #[arg(long, default_value_t = 1.0, value_name = "PERCENT", allow_negative_numbers = true)]
     noise: f64,
     /// Relative change of the light across and down the picture
     #[arg(long, value_name = "ACROSS,DOWN", value_parser = numbers::<2>,
@@ -187,7 +186,9 @@ impl Args {
             let rotation = DQuat::from_scaled_axis(DVec3::from_slice(&pose[..3]));
             return Ok(Pose { rotation, translation: DVec3::from_slice(&pose[3..]) });
         }
-        let Some(eye) = self.eye.map(DVec3::from) else { bail!("--pose or --eye is needed") };
+        let Some(eye) = self.eye.map(DVec3::from) else {
+            bail!("give --pose, or --eye for where the camera stands");
+        };
         let centre = self.look_at.map(DVec3::from).unwrap_or(middle);
         let sight = (centre - eye).normalize_or_zero();
         let upright = if sight.cross(DVec3::Z).length() < 1e-6 { DVec3::Y } else { DVec3::Z };

@@ -29,7 +29,8 @@ pub struct Args {
     /// Black tiles along each side of a face [default: 10]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     tiles: Option<u32>,
-    /// Blank between a face's edges and its tiles [default: 5mm]
+    /// Blank between a face's edges and its tiles [default: 5mm, with a skeleton at least 3 mm on
+    /// its panels]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     face_margin: Option<String>,
     /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
@@ -168,11 +169,12 @@ pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
 
 /// Makes a solid, writes its files, and verifies what it wrote.
 pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
+    args.check_use()?;
     let spec = args.spec(shape)?;
     let paper = args.paper()?;
     let family = Family::resolve(&spec.tags.family).context("--family")?;
     let name = args.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
-    let printed = args.pdf || args.svg || args.png;
+    let printed = args.printed();
     let layout = printed.then_some(&paper);
     let solid = TargetSpec::Solid(spec.clone());
     let target = Target::build(&name, &solid, Some(&family), layout)?;
@@ -188,13 +190,46 @@ pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
 }
 
 impl Args {
+    fn printed(&self) -> bool {
+        self.pdf || self.svg || self.png
+    }
+
+    fn with_gltf(&self) -> bool {
+        self.gltf || !(self.obj || self.stl || self.skeleton || self.dxf || self.printed())
+    }
+
+    /// Refuses options that nothing asked for makes use of.
+    fn check_use(&self) -> anyhow::Result<()> {
+        let unused = |option: &str, needed: &str| {
+            Err(anyhow!("{option}: it says nothing without {needed}: add one, or leave it out"))
+        };
+        if self.texture_dpi.is_some() && !(self.with_gltf() || self.obj) {
+            return unused("--texture-dpi", "--gltf or --obj");
+        }
+        if self.dpi.is_some() && !self.png {
+            return unused("--dpi", "--png");
+        }
+        let layout = [
+            ("--paper", self.paper.is_some()),
+            ("--orientation", self.orientation.is_some()),
+            ("--margin", self.margin.is_some()),
+            ("--per-face", self.per_face),
+        ];
+        match layout.into_iter().find(|(_, given)| *given) {
+            Some((option, _)) if !(self.printed() || self.dxf) => {
+                unused(option, "--pdf, --svg, --png or --dxf")
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn spec(&self, shape: SolidShape) -> anyhow::Result<SolidSpec> {
         let default = SolidSpec::new(shape);
         let tags = TagSpec::default();
-        Ok(SolidSpec {
+        let mut spec = SolidSpec {
             edge_mm: length("--edge", &self.edge)?.unwrap_or(default.edge_mm),
             tiles: self.tiles.unwrap_or(default.tiles),
-            margin_mm: length("--face-margin", &self.face_margin)?.unwrap_or(default.margin_mm),
+            margin_mm: default.margin_mm,
             board_id: self.board_id.unwrap_or(default.board_id),
             tags: TagSpec {
                 tags_in: TagsIn::Black,
@@ -205,7 +240,12 @@ impl Args {
             },
             skeleton: self.skeleton()?,
             shape: default.shape,
-        })
+        };
+        spec.margin_mm = match length("--face-margin", &self.face_margin)? {
+            Some(given) => given,
+            None => spec.comfortable_margin_mm()?,
+        };
+        Ok(spec)
     }
 
     fn skeleton(&self) -> anyhow::Result<Option<SkeletonSpec>> {
@@ -251,9 +291,7 @@ impl Args {
             let text = dsc::write(target, dialect).context("--dsc")?;
             files.push(text_file(format!("{name}.dsc"), text));
         }
-        let printed = self.pdf || self.svg || self.png;
-        let with_gltf =
-            self.gltf || !(self.obj || self.stl || self.skeleton || self.dxf || printed);
+        let (printed, with_gltf) = (self.printed(), self.with_gltf());
         if self.texture_dpi.is_some_and(|dpi| !(1.0..=1e5).contains(&dpi)) {
             bail!("--texture-dpi: it must be between 1 and 100000");
         }
@@ -263,14 +301,7 @@ impl Args {
         }
         if let Some(skeleton) = &spec.skeleton {
             let skeleton = Skeleton::new(&spec.polyhedron(), skeleton)?;
-            if skeleton.panel_inset_mm > spec.margin_mm {
-                bail!(
-                    "--face-margin: tiles {} mm from the edges would lie on the ribs: take at \
-                     least {:.1} mm, or thinner panels",
-                    spec.margin_mm,
-                    (skeleton.panel_inset_mm * 10.0).ceil() / 10.0
-                );
-            }
+            spec.panel_inset_mm()?;
             let bytes = stl::to_bytes(name, &skeleton.triangles_mm);
             files.push(bytes_file(stl::skeleton_name(name), bytes));
         }

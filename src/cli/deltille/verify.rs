@@ -8,6 +8,7 @@ use anyhow::{Context, bail};
 use serde::Serialize;
 
 use super::target_file;
+use crate::cli::output::say;
 use crate::cli::run::FAILED;
 use crate::export::{atomic, sheet_file_name, stl};
 use crate::family::Family;
@@ -35,7 +36,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = target_file::family(&target, args.family.as_deref())?;
     let folder = args.target.parent().unwrap_or(Path::new("."));
     let artifacts = match args.artifacts.as_slice() {
-        [] => artifacts_in(folder, &target),
+        [] => artifacts_beside(folder, &target),
         given => given.to_vec(),
     };
     if artifacts.is_empty() {
@@ -65,7 +66,7 @@ pub fn verify(
         }
         done.extend(verifier.set_of(path));
         let verdict = verifier.verify(path)?;
-        println!("{verdict}");
+        say!("{verdict}");
         verdicts.push(verdict);
     }
     let failed = verdicts.iter().filter(|verdict| !verdict.passed).count();
@@ -78,27 +79,38 @@ pub fn verify(
     let files = if count == 1 { "file" } else { "files" };
     if failed > 0 {
         let differ = if failed == 1 { "differs" } else { "differ" };
-        println!("FAILED: {failed} of {count} {files} {differ} from target {}", target.name);
+        say!("FAILED: {failed} of {count} {files} {differ} from target {}", target.name);
         return Ok(ExitCode::from(FAILED));
     }
-    println!("verified: {count} {files} of target {}", target.name);
+    say!("verified: {count} {files} of target {}", target.name);
     Ok(ExitCode::SUCCESS)
 }
 
-/// The artifacts of a target that are in a folder.
-fn artifacts_in(folder: &Path, target: &Target) -> Vec<PathBuf> {
+/// The artifacts of a target that are in a folder; those that cannot be its own are named.
+fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
+    let name = &target.name;
+    let present = |name: String| Some(folder.join(name)).filter(|path| path.is_file());
     let count = target.page_count();
-    let pages = ["svg", "png"].into_iter().flat_map(|extension| {
-        (0..count).map(move |index| sheet_file_name(&target.name, index, count, extension))
+    let drawn = ["svg", "png"].into_iter().flat_map(|extension| {
+        let page = move |index| sheet_file_name(name, index, count, extension);
+        let single = (count == 0).then(|| format!("{name}.{extension}"));
+        (0..count).map(page).chain(single)
     });
-    ["pdf", "glb", "obj", "stl"]
-        .map(|extension| format!("{}.{extension}", target.name))
-        .into_iter()
-        .chain([stl::skeleton_name(&target.name)])
-        .chain(pages)
-        .map(|name| folder.join(name))
-        .filter(|path| path.is_file())
-        .collect()
+    let printed = [format!("{name}.pdf")].into_iter().chain(drawn).filter_map(present);
+    let printed: Vec<PathBuf> = printed.collect();
+    let meshes = ["glb", "obj", "stl"].map(|extension| format!("{name}.{extension}"));
+    let meshes = meshes.into_iter().chain([stl::skeleton_name(name)]).filter_map(present);
+    if target.sheets.is_empty() {
+        for path in printed {
+            eprintln!(
+                "{}: not compared, {name} as described was not laid out on paper: print it anew, \
+                 or remove the file",
+                path.display()
+            );
+        }
+        return meshes.collect();
+    }
+    printed.into_iter().chain(meshes).collect()
 }
 
 #[derive(Serialize)]

@@ -23,3 +23,4 @@ mod tiling;
 mod unfold;
 
 pub(super) use sheet::sheets;
+pub(super) use unfold::{Side, Sides};

@@ -1,6 +1,8 @@
 //! A net on paper: which of its unfoldings, how it lies, and what is drawn of it.
 
-use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+use glam::DVec2;
 
 use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
@@ -15,6 +17,10 @@ use crate::target::{
     Face, FamilyRef, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine, SheetText,
     SolidSpec, TargetError,
 };
+
+/// Faces that rise or fall from one plane by less than this are not folded, radians (a tenth of a
+/// degree): no hand makes so slight a fold, and the neighbours hold the paper in its place.
+const FLAT_RAD: f64 = 0.1 / 180.0 * PI;
 
 /// Width of lines to cut and to fold along, mm: a hairline that every printer holds.
 pub const LINE_WIDTH_MM: f64 = 0.15;
@@ -216,18 +222,16 @@ impl<'a> Drawing<'a> {
         sides: &'a Sides,
     ) -> Self {
         let edges = solid.edges();
-        let numbers = (0..faces.len()).map(|face| edge_numbers(solid, &edges, face)).collect();
-        let fold = |face: usize, side: usize| {
-            let [a, b, c] = solid.triangle_mm(face);
-            let partner = sides.partner(Side { face, side });
-            let beyond = partner.map_or(DVec3::ZERO, |other| {
-                solid.triangle_mm(other.face)[(other.side + 2) % 3] - a
-            });
-            // The next face rises out of this one's plane: the edge is a valley.
-            let rises = (b - a).cross(c - a).normalize_or_zero().dot(beyond);
-            if rises > 1e-6 * (b - a).length() { LineKind::Valley } else { LineKind::Fold }
+        let numbers: Vec<[usize; 3]> =
+            (0..faces.len()).map(|face| edge_numbers(solid, &edges, face)).collect();
+        let angles_rad = solid.dihedral_angles_rad();
+        let fold = |edge: usize| match angles_rad[edge] - PI {
+            angle if angle.abs() < FLAT_RAD => LineKind::Flat,
+            // The next face rises out of this one's plane.
+            angle if angle > 0.0 => LineKind::Valley,
+            _ => LineKind::Fold,
         };
-        let folds = (0..faces.len()).map(|face| [0, 1, 2].map(|side| fold(face, side))).collect();
+        let folds = numbers.iter().map(|edges| edges.map(fold)).collect();
         Self { name, spec, faces, panels, family, sides, numbers, folds }
     }
 
@@ -237,8 +241,8 @@ impl<'a> Drawing<'a> {
         sheet.placements.clear();
         self.draw(&mut sheet, laid.piece, laid.tabs, &laid.page_from_net);
         let [left, lower, right, _] = laid.arrangement.clear_mm();
-        let has_valleys = sheet.lines.iter().any(|line| line.kind == LineKind::Valley);
-        let words = instructions(has_valleys, [left, lower + BLANK_MM], right - left - BLANK_MM);
+        let at = [left, lower + BLANK_MM];
+        let words = instructions(&sheet.lines, at, right - left - BLANK_MM);
         sheet.texts.extend(words);
         sheet
     }
@@ -355,21 +359,28 @@ impl<'a> Drawing<'a> {
     }
 }
 
-/// How to make the solid from the print, two lines; the lower one stands at `at`.
-pub(super) fn instructions(has_valleys: bool, at: [f64; 2], room: f64) -> [SheetText; 2] {
-    let folds = if has_valleys {
+/// How to make the solid from a print of these lines, two lines of text; the lower one stands at
+/// `at`.
+pub(super) fn instructions(lines: &[SheetLine], at: [f64; 2], room: f64) -> [SheetText; 2] {
+    let has = |kind| lines.iter().any(|line| line.kind == kind);
+    let mut folds = if has(LineKind::Valley) {
         "Cut along solid lines. Score and fold dashed lines away from the print, dash-dotted ones \
          towards it."
     } else {
         "Cut along solid lines. Score dashed lines and fold them away from the print."
-    };
+    }
+    .to_owned();
+    if has(LineKind::Flat) {
+        folds += " Do not fold dotted lines.";
+    }
     let glue = "Glue each tab under the face that it names, where the face has the same number: \
-                edge 1 to edge 1, and so on.";
+                edge 1 to edge 1, and so on."
+        .to_owned();
     let mut y = at[1] + 2.0 * WORDS_STEP_MM;
     [folds, glue].map(|text| {
         y -= WORDS_STEP_MM;
         SheetText {
-            text: text.to_owned(),
+            text,
             at_mm: [at[0], y],
             angle_rad: 0.0,
             cap_height_mm: WORDS_CAP_MM,

@@ -207,8 +207,7 @@ impl Tiling {
             let label = format!("{label} · page {}", name((column, row)));
             let mut marks = self.page.sheet(0, [0.0; 4], label);
             marks.placements.clear();
-            let has_valleys = sheet.lines.iter().any(|line| line.kind == LineKind::Valley);
-            self.explain(&mut marks, name((column, row)), has_valleys);
+            self.explain(&mut marks, name((column, row)), &sheet.lines);
             self.draw_overview(&mut marks, &overview, window);
             SheetPage {
                 label: name((column, row)),
@@ -230,7 +229,7 @@ impl Tiling {
     }
 
     /// The name of the page, and what to do with it.
-    fn explain(&self, marks: &mut SheetLayout, name: String, has_valleys: bool) {
+    fn explain(&self, marks: &mut SheetLayout, name: String, lines: &[SheetLine]) {
         let [left, lower, right, _] = self.page.clear_mm();
         let at = lower + BLANK_MM;
         let ([overview, _], _) = self.overview();
@@ -246,7 +245,7 @@ impl Tiling {
         };
         let middle = at + (WORDS_MM - 2.0 * BLANK_MM - NAME_CAP_MM) / 2.0;
         marks.texts.push(text(name, [left, middle], NAME_CAP_MM, width));
-        marks.texts.extend(instructions(has_valleys, [start, at], room));
+        marks.texts.extend(instructions(lines, [start, at], room));
         let join = "Join the pages first: what overlaps is the same on both; lay cross on cross.";
         marks.texts.push(text(join.to_owned(), [start, at + 7.2], 2.2, room));
     }
