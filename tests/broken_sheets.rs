@@ -43,7 +43,7 @@ fn spec() -> BoardSpec {
 
 /// A checkerboard with tags from id 17.
 fn squares(tags_in: TagsIn) -> BoardSpec {
-    let tags = TagSpec { first_id: 17, tags_in, ..TagSpec::for_grid(GridKind::Checker) };
+    let tags = TagSpec { first_id: 17, ..TagSpec::for_squares(tags_in) };
     BoardSpec { grid: GridKind::Checker, tags: Some(tags), ..spec() }
 }
 

@@ -25,7 +25,7 @@ fn deltille(folder: &Path, args: &str) -> std::process::Output {
 }
 
 fn spec(rows: u32, cols: u32, tags_in: TagsIn) -> BoardSpec {
-    let tags = Some(TagSpec { tags_in, ..TagSpec::for_grid(GridKind::Checker) });
+    let tags = Some(TagSpec::for_squares(tags_in));
     let (grid, edge_mm, boards, board_id) = (GridKind::Checker, 20.0, 1, 4);
     BoardSpec { grid, rows, cols, edge_mm, boards, board_id, tags, inverted: false }
 }
@@ -309,7 +309,7 @@ fn opencv_reads_the_tags() {
     for colour in ["black", "white"] {
         let args = format!(
             "checkerboard --rows 8 --cols 11 --edge 20mm --tags t36h11 --tags-in {colour} \
-             --first-id 300 --png --name {colour}"
+             --tag-border 1 --first-id 300 --png --name {colour}"
         );
         assert!(deltille(folder.path(), &args).status.success());
     }

@@ -12,9 +12,9 @@ const QUIET_EDGES: f64 = 0.25;
 /// The least quiet zone, mm: on fine boards text stays clear of the tiles for the eye as well.
 const QUIET_MIN_MM: f64 = 5.0;
 
-/// White between a white square and the border of the tag in it, bit-widths: what readers of
-/// AprilTags ask for around a tag.
-const TAG_MARGIN_BITS: f64 = 1.0;
+/// White between a white square and the border of the tag in it, bit-widths: readers of AprilTags ask
+/// for one, the corners of the square for as much clear of the tag as in a black one.
+const TAG_MARGIN_BITS: f64 = 2.0;
 
 impl Panel {
     /// Whether it is a single tag, with no corner of the lattice around it.

@@ -190,18 +190,22 @@ impl Default for TagSpec {
 }
 
 impl TagSpec {
-    /// Tags for tiles of `kind`; on a checkerboard aprilTag36h11 in every second row and column of
-    /// black squares, so that each corner touches one tag at most, with the border of one bit that
-    /// every reader of AprilTags knows.
-    pub fn for_grid(kind: GridKind) -> Self {
-        match kind {
-            GridKind::Deltille => Self::default(),
-            GridKind::Checker => Self {
-                family: "aprilTag36h11".to_owned(),
-                spacing: 2,
-                border_bits: LEAST_SQUARE_BORDER_BITS,
-                ..Self::default()
+    /// Tags for a checkerboard: aprilTag36h11 in every second row and column, so that each corner
+    /// touches one tag at most.
+    ///
+    /// In black squares the border has two bits: with one, cells come so near to the corners that
+    /// these are found half as precisely (docs/measurements.md). In white squares it has the one bit
+    /// that every reader of AprilTags knows.
+    pub fn for_squares(tags_in: TagsIn) -> Self {
+        Self {
+            family: "aprilTag36h11".to_owned(),
+            spacing: 2,
+            border_bits: match tags_in {
+                TagsIn::Black => 2.0,
+                TagsIn::White => LEAST_SQUARE_BORDER_BITS,
             },
+            tags_in,
+            ..Self::default()
         }
     }
 }

@@ -56,7 +56,7 @@ pub struct Settings {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
     /// Black border of a tag, in widths of a bit, 0.6 to 10, on a checkerboard at least 1
-    /// [default: 1.5, on a checkerboard 1]
+    /// [default: 1.5, in black squares 2, in white ones 1]
     #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = border)]
     tag_border: Option<f64>,
     /// Id of the first tag; the others follow [default: 0]
@@ -227,7 +227,10 @@ impl Settings {
         if grid == GridKind::Deltille && self.tags_in.is_some() {
             bail!("--tags-in: the tags of a deltille board are in its black tiles: leave it out");
         }
-        let default = TagSpec::for_grid(grid);
+        let default = match grid {
+            GridKind::Deltille => TagSpec::default(),
+            GridKind::Checker => TagSpec::for_squares(self.tags_in.unwrap_or_default()),
+        };
         let tagged = !self.untagged && (grid == GridKind::Deltille || self.family.is_some());
         let of_tags = [
             ("--tags-in", self.tags_in.is_some()),
