@@ -12,7 +12,7 @@ use deltille::detect::{Detector, DetectorConfig, Refinement};
 use deltille::family::Family;
 use deltille::raster::Gray;
 use deltille::synth::{Light, scene_of_sheet};
-use deltille::target::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::target::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
 use glam::DVec3;
 
 /// A board of 10 × 11 corners with tags, seen at 35°.
@@ -20,6 +20,7 @@ fn photograph() -> (Target, Family, Gray<u8>) {
     let tags = TagSpec::default();
     let family = Family::resolve(&tags.family).expect("a shipped family");
     let spec = BoardSpec {
+        grid: GridKind::Deltille,
         rows: 10,
         cols: 11,
         edge_mm: 20.0,

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use deltille::artwork::{self, Artwork, Paint, Part, Shape, Sheet};
 use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
-use deltille::lattice::{TagCells, Tile, Vertex};
-use deltille::target::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::lattice::Vertex;
+use deltille::target::{BoardSpec, GridKind, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
 use deltille::verify::{Finding, Verdict, Verifier};
 use kurbo::{Affine, BezPath, Point};
 use tempfile::TempDir;
@@ -30,6 +30,7 @@ const ALL: [Format; 3] = [Format::Pdf, Format::Svg, Format::Png];
 
 fn spec() -> BoardSpec {
     BoardSpec {
+        grid: GridKind::Deltille,
         rows: 5,
         cols: 7,
         edge_mm: 20.0,
@@ -40,8 +41,20 @@ fn spec() -> BoardSpec {
     }
 }
 
+/// A checkerboard with tags from id 17.
+fn squares(tags_in: TagsIn) -> BoardSpec {
+    let tags = TagSpec { first_id: 17, ..TagSpec::for_squares(tags_in) };
+    BoardSpec { grid: GridKind::Checker, tags: Some(tags), ..spec() }
+}
+
+/// A board of every kind.
+fn all_specs() -> [BoardSpec; 3] {
+    [spec(), squares(TagsIn::Black), squares(TagsIn::White)]
+}
+
 fn board(spec: BoardSpec) -> Board {
-    let family = Family::resolve("delTag25h7").unwrap();
+    let family = spec.tags.as_ref().map_or("delTag25h7", |tags| &tags.family);
+    let family = Family::resolve(family).unwrap();
     let spec = TargetSpec::Board(spec);
     let target = Target::build("b", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
     Board { target, family }
@@ -89,18 +102,16 @@ fn tile(artwork: &mut Artwork, (row, col): (i32, i32)) -> &mut Shape {
 fn flip(board: &Board, artwork: &mut Artwork, at: (i32, i32), bit: u32) {
     let (panel, placement) = (&board.target.panels[0], board.target.sheets[0].placements[0]);
     assert_eq!(placement.angle_rad, 0.0);
-    let cells = TagCells::new(board.family.dimension());
-    let [a, b, c] = Tile::upright(Vertex::new(at.0, at.1)).vertices().map(|v| {
-        let [x, y] = v.position();
-        let [ox, oy] = placement.origin_mm;
-        Point::new(x * panel.edge_mm + ox, y * panel.edge_mm + oy)
+    let [a, b, c] = panel.kind.tag_tile(Vertex::new(at.0, at.1)).frame().map(|v| {
+        let [x, y] = placement.page_from_panel(panel.lattice_mm(v));
+        Point::new(x, y)
     });
-    let corners = cells.corners(bit, panel.border_bits.unwrap());
-    let [p, q, r] = corners.map(|[u, v]| a + (b - a) * u + (c - a) * v);
+    let corners = board.family.cells().corners(bit, panel.tag_inset_bits());
     let mut path = BezPath::new();
-    path.move_to(p);
-    path.line_to(q);
-    path.line_to(r);
+    for (i, [u, v]) in corners.into_iter().enumerate() {
+        let point = a + (b - a) * u + (c - a) * v;
+        if i == 0 { path.move_to(point) } else { path.line_to(point) }
+    }
     path.close_path();
     tile(artwork, at).path.extend(path);
 }
@@ -130,43 +141,49 @@ fn assert_fails(verdict: &Verdict, reasons: &[&str]) {
 
 #[test]
 fn whole_sheets_pass_in_every_format() {
-    for (tagged, inverted) in [(true, false), (false, false), (true, true)] {
-        let tags = spec().tags.filter(|_| tagged);
-        let board = board(BoardSpec { tags, inverted, ..spec() });
-        for format in ALL {
-            let verdict = board.verify(&board.artwork(), format);
-            assert!(verdict.passed, "tagged {tagged}, inverted {inverted}: {verdict}");
-            let sheet = &verdict.sheets[0];
-            assert_eq!((sheet.corners_found, sheet.corners), (35, 35));
-            assert_eq!(sheet.tags_exact, board.target.panels[0].tags.len());
+    for spec in all_specs() {
+        for (tagged, inverted) in [(true, false), (false, false), (true, true), (false, true)] {
+            let tags = spec.tags.clone().filter(|_| tagged);
+            let spec = BoardSpec { tags, inverted, ..spec.clone() };
+            let board = board(spec.clone());
+            for format in ALL {
+                let verdict = board.verify(&board.artwork(), format);
+                assert!(verdict.passed, "{spec:?}: {verdict}");
+                let sheet = &verdict.sheets[0];
+                assert_eq!((sheet.corners_found, sheet.corners), (35, 35));
+                assert_eq!(sheet.tags_exact, board.target.panels[0].tags.len());
+                assert!(sheet.max_deviation_mm < 0.006, "{spec:?}: {verdict}");
+            }
         }
     }
 }
 
 #[test]
 fn swapped_tags_are_named() {
-    let board = board(spec());
-    let mut swapped = board.target.clone();
-    let tags = &mut swapped.panels[0].tags;
-    (tags[0].id, tags[1].id) = (tags[1].id, tags[0].id);
-    let artwork = artwork::draw(&swapped, Some(&board.family)).unwrap();
-    let (row, col) = board.tag(0);
-    let reason = format!("tag 17 at row {row} col {col} reads 18");
-    for format in ALL {
-        assert_fails(&board.verify(&artwork, format), &[&reason, "reads 17"]);
+    for board in all_specs().map(board) {
+        let mut swapped = board.target.clone();
+        let tags = &mut swapped.panels[0].tags;
+        (tags[0].id, tags[1].id) = (tags[1].id, tags[0].id);
+        let artwork = artwork::draw(&swapped, Some(&board.family)).unwrap();
+        let (row, col) = board.tag(0);
+        let reason = format!("tag 17 at row {row} col {col} reads 18");
+        for format in ALL {
+            assert_fails(&board.verify(&artwork, format), &[&reason, "reads 17"]);
+        }
     }
 }
 
 #[test]
 fn a_flipped_cell_is_found_although_decoding_would_correct_it() {
-    let board = board(spec());
-    let at = board.tag(1);
-    for bit in [0, 12, 24] {
-        let mut artwork = board.artwork();
-        flip(&board, &mut artwork, at, bit);
-        for format in ALL {
-            let reason = format!("tag 18 at row {} col {} damaged: 1 bit differs", at.0, at.1);
-            assert_fails(&board.verify(&artwork, format), &[&reason]);
+    for board in all_specs().map(board) {
+        let at = board.tag(1);
+        for bit in [0, 12, 24] {
+            let mut artwork = board.artwork();
+            flip(&board, &mut artwork, at, bit);
+            for format in ALL {
+                let reason = format!("tag 18 at row {} col {} damaged: 1 bit differs", at.0, at.1);
+                assert_fails(&board.verify(&artwork, format), &[&reason]);
+            }
         }
     }
 }
@@ -225,15 +242,15 @@ fn a_mirrored_page_is_named() {
 
 #[test]
 fn a_deleted_tile_is_named() {
-    for tags in [spec().tags, None] {
-        let board = board(BoardSpec { tags, ..spec() });
+    let plain = all_specs().map(|spec| BoardSpec { tags: None, ..spec });
+    for board in all_specs().into_iter().chain(plain).map(board) {
         let mut artwork = board.artwork();
-        let path = &mut tile(&mut artwork, (2, 3)).path;
+        let path = &mut tile(&mut artwork, (1, 3)).path;
         *path = BezPath::new();
         artwork.sheets[0].shapes.retain(|shape| !shape.path.is_empty());
         for format in ALL {
             let verdict = board.verify(&artwork, format);
-            assert_fails(&verdict, &["tile missing at row 2 col 3", "at row 2 col 3 not found"]);
+            assert_fails(&verdict, &["tile missing at row 1 col 3", "at row 1 col 3 not found"]);
         }
     }
 }

@@ -35,6 +35,7 @@ impl Board {
         let bits_across = f64::from(family.dimension().rows()) + 3.0 * tags.border_bits;
         let tags = Some(tags);
         let spec = BoardSpec {
+            grid: deltille::target::GridKind::Deltille,
             rows: 6,
             cols: 7,
             edge_mm: EDGE_MM,

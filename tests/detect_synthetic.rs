@@ -8,7 +8,7 @@ use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::family::Family;
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Truth, scene_of_sheet};
-use deltille::target::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::target::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
 use glam::DVec3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -22,8 +22,16 @@ struct Board {
 
 fn board(tags: Option<TagSpec>, inverted: bool) -> Board {
     let family = tags.as_ref().map(|tags| Family::resolve(&tags.family).unwrap());
-    let spec =
-        BoardSpec { rows: 8, cols: 9, edge_mm: 18.0, boards: 1, board_id: 4, tags, inverted };
+    let spec = BoardSpec {
+        grid: GridKind::Deltille,
+        rows: 8,
+        cols: 9,
+        edge_mm: 18.0,
+        boards: 1,
+        board_id: 4,
+        tags,
+        inverted,
+    };
     let paper = PaperSpec::default();
     let target =
         Target::build("board", &TargetSpec::Board(spec), family.as_ref(), Some(&paper)).unwrap();

@@ -7,13 +7,22 @@ use deltille::family::Family;
 use deltille::lattice::Vertex;
 use deltille::target::{
     BoardSpec, Corner, GridKind, ListFormat, Outline, Panel, PanelPose, TagPlacement, TagSpec,
-    Target, TargetSpec,
+    TagsIn, Target, TargetSpec,
 };
 use proptest::prelude::*;
 
 fn board(rows: u32, cols: u32, edge_mm: f64, boards: u32) -> Target {
     let tags = Some(TagSpec::default());
-    let spec = BoardSpec { rows, cols, edge_mm, boards, board_id: 5, tags, inverted: false };
+    let spec = BoardSpec {
+        grid: GridKind::Deltille,
+        rows,
+        cols,
+        edge_mm,
+        boards,
+        board_id: 5,
+        tags,
+        inverted: false,
+    };
     let family = Family::resolve("delTag25h7").unwrap();
     Target::build("board", &TargetSpec::Board(spec), Some(&family), None).unwrap()
 }
@@ -26,6 +35,7 @@ fn face(side: i32, pose: PanelPose) -> Target {
         kind: GridKind::Deltille,
         edge_mm: 10.0,
         border_bits: Some(1.5),
+        tags_in: TagsIn::Black,
         inverted: false,
         outline: Outline::Touching,
         matrix: [side as u32; 2],

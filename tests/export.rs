@@ -7,7 +7,7 @@ use deltille::artwork::{self, Artwork, Paint, Part, Shape};
 use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
 use deltille::raster::{AnyGray, Gray, io};
-use deltille::target::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::target::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
 use deltille::verify::Document;
 use kurbo::BezPath;
 use lopdf::Object;
@@ -15,6 +15,7 @@ use tempfile::TempDir;
 
 fn tiny(inverted: bool) -> Artwork {
     let spec = BoardSpec {
+        grid: GridKind::Deltille,
         rows: 2,
         cols: 3,
         edge_mm: 20.0,

@@ -24,6 +24,7 @@ static DETECTORS: LazyLock<Vec<(&str, Detector)>> = LazyLock::new(|| {
     let tags = TagSpec::default();
     let family = Family::resolve(&tags.family).unwrap();
     let spec = BoardSpec {
+        grid: GridKind::Deltille,
         rows: 10,
         cols: 11,
         edge_mm: 20.0,

@@ -14,6 +14,7 @@ fn board() -> (Target, Family) {
     let tags = TagSpec::default();
     let family = Family::resolve(&tags.family).unwrap();
     let spec = BoardSpec {
+        grid: GridKind::Deltille,
         rows: 5,
         cols: 6,
         edge_mm: 20.0,

@@ -68,7 +68,9 @@ fn corners_are_where_the_truth_says_to_a_five_hundredth_of_a_pixel() {
         let truth = scene.truth(&camera, &pose, 10.0);
         for corner in truth.corners.iter().step_by(7) {
             let panel = &target.panels[corner.panel as usize];
-            let around = Tile::upright_around(Vertex::new(corner.row, corner.col));
+            let vertex = Vertex::new(corner.row, corner.col);
+            let around: Vec<Tile> =
+                panel.kind.tiles_around(vertex).filter(|tile| tile.is_dark()).collect();
             let tagged =
                 |tile: &Tile| panel.tags.iter().any(|t| Vertex::new(t.row, t.col) == tile.anchor);
             if around.iter().any(tagged) {
@@ -78,7 +80,8 @@ fn corners_are_where_the_truth_says_to_a_five_hundredth_of_a_pixel() {
                 let at = panel.pose.target_from_panel(panel.lattice_mm(v));
                 DVec2::from(camera.project(pose.apply(DVec3::from(at))).unwrap())
             };
-            let tiles = around.map(|tile| tile.vertices().map(pixel));
+            let tiles = around.iter().map(|tile| tile.frame().map(pixel));
+            let tiles: Vec<_> = tiles.collect();
             let [cx, cy] = [corner.x.round(), corner.y.round()];
             for (x, y) in
                 (-2..=2).flat_map(|y| (-2..=2).map(move |x| (cx + f64::from(x), cy + f64::from(y))))
@@ -195,7 +198,7 @@ fn hidden_parts_of_a_concave_solid_are_hidden() {
                 let anchor = Vertex::new(row.floor() as i32, col.floor() as i32);
                 let upright = row - row.floor() + col - col.floor() < 1.0;
                 let tile = if upright { Tile::upright(anchor) } else { Tile::inverted(anchor) };
-                let black = panel.upright_tiles().contains(&tile);
+                let black = panel.dark_tiles().contains(&tile);
                 let tagged = panel.tags.iter().any(|t| Vertex::new(t.row, t.col) == anchor);
                 let value = if black { light.black } else { light.white };
                 (!(black && tagged)).then_some((value, Some((face, tile))))

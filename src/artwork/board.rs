@@ -1,9 +1,13 @@
+use std::collections::BTreeMap;
+
 use kurbo::{Affine, BezPath, Point, Rect};
 
 use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_mm, text, window};
 use crate::family::Family;
-use crate::lattice::{ROW_HEIGHT, TagCells, Tile};
-use crate::target::{Panel, Placement, SheetLayout, SheetPage, SheetText, Target};
+use crate::lattice::{TagCells, Tile};
+use crate::target::{
+    Panel, Placement, SheetLayout, SheetPage, SheetText, TagPlacement, TagsIn, Target,
+};
 
 /// The shapes of sheet `index` of a target.
 pub(super) fn sheet(
@@ -83,36 +87,39 @@ pub(super) fn draw_panel(
 ) -> Result<Vec<Shape>, ArtworkError> {
     let page_from_panel = Affine::translate((placement.origin_mm[0], placement.origin_mm[1]))
         * Affine::rotate(placement.angle_rad);
-    let tiles = panel.upright_tiles();
-    let mut paths = Vec::with_capacity(tiles.len());
-    for tile in tiles {
-        let path = tile_path(panel, tile, tag_word(target, panel, tile, family)?);
-        paths.push((tile, page_from_panel * path));
+    let mut drawn: BTreeMap<Tile, BezPath> =
+        panel.dark_tiles().into_iter().map(|tile| (tile, tile_outline(panel, tile, 0.0))).collect();
+    for tag in &panel.tags {
+        let (cells, word) = tag_word(target, tag, family)?;
+        let tile = panel.tag_tile(tag);
+        if panel.tags_in == TagsIn::White {
+            let margin = panel.tag_margin_bits() / cells.width(panel.tag_inset_bits());
+            drawn.insert(tile, tile_outline(panel, tile, margin));
+        }
+        let path = drawn.entry(tile).or_default();
+        tag_outlines(&cells, word, panel.tag_inset_bits())
+            .for_each(|outline| path.extend(in_tile(panel, tile, outline)));
     }
+    let paths = drawn.into_iter().map(|(tile, path)| (tile, page_from_panel * path));
     if panel.inverted {
         let mut field = page_from_panel * rectangle(panel.field_mm());
-        paths.into_iter().for_each(|(_, path)| field.extend(path));
+        paths.for_each(|(_, path)| field.extend(path));
         let part = Part::Field { panel: panel.id };
         return Ok(vec![Shape { part, paint: Paint::Fill, path: field }]);
     }
-    let shapes = paths.into_iter().map(|(tile, path)| {
+    let shapes = paths.map(|(tile, path)| {
         let (row, col) = (tile.anchor.row, tile.anchor.col);
         Shape { part: Part::Tile { panel: panel.id, row, col }, paint: Paint::Fill, path }
     });
     Ok(shapes.collect())
 }
 
-/// Cells and code of the tag in a tile, if it has one.
+/// Cells and code of a tag.
 fn tag_word(
     target: &Target,
-    panel: &Panel,
-    tile: Tile,
+    tag: &TagPlacement,
     family: Option<&Family>,
-) -> Result<Option<(TagCells, u64)>, ArtworkError> {
-    let anchor = tile.anchor;
-    let Some(tag) = panel.tags.iter().find(|t| (t.row, t.col) == (anchor.row, anchor.col)) else {
-        return Ok(None);
-    };
+) -> Result<(TagCells, u64), ArtworkError> {
     let Some(family) = family else {
         let name = target.family.as_ref().map_or_else(String::new, |f| f.name.clone());
         return Err(ArtworkError::FamilyMissing(name));
@@ -124,26 +131,26 @@ fn tag_word(
         family: family.name().to_owned(),
         len: family.len(),
     })?;
-    Ok(Some((TagCells::new(family.dimension()), word)))
+    Ok((family.cells(), word))
 }
 
-/// A tile's outline with the outlines of its tag's white areas, in the panel frame, mm.
-fn tile_path(panel: &Panel, tile: Tile, tag: Option<(TagCells, u64)>) -> BezPath {
-    let edge = panel.edge_mm;
-    let mut path = polygon(tile.vertices().map(|v| {
-        let [x, y] = v.position();
-        Point::new(x * edge, y * edge)
-    }));
-    if let Some((cells, word)) = tag {
-        let border = panel.border_bits.unwrap_or_default();
-        tag_outlines(&cells, word, border).for_each(|outline| {
-            path.extend(polygon(outline.into_iter().map(|[u, v]| {
-                let (row, col) = (f64::from(tile.anchor.row) + v, f64::from(tile.anchor.col) + u);
-                Point::new((col + row / 2.0) * edge, row * ROW_HEIGHT * edge)
-            })));
-        });
-    }
-    path
+/// A polygon given in the coordinates of a tile, in the panel frame, mm.
+fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = [f64; 2]>) -> BezPath {
+    let (row, col) = (f64::from(tile.anchor.row), f64::from(tile.anchor.col));
+    polygon(outline.into_iter().map(|[u, v]| {
+        let [x, y] = panel.kind.position(row + v, col + u);
+        Point::new(x * panel.edge_mm, y * panel.edge_mm)
+    }))
+}
+
+/// The outline of a dark tile, or of a square, moved inside by a part of its edge.
+fn tile_outline(panel: &Panel, tile: Tile, inside: f64) -> BezPath {
+    let [u, v] = panel.kind.middle();
+    let left = 1.0 - panel.kind.insets() * inside;
+    let corners = tile.vertices().map(|vertex| vertex - tile.anchor);
+    let moved =
+        corners.map(|c| [u + left * (f64::from(c.col) - u), v + left * (f64::from(c.row) - v)]);
+    in_tile(panel, tile, moved)
 }
 
 /// The outlines of a tag's white areas in tile coordinates (u along the lower edge, v along the
@@ -151,10 +158,10 @@ fn tile_path(panel: &Panel, tile: Tile, tag: Option<(TagCells, u64)>) -> BezPath
 pub(super) fn tag_outlines(
     cells: &TagCells,
     word: u64,
-    border: f64,
+    inset: f64,
 ) -> impl Iterator<Item = Vec<[f64; 2]>> {
-    let width = f64::from(cells.dimension().rows()) + 3.0 * border;
-    let at = move |cell: i32| (border + f64::from(cell)) / width;
+    let width = cells.width(inset);
+    let at = move |cell: i32| (inset + f64::from(cell)) / width;
     cells::white_outlines(cells, word)
         .into_iter()
         .map(move |outline| outline.into_iter().map(|v| [at(v.col), at(v.row)]).collect())

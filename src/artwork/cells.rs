@@ -1,8 +1,9 @@
 use std::collections::BTreeMap;
 
-use crate::lattice::{TagCells, Tile, Vertex};
+use crate::lattice::{GridKind, TagCells, Tile, Vertex};
 
-/// The outlines of a tag's white areas, as vertices of the lattice of its cells.
+/// The outlines of a tag's white areas, as vertices of the lattice of its cells, triangles or
+/// squares.
 ///
 /// ```text
 ///      ·───·───·            White cells that share an edge form one area. Its outline runs with
@@ -11,31 +12,33 @@ use crate::lattice::{TagCells, Tile, Vertex};
 ///   ╱ ╲ ╱ ╲w╱ ╲ ╱ ╲         is simple, and filling all of them by the even-odd rule is exact.
 /// ```
 ///
-/// A vertex (row, col) lies at tile coordinates u = (border + col) / width, v = (border + row) /
-/// width, width = d + 3·border. Vertices on a straight run are left out. The order of the loops is
+/// A vertex (row, col) lies at tile coordinates u = (inset + col) / width, v = (inset + row) /
+/// width, with the width of [`TagCells::width`]. Vertices on a straight run are left out. The order of the loops is
 /// fixed.
 pub fn white_outlines(cells: &TagCells, word: u64) -> Vec<Vec<Vertex>> {
     let mut edges = boundary_edges(cells, word);
     let mut loops = Vec::new();
     while let Some((&start, directions)) = edges.first_key_value() {
         let first = (start, directions[0]);
-        trace(&mut edges, first, &mut loops);
+        trace(cells.kind(), &mut edges, first, &mut loops);
     }
     loops
 }
 
 /// Edges between white and black, white on the left: from each vertex the directions, as indices
-/// into [`Vertex::STEPS`], in ascending order.
+/// into [`GridKind::steps`], in ascending order.
 fn boundary_edges(cells: &TagCells, word: u64) -> BTreeMap<Vertex, Vec<usize>> {
     let white = cells.cells().iter().enumerate().filter(|&(bit, _)| word >> bit & 1 == 1);
     let mut edges = BTreeMap::<Vertex, Vec<usize>>::new();
     for (_, cell) in white {
         let anchor = Vertex::new(cell.row as i32, cell.col as i32);
-        let tile = if cell.upright { Tile::upright(anchor) } else { Tile::inverted(anchor) };
-        let [a, b, c] = tile.vertices();
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            if !remove(&mut edges, to, direction(to, from)) {
-                edges.entry(from).or_default().push(direction(from, to));
+        let kind = cells.kind();
+        let tile = if cell.upright { kind.tag_tile(anchor) } else { Tile::inverted(anchor) };
+        let vertices = tile.vertices();
+        let ends = vertices.clone().cycle().skip(1);
+        for (from, to) in vertices.zip(ends) {
+            if !remove(&mut edges, to, direction(kind, to, from)) {
+                edges.entry(from).or_default().push(direction(kind, from, to));
             }
         }
     }
@@ -43,9 +46,9 @@ fn boundary_edges(cells: &TagCells, word: u64) -> BTreeMap<Vertex, Vec<usize>> {
     edges
 }
 
-fn direction(from: Vertex, to: Vertex) -> usize {
+fn direction(kind: GridKind, from: Vertex, to: Vertex) -> usize {
     let step = to - from;
-    Vertex::STEPS.iter().position(|&s| s == step).expect("cell edges join neighbours")
+    kind.steps().iter().position(|&s| s == step).expect("cell edges join neighbours")
 }
 
 fn remove(edges: &mut BTreeMap<Vertex, Vec<usize>>, from: Vertex, direction: usize) -> bool {
@@ -62,6 +65,7 @@ fn remove(edges: &mut BTreeMap<Vertex, Vec<usize>>, from: Vertex, direction: usi
 /// that stays on the white area it started on where several meet. Each time the walk comes to a
 /// vertex for the second time, what lies between is cut off as a loop of its own.
 fn trace(
+    kind: GridKind,
     edges: &mut BTreeMap<Vertex, Vec<usize>>,
     (start, first): (Vertex, usize),
     loops: &mut Vec<Vec<Vertex>>,
@@ -69,14 +73,16 @@ fn trace(
     let mut steps = vec![(start, first)];
     while let Some(&(from, heading)) = steps.last() {
         remove(edges, from, heading);
-        let at = from + Vertex::STEPS[heading];
+        let at = from + kind.steps()[heading];
         if let Some(again) = steps.iter().position(|&(vertex, _)| vertex == at) {
             loops.push(bends(&steps.split_off(again)));
             if steps.is_empty() {
                 break;
             }
         }
-        let left_first = [2, 1, 0, 5, 4].map(|turn| (heading + turn) % 6);
+        // All headings but the way back.
+        let full = kind.steps().len();
+        let left_first = (1..full).map(|right| (heading + full / 2 + full - right) % full);
         let next = left_first.into_iter().find(|turn| edges[&at].contains(turn));
         steps.push((at, next.expect("as many outlines leave a vertex as reach it")));
     }
@@ -96,7 +102,7 @@ mod tests {
     use super::*;
     use crate::lattice::Dimension;
 
-    /// Twice the signed area in cells: a cell has area 1.
+    /// The signed area of which a triangular cell has 1, a square one 2.
     fn area(outline: &[Vertex]) -> i32 {
         let next = outline.iter().cycle().skip(1);
         outline.iter().zip(next).map(|(a, b)| a.col * b.row - a.row * b.col).sum()
@@ -122,12 +128,15 @@ mod tests {
     proptest! {
         /// The loops enclose exactly the white cells, each runs through a vertex once.
         #[test]
-        fn loops_are_simple_and_enclose_the_white_cells(bits in 3u32..8, seed: u64) {
-            let cells = cells(bits * bits);
+        fn loops_are_simple_and_enclose_the_white_cells(
+            bits in 3u32..8, seed: u64, square: bool,
+        ) {
+            let kind = if square { GridKind::Checker } else { GridKind::Deltille };
+            let cells = TagCells::of(kind, Dimension::from_bits(bits * bits).unwrap());
             let word = seed & cells.dimension().mask();
             let outlines = white_outlines(&cells, word);
             let total: i32 = outlines.iter().map(|l| area(l)).sum();
-            prop_assert_eq!(total, word.count_ones() as i32);
+            prop_assert_eq!(total, word.count_ones() as i32 * if square { 2 } else { 1 });
             for outline in &outlines {
                 let mut sorted = outline.clone();
                 sorted.sort();

@@ -24,7 +24,7 @@ mod window;
 use kurbo::BezPath;
 
 use crate::family::Family;
-use crate::target::{LineKind, Panel, Placement, SheetText, Target};
+use crate::target::{GridKind, LineKind, Panel, Placement, SheetText, Target};
 
 pub use atlas::Atlas;
 pub use cells::white_outlines;
@@ -81,7 +81,8 @@ pub enum Paint {
 /// What a shape is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
-    /// A black tile of a panel with the holes of its tag, named by panel id and lower-left vertex.
+    /// A black tile of a panel with the holes of its tag, or a tag in a white square, named by panel
+    /// id and lower-left vertex.
     Tile {
         /// Panel id.
         panel: u32,
@@ -186,7 +187,13 @@ fn subject(target: &Target) -> String {
     let plural = if tags == 1 { "" } else { "s" };
     let what = match corners {
         0 => "single DelTags".to_owned(),
-        _ => format!("deltille calibration target, {corners} corners"),
+        _ => {
+            let kind = match target.panels.first().map(|panel| panel.kind) {
+                Some(GridKind::Checker) => "checkerboard",
+                _ => "deltille",
+            };
+            format!("{kind} calibration target, {corners} corners")
+        }
     };
     let mut subject = format!("{what}, {tags} tag{plural}");
     if let Some(family) = &target.family {

@@ -8,7 +8,8 @@
 //!     4 ╲────────╱ 5
 //! ```
 //!
-//! On a checkerboard the four squares around a corner are bounded by its eight neighbours.
+//! On a checkerboard the four squares around a corner are bounded by its eight neighbours, with tags
+//! in them by the lines that join the four nearest.
 
 use std::collections::BTreeMap;
 
@@ -20,16 +21,21 @@ const HEXAGON: [(i32, i32); 6] = [(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1
 const SQUARE: [(i32, i32); 8] =
     [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)];
 
+/// The nearest neighbours on a checkerboard: between them lie the diagonals of the squares.
+const DIAMOND: [(i32, i32); 4] = [(0, 1), (1, 0), (0, -1), (-1, 0)];
+
 /// Blur of the next edges reaches this far into the clear, px: two standard deviations at 1 px.
 const BLUR_MARGIN_PX: f64 = 2.0;
 
 /// Half the side of the largest clear square around every corner of a grid, px, in their order.
 ///
-/// `part` is the part of the way to the far side of a tile where its tag begins, 1 without tags.
+/// `part` is the part of the way to the far side of a triangle, or to the diagonal of a square,
+/// where its tag begins, 1 without tags.
 /// A corner with no two neighbours in turn has none: 0.
 pub fn clear_squares(grid: &Grid, part: f64) -> Vec<f64> {
     let steps: &[(i32, i32)] = match grid.kind {
         GridKind::Deltille => &HEXAGON,
+        GridKind::Checker if part < 1.0 => &DIAMOND,
         GridKind::Checker => &SQUARE,
     };
     let places: BTreeMap<(i32, i32), [f64; 2]> =

@@ -13,24 +13,15 @@ use super::refine::{Refinement, Refiner};
 use super::saddles::SaddleFinder;
 use super::tiling::{CHECKER, DELTILLE, kind};
 use crate::family::Family;
-use crate::lattice::{TagCells, Vertex};
+use crate::lattice::{GridKind, Vertex};
 use crate::raster::{AnyGray, Gray, Intensity, Pyramid};
-use crate::target::{GridKind, Target, zigzag_vertices};
+use crate::target::{Panel, TagsIn, Target, least_untagged_corners, zigzag_vertices};
 
 /// Levels of the pyramid: the coarsest sees four times the blur that the finest can.
 const PYRAMID_LEVELS: usize = 3;
 
 /// A level narrower than this shows no grid.
 const MIN_LEVEL_SIDE: usize = 24;
-
-/// Fewest corners of a grid that no tag vouches for: a hexagon of triangles, or four squares. A quad
-/// or two of random texture may pass for tiles, twelve clean edges between so few corners do not.
-const fn min_untagged_corners(kind: GridKind) -> usize {
-    match kind {
-        GridKind::Deltille => 7,
-        GridKind::Checker => 9,
-    }
-}
 
 /// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
 /// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
@@ -79,6 +70,15 @@ enum Finder {
     Checker(SaddleFinder<CHECKER>),
 }
 
+impl Finder {
+    fn of(kind: GridKind) -> Self {
+        match kind {
+            GridKind::Deltille => Self::Deltille(SaddleFinder::new()),
+            GridKind::Checker => Self::Checker(SaddleFinder::new()),
+        }
+    }
+}
+
 /// How corners get absolute labels.
 #[derive(Clone, Debug)]
 enum Labels {
@@ -96,6 +96,9 @@ enum Labels {
 #[derive(Clone, Debug)]
 struct TargetPanel {
     id: u32,
+    kind: GridKind,
+    /// Rows and columns.
+    size: (u32, u32),
     inverted: bool,
     tagged: bool,
     corner_ids: BTreeMap<Vertex, u32>,
@@ -117,14 +120,15 @@ impl Detector {
             (Some(size), GridKind::Checker) => Labels::Rectangle(size),
             (None, _) => Labels::None,
         };
-        let finder = match kind {
-            GridKind::Deltille => Finder::Deltille(SaddleFinder::new()),
-            GridKind::Checker => Finder::Checker(SaddleFinder::new()),
-        };
-        Self { finder, refiner: refiner(kind, config), clear_part: 1.0, labels }
+        let refiner = refiner(kind, config);
+        Self { finder: Finder::of(kind), refiner, clear_part: 1.0, labels }
     }
 
-    /// A detector of a target; `family` is the family that the target names.
+    /// A detector of a target, whose panels are of one kind; `family` is the family that the target
+    /// names.
+    ///
+    /// An untagged panel is labelled where it is seen whole and nothing else of the target looks so;
+    /// see [`Self::for_grid`] for which corner of a checkerboard is the first then.
     pub fn for_target(target: &Target, family: Option<&Family>, config: DetectorConfig) -> Self {
         let tags = family.and_then(|family| {
             let max_errors = config.max_bit_errors.unwrap_or(family.correctable());
@@ -132,15 +136,16 @@ impl Detector {
         });
         let panels = target.panels.iter().map(|panel| TargetPanel {
             id: panel.id,
+            kind: panel.kind,
+            size: (panel.matrix[1], panel.matrix[0]),
             inverted: panel.inverted,
             tagged: !panel.tags.is_empty(),
             corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
         });
         let labels = Labels::Target { tags, panels: panels.collect() };
         let clear_part = family.map_or(1.0, |family| clear_part(target, family));
-        let refiner = refiner(GridKind::Deltille, config);
-        let finder = Finder::Deltille(SaddleFinder::new());
-        Self { finder, refiner, clear_part, labels }
+        let kind = target.panels.first().map_or(GridKind::Deltille, |panel| panel.kind);
+        Self { finder: Finder::of(kind), refiner: refiner(kind, config), clear_part, labels }
     }
 
     /// Finds grids in one image; `name` is only noted in the result.
@@ -167,7 +172,7 @@ impl Detector {
         let mut grids: Vec<Grid> =
             found.iter().flat_map(|grid| self.labelled_grids(image, grid)).collect();
         grids.iter_mut().for_each(|grid| grid.kind = kind::<N>());
-        let least = min_untagged_corners(kind::<N>());
+        let least = least_untagged_corners(kind::<N>()) as usize;
         grids.retain(|grid| {
             let plausible = grid.corners.len() >= least && !self.labels.exceeded_by(grid);
             !grid.tags.is_empty() || plausible && median_edge_px(grid) >= MIN_UNTAGGED_EDGE_PX
@@ -212,8 +217,10 @@ impl Detector {
                 }
                 None => vec![unlabelled(grid)],
             },
-            Labels::Rectangle(size) => match fit_rectangle(grid, *size) {
-                Some(map) => vec![relabelled(grid, |v| Some((map(v), None)), None, Vec::new())],
+            Labels::Rectangle(size) => match fit_rectangle(grid, *size, false) {
+                Some(map) => {
+                    vec![relabelled(grid, |v| Some((map.apply(v), None)), None, Vec::new())]
+                }
                 None => vec![unlabelled(grid)],
             },
             Labels::Target { tags, panels } => {
@@ -265,17 +272,18 @@ fn refiner(kind: GridKind, config: DetectorConfig) -> Refiner {
     Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
 }
 
-/// Part of the way from a corner to the far side of a tile where the nearest tag cell begins.
+/// Part of the way from a corner to the line between its two neighbours on a tile where the tag in
+/// it begins: u + v of the nearest point of the cells, or of a border in a white square.
 fn clear_part(target: &Target, family: &Family) -> f64 {
-    let cells = TagCells::new(family.dimension());
-    let nearest = |border: f64| {
-        (0..family.dimension().bits())
-            .flat_map(|bit| cells.corners(bit, border))
-            .map(|[u, v]| u + v)
-            .fold(1.0, f64::min)
+    let cells = family.cells();
+    let begins = |panel: &Panel| {
+        let at = match panel.tags_in {
+            TagsIn::Black => panel.tag_inset_bits(),
+            TagsIn::White => panel.tag_margin_bits(),
+        };
+        2.0 * at / cells.width(panel.tag_inset_bits())
     };
-    let tagged = target.panels.iter().filter(|panel| !panel.tags.is_empty());
-    tagged.map(|panel| nearest(panel.border_bits.unwrap_or(1.0))).fold(1.0, f64::min)
+    target.panels.iter().filter(|panel| !panel.tags.is_empty()).map(begins).fold(1.0, f64::min)
 }
 
 fn unlabelled(grid: &SaddleGrid) -> Grid {
@@ -293,8 +301,14 @@ fn on_panel(grid: &SaddleGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid
 /// The grid on the one untagged panel whose outline it fills.
 fn on_untagged_panel(grid: &SaddleGrid, panels: &[TargetPanel]) -> Option<Grid> {
     let mut fitting = panels.iter().filter(|panel| !panel.tagged).filter_map(|panel| {
-        let outline = panel.corner_ids.keys().copied().collect();
-        Some((panel, fit_outline(grid, &outline, panel.inverted)?))
+        let map = match panel.kind {
+            GridKind::Deltille => {
+                let outline = panel.corner_ids.keys().copied().collect();
+                fit_outline(grid, &outline, panel.inverted)
+            }
+            GridKind::Checker => fit_rectangle(grid, panel.size, panel.inverted),
+        };
+        Some((panel, map?))
     });
     let (panel, map) = fitting.next()?;
     if fitting.next().is_some() {

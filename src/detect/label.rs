@@ -9,9 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::detection::DecodedTag;
 use super::grow::SaddleGrid;
-use super::tags::{Reading, TagReader};
+use super::tags::{Reading, TagPlace, TagReader};
 use crate::family::{Family, ball};
-use crate::lattice::{LatticeMap, Orientation, Tile, Vertex};
+use crate::lattice::{GridKind, LatticeMap, Orientation, Tile, Vertex};
 use crate::raster::{Gray, Intensity};
 use crate::target::{Panel, Target};
 
@@ -36,6 +36,7 @@ pub struct Labelled {
 /// Labels grids with the panels of a tagged target.
 #[derive(Clone, Debug)]
 pub struct TagLabeller {
+    kind: GridKind,
     readers: Vec<TagReader>,
     family: String,
     codes: BTreeMap<u32, u64>,
@@ -46,7 +47,7 @@ pub struct TagLabeller {
 
 #[derive(Clone, Debug)]
 struct LabelPanel {
-    /// Index into the readers, by border width.
+    /// Index into the readers, by where tags lie in their tiles.
     reader: usize,
     corners: BTreeSet<Vertex>,
     tags: BTreeMap<Tile, u32>,
@@ -55,18 +56,17 @@ struct LabelPanel {
 impl TagLabeller {
     /// A labeller for the tags of `target`; `None` when it has no tags.
     pub fn new(target: &Target, family: &Family, max_errors: u32) -> Option<Self> {
-        let mut borders: Vec<f64> = Vec::new();
+        let mut tag_places: Vec<TagPlace> = Vec::new();
         let mut places: BTreeMap<u32, Vec<(usize, Tile)>> = BTreeMap::new();
         let mut panels = Vec::new();
         for (index, panel) in target.panels.iter().enumerate() {
-            let border = panel.border_bits.unwrap_or(1.0);
-            let reader = borders.iter().position(|&b| b == border).unwrap_or_else(|| {
-                borders.push(border);
-                borders.len() - 1
+            let place = TagPlace::of(panel);
+            let reader = tag_places.iter().position(|&p| p == place).unwrap_or_else(|| {
+                tag_places.push(place);
+                tag_places.len() - 1
             });
-            let tile = |row, col| Tile::upright(Vertex::new(row, col));
             let tags: BTreeMap<Tile, u32> =
-                panel.tags.iter().map(|tag| (tile(tag.row, tag.col), tag.id)).collect();
+                panel.tags.iter().map(|tag| (panel.tag_tile(tag), tag.id)).collect();
             for (&tile, &id) in &tags {
                 places.entry(id).or_default().push((index, tile));
             }
@@ -77,8 +77,9 @@ impl TagLabeller {
             .filter_map(|&id| Some((id, family.code(id)?)))
             .collect::<BTreeMap<_, _>>();
         let readers =
-            borders.iter().map(|&border| TagReader::new(family, border, max_errors)).collect();
+            tag_places.iter().map(|&place| TagReader::new(family, place, max_errors)).collect();
         (!codes.is_empty()).then_some(Self {
+            kind: family.kind(),
             readers,
             family: family.name().to_owned(),
             codes,
@@ -105,7 +106,7 @@ impl TagLabeller {
 
     /// The proposal with the most evidence among the corners not yet labelled.
     fn best(&self, readings: &[BTreeMap<Tile, Reading>], grid: &SaddleGrid) -> Option<Labelled> {
-        let available = |tile: Tile| tile.vertices().iter().all(|vertex| grid.contains_key(vertex));
+        let available = |tile: Tile| tile.vertices().all(|vertex| grid.contains_key(&vertex));
         let mut proposals: BTreeSet<(usize, LatticeMap)> = BTreeSet::new();
         let mut tiles = 0;
         for (reader, readings) in readings.iter().enumerate() {
@@ -120,7 +121,7 @@ impl TagLabeller {
                 }
             }
         }
-        let ways = (3 * tiles * self.codes.len()).max(1);
+        let ways = (usize::from(self.kind.turns()) * tiles * self.codes.len()).max(1);
         let (evidence, panel, map) = proposals
             .into_iter()
             .map(|(panel, map)| {
@@ -165,8 +166,8 @@ impl TagLabeller {
         let grid_from_panel = panel_from_grid.inverse();
         self.panels[panel].tags.iter().map(move |(&tile, &id)| {
             let on_grid = grid_from_panel.apply_tile(tile);
-            let a = grid_from_panel.apply(tile.vertices()[0]);
-            let turns = on_grid.vertices().iter().position(|&v| v == a).unwrap_or(0);
+            let a = grid_from_panel.apply(tile.frame()[0]);
+            let turns = on_grid.vertices().position(|v| v == a).unwrap_or(0);
             (on_grid, id, turns as u8)
         })
     }
@@ -195,7 +196,7 @@ impl TagLabeller {
         let max_errors = self.readers[*reader].max_errors();
         let mut tags: Vec<DecodedTag> = self
             .expected(panel, map)
-            .filter(|(tile, ..)| tile.vertices().iter().all(|v| grid.contains_key(v)))
+            .filter(|(tile, ..)| tile.vertices().all(|v| grid.contains_key(&v)))
             .filter_map(|(tile, id, turns)| {
                 let errors = self.errors(readings[*reader].get(&tile)?, id, turns);
                 let Vertex { row, col } = map.apply_tile(tile).anchor;
@@ -213,12 +214,15 @@ pub fn panel_vertices(panel: &Panel) -> BTreeSet<Vertex> {
     panel.corners.iter().map(|corner| Vertex::new(corner.row, corner.col)).collect()
 }
 
-/// The motion that takes the grid tile to the panel's upright `tile` when the tag in it is turned
-/// counter-clockwise `turns` times by 120° against the grid.
+/// The motion that takes the grid tile to the panel's `tile` when the tag in it is turned
+/// counter-clockwise `turns` times, by 120° or 90°, against the grid.
 fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
     // The tag's lower-left vertex lies on vertex `turns` of the grid tile, and its lower edge
-    // points along step 2·turns, on an inverted tile half a turn further.
-    let half_turn = if on_grid.orientation == Orientation::Upright { 0 } else { 3 };
-    let from = on_grid.vertices()[usize::from(turns)];
-    LatticeMap::taking(from, tile.anchor, -(2 * i32::from(turns) + half_turn))
+    // points along step 2·turns, on an inverted tile half a turn further; on a square along step
+    // `turns`.
+    let kind = tile.kind();
+    let steps = kind.steps().len() as i32 / i32::from(kind.turns());
+    let half_turn = if on_grid.orientation == Orientation::Inverted { 3 } else { 0 };
+    let from = on_grid.vertices().nth(usize::from(turns)).unwrap_or(on_grid.anchor);
+    LatticeMap::taking(kind, from, tile.anchor, -(steps * i32::from(turns) + half_turn))
 }

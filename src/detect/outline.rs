@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::grow::SaddleGrid;
-use crate::lattice::{LatticeMap, Vertex};
+use crate::lattice::{GridKind, LatticeMap, Vertex};
 
 /// The motion that puts a whole grid exactly onto an outline, if just one does. `inverted` boards
 /// show their upright tiles bright, so they lie half a turn round.
@@ -17,26 +17,29 @@ pub fn fit_outline(
     }
     let half_turn = if inverted { 3 } else { 0 };
     let mut fitting = [0, 2, 4].into_iter().filter_map(|turns| {
-        let turned = LatticeMap::new(turns + half_turn, Vertex::new(0, 0));
+        let turned = LatticeMap::new(GridKind::Deltille, turns + half_turn, Vertex::new(0, 0));
         // Lowest-leftmost corners must coincide.
         let lowest = grid.keys().map(|&v| turned.apply(v)).min()?;
-        let map = LatticeMap::new(turns + half_turn, *outline.first()? - lowest);
+        let map =
+            LatticeMap::new(GridKind::Deltille, turns + half_turn, *outline.first()? - lowest);
         grid.keys().all(|&v| outline.contains(&map.apply(v))).then_some(map)
     });
     let map = fitting.next()?;
     fitting.next().is_none().then_some(map)
 }
 
-/// Rows and columns of a grid that shows a whole checkerboard, from a function of its vertices.
+/// The motion that labels a grid that shows a whole checkerboard.
 ///
 /// A rectangle fits in two ways, a square in four. Row 0, column 0 is the lower left corner of the
 /// print when the print is turned so that the square at it, the one up and right of it, is dark;
 /// this tells the two ways apart where rows + columns is odd. Where it does not, they look the
-/// same, and the corner (0, 0) is the one that lies lowest in the image (then leftmost).
+/// same, and the corner (0, 0) is the one that lies lowest in the image (then leftmost). On an
+/// `inverted` board that square is bright.
 pub fn fit_rectangle(
     grid: &SaddleGrid,
     (rows, cols): (u32, u32),
-) -> Option<impl Fn(Vertex) -> Vertex + use<>> {
+    inverted: bool,
+) -> Option<LatticeMap> {
     let (rows, cols) = (i32::try_from(rows).ok()?, i32::try_from(cols).ok()?);
     let low = grid.keys().fold((i32::MAX, i32::MAX), |(r, c), v| (r.min(v.row), c.min(v.col)));
     let high = grid.keys().fold((i32::MIN, i32::MIN), |(r, c), v| (r.max(v.row), c.max(v.col)));
@@ -60,20 +63,12 @@ pub fn fit_rectangle(
             let square =
                 (at.row - i32::from(turns >= 2)) + (at.col - i32::from(matches!(turns, 1 | 2)));
             let [x, y] = grid.get(&at).map_or([0.0; 2], |placed| placed.position);
-            (square.rem_euclid(2) == 0, [y, -x])
+            ((square.rem_euclid(2) == 0) != inverted, [y, -x])
         };
         key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
     })?;
-    let from = origin(best);
-    Some(move |v: Vertex| {
-        let (row, col) = (v.row - from.row, v.col - from.col);
-        match best {
-            0 => Vertex::new(row, col),
-            1 => Vertex::new(-col, row),
-            2 => Vertex::new(-row, -col),
-            _ => Vertex::new(col, -row),
-        }
-    })
+    let back = -i32::from(best);
+    Some(LatticeMap::taking(GridKind::Checker, origin(best), Vertex::new(0, 0), back))
 }
 
 #[cfg(test)]
@@ -104,9 +99,12 @@ mod tests {
         #[test]
         fn labels_are_those_of_the_print_however_the_grid_counts(
             rows in 2..7i32, cols in 2..7i32, row in -9..9i32, col in -9..9i32, turns in 0..4u8,
+            inverted: bool,
         ) {
             let grid = board(rows, cols, Vertex::new(row, col), turns);
-            let map = fit_rectangle(&grid, (rows as u32, cols as u32)).unwrap();
+            let size = (rows as u32, cols as u32);
+            let motion = fit_rectangle(&grid, size, inverted).unwrap();
+            let map = |v| motion.apply(v);
             let labels: BTreeSet<Vertex> = grid.keys().map(|&v| map(v)).collect();
             prop_assert_eq!(labels.len(), grid.len());
             prop_assert_eq!(labels.first(), Some(&Vertex::new(0, 0)));
@@ -128,12 +126,12 @@ mod tests {
             };
             let dark = of_square(Vertex::new(0, 0));
             if (rows + cols) % 2 == 1 {
-                prop_assert!(dark);
+                prop_assert_eq!(dark, !inverted);
             } else if rows != cols {
                 prop_assert_eq!(dark, of_square(Vertex::new(rows - 2, cols - 2)));
                 prop_assert_eq!(o[1], 0.0, "the lower of the two");
             }
-            prop_assert!(fit_rectangle(&grid, (rows as u32 + 1, cols as u32)).is_none());
+            prop_assert!(fit_rectangle(&grid, (size.0 + 1, size.1), inverted).is_none());
         }
     }
 }

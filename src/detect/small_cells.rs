@@ -16,7 +16,7 @@ use super::tile_map::TileMap;
 use crate::lattice::TagCells;
 use crate::raster::{Gray, Intensity};
 
-/// A cell is divided into 4² triangles: at 4 px a bit they are as wide as a pixel.
+/// A triangle is divided into 4², of which a square has two: at 4 px a bit they are as wide as a pixel.
 const DIVISIONS: usize = 4;
 
 /// λ: the variance of a pixel, 5 % of the contrast of noise and of what the map leaves, over that of a
@@ -29,22 +29,24 @@ const REACH_SIGMAS: f64 = 3.0;
 /// Pixels that see less of the cells than this show the border.
 const MIN_SHARE: f64 = 0.2;
 
-/// The word of a tag under a blur of `sigma_px`, the pixel's square included; `levels` are the border
+/// The word of a tag, `inset_bits` inside its tile, under a blur of `sigma_px`, the pixel's square included; `levels` are the border
 /// and the white at a point of the tile, in units of the image. `None` where the tag leaves the image.
 pub fn word<T: Intensity>(
     image: &Gray<T>,
     map: &TileMap,
     cells: &TagCells,
-    border_bits: f64,
+    inset_bits: f64,
     sigma_px: f64,
     levels: impl Fn([f64; 2]) -> [f64; 2],
 ) -> Option<u64> {
     let bits = cells.dimension().bits();
     let points: Vec<Point> = (0..bits)
-        .flat_map(|bit| pieces(cells.corners(bit, border_bits)).map(move |tile| (bit, tile)))
+        .flat_map(|bit| {
+            pieces(&cells.corners(bit, inset_bits)).into_iter().map(move |tile| (bit, tile))
+        })
         .map(|(bit, tile)| Point { bit: bit as usize, tile, image: map.image_from_tile(tile) })
         .collect();
-    let area_px2 = piece_area_px2(map, cells.corners(0, border_bits));
+    let area_px2 = piece_area_px2(map, &cells.corners(0, inset_bits));
     let low = points.iter().fold([f64::INFINITY; 2], |m, p| [0, 1].map(|i| m[i].min(p.image[i])));
     let high =
         points.iter().fold([f64::NEG_INFINITY; 2], |m, p| [0, 1].map(|i| m[i].max(p.image[i])));
@@ -97,23 +99,29 @@ struct Point {
 }
 
 /// Middles of the equal triangles that a cell is divided into.
-fn pieces([a, b, c]: [[f64; 2]; 3]) -> impl Iterator<Item = [f64; 2]> {
+fn pieces(cell: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let third = 1.0 / (3.0 * DIVISIONS as f64);
     let rows = (0..DIVISIONS).flat_map(|j| (0..DIVISIONS - j).map(move |i| (i, j)));
-    rows.flat_map(move |(i, j)| {
-        let upright = [3 * i + 1, 3 * j + 1];
-        let inverted = (i + j + 1 < DIVISIONS).then_some([3 * i + 2, 3 * j + 2]);
-        [Some(upright), inverted].into_iter().flatten()
-    })
-    .map(move |[s, t]| {
-        let (s, t) = (s as f64 * third, t as f64 * third);
-        [0, 1].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]))
-    })
+    let parts: Vec<[f64; 2]> = rows
+        .flat_map(|(i, j)| {
+            let upright = [3 * i + 1, 3 * j + 1];
+            let inverted = (i + j + 1 < DIVISIONS).then_some([3 * i + 2, 3 * j + 2]);
+            [Some(upright), inverted].into_iter().flatten()
+        })
+        .map(|part| part.map(|thirds| thirds as f64 * third))
+        .collect();
+    let a = cell[0];
+    let triangles = cell[1..].windows(2);
+    let middles = triangles.flat_map(|bc| {
+        let [b, c] = [bc[0], bc[1]];
+        parts.iter().map(move |[s, t]| [0, 1].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k])))
+    });
+    middles.collect()
 }
 
 /// Area of a piece of a cell in the image.
-fn piece_area_px2(map: &TileMap, cell: [[f64; 2]; 3]) -> f64 {
-    let [a, b, c] = cell.map(|p| map.image_from_tile(p));
+fn piece_area_px2(map: &TileMap, cell: &[[f64; 2]]) -> f64 {
+    let [a, b, c] = [cell[0], cell[1], cell[2]].map(|p| map.image_from_tile(p));
     let cross = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     0.5 * cross.abs() / (DIVISIONS * DIVISIONS) as f64
 }

@@ -19,17 +19,17 @@ pub struct TileMap {
 }
 
 impl TileMap {
-    /// The map of `tile`; `None` unless all its three corners are in the grid.
-    ///
-    /// Tile coordinates: A + u·(B − A) + v·(C − A), with A, B, C = [`Tile::vertices`].
+    /// The map of `tile`, in the coordinates of [`Tile::frame`]; `None` unless all its corners are
+    /// in the grid.
     pub fn new(grid: &SaddleGrid, tile: Tile) -> Option<Self> {
+        let kind = tile.kind();
         let own = tile.vertices();
-        let mut around: Vec<Vertex> = own.iter().flat_map(|v| v.neighbours()).collect();
+        let mut around: Vec<Vertex> = own.clone().flat_map(|v| kind.neighbours(v)).collect();
         around.sort();
         around.dedup();
         let at = |v: &Vertex| grid.get(v).map(|placed| placed.position);
-        for vertex in &own {
-            at(vertex)?;
+        for vertex in own.clone() {
+            at(&vertex)?;
         }
         let known: Vec<(Vertex, [f64; 2])> =
             around.iter().filter_map(|v| Some((*v, at(v)?))).collect();
@@ -37,8 +37,8 @@ impl TileMap {
         let mut x = DVector::zeros(known.len() + 3);
         let mut y = DVector::zeros(known.len() + 3);
         for (i, (vertex, position)) in known.iter().enumerate() {
-            let weight = if own.contains(vertex) { OWN_WEIGHT } else { 1.0 };
-            let [u, v] = tile_coordinates(own, *vertex);
+            let weight = if own.clone().any(|v| v == *vertex) { OWN_WEIGHT } else { 1.0 };
+            let [u, v] = tile_coordinates(tile.frame(), *vertex);
             for (j, monomial) in monomials([u, v]).into_iter().enumerate() {
                 design[(i, j)] = weight * monomial;
             }
@@ -66,7 +66,8 @@ fn monomials([u, v]: [f64; 2]) -> [f64; 6] {
     [1.0, u, v, u * u, u * v, v * v]
 }
 
-/// Coordinates of a vertex in the frame of a tile: the two edges from A are steps 60° apart.
+/// Coordinates of a vertex in the frame of a tile: the two edges from A are steps along
+/// the row and the column.
 fn tile_coordinates([a, b, _]: [Vertex; 3], vertex: Vertex) -> [f64; 2] {
     let offset = vertex - a;
     // Upright: B − A is one column; inverted: B − A is one column backwards, and so is C − A.

@@ -145,10 +145,10 @@ fn draw_grid(canvas: &mut Pixmap, grid: &Grid, colour: Color, scale: f64) {
     }
     for tag in &grid.tags {
         let anchor = Vertex::new(tag.row, tag.col);
-        let tile = crate::lattice::Tile::upright(anchor).vertices();
-        let ends: Vec<[f64; 2]> = tile.iter().filter_map(|v| place.get(v).copied()).collect();
-        if let [a, b, c] = ends[..] {
-            let centre = [(a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0];
+        let tile = grid.kind.tag_tile(anchor).vertices();
+        let ends: Option<Vec<[f64; 2]>> = tile.map(|v| place.get(&v).copied()).collect();
+        if let Some(ends) = ends {
+            let centre = [0, 1].map(|i| ends.iter().map(|p| p[i]).sum::<f64>() / ends.len() as f64);
             write(canvas, &tag.id.to_string(), centre, TAG_TEXT_EDGES * edge, true, colour);
         }
     }

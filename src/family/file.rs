@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use super::algebra::AlgebraicConstruction;
 use super::{Family, FamilyError, Rules, TagWords, false_positive_rates};
-use crate::lattice::Dimension;
+use crate::lattice::{Dimension, GridKind};
 
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/family/1";
@@ -51,6 +51,9 @@ pub enum Construction {
 struct FamilyFile {
     schema: String,
     name: String,
+    /// The tiling whose tiles the tags fill.
+    #[serde(default, skip_serializing_if = "is_deltille")]
+    kind: GridKind,
     bits: u32,
     distance: u32,
     fingerprint: String,
@@ -61,6 +64,10 @@ struct FamilyFile {
     /// Index = number of corrected bits.
     false_positive_rate: Vec<f64>,
     codes: Vec<String>,
+}
+
+fn is_deltille(kind: &GridKind) -> bool {
+    *kind == GridKind::Deltille
 }
 
 pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
@@ -86,8 +93,8 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
             let problem = format!("`{text}` is not a hexadecimal word such as 0x08f50a7");
             FamilyError::field(format!("codes[{id}]"), problem)
         })?;
-    check_form(&file.name, dimension, file.distance, &codes, &file.rules)?;
-    let rates = false_positive_rates(dimension, file.distance, codes.len());
+    check_form(&file.name, file.kind, dimension, file.distance, &codes, &file.rules)?;
+    let rates = false_positive_rates(file.kind, dimension, file.distance, codes.len());
     let same = |(stated, rate): (&f64, &f64)| (stated - rate).abs() <= 1e-9 * rate;
     if rates.len() != file.false_positive_rate.len()
         || !file.false_positive_rate.iter().zip(&rates).all(same)
@@ -95,7 +102,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
         let problem = format!("not that of {} such codes, {rates:?}", codes.len());
         return Err(FamilyError::Claim { field: "false_positive_rate".to_owned(), problem });
     }
-    let fingerprint = fingerprint(dimension, file.distance, &codes);
+    let fingerprint = fingerprint(file.kind, dimension, file.distance, &codes);
     if fingerprint != file.fingerprint {
         let problem = format!(
             "the file says {}, its codes give {fingerprint}: codes were altered, added or lost; \
@@ -106,6 +113,7 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
     }
     Ok(Family {
         name: file.name,
+        kind: file.kind,
         dimension,
         distance: file.distance,
         codes,
@@ -117,10 +125,11 @@ pub(super) fn from_json(json: &str) -> Result<Family, FamilyError> {
 }
 
 pub(super) fn to_json(family: &Family) -> String {
-    let words = TagWords::new(family.dimension);
+    let words = TagWords::of(family.kind, family.dimension);
     let file = FamilyFile {
         schema: SCHEMA.to_owned(),
         name: family.name.clone(),
+        kind: family.kind,
         bits: family.dimension.bits(),
         distance: family.distance,
         fingerprint: family.fingerprint.clone(),
@@ -138,6 +147,7 @@ pub(super) fn to_json(family: &Family) -> String {
 /// Checks all that can be checked without comparing codes pair by pair.
 pub(super) fn check_form(
     name: &str,
+    kind: GridKind,
     dimension: Dimension,
     distance: u32,
     codes: &[u64],
@@ -158,7 +168,7 @@ pub(super) fn check_form(
     if codes.is_empty() {
         return Err(FamilyError::field("codes", "there is no code"));
     }
-    let words = TagWords::new(dimension);
+    let words = TagWords::of(kind, dimension);
     if let Some(id) = codes.iter().position(|&code| code > dimension.mask()) {
         let problem = format!("{} has more than {bits} bits", words.hex(codes[id]));
         return Err(FamilyError::field(format!("codes[{id}]"), problem));
@@ -183,7 +193,7 @@ pub(crate) fn check_name(
     dimension: Dimension,
     distance: u32,
 ) -> Result<(), FamilyError> {
-    let rest = name.strip_prefix("delTag").or_else(|| name.strip_prefix('d'));
+    let rest = ["delTag", "aprilTag", "d"].iter().find_map(|prefix| name.strip_prefix(prefix));
     let number = |text: &str| text.parse::<u32>().ok();
     let said = rest.and_then(|rest| rest.split_once('h'));
     let said = said.and_then(|(bits, distance)| Some((number(bits)?, number(distance)?)));
@@ -203,10 +213,16 @@ pub(crate) fn check_name(
 }
 
 /// See [`Family::fingerprint`].
-pub(super) fn fingerprint(dimension: Dimension, distance: u32, codes: &[u64]) -> String {
-    let words = TagWords::new(dimension);
+pub(super) fn fingerprint(
+    kind: GridKind,
+    dimension: Dimension,
+    distance: u32,
+    codes: &[u64],
+) -> String {
+    let words = TagWords::of(kind, dimension);
     let mut hash = Sha256::new();
-    hash.update(format!("deltille/family\nbits {}\ndistance {distance}\n", dimension.bits()));
+    let kind = if kind == GridKind::Checker { "kind checker\n" } else { "" };
+    hash.update(format!("deltille/family\n{kind}bits {}\ndistance {distance}\n", dimension.bits()));
     for &code in codes {
         hash.update(words.hex(code));
         hash.update("\n");

@@ -1,4 +1,4 @@
-//! DelTag code families: what a family is, how one is searched, checked, stored and decoded.
+//! Code families: what a family is, how one is searched, checked, stored and decoded.
 //!
 //! A *family* of bits b and distance h is a list of b-bit codes such that any two of the words a
 //! camera may read off the tags, the codes and their turns by 120° and 240°, differ in at least h
@@ -14,6 +14,9 @@
 //! assert_eq!((decoded.id, decoded.turns, decoded.errors), (12, 0, 3));
 //! # Ok::<(), deltille::family::FamilyError>(())
 //! ```
+//!
+//! Families of square tags, the AprilTags of checkerboards, are read, decoded and drawn like the
+//! others, with their four turns by 90°; they are neither searched nor certified here.
 //!
 //! Limits: codes have 9, 16, 25, 36 or 49 bits ([`crate::lattice::Dimension`]). Loading a family
 //! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
@@ -49,19 +52,20 @@ pub use export::{ExportFormat, export};
 pub(crate) use file::check_name;
 pub use file::{Construction, SCHEMA};
 pub use rules::{Rules, Screen};
-pub use shipped::{shipped_names, smallest_shipped};
+pub use shipped::{shipped_names, smallest_shipped, square_names};
 pub use statistics::{ball, distance_histogram, false_positive_rates};
 pub use tagwords::TagWords;
 
-use crate::lattice::Dimension;
+use crate::lattice::{Dimension, GridKind, TagCells};
 
 /// The pairs of larger families are too many to count one by one.
 pub(crate) const PAIRS_COUNTED: usize = 100_000;
 
-/// A DelTag family: its codes, and how they came about.
+/// A family: its codes, and how they came about.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Family {
     name: String,
+    kind: GridKind,
     dimension: Dimension,
     distance: u32,
     codes: Vec<u64>,
@@ -72,7 +76,7 @@ pub struct Family {
 }
 
 impl Family {
-    /// A family of `codes`, in the order of their ids.
+    /// A family of triangular tags with these `codes`, in the order of their ids.
     ///
     /// Checks the form (name, code width, no code twice in any turn) but not the distance, which
     /// [`certify`] proves. The distance histogram is counted here. A name that speaks of bits and a
@@ -85,15 +89,26 @@ impl Family {
         rules: Rules,
         construction: Construction,
     ) -> Result<Self, FamilyError> {
-        file::check_form(name, dimension, distance, &codes, &rules)?;
+        let kind = GridKind::Deltille;
+        file::check_form(name, kind, dimension, distance, &codes, &rules)?;
         let histogram = if codes.len() <= PAIRS_COUNTED {
             distance_histogram(dimension, &codes)
         } else {
             BTreeMap::new()
         };
-        let fingerprint = file::fingerprint(dimension, distance, &codes);
+        let fingerprint = file::fingerprint(kind, dimension, distance, &codes);
         let name = name.to_owned();
-        Ok(Self { name, dimension, distance, codes, rules, construction, histogram, fingerprint })
+        Ok(Self {
+            name,
+            kind,
+            dimension,
+            distance,
+            codes,
+            rules,
+            construction,
+            histogram,
+            fingerprint,
+        })
     }
 
     /// A shipped family by its name, or a family file by its path.
@@ -130,6 +145,16 @@ impl Family {
     /// The name, usable as the stem of a file.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The tiling whose tiles its tags fill: triangular or square tags.
+    pub fn kind(&self) -> GridKind {
+        self.kind
+    }
+
+    /// The cells of its tags.
+    pub fn cells(&self) -> TagCells {
+        TagCells::of(self.kind, self.dimension)
     }
 
     /// The dimension of its tags.
@@ -186,7 +211,7 @@ impl Family {
     /// Probability that a word of fair coin tosses is taken for a tag, for 0, 1, …,
     /// [`Self::correctable`] corrected bits.
     pub fn false_positive_rates(&self) -> Vec<f64> {
-        false_positive_rates(self.dimension, self.distance, self.codes.len())
+        false_positive_rates(self.kind, self.dimension, self.distance, self.codes.len())
     }
 
     /// 16 hexadecimal digits that stand for bits, distance and codes: the first half of the first
@@ -200,7 +225,8 @@ impl Family {
     /// …
     /// ```
     ///
-    /// one code a line in id order, lower case, ⌈b/4⌉ digits, every line ended by a line feed.
+    /// one code a line in id order, lower case, ⌈b/4⌉ digits, every line ended by a line feed. That
+    /// of square tags has a second line `kind checker`.
     pub fn fingerprint(&self) -> &str {
         &self.fingerprint
     }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::TagWords;
 use super::kernels::count_distances;
-use crate::lattice::Dimension;
+use crate::lattice::{Dimension, GridKind};
 
 /// Number of unordered pairs of different words, among the codes and their turns, at each distance.
 ///
@@ -33,11 +33,17 @@ pub fn distance_histogram(dimension: Dimension, codes: &[u64]) -> BTreeMap<u32, 
 }
 
 /// Probability that a random word is within t cells of a code or one of its turns, for
-/// t = 0 … ⌊(h−1)/2⌋: 3·N·Σ_{i≤t} C(b,i) / 2^b, exact because these balls do not overlap.
-pub fn false_positive_rates(dimension: Dimension, distance: u32, codes: usize) -> Vec<f64> {
+/// t = 0 … ⌊(h−1)/2⌋: 3·N·Σ_{i≤t} C(b,i) / 2^b, of square tags 4·N·…, exact because these balls
+/// do not overlap.
+pub fn false_positive_rates(
+    kind: GridKind,
+    dimension: Dimension,
+    distance: u32,
+    codes: usize,
+) -> Vec<f64> {
     let b = dimension.bits();
     let correctable = distance.saturating_sub(1) / 2;
-    let words = 3.0 * codes as f64 / 2f64.powi(b as i32);
+    let words = f64::from(kind.turns()) * codes as f64 / 2f64.powi(b as i32);
     (0..=correctable).map(|t| words * ball(b, t)).collect()
 }
 

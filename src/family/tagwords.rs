@@ -1,10 +1,11 @@
-use crate::lattice::{Dimension, TagCells};
+use crate::lattice::{Dimension, GridKind, TagCells};
 
 /// Arithmetic on the words of one dimension, tabulated for speed: turns and complexity.
 ///
 /// Bit order and rotation come from [`TagCells`]; this only evaluates them fast.
 #[derive(Clone, Debug)]
 pub struct TagWords {
+    kind: GridKind,
     dimension: Dimension,
     /// turned[i][x]: the word with byte i = x and all else 0, turned once.
     turned: Vec<[u64; 256]>,
@@ -14,9 +15,14 @@ pub struct TagWords {
 }
 
 impl TagWords {
-    /// The words of dimension `d`.
+    /// The words of triangular tags of dimension `d`.
     pub fn new(dimension: Dimension) -> Self {
-        let cells = TagCells::new(dimension);
+        Self::of(GridKind::Deltille, dimension)
+    }
+
+    /// The words of tags that fill a tile of `kind`.
+    pub fn of(kind: GridKind, dimension: Dimension) -> Self {
+        let cells = TagCells::of(kind, dimension);
         let bytes = dimension.bits().div_ceil(8) as usize;
         let turned = (0..bytes)
             .map(|i| {
@@ -31,7 +37,7 @@ impl TagWords {
                 None => neighbours.push((gap, 1 << low)),
             }
         }
-        Self { dimension, turned, neighbours, pairs: cells.neighbours().len() as u32 }
+        Self { kind, dimension, turned, neighbours, pairs: cells.neighbours().len() as u32 }
     }
 
     /// The dimension.
@@ -39,7 +45,7 @@ impl TagWords {
         self.dimension
     }
 
-    /// The word read after the tag was turned by 120° counter-clockwise.
+    /// The word read after the tag was turned counter-clockwise, by 120° or 90°.
     #[inline]
     pub fn turn(&self, word: u64) -> u64 {
         self.turned
@@ -48,18 +54,23 @@ impl TagWords {
             .fold(0, |turned, (i, table)| turned | table[(word >> (8 * i) & 0xff) as usize])
     }
 
-    /// The words read after no turn, one and two turns by 120° counter-clockwise.
+    /// The words read off a triangular tag after no turn, one and two turns by 120°
+    /// counter-clockwise.
     #[inline]
     pub fn turns(&self, word: u64) -> [u64; 3] {
         let once = self.turn(word);
         [word, once, self.turn(once)]
     }
 
-    /// The smallest of the three words: one name for all turns of a tag.
+    /// The smallest of the words of all turns: one name for a tag however it is turned.
     #[inline]
     pub fn canonical(&self, word: u64) -> u64 {
-        let [a, b, c] = self.turns(word);
-        a.min(b).min(c)
+        let (mut least, mut turned) = (word, word);
+        for _ in 1..self.kind.turns() {
+            turned = self.turn(turned);
+            least = least.min(turned);
+        }
+        least
     }
 
     /// Distance from a word to its own turns (both are equally far).

@@ -1,5 +1,7 @@
 use std::num::NonZeroU8;
 
+use super::GridKind;
+
 /// Tag dimension d: a tag has d rows of cells and d² bits. From 3 (9 bits) to 7 (49 bits).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Dimension(NonZeroU8);
@@ -40,7 +42,7 @@ impl Dimension {
     }
 }
 
-/// One small triangle of a tag.
+/// One small triangle, or square, of a tag.
 ///
 /// ```text
 ///               ╱╲
@@ -55,55 +57,91 @@ impl Dimension {
 ///      ╱ 8 7 6 5 4 3 2 1 0╲
 ///    A ────────────────────  B
 /// ```
+///
+/// A square tag is an AprilTag: its cells are read like a page, row by row from the upper left, the
+/// first of them the most significant bit.
+///
+/// ```text
+///      C ───────────────
+///      │ 15  14  13  12 │       d = 4: rows count from the base here too, so that cell k of row r
+///      │ 11  10   9   8 │       carries bit r·d + d − 1 − k
+///      │  7   6   5   4 │
+///      │  3   2   1   0 │
+///      A ─────────────── B
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Cell {
     /// Row from the base, 0 to d − 1.
     pub row: u32,
-    /// Column of the rhombus that holds the cell, from the left: k = 2·col, or 2·col + 1.
+    /// Column from the left; of a triangle that of the rhombus that holds it: k = 2·col, or
+    /// 2·col + 1.
     pub col: u32,
-    /// Whether the cell points up.
+    /// Whether the cell points up, as all squares do.
     pub upright: bool,
 }
 
-/// The cells of a tag of one dimension: bit order, rotation by 120°, adjacency, geometry.
+/// The cells of a tag of one kind and dimension: bit order, rotation, adjacency, geometry.
 #[derive(Clone, Debug)]
 pub struct TagCells {
+    kind: GridKind,
     dimension: Dimension,
     /// Cell of each bit, index = bit.
     cells: Vec<Cell>,
-    /// Bit whose cell lands on bit i's cell when the tag is turned 120° counter-clockwise.
+    /// Bit whose cell lands on bit i's cell when the tag is turned counter-clockwise.
     source: Vec<u8>,
     /// Pairs of bits whose cells share an edge.
     neighbours: Vec<[u8; 2]>,
 }
 
 impl TagCells {
-    /// The cells of a tag of dimension `d`.
+    /// The cells of a triangular tag, a DelTag, of dimension `d`.
     pub fn new(dimension: Dimension) -> Self {
+        Self::of(GridKind::Deltille, dimension)
+    }
+
+    /// The cells of a tag that fills a tile of `kind`.
+    pub fn of(kind: GridKind, dimension: Dimension) -> Self {
         let d = dimension.rows();
         let cells: Vec<Cell> = {
+            let in_row = move |row: u32| match kind {
+                GridKind::Deltille => 2 * (d - row) - 1,
+                GridKind::Checker => d,
+            };
+            let cell = move |row: u32, k: u32| match kind {
+                GridKind::Deltille => Cell { row, col: k / 2, upright: k.is_multiple_of(2) },
+                GridKind::Checker => Cell { row, col: k, upright: true },
+            };
             let mut by_bit: Vec<_> = (0..d)
-                .flat_map(|row| (0..2 * (d - row) - 1).map(move |k| (row, k)))
-                .map(|(row, k)| Cell { row, col: k / 2, upright: k % 2 == 0 })
-                .map(|cell| (bit_of(d, cell), cell))
+                .flat_map(|row| (0..in_row(row)).map(move |k| cell(row, k)))
+                .map(|cell| (bit_of(kind, d, cell), cell))
                 .collect();
             by_bit.sort_by_key(|&(bit, _)| bit);
             by_bit.into_iter().map(|(_, cell)| cell).collect()
         };
-        let source = cells.iter().map(|&cell| bit_of(d, turned_clockwise(d, cell)) as u8).collect();
-        let neighbours = cells
-            .iter()
-            .filter(|cell| !cell.upright)
-            .flat_map(|&inverted| {
-                let Cell { row, col, .. } = inverted;
-                // Its own rhombus, the one to the right, and the one above share an edge with it.
-                [(row, col), (row, col + 1), (row + 1, col)].map(|(row, col)| {
-                    let upright = Cell { row, col, upright: true };
-                    [bit_of(d, inverted) as u8, bit_of(d, upright) as u8]
-                })
-            })
-            .collect();
-        Self { dimension, cells, source, neighbours }
+        let source = cells.iter().map(|&cell| bit_of(kind, d, source_of(kind, d, cell)) as u8);
+        let source = source.collect();
+        let neighbours = cells.iter().flat_map(|&cell| {
+            let Cell { row, col, upright } = cell;
+            let beside: &[(u32, u32)] = match kind {
+                // The cell's own rhombus, the one to the right, and the one above share an edge.
+                GridKind::Deltille if !upright => &[(row, col), (row, col + 1), (row + 1, col)],
+                GridKind::Deltille => &[],
+                GridKind::Checker => &[(row, col + 1), (row + 1, col)],
+            };
+            let inside = beside.iter().filter(|&&(row, col)| row < d && col < d);
+            let pairs = inside.map(|&(row, col)| {
+                let other = Cell { row, col, upright: true };
+                [cell, other].map(|cell| bit_of(kind, d, cell) as u8)
+            });
+            pairs.collect::<Vec<_>>()
+        });
+        let neighbours = neighbours.collect();
+        Self { kind, dimension, cells, source, neighbours }
+    }
+
+    /// The tiling whose tiles the tag fills.
+    pub fn kind(&self) -> GridKind {
+        self.kind
     }
 
     /// The dimension.
@@ -116,17 +154,18 @@ impl TagCells {
         &self.cells
     }
 
-    /// Pairs of bits whose cells share an edge: 3·d·(d−1)/2 of them.
+    /// Pairs of bits whose cells share an edge: 3·d·(d−1)/2 of them, in a square tag 2·d·(d−1).
     pub fn neighbours(&self) -> &[[u8; 2]] {
         &self.neighbours
     }
 
-    /// For each bit the bit whose content it receives when the tag turns 120° counter-clockwise.
+    /// For each bit the bit whose content it receives when the tag turns counter-clockwise, by 120°
+    /// or 90°.
     pub fn rotation(&self) -> &[u8] {
         &self.source
     }
 
-    /// The word read off the same cells after the tag was turned 120° counter-clockwise.
+    /// The word read off the same cells after the tag was turned counter-clockwise, by 120° or 90°.
     pub fn rotate(&self, word: u64) -> u64 {
         self.source
             .iter()
@@ -134,39 +173,51 @@ impl TagCells {
             .fold(0, |turned, (to, &from)| turned | ((word >> from & 1) << to))
     }
 
-    /// Centre of a bit's cell in tile coordinates (u along A→B, v along A→C, both 0..1), for a
-    /// border of `border` bit-widths measured along the edge.
-    pub fn centre(&self, bit: u32, border: f64) -> [f64; 2] {
-        let [a, b, c] = self.corners(bit, border);
-        [(a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0]
+    /// Length of the tile's edge in bit-widths, for cells that begin `inset` bit-widths, measured
+    /// along the edge, from each side: the border of the tag and what is around it.
+    pub fn width(&self, inset: f64) -> f64 {
+        f64::from(self.dimension.rows()) + self.kind.insets() * inset
     }
 
-    /// The three corners of a bit's cell in tile coordinates, counter-clockwise on the print.
-    pub fn corners(&self, bit: u32, border: f64) -> [[f64; 2]; 3] {
-        let width = f64::from(self.dimension.rows()) + 3.0 * border;
+    /// Centre of a bit's cell in tile coordinates (u along A→B, v along A→C, both 0..1).
+    pub fn centre(&self, bit: u32, inset: f64) -> [f64; 2] {
+        let corners = self.corners(bit, inset);
+        [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / corners.len() as f64)
+    }
+
+    /// The corners of a bit's cell in tile coordinates, counter-clockwise on the print.
+    pub fn corners(&self, bit: u32, inset: f64) -> Vec<[f64; 2]> {
+        let width = self.width(inset);
         let Cell { row, col, upright } = self.cells[bit as usize];
-        let (u, v) = (border + f64::from(col), border + f64::from(row));
-        let corners = if upright {
-            [[u, v], [u + 1.0, v], [u, v + 1.0]]
-        } else {
-            [[u + 1.0, v + 1.0], [u, v + 1.0], [u + 1.0, v]]
+        let (u, v) = (inset + f64::from(col), inset + f64::from(row));
+        let corners: &[[f64; 2]] = match (self.kind, upright) {
+            (GridKind::Checker, _) => &[[u, v], [u + 1.0, v], [u + 1.0, v + 1.0], [u, v + 1.0]],
+            (GridKind::Deltille, true) => &[[u, v], [u + 1.0, v], [u, v + 1.0]],
+            (GridKind::Deltille, false) => &[[u + 1.0, v + 1.0], [u, v + 1.0], [u + 1.0, v]],
         };
-        corners.map(|[u, v]| [u / width, v / width])
+        corners.iter().map(|[u, v]| [u / width, v / width]).collect()
     }
 }
 
-/// Bit carried by a cell: d² − 1 − (d−1−r)² − k.
-fn bit_of(d: u32, cell: Cell) -> u32 {
+/// Bit carried by a cell: d² − 1 − (d−1−r)² − k, in a square tag r·d + d − 1 − k.
+fn bit_of(kind: GridKind, d: u32, cell: Cell) -> u32 {
+    if kind == GridKind::Checker {
+        return cell.row * d + d - 1 - cell.col;
+    }
     let k = 2 * cell.col + u32::from(!cell.upright);
     let above = d - 1 - cell.row;
     d * d - 1 - above * above - k
 }
 
-/// The cell that a counter-clockwise turn by 120° (A→B→C→A) moves onto `cell`.
+/// The cell that a counter-clockwise turn moves onto `cell`.
 ///
-/// In barycentric cell coordinates (towards B, C, A) = (col, row, rest) the turn sends
-/// (b, c, a) to (a, b, c), so the cell at (col, row, rest) came from (row, rest, col).
-fn turned_clockwise(d: u32, cell: Cell) -> Cell {
+/// In barycentric cell coordinates (towards B, C, A) = (col, row, rest) a turn by 120° sends
+/// (b, c, a) to (a, b, c), so the cell at (col, row, rest) came from (row, rest, col). A quarter
+/// turn sends column c, row r to column d − 1 − r, row c.
+fn source_of(kind: GridKind, d: u32, cell: Cell) -> Cell {
+    if kind == GridKind::Checker {
+        return Cell { row: d - 1 - cell.col, col: cell.row, upright: true };
+    }
     let side = if cell.upright { d - 1 } else { d - 2 };
     let rest = side - cell.row - cell.col;
     Cell { col: cell.row, row: rest, upright: cell.upright }
@@ -178,6 +229,28 @@ mod tests {
 
     fn all() -> impl Iterator<Item = TagCells> {
         Dimension::all().map(TagCells::new)
+    }
+
+    fn squares() -> impl Iterator<Item = TagCells> {
+        Dimension::all().map(|dimension| TagCells::of(GridKind::Checker, dimension))
+    }
+
+    /// The quarter turn as a motion of the plane: A→B→D→C sends (u, v) to (1−v, u).
+    #[test]
+    fn four_quarter_turns_of_a_square_tag_are_none_and_agree_with_geometry() {
+        for tag in squares() {
+            for (to, &from) in tag.rotation().iter().enumerate() {
+                let [u, v] = tag.centre(u32::from(from), 1.5);
+                let [x, y] = tag.centre(to as u32, 1.5);
+                assert!((x - (1.0 - v)).abs() < 1e-12 && (y - u).abs() < 1e-12);
+            }
+            let word = 0x1234_5678_9abc_def1 & tag.dimension().mask();
+            let turned = (0..4).fold(word, |word, _| tag.rotate(word));
+            assert_eq!(turned, word);
+            let d = tag.dimension().rows() as usize;
+            assert_eq!(tag.neighbours().len(), 2 * d * (d - 1));
+            assert_eq!(tag.cells()[d * d - 1], Cell { row: d as u32 - 1, col: 0, upright: true });
+        }
     }
 
     #[test]

@@ -1,53 +1,58 @@
-use super::{Orientation, Tile, Vertex};
+use super::{GridKind, Orientation, Tile, Vertex};
 
-/// A proper motion of the lattice onto itself: a turn by a multiple of 60°, then a shift.
+/// A proper motion of a lattice onto itself: a turn by a multiple of 60°, on the square lattice of
+/// 90°, then a shift.
 ///
-/// Turns by 120° keep upright tiles upright; odd multiples of 60° exchange the two colours.
+/// Turns by 120° keep upright tiles upright; odd multiples of 60° exchange the two colours. On a
+/// checkerboard colours are exchanged where turns + row + column of the shift are odd.
 /// Reflections are left out on purpose: a mirrored board is an error, never a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LatticeMap {
+    kind: GridKind,
     turns: u8,
     shift: Vertex,
 }
 
 impl LatticeMap {
-    /// The map that leaves everything where it is.
-    pub const IDENTITY: LatticeMap = LatticeMap { turns: 0, shift: Vertex::new(0, 0) };
-
-    /// A counter-clockwise turn about vertex (0,0) by `turns` times 60°, then a shift.
-    pub fn new(turns: i32, shift: Vertex) -> Self {
-        Self { turns: turns.rem_euclid(6) as u8, shift }
+    /// A counter-clockwise turn about vertex (0,0) by `turns` times 60° or 90°, then a shift.
+    pub fn new(kind: GridKind, turns: i32, shift: Vertex) -> Self {
+        let full = kind.steps().len() as i32;
+        Self { kind, turns: turns.rem_euclid(full) as u8, shift }
     }
 
-    /// The map with `turns` times 60° that takes `from` to `to`.
-    pub fn taking(from: Vertex, to: Vertex, turns: i32) -> Self {
-        let turned = Self::new(turns, Vertex::new(0, 0)).apply(from);
-        Self::new(turns, to - turned)
+    /// The map with `turns` times 60° or 90° that takes `from` to `to`.
+    pub fn taking(kind: GridKind, from: Vertex, to: Vertex, turns: i32) -> Self {
+        let turned = Self::new(kind, turns, Vertex::new(0, 0)).apply(from);
+        Self::new(kind, turns, to - turned)
     }
 
-    /// Number of counter-clockwise turns by 60°, 0 to 5.
+    /// Number of counter-clockwise turns by 60° or 90°.
     pub fn turns(self) -> u8 {
         self.turns
     }
 
     /// Where `v` goes.
     pub fn apply(self, v: Vertex) -> Vertex {
-        // One turn sends the column step to the row step, and the row step to row − column.
         let (mut row, mut col) = (v.row, v.col);
         for _ in 0..self.turns {
-            (row, col) = (row + col, -row);
+            (row, col) = match self.kind {
+                // One turn sends the column step to the row step, and the row step to row − column.
+                GridKind::Deltille => (row + col, -row),
+                // Here the row step to the column step backwards.
+                GridKind::Checker => (col, -row),
+            };
         }
         Vertex::new(row, col) + self.shift
     }
 
     /// Where `tile` goes.
     pub fn apply_tile(self, tile: Tile) -> Tile {
-        let [a, b, c] = tile.vertices().map(|v| self.apply(v));
+        let [a, b, c] = tile.frame().map(|v| self.apply(v));
         let row = a.row.min(b.row).min(c.row);
         let col = a.col.min(b.col).min(c.col);
-        let flips = self.turns % 2 == 1;
-        let orientation = match (tile.orientation, flips) {
-            (Orientation::Upright, false) | (Orientation::Inverted, true) => Orientation::Upright,
+        let orientation = match (tile.orientation, self.turns % 2) {
+            (Orientation::Square, _) => Orientation::Square,
+            (Orientation::Upright, 0) | (Orientation::Inverted, 1) => Orientation::Upright,
             _ => Orientation::Inverted,
         };
         Tile { anchor: Vertex::new(row, col), orientation }
@@ -55,14 +60,15 @@ impl LatticeMap {
 
     /// The map that undoes this one.
     pub fn inverse(self) -> Self {
-        let back = Self::new(-i32::from(self.turns), Vertex::new(0, 0));
+        let back = Self::new(self.kind, -i32::from(self.turns), Vertex::new(0, 0));
         let shift = back.apply(self.shift);
-        Self { turns: back.turns, shift: Vertex::new(-shift.row, -shift.col) }
+        Self { shift: Vertex::new(-shift.row, -shift.col), ..back }
     }
 
-    /// This map after `first`.
+    /// This map after `first`, on the same lattice.
     pub fn after(self, first: LatticeMap) -> Self {
-        Self::new(i32::from(self.turns) + i32::from(first.turns), self.apply(first.shift))
+        let turns = i32::from(self.turns) + i32::from(first.turns);
+        Self::new(self.kind, turns, self.apply(first.shift))
     }
 }
 
@@ -75,39 +81,52 @@ mod tests {
     prop_compose! {
         fn vertex()(row in -50..50, col in -50..50) -> Vertex { Vertex::new(row, col) }
     }
+
+    fn kind() -> impl Strategy<Value = GridKind> {
+        prop_oneof![Just(GridKind::Deltille), Just(GridKind::Checker)]
+    }
+
     prop_compose! {
-        fn map()(turns in 0..6, shift in vertex()) -> LatticeMap { LatticeMap::new(turns, shift) }
+        fn maps()(kind in kind(), turns: [u8; 2], shift in [vertex(), vertex()]) -> [LatticeMap; 2] {
+            [0, 1].map(|i| LatticeMap::new(kind, turns[i].into(), shift[i]))
+        }
     }
 
     proptest! {
         #[test]
-        fn maps_are_rigid_and_keep_handedness(m in map(), v in vertex(), step in 0..6usize) {
-            let (a, b, c) = (v, v + Vertex::STEPS[step], v + Vertex::STEPS[(step + 1) % 6]);
-            let [p, q, r] = [a, b, c].map(|v| m.apply(v).position());
+        fn maps_are_rigid_and_keep_handedness([m, _] in maps(), v in vertex(), step in 0..6usize) {
+            let steps = m.kind.steps();
+            let next = |k: usize| v + steps[k % steps.len()];
+            let [p, q, r] = [v, next(step), next(step + 1)].map(|v| {
+                let Vertex { row, col } = m.apply(v);
+                m.kind.position(row.into(), col.into())
+            });
             let cross = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-            prop_assert!((cross - crate::lattice::ROW_HEIGHT).abs() < 1e-9);
+            let angle = std::f64::consts::TAU / steps.len() as f64;
+            prop_assert!((cross - angle.sin()).abs() < 1e-9);
         }
 
         #[test]
-        fn inverse_and_composition(m in map(), n in map(), v in vertex()) {
+        fn inverse_and_composition([m, n] in maps(), v in vertex()) {
             prop_assert_eq!(m.inverse().apply(m.apply(v)), v);
             prop_assert_eq!(m.after(n).apply(v), m.apply(n.apply(v)));
-            prop_assert_eq!(m.after(m.inverse()), LatticeMap::IDENTITY);
+            prop_assert_eq!(m.after(m.inverse()), LatticeMap::new(m.kind, 0, Vertex::new(0, 0)));
         }
 
         #[test]
-        fn tiles_go_where_their_vertices_go(m in map(), v in vertex(), upright: bool) {
-            let tile = if upright { Tile::upright(v) } else { Tile::inverted(v) };
-            let mut by_vertices = tile.vertices().map(|v| m.apply(v));
-            let mut by_tile = m.apply_tile(tile).vertices();
-            by_vertices.sort();
-            by_tile.sort();
-            prop_assert_eq!(by_vertices, by_tile);
+        fn tiles_go_where_their_vertices_go([m, _] in maps(), v in vertex()) {
+            for tile in m.kind.tiles_at(v) {
+                let mut by_vertices: Vec<Vertex> = tile.vertices().map(|v| m.apply(v)).collect();
+                let mut by_tile: Vec<Vertex> = m.apply_tile(tile).vertices().collect();
+                by_vertices.sort();
+                by_tile.sort();
+                prop_assert_eq!(by_vertices, by_tile);
+            }
         }
 
         #[test]
-        fn taking_takes(from in vertex(), to in vertex(), turns in -9..9) {
-            prop_assert_eq!(LatticeMap::taking(from, to, turns).apply(from), to);
+        fn taking_takes(kind in kind(), from in vertex(), to in vertex(), turns in -9..9) {
+            prop_assert_eq!(LatticeMap::taking(kind, from, to, turns).apply(from), to);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The triangular lattice: where its vertices and tiles are, how it maps onto itself, and how the
+//! The lattices: where its vertices and tiles are, how it maps onto itself, and how the
 //! cells of a tag lie inside a tile. Everything else takes bit layout and rotation from here.
 //!
 //! ```text
@@ -14,13 +14,18 @@
 //!
 //! With edge length `s` the vertex (row `r`, column `c`) lies at `x = (c + r/2)·s`,
 //! `y = r·s·√3/2`: columns run along the lower edge, rows lean to the right by 60°.
+//!
+//! The square lattice of checkerboards has the same vertices at `x = c·s`, `y = r·s`; its tiles are
+//! squares, of which those with even r + c are black. [`GridKind`] says what differs.
 
 mod cells;
+mod kind;
 mod map;
 mod tile;
 mod vertex;
 
 pub use cells::{Cell, Dimension, DimensionError, TagCells};
+pub use kind::GridKind;
 pub use map::LatticeMap;
 pub use tile::{Orientation, Tile};
 pub use vertex::Vertex;

@@ -1,14 +1,16 @@
 //! What to do where a family has too few codes for a target.
 
-use super::{FamilyRef, TagSpec, TargetError};
+use super::{FamilyRef, GridKind, TagSpec, TargetError};
 use crate::family::{Family, smallest_shipped};
 
 /// Spacings beyond this are not proposed: a tag in twenty tiles is easily hidden.
 const SPARSEST: u32 = 20;
 
-/// Checks that the family is there and has `needed` codes from the first id on; `instead` lists
+/// Checks that the family is there, for tiles of this kind, and has `needed` codes from the first
+/// id on; `instead` lists
 /// what other than ids and family to change, given how many codes there are from the first id on.
 pub(super) fn check_family(
+    kind: GridKind,
     tags: &TagSpec,
     family: Option<&Family>,
     needed: u64,
@@ -18,6 +20,19 @@ pub(super) fn check_family(
         let given = "and no family was given".to_owned();
         return Err(TargetError::Family { wanted: tags.family.clone(), given });
     };
+    if family.kind() != kind {
+        let problem = match kind {
+            GridKind::Deltille => {
+                "has square tags, deltille tiles need triangular ones: take one \
+                                   of `deltag list`"
+            }
+            GridKind::Checker => {
+                "has triangular tags, squares need one of aprilTag36h11, \
+                                  aprilTag25h9, aprilTag16h5"
+            }
+        };
+        return Err(TargetError::invalid("--family", format!("{} {problem}", family.name())));
+    }
     let there = family.len() as u64;
     let first = u64::from(tags.first_id);
     if first + needed <= there {
@@ -29,7 +44,7 @@ pub(super) fn check_family(
         proposals.push(format!("lower it to at most {highest}"));
     }
     proposals.extend(instead(there.saturating_sub(first)));
-    if let Some(larger) = smallest_shipped(first + needed, 0) {
+    if let Some(larger) = smallest_shipped(kind, first + needed, 0) {
         let (name, len) = (larger.name(), larger.len());
         proposals.push(format!("take --family {name} with its {len} codes"));
     }

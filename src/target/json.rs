@@ -122,6 +122,9 @@ pub(crate) fn check(target: &Target) -> Result<(), Problem> {
             return problem(format!("{field}.id"), "ids must ascend from panel to panel");
         }
         panels.insert(panel.id);
+        if panel.kind != target.panels[0].kind {
+            return problem(format!("{field}.kind"), "all panels must be of one kind");
+        }
         check_panel(panel, &field)?;
         for (i, corner) in panel.corners.iter().enumerate() {
             if !corners.insert(corner.id) {
@@ -215,6 +218,7 @@ fn check_against_spec(target: &Target) -> Result<(), Problem> {
         let plain = [
             ("kind", panel.kind == made.kind),
             ("border_bits", panel.border_bits == made.border_bits),
+            ("tags_in", panel.tags_in == made.tags_in),
             ("inverted", panel.inverted == made.inverted),
             ("outline", panel.outline == made.outline),
             ("matrix", panel.matrix == made.matrix),
@@ -297,8 +301,9 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
         }
         previous = Some(vertex);
         let corner = |v: &Vertex| panel.corner_at(*v).is_some();
-        let complete = panel.kind == GridKind::Checker
-            || crate::lattice::Tile::upright(vertex).vertices().iter().all(corner);
+        // Other programs put tags into the outermost squares as well.
+        let complete =
+            panel.kind == GridKind::Checker || panel.tag_tile(tag).vertices().all(|v| corner(&v));
         if !complete {
             let what = "its tile does not lie between three corners";
             return problem(format!("{field}.tags[{i}].row"), what);
@@ -329,9 +334,10 @@ mod tests {
     use crate::target::{BoardSpec, PaperSpec, TagSpec};
 
     fn board(rows: u32, cols: u32, edge_mm: f64, tagged: bool, boards: u32) -> Target {
+        let grid = GridKind::Deltille;
         let tags = tagged.then(TagSpec::default);
         let inverted = rows % 2 == 1;
-        let spec = BoardSpec { rows, cols, edge_mm, boards, board_id: 3, tags, inverted };
+        let spec = BoardSpec { grid, rows, cols, edge_mm, boards, board_id: 3, tags, inverted };
         let family = Family::resolve("delTag25h7").unwrap();
         let paper = PaperSpec::default();
         Target::build("board", &TargetSpec::Board(spec), Some(&family), Some(&paper)).unwrap()

@@ -16,7 +16,8 @@ use std::f64::consts::FRAC_PI_2;
 use super::length::format_mm;
 use super::paper::{Orientation, PaperSize, PaperSpec};
 use super::{
-    BoardSpec, CheckBar, FamilyRef, Panel, Placement, SheetLayout, SheetText, TargetError,
+    BoardSpec, CheckBar, FamilyRef, GridKind, Panel, Placement, SheetLayout, SheetText, TagsIn,
+    TargetError, board,
 };
 
 /// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
@@ -58,7 +59,7 @@ pub(super) struct Footprint {
 
 impl Footprint {
     fn new(spec: &BoardSpec, margin_mm: f64) -> Self {
-        let [width, height] = Panel::zigzag_size_mm(spec.rows, spec.cols, spec.edge_mm);
+        let [width, height] = board::size_mm(spec);
         let quiet = Panel::quiet_zone_at_mm(spec.edge_mm);
         if spec.inverted {
             let (width, height) = (width + 2.0 * quiet, height + 2.0 * quiet);
@@ -342,14 +343,21 @@ pub(super) fn label(
     panel: &Panel,
     family: Option<&FamilyRef>,
 ) -> String {
+    let corners = format!("{} × {} corners", spec.rows, spec.cols);
     let mut parts = vec![
         name.to_owned(),
-        format!("{} × {} corners", spec.rows, spec.cols),
+        match spec.grid {
+            GridKind::Deltille => corners,
+            GridKind::Checker => format!("checkerboard {corners}"),
+        },
         format!("edge {}", format_mm(spec.edge_mm)),
     ];
     if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
         parts.push(format!("{} {}", family.name, id_range(first.id, last.id)));
         parts.push(format!("fingerprint {}", family.fingerprint));
+        if panel.tags_in == TagsIn::White {
+            parts.push("tags in white squares".to_owned());
+        }
     }
     parts.push(format!("board {}", panel.id));
     parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
@@ -369,7 +377,8 @@ mod tests {
     use crate::target::{Target, TargetSpec};
 
     fn spec(rows: u32, cols: u32, edge_mm: f64) -> BoardSpec {
-        BoardSpec { rows, cols, edge_mm, boards: 1, board_id: 0, tags: None, inverted: false }
+        let grid = GridKind::Deltille;
+        BoardSpec { grid, rows, cols, edge_mm, boards: 1, board_id: 0, tags: None, inverted: false }
     }
 
     fn build(spec: &BoardSpec, paper: &PaperSpec) -> Result<Target, TargetError> {
@@ -437,10 +446,11 @@ mod tests {
         #[test]
         fn nothing_overlaps(
             rows in 2u32..20, cols in 2u32..20, edge in 5.0f64..40.0, margin in 0.0f64..20.0,
-            inverted: bool, orientation in 0usize..3,
+            inverted: bool, orientation in 0usize..3, checker: bool,
         ) {
             use Orientation::{Auto, Landscape, Portrait};
-            let spec = BoardSpec { inverted, ..spec(rows, cols, edge) };
+            let grid = if checker { GridKind::Checker } else { GridKind::Deltille };
+            let spec = BoardSpec { grid, inverted, ..spec(rows, cols, edge) };
             let orientation = [Auto, Landscape, Portrait][orientation];
             let paper = PaperSpec { orientation, margin_mm: margin, ..PaperSpec::default() };
             let Ok(target) = build(&spec, &paper) else { return Ok(()) };

@@ -28,6 +28,7 @@ mod tag_sheet;
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::lattice::GridKind;
 pub use board::zigzag_vertices;
 pub use build::largest_edge_mm;
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
@@ -41,7 +42,7 @@ pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec
 pub use polyhedron::{Face, Polyhedron};
 pub(crate) use skeleton::Incircle;
 pub use skeleton::{Skeleton, SkeletonSpec};
-pub(crate) use spec::{BORDER_BITS, MOST_ROWS, SIDES};
+pub(crate) use spec::{BORDER_BITS, MOST_ROWS, SIDES, least_untagged_corners};
 pub use spec::{
     BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSheetSpec, TagSpec, TargetSpec,
 };
@@ -87,14 +88,22 @@ pub enum Outline {
     Triangle,
 }
 
-/// Which tiling a panel carries.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+/// Which tiles carry tags, by their colour on a board that is not inverted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum GridKind {
-    /// Triangles; six tiles meet at a corner.
-    Deltille,
-    /// Squares; four tiles meet at a corner.
-    Checker,
+pub enum TagsIn {
+    /// Black tiles: the tile itself is the tag's border.
+    #[default]
+    Black,
+    /// White squares of a checkerboard: the tag has a border of its own, and white around it.
+    White,
+}
+
+impl TagsIn {
+    /// Whether it is what goes without saying in files.
+    pub(crate) fn is_black(&self) -> bool {
+        *self == Self::Black
+    }
 }
 
 /// A planar piece of a target.
@@ -109,7 +118,10 @@ pub struct Panel {
     pub edge_mm: f64,
     /// Border of its tags in bit-widths along the edge; `None` without tags.
     pub border_bits: Option<f64>,
-    /// Whether the colours are exchanged: white upright tiles on a black field.
+    /// Which squares of a checkerboard carry its tags.
+    #[serde(default, skip_serializing_if = "TagsIn::is_black")]
+    pub tags_in: TagsIn,
+    /// Whether the colours are exchanged: white upright tiles, or squares, on a black field.
     pub inverted: bool,
     /// Which tiles are drawn around the corners.
     #[serde(default)]
@@ -155,7 +167,7 @@ pub struct Corner {
     pub target_mm: [f64; 3],
 }
 
-/// A tag in the upright tile whose lower-left vertex is (row, col).
+/// A tag in the upright tile, or the square, whose lower-left vertex is (row, col).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TagPlacement {

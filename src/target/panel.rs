@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 
-use super::{Corner, GridKind, Outline, Panel};
-use crate::lattice::{ROW_HEIGHT, Tile, Vertex};
+use super::{Corner, Outline, Panel, TagPlacement, TagsIn};
+use crate::lattice::{Tile, Vertex};
 
 /// White left around the tiles of a panel, in edges. All six tiles of every corner lie inside the
 /// tiles' bounding box, so that nothing is measured beyond it; the quiet zone only has to keep
@@ -11,6 +11,10 @@ const QUIET_EDGES: f64 = 0.25;
 
 /// The least quiet zone, mm: on fine boards text stays clear of the tiles for the eye as well.
 const QUIET_MIN_MM: f64 = 5.0;
+
+/// White between a white square and the border of the tag in it, bit-widths: readers of AprilTags ask
+/// for one, the corners of the square for as much clear of the tag as in a black one.
+const TAG_MARGIN_BITS: f64 = 2.0;
 
 impl Panel {
     /// Whether it is a single tag, with no corner of the lattice around it.
@@ -26,19 +30,43 @@ impl Panel {
 
     /// Where a vertex of the panel's lattice lies in the panel frame, mm.
     pub fn lattice_mm(&self, vertex: Vertex) -> [f64; 2] {
-        let place = match self.kind {
-            GridKind::Deltille => vertex.position(),
-            GridKind::Checker => [f64::from(vertex.col), f64::from(vertex.row)],
-        };
-        place.map(|v| v * self.edge_mm)
+        self.kind.position(vertex.row.into(), vertex.col.into()).map(|v| v * self.edge_mm)
     }
 
-    /// The upright tiles that are drawn, ordered by row, then column: black ones on white, or, on
-    /// an inverted panel, white ones on black.
-    pub fn upright_tiles(&self) -> Vec<Tile> {
+    /// The tile of a tag.
+    pub fn tag_tile(&self, tag: &TagPlacement) -> Tile {
+        self.kind.tag_tile(Vertex::new(tag.row, tag.col))
+    }
+
+    /// Blank between the edges of a tile and the border of the tag in it, bit-widths.
+    pub fn tag_margin_bits(&self) -> f64 {
+        match self.tags_in {
+            TagsIn::Black => 0.0,
+            TagsIn::White => TAG_MARGIN_BITS,
+        }
+    }
+
+    /// Distance from the edges of a tile to the cells of the tag in it, bit-widths along the edge.
+    pub fn tag_inset_bits(&self) -> f64 {
+        self.tag_margin_bits() + self.border_bits.unwrap_or_default()
+    }
+
+    /// The tiles that meet at corners, of either colour.
+    fn tiles_around_corners(&self) -> impl Iterator<Item = Tile> {
         let corners = self.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
-        let mut anchors: BTreeSet<Vertex> =
-            corners.flat_map(Tile::upright_around).map(|tile| tile.anchor).collect();
+        corners.flat_map(|vertex| self.kind.tiles_around(vertex))
+    }
+
+    /// The drawn tiles, and all tiles of the other colour that touch a corner.
+    pub fn tiles(&self) -> BTreeSet<Tile> {
+        self.dark_tiles().into_iter().chain(self.tiles_around_corners()).collect()
+    }
+
+    /// The dark tiles that are drawn, ordered by row, then column: black ones on white, or, on an
+    /// inverted panel, white ones on black.
+    pub fn dark_tiles(&self) -> Vec<Tile> {
+        let dark = self.tiles_around_corners().filter(|tile| tile.is_dark());
+        let mut anchors: BTreeSet<Vertex> = dark.map(|tile| tile.anchor).collect();
         if self.outline == Outline::Zigzag
             && let Some(lowest) = anchors.first().map(|anchor| anchor.row)
             && let Some(last) = anchors.range(..Vertex::new(lowest + 1, i32::MIN)).next_back()
@@ -52,22 +80,23 @@ impl Panel {
             anchors.extend(ends.map(|(row, col)| Vertex::new(row, col)));
         }
         // A tag has a tile, also where it stands alone.
-        anchors.extend(self.tags.iter().map(|tag| Vertex::new(tag.row, tag.col)));
-        anchors.into_iter().map(Tile::upright).collect()
+        let tagged = self.tags.iter().map(|tag| self.tag_tile(tag)).filter(|tile| tile.is_dark());
+        anchors.extend(tagged.map(|tile| tile.anchor));
+        anchors.into_iter().map(|anchor| self.kind.tag_tile(anchor)).collect()
     }
 
     /// Bounding box of the drawn tiles in the panel frame, mm: left, lower, right and upper end.
     pub fn bounds_mm(&self) -> [f64; 4] {
         let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
-        for tile in self.upright_tiles() {
-            // Left, right and lower end are those of the base, the upper end is the apex.
-            let [x, y] = tile.anchor.position();
+        for [x, y] in
+            self.dark_tiles().iter().flat_map(|t| t.vertices()).map(|v| self.lattice_mm(v))
+        {
             bounds[0] = bounds[0].min(x);
             bounds[1] = bounds[1].min(y);
-            bounds[2] = bounds[2].max(x + 1.0);
-            bounds[3] = bounds[3].max(y + ROW_HEIGHT);
+            bounds[2] = bounds[2].max(x);
+            bounds[3] = bounds[3].max(y);
         }
-        bounds.map(|v| v * self.edge_mm)
+        bounds
     }
 
     /// Width of the quiet zone around [`Self::bounds_mm`], mm. Nothing else is printed in it; on
@@ -86,12 +115,5 @@ impl Panel {
     /// Width of the quiet zone around tiles of a given edge, mm.
     pub(super) fn quiet_zone_at_mm(edge_mm: f64) -> f64 {
         (QUIET_EDGES * edge_mm).max(QUIET_MIN_MM)
-    }
-
-    /// Width and height of the drawn tiles of a zigzag board, mm; what [`Self::bounds_mm`] finds
-    /// without a panel at hand.
-    pub(super) fn zigzag_size_mm(rows: u32, cols: u32, edge_mm: f64) -> [f64; 2] {
-        let (rows, cols) = (f64::from(rows), f64::from(cols));
-        [(cols + 1.5) * edge_mm, (rows + 1.0) * ROW_HEIGHT * edge_mm]
     }
 }

@@ -8,7 +8,7 @@ use super::length::format_mm;
 use super::polyhedron::{Face, Polyhedron};
 use super::{
     Corner, FamilyRef, GridKind, Incircle, Outline, Panel, Skeleton, SolidShape, SolidSpec,
-    TagPlacement, TargetError,
+    TagPlacement, TagsIn, TargetError,
 };
 use crate::family::Family;
 use crate::lattice::Vertex;
@@ -134,8 +134,10 @@ pub(super) fn panels(
 ) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
     let panels = untied_panels(spec)?;
     let faces = panels.len() as u64;
-    let needed =
-        |tiles, spacing| faces * tagged_tiles(&triangle_vertices(tiles), spacing).len() as u64;
+    let needed = |tiles, spacing| {
+        let vertices = triangle_vertices(tiles);
+        faces * tagged_tiles(GridKind::Deltille, &vertices, spacing, TagsIn::Black).len() as u64
+    };
     let instead = |available: u64| {
         let wider = wider_spacing(&spec.tags, available, |spacing| needed(spec.tiles, spacing));
         let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)
@@ -145,7 +147,7 @@ pub(super) fn panels(
         wider.into_iter().chain(fewer).collect()
     };
     let tags = needed(spec.tiles, spec.tags.spacing);
-    let family = check_family(&spec.tags, family, tags, instead)?;
+    let family = check_family(GridKind::Deltille, &spec.tags, family, tags, instead)?;
     Ok((panels, Some(family)))
 }
 
@@ -153,12 +155,13 @@ pub(super) fn panels(
 pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError> {
     let faces = spec.faces()?;
     let vertices = triangle_vertices(spec.tiles);
-    let tiles = tagged_tiles(&vertices, spec.tags.spacing);
+    let tiles = tagged_tiles(GridKind::Deltille, &vertices, spec.tags.spacing, TagsIn::Black);
     let panel = |(index, face): (u32, &Face)| Panel {
         id: spec.board_id + index,
         kind: GridKind::Deltille,
         edge_mm: face.tile_edge_mm,
         border_bits: Some(spec.tags.border_bits),
+        tags_in: TagsIn::Black,
         inverted: false,
         outline: Outline::Triangle,
         matrix: [spec.tiles - 2; 2],
@@ -211,7 +214,7 @@ mod tests {
         assert_eq!(target.panels.len(), 20);
         for panel in &target.panels {
             assert_eq!((panel.corners.len(), panel.tags.len()), (66, 10));
-            assert_eq!(panel.upright_tiles().len(), 13 * 14 / 2);
+            assert_eq!(panel.dark_tiles().len(), 13 * 14 / 2);
         }
     }
 

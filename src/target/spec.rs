@@ -2,7 +2,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::length::format_mm;
-use super::{ClosedMesh, SkeletonSpec, TargetError};
+use super::{ClosedMesh, GridKind, SkeletonSpec, TagsIn, TargetError};
 
 /// Most rows or columns of a board: more than the largest paper holds at the finest edge that
 /// anybody prints, and few enough that no number overflows.
@@ -15,7 +15,17 @@ pub(crate) const SIDES: std::ops::RangeInclusive<u32> = 2..=MOST_ROWS;
 const MOST_CORNERS: u64 = 1_000_000;
 
 /// Fewest corners of an untagged board: what the detector asks for where no tag vouches for a grid.
-const LEAST_UNTAGGED_CORNERS: u32 = 7;
+/// A hexagon of triangles, or four squares: a quad or two of random texture may pass for tiles,
+/// twelve clean edges between so few corners do not.
+pub(crate) const fn least_untagged_corners(kind: GridKind) -> u32 {
+    match kind {
+        GridKind::Deltille => 7,
+        GridKind::Checker => 9,
+    }
+}
+
+/// Least border of a square tag, bit-widths: that of an AprilTag.
+const LEAST_SQUARE_BORDER_BITS: f64 = 1.0;
 
 /// Range of a tile's edge, mm.
 const EDGE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
@@ -43,7 +53,7 @@ pub(crate) const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.6..=10.0;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum TargetSpec {
-    /// Flat zigzag boards.
+    /// Flat boards: deltille zigzags, or checkerboards.
     Board(BoardSpec),
     /// A solid with a board on each face.
     Solid(SolidSpec),
@@ -53,10 +63,13 @@ pub enum TargetSpec {
     Listed(ListedSpec),
 }
 
-/// Zigzag deltille boards of `rows × cols` corners, all alike but for their ids.
+/// Boards of `rows × cols` corners, all alike but for their ids.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoardSpec {
+    /// The tiling.
+    #[serde(default, skip_serializing_if = "is_deltille")]
+    pub grid: GridKind,
     /// Rows of corners.
     pub rows: u32,
     /// Corners in each row.
@@ -79,6 +92,10 @@ fn one() -> u32 {
     1
 }
 
+fn is_deltille(kind: &GridKind) -> bool {
+    *kind == GridKind::Deltille
+}
+
 /// Which tags a board carries, and where.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -91,6 +108,9 @@ pub struct TagSpec {
     pub spacing: u32,
     /// Border in bit-widths along the edge.
     pub border_bits: f64,
+    /// Which squares of a checkerboard carry them.
+    #[serde(default, skip_serializing_if = "TagsIn::is_black")]
+    pub tags_in: TagsIn,
 }
 
 /// Single tags on sheets: a panel of one tile without corners for each, whose id is the tag's.
@@ -165,7 +185,28 @@ impl Default for TagSpec {
     /// six plain tiles around each of its corners, and the border is that of published targets.
     fn default() -> Self {
         let family = "delTag25h7".to_owned();
-        Self { family, first_id: 0, spacing: 3, border_bits: 1.5 }
+        Self { family, first_id: 0, spacing: 3, border_bits: 1.5, tags_in: TagsIn::Black }
+    }
+}
+
+impl TagSpec {
+    /// Tags for a checkerboard: aprilTag36h11 in every second row and column, so that each corner
+    /// touches one tag at most.
+    ///
+    /// In black squares the border has two bits: with one, cells come so near to the corners that
+    /// these are found half as precisely (docs/measurements.md). In white squares it has the one bit
+    /// that every reader of AprilTags knows.
+    pub fn for_squares(tags_in: TagsIn) -> Self {
+        Self {
+            family: "aprilTag36h11".to_owned(),
+            spacing: 2,
+            border_bits: match tags_in {
+                TagsIn::Black => 2.0,
+                TagsIn::White => LEAST_SQUARE_BORDER_BITS,
+            },
+            tags_in,
+            ..Self::default()
+        }
     }
 }
 
@@ -277,16 +318,41 @@ impl BoardSpec {
             let problem = format!("{} leaves no ids for the boards after it", self.board_id);
             return Err(TargetError::invalid("--board-id", problem));
         }
-        if self.tags.is_none() && self.rows * self.cols < LEAST_UNTAGGED_CORNERS {
+        let least = least_untagged_corners(self.grid);
+        if self.tags.is_none() && self.rows * self.cols < least {
             let problem = format!(
                 "{} × {} corners without tags are too few to be told from texture: take at least \
-                 {LEAST_UNTAGGED_CORNERS} corners, or tags",
+                 {least} corners, or tags",
                 self.rows, self.cols
             );
-            return Err(TargetError::invalid("--untagged", problem));
+            let option = match self.grid {
+                GridKind::Deltille => "--untagged",
+                GridKind::Checker => "--rows",
+            };
+            return Err(TargetError::invalid(option, problem));
         }
         match &self.tags {
-            Some(tags) => tags.check(),
+            Some(tags) => {
+                if self.grid == GridKind::Deltille && tags.tags_in == TagsIn::White {
+                    let problem = "the tags of a deltille board are in its black tiles";
+                    return Err(TargetError::invalid("--tags-in", problem));
+                }
+                let least = LEAST_SQUARE_BORDER_BITS;
+                if self.grid == GridKind::Checker && tags.border_bits < least {
+                    let problem = format!(
+                        "{} is too narrow, a square tag has a border of at least {least} bit-width",
+                        tags.border_bits
+                    );
+                    return Err(TargetError::invalid("--tag-border", problem));
+                }
+                if (self.grid, self.rows, self.cols, tags.tags_in)
+                    == (GridKind::Checker, 2, 2, TagsIn::White)
+                {
+                    let problem = "the one square between 2 × 2 corners is black";
+                    return Err(TargetError::invalid("--tags-in", problem));
+                }
+                tags.check()
+            }
             None if self.boards > 1 => {
                 let problem = "untagged boards cannot be told apart: give them tags, or make one";
                 Err(TargetError::invalid("--boards", problem))

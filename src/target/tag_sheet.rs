@@ -13,7 +13,7 @@ use super::paper::{Orientation, PaperSize, PaperSpec};
 use super::spec::BORDER_BITS;
 use super::{
     FamilyRef, GridKind, Outline, Panel, PanelPose, Placement, SheetLayout, SheetText,
-    TagPlacement, TagSheetSpec, TargetError,
+    TagPlacement, TagSheetSpec, TagsIn, TargetError,
 };
 use crate::family::Family;
 use crate::lattice::ROW_HEIGHT;
@@ -95,6 +95,10 @@ pub(super) fn panels(spec: &TagSheetSpec) -> Vec<Panel> {
 }
 
 fn check(spec: &TagSheetSpec, family: &Family) -> Result<(), TargetError> {
+    if family.kind() != GridKind::Deltille {
+        let problem = format!("{} has square tags, a sheet takes triangular ones", family.name());
+        return Err(TargetError::invalid("--family", problem));
+    }
     if !EDGE_MM.contains(&spec.edge_mm) {
         let problem = format!("{} is not between 5 mm and 2000 mm", format_mm(spec.edge_mm));
         return Err(TargetError::invalid("--edge", problem));
@@ -121,6 +125,7 @@ fn panel(spec: &TagSheetSpec, id: u32) -> Panel {
         kind: GridKind::Deltille,
         edge_mm: spec.edge_mm,
         border_bits: Some(spec.border_bits),
+        tags_in: TagsIn::Black,
         inverted: false,
         outline: Outline::Touching,
         matrix: [0, 0],

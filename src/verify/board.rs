@@ -8,7 +8,6 @@ use super::fold::Seen;
 use super::tiles::{MAX_INK_ERROR, PlacedPanel};
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
 use crate::detect::{Detection, GridCorner};
-use crate::lattice::{Tile, Vertex};
 use crate::target::{Corner, Panel, SheetLayout};
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
@@ -33,7 +32,7 @@ pub(super) fn check(
     layout: &SheetLayout,
     verdict: &mut SheetVerdict,
 ) -> (AffineMap, Seen) {
-    let detection = verifier.detector.detect(&page.image, "page");
+    let detection = verifier.detector.detect(&page.blurred(), "page");
     // Looked at in a mirror only if need be.
     let mut mirrored: Option<Detection> = None;
     let mut mirror = None;
@@ -47,8 +46,9 @@ pub(super) fn check(
         verdict.corners += panel.corners.len();
         verdict.tags += panel.tags.len();
         if !detection.grids.iter().any(|grid| grid.panel == Some(id)) {
-            let mirrored = mirrored
-                .get_or_insert_with(|| verifier.detector.detect(&page.mirrored().image, "mirror"));
+            let mirrored = mirrored.get_or_insert_with(|| {
+                verifier.detector.detect(&page.mirrored().blurred(), "mirror")
+            });
             if mirrored.grids.iter().any(|grid| grid.panel == Some(id)) {
                 verdict.findings.push(Finding::Mirrored { panel: id });
                 let linear = [[-1.0, 0.0], [0.0, 1.0]];
@@ -285,13 +285,14 @@ fn extra_corners(detection: &Detection, placed: &[PlacedPanel], verdict: &mut Sh
 fn in_tag(placed: &PlacedPanel, at_mm: [f64; 2]) -> bool {
     let panel = placed.panel;
     panel.tags.iter().any(|tag| {
-        let [a, b, c] = Tile::upright(Vertex::new(tag.row, tag.col)).vertices().map(|v| {
-            let stated = placed.page_from_panel(v.position().map(|x| x * panel.edge_mm));
+        let vertices = panel.tag_tile(tag).vertices().map(|v| {
+            let stated = placed.page_from_panel(panel.lattice_mm(v));
             placed.found_from_stated.apply(stated)
         });
         let left = |p: [f64; 2], q: [f64; 2]| {
             (q[0] - p[0]) * (at_mm[1] - p[1]) - (q[1] - p[1]) * (at_mm[0] - p[0]) > 0.0
         };
-        left(a, b) && left(b, c) && left(c, a)
+        let next = vertices.clone().cycle().skip(1);
+        vertices.zip(next).all(|(p, q)| left(p, q))
     })
 }

@@ -13,7 +13,7 @@ use super::document::Page;
 use super::tiles::{EDGE_PX, MAX_INK_ERROR, PlacedPanel};
 use super::{Finding, SheetVerdict};
 use crate::artwork;
-use crate::lattice::{ROW_HEIGHT, Tile, Vertex};
+use crate::lattice::Tile;
 use crate::raster::{Coverage, Gray};
 use crate::target::{CHECK_BAR_STROKE_MM, SheetLayout, SheetLine, SheetText};
 
@@ -298,7 +298,7 @@ impl<'a> Ground<'a> {
             ends.map(|p| sign * p[i]).into_iter().fold(f64::MIN, f64::max) + 2.0 * EDGE_PX
         };
         let around_px = [-most(0, -1.0), -most(1, -1.0), most(0, 1.0), most(1, 1.0)];
-        Self { placed, tiles: placed.tiles(), field, around_px }
+        Self { placed, tiles: panel.tiles(), field, around_px }
     }
 
     fn inverted(&self) -> bool {
@@ -322,7 +322,8 @@ impl<'a> Ground<'a> {
         let edge_mm = self.placed.panel.edge_mm;
         let near = EDGE_PX / page.px_per_mm;
         let reaches = |[du, dv]: [f64; 2]| {
-            self.tiles.contains(&tile_at([(u + du) / edge_mm, (v + dv) / edge_mm]))
+            let at = [(u + du) / edge_mm, (v + dv) / edge_mm];
+            self.tiles.contains(&self.placed.panel.kind.tile_at(at))
         };
         // Fine enough that no tip of a tile, also a lone one, slips between two directions.
         let around = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
@@ -331,13 +332,4 @@ impl<'a> Ground<'a> {
         let undecided = in_tile || (self.inverted() && inside < EDGE_PX);
         if undecided { Some(None) } else { self.inverted().then_some(Some(1.0)) }
     }
-}
-
-/// The tile of the lattice at a position, in edges.
-fn tile_at([x, y]: [f64; 2]) -> Tile {
-    let row = y / ROW_HEIGHT;
-    let col = x - row / 2.0;
-    let anchor = Vertex::new(row.floor() as i32, col.floor() as i32);
-    let upright = row - row.floor() + col - col.floor() < 1.0;
-    if upright { Tile::upright(anchor) } else { Tile::inverted(anchor) }
 }

@@ -280,8 +280,8 @@ impl<'a> Verifier<'a> {
         let panels = self.target.panels.iter();
         let here = panels.filter(|panel| layout.placements.iter().any(|p| p.panel == panel.id));
         let cells_mm = here.filter_map(|panel| {
-            let rows = f64::from(self.family?.dimension().rows());
-            Some(panel.edge_mm / (rows + 3.0 * panel.border_bits?))
+            panel.border_bits?;
+            Some(panel.edge_mm / self.family?.cells().width(panel.tag_inset_bits()))
         });
         cells_mm.map(|cell_mm| CELL_PX / cell_mm).fold(PRINT_PX_PER_MM, f64::max)
     }

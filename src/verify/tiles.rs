@@ -10,7 +10,7 @@ use super::Finding;
 use super::document::Page;
 use super::fit::AffineMap;
 use crate::family::{Decoder, Family};
-use crate::lattice::{Orientation, TagCells, Tile, Vertex};
+use crate::lattice::{GridKind, TagCells, Tile, Vertex};
 use crate::target::{Panel, Placement, TagPlacement};
 
 /// Pixels nearer than this to a change of colour are left out, px: the half diagonal of a pixel
@@ -40,8 +40,23 @@ impl Tally {
 
 /// What a tile should look like.
 struct Expected<'a> {
+    /// Black, as a whole or around its tag.
     black: bool,
+    /// Black and white are exchanged.
+    inverted: bool,
     tag: Option<ExpectedTag<'a>>,
+}
+
+impl Expected<'_> {
+    /// Whether the tile is black at tile coordinates.
+    fn is_black_at(&self, p: [f64; 2]) -> bool {
+        let Some(tag) = &self.tag else { return self.black };
+        match tag.looks.region(p) {
+            Region::Margin => self.black,
+            Region::Border => !self.inverted,
+            Region::Cell(bit) => (tag.word >> bit & 1 == 0) != self.inverted,
+        }
+    }
 }
 
 struct ExpectedTag<'a> {
@@ -53,28 +68,52 @@ struct ExpectedTag<'a> {
 /// Where the cells of a panel's tags are, in tile coordinates.
 pub(super) struct TagLooks {
     cells: TagCells,
-    border: f64,
+    /// From the edges of the tile to the border, and to the cells, bit-widths.
+    margin: f64,
+    inset: f64,
     width: f64,
     /// Bit of each cell, by (row, column, upright).
     bits: BTreeMap<(u32, u32, bool), u32>,
 }
 
+/// A part of a tile with a tag.
+#[derive(Clone, Copy, PartialEq)]
+enum Region {
+    Margin,
+    Border,
+    Cell(u32),
+}
+
 impl TagLooks {
-    pub fn new(family: &Family, border: f64) -> Self {
-        let cells = TagCells::new(family.dimension());
+    pub fn new(family: &Family, panel: &Panel) -> Self {
+        let cells = family.cells();
+        let (margin, inset) = (panel.tag_margin_bits(), panel.tag_inset_bits());
         let bits = cells.cells().iter().enumerate();
         let bits = bits.map(|(bit, c)| ((c.row, c.col, c.upright), bit as u32)).collect();
-        let width = f64::from(family.dimension().rows()) + 3.0 * border;
-        Self { cells, border, width, bits }
+        let width = cells.width(inset);
+        Self { cells, margin, inset, width, bits }
     }
 
-    /// The bit of the cell at tile coordinates (u, v); `None` on the border.
+    /// What is at tile coordinates.
+    fn region(&self, [u, v]: [f64; 2]) -> Region {
+        if let Some(bit) = self.bit([u, v]) {
+            return Region::Cell(bit);
+        }
+        // Only squares have a margin.
+        let margin = self.margin / self.width;
+        match [u, v].into_iter().all(|t| (margin..=1.0 - margin).contains(&t)) {
+            true => Region::Border,
+            false => Region::Margin,
+        }
+    }
+
+    /// The bit of the cell at tile coordinates (u, v); `None` beside the cells.
     fn bit(&self, [u, v]: [f64; 2]) -> Option<u32> {
-        let (u, v) = (u * self.width - self.border, v * self.width - self.border);
+        let (u, v) = (u * self.width - self.inset, v * self.width - self.inset);
         if u < 0.0 || v < 0.0 {
             return None;
         }
-        let upright = u.fract() + v.fract() < 1.0;
+        let upright = self.cells.kind() == GridKind::Checker || u.fract() + v.fract() < 1.0;
         self.bits.get(&(v as u32, u as u32, upright)).copied()
     }
 }
@@ -117,17 +156,17 @@ impl PlacedPanel<'_> {
     /// The ink of the tiles that should be white and black, in the middle of plain tiles; `None`
     /// where those of one colour are not alike, so that the picture shows something else.
     pub fn tones(&self) -> Option<[f64; 2]> {
-        let tagged: BTreeSet<Vertex> =
-            self.panel.tags.iter().map(|tag| Vertex::new(tag.row, tag.col)).collect();
+        let tagged: BTreeSet<Tile> =
+            self.panel.tags.iter().map(|tag| self.panel.tag_tile(tag)).collect();
         let mut inks = [Vec::new(), Vec::new()];
-        for tile in self.tiles() {
-            let upright = tile.orientation == Orientation::Upright;
-            if upright && tagged.contains(&tile.anchor) {
+        for tile in self.panel.tiles() {
+            if tagged.contains(&tile) {
                 continue;
             }
-            let [a, b, c] = self.vertices_px(tile);
-            let centre = [0, 1].map(|i| (a[i] + b[i] + c[i]) / 3.0);
-            inks[usize::from(upright != self.panel.inverted)].push(self.page.ink(centre));
+            let [a, b, c] = self.frame_px(tile);
+            let [u, v] = self.panel.kind.middle();
+            let centre = [0, 1].map(|i| a[i] + u * (b[i] - a[i]) + v * (c[i] - a[i]));
+            inks[usize::from(tile.is_dark() != self.panel.inverted)].push(self.page.ink(centre));
         }
         let tone = |inks: &mut Vec<f64>| {
             inks.sort_by(f64::total_cmp);
@@ -139,29 +178,29 @@ impl PlacedPanel<'_> {
         Some([tone(white)?, tone(black)?])
     }
 
-    /// Picture positions of a tile's vertices.
-    fn vertices_px(&self, tile: Tile) -> [[f64; 2]; 3] {
-        tile.vertices().map(|v| {
-            let stated = self.page_from_panel(v.position().map(|x| x * self.panel.edge_mm));
+    /// Picture positions of a tile's A, B and C.
+    fn frame_px(&self, tile: Tile) -> [[f64; 2]; 3] {
+        tile.frame().map(|v| {
+            let stated = self.page_from_panel(self.panel.lattice_mm(v));
             self.page.px_from_page(self.found_from_stated.apply(stated))
         })
     }
 
     /// Compares all tiles of the panel.
     pub fn check_tiles(&self, family: Option<&Family>) -> TileReport {
-        let looks = family.map(|f| TagLooks::new(f, self.panel.border_bits.unwrap_or_default()));
-        let tags: BTreeMap<Vertex, TagPlacement> =
-            self.panel.tags.iter().map(|t| (Vertex::new(t.row, t.col), *t)).collect();
+        let looks = family.map(|family| TagLooks::new(family, self.panel));
+        let tags: BTreeMap<Tile, TagPlacement> =
+            self.panel.tags.iter().map(|tag| (self.panel.tag_tile(tag), *tag)).collect();
         // Needed only where something is wrong.
         let decoder = OnceCell::new();
         let mut report = TileReport::default();
-        for tile in self.tiles() {
-            let upright = tile.orientation == Orientation::Upright;
-            let tag = tags.get(&tile.anchor).filter(|_| upright).and_then(|&placement| {
+        for tile in self.panel.tiles() {
+            let tag = tags.get(&tile).and_then(|&placement| {
                 let word = family?.code(placement.id)?;
                 Some(ExpectedTag { placement, word, looks: looks.as_ref()? })
             });
-            let expected = Expected { black: upright != self.panel.inverted, tag };
+            let inverted = self.panel.inverted;
+            let expected = Expected { black: tile.is_dark() != inverted, inverted, tag };
             let tally = self.compare(tile, &expected);
             report.tiles += 1;
             self.judge(tile, &expected, &tally, family, &decoder, &mut report);
@@ -169,21 +208,9 @@ impl PlacedPanel<'_> {
         report
     }
 
-    /// The drawn tiles, and all tiles of the other colour that touch a corner.
-    pub fn tiles(&self) -> BTreeSet<Tile> {
-        let mut tiles: BTreeSet<Tile> = self.panel.upright_tiles().into_iter().collect();
-        for corner in &self.panel.corners {
-            let v = Vertex::new(corner.row, corner.col);
-            for step in [Vertex::new(0, -1), Vertex::new(-1, 0), Vertex::new(-1, -1)] {
-                tiles.insert(Tile::inverted(v + step));
-            }
-        }
-        tiles
-    }
-
-    /// Counts wrong pixels, by cell; the key `None` is the border of a tag, or a plain tile.
+    /// Counts wrong pixels, by cell; the key `None` is what is around the cells, or a plain tile.
     fn compare(&self, tile: Tile, expected: &Expected) -> BTreeMap<Option<u32>, Tally> {
-        let [a, b, c] = self.vertices_px(tile);
+        let [a, b, c] = self.frame_px(tile);
         let (ab, ac) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
         let det = ab[0] * ac[1] - ab[1] * ac[0];
         let uv = |[x, y]: [f64; 2]| [(x * ac[1] - y * ac[0]) / det, (y * ab[0] - x * ab[1]) / det];
@@ -192,18 +219,21 @@ impl PlacedPanel<'_> {
             .map(|angle| uv([EDGE_PX * angle.cos(), EDGE_PX * angle.sin()]))
             .collect();
         let bit = |p: [f64; 2]| expected.tag.as_ref().and_then(|tag| tag.looks.bit(p));
-        let ink = |bit: Option<u32>| {
-            let white_cell =
-                expected.tag.as_ref().zip(bit).is_some_and(|(t, b)| t.word >> b & 1 == 1);
-            expected.black != white_cell
+        let black_at = |p: [f64; 2]| expected.is_black_at(p);
+        let inside = |[u, v]: [f64; 2]| match self.panel.kind {
+            GridKind::Deltille => u >= 0.0 && v >= 0.0 && u + v <= 1.0,
+            GridKind::Checker => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
         };
-        let inside = |[u, v]: [f64; 2]| u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+        let fourth = [0, 1].map(|i| match self.panel.kind {
+            GridKind::Deltille => c[i],
+            GridKind::Checker => b[i] + c[i] - a[i],
+        });
 
         let mut tallies = BTreeMap::<Option<u32>, Tally>::new();
         let image = &self.page.image;
-        let low = |i: usize| a[i].min(b[i]).min(c[i]).ceil().max(0.0) as usize;
+        let low = |i: usize| a[i].min(b[i]).min(c[i]).min(fourth[i]).ceil().max(0.0) as usize;
         let high = |i: usize, size: usize| {
-            ((a[i].max(b[i]).max(c[i]).floor() + 1.0).max(0.0) as usize).min(size)
+            ((a[i].max(b[i]).max(c[i]).max(fourth[i]).floor() + 1.0).max(0.0) as usize).min(size)
         };
         for y in low(1)..high(1, image.height()) {
             for x in low(0)..high(0, image.width()) {
@@ -213,10 +243,10 @@ impl PlacedPanel<'_> {
                     continue;
                 }
                 let here = bit(p);
-                let black = ink(here);
+                let black = black_at(p);
                 let uniform = around.iter().all(|d| {
                     let q = [p[0] + d[0], p[1] + d[1]];
-                    inside(q) && ink(bit(q)) == black
+                    inside(q) && black_at(q) == black
                 });
                 if !uniform {
                     continue;
@@ -235,9 +265,9 @@ impl PlacedPanel<'_> {
         if let Some(tag) = &expected.tag {
             for bit in 0..tag.looks.cells.dimension().bits() {
                 tallies.entry(Some(bit)).or_insert_with(|| {
-                    let [u, v] = tag.looks.cells.centre(bit, tag.looks.border);
+                    let [u, v] = tag.looks.cells.centre(bit, tag.looks.inset);
                     let at = [0, 1].map(|i| a[i] + u * ab[i] + v * ac[i]);
-                    let wrong = (self.page.ink(at) > 0.5) != ink(Some(bit));
+                    let wrong = (self.page.ink(at) > 0.5) != black_at([u, v]);
                     Tally { checked: 1, wrong: usize::from(wrong), moment: at }
                 });
             }

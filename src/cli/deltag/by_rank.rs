@@ -21,7 +21,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = Family::resolve(&args.family)?;
+    let family = super::deltags(Family::resolve(&args.family)?)?;
     let Construction::Algebraic(construction) = family.construction() else {
         anyhow::bail!("{}: not an algebraic family, its codes have no rank", args.family);
     };

@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 use crate::cli::output::say;
 use crate::family::{Family, TagWords, bounds::bounds};
-use crate::target::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use crate::target::{BoardSpec, GridKind, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -51,6 +51,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     );
     let [rows, cols] = BOARD;
     let board = tags_of(&TargetSpec::Board(BoardSpec {
+        grid: GridKind::Deltille,
         rows,
         cols,
         edge_mm: 20.0,

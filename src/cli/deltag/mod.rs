@@ -18,9 +18,11 @@ mod verify_family;
 use std::path::Path;
 use std::process::ExitCode;
 
+use anyhow::bail;
 use clap::{Parser, Subcommand};
 
-use crate::family::{Family, FamilyError, PAIRS_COUNTED, certify_codes, shipped_names};
+use crate::family::{Family, PAIRS_COUNTED, certify_codes, shipped_names};
+use crate::lattice::GridKind;
 
 /// Search, check, list and draw DelTag code families.
 #[derive(Parser)]
@@ -72,10 +74,22 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
     }
 }
 
+/// Refuses families of other tags than DelTags.
+fn deltags(family: Family) -> anyhow::Result<Family> {
+    if family.kind() != GridKind::Deltille {
+        let name = family.name();
+        bail!(
+            "{name}: its tags are square, deltag is about triangular ones; squares carry them: \
+             `deltille checkerboard --tags {name}`"
+        );
+    }
+    Ok(family)
+}
+
 /// A family to make something of. The codes of a file that comes from elsewhere are compared where
 /// that is a matter of a second, and a word is said where they are not what the file claims.
-fn resolve(name_or_path: &str) -> Result<Family, FamilyError> {
-    let family = Family::resolve(name_or_path)?;
+fn resolve(name_or_path: &str) -> anyhow::Result<Family> {
+    let family = deltags(Family::resolve(name_or_path)?)?;
     if !shipped_names().contains(&name_or_path)
         && family.len() <= PAIRS_COUNTED
         && let Some(failure) = certify_codes(&family).failures.first()

@@ -6,6 +6,7 @@ use super::gen_family::{FILE_LIMIT, bytes_per_code};
 use super::values::whole;
 use crate::cli::output::say;
 use crate::family::{Family, shipped_names, smallest_shipped};
+use crate::lattice::GridKind;
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -32,7 +33,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Some(largest) = largest else {
         anyhow::bail!("--corrects {}: no shipped family corrects so many cells", args.corrects);
     };
-    let Some(best) = smallest_shipped(needed, args.corrects) else {
+    let Some(best) = smallest_shipped(GridKind::Deltille, needed, args.corrects) else {
         let (name, len) = (largest.name(), largest.len());
         let listed = FILE_LIMIT / bytes_per_code(largest.dimension());
         let instead = if largest.dimension().bits() == 49 && needed <= listed / 2 {
@@ -51,7 +52,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     say!("{} x {} = {needed} tags: {}", args.faces, args.tags_per_face, about(&best));
     // What more bits would buy.
-    if let Some(more) = smallest_shipped(needed, best.correctable() + 1) {
+    if let Some(more) = smallest_shipped(GridKind::Deltille, needed, best.correctable() + 1) {
         say!("to correct more, with smaller cells: {}", about(&more));
     }
     Ok(ExitCode::SUCCESS)

@@ -1,4 +1,4 @@
-//! `deltille board`.
+//! `deltille board` and `deltille checkerboard`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -11,9 +11,9 @@ use super::settings::{Plan, Settings};
 use crate::artwork::{self, Artwork};
 use crate::export::{atomic, dsc};
 use crate::family::Family;
-use crate::target::{Target, TargetSpec, id_range};
+use crate::target::{GridKind, Target, TargetSpec, id_range};
 
-/// Arguments of `deltille board`.
+/// Arguments of both.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -29,12 +29,12 @@ pub struct Args {
 }
 
 /// Makes a board, writes its files, and verifies what it wrote.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let settings = match &args.template {
         Some(path) => args.settings.or(Settings::read(path)?),
         None => args.settings,
     };
-    let plan = settings.plan()?;
+    let plan = settings.plan(grid)?;
     let family = plan.spec.tags.as_ref().map(|tags| Family::resolve(&tags.family)).transpose();
     let family = family.context("--family")?;
     let spec = TargetSpec::Board(plan.spec.clone());
@@ -43,7 +43,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let files = files(&plan, &target, artwork::draw(&target, family.as_ref())?)?;
     let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &summary(&target))?;
     if let Some(path) = &args.save_template {
-        let template = settings.with_edge(plan.spec.edge_mm).to_toml();
+        let template = settings.with_edge(plan.spec.edge_mm).to_toml(grid);
         atomic::write(path, |out| out.write_all(template.as_bytes()))?;
     }
     Ok(delivered)

@@ -77,9 +77,6 @@ impl FinderArgs {
                 family.name()
             );
         }
-        if target.panels.iter().any(|panel| panel.kind != GridKind::Deltille) {
-            bail!("--target: {} has checkerboards, which cannot be detected yet", target.name);
-        }
         let detector = Detector::for_target(&target, family.as_ref(), config);
         Ok((Some(target), detector))
     }

@@ -23,7 +23,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::target::SolidShape;
+use crate::target::{GridKind, SolidShape};
 
 /// Make, detect and verify deltille targets.
 #[derive(Parser)]
@@ -36,7 +36,11 @@ pub struct Deltille {
 #[derive(Subcommand)]
 enum Command {
     /// Make a board: its description, and what to print
+    #[command(mut_arg("tags_in", |arg| arg.hide(true)))]
     Board(Box<board::Args>),
+    /// Make a checkerboard, plain or with square tags
+    #[command(mut_arg("family", |arg| arg.long("tags").alias("family")))]
+    Checkerboard(Box<board::Args>),
     /// Make a tetrahedron with tagged boards on its faces: a mesh, and what to print
     Tetrahedron(Box<solid::Args>),
     /// Make an octahedron
@@ -70,7 +74,8 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Bench(args) => bench::run(args),
         Command::Calibrate(args) => calibrate::run(args),
-        Command::Board(args) => board::run(*args),
+        Command::Board(args) => board::run(GridKind::Deltille, *args),
+        Command::Checkerboard(args) => board::run(GridKind::Checker, *args),
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),
         Command::Octahedron(args) => solid::run(SolidShape::Octahedron, *args),
         Command::Icosahedron(args) => solid::run(SolidShape::Icosahedron, *args),

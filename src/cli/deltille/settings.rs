@@ -1,4 +1,5 @@
-//! What `deltille board` is told: the same settings as options and as a TOML template.
+//! What `deltille board` and `deltille checkerboard` are told: the same settings as options and as a
+//! TOML template.
 
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -8,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::export::dsc::Dialect;
 use crate::target::{
-    BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, MOST_ROWS, PaperSpec, SIDES, TagSpec,
-    largest_edge_mm, parse_length_mm,
+    BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, GridKind, MOST_ROWS, PaperSpec, SIDES, TagSpec,
+    TagsIn, largest_edge_mm, parse_length_mm,
 };
 
 /// Edge where neither an edge nor a paper is given, mm: that of the published board, which fits
@@ -36,17 +37,26 @@ pub struct Settings {
     /// millimetres that fits --paper]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
-    /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
+    /// Tag family: on a board a name from `deltag list`, or a family file [default: delTag25h7]; on a
+    /// checkerboard aprilTag36h11, aprilTag25h9 or aprilTag16h5 [default: no tags]
     #[arg(long)]
+    #[serde(alias = "tags")]
     family: Option<String>,
+    /// Squares of a checkerboard that carry the tags: black, the square itself being the border, or
+    /// white, each tag with a border of its own, for detectors that know single tags only
+    /// [default: black]
+    #[arg(long, value_name = "COLOUR", value_parser = colour)]
+    tags_in: Option<TagsIn>,
     /// No tags
-    #[arg(long, conflicts_with_all = ["family", "tag_spacing", "tag_border", "first_id"])]
+    #[arg(long, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
-    /// A tag in every n-th row and column [default: 3]
+    /// A tag in every n-th row and column, on a checkerboard where the square has the right colour
+    /// [default: 3, on a checkerboard 2]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
-    /// Black border of a tag, in widths of a bit, 0.6 to 10 [default: 1.5]
+    /// Black border of a tag, in widths of a bit, 0.6 to 10, on a checkerboard at least 1
+    /// [default: 1.5, in black squares 2, in white ones 1]
     #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = border)]
     tag_border: Option<f64>,
     /// Id of the first tag; the others follow [default: 0]
@@ -58,7 +68,7 @@ pub struct Settings {
     /// Number of boards, alike but for their ids, each on its own sheet [default: 1]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     boards: Option<u32>,
-    /// White tiles on black
+    /// White tiles on black: black and white exchanged
     #[arg(long)]
     #[serde(skip_serializing_if = "is_false")]
     invert: bool,
@@ -94,7 +104,7 @@ pub struct Settings {
     /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(DPI))]
     dpi: Option<u32>,
-    /// Stem of the files' names, printed on the sheet [default: board]
+    /// Stem of the files' names, printed on the sheet [default: board, or checkerboard]
     #[arg(long)]
     name: Option<String>,
 }
@@ -113,6 +123,15 @@ fn border(text: &str) -> Result<f64, String> {
     let number = text.trim().parse().ok().filter(|number| BORDER_BITS.contains(number));
     let (least, most) = (BORDER_BITS.start(), BORDER_BITS.end());
     number.ok_or_else(|| format!("not a number from {least} to {most}"))
+}
+
+/// Reads the colour of the squares that carry tags.
+fn colour(text: &str) -> Result<TagsIn, String> {
+    match text {
+        "black" => Ok(TagsIn::Black),
+        "white" => Ok(TagsIn::White),
+        _ => Err("neither black nor white".to_owned()),
+    }
 }
 
 fn is_false(value: &bool) -> bool {
@@ -145,14 +164,15 @@ impl Settings {
     }
 
     /// The text of a template.
-    pub fn to_toml(&self) -> String {
+    pub fn to_toml(&self, grid: GridKind) -> String {
         let settings = toml::to_string(self).expect("plain settings have a TOML form");
-        format!("# Made with `deltille board --save-template`.\n{settings}")
+        format!("# Made with `deltille {} --save-template`.\n{settings}", command(grid))
     }
 
     /// These settings, and those of a template where these say nothing.
     pub fn or(self, template: Self) -> Self {
         let tagged = self.family.is_some()
+            || self.tags_in.is_some()
             || self.tag_spacing.is_some()
             || self.tag_border.is_some()
             || self.first_id.is_some();
@@ -164,6 +184,7 @@ impl Settings {
             cols: self.cols.or(template.cols),
             edge: self.edge.or(template.edge),
             family: self.family.or(template.family),
+            tags_in: self.tags_in.or(template.tags_in),
             untagged: self.untagged || (template.untagged && !tagged),
             tag_spacing: self.tag_spacing.or(template.tag_spacing),
             tag_border: self.tag_border.or(template.tag_border),
@@ -186,7 +207,7 @@ impl Settings {
     }
 
     /// Understands the settings; numbers that no board has are left to its making.
-    pub fn plan(&self) -> anyhow::Result<Plan> {
+    pub fn plan(&self, grid: GridKind) -> anyhow::Result<Plan> {
         let (Some(rows), Some(cols)) = (self.rows, self.cols) else {
             bail!("--rows and --cols are needed, here or in a --template");
         };
@@ -203,14 +224,35 @@ impl Settings {
             margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
             ..PaperSpec::default()
         };
-        let default = TagSpec::default();
-        let tags = (!self.untagged).then(|| TagSpec {
+        if grid == GridKind::Deltille && self.tags_in.is_some() {
+            bail!("--tags-in: the tags of a deltille board are in its black tiles: leave it out");
+        }
+        let default = match grid {
+            GridKind::Deltille => TagSpec::default(),
+            GridKind::Checker => TagSpec::for_squares(self.tags_in.unwrap_or_default()),
+        };
+        let tagged = !self.untagged && (grid == GridKind::Deltille || self.family.is_some());
+        let of_tags = [
+            ("--tags-in", self.tags_in.is_some()),
+            ("--tag-spacing", self.tag_spacing.is_some()),
+            ("--tag-border", self.tag_border.is_some()),
+            ("--first-id", self.first_id.is_some()),
+        ];
+        if grid == GridKind::Checker
+            && self.family.is_none()
+            && let Some((option, _)) = of_tags.iter().find(|(_, given)| *given)
+        {
+            bail!("{option}: there are no tags: name their family with --tags");
+        }
+        let tags = tagged.then(|| TagSpec {
             family: self.family.clone().unwrap_or(default.family),
             first_id: self.first_id.unwrap_or(default.first_id),
             spacing: self.tag_spacing.unwrap_or(default.spacing),
             border_bits: self.tag_border.unwrap_or(default.border_bits),
+            tags_in: self.tags_in.unwrap_or(default.tags_in),
         });
         let mut spec = BoardSpec {
+            grid,
             rows,
             cols,
             edge_mm: DEFAULT_EDGE_MM,
@@ -244,7 +286,7 @@ impl Settings {
             bail!("--dpi: {dpi} is not between {} and {}", DPI.start(), DPI.end());
         }
         Ok(Plan {
-            name: self.name.clone().unwrap_or_else(|| "board".to_owned()),
+            name: self.name.clone().unwrap_or_else(|| command(grid).to_owned()),
             spec,
             paper,
             pdf: self.pdf || !(self.svg || self.png),
@@ -258,5 +300,13 @@ impl Settings {
     /// The same with the edge that was chosen, so that a template gives the same board again.
     pub fn with_edge(self, edge_mm: f64) -> Self {
         Self { edge: Some(format!("{edge_mm}mm")), ..self }
+    }
+}
+
+/// The command that makes boards of this kind, and the name of those that have none.
+fn command(grid: GridKind) -> &'static str {
+    match grid {
+        GridKind::Deltille => "board",
+        GridKind::Checker => "checkerboard",
     }
 }

@@ -16,7 +16,7 @@ use crate::export::{dxf, gltf, obj, stl};
 use crate::family::Family;
 use crate::target::{
     ClosedMesh, DEFAULT_MARGIN_MM, NEAR_EQUILATERAL, PaperSpec, Skeleton, SkeletonSpec, SolidShape,
-    SolidSheets, SolidSpec, TagSpec, Target, TargetSpec, parse_length_mm,
+    SolidSheets, SolidSpec, TagSpec, TagsIn, Target, TargetSpec, parse_length_mm,
 };
 
 /// Arguments of the commands that make solids.
@@ -232,6 +232,7 @@ impl Args {
             margin_mm: default.margin_mm,
             board_id: self.board_id.unwrap_or(default.board_id),
             tags: TagSpec {
+                tags_in: TagsIn::Black,
                 family: self.family.clone().unwrap_or(tags.family),
                 first_id: self.first_id.unwrap_or(tags.first_id),
                 spacing: self.tag_spacing.unwrap_or(tags.spacing),

@@ -5,7 +5,7 @@ use crate::family::Family;
 use crate::lattice::Vertex;
 use crate::target::{
     Corner, FamilyRef, GridKind, ListFormat, ListedSpec, Outline, Panel, PanelPose, TagPlacement,
-    Target, TargetSpec,
+    TagsIn, Target, TargetSpec,
 };
 
 /// Most boards in a file, and most columns or rows of one: beyond this a number is a typing error.
@@ -198,6 +198,7 @@ impl<'a> Block<'a> {
             kind: self.kind,
             edge_mm,
             border_bits: Some(self.border),
+            tags_in: TagsIn::Black,
             inverted: false,
             outline: Outline::Touching,
             matrix: self.matrix,

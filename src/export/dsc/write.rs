@@ -2,7 +2,7 @@ use std::fmt::Write;
 
 use super::{Dialect, DscError, FAMILIES};
 use crate::lattice::Vertex;
-use crate::target::{GridKind, Panel, Target};
+use crate::target::{GridKind, Panel, TagsIn, Target};
 
 /// The text of the `.dsc` of a target; positions are those in the target frame, mm.
 pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
@@ -17,7 +17,7 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
         name.strip_prefix("delTag") == Some(known) || name.strip_prefix("aprilTag") == Some(known)
     });
     let known = known.ok_or_else(|| {
-        let names: Vec<String> = FAMILIES.iter().map(|f| format!("delTag{f}")).collect();
+        let names = FAMILIES.map(|f| format!("delTag{f}"));
         refused(&format!(
             "its readers have the codes of {} only, not those of {name}: choose one of them with \
              --family, or leave --dsc out",
@@ -32,6 +32,11 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
     for panel in &target.panels {
         if panel.inverted {
             return Err(refused("its readers look for black tags, and the board is inverted"));
+        }
+        if panel.tags_in == TagsIn::White {
+            return Err(refused(
+                "its readers look for tags in black squares: take --tags-in black, or leave --dsc out",
+            ));
         }
         let [a, b] = header(panel, dialect).map_err(|reason| refused(&reason))?;
         let border = panel.border_bits.unwrap_or_default();

@@ -7,13 +7,15 @@ use blocks::Blocks;
 use syndromes::Syndromes;
 
 use super::{Family, TagWords};
+use crate::lattice::GridKind;
 
 /// A word recognised as a tag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decoded {
     /// Id of the tag.
     pub id: u32,
-    /// Number of counter-clockwise turns by 120° of the tag that give the word read, 0 to 2.
+    /// Number of counter-clockwise turns of the tag that give the word read: by 120°, 0 to 2, or of
+    /// a square tag by 90°, 0 to 3.
     pub turns: u8,
     /// Cells that differ.
     pub errors: u32,
@@ -26,11 +28,13 @@ pub struct Decoded {
 /// Finds the nearest code, in any turn, to a word that was read.
 ///
 /// The bits are compared in blocks; very large families made from a linear code are searched by the
-/// syndrome of the word instead. Both give the same answers.
+/// syndrome of the word instead. Both give the same answers. Square families are so small that every
+/// code is compared.
 #[derive(Clone, Debug)]
 pub struct Decoder {
     /// Largest number of errors at which every word has one nearest code at most.
     correctable: u32,
+    kind: GridKind,
     words: TagWords,
     codes: Vec<u64>,
     search: Search,
@@ -40,12 +44,16 @@ pub struct Decoder {
 enum Search {
     Blocks(Blocks),
     Syndromes(Box<Syndromes>),
+    Every,
 }
 
 impl Decoder {
     /// A decoder for `family`, by whatever way is faster. Takes memory in proportion to the number
     /// of codes, and of patterns of errors that are corrected.
     pub fn new(family: &Family) -> Self {
+        if family.kind() == GridKind::Checker {
+            return Self::with(family, Search::Every);
+        }
         let syndromes = (Blocks::cost(family) > Syndromes::cost(family))
             .then(|| Syndromes::new(family))
             .flatten();
@@ -58,7 +66,7 @@ impl Decoder {
         )
     }
 
-    /// A decoder that compares blocks, whatever the family.
+    /// A decoder that compares blocks, whatever the family of triangular tags.
     pub fn by_blocks(family: &Family) -> Self {
         Self::with(family, Search::Blocks(Blocks::new(family)))
     }
@@ -71,7 +79,8 @@ impl Decoder {
     fn with(family: &Family, search: Search) -> Self {
         Self {
             correctable: family.correctable(),
-            words: TagWords::new(family.dimension()),
+            kind: family.kind(),
+            words: TagWords::of(family.kind(), family.dimension()),
             codes: family.codes().to_vec(),
             search,
         }
@@ -88,17 +97,21 @@ impl Decoder {
         }
         match &self.search {
             Search::Blocks(blocks) => blocks.decode(word, max_errors),
+            Search::Every => self.decode_beyond(word, max_errors),
             Search::Syndromes(syndromes) => syndromes.decode(&self.codes, word, max_errors),
         }
     }
 
     fn decode_beyond(&self, word: u64, max_errors: u32) -> Option<Decoded> {
         // Turning the word back by k turns is comparing it with every code turned k times.
-        let [none, once, twice] = self.words.turns(word);
-        let turned_back = [none, twice, once];
+        let mut turned_back = [word; 4];
+        let full = usize::from(self.kind.turns());
+        for turns in (1..full).rev() {
+            turned_back[turns] = self.words.turn(turned_back[(turns + 1) % full]);
+        }
         let (mut best, mut second) = ((u32::MAX, 0, 0), u32::MAX);
         for (id, code) in (0..).zip(&self.codes) {
-            for (turns, back) in (0..).zip(turned_back) {
+            for (turns, back) in (0..).zip(&turned_back[..full]) {
                 let errors = (back ^ code).count_ones();
                 if errors < best.0 {
                     second = best.0;

@@ -177,6 +177,27 @@ impl Page {
         [(x + 0.5) / self.px_per_mm, self.height_mm - (y + 0.5) / self.px_per_mm]
     }
 
+    /// The page as a lens shows it: each pixel with its neighbours, weighted 1 2 1 along both axes,
+    /// which is a blur of 0.71 px, on the scale of 16 bits.
+    ///
+    /// Corners are located by a blurred model; of a sharp edge along the pixels a single grey value
+    /// tells the place, and the model misreads it by up to a quarter of a pixel.
+    pub fn blurred(&self) -> Gray<u16> {
+        let (width, height) = (self.image.width(), self.image.height());
+        let near = |i: usize, size: usize| [i.saturating_sub(1), i, i, (i + 1).min(size - 1)];
+        let mut blurred = Gray::new(width, height);
+        for y in 0..height {
+            let rows = near(y, height).map(|y| self.image.row(y));
+            let down = |x: usize| rows.iter().map(|row| u32::from(row[x])).sum::<u32>();
+            for (x, pixel) in blurred.row_mut(y).iter_mut().enumerate() {
+                // A sum of sixteen pixels; 257 · 255 is full scale.
+                let sum: u32 = near(x, width).into_iter().map(down).sum();
+                *pixel = (sum * 257 / 16) as u16;
+            }
+        }
+        blurred
+    }
+
     /// The page as in a mirror, left and right exchanged.
     pub fn mirrored(&self) -> Self {
         let mut page = self.clone();
