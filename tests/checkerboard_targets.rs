@@ -164,7 +164,7 @@ fn partial_views_are_labelled_by_few_tags() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let (mut labelled, mut single) = (0, 0);
     for _ in 0..20 {
-        let (detection, truth) = board.seen(&mut rng, &camera, 130.0, 0.5);
+        let (detection, truth) = board.seen(&mut rng, &camera, 180.0, 0.5);
         let found = errors(&detection, &truth);
         assert!(found.is_empty() || rms(&found) < 0.04, "rms {}", rms(&found));
         labelled += usize::from(detection.grids.iter().any(|grid| grid.panel == Some(4)));

@@ -69,7 +69,7 @@ pub fn advice(report: &Report, survey: &Survey) -> Vec<Advice> {
                 .to_owned();
         add(Weight::Hint, text);
     }
-    found.sort_by(|a, b| b.weight.cmp(&a.weight));
+    found.sort_by_key(|advice| std::cmp::Reverse(advice.weight));
     found
 }
 
