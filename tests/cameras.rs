@@ -68,8 +68,8 @@ proptest! {
                 let step = h * DVec3::AXES[axis];
                 let expected =
                     differences(camera.project(point + step), camera.project(point - step), h);
-                for i in 0..2 {
-                    let off = (at.by_point[i][axis] - expected[i]).abs() * distance;
+                for (by, expected) in at.by_point.iter().zip(expected) {
+                    let off = (by[axis] - expected).abs() * distance;
                     prop_assert!(off < 1e-4, "{:?} axis {axis}: {off}", camera.lens);
                 }
             }
@@ -82,9 +82,9 @@ proptest! {
                     camera.with_parameters(&values).project(point)
                 };
                 let expected = differences(moved(h), moved(-h), h);
-                for i in 0..2 {
-                    let off = (at.by_parameters[k][i] - expected[i]).abs();
-                    let size = 1.0 + expected[i].abs();
+                for (by, expected) in at.by_parameters[k].iter().zip(expected) {
+                    let off = (by - expected).abs();
+                    let size = 1.0 + expected.abs();
                     prop_assert!(off < 1e-5 * size, "{:?} {name}: {off}", camera.lens);
                 }
             }
