@@ -93,17 +93,17 @@ fn a_saved_template_makes_the_same_board_and_options_win_over_it() {
 fn every_sample_template_makes_a_board() {
     let templates = Path::new(env!("CARGO_MANIFEST_DIR")).join("templates");
     let folder = tempfile::tempdir().unwrap();
-    for name in names(&templates) {
+    for name in names(&templates).iter().filter(|name| name.ends_with(".toml")) {
         let mut command = deltille(folder.path());
-        let text = std::fs::read_to_string(templates.join(&name)).unwrap();
+        let text = std::fs::read_to_string(templates.join(name)).unwrap();
         let of_squares = text.contains("deltille checkerboard --template");
         command
             .arg(if of_squares { "checkerboard" } else { "board" })
             .arg("--template")
-            .arg(templates.join(&name))
+            .arg(templates.join(name))
             .args(["--svg"]);
         command.assert().success();
-        let json = Path::new(&name).with_extension("json");
+        let json = Path::new(name).with_extension("json");
         assert!(!read(&folder.path().join(json)).sheets.is_empty(), "{name}");
     }
 }
