@@ -67,7 +67,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
         (&["b.json", "empty.pdf"], "empty.pdf"),
         (&["b.json", "cut.pdf"], "cut.pdf"),
         (&["b.json", "absent.png"], "absent.png"),
-        (&["b.json", "b.json"], "not a .pdf, .svg or .png"),
+        (&["b.json", "b.json"], "only .pdf, .svg, .png"),
         (&["broken.json"], "broken.json"),
         (&["alone/b.json"], "no b.pdf, .svg, .png, .glb, .obj or .stl beside"),
         (&["b.json", "--report", "nowhere/r.json"], "nowhere"),

@@ -3,4 +3,5 @@
 mod bound;
 pub mod corners;
 pub mod plot;
+pub mod rig;
 pub mod table2;

@@ -1,0 +1,394 @@
+//! The paper's §4.4 by simulation: a rig of four cameras, calibrated with an icosahedron of deltille
+//! boards and with a cube of checkerboards, whose panels were both glued on imprecisely.
+//!
+//! ```text
+//!        c2 ──── c3       four cameras at the corners of a square of 0.5 m, 0.8 m from the target
+//!         │      │        that all look at; 20° wide, all taking their pictures at the same moment
+//!        c0 ──── c1
+//! ```
+//!
+//! Every picture is rendered and detected. Then the rig is calibrated twice: with the panels where
+//! they are stated to be, and with their poses among the unknowns.
+
+use std::fmt::Write as _;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::{DMat3, DQuat, DVec3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use crate::artwork::ArtworkError;
+use crate::calibrate::{
+    CalibrationError, Loss, Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews,
+    Weights, calibrate_rig, views,
+};
+use crate::camera::{BrownConrady, Camera, Lens, Pose};
+use crate::detect::{Detection, Detector, DetectorConfig};
+use crate::family::{Family, FamilyError};
+use crate::synth::{Light, Scene, scene_of_target};
+use crate::target::{
+    BoardSpec, GridKind, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, TagSpec, TagsIn,
+    Target, TargetError, TargetSpec,
+};
+
+/// Cameras of the rig.
+pub const CAMERAS: usize = 4;
+
+/// Horizontal field of view, rad (20°).
+const FIELD_RAD: f64 = 0.349_065_850_398_865_9;
+/// Distance of the target from the cameras, and half the distance between these, mm.
+const DISTANCE_MM: f64 = 800.0;
+const BASE_MM: f64 = 250.0;
+/// How far the target is moved about, sideways and in depth, mm: it stays in the field of 280 mm.
+const MOVED_MM: [f64; 2] = [12.0, 40.0];
+/// Standard deviations of the placement of a panel, mm and rad (0.1°).
+const PLACED_MM: f64 = 0.1;
+const PLACED_RAD: f64 = 0.001_745_329_251_994_33;
+/// Edge of the icosahedron and of the cube, mm: spheres of the same size hold both.
+const ICOSAHEDRON_MM: f64 = 100.0;
+const CUBE_MM: f64 = 110.0;
+/// Squares along the edge of the cube, and the quiet zone around them, mm.
+const SQUARES: u32 = 10;
+const QUIET_MM: f64 = 5.0;
+
+/// What is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Setup {
+    /// Width of the pictures, px; the height is three quarters of it.
+    pub width: u32,
+    /// Moments at which pictures are taken.
+    pub frames: usize,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// What a rig is calibrated with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Object {
+    /// Twenty faces with DelTags.
+    Icosahedron,
+    /// Six faces with checkerboards and square tags.
+    Cube,
+}
+
+impl Object {
+    /// Both.
+    pub const ALL: [Object; 2] = [Self::Icosahedron, Self::Cube];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Icosahedron => "icosahedron",
+            Self::Cube => "cube",
+        }
+    }
+}
+
+/// What came of a calibration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// What it was done with.
+    pub object: Object,
+    /// Whether the panels' poses were found too.
+    pub refined: bool,
+    /// Root mean square error of a coordinate, px.
+    pub rms_px: f64,
+    /// The same of each frame.
+    pub frames_px: Vec<f64>,
+    /// Frames that took no part.
+    pub left_out: usize,
+    /// Corners that were seen.
+    pub corners: usize,
+    /// Root mean square errors over the cameras: focal length, relative; principal point, px.
+    pub focal: f64,
+    /// See `focal`.
+    pub centre_px: f64,
+    /// Root mean square errors of the cameras' places and directions relative to the first one, mm
+    /// and rad.
+    pub place_mm: f64,
+    /// See `place_mm`.
+    pub turn_rad: f64,
+}
+
+/// Why an experiment was not made.
+#[derive(Debug, thiserror::Error)]
+pub enum RigExperimentError {
+    /// A target that cannot be made.
+    #[error(transparent)]
+    Target(#[from] TargetError),
+    /// A family that is not there.
+    #[error(transparent)]
+    Family(#[from] FamilyError),
+    /// A target that cannot be drawn.
+    #[error(transparent)]
+    Artwork(#[from] ArtworkError),
+    /// A rig that cannot be found, such as from too few frames.
+    #[error("{}: {error}", object.name())]
+    Calibration {
+        /// With what.
+        object: Object,
+        /// Why.
+        error: CalibrationError,
+    },
+}
+
+/// The rig and its target, as they are.
+struct World {
+    camera: Camera,
+    camera_from_world: Vec<Pose>,
+    world_from_target: Vec<Pose>,
+}
+
+impl World {
+    fn new(setup: Setup) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(setup.seed);
+        let (width, height) = (setup.width, setup.width * 3 / 4);
+        let focal = f64::from(width) / 2.0 / (FIELD_RAD / 2.0).tan();
+        let lens = BrownConrady { radial: [-0.1, 0.05, 0.0], ..BrownConrady::default() };
+        let mut camera = Camera::centred(width, height, focal, Lens::BrownConrady(lens));
+        camera.centre_px = camera.centre_px.map(|c| c + 0.01 * f64::from(width));
+        let depth = (DISTANCE_MM * DISTANCE_MM - 2.0 * BASE_MM * BASE_MM).sqrt();
+        let camera_from_world = (0..CAMERAS).map(|index| {
+            let side = |bit: usize| if index & bit == 0 { -BASE_MM } else { BASE_MM };
+            Pose::looking_at(DVec3::new(side(1), side(2), depth), DVec3::ZERO, DVec3::Y)
+        });
+        let camera_from_world = camera_from_world.collect();
+        let world_from_target = (0..setup.frames).map(|_| {
+            let [x, y, z, w] = [0; 4].map(|_| StandardNormal.sample(&mut random));
+            let [aside, deep] = MOVED_MM;
+            let moved = [aside, aside, deep].map(|mm| random.random_range(-mm..mm));
+            Pose {
+                rotation: DQuat::from_xyzw(x, y, z, w).normalize(),
+                translation: DVec3::from(moved),
+            }
+        });
+        let world_from_target = world_from_target.collect();
+        Self { camera, camera_from_world, world_from_target }
+    }
+
+    fn camera_from_rig(&self, index: usize) -> Pose {
+        self.camera_from_world[index].after(&self.camera_from_world[0].inverse())
+    }
+}
+
+/// Renders, detects and calibrates; `None` when it was interrupted. `tick` is called after every
+/// picture, of which there are two for each camera and frame.
+pub fn run(
+    setup: Setup,
+    interrupted: &AtomicBool,
+    tick: &(dyn Fn() + Sync),
+) -> Result<Option<Vec<Outcome>>, RigExperimentError> {
+    let world = World::new(setup);
+    let mut outcomes = Vec::new();
+    for object in Object::ALL {
+        let (stated, family) = target(object)?;
+        let scene = scene_of_target(&misplaced(&stated, setup.seed), Some(&family))?;
+        let detector = Detector::for_target(&stated, Some(&family), DetectorConfig::default());
+        let pictures: Vec<(usize, usize)> = (0..CAMERAS)
+            .flat_map(|camera| (0..setup.frames).map(move |frame| (camera, frame)))
+            .collect();
+        let found: Option<Vec<(usize, String, Detection)>> = pictures
+            .into_par_iter()
+            .map(|(camera, frame)| {
+                if interrupted.load(Ordering::Relaxed) {
+                    return None;
+                }
+                let detection = picture(&world, &scene, &detector, camera, frame, setup.seed);
+                tick();
+                Some((camera, format!("{frame:04}"), detection))
+            })
+            .collect();
+        let Some(found) = found else { return Ok(None) };
+        let failed = |error| RigExperimentError::Calibration { object, error };
+        let reference = Reference::Target(&stated);
+        let mut cameras = Vec::with_capacity(CAMERAS);
+        for index in 0..CAMERAS {
+            let of_camera = found.iter().filter(|(camera, ..)| *camera == index);
+            let of_camera: Vec<(String, Detection)> =
+                of_camera.map(|(_, name, detection)| (name.clone(), detection.clone())).collect();
+            let views = views(&of_camera, &reference).map_err(failed)?;
+            cameras.push(RigViews { name: format!("c{index}"), views, known: None });
+        }
+        let panels: Vec<PanelPlace> = reference
+            .panels()
+            .into_iter()
+            .map(|target_from_panel| PanelPlace { target_from_panel, covariance: None })
+            .collect();
+        for refined in [false, true] {
+            let options = RigOptions {
+                model: Model::Radtan,
+                loss: Loss::Huber,
+                weights: Weights::Covariance,
+                refine_target: refined,
+            };
+            let solution = calibrate_rig(&cameras, &panels, options).map_err(failed)?;
+            outcomes.push(Outcome::new(object, refined, &world, &solution));
+        }
+    }
+    Ok(Some(outcomes))
+}
+
+fn picture(
+    world: &World,
+    scene: &Scene,
+    detector: &Detector,
+    camera: usize,
+    frame: usize,
+    seed: u64,
+) -> Detection {
+    let pose = world.camera_from_world[camera].after(&world.world_from_target[frame]);
+    let number = (camera * world.world_from_target.len() + frame) as u64;
+    let light = Light { seed: seed.wrapping_add(number), ..Light::default() };
+    let image = scene.render(&world.camera, &pose, &light);
+    detector.detect(&image.map(|v| (v * 255.0 + 0.5) as u8), "")
+}
+
+/// The target as it is stated.
+fn target(object: Object) -> Result<(Target, Family), RigExperimentError> {
+    let spec = match object {
+        Object::Icosahedron => TargetSpec::Solid(SolidSpec {
+            edge_mm: ICOSAHEDRON_MM,
+            ..SolidSpec::new(SolidShape::Icosahedron)
+        }),
+        Object::Cube => TargetSpec::Board(BoardSpec {
+            grid: GridKind::Checker,
+            rows: SQUARES - 1,
+            cols: SQUARES - 1,
+            edge_mm: (CUBE_MM - 2.0 * QUIET_MM) / f64::from(SQUARES),
+            boards: 6,
+            board_id: 0,
+            tags: Some(TagSpec {
+                family: "aprilTag36h11".to_owned(),
+                first_id: 0,
+                spacing: 2,
+                border_bits: 2.0,
+                tags_in: TagsIn::Black,
+            }),
+            inverted: false,
+        }),
+    };
+    let family = match &spec {
+        TargetSpec::Solid(spec) => Family::resolve(&spec.tags.family)?,
+        _ => Family::resolve("aprilTag36h11")?,
+    };
+    let target = Target::build(object.name(), &spec, Some(&family), None)?;
+    if object == Object::Icosahedron {
+        return Ok((target, family));
+    }
+    let faces: Vec<PanelPose> =
+        (0..6).map(|face| cube_face(face, target.panels[face].field_mm())).collect();
+    // Its boards are loose no more.
+    let spec = TargetSpec::Listed(ListedSpec { format: ListFormat::DscFork });
+    Ok((Target { spec, ..target.with_poses(&faces) }, family))
+}
+
+/// The pose of a board of `field_mm` on a face of the cube: ±x, ±y, ±z.
+fn cube_face(face: usize, [left, lower, right, upper]: [f64; 4]) -> PanelPose {
+    let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
+    let normal = sign * DVec3::AXES[face / 2];
+    let along = DVec3::AXES[(face / 2 + 1) % 3];
+    let up = normal.cross(along);
+    let middle = along * (left + right) / 2.0 + up * (lower + upper) / 2.0;
+    let translation = normal * CUBE_MM / 2.0 - middle;
+    PanelPose {
+        rotation: DMat3::from_cols(along, up, normal).transpose().to_cols_array(),
+        translation_mm: translation.to_array(),
+        covariance: None,
+    }
+}
+
+/// The target with its panels as they were glued on.
+fn misplaced(target: &Target, seed: u64) -> Target {
+    let mut random = ChaCha8Rng::seed_from_u64(!seed);
+    let mut normal = |sd: f64| {
+        let [x, y, z]: [f64; 3] = [0; 3].map(|_| StandardNormal.sample(&mut random));
+        sd * DVec3::new(x, y, z)
+    };
+    let poses = target.panels.iter().map(|panel| {
+        let turn = DMat3::from_quat(DQuat::from_scaled_axis(normal(PLACED_RAD)));
+        let rotation = turn * DMat3::from_cols_array(&panel.pose.rotation).transpose();
+        // A panel is turned about its own middle.
+        let count = panel.corners.len() as f64;
+        let middle = panel.corners.iter().map(|c| DVec3::from(c.target_mm)).sum::<DVec3>() / count;
+        let arm = DVec3::from(panel.pose.translation_mm) - middle;
+        PanelPose {
+            rotation: rotation.transpose().to_cols_array(),
+            translation_mm: (middle + turn * arm + normal(PLACED_MM)).to_array(),
+            covariance: None,
+        }
+    });
+    target.with_poses(&poses.collect::<Vec<_>>())
+}
+
+impl Outcome {
+    fn new(object: Object, refined: bool, world: &World, solution: &RigSolution) -> Self {
+        let rms = |errors: Vec<f64>| {
+            (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+        };
+        let truth = &world.camera;
+        let cameras = || solution.cameras.iter();
+        let focal =
+            cameras().flat_map(|c| [0, 1].map(|i| c.camera.focal_px[i] / truth.focal_px[i] - 1.0));
+        let centre =
+            cameras().flat_map(|c| [0, 1].map(|i| c.camera.centre_px[i] - truth.centre_px[i]));
+        let off = cameras().enumerate().skip(1).map(|(index, found)| {
+            let truth = world.camera_from_rig(index);
+            let place = found.camera_from_rig.inverse().translation - truth.inverse().translation;
+            (place.length(), found.camera_from_rig.rotation.angle_between(truth.rotation))
+        });
+        let (places, turns): (Vec<f64>, Vec<f64>) = off.unzip();
+        Self {
+            object,
+            refined,
+            rms_px: solution.rms_px,
+            frames_px: solution.frames.iter().map(|frame| frame.rms_px).collect(),
+            left_out: solution.excluded.len(),
+            corners: cameras().map(|camera| camera.corners).sum(),
+            focal: rms(focal.collect()),
+            centre_px: rms(centre.collect()),
+            place_mm: rms(places),
+            turn_rad: rms(turns),
+        }
+    }
+}
+
+/// The outcomes as a table to read.
+pub fn text(outcomes: &[Outcome]) -> String {
+    let mut text = "target       panels   corners  rms px  worst frame  focal %  centre px  place mm  turn °\n"
+        .to_owned();
+    for outcome in outcomes {
+        let worst = outcome.frames_px.iter().copied().fold(0.0, f64::max);
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{:12} {:8} {:7}  {:.4}  {worst:11.4}  {:7.4}  {:9.3}  {:8.4}  {:.5}{}",
+            outcome.object.name(),
+            if outcome.refined { "refined" } else { "stated" },
+            outcome.corners,
+            outcome.rms_px,
+            100.0 * outcome.focal,
+            outcome.centre_px,
+            outcome.place_mm,
+            outcome.turn_rad.to_degrees(),
+            match outcome.left_out {
+                0 => String::new(),
+                n => format!("  ({n} left out)"),
+            }
+        );
+    }
+    text
+}
+
+/// The error of every frame, as the paper's Fig. 8 shows it.
+pub fn csv(outcomes: &[Outcome]) -> String {
+    let mut text = "target,panels,frame,rms_px\n".to_owned();
+    for outcome in outcomes {
+        let panels = if outcome.refined { "refined" } else { "stated" };
+        for (frame, rms_px) in outcome.frames_px.iter().enumerate() {
+            let _ = writeln!(text, "{},{panels},{frame},{rms_px:.6}", outcome.object.name());
+        }
+    }
+    text
+}
