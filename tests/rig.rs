@@ -178,8 +178,7 @@ fn normalised_errors(truth: &Simulated, found: &RigSolution) -> Vec<f64> {
 }
 
 fn pose_errors(found: &Pose, truth: &Pose, sd: [f64; 6]) -> [f64; 6] {
-    let turn = (found.rotation * truth.rotation.conjugate()).to_scaled_axis();
-    let moved = found.translation - truth.translation;
+    let [turn, moved] = found.off(truth);
     let off = [turn.x, turn.y, turn.z, moved.x, moved.y, moved.z];
     std::array::from_fn(|i| off[i] / sd[i])
 }

@@ -1,3 +1,4 @@
+use std::f64::consts::FRAC_PI_2;
 use std::fmt;
 use std::str::FromStr;
 
@@ -8,6 +9,9 @@ use crate::camera::{
 
 /// Terms of a Kannala–Brandt polynomial unless said otherwise.
 const TERMS: usize = 4;
+
+/// ξ in the two valleys of double sphere.
+const VALLEYS: [f64; 2] = [-0.3, 0.3];
 
 /// What is to be found of a camera, beside fx, fy, cx and cy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +66,27 @@ impl Model {
             Self::Eucm => Lens::ExtendedUnified(ExtendedUnified::default()),
             Self::DoubleSphere => Lens::DoubleSphere(DoubleSphere::default()),
             Self::Pupil => Lens::Pupil(Pupil::default()),
+        }
+    }
+
+    /// The lenses to start from, each with its focal length over that of an ideal camera.
+    ///
+    /// The cost of double sphere has two valleys, one on either side of ξ = 0, and no way between
+    /// them. Near the axis its radius is fx/(1 + ξ) times the angle; with the α here it is so at 90°
+    /// too:
+    ///
+    /// ```text
+    ///     (1 + ξ) / (α √(1 + ξ²) + (1 − α) ξ) = π/2
+    /// ```
+    pub(super) fn starts(self) -> Vec<(Lens, f64)> {
+        match self {
+            Self::DoubleSphere => VALLEYS
+                .map(|xi| {
+                    let alpha = ((1.0 + xi) / FRAC_PI_2 - xi) / ((1.0 + xi * xi).sqrt() - xi);
+                    (Lens::DoubleSphere(DoubleSphere { xi, alpha }), 1.0 + xi)
+                })
+                .to_vec(),
+            _ => vec![(self.lens(), 1.0)],
         }
     }
 

@@ -64,8 +64,7 @@ impl Prior {
 
     /// How far a pose is from the measured one, as (ω, τ), and the inverse covariance of that.
     pub(super) fn off(&self, pose: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
-        let turn = (pose.rotation * self.pose.rotation.conjugate()).to_scaled_axis();
-        let moved = pose.translation - self.pose.translation;
+        let [turn, moved] = pose.off(&self.pose);
         let off = Vector6::new(turn.x, turn.y, turn.z, moved.x, moved.y, moved.z);
         (off, self.information)
     }
@@ -127,11 +126,6 @@ impl Problem {
     /// How many corners there are in all.
     pub fn count(&self) -> usize {
         self.blocks.iter().map(|block| block.observations.len()).sum()
-    }
-
-    /// Whether any corner has a covariance.
-    pub(super) fn has_covariances(&self) -> bool {
-        self.blocks.iter().flat_map(|block| &block.observations).any(|seen| seen.cov.is_some())
     }
 
     /// The same with the frames for which `keep` holds, and their observations.

@@ -7,11 +7,12 @@ use super::model::Model;
 use super::normal::Covariances;
 use super::pose::{blocks, estimate_pose, fixed};
 use super::problem::{CameraUnknowns, Problem};
+use super::settle::{residuals, settle, variance};
 use super::solution::{Corner, Parameter, Solution, ViewSolution, rms_px};
 use super::start::first_camera;
 use super::view::View;
 use super::weights::{Weights, Whitening, median};
-use crate::camera::{Camera, Pose};
+use crate::camera::{Camera, Lens, Pose};
 
 /// Two views of a plane determine focal lengths and principal point if nothing is off; a third
 /// shows whether something is.
@@ -32,10 +33,6 @@ const LOOSE_FOCAL: f64 = 0.1;
 /// A corner is an outlier beyond so many standard deviations: of a million corners with normal
 /// errors four are.
 const OUTLIER_SIGMA: f64 = 5.0;
-
-/// Rounds in which weights and solution are fitted to one another; the third changes no digit that
-/// matters.
-const WEIGHT_ROUNDS: usize = 3;
 
 /// How a camera is calibrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,13 +55,22 @@ pub fn calibrate(
     enough(views.len(), views.len())?;
     let ideal = first_camera(views, options.model).ok_or(CalibrationError::NoStart)?;
     let [width, height] = views[0].size_px;
-    let camera = Camera::centred(width, height, ideal.focal_px[0], options.model.lens());
-    let poses = views.iter().map(|view| estimate_pose(&ideal, panels, &view.sightings)).collect();
-    let mut search = Search { views, panels, camera, poses };
-    search.adjust(options.model.coarse())?;
-    search.adjust(options.model.free())?;
-    search.look_again();
-    search.adjust(options.model.free())?;
+    let poses: Vec<Option<Pose>> =
+        views.iter().map(|view| estimate_pose(&ideal, panels, &view.sightings)).collect();
+    let from = |(lens, scale): (Lens, f64)| {
+        let camera = Camera::centred(width, height, scale * ideal.focal_px[0], lens);
+        let mut search = Search { views, panels, camera, poses: poses.clone() };
+        search.adjust(options.model.coarse())?;
+        search.adjust(options.model.free())?;
+        search.look_again();
+        search.adjust(options.model.free())?;
+        Ok((search.error_px(), search))
+    };
+    // The best of all starts; an error where none leads anywhere.
+    let found = options.model.starts().into_iter().map(from);
+    let error = |found: &Result<(f64, Search), _>| found.as_ref().map_or(f64::INFINITY, |f| f.0);
+    let best = found.min_by(|a, b| error(a).total_cmp(&error(b)));
+    let (_, search) = best.ok_or(CalibrationError::NoStart)??;
     if panels.len() == 1 {
         check_tilts(&search.poses)?;
     }
@@ -164,6 +170,15 @@ impl Search<'_> {
         }
     }
 
+    /// Median over all views of the median error of their corners, px.
+    fn error_px(&self) -> f64 {
+        let views = self.views.iter().zip(&self.poses);
+        let error = |(view, pose): (&View, &Option<Pose>)| {
+            pose.map_or(f64::INFINITY, |pose| view_error_px(&self.camera, self.panels, view, pose))
+        };
+        median(views.map(error).collect())
+    }
+
     /// Leaves out views that do not belong, and solves for what is asked.
     fn finish(
         &self,
@@ -205,20 +220,7 @@ impl Search<'_> {
         });
         let excluded = excluded.collect();
 
-        // Where corners are alike and losses square, weights change nothing.
-        let mut problem = problem;
-        let weighted = problem.has_covariances() && weights == Weights::Covariance;
-        if weighted || loss != Loss::Squared {
-            for _ in 1..WEIGHT_ROUNDS {
-                let whitening = Whitening::fit(&problem, weights, &residuals(&problem));
-                problem = minimise(problem, &whitening, loss, Until::Rough)
-                    .ok_or(CalibrationError::NoStart)?
-                    .problem;
-            }
-        }
-        let whitening = Whitening::fit(&problem, weights, &residuals(&problem));
-        let minimum =
-            minimise(problem, &whitening, loss, Until::Fine).ok_or(CalibrationError::NoStart)?;
+        let (minimum, whitening) = settle(problem, weights, loss)?;
         self.solution(&kept, excluded, &minimum, &whitening)
     }
 
@@ -240,10 +242,7 @@ impl Search<'_> {
             let names: Vec<&str> = involved.map(|&(i, _)| names[i].as_str()).collect();
             CalibrationError::Undetermined { parameters: names.join(", ") }
         })?;
-        // The a-posteriori variance: what the residuals cost for each of their degrees of freedom.
-        let unknowns = layout.count + 6 * problem.frames.len();
-        let freedom = (2 * problem.count()).saturating_sub(unknowns).max(1);
-        let variance = normal.cost / freedom as f64;
+        let variance = variance(minimum);
         let covariance = shared * variance;
         let mut sds = (0..layout.count).map(|i| covariance[(i, i)].sqrt());
         let values = camera.parameters();
@@ -293,12 +292,6 @@ impl Search<'_> {
             steps: *steps,
         })
     }
-}
-
-/// Seen less predicted positions; empty blocks where a corner is out of reach, which the callers'
-/// problems do not have.
-fn residuals(problem: &Problem) -> Vec<Vec<[f64; 2]>> {
-    problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
 }
 
 /// Median error of a view's corners at a pose, px.

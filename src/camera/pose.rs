@@ -33,6 +33,15 @@ impl Pose {
         }
     }
 
+    /// How far this pose is from another between the same frames: the turn exp(ω) after the other's
+    /// rotation, rad, at most half a turn, and the move τ, mm.
+    pub fn off(&self, other: &Pose) -> [DVec3; 2] {
+        let turn = self.rotation * other.rotation.conjugate();
+        // A quaternion and its negative are the same turn; one of them goes the long way round.
+        let turn = if turn.w < 0.0 { -turn } else { turn };
+        [turn.to_scaled_axis(), self.translation - other.translation]
+    }
+
     /// The camera_from_target pose of a camera that stands at `eye`, looks at `centre`, and has
     /// `up` upwards in its image; `up` must not be parallel to the line of sight.
     pub fn looking_at(eye: DVec3, centre: DVec3, up: DVec3) -> Self {
@@ -59,6 +68,8 @@ mod tests {
         assert!(pose.apply(centre + DVec3::X).x > 0.0);
         let back = pose.inverse().after(&pose);
         assert!((back.apply(centre) - centre).length() < 1e-9);
+        let twice = Pose { rotation: -pose.rotation, ..pose };
+        assert!(twice.off(&pose)[0].length() < 1e-9, "one turn in two ways");
         assert!((pose.inverse().apply(DVec3::ZERO) - eye).length() < 1e-9);
     }
 }
