@@ -14,22 +14,23 @@ const STIFFEN: f64 = 10.0;
 /// Beyond this damping no step is left that would help.
 const MOST_DAMPING: f64 = 1e12;
 
-/// How far the search goes on: a step that is expected to lower the cost by less than this part of
-/// it ends it. With ten thousand corners, unknowns then move by less than a tenth of their standard
-/// deviations, or a ten-thousandth.
+/// How far the search goes on. A step that is expected to lower the cost by δ² variances moves no
+/// unknown by more than δ of its standard deviations, however many corners there are; below that the
+/// search ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Until {
-    /// Good enough to go on with more unknowns or other weights.
+    /// Good enough to go on with more unknowns or other weights: what is left is small beside noise.
     Rough,
-    /// Good enough to be told.
+    /// Good enough to be told: three digits of the deviations, and more of the values.
     Fine,
 }
 
 impl Until {
-    fn part(self) -> f64 {
+    /// δ.
+    fn deviations(self) -> f64 {
         match self {
-            Self::Rough => 1e-6,
-            Self::Fine => 1e-12,
+            Self::Rough => 0.1,
+            Self::Fine => 1e-3,
         }
     }
 }
@@ -54,12 +55,14 @@ pub(super) fn minimise(
     let normal = Normal::of(&problem, &layout, whitening, loss)?;
     let mut best = Minimum { problem, normal, layout, steps: 0 };
     let mut damping = DAMPING;
+    let coordinates = 2.0 * best.problem.count() as f64;
     while best.steps < MOST_STEPS && damping < MOST_DAMPING {
         let Some(step) = best.normal.step(damping) else {
             damping *= STIFFEN;
             continue;
         };
-        if best.normal.predicted(&step) <= until.part() * best.normal.cost {
+        let variance = best.normal.cost / coordinates;
+        if best.normal.predicted(&step) <= until.deviations().powi(2) * variance {
             break;
         }
         let problem = best.problem.after(&best.layout, &step);

@@ -7,6 +7,8 @@
 //!     (A − Σ B C⁻¹ Bᵀ) shared = a − Σ B C⁻¹ c,     frame = C⁻¹ (c − Bᵀ shared)
 //! ```
 
+use std::collections::BTreeSet;
+
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
@@ -74,6 +76,9 @@ pub(super) struct Step {
 pub(super) struct Covariances {
     pub shared: DMatrix<f64>,
     pub frames: Vec<Matrix6<f64>>,
+    /// The columns that nothing tells apart beyond what rounding leaves; their variances are the
+    /// least that they can be.
+    pub loose: Vec<usize>,
 }
 
 impl Normal {
@@ -179,45 +184,54 @@ impl Normal {
         self.right.dot(&step.shared) + frames.map(|(f, step)| f.right.dot(step)).sum::<f64>()
     }
 
-    /// The inverse of the equations; an error is the direction that nothing determines, in units
-    /// of each shared unknown's own precision.
-    pub(super) fn covariances(&self) -> Result<Covariances, DVector<f64>> {
-        let n = self.a.nrows();
+    /// The inverse of the equations; `None` where a frame's pose is open by itself.
+    pub(super) fn covariances(&self) -> Option<Covariances> {
         let mut reduced = self.a.clone();
         let mut inverses = Vec::with_capacity(self.frames.len());
         for Frame { b, c, .. } in &self.frames {
-            let inverse = c.cholesky().ok_or_else(|| DVector::zeros(n))?.inverse();
+            let inverse = c.cholesky()?.inverse();
             reduced -= b * inverse * b.transpose();
             inverses.push(inverse);
         }
-        let shared = self.invert_reduced(reduced)?;
+        let (shared, loose) = self.invert_reduced(reduced);
         let frames = self.frames.iter().zip(inverses).map(|(frame, inverse)| {
             let through = &frame.b * inverse;
             let carried = through.tr_mul(&shared) * &through;
             inverse + Matrix6::from_fn(|i, j| carried[(i, j)])
         });
-        Ok(Covariances { frames: frames.collect(), shared })
+        Some(Covariances { frames: frames.collect(), shared, loose })
     }
 
-    fn invert_reduced(&self, reduced: DMatrix<f64>) -> Result<DMatrix<f64>, DVector<f64>> {
+    /// The inverse of the reduced equations, and the columns that they leave open.
+    fn invert_reduced(&self, reduced: DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
         let n = reduced.nrows();
         if n == 0 {
-            return Ok(reduced);
+            return (reduced, Vec::new());
         }
         let scale = DVector::from_fn(n, |i, _| 1.0 / self.a[(i, i)].max(f64::MIN_POSITIVE).sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| reduced[(i, j)] * scale[i] * scale[j]);
-        let eigen = scaled.clone().symmetric_eigen();
-        if eigen.eigenvalues.min() <= SINGULAR {
-            return Err(eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned());
+        let eigen = scaled.symmetric_eigen();
+        let mut inverse = DMatrix::zeros(n, n);
+        let mut loose = BTreeSet::new();
+        for (&value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if value <= SINGULAR {
+                let most = direction.amax();
+                loose.extend((0..n).filter(|&i| direction[i].abs() >= INVOLVED * most));
+            }
+            inverse += direction * direction.transpose() / value.max(SINGULAR);
         }
-        let inverse = scaled.cholesky().ok_or_else(|| DVector::zeros(n))?.inverse();
-        Ok(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+        let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        (inverse, loose.into_iter().collect())
     }
 }
 
-/// The least eigenvalue of the reduced equations, scaled by the diagonal that they would have if
-/// poses were known, that counts as determined: what rounding leaves of zero after elimination.
-const SINGULAR: f64 = 1e-13;
+/// Eigenvalues of the reduced equations, scaled by the diagonal that they would have if poses were
+/// known, mean nothing below this: elimination leaves a few dozen times the precision of numbers.
+const SINGULAR: f64 = 1e-14;
+
+/// An unknown takes part in a direction if it moves by this part of what the one does that moves
+/// most.
+const INVOLVED: f64 = 0.3;
 
 /// Solves symmetric equations after scaling their diagonal to 1.
 fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64>> {

@@ -23,6 +23,9 @@ pub struct Solution {
     /// A-posteriori standard deviation of a coordinate: in px where corners were taken as equally
     /// precise, else in units of what its covariance says. All covariances are scaled by its square.
     pub sigma: f64,
+    /// Names of parameters that the views cannot tell apart: some change of them together moves no
+    /// corner. Their deviations are the least that they can be.
+    pub loose: Vec<String>,
     /// Steps of the last bundle adjustment.
     pub steps: usize,
 }

@@ -12,7 +12,7 @@ use super::solution::{Corner, Parameter, Solution, ViewSolution, rms_px};
 use super::start::first_camera;
 use super::view::View;
 use super::weights::{Weights, Whitening, median};
-use crate::camera::{Camera, Lens, Pose};
+use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Pose};
 
 /// Two views of a plane determine focal lengths and principal point if nothing is off; a third
 /// shows whether something is.
@@ -27,7 +27,9 @@ const WRONG_VIEW_PX: f64 = 1.0;
 /// pixel on a board of 500 px already looks like a tilt of one degree.
 const PARALLEL_RAD: f64 = 0.05;
 
-/// A focal length that is known no better than to this part is not determined.
+/// Focal lengths and the principal point are not determined when a deviation is more than this part
+/// of the focal length: equations that are linear near the solution, as deviations are computed from,
+/// are then off by as much as they say, and the deviation means nothing.
 const LOOSE_FOCAL: f64 = 0.1;
 
 /// A corner is an outlier beyond so many standard deviations: of a million corners with normal
@@ -234,14 +236,10 @@ impl Search<'_> {
         let Minimum { problem, normal, layout, steps } = minimum;
         let CameraUnknowns { camera, free, .. } = &problem.cameras[0];
         let names = camera.parameter_names();
-        let Covariances { shared, frames } = normal.covariances().map_err(|direction| {
-            let most = direction.amax();
-            let involved = layout.parameters[0]
-                .iter()
-                .filter(|(_, column)| direction[*column].abs() >= 0.3 * most);
-            let names: Vec<&str> = involved.map(|&(i, _)| names[i].as_str()).collect();
-            CalibrationError::Undetermined { parameters: names.join(", ") }
-        })?;
+        let open = || CalibrationError::Undetermined { parameters: "the poses".to_owned() };
+        let Covariances { shared, frames, loose } = normal.covariances().ok_or_else(open)?;
+        let loose = layout.parameters[0].iter().filter(|(_, column)| loose.contains(column));
+        let loose = loose.map(|&(i, _)| names[i].clone()).collect();
         let variance = variance(minimum);
         let covariance = shared * variance;
         let mut sds = (0..layout.count).map(|i| covariance[(i, i)].sqrt());
@@ -289,6 +287,7 @@ impl Search<'_> {
             excluded,
             common_px: whitening.common_px,
             sigma: variance.sqrt(),
+            loose,
             steps: *steps,
         })
     }
@@ -319,11 +318,14 @@ fn check_tilts(poses: &[Option<Pose>]) -> Result<(), CalibrationError> {
     }
 }
 
-/// Refuses a camera that the views leave open.
+/// Refuses a camera that the views leave open. Parameters of the lens that cannot be told apart are
+/// no reason: within the image they make the same camera.
 fn check_focal(solution: &Solution) -> Result<(), CalibrationError> {
-    let loose = solution.parameters[..2]
-        .iter()
-        .filter(|p| p.sd.is_some_and(|sd| sd.is_nan() || sd > LOOSE_FOCAL * p.value));
+    let of_every_lens = &solution.parameters[..PROJECTION_PARAMETERS.len()];
+    let loose = of_every_lens.iter().filter(|p| {
+        let focal = if p.name.starts_with('f') { p.value } else { solution.camera.focal_px[0] };
+        solution.loose.contains(&p.name) || p.sd.is_some_and(|sd| sd > LOOSE_FOCAL * focal)
+    });
     let loose: Vec<&str> = loose.map(|p| p.name.as_str()).collect();
     match loose.is_empty() {
         true => Ok(()),

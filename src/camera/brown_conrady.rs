@@ -23,8 +23,12 @@ const ITERATIONS: usize = 20;
 ///     y' = y ρ + p1 (r² + 2y²) + 2 p2 xy + s3 r² + s4 r⁴
 /// ```
 ///
-/// Valid less than 89.9° from the axis, where the denominator is positive and r ρ still grows with
-/// r. Parameters in OpenCV's order: k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
+/// Valid less than 89.9° from the axis, where ρ is positive and r ρ grows with r. Parameters in
+/// OpenCV's order: k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
+///
+/// A denominator has more freedom than lenses need: a calibration commonly ends with a zero of it
+/// within the image, and one of the numerator so close by that they cancel but for a ring far
+/// narrower than a pixel. Only the ring is not valid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BrownConrady {
     /// k1, k2, k3.
@@ -45,11 +49,12 @@ struct Radial {
     slope: f64,
     /// Its denominator.
     below: f64,
+    /// Whether ρ is positive and r ρ grows.
+    valid: bool,
 }
 
 impl BrownConrady {
-    /// `None` where the model is not valid.
-    fn radial(&self, q: f64) -> Option<Radial> {
+    fn radial(&self, q: f64) -> Radial {
         let [k1, k2, k3] = self.radial;
         let [k4, k5, k6] = self.denominator;
         let above = 1.0 + q * (k1 + q * (k2 + q * k3));
@@ -58,7 +63,7 @@ impl BrownConrady {
         let above_slope = k1 + q * (2.0 * k2 + q * 3.0 * k3);
         let below_slope = k4 + q * (2.0 * k5 + q * 3.0 * k6);
         let slope = (above_slope - rho * below_slope) / below;
-        (below > 0.0 && rho + 2.0 * q * slope > 0.0).then_some(Radial { rho, slope, below })
+        Radial { rho, slope, below, valid: rho > 0.0 && rho + 2.0 * q * slope > 0.0 }
     }
 
     /// x', y' and ∂(x', y')/∂(x, y).
@@ -88,20 +93,26 @@ impl BrownConrady {
     /// The radius r with r ρ(r) = `distorted`, to within a step.
     fn undistorted_radius(&self, distorted: f64) -> Option<f64> {
         let farthest = 1.0 / MIN_FORWARD;
-        let (mut r, mut reached) = (0.0, 0.0);
+        let (mut last, mut reached, mut r) = (0.0, 0.0, 0.0);
         while r < farthest {
-            let step = RADIUS_STEP * (1.0 + r);
-            let next = r + step;
-            let radial = self.radial(next * next);
-            let value = radial.map_or(f64::INFINITY, |radial| next * radial.rho);
-            if value >= distorted {
-                let part =
-                    if value.is_finite() { (distorted - reached) / (value - reached) } else { 0.0 };
-                return Some(r + step * part);
+            r += RADIUS_STEP * (1.0 + r);
+            let radial = self.radial(r * r);
+            let value = r * radial.rho;
+            match radial.valid {
+                true if value >= distorted => {
+                    return Some(last + (r - last) * (distorted - reached) / (value - reached));
+                }
+                true => (last, reached) = (r, value),
+                false if self.is_rational() => {}
+                false => return Some(last),
             }
-            (r, reached) = (next, value);
         }
         None
+    }
+
+    /// Whether its domain may have gaps.
+    fn is_rational(&self) -> bool {
+        self.denominator != [0.0; 3]
     }
 }
 
@@ -130,7 +141,10 @@ impl LensLaw for BrownConrady {
         }
         let (x, y) = (point.x / point.z, point.y / point.z);
         let q = x * x + y * y;
-        let radial = self.radial(q)?;
+        let radial = self.radial(q);
+        if !(radial.valid || self.is_rational()) {
+            return None;
+        }
         let (at, plane) = self.distort([x, y], &radial);
         let by_point = plane
             .map(|[by_x, by_y]| [by_x / point.z, by_y / point.z, -(x * by_x + y * by_y) / point.z]);
@@ -154,6 +168,10 @@ impl LensLaw for BrownConrady {
         Some(Imaged { at, by_point })
     }
 
+    fn covers(&self, DVec3 { x, y, z }: DVec3) -> bool {
+        self.radial((x * x + y * y) / (z * z)).valid
+    }
+
     fn ray(&self, at: [f64; 2]) -> Option<Ray> {
         let distorted = at[0].hypot(at[1]);
         if distorted == 0.0 {
@@ -162,7 +180,10 @@ impl LensLaw for BrownConrady {
         let part = self.undistorted_radius(distorted)? / distorted;
         let mut plane = [at[0] * part, at[1] * part];
         for _ in 0..ITERATIONS {
-            let radial = self.radial(plane[0] * plane[0] + plane[1] * plane[1])?;
+            let radial = self.radial(plane[0] * plane[0] + plane[1] * plane[1]);
+            if !(radial.valid || self.is_rational()) {
+                return None;
+            }
             let (image, by_plane) = self.distort(plane, &radial);
             let step = solve(by_plane, [at[0] - image[0], at[1] - image[1]])?;
             plane = [plane[0] + step[0], plane[1] + step[1]];
@@ -170,7 +191,8 @@ impl LensLaw for BrownConrady {
                 break;
             }
         }
-        Ray::central(DVec3::new(plane[0], plane[1], 1.0))
+        let valid = self.radial(plane[0] * plane[0] + plane[1] * plane[1]).valid;
+        Ray::central(DVec3::new(plane[0], plane[1], 1.0)).filter(|_| valid)
     }
 }
 

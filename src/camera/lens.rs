@@ -58,8 +58,13 @@ pub trait LensLaw {
     fn set_parameters(&mut self, values: &[f64]);
 
     /// The image of a point, and in `by_parameters` the derivatives of x', y' by each parameter;
-    /// `None` outside the domain of the model.
+    /// `None` where the formula has no value that a search may pass through.
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged>;
+
+    /// Whether a point that has an image lies in the domain of the model.
+    fn covers(&self, _point: DVec3) -> bool {
+        true
+    }
 
     /// The ray that is imaged at a point of the normalised plane; `None` where there is none.
     fn ray(&self, at: [f64; 2]) -> Option<Ray>;
@@ -104,9 +109,15 @@ impl Lens {
     }
 
     /// The image of a point of the camera frame with all derivatives; `by_parameters` takes one
-    /// pair for each parameter. `None` outside the domain of the model.
+    /// pair for each parameter. `None` where the formula has no value that a search may pass through;
+    /// rational lenses have one beyond their domain too.
     pub fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
         self.law().image(point, by_parameters)
+    }
+
+    /// Whether a point that has an image lies in the domain of the model.
+    pub fn covers(&self, point: DVec3) -> bool {
+        self.law().covers(point)
     }
 
     /// The ray that is imaged at a point of the normalised plane; `None` where there is none.

@@ -105,10 +105,12 @@ impl Camera {
     /// Pixel position of a point of the camera frame; `None` where the model does not reach.
     /// The position may lie outside the image.
     pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
-        self.project_with_derivatives(point).map(|projection| projection.pixel)
+        let projection = self.project_with_derivatives(point)?;
+        self.lens.covers(point).then_some(projection.pixel)
     }
 
-    /// [`Self::project`] with the derivatives by the point and by every parameter.
+    /// Pixel position with the derivatives by the point and by every parameter. Unlike
+    /// [`Self::project`] it passes the gaps in the domain of a rational lens, as a search must.
     pub fn project_with_derivatives(&self, point: DVec3) -> Option<Projection> {
         let ([fx, fy], [cx, cy]) = (self.focal_px, self.centre_px);
         let mut by_parameters = [[0.0; 2]; MAX_PARAMETERS];

@@ -69,28 +69,24 @@ impl RigSolution {
         whitening: &Whitening,
     ) -> Result<Self, CalibrationError> {
         let Minimum { problem, normal, layout, .. } = minimum;
-        let Covariances { shared, frames } = normal.covariances().map_err(|direction| {
-            let most = direction.amax();
-            let large = |column: usize| direction[column].abs() >= 0.3 * most;
-            let mut parameters = Vec::new();
-            for (camera, (of_camera, pose)) in
-                layout.parameters.iter().zip(&layout.cameras).enumerate()
-            {
-                let names = problem.cameras[camera].camera.parameter_names();
-                let found = of_camera.iter().filter(|(_, column)| large(*column));
-                parameters
-                    .extend(found.map(|&(i, _)| format!("{} of {}", names[i], views[camera].name)));
-                if pose.is_some_and(|first| (first..first + 6).any(large)) {
-                    parameters.push(format!("the pose of {}", views[camera].name));
-                }
-            }
-            for (panel, first) in layout.panels.iter().enumerate() {
-                if first.is_some_and(|first| (first..first + 6).any(large)) {
-                    parameters.push(format!("the pose of panel {panel}"));
-                }
-            }
-            CalibrationError::Undetermined { parameters: parameters.join(", ") }
-        })?;
+        let open = |parameters: &[String]| CalibrationError::Undetermined {
+            parameters: parameters.join(", "),
+        };
+        let covariances = normal.covariances().ok_or_else(|| open(&["the poses".to_owned()]))?;
+        let Covariances { shared, frames, loose } = covariances;
+        let is_loose = |first: &Option<usize>| {
+            first.is_some_and(|first| (first..first + 6).any(|column| loose.contains(&column)))
+        };
+        let mut poses = Vec::new();
+        for (views, _) in views.iter().zip(&layout.cameras).filter(|(_, first)| is_loose(first)) {
+            poses.push(format!("the pose of {}", views.name));
+        }
+        for (panel, _) in layout.panels.iter().enumerate().filter(|(_, first)| is_loose(first)) {
+            poses.push(format!("the pose of panel {panel}"));
+        }
+        if !poses.is_empty() {
+            return Err(open(&poses));
+        }
         let variance = variance(minimum);
         let covariance = shared * variance;
         let residuals = residuals(problem);

@@ -139,6 +139,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             solution.calibrated.rms_px
         );
     }
+    if !solution.calibrated.loose.is_empty() {
+        eprintln!(
+            "warning: the views cannot tell apart {}: where corners were seen the camera is right, \
+             beyond them it is not; fill the corners of the image, or choose a model with fewer \
+             parameters",
+            solution.calibrated.loose.join(", ")
+        );
+    }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let texts = args.format.iter().map(|&format| format.texts(&stem, &solution));
     let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
