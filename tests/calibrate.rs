@@ -124,9 +124,14 @@ fn within_3_sigma(model: Model, seed: u64) -> (usize, usize) {
     (errors.iter().filter(|error| error.abs() <= 3.0).count(), errors.len())
 }
 
+/// One direction that is off by three deviations takes the poses of all views with it; over several
+/// seeds that evens out.
 #[test]
 fn every_model_is_found_without_a_guess_and_knows_its_precision() {
-    let counts = MODELS.map(|model| within_3_sigma(model, 1));
+    let counts = MODELS.map(|model| {
+        let counts = (0..4).map(|seed| within_3_sigma(model, seed));
+        counts.fold((0, 0), |sum, c| (sum.0 + c.0, sum.1 + c.1))
+    });
     let (within, all) = counts.iter().fold((0, 0), |sum, c| (sum.0 + c.0, sum.1 + c.1));
     assert!(within as f64 >= 0.99 * all as f64, "{within} of {all}: {counts:?}");
 }

@@ -35,15 +35,20 @@ pub enum CalibrationError {
     },
     /// Labels that run the wrong way round.
     #[error(
-        "{view}: the labels are mirrored: rows and columns are exchanged, or the image was flipped \
-         (and so {more} more of {all} views)"
+        "{view}: the labels are mirrored: rows and columns are exchanged, or the image was flipped"
     )]
     Mirrored {
-        /// A view.
+        /// The view.
         view: String,
-        /// How many others.
-        more: usize,
-        /// Of how many.
+    },
+    /// Most detections are wrong in themselves.
+    #[error("{first} ({wrong} of {all} detections are wrong)")]
+    MostWrong {
+        /// What is wrong with the first of them.
+        first: Box<CalibrationError>,
+        /// How many are wrong.
+        wrong: usize,
+        /// How many show something.
         all: usize,
     },
     /// Not enough views.

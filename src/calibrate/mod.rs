@@ -44,5 +44,5 @@ pub use problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Prior, Prob
 pub use rig::{PanelPlace, RigCamera, RigFrame, RigOptions, RigSolution, RigViews, calibrate_rig};
 pub use solution::{Corner, Parameter, Solution, ViewSolution};
 pub use solve::{Options, calibrate, poses};
-pub use view::{Reference, Sighting, View, views};
+pub use view::{Reference, Shown, Sighting, View, views};
 pub use weights::Weights;

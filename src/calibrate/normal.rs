@@ -11,10 +11,12 @@ use std::collections::BTreeSet;
 
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use rayon::prelude::*;
 
 use super::loss::Loss;
 use super::problem::{Block, Problem, moved};
 use super::weights::Whitening;
+use crate::camera::MAX_PARAMETERS;
 
 /// Which column of the shared unknowns belongs to what.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,10 +99,18 @@ impl Normal {
             right: DVector::zeros(n),
             frames: vec![frame; problem.frames.len()],
         };
-        for (block, whitening_of) in problem.blocks.iter().zip(&whitening.blocks) {
-            let local = Local::of(problem, layout, block, whitening_of, loss, whitening.sigma)?;
-            normal.add(&local, block.frame);
+        let blocks: Vec<_> = problem.blocks.iter().zip(&whitening.blocks).collect();
+        for some in blocks.chunks(BLOCKS_AT_A_TIME) {
+            let locals = some.par_iter().map(|(block, whitening_of)| {
+                Local::of(problem, layout, block, whitening_of, loss, whitening.sigma)
+            });
+            // Summed in the order of the blocks, however many threads there are.
+            let locals = locals.collect::<Vec<Option<Local>>>();
+            for ((block, _), local) in some.iter().zip(locals) {
+                normal.add(&local?, block.frame);
+            }
         }
+        normal.a.fill_upper_triangle_with_lower_triangle();
         for (panel, first) in problem.panels.iter().zip(&layout.panels) {
             if let (Some(prior), Some(first)) = (&panel.prior, *first) {
                 normal.add_prior(prior.off(&panel.target_from_panel), first, whitening.sigma);
@@ -128,23 +138,28 @@ impl Normal {
         }
     }
 
-    /// Adds a block: its last six columns are those of the frame's pose.
+    /// Adds a block, to the lower triangle only: its columns ascend, and its last six are those of
+    /// the frame's pose.
     fn add(&mut self, local: &Local, frame: usize) {
         self.cost += local.cost;
         let frame = &mut self.frames[frame];
         let shared = local.columns.len();
         for (i, &row) in local.columns.iter().enumerate() {
-            for (j, &column) in local.columns.iter().enumerate() {
-                self.a[(row, column)] += local.matrix[(i, j)];
-            }
-            for j in 0..6 {
-                frame.b[(row, j)] += local.matrix[(i, shared + j)];
+            for (&column, value) in local.columns.iter().zip(local.row(i)) {
+                self.a[(row, column)] += value;
             }
             self.right[row] += local.right[i];
         }
         for i in 0..6 {
-            for j in 0..6 {
-                frame.c[(i, j)] += local.matrix[(shared + i, shared + j)];
+            let (of_shared, of_frame) = local.row(shared + i).split_at(shared);
+            for (&row, value) in local.columns.iter().zip(of_shared) {
+                frame.b[(row, i)] += value;
+            }
+            for (j, value) in of_frame.iter().enumerate() {
+                frame.c[(i, j)] += value;
+                if j < i {
+                    frame.c[(j, i)] += value;
+                }
             }
             frame.right[i] += local.right[shared + i];
         }
@@ -245,13 +260,20 @@ fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64
     Some(solution.component_mul(&scale))
 }
 
+/// Blocks whose equations are held at a time: enough for every thread, little for the memory.
+const BLOCKS_AT_A_TIME: usize = 256;
+
+/// Most columns of a block: parameters and poses of a camera, a panel and a frame.
+const MOST_COLUMNS: usize = MAX_PARAMETERS + 18;
+
 /// The normal equations of one block, with only the columns that it has.
 struct Local {
     cost: f64,
     /// Shared columns; those of the frame's pose follow.
     columns: Vec<usize>,
-    matrix: DMatrix<f64>,
-    right: DVector<f64>,
+    /// Rows of the lower triangle, one after the other.
+    matrix: Vec<f64>,
+    right: Vec<f64>,
 }
 
 impl Local {
@@ -272,9 +294,9 @@ impl Local {
         let poses = of_camera.into_iter().chain(of_panel).flat_map(|first| first..first + 6);
         let columns: Vec<usize> = free.iter().map(|&(_, column)| column).chain(poses).collect();
         let n = columns.len() + 6;
-        let mut local =
-            Self { cost: 0.0, columns, matrix: DMatrix::zeros(n, n), right: DVector::zeros(n) };
-        let mut rows = [vec![0.0; n], vec![0.0; n]];
+        let matrix = vec![0.0; n * (n + 1) / 2];
+        let mut local = Self { cost: 0.0, columns, matrix, right: vec![0.0; n] };
+        let mut rows = [[0.0; MOST_COLUMNS]; 2];
         for (seen, &w) in block.observations.iter().zip(whitening) {
             let turned_panel = target.target_from_panel.rotation * seen.panel_mm;
             let in_target = turned_panel + target.target_from_panel.translation;
@@ -307,15 +329,20 @@ impl Local {
                 pose(turned_target, by_rig);
             }
             let residual = [seen.pixel[0] - at.pixel[0], seen.pixel[1] - at.pixel[1]];
-            local.add(&rows, residual, w, loss, sigma);
+            local.add([&rows[0][..n], &rows[1][..n]], residual, w, loss, sigma);
         }
         Some(local)
+    }
+
+    /// A row of the lower triangle, up to the diagonal.
+    fn row(&self, i: usize) -> &[f64] {
+        &self.matrix[i * (i + 1) / 2..][..=i]
     }
 
     /// Adds a corner's two rows.
     fn add(
         &mut self,
-        rows: &[Vec<f64>; 2],
+        [along_x, along_y]: [&[f64]; 2],
         residual: [f64; 2],
         w: [f64; 3],
         loss: Loss,
@@ -325,16 +352,16 @@ impl Local {
         let (cost, weight) = loss.of(r0 * r0 + r1 * r1, sigma);
         self.cost += cost;
         let [a, b, c] = w;
-        let n = rows[0].len();
-        for i in 0..n {
-            let (x, y) = (a * rows[0][i], b * rows[0][i] + c * rows[1][i]);
-            let (x, y) = (weight * x, weight * y);
-            self.right[i] += x * r0 + y * r1;
-            // Column-major: the inner loop runs down a column.
+        let mut rest = self.matrix.as_mut_slice();
+        for (i, right) in self.right.iter_mut().enumerate() {
+            let (x, y) = (weight * a * along_x[i], weight * (b * along_x[i] + c * along_y[i]));
+            *right += x * r0 + y * r1;
             let (by_x, by_y) = (a * x + b * y, c * y);
-            for (j, value) in self.matrix.column_mut(i).iter_mut().enumerate() {
-                *value += by_x * rows[0][j] + by_y * rows[1][j];
+            let (row, below) = rest.split_at_mut(i + 1);
+            for ((value, of_x), of_y) in row.iter_mut().zip(along_x).zip(along_y) {
+                *value += by_x * of_x + by_y * of_y;
             }
+            rest = below;
         }
     }
 }

@@ -95,13 +95,26 @@ impl Reference<'_> {
     }
 }
 
-/// The views of all detections, each with its name: one for each picture, or for each board in it
-/// where several lie about. Pictures in which nothing was found give none.
+/// The views of detections.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// One for each picture, or for each board in it where several lie about.
+    pub views: Vec<View>,
+    /// Names of the detections that show nothing.
+    pub empty: Vec<String>,
+    /// What is wrong with detections that do not belong to the target.
+    pub left_out: Vec<CalibrationError>,
+}
+
+/// The views of all detections, each with its name; an error where most of those that show
+/// something do not belong to the target.
 pub fn views(
     detections: &[(String, Detection)],
     reference: &Reference,
-) -> Result<Vec<View>, CalibrationError> {
+) -> Result<Shown, CalibrationError> {
     let mut views = Vec::new();
+    let mut empty = Vec::new();
+    let mut left_out = Vec::new();
     for (name, detection) in detections {
         let size_px = [detection.width, detection.height];
         if let Some((first, other)) = detections.first()
@@ -114,23 +127,53 @@ pub fn views(
                 other_px: size_px,
             });
         }
-        let (view, image) = (name.clone(), detection.image.clone());
-        let mut sightings = reference.sightings(detection).map_err(|problem| match reference {
-            Reference::Grid(_) => CalibrationError::NotTheBoard { view, problem },
-            Reference::Target(_) => CalibrationError::NotOfTarget { view, problem },
-        })?;
-        sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
-        if reference.is_loose() {
-            views.extend(sightings.into_iter().map(|sighting| {
-                let name = format!("{name} board {}", sighting.panel);
-                View { name, image: image.clone(), size_px, sightings: vec![sighting] }
-            }));
-        } else if !sightings.is_empty() {
-            views.push(View { name: name.clone(), image, size_px, sightings });
+        match sightings(name, detection, reference) {
+            Err(error) => left_out.push(error),
+            Ok(sightings) if sightings.is_empty() => empty.push(name.clone()),
+            Ok(sightings) if reference.is_loose() => {
+                views.extend(sightings.into_iter().map(|sighting| View {
+                    name: format!("{name} board {}", sighting.panel),
+                    image: detection.image.clone(),
+                    size_px,
+                    sightings: vec![sighting],
+                }));
+            }
+            Ok(sightings) => {
+                let (name, image) = (name.clone(), detection.image.clone());
+                views.push(View { name, image, size_px, sightings });
+            }
         }
     }
-    check_labels(&views)?;
-    Ok(views)
+    let all = detections.len() - empty.len();
+    match left_out.first() {
+        Some(first) if 2 * left_out.len() > all => Err(match all {
+            1 => first.clone(),
+            _ => CalibrationError::MostWrong {
+                first: Box::new(first.clone()),
+                wrong: left_out.len(),
+                all,
+            },
+        }),
+        _ => Ok(Shown { views, empty, left_out }),
+    }
+}
+
+/// What a detection shows of the panels.
+fn sightings(
+    name: &str,
+    detection: &Detection,
+    reference: &Reference,
+) -> Result<Vec<Sighting>, CalibrationError> {
+    let view = || name.to_owned();
+    let mut sightings = reference.sightings(detection).map_err(|problem| match reference {
+        Reference::Grid(_) => CalibrationError::NotTheBoard { view: view(), problem },
+        Reference::Target(_) => CalibrationError::NotOfTarget { view: view(), problem },
+    })?;
+    sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
+    match sightings.iter().any(is_mirrored) {
+        true => Err(CalibrationError::Mirrored { view: view() }),
+        false => Ok(sightings),
+    }
 }
 
 /// The corners of a grid on its panel; `None` where it was not labelled and the target has several.
@@ -220,21 +263,8 @@ fn observations(grid: &Grid, at: impl Fn(i32, i32) -> DVec3) -> Vec<Observation>
     seen.collect()
 }
 
-/// In a picture, y down, rows and columns that run as on the print turn clockwise.
-fn check_labels(views: &[View]) -> Result<(), CalibrationError> {
-    let mirrored: Vec<&View> =
-        views.iter().filter(|view| view.sightings.iter().any(is_mirrored)).collect();
-    match mirrored.first() {
-        None => Ok(()),
-        Some(view) => Err(CalibrationError::Mirrored {
-            view: view.name.clone(),
-            more: mirrored.len() - 1,
-            all: views.len(),
-        }),
-    }
-}
-
-/// Whether most corners with two neighbours are mirrored.
+/// Whether most corners with two neighbours are mirrored. In a picture, y down, rows and columns that
+/// run as on the print turn clockwise.
 fn is_mirrored(sighting: &Sighting) -> bool {
     let places: BTreeMap<(i32, i32), [f64; 2]> =
         sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();

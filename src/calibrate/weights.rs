@@ -109,6 +109,9 @@ fn triangle([xx, xy, yy]: [f64; 3], common: f64) -> [f64; 3] {
 
 /// The middle value; zero of none.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

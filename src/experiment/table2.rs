@@ -81,7 +81,7 @@ fn detect(
         Ok((name.clone(), detector.detect_any(&image, &name)))
     });
     let found = found.collect::<Result<Vec<_>, ImageError>>()?;
-    Ok(views(&found, &reference())?)
+    Ok(views(&found, &reference())?.views)
 }
 
 /// The table as text; beside it what the paper's corners give on the whole sequence.

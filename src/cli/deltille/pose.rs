@@ -52,7 +52,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         all += 1;
         let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let found = detector.detect_any(&raster::read(&image)?, &name);
-        let shown = views(&[(name, found)], &reference)?;
+        let shown = views(&[(name, found)], &reference)?.views;
         let (loss, weights) = (Loss::default(), Weights::default());
         let solution = calibrate::poses(&shown, &reference.panels(), &camera, loss, weights)
             .with_context(|| image.display().to_string())?;

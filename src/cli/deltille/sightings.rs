@@ -1,13 +1,12 @@
 //! What was photographed, and the detections of it: the options of commands that calibrate.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
 use super::target_file;
-use crate::calibrate::{Reference, UntaggedGrid, View, views};
+use crate::calibrate::{Reference, Shown, UntaggedGrid, View, views};
 use crate::camera::Pose;
 use crate::detect::Detection;
 use crate::export::detection;
@@ -125,6 +124,7 @@ fn angle_on_sheet(target: &Target, panel: usize) -> f64 {
 }
 
 /// The views that detections show, files or folders of them, and the names of those that show none.
+/// Detections that do not belong to the target are told on standard error.
 pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<(Vec<View>, Vec<String>)> {
     let mut detections = Vec::new();
     for path in files(paths)? {
@@ -135,10 +135,10 @@ pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<(Vec<Vie
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         detections.push((name, found));
     }
-    let views = views(&detections, reference)?;
-    let seen: BTreeSet<&str> = views.iter().map(|view| view.image.as_str()).collect();
-    let unseen = detections.iter().filter(|(_, found)| !seen.contains(found.image.as_str()));
-    let empty = unseen.map(|(name, _)| name.clone()).collect();
+    let Shown { views, empty, left_out } = views(&detections, reference)?;
+    for error in left_out {
+        eprintln!("warning: left out: {error}");
+    }
     Ok((views, empty))
 }
 
