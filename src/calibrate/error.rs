@@ -106,6 +106,15 @@ pub enum CalibrationError {
         /// All frames.
         all: usize,
     },
+    /// The shape of a target of several panels.
+    #[error(
+        "the target has {panels} panels: the shape of a sheet is found for one board; the places of \
+         the panels are found by `rig --refine-target`"
+    )]
+    ShapeOfMany {
+        /// How many.
+        panels: usize,
+    },
     /// No focal length explains the views.
     #[error(
         "no camera explains the views: most corners must be wrongly labelled, or the target is not \

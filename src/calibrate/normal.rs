@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::loss::Loss;
 use super::problem::{Block, Problem, moved};
+use super::shape;
 use super::weights::Whitening;
 use crate::camera::MAX_PARAMETERS;
 
@@ -27,6 +28,8 @@ pub(super) struct Layout {
     pub cameras: Vec<Option<usize>>,
     /// First of the six columns of a panel's pose.
     pub panels: Vec<Option<usize>>,
+    /// First of the columns of the sheet's shape.
+    pub shape: Option<usize>,
     /// Number of columns.
     pub count: usize,
 }
@@ -46,7 +49,8 @@ impl Layout {
             cameras.push(camera.pose_free.then(|| take(6)));
         }
         let panels = problem.panels.iter().map(|p| p.pose_free.then(|| take(6))).collect();
-        Self { parameters, cameras, panels, count }
+        let shape = problem.shape.map(|_| take(shape::COUNT));
+        Self { parameters, cameras, panels, shape, count }
     }
 }
 
@@ -263,8 +267,8 @@ fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64
 /// Blocks whose equations are held at a time: enough for every thread, little for the memory.
 const BLOCKS_AT_A_TIME: usize = 256;
 
-/// Most columns of a block: parameters and poses of a camera, a panel and a frame.
-const MOST_COLUMNS: usize = MAX_PARAMETERS + 18;
+/// Most columns of a block: parameters and poses of a camera, a panel and a frame, and a shape.
+const MOST_COLUMNS: usize = MAX_PARAMETERS + 18 + shape::COUNT;
 
 /// The normal equations of one block, with only the columns that it has.
 struct Local {
@@ -292,13 +296,17 @@ impl Local {
         let free = &layout.parameters[block.camera];
         let (of_camera, of_panel) = (layout.cameras[block.camera], layout.panels[block.panel]);
         let poses = of_camera.into_iter().chain(of_panel).flat_map(|first| first..first + 6);
+        let of_shape = layout.shape.into_iter().flat_map(|first| first..first + shape::COUNT);
+        let poses = poses.chain(of_shape);
         let columns: Vec<usize> = free.iter().map(|&(_, column)| column).chain(poses).collect();
         let n = columns.len() + 6;
         let matrix = vec![0.0; n * (n + 1) / 2];
         let mut local = Self { cost: 0.0, columns, matrix, right: vec![0.0; n] };
         let mut rows = [[0.0; MOST_COLUMNS]; 2];
         for (seen, &w) in block.observations.iter().zip(whitening) {
-            let turned_panel = target.target_from_panel.rotation * seen.panel_mm;
+            let bends = problem.shape.map(|shape| shape.directions(seen.panel_mm));
+            let offset = problem.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
+            let turned_panel = target.target_from_panel.rotation * (seen.panel_mm + offset);
             let in_target = turned_panel + target.target_from_panel.translation;
             let turned_target = rig.rotation * in_target;
             let in_rig = turned_target + rig.translation;
@@ -326,6 +334,14 @@ impl Local {
                 if of_panel.is_some() {
                     pose(turned_panel, target_from_rig * by_rig);
                 }
+                if let Some(bends) = bends {
+                    let panel_from_target = target.target_from_panel.rotation.conjugate();
+                    let by_panel = panel_from_target * (target_from_rig * by_rig);
+                    bends.iter().for_each(|&bend| push(by_panel.dot(bend)));
+                }
+                let mut pose = |arm: DVec3, by: DVec3| {
+                    arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(&mut push);
+                };
                 pose(turned_target, by_rig);
             }
             let residual = [seen.pixel[0] - at.pixel[0], seen.pixel[1] - at.pixel[1]];
@@ -385,6 +401,13 @@ impl Problem {
             if let Some(first) = *first {
                 let change = &step.shared.as_slice()[first..first + 6];
                 panel.target_from_panel = moved(&panel.target_from_panel, change);
+            }
+        }
+        if let (Some(shape), Some(first)) = (&mut problem.shape, layout.shape) {
+            for (mm, change) in
+                shape.coefficients_mm.iter_mut().zip(&step.shared.as_slice()[first..])
+            {
+                *mm += change;
             }
         }
         for (frame, step) in problem.frames.iter_mut().zip(&step.frames) {

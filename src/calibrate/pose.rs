@@ -97,6 +97,7 @@ fn refine(
         frames: vec![pose],
         panels: fixed(panels),
         blocks: blocks(sightings, 0).collect(),
+        shape: None,
     };
     let residuals: Option<Vec<_>> =
         problem.blocks.iter().map(|block| problem.residuals(block)).collect();

@@ -1,6 +1,7 @@
 use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
+use super::shape::Shape;
 use crate::camera::{Camera, Pose, Projection};
 
 /// A corner that a camera saw.
@@ -94,6 +95,8 @@ pub struct Problem {
     pub panels: Vec<PanelUnknowns>,
     /// Observations.
     pub blocks: Vec<Block>,
+    /// How the panels' sheets differ from their plan, where that is unknown too; of one panel.
+    pub shape: Option<Shape>,
 }
 
 impl CameraUnknowns {
@@ -106,7 +109,9 @@ impl CameraUnknowns {
 impl Problem {
     /// Where a corner is in the frame of the camera that saw it, mm.
     pub fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
-        let target = self.panels[block.panel].target_from_panel.apply(observation.panel_mm);
+        let shape = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(observation.panel_mm));
+        let at = observation.panel_mm + shape;
+        let target = self.panels[block.panel].target_from_panel.apply(at);
         let rig = self.frames[block.frame].apply(target);
         self.cameras[block.camera].camera_from_rig.apply(rig)
     }
@@ -141,7 +146,8 @@ impl Problem {
             .iter()
             .filter_map(|block| Some(Block { frame: places[block.frame]?, ..block.clone() }));
         let blocks = blocks.collect();
-        Problem { cameras: self.cameras.clone(), frames, panels: self.panels.clone(), blocks }
+        let (cameras, panels) = (self.cameras.clone(), self.panels.clone());
+        Problem { cameras, frames, panels, blocks, shape: self.shape }
     }
 }
 

@@ -1,5 +1,6 @@
 use nalgebra::DMatrix;
 
+use super::shape::BoardShape;
 use crate::camera::{Camera, Pose};
 
 /// A camera as the views have it, with what that is worth.
@@ -26,6 +27,8 @@ pub struct Solution {
     /// Names of parameters that the views cannot tell apart: some change of them together moves no
     /// corner. Their deviations are the least that they can be.
     pub loose: Vec<String>,
+    /// The shape of the board's sheet, where it was to be found.
+    pub shape: Option<BoardShape>,
     /// Steps of the last bundle adjustment.
     pub steps: usize,
 }

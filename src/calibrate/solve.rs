@@ -8,6 +8,7 @@ use super::normal::Covariances;
 use super::pose::{blocks, estimate_pose, fixed};
 use super::problem::{CameraUnknowns, Problem};
 use super::settle::{residuals, settle, variance};
+use super::shape::{self, BoardShape, Shape};
 use super::solution::{Corner, Parameter, Solution, ViewSolution, rms_px};
 use super::start::first_camera;
 use super::view::View;
@@ -54,6 +55,27 @@ pub fn calibrate(
     panels: &[Pose],
     options: Options,
 ) -> Result<Solution, CalibrationError> {
+    calibrated(views, panels, options, false)
+}
+
+/// [`calibrate`], and finds how the sheet of the board, which is of one panel, differs from its plan.
+pub fn calibrate_with_shape(
+    views: &[View],
+    panels: &[Pose],
+    options: Options,
+) -> Result<Solution, CalibrationError> {
+    if panels.len() > 1 {
+        return Err(CalibrationError::ShapeOfMany { panels: panels.len() });
+    }
+    calibrated(views, panels, options, true)
+}
+
+fn calibrated(
+    views: &[View],
+    panels: &[Pose],
+    options: Options,
+    with_shape: bool,
+) -> Result<Solution, CalibrationError> {
     enough(views.len(), views.len())?;
     let ideal = first_camera(views, options.model).ok_or(CalibrationError::NoStart)?;
     let [width, height] = views[0].size_px;
@@ -76,7 +98,8 @@ pub fn calibrate(
     if panels.len() == 1 {
         check_tilts(&search.poses)?;
     }
-    let solution = search.finish(options.model.free(), options.loss, options.weights)?;
+    let solution =
+        search.finish(options.model.free(), options.loss, options.weights, with_shape)?;
     check_focal(&solution)?;
     Ok(solution)
 }
@@ -99,7 +122,7 @@ pub fn poses(
     }
     let poses = views.iter().map(|view| estimate_pose(camera, panels, &view.sightings)).collect();
     let search = Search { views, panels, camera: camera.clone(), poses };
-    search.finish(vec![false; camera.parameters().len()], loss, weights)
+    search.finish(vec![false; camera.parameters().len()], loss, weights, false)
 }
 
 fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
@@ -187,6 +210,7 @@ impl Search<'_> {
         free: Vec<bool>,
         loss: Loss,
         weights: Weights,
+        with_shape: bool,
     ) -> Result<Solution, CalibrationError> {
         let calibrating = free.contains(&true);
         let (used, all) = self.problem(free);
@@ -222,8 +246,20 @@ impl Search<'_> {
         });
         let excluded = excluded.collect();
 
-        let (minimum, whitening) = settle(problem, weights, loss)?;
-        self.solution(&kept, excluded, &minimum, &whitening)
+        let (mut minimum, mut whitening) = settle(problem, weights, loss)?;
+        let mut f_ratio = 0.0;
+        if with_shape {
+            let flat = minimum.normal.cost;
+            let mut problem = minimum.problem;
+            let observations = problem.blocks.iter().flat_map(|block| &block.observations);
+            problem.shape = Some(Shape::flat(observations.map(|seen| seen.panel_mm)));
+            // Compared under the same weights.
+            let bent = minimise(problem, &whitening, loss, Until::Fine)
+                .ok_or(CalibrationError::NoStart)?;
+            f_ratio = (flat - bent.normal.cost) / shape::COUNT as f64 / variance(&bent);
+            (minimum, whitening) = settle(bent.problem, weights, loss)?;
+        }
+        self.solution(&kept, excluded, &minimum, &whitening, f_ratio)
     }
 
     fn solution(
@@ -232,6 +268,7 @@ impl Search<'_> {
         excluded: Vec<(String, String)>,
         minimum: &Minimum,
         whitening: &Whitening,
+        f_ratio: f64,
     ) -> Result<Solution, CalibrationError> {
         let Minimum { problem, normal, layout, steps } = minimum;
         let CameraUnknowns { camera, free, .. } = &problem.cameras[0];
@@ -242,7 +279,23 @@ impl Search<'_> {
         let loose = loose.map(|&(i, _)| names[i].clone()).collect();
         let variance = variance(minimum);
         let covariance = shared * variance;
-        let mut sds = (0..layout.count).map(|i| covariance[(i, i)].sqrt());
+        let shape = problem.shape.zip(layout.shape).map(|(shape, first)| {
+            let at = problem.blocks.iter().flat_map(|b| &b.observations).map(|o| o.panel_mm);
+            let offsets = at.map(|at| shape.offset(at));
+            let (low, high, beside) = offsets.fold((0.0, 0.0, 0.0), |(low, high, beside), d| {
+                (d.z.min(low), d.z.max(high), d.truncate().length().max(beside))
+            });
+            BoardShape {
+                shape,
+                sd_mm: std::array::from_fn(|i| covariance[(first + i, first + i)].sqrt()),
+                f_ratio,
+                bent_mm: high - low,
+                stretched_mm: beside,
+            }
+        });
+        let found = layout.parameters[0].len();
+        let covariance = covariance.view((0, 0), (found, found)).into_owned();
+        let mut sds = (0..found).map(|i| covariance[(i, i)].sqrt());
         let values = camera.parameters();
         let parameters = names.iter().zip(values).zip(free).map(|((name, value), &free)| {
             let sd = if free { sds.next() } else { None };
@@ -288,6 +341,7 @@ impl Search<'_> {
             common_px: whitening.common_px,
             sigma: variance.sqrt(),
             loose,
+            shape,
             steps: *steps,
         })
     }

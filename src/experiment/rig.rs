@@ -208,7 +208,7 @@ pub fn run(
             let of_camera = found.iter().filter(|(camera, ..)| *camera == index);
             let of_camera: Vec<(String, Detection)> =
                 of_camera.map(|(_, name, detection)| (name.clone(), detection.clone())).collect();
-            let views = views(&of_camera, &reference).map_err(failed)?;
+            let views = views(&of_camera, &reference).map_err(failed)?.views;
             cameras.push(RigViews { name: format!("c{index}"), views, known: None });
         }
         let panels: Vec<PanelPlace> = reference

@@ -20,8 +20,21 @@ struct CalibrationFile {
     rms_px: f64,
     sigma: f64,
     common_px: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    board_shape: Option<ShapeOfBoard>,
     views: Vec<View>,
     excluded: Vec<Excluded>,
+}
+
+#[derive(Serialize)]
+struct ShapeOfBoard {
+    /// b₁ … b₇, a₁, a₂ of [`crate::calibrate::Shape`].
+    coefficients_mm: Vec<f64>,
+    sd_mm: Vec<f64>,
+    bent_mm: f64,
+    stretched_mm: f64,
+    f_ratio: f64,
+    significant: bool,
 }
 
 #[derive(Serialize)]
@@ -80,6 +93,14 @@ pub fn write(solution: &Solution, model: &str) -> String {
         rms_px: solution.rms_px,
         sigma: solution.sigma,
         common_px: solution.common_px,
+        board_shape: solution.shape.map(|found| ShapeOfBoard {
+            coefficients_mm: found.shape.coefficients_mm.to_vec(),
+            sd_mm: found.sd_mm.to_vec(),
+            bent_mm: found.bent_mm,
+            stretched_mm: found.stretched_mm,
+            f_ratio: found.f_ratio,
+            significant: found.is_significant(),
+        }),
         views: solution.views.iter().map(view).collect(),
         excluded: excluded.map(|(name, why)| Excluded { name, why }).collect(),
     };

@@ -205,6 +205,14 @@ fn residuals(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, Stri
         }
         None => {}
     }
+    if let Some(shape) = solution.shape.filter(|shape| shape.is_significant()) {
+        let text = format!(
+            "The sheet is bent by {:.2} mm and its corners lie up to {:.2} mm beside their places; that \
+             is allowed for. Glue it on something flat.",
+            shape.bent_mm, shape.stretched_mm
+        );
+        add(Weight::Hint, text);
+    }
     let outliers: usize = solution.views.iter().map(|view| view.outlier_count()).sum();
     if outliers > 0 {
         let text = format!(

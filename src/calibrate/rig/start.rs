@@ -98,6 +98,7 @@ impl Start {
             frames: self.rig_from_target.clone(),
             panels: panel_unknowns(&blocks, panels, options.refine_target),
             blocks: Vec::new(),
+            shape: None,
         };
         // What is out of a camera's reach from this start cannot be walked to.
         blocks.retain(|block| problem.residuals(block).is_some());

@@ -10,7 +10,7 @@ use clap::ValueEnum;
 
 use super::files::{self, File};
 use super::sightings::{Sightings, SightingsArgs};
-use crate::calibrate::{self, Loss, Model, Options, Solution, View, Weights};
+use crate::calibrate::{self, BoardShape, Loss, Model, Options, Solution, View, Weights};
 use crate::camera::{Camera, Pose};
 use crate::cli::output;
 use crate::export::calibration;
@@ -52,6 +52,10 @@ pub struct Args {
     /// What to write; several may be given, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "own")]
     format: Vec<Format>,
+    /// Find how the sheet of the board is bent, stretched and sheared, too, and whether that is more
+    /// than chance
+    #[arg(long, conflicts_with = "fixed_intrinsics")]
+    board_shape: bool,
     /// Write a page that shows what the calibration is worth, and what would make it better
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -161,6 +165,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         written.push(page);
     }
     let mut text = table(&solution.calibrated);
+    if let Some(shape) = &solution.calibrated.shape {
+        let _ = writeln!(text, "{}", told(shape));
+    }
     if let Some(test) = &solution.held_out {
         // Writing to a String cannot fail.
         let _ = writeln!(
@@ -233,7 +240,11 @@ impl Args {
             let views = views.iter().enumerate();
             views.filter(|(i, _)| is_held_out(*i) == held_out).map(|(_, v)| v.clone()).collect()
         };
-        let calibrated = calibrate::calibrate(&part(false), panels, options)?;
+        let calibrated = match self.board_shape {
+            true => calibrate::calibrate_with_shape(&part(false), panels, options)
+                .context("--board-shape")?,
+            false => calibrate::calibrate(&part(false), panels, options)?,
+        };
         let test = part(true);
         let held_out = match test.is_empty() {
             true => None,
@@ -265,6 +276,18 @@ impl Format {
             }
         })
     }
+}
+
+/// The shape of a sheet, and whether it is to be believed.
+fn told(found: &BoardShape) -> String {
+    let significance = match found.is_significant() {
+        true => "more than chance makes",
+        false => "no more than chance makes: take the calibration without",
+    };
+    format!(
+        "sheet: bent by {:.3} mm, corners up to {:.3} mm beside their places, F = {:.1}, {significance}",
+        found.bent_mm, found.stretched_mm, found.f_ratio
+    )
 }
 
 /// Parameters with their deviations, views with their errors.
