@@ -18,6 +18,8 @@ pub struct RigSolution {
     pub frames: Vec<RigFrame>,
     /// The panels of the target.
     pub panels: Vec<PanelPlace>,
+    /// Parameters that the views cannot tell apart, see [`super::super::Solution::loose`].
+    pub loose: Vec<String>,
     /// Views and frames that took no part, and why.
     pub excluded: Vec<(String, String)>,
     /// Root mean square error of a coordinate over all corners, px.
@@ -77,6 +79,13 @@ impl RigSolution {
         let is_loose = |first: &Option<usize>| {
             first.is_some_and(|first| (first..first + 6).any(|column| loose.contains(&column)))
         };
+        let of_cameras = views.iter().zip(&problem.cameras).zip(&layout.parameters);
+        let of_cameras = of_cameras.flat_map(|((views, found), parameters)| {
+            let names = found.camera.parameter_names();
+            let loose = parameters.iter().filter(|(_, column)| loose.contains(column));
+            loose.map(move |&(i, _)| format!("{} of {}", names[i], views.name))
+        });
+        let loose_parameters = of_cameras.collect();
         let mut poses = Vec::new();
         for (views, _) in views.iter().zip(&layout.cameras).filter(|(_, first)| is_loose(first)) {
             poses.push(format!("the pose of {}", views.name));
@@ -134,6 +143,7 @@ impl RigSolution {
             cameras,
             frames: of_frames.collect(),
             panels: panels.collect(),
+            loose: loose_parameters,
             excluded: Vec::new(),
             rms_px: rms_px(residuals.iter().flatten()),
             common_px: whitening.common_px,

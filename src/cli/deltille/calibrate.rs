@@ -144,12 +144,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     }
     if !solution.calibrated.loose.is_empty() {
-        eprintln!(
-            "warning: the views cannot tell apart {}: where corners were seen the camera is right, \
-             beyond them it is not; fill the corners of the image, or choose a model with fewer \
-             parameters",
-            solution.calibrated.loose.join(", ")
-        );
+        eprintln!("{}", cannot_tell_apart(&solution.calibrated.loose));
     }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let texts = args.format.iter().map(|&format| format.texts(&stem, &solution));
@@ -183,6 +178,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     output::print(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The warning for parameters that the views leave open.
+pub fn cannot_tell_apart(parameters: &[String]) -> String {
+    format!(
+        "warning: the views cannot tell apart {}: where corners were seen the camera is right, \
+         beyond them it may not be; fill the corners of the image, or choose a model with fewer \
+         parameters",
+        parameters.join(", ")
+    )
 }
 
 /// What came of a command.

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use glam::{DMat3, DQuat};
 
-use super::calibrate::{Robust, Weighting};
+use super::calibrate::{Robust, Weighting, cannot_tell_apart};
 use super::files::{File, text_file, write_all};
 use super::{sightings, target_file};
 use crate::calibrate::{
@@ -102,6 +102,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         refine_target: args.refine_target,
     };
     let solution = calibrate_rig(&cameras, &panels, options)?;
+    if !solution.loose.is_empty() {
+        eprintln!("{}", cannot_tell_apart(&solution.loose));
+    }
     let mut files =
         vec![text_file("rig.json".to_owned(), rig::write(&solution, &args.model.to_string()))];
     for camera in &solution.cameras {

@@ -1,0 +1,262 @@
+//! `deltille calibrate`, `rig` and `pose` from files to files, and input that makes no camera.
+
+use std::path::Path;
+use std::process::Output;
+
+use assert_cmd::Command;
+use deltille::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille::detect::{Detection, Grid, GridCorner};
+use deltille::export::detection;
+use deltille::family::Family;
+use deltille::target::{BoardSpec, GridKind, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use glam::{DMat3, DQuat, DVec3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+
+fn deltille(folder: &Path, args: &str) -> Output {
+    let mut command = Command::cargo_bin("deltille").unwrap();
+    command.current_dir(folder).args(args.split_whitespace()).output().unwrap()
+}
+
+/// What a command that has to succeed says on standard output.
+fn done(folder: &Path, args: &str) -> String {
+    let output = deltille(folder, args);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{args}: {said}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The one line of a command that has to refuse its input.
+fn refused(folder: &Path, args: &str) -> String {
+    let output = deltille(folder, args);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{args}: {said}");
+    assert!(!folder.join("camera.yaml").exists() && !folder.join("camera.json").exists());
+    assert_eq!(said.lines().count(), 1, "{said}");
+    said
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn board(rows: u32, cols: u32) -> Target {
+    let tags = Some(TagSpec::default());
+    let family = Family::resolve(&TagSpec::default().family).unwrap();
+    let (grid, edge_mm, inverted) = (GridKind::Deltille, 20.0, false);
+    let spec = BoardSpec { grid, rows, cols, edge_mm, boards: 1, board_id: 0, tags, inverted };
+    Target::build("board", &TargetSpec::Board(spec), Some(&family), None).unwrap()
+}
+
+fn camera() -> Camera {
+    let radial = [-0.17, 0.02, 0.0];
+    let lens = Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() });
+    Camera { centre_px: [804.0, 606.0], ..Camera::centred(1600, 1200, 625.0, lens) }
+}
+
+/// What a detector finds of a board of one panel that is seen whole.
+fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8Rng) -> Detection {
+    let panel = &target.panels[0];
+    let corners = panel.corners.iter().map(|corner| {
+        let [x, y] = camera.project(pose.apply(corner.target_mm.into())).unwrap();
+        let mut off = || random.random_range(-0.1..0.1);
+        let (row, col, id) = (corner.row, corner.col, Some(corner.id));
+        GridCorner { row, col, id, x: x + off(), y: y + off(), cov: None }
+    });
+    let corners = corners.collect();
+    let grid = Grid { kind: panel.kind, panel: Some(panel.id), corners, tags: Vec::new() };
+    Detection {
+        image: String::new(),
+        width: camera.width,
+        height: camera.height,
+        grids: vec![grid],
+        timing_ms: Default::default(),
+    }
+}
+
+/// Detections of a board in so many pictures, tilted by up to 0.7 rad.
+fn detections(target: &Target, count: usize, tilt_rad: f64) -> Vec<Detection> {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let middle = DVec3::new(150.0, 80.0, 0.0);
+    let poses = (0..count).map(|_| {
+        let mut any = |reach: f64| random.random_range(-reach..reach);
+        let tilt = DVec3::new(any(1.0), any(1.0), 0.0) * tilt_rad;
+        // y up on the print is y down in the camera: half a turn about x faces the board.
+        let rotation = DQuat::from_scaled_axis(tilt) * DQuat::from_rotation_x(std::f64::consts::PI);
+        let centre = DVec3::new(any(120.0), any(70.0), 400.0 + any(100.0));
+        Pose { rotation, translation: centre - rotation * middle }
+    });
+    let poses: Vec<Pose> = poses.collect();
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    poses.iter().map(|pose| detection(target, &camera(), pose, &mut random)).collect()
+}
+
+/// A folder with `board.json` and the detections in `corners`.
+fn folder(target: &Target, detections: &[Detection]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("board.json"), target.to_json()).unwrap();
+    std::fs::create_dir(folder.path().join("corners")).unwrap();
+    for (i, detection) in detections.iter().enumerate() {
+        let detection = Detection { image: format!("{i:02}.png"), ..detection.clone() };
+        let path = folder.path().join(format!("corners/{i:02}.json"));
+        std::fs::write(path, detection::write(&detection)).unwrap();
+    }
+    folder
+}
+
+const CALIBRATE: &str = "calibrate corners --target board.json --model radtan";
+
+/// Exchanges rows with columns.
+fn swap(detection: &mut Detection) {
+    for corner in &mut detection.grids[0].corners {
+        (corner.row, corner.col) = (corner.col, corner.row);
+    }
+}
+
+/// Turns left to right.
+fn mirror(detection: &mut Detection) {
+    for corner in &mut detection.grids[0].corners {
+        corner.x = 1599.0 - corner.x;
+    }
+}
+
+#[test]
+fn a_camera_is_calibrated_and_read_back() {
+    let target = board(8, 9);
+    let folder = folder(&target, &detections(&target, 15, 0.7));
+    let at = folder.path();
+    let formats = "own,opencv,ros,kalibr,colmap,nerfstudio";
+    let said = done(at, &format!("{CALIBRATE} --holdout 5 --format {formats} --report page.html"));
+    assert!(said.contains("12 views, 864 corners, rms 0.05"), "{said}");
+    assert!(said.contains("held out: 3 views, 216 corners, rms 0.05"), "{said}");
+    let found = Camera::from_yaml(&std::fs::read_to_string(at.join("camera.yaml")).unwrap());
+    assert!((found.unwrap().focal_px[0] - 625.0).abs() < 0.5);
+    for end in ["-opencv.yaml", "-ros.yaml", "-camchain.yaml", "-cameras.txt", "-transforms.json"] {
+        assert!(at.join(format!("camera{end}")).exists(), "{end}");
+    }
+    for camera in ["camera.yaml", "camera-opencv.yaml", "camera-ros.yaml"] {
+        let args = format!(
+            "calibrate corners --target board.json --fixed-intrinsics {camera} -o again.yaml"
+        );
+        assert!(done(at, &args).contains("15 views, 1080 corners, rms 0.05"));
+    }
+}
+
+#[test]
+fn wrong_detections_among_good_ones_are_left_out() {
+    let target = board(8, 9);
+    let mut detections = detections(&target, 15, 0.7);
+    mirror(&mut detections[4]);
+    swap(&mut detections[7]);
+    detections[9].grids[0].panel = Some(77);
+    let folder = folder(&target, &detections);
+    let output = deltille(folder.path(), CALIBRATE);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let lines: Vec<&str> = said.lines().collect();
+    assert_eq!(lines.len(), 3, "{said}");
+    assert!(lines[0].starts_with("warning: left out: 04: the labels are mirrored"), "{said}");
+    assert!(lines[1].starts_with("warning: left out: 07: ") && lines[1].contains("exchanged?"));
+    assert!(lines[2].starts_with("warning: left out: 09: panel 77 is not on"), "{said}");
+    assert!(String::from_utf8(output.stdout).unwrap().contains("12 views, 864 corners, rms 0.05"));
+}
+
+#[test]
+fn input_that_makes_no_camera_is_refused_by_its_cause() {
+    let target = board(8, 9);
+    let good = detections(&target, 10, 0.7);
+    let said = |target: &Target, detections: &[Detection]| {
+        refused(folder(target, detections).path(), CALIBRATE)
+    };
+    let one = said(&target, &good[..1]);
+    assert!(one.contains("1 usable views of 1: a calibration needs at least 3"), "{one}");
+
+    let parallel = said(&target, &detections(&target, 10, 0.001));
+    assert!(parallel.contains("all views are parallel"), "{parallel}");
+
+    let mut mirrored = good.clone();
+    mirrored.iter_mut().for_each(mirror);
+    let mirrored = said(&target, &mirrored);
+    assert!(mirrored.contains("00: the labels are mirrored"), "{mirrored}");
+    assert!(mirrored.contains("10 of 10"), "{mirrored}");
+
+    let mut swapped = good.clone();
+    swapped.iter_mut().for_each(swap);
+    let swapped = said(&target, &swapped);
+    assert!(swapped.contains("rows and columns exchanged?"), "{swapped}");
+
+    let mut mixed = good.clone();
+    (mixed[3].width, mixed[3].height) = (800, 600);
+    let mixed = said(&target, &mixed);
+    assert!(mixed.contains("00 is 1600 × 1200 px, 03 is 800 × 600 px"), "{mixed}");
+
+    let foreign = said(&board(6, 7), &good);
+    assert!(foreign.contains("the target does not belong to this detection"), "{foreign}");
+}
+
+/// An icosahedron before two cameras, rendered, detected, calibrated, and its poses found.
+#[test]
+fn a_rig_is_calibrated_from_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let family = Family::resolve("delTag25h7").unwrap();
+    let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
+    let target = Target::build("ico", &spec, Some(&family), None).unwrap();
+    std::fs::write(at.join("ico.json"), target.to_json()).unwrap();
+    let camera = Camera::centred(1200, 900, 1700.0, camera().lens);
+    std::fs::write(at.join("true.yaml"), camera.to_yaml()).unwrap();
+    let eye = DVec3::new(200.0, 20.0, 0.0);
+    let right = Pose::looking_at(eye, DVec3::new(0.0, 0.0, 650.0), DVec3::NEG_Y);
+    let places = [("left", Pose::IDENTITY), ("right", right)];
+    for (name, place) in &places {
+        for frame in 0..5 {
+            let i = f64::from(frame);
+            let turn = DVec3::new(0.9 - 0.5 * i, 1.1 * i - 2.0, 0.4 * i);
+            let translation = DVec3::new(20.0 * i - 40.0, 30.0 - 15.0 * i, 600.0 + 25.0 * i);
+            let rotation = DQuat::from_scaled_axis(turn);
+            let pose = place.after(&Pose { rotation, translation });
+            let (turn, at_mm) = (pose.rotation.to_scaled_axis(), pose.translation);
+            let pose = turn.to_array().into_iter().chain(at_mm.to_array());
+            let pose: Vec<String> = pose.map(|v| v.to_string()).collect();
+            let file = format!("{name}/{frame}.png");
+            let args = format!("render ico.json --camera true.yaml -o {file} --seed {frame}");
+            std::fs::create_dir_all(at.join(name)).unwrap();
+            done(at, &format!("{args} --pose {}", pose.join(",")));
+        }
+        done(at, &format!("detect {name} --target ico.json -o corners/{name}"));
+    }
+    let cameras = "--camera left=corners/left --camera right=corners/right";
+    let said = done(at, &format!("rig {cameras} --target ico.json -o rig --format kalibr,colmap"));
+    assert!(said.starts_with("2 cameras, 5 frames, rms 0.0"), "{said}");
+    let rig = json(&at.join("rig/rig.json"));
+    let found = motion(&rig["cameras"][1]["camera_from_rig"]);
+    let [turn, step] = found.off(&right);
+    assert!(turn.length() < 2e-3 && step.length() < 1.0, "{found:?} {right:?}");
+    for file in ["left.yaml", "right.yaml", "camchain.yaml", "cameras.txt", "rig_config.json"] {
+        assert!(at.join("rig").join(file).exists(), "{file}");
+    }
+
+    let lines = done(at, "pose left --target ico.json --camera true.yaml");
+    assert_eq!(lines.lines().count(), 5, "{lines}");
+    for line in lines.lines() {
+        let found: Value = serde_json::from_str(line).unwrap();
+        let picture = Path::new(found["image"].as_str().unwrap()).with_extension("json");
+        let truth = &json(&at.join("left").join(picture))["camera_from_target"];
+        let [found, truth] = [&found["camera_from_target"], truth].map(motion);
+        let [turn, step] = found.off(&truth);
+        assert!(turn.length() < 1e-3 && step.length() < 0.5, "{found:?} {truth:?}");
+    }
+    let wrong = refused(at, &format!("rig {cameras} --camera third=nowhere --target ico.json"));
+    assert!(wrong.contains("third") && wrong.contains("nowhere"), "{wrong}");
+}
+
+fn motion(value: &Value) -> Pose {
+    let numbers = |key: &str| {
+        let numbers = value[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap());
+        numbers.collect::<Vec<f64>>()
+    };
+    let rotation = DMat3::from_cols_slice(&numbers("rotation")).transpose();
+    let translation = DVec3::from_slice(&numbers("translation_mm"));
+    Pose { rotation: DQuat::from_mat3(&rotation), translation }
+}
