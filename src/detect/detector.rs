@@ -185,6 +185,7 @@ impl Detector {
             let plausible = grid.corners.len() >= least && !self.labels.exceeded_by(grid);
             !grid.tags.is_empty() || plausible && median_edge_px(grid) >= MIN_UNTAGGED_EDGE_PX
         });
+        report_once(&mut grids);
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
         grids.sort_by_key(|grid| grid.panel.unwrap_or(u32::MAX));
         timing.lap("labels");
@@ -257,6 +258,19 @@ impl Labels {
         };
         grid.corners.len() > most
     }
+}
+
+/// Leaves out of grids of one panel what a larger one, which comes before, has already: beside a tag of
+/// few pixels corners may be found twice, a pixel apart.
+fn report_once(grids: &mut Vec<Grid>) {
+    let (mut corners, mut tags) = (BTreeSet::new(), BTreeSet::new());
+    grids.retain_mut(|grid| {
+        if let Some(panel) = grid.panel {
+            grid.corners.retain(|corner| corners.insert((panel, corner.row, corner.col)));
+            grid.tags.retain(|tag| tags.insert((panel, tag.row, tag.col)));
+        }
+        !grid.corners.is_empty()
+    });
 }
 
 /// Median distance of corners that follow each other in a row or column, px.
