@@ -128,11 +128,11 @@ fn recorded_faults_are_refused_or_read() {
     assert!(files > 30, "{files} files");
 }
 
-/// Brackets nested deeper than a stack.
+/// Brackets nested deeper than any reader follows.
 #[test]
 fn deep_nesting_is_refused() {
     for open in ["[", "{\"a\":", "{a: ", "- "] {
-        assert_eq!(read_all(&open.repeat(200_000)), 0);
+        assert_eq!(read_all(&open.repeat(10_000)), 0);
     }
 }
 
