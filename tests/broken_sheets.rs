@@ -269,7 +269,9 @@ fn a_short_check_bar_is_measured() {
         assert_eq!(verdict.sheets[0].findings.len(), 1);
         let (stated, found) = verdict.sheets[0].check_bars_mm[0];
         assert!((stated - length).abs() < 1e-9);
-        assert!((found.unwrap() - (length - 0.1)).abs() < 0.01, "{verdict}");
+        let off = found.unwrap() - (length - 0.1);
+        // The renderers draw either end to within a 32nd of a pixel.
+        assert!(off.abs() < 2.0 / 32.0 * 25.4 / DPI, "{off}: {verdict}");
     }
     let mut none = board.artwork();
     none.sheets[0].shapes.retain(|shape| shape.part != (Part::CheckBar { index: 1 }));
@@ -370,7 +372,7 @@ fn wrong_tones_and_other_boards_are_called_that() {
     assert_fails(&verify_toned(&board, |v| 170 + v / 3), &["contrast of board 3 too low"]);
     let other = crate::board(BoardSpec { rows: 4, cols: 5, ..spec() });
     let verdict = board.verify(&other.artwork(), Format::Png);
-    assert_fails(&verdict, &["shows another board: "]);
+    assert_fails(&verdict, &["shows another board: 20 corners instead of 35"]);
     assert!(verdict.to_string().contains("another board"), "{verdict}");
 }
 

@@ -170,6 +170,20 @@ fn halftones_of_dots_that_meet_are_no_board_of_a_known_size() {
     }
 }
 
+/// Waves have the symmetry of boards and no edges: their brightness is that of a board blurred by
+/// a fifth of a tile and more.
+#[test]
+fn smooth_waves() {
+    let pitches = [12.0, 16.0, 24.0, 40.0, 70.0];
+    nothing_in(everywhere("two waves", &pitches, |[u, v]| {
+        (2.0 + (TAU * u).cos() + (TAU * v).cos()) / 4.0
+    }));
+    nothing_in(everywhere("three waves", &pitches, |p| {
+        let waves = [0.0, 120.0, 240.0].map(|a| (TAU * turned(a, 1.0, p)[0]).sin());
+        0.5 + waves.iter().sum::<f64>() / 5.2
+    }));
+}
+
 #[test]
 fn stripes_bricks_fences_and_fabrics() {
     let pitches = [8.0, 14.0, 24.0, 48.0];

@@ -71,6 +71,11 @@ fn checkerboards_and_lamps_are_no_deltille_grids() {
     }
 }
 
+/// Largest ratio of an edge to the next. Seen by an equidistant lens at x edges from the foot of the
+/// camera on the plane and at a height of one edge, it is ((x + 1)² + 1)/(x² + 1), at most the golden
+/// ratio squared; a camera this wide cannot be nearer than that and see the board.
+const MAX_RATIO: f64 = 2.618;
+
 /// Rows and columns of a checkerboard are straight for a few squares, and unmirrored.
 fn squares_are_consistent(grid: &Grid) -> bool {
     let at: BTreeMap<(i32, i32), [f64; 2]> =
@@ -82,9 +87,8 @@ fn squares_are_consistent(grid: &Grid) -> bool {
             let (a, b) = ([q[0] - p[0], q[1] - p[1]], [p[0] - r[0], p[1] - r[1]]);
             let cos = (a[0] * b[0] + a[1] * b[1]) / (a[0].hypot(a[1]) * b[0].hypot(b[1]));
             let ratio = a[0].hypot(a[1]) / b[0].hypot(b[1]);
-            // A row turns by less than 45° at a corner, and even at the rim no square is three times
-            // as long as the next.
-            cos > 0.7 && (1.0 / 3.0..3.0).contains(&ratio)
+            // A row turns by less than 45° at a corner.
+            cos > 0.7 && (1.0 / MAX_RATIO..MAX_RATIO).contains(&ratio)
         });
         let handed = match (near(0, 1), near(1, 0)) {
             (Some(q), Some(r)) => {

@@ -2,12 +2,13 @@
 
 use deltille::camera::Camera;
 use deltille::detect::{Detection, Detector, DetectorConfig};
-use deltille::export::{detection, dsc};
+use deltille::export::{detection, dsc, obj};
 use deltille::family::Family;
 use deltille::raster::{self, Gray, Intensity};
 use deltille::target::{
     BoardSpec, GridKind, PaperSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec,
 };
+use deltille::verify::Document;
 use proptest::prelude::*;
 
 fn board() -> (Target, Family) {
@@ -103,6 +104,35 @@ fn read_all(text: &str) -> usize {
 fn each_file_is_taken_by_one_reader() {
     for file in files() {
         assert_eq!(read_all(&file), 1, "{file}");
+    }
+}
+
+/// Files of `tests/corpus`, each of a kind and with the fault that its name says: no reader takes
+/// more memory or time over them than over a good one, and none panics.
+#[test]
+fn recorded_faults_are_refused_or_read() {
+    let mut files = 0;
+    for entry in std::fs::read_dir("tests/corpus").unwrap() {
+        let path = entry.unwrap().path();
+        let bytes = std::fs::read(&path).unwrap();
+        read_all(&String::from_utf8_lossy(&bytes));
+        drop(obj::read(&bytes));
+        if let Ok(image) = raster::read(&path) {
+            detectors().iter().for_each(|detector| drop(detector.detect_any(&image, "")));
+        }
+        if let Ok(document) = Document::open(&path) {
+            (0..document.pages().min(1)).for_each(|page| drop(document.render(page, 1.0)));
+        }
+        files += 1;
+    }
+    assert!(files > 30, "{files} files");
+}
+
+/// Brackets nested deeper than any reader follows.
+#[test]
+fn deep_nesting_is_refused() {
+    for open in ["[", "{\"a\":", "{a: ", "- "] {
+        assert_eq!(read_all(&open.repeat(10_000)), 0);
     }
 }
 

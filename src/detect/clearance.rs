@@ -24,15 +24,16 @@ const SQUARE: [(i32, i32); 8] =
 /// The nearest neighbours on a checkerboard: between them lie the diagonals of the squares.
 const DIAMOND: [(i32, i32); 4] = [(0, 1), (1, 0), (0, -1), (-1, 0)];
 
-/// Blur of the next edges reaches this far into the clear, px: two standard deviations at 1 px.
-const BLUR_MARGIN_PX: f64 = 2.0;
+/// Blur of the next edges reaches this many standard deviations into the clear: beyond, an edge
+/// changes what is seen by less than 2.5 % of its contrast.
+const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 
 /// Half the side of the largest clear square around every corner of a grid, px, in their order.
 ///
 /// `part` is the part of the way to the far side of a triangle, or to the diagonal of a square,
-/// where its tag begins, 1 without tags.
+/// where its tag begins, 1 without tags; `blur_px` is the deviation of the blur.
 /// A corner with no two neighbours in turn has none: 0.
-pub fn clear_squares(grid: &Grid, part: f64) -> Vec<f64> {
+pub fn clear_squares(grid: &Grid, part: f64, blur_px: f64) -> Vec<f64> {
     let steps: &[(i32, i32)] = match grid.kind {
         GridKind::Deltille => &HEXAGON,
         GridKind::Checker if part < 1.0 => &DIAMOND,
@@ -51,7 +52,7 @@ pub fn clear_squares(grid: &Grid, part: f64) -> Vec<f64> {
             Some(distance(neighbour(steps[i])?, neighbour(steps[(i + 1) % steps.len()])?))
         });
         let clear = sides.min_by(f64::total_cmp).unwrap_or(0.0);
-        (part * clear - BLUR_MARGIN_PX).max(0.0) * std::f64::consts::FRAC_1_SQRT_2
+        (part * clear - BLUR_MARGIN_SIGMAS * blur_px).max(0.0) * std::f64::consts::FRAC_1_SQRT_2
     };
     grid.corners.iter().map(square).collect()
 }

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-use super::clearance::clear_squares;
 use super::corner_model::CornerFitter;
 use super::detection::{DecodedTag, Detection, Grid, GridCorner};
 use super::grow::{SaddleGrid, grids};
@@ -26,6 +25,15 @@ const MIN_LEVEL_SIDE: usize = 24;
 /// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
 /// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
 const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;
+
+/// Nor is its blur a larger part of the edge. It leaves less than a tenth of the next wave, and in the
+/// wave by itself the model reads a blur of 0.25 of the edge, of three waves 0.155.
+const fn max_untagged_blur(kind: GridKind) -> f64 {
+    match kind {
+        GridKind::Deltille => 0.14,
+        GridKind::Checker => 0.2,
+    }
+}
 
 /// Options of a detector.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -177,19 +185,19 @@ impl Detector {
             let plausible = grid.corners.len() >= least && !self.labels.exceeded_by(grid);
             !grid.tags.is_empty() || plausible && median_edge_px(grid) >= MIN_UNTAGGED_EDGE_PX
         });
+        report_once(&mut grids);
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
         grids.sort_by_key(|grid| grid.panel.unwrap_or(u32::MAX));
         timing.lap("labels");
         let mut fitter = CornerFitter::default();
-        for grid in &mut grids {
-            let clear = clear_squares(grid, self.clear_part);
-            for (corner, clear_px) in grid.corners.iter_mut().zip(clear) {
-                let start = [corner.x, corner.y];
-                let refined = self.refiner.refine_within(&mut fitter, image, start, clear_px);
-                [corner.x, corner.y] = refined.position;
-                corner.cov = refined.cov;
-            }
-        }
+        grids.retain_mut(|grid| {
+            let edge_px = median_edge_px(grid);
+            let images = (image, &pyramid);
+            let blur_px = self.refiner.refine_grid(&mut fitter, images, grid, self.clear_part);
+            let is_wave =
+                blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(kind::<N>()) * edge_px);
+            !grid.tags.is_empty() || grid.corners.len() >= least && !is_wave
+        });
         timing.lap("refine");
         Detection {
             image: name.to_owned(),
@@ -250,6 +258,19 @@ impl Labels {
         };
         grid.corners.len() > most
     }
+}
+
+/// Leaves out of grids of one panel what a larger one, which comes before, has already: beside a tag of
+/// few pixels corners may be found twice, a pixel apart.
+fn report_once(grids: &mut Vec<Grid>) {
+    let (mut corners, mut tags) = (BTreeSet::new(), BTreeSet::new());
+    grids.retain_mut(|grid| {
+        if let Some(panel) = grid.panel {
+            grid.corners.retain(|corner| corners.insert((panel, corner.row, corner.col)));
+            grid.tags.retain(|tag| tags.insert((panel, tag.row, tag.col)));
+        }
+        !grid.corners.is_empty()
+    });
 }
 
 /// Median distance of corners that follow each other in a row or column, px.

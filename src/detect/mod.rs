@@ -11,7 +11,8 @@
 //! 5. `grow` starts from four corners, grows tile by tile and fills the gaps, where tiles are narrow
 //!    in the frame of their neighbours (`rectified`).
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns.
-//! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`.
+//! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`, in windows
+//!    that `refine_grid` chooses by blur (`clearance`) and by what else they show.
 //!
 //! Both tilings go the same way; `tiling` says where they differ.
 
@@ -32,6 +33,7 @@ mod polynomial;
 mod quadric;
 mod rectified;
 mod refine;
+mod refine_grid;
 mod ring;
 mod saddles;
 mod sectors;

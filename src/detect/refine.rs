@@ -13,7 +13,7 @@
 //! assert!((refined.position[0] - 20.2).abs() < 1e-3 && refined.cov.is_some());
 //! ```
 
-use super::corner_model::{CornerFitter, MAX_RADIUS, Window};
+use super::corner_model::{Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
 use super::corner_start::start;
 use super::polynomial::Polynomial;
 use crate::raster::{Gray, Intensity};
@@ -61,6 +61,26 @@ pub struct Refined {
     pub status: RefineStatus,
 }
 
+/// What the model found, of either kind of corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ModelFit {
+    /// Position, px.
+    pub position: [f64; 2],
+    /// Covariance xx, xy, yy, px².
+    pub cov: [f64; 3],
+    /// Standard deviation of the blur with the pixel's box in it, px.
+    pub blur_px: f64,
+    /// Standard deviation of what is left, over half the contrast.
+    pub residual: f64,
+}
+
+impl<const K: usize> From<Fitted<K>> for ModelFit {
+    fn from(Fitted { corner, cov, noise }: Fitted<K>) -> Self {
+        let Corner { position, blur_px, amplitude, .. } = corner;
+        Self { position, cov, blur_px, residual: noise / amplitude.abs() }
+    }
+}
+
 /// Refines corners of one kind.
 #[derive(Clone, Debug)]
 pub struct Refiner {
@@ -99,18 +119,18 @@ impl Refiner {
 
     /// The corner near `start`, in the whole window.
     pub fn refine<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Refined {
-        self.refine_within(&mut CornerFitter::default(), image, start, f64::INFINITY)
+        self.refine_within(&mut CornerFitter::default(), image, start, f64::INFINITY).0
     }
 
     /// The corner near `start`, from pixels whose both coordinates are within `clear_px` of it;
-    /// what lies beyond shows something else than the corner.
+    /// what lies beyond shows something else than the corner. Beside it what the model found.
     pub(super) fn refine_within<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         start: [f64; 2],
         clear_px: f64,
-    ) -> Refined {
+    ) -> (Refined, Option<ModelFit>) {
         // Where other edges are this near, they would draw the polynomial away from a start that the
         // finder has taken care of.
         let found = (clear_px >= MIN_POLYNOMIAL_CLEAR_PX)
@@ -118,43 +138,50 @@ impl Refiner {
             .flatten();
         let polynomial = found.map(|corner| corner.position);
         if self.method == Refinement::Model
-            && let Some(refined) = self.model(fitter, image, polynomial.unwrap_or(start), clear_px)
+            && let Some(fit) = self.model(fitter, image, polynomial.unwrap_or(start), clear_px)
         {
-            return refined;
+            let ModelFit { position, cov, .. } = fit;
+            return (Refined { position, cov: Some(cov), status: RefineStatus::Ok }, Some(fit));
         }
         let status = match (polynomial, self.method) {
             (None, _) => RefineStatus::Failed,
             (Some(_), Refinement::Polynomial) => RefineStatus::Ok,
             (Some(_), Refinement::Model) => RefineStatus::Polynomial,
         };
-        Refined { position: polynomial.unwrap_or(start), cov: None, status }
+        (Refined { position: polynomial.unwrap_or(start), cov: None, status }, None)
     }
 
     /// The model in the largest window that is clear and lies in the image.
-    fn model<T: Intensity>(
+    pub(super) fn model<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         position: [f64; 2],
         clear_px: f64,
-    ) -> Option<Refined> {
+    ) -> Option<ModelFit> {
         let [x, y] = position;
         let (right, bottom) = (image.width() as f64 - 2.0 - x, image.height() as f64 - 2.0 - y);
         let room = [x - 1.0, y - 1.0, right, bottom, clear_px];
         let reach = room.into_iter().fold(f64::INFINITY, f64::min).floor();
         let window = self.windows.iter().rev().find(|window| window.radius() as f64 <= reach)?;
-        let (position, cov) = match self.polynomial {
+        Some(match self.polynomial {
             Polynomial::Cubic(_) => {
                 let first = start::<3, T>(image, position, window.radius())?;
-                let fitted = fitter.fit(image, window, &first)?;
-                (fitted.corner.position, fitted.cov)
+                fitter.fit(image, window, &first)?.into()
             }
             Polynomial::Quadric(_) => {
                 let first = start::<2, T>(image, position, window.radius())?;
-                let fitted = fitter.fit(image, window, &first)?;
-                (fitted.corner.position, fitted.cov)
+                fitter.fit(image, window, &first)?.into()
             }
-        };
-        Some(Refined { position, cov: Some(cov), status: RefineStatus::Ok })
+        })
+    }
+
+    pub(super) fn method(&self) -> Refinement {
+        self.method
+    }
+
+    /// Radius of the largest window of the model, px.
+    pub(super) fn largest_radius(&self) -> f64 {
+        self.windows.last().map_or(0.0, |window| window.radius() as f64)
     }
 }

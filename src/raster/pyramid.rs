@@ -38,6 +38,12 @@ impl Pyramid {
         let scale = f64::from(1u32 << level);
         [(x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5]
     }
+
+    /// Position in `level` of a position in level 0, px.
+    pub fn from_level_0(level: usize, [x, y]: [f64; 2]) -> [f64; 2] {
+        let scale = f64::from(1u32 << level);
+        [(x + 0.5) / scale - 0.5, (y + 0.5) / scale - 0.5]
+    }
 }
 
 /// The 3×3 binomial (1 2 1)ᵀ(1 2 1)/16, borders repeated, in 10 bits.

@@ -46,8 +46,9 @@ pub(super) fn measure(page: &Page, ends_mm: [[f64; 2]; 2]) -> Option<f64> {
 ///
 /// Ink is sampled at whole pixels along lines parallel to the bar. A stroke is what is dark on all
 /// of them, with the bar's line on its inner side alone; the one nearest to the expected end counts.
-/// Its ink adds up to its width, and its centre of gravity is its middle, whatever the resolution
-/// and wherever the pixels lie: edge = middle + width / 2.
+/// From the middle of a pixel that it fills, the ink of the pixels beyond adds up to its edge, whatever
+/// the resolution and wherever the pixels lie: edge = place + ½ + Σ ink. (Its centre of gravity would
+/// not do: a pixel's ink counts in the pixel's middle, up to ⅛ px² too far out.)
 fn outer_edge(
     page: &Page,
     end: [f64; 2],
@@ -67,7 +68,10 @@ fn outer_edge(
         .collect();
     let first = -inner_reach.ceil();
     let count = (inner_reach.ceil() + outer_reach.ceil()) as usize + 1;
-    let position = |i: usize| first + i as f64;
+    // Along a bar that follows the pixels, their middles.
+    let axis = usize::from(outwards[1].abs() > outwards[0].abs());
+    let to_middle = (end[axis].round() - end[axis]) / outwards[axis];
+    let position = |i: usize| first + to_middle + i as f64;
     let least: Vec<f64> = (0..count)
         .map(|i| offsets.iter().map(|&offset| ink(position(i), offset)).fold(1.0, f64::min))
         .collect();
@@ -85,15 +89,14 @@ fn outer_edge(
     });
     let strokes = runs.filter(|(_, run)| run.iter().any(|&ink| ink >= MIN_INK));
     let edges = strokes.filter_map(|(from, run)| {
-        let (mut width, mut moment) = (0.0, 0.0);
-        for t in (from..from + run.len()).map(position) {
-            let ink = mean(t);
-            width += ink;
-            moment += ink * t;
-        }
-        let (middle, step) = (moment / width, LINE_MM * page.px_per_mm);
+        let inks: Vec<(f64, f64)> =
+            (from..from + run.len()).map(position).map(|t| (t, mean(t))).collect();
+        let &(filled, full) = inks.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let beyond = inks.iter().filter(|(t, _)| *t > filled).map(|(_, ink)| ink / full);
+        let edge = filled + 0.5 + beyond.sum::<f64>();
+        let (middle, step) = ((position(from) + edge) / 2.0, LINE_MM * page.px_per_mm);
         let ends_line = line(middle - step) >= MIN_INK && line(middle + step) < MIN_INK;
-        ends_line.then_some(middle + width / 2.0)
+        ends_line.then_some(edge)
     });
     edges.min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
@@ -146,7 +149,7 @@ mod tests {
                             assert_eq!(found, None);
                         } else {
                             assert!(
-                                off.is_some_and(|mm| mm < 0.01),
+                                off.is_some_and(|mm| mm < 0.001),
                                 "{dpi} dpi, phase {phase}, upright {upright}, {length} mm: {found:?}"
                             );
                         }

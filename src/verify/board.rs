@@ -7,7 +7,7 @@ use super::fit::AffineMap;
 use super::fold::Seen;
 use super::tiles::{MAX_INK_ERROR, PlacedPanel};
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
-use crate::detect::{Detection, GridCorner};
+use crate::detect::{Detection, Detector, DetectorConfig, GridCorner};
 use crate::target::{Corner, Panel, SheetLayout};
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
@@ -77,7 +77,7 @@ pub(super) fn check(
     if verdict.corners_found > 0 {
         extra_corners(&detection, &placed, verdict);
     }
-    another_board(&detection, verdict);
+    another_board(verifier, page, verdict);
     let first = placed.first().map(|panel| panel.found_from_stated);
     (mirror.or(first).unwrap_or(AffineMap::IDENTITY), seen)
 }
@@ -94,16 +94,22 @@ fn wrong_tones(placed: &PlacedPanel) -> Option<Finding> {
 }
 
 /// Says first that the corners found are those of another board, where too few are the stated ones
-/// and their number differs.
-fn another_board(detection: &Detection, verdict: &mut SheetVerdict) {
-    let found: usize = detection.grids.iter().map(|grid| grid.corners.len()).sum();
-    let stated = verdict.corners;
+/// and their number differs. All corners count, whether or not they are on the stated board.
+fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
     let unknown = verdict.findings.iter().any(|finding| {
         matches!(finding, Finding::PanelMissing { .. } | Finding::CornerExtra { .. })
     });
+    let Some(kind) = verifier.target.panels.first().map(|panel| panel.kind).filter(|_| unknown)
+    else {
+        return;
+    };
+    let any_grid = Detector::for_grid(kind, None, DetectorConfig::default());
+    let grids = any_grid.detect(&page.blurred(), "page").grids;
+    let found: usize = grids.iter().map(|grid| grid.corners.len()).sum();
+    let stated = verdict.corners;
     let few = (verdict.corners_found as f64) < (1.0 - MAX_MISSING) * stated as f64;
     let more = found as f64 > (1.0 + MAX_MISSING) * stated as f64;
-    if unknown && found > 0 && found != stated && (few || more) {
+    if found > 0 && found != stated && (few || more) {
         verdict.findings.insert(0, Finding::AnotherBoard { found, stated });
     }
 }
