@@ -349,7 +349,7 @@ mod tests {
         let radtan = camera(Model::Radtan, 4);
         assert_eq!(
             kalibr(&[(&radtan, Pose::IDENTITY)]).unwrap(),
-            "  camera_model: pinhole\n  intrinsics: [500.0, 500.0, 319.5, 239.5]\n  \
+            "cam0:\n  camera_model: pinhole\n  intrinsics: [500.0, 500.0, 319.5, 239.5]\n  \
              distortion_model: radtan\n  distortion_coeffs: [0.25, 1.0e-5, -1.0e-7, 0.125]\n  \
              resolution: [640, 480]\n"
         );

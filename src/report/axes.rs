@@ -114,10 +114,10 @@ impl Axes {
     }
 }
 
-/// Round numbers in a range, four to nine of them.
+/// Round numbers in a range, three to eight of them.
 fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
     let (low, high) = (low.min(high), low.max(high));
-    let rough = (high - low) / 5.0;
+    let rough = (high - low) / 7.0;
     let decade = 10f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].map(|n| n * decade).into_iter().find(|step| *step >= rough);
     let step = step.unwrap_or(decade);
@@ -141,7 +141,7 @@ mod tests {
     fn ticks_are_round_and_within_the_range() {
         assert_eq!(ticks([0.0, 1600.0]), [0.0, 500.0, 1000.0, 1500.0]);
         assert_eq!(ticks([-0.3, 0.3]).len(), 7);
-        assert_eq!(ticks([0.0, 62.0]), [0.0, 20.0, 40.0, 60.0]);
+        assert_eq!(ticks([0.0, 62.0]), [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0]);
         assert_eq!(number(ticks([-0.3, 0.3])[3]), "0");
     }
 }
