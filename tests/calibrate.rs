@@ -213,6 +213,22 @@ fn views_that_determine_no_camera_are_refused() {
     assert!(matches!(said, CalibrationError::Parallel { .. }), "{said}");
 }
 
+/// Without distortion numerator and denominator of the rational model are the same, whatever they are.
+#[test]
+fn parameters_that_cannot_be_told_apart_are_named_and_do_no_harm() {
+    let mut values = [0.0; 16];
+    values[..4].copy_from_slice(&[625.0, 625.0, 804.0, 606.0]);
+    let truth = camera(Model::Radtan).with_parameters(&values);
+    let (views, _) = simulated(&truth, 20, 0.8, 9);
+    let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Rational)).unwrap();
+    assert!(found.loose.contains(&"k1".to_owned()) && found.loose.contains(&"k4".to_owned()));
+    assert!(found.loose.iter().all(|name| name.starts_with('k')), "{:?}", found.loose);
+    assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.1, "{} px", found.rms_px);
+    for (parameter, value) in found.parameters[..4].iter().zip(values) {
+        assert!((parameter.value - value).abs() < 4.0 * parameter.sd.unwrap(), "{parameter:?}");
+    }
+}
+
 #[test]
 fn any_focal_length_is_found() {
     for (seed, focal) in [300.0, 1000.0, 4000.0, 20_000.0].into_iter().enumerate() {

@@ -114,3 +114,26 @@ fn what_lies_outside_the_domain_is_not_seen() {
         assert!(camera.unproject([1e9, 1e9]).is_none_or(|ray| ray.direction.is_finite()));
     }
 }
+
+/// (1 − 0.1q)(1 − q/q0) / (1 + 0.1q)(1 − q/q1): between q0 and q1 the factor is negative, elsewhere
+/// the two zeros cancel.
+#[test]
+fn a_pole_that_cancels_leaves_a_gap_no_wider_than_itself() {
+    let product = |a: f64, zero: f64| [a - 1.0 / zero, -a / zero, 0.0];
+    let lens = BrownConrady {
+        radial: product(-0.1, 1.0),
+        denominator: product(0.1, 1.0 + 1e-6),
+        ..BrownConrady::default()
+    };
+    let camera = Camera::centred(1600, 1200, 600.0, Lens::BrownConrady(lens));
+    let at = |radius: f64| DVec3::new(300.0 * radius, 0.0, 300.0);
+    for step in 1..150 {
+        let radius = 0.01 * f64::from(step) + 0.005;
+        let seen = camera.project(at(radius)).unwrap();
+        let ray = camera.unproject(seen).unwrap();
+        assert!((ray.direction.cross(at(radius).normalize())).length() < 1e-9, "{radius}");
+    }
+    let between = at((1.0f64 + 0.5e-6).sqrt());
+    assert_eq!(camera.project(between), None);
+    assert!(camera.project_with_derivatives(between).is_some(), "a search passes it");
+}

@@ -10,6 +10,9 @@ use super::view::Sighting;
 use super::weights::{Weights, Whitening};
 use crate::camera::{Camera, Pose};
 
+/// Corners that determine a homography.
+const LEAST_RAYS: usize = 4;
+
 /// camera_from_target, with the least squared error of all corners; `panels` are the poses of the
 /// target's panels on it. `None` where the corners lie on a line or out of the camera's reach.
 pub fn estimate_pose(camera: &Camera, panels: &[Pose], sightings: &[Sighting]) -> Option<Pose> {
@@ -38,7 +41,8 @@ pub(super) fn planar_pose(camera: &Camera, observations: &[Observation]) -> Opti
     let mut normal = SMatrix::<f64, 9, 9>::zeros();
     let mut rays = Vec::with_capacity(observations.len());
     for seen in observations {
-        let b = camera.unproject(seen.pixel)?.direction;
+        // The lens may have no ray for some, at its rim or at a pole.
+        let Some(b) = camera.unproject(seen.pixel).map(|ray| ray.direction) else { continue };
         let at = (seen.panel_mm - centre) / size;
         let h = [at.x, at.y, 1.0];
         // b × (H h) = [b]× H h: bᵀb I − b bᵀ is [b]×ᵀ [b]×.
@@ -55,6 +59,9 @@ pub(super) fn planar_pose(camera: &Camera, observations: &[Observation]) -> Opti
             }
         }
         rays.push((b, at));
+    }
+    if rays.len() < LEAST_RAYS {
+        return None;
     }
     let eigen = normal.symmetric_eigen();
     let least = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();

@@ -19,9 +19,13 @@ use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Pose};
 /// shows whether something is.
 const LEAST_VIEWS: usize = 3;
 
-/// A view does not belong with the others when its median error is so many times that of the
-/// median view, and more than so many pixels: labels that are off put corners a tile away.
+/// A view does not belong with the others when its median error is more than so many times that of
+/// the median view: blur, light and distance make a few times as much of it, labels that are off by a
+/// tile a hundred times.
 const WRONG_VIEW_RATIO: f64 = 10.0;
+
+/// Nor is it wrong below this: a corner that was found at all is found to the pixel, however much
+/// better the others are.
 const WRONG_VIEW_PX: f64 = 1.0;
 
 /// Boards whose normals differ by less count as parallel. A corner's noise of a twentieth of a

@@ -17,6 +17,7 @@ struct CalibrationFile {
     height: u32,
     parameters: Vec<Parameter>,
     correlations: Vec<Vec<f64>>,
+    loose: Vec<String>,
     rms_px: f64,
     sigma: f64,
     common_px: Option<f64>,
@@ -90,6 +91,7 @@ pub fn write(solution: &Solution, model: &str) -> String {
             .map(|p| Parameter { name: p.name.clone(), value: p.value, sd: p.sd })
             .collect(),
         correlations,
+        loose: solution.loose.clone(),
         rms_px: solution.rms_px,
         sigma: solution.sigma,
         common_px: solution.common_px,

@@ -64,8 +64,9 @@ pub struct PanelPlace {
     pub covariance: Option<[[f64; 6]; 6]>,
 }
 
-/// A frame does not belong when a camera's corners in it are off so many times as much as usual, and
-/// more than so many pixels: the pictures were not taken at the same moment.
+/// A frame does not belong when a camera's corners in it are off by more than so many times the usual,
+/// and by more than so many pixels, for the reasons that a view does not: here the pictures were not
+/// taken at the same moment.
 const WRONG_FRAME_RATIO: f64 = 10.0;
 const WRONG_FRAME_PX: f64 = 1.0;
 
