@@ -286,7 +286,7 @@ fn target(object: Object) -> Result<(Target, Family), RigExperimentError> {
 
 /// The pose of a board of `field_mm` on a face of the cube: ±x, ±y, ±z.
 fn cube_face(face: usize, [left, lower, right, upper]: [f64; 4]) -> PanelPose {
-    let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
     let normal = sign * DVec3::AXES[face / 2];
     let along = DVec3::AXES[(face / 2 + 1) % 3];
     let up = normal.cross(along);
