@@ -73,6 +73,12 @@ pub enum CalibrationError {
         /// The largest angle between a view's board and the mean, degrees.
         spread_deg: f64,
     },
+    /// A camera of a rig that saw nothing of the target.
+    #[error("camera {camera}: no detection shows the target")]
+    NotSeen {
+        /// Its name.
+        camera: String,
+    },
     /// A camera of a rig by itself.
     #[error("camera {camera}: {error}")]
     OfCamera {

@@ -5,6 +5,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::error::CalibrationError;
 use super::grid::UntaggedGrid;
 use super::problem::Observation;
+use super::shape::Shape;
 use crate::camera::Pose;
 use crate::detect::{Detection, Grid};
 use crate::target::{Panel, PanelPose, Target, TargetSpec};
@@ -44,6 +45,13 @@ pub struct Sighting {
 }
 
 impl Sighting {
+    /// Moves the corners to where a sheet of this shape has them.
+    pub fn bend(&mut self, shape: &Shape) {
+        for seen in &mut self.observations {
+            seen.panel_mm += shape.offset(seen.panel_mm);
+        }
+    }
+
     /// Moves the corners to where a print has them that is stretched across and up its sheet;
     /// the panel is turned by `angle_rad` on it.
     pub fn stretch(&mut self, [across, up]: [f64; 2], angle_rad: f64) {

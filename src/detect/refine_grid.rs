@@ -62,7 +62,10 @@ impl Refiner {
             .zip(&clear)
             .map(|(start, &clear_px)| self.refine_within(fitter, image, start, clear_px))
             .collect();
-        let residuals = refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
+        let residuals: Vec<f64> =
+            refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
+        // Of edges as sharp as pixels the model makes nothing; then it is no judge of corners.
+        let judged = 2 * residuals.len() > refined.len();
         let limit = (MAX_RESIDUAL_RATIO * median(residuals).unwrap_or(0.0)).max(MIN_RESIDUAL);
         let places: BTreeSet<(i32, i32)> = grid.corners.iter().map(|c| (c.row, c.col)).collect();
         let inner = |corner: &GridCorner| {
@@ -74,7 +77,7 @@ impl Refiner {
             let clean = fit.is_some_and(|fit| fit.residual <= limit);
             let modelled =
                 self.method() == Refinement::Model && clear_px >= MIN_MODEL_RADIUS as f64;
-            let refined = if clean || !modelled {
+            let refined = if clean || !modelled || !judged {
                 Some(refined)
             } else {
                 let smaller = self.clean_fit(fitter, image, corner, clear_px, limit);

@@ -24,6 +24,8 @@ struct CalibrationFile {
     #[serde(skip_serializing_if = "Option::is_none")]
     board_shape: Option<ShapeOfBoard>,
     views: Vec<View>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_out: Option<HeldOut>,
     excluded: Vec<Excluded>,
 }
 
@@ -75,8 +77,15 @@ struct Excluded {
     why: String,
 }
 
-/// The text of the file; `model` is the name of what was calibrated.
-pub fn write(solution: &Solution, model: &str) -> String {
+#[derive(Serialize)]
+struct HeldOut {
+    rms_px: f64,
+    views: Vec<View>,
+}
+
+/// The text of the file; `model` is the name of what was calibrated, `held_out` are the views that
+/// only had their poses found.
+pub fn write(solution: &Solution, model: &str, held_out: Option<&Solution>) -> String {
     let found = solution.found().count();
     let correlations =
         (0..found).map(|i| (0..found).map(|j| solution.correlation(i, j)).collect()).collect();
@@ -102,6 +111,10 @@ pub fn write(solution: &Solution, model: &str) -> String {
             stretched_mm: found.stretched_mm,
             f_ratio: found.f_ratio,
             significant: found.is_significant(),
+        }),
+        held_out: held_out.map(|test| HeldOut {
+            rms_px: test.rms_px,
+            views: test.views.iter().map(view).collect(),
         }),
         views: solution.views.iter().map(view).collect(),
         excluded: excluded.map(|(name, why)| Excluded { name, why }).collect(),

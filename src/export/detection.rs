@@ -20,6 +20,16 @@ pub enum DetectionFileError {
         /// The schema that the file names.
         found: String,
     },
+    /// A corner that cannot be one.
+    #[error("grids[{grid}].corners[{corner}]: {problem}")]
+    Corner {
+        /// Index of the grid.
+        grid: usize,
+        /// Index of the corner.
+        corner: usize,
+        /// What is wrong.
+        problem: &'static str,
+    },
 }
 
 #[derive(Serialize, Deserialize)]
@@ -62,5 +72,15 @@ pub fn read(json: &str) -> Result<Detection, DetectionFileError> {
     }
     let file: DetectionFile = serde_json::from_str(json)?;
     let DetectionFile { schema: _, image, width, height, grids, timing_ms } = file;
+    for (grid, of_grid) in grids.iter().enumerate() {
+        for (corner, found) in of_grid.corners.iter().enumerate() {
+            // Negations, so that what is no number is refused too.
+            let usable = |[xx, xy, yy]: [f64; 3]| xx > 0.0 && yy > 0.0 && xx * yy > xy * xy;
+            if !found.cov.is_none_or(usable) {
+                let problem = "`cov` is no covariance xx, xy, yy";
+                return Err(DetectionFileError::Corner { grid, corner, problem });
+            }
+        }
+    }
     Ok(Detection { image, width, height, grids, timing_ms })
 }

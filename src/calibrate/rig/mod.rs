@@ -161,6 +161,9 @@ fn alone(
 ) -> Result<super::Solution, CalibrationError> {
     let RigOptions { model, loss, weights, .. } = options;
     let panels: Vec<Pose> = panels.iter().map(|panel| panel.target_from_panel).collect();
+    if views.views.is_empty() {
+        return Err(CalibrationError::NotSeen { camera: views.name.clone() });
+    }
     let found = match &views.known {
         Some(camera) => solve::poses(&views.views, &panels, camera, loss, weights),
         None => solve::calibrate(&views.views, &panels, Options { model, loss, weights }),

@@ -36,7 +36,8 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     };
     let plan = settings.plan(grid)?;
     let family = plan.spec.tags.as_ref().map(|tags| Family::resolve(&tags.family)).transpose();
-    let family = family.context("--family")?;
+    let option = if grid == GridKind::Checker { "--tags" } else { "--family" };
+    let family = family.context(option)?;
     let spec = TargetSpec::Board(plan.spec.clone());
     let target = Target::build(&plan.name, &spec, family.as_ref(), Some(&plan.paper))?;
     args.delivery.check_beside(&target)?;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
 use super::files::{self, File};
@@ -63,9 +63,9 @@ pub struct Args {
     #[arg(long, value_name = "FOLDER", requires = "report")]
     images: Option<PathBuf>,
     /// The camera file, .yaml, or a folder for camera.yaml; other files are written beside it and
-    /// named after it
-    #[arg(short, long, value_name = "FILE", default_value = "camera.yaml")]
-    output: PathBuf,
+    /// named after it [default: camera.yaml, or poses.yaml with --fixed-intrinsics]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
 }
 
 /// How corners far off count.
@@ -126,11 +126,20 @@ enum Format {
 
 /// Calibrates, writes the camera, and tells how good it is.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let path = output::file(&args.output, "camera", "yaml")?;
+    // Poses of a known camera do not take the place of its calibration.
+    let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
+    let path = output::file(args.output.as_deref().unwrap_or(Path::new(".")), stem, "yaml")?;
     let Sightings { views, panels, empty } = args.sightings.read()?;
     ensure!(!views.is_empty(), "none of {} pictures shows a board of this kind", empty.len());
     for picture in &empty {
         eprintln!("{picture}: no board, left out");
+    }
+    if let Some(folder) = &args.images {
+        ensure!(folder.is_dir(), "--images: {} is no folder", folder.display());
+    }
+    if let Some(page) = &args.report {
+        let is_page = page.is_dir() || page.extension().is_some_and(|end| end == "html");
+        ensure!(is_page, "--report: {} must end in .html, or be a folder", page.display());
     }
     let solution = args.solve(&views, &panels)?;
     for (name, why) in &solution.calibrated.excluded {
@@ -156,7 +165,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut written = written;
     if let Some(page) = &args.report {
         let page = output::file(page, &format!("{stem}-report"), "html")?;
-        output::write(&page, args.page(&stem, &solution).as_bytes())?;
+        output::write(&page, args.page(&stem, &solution).as_bytes()).context("--report")?;
         written.push(page);
     }
     let mut text = table(&solution.calibrated);
@@ -245,12 +254,21 @@ impl Args {
             let views = views.iter().enumerate();
             views.filter(|(i, _)| is_held_out(*i) == held_out).map(|(_, v)| v.clone()).collect()
         };
+        if let Some(every) = every
+            && every > views.len()
+        {
+            bail!("--holdout: there are only {} views, of which no {every}-th is one", views.len());
+        }
         let calibrated = match self.board_shape {
             true => calibrate::calibrate_with_shape(&part(false), panels, options)
                 .context("--board-shape")?,
             false => calibrate::calibrate(&part(false), panels, options)?,
         };
-        let test = part(true);
+        let mut test = part(true);
+        if let Some(BoardShape { shape, .. }) = &calibrated.shape {
+            let sightings = test.iter_mut().flat_map(|view| &mut view.sightings);
+            sightings.for_each(|sighting| sighting.bend(shape));
+        }
         let held_out = match test.is_empty() {
             true => None,
             false => Some(calibrate::poses(&test, panels, &calibrated.camera, loss, weights)?),
@@ -268,7 +286,10 @@ impl Format {
         Ok(match self {
             Self::Own => vec![
                 (format!("{stem}.yaml"), camera.to_yaml()),
-                (format!("{stem}.json"), calibration::write(solution, &solved.model)),
+                (
+                    format!("{stem}.json"),
+                    calibration::write(solution, &solved.model, solved.held_out.as_ref()),
+                ),
             ],
             Self::Opencv => one("-opencv.yaml", opencv(camera)?),
             Self::Ros => one("-ros.yaml", ros(camera, stem)?),

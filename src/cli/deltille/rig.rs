@@ -115,6 +115,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if args.refine_target {
         let refined = refined(&target, &solution);
+        let place = args.output.join(format!("{}.json", refined.name));
+        if place
+            .canonicalize()
+            .ok()
+            .is_some_and(|place| args.target.canonicalize().ok() == Some(place))
+        {
+            bail!(
+                "-o: {} would overwrite the target that was given: choose another folder",
+                place.display()
+            );
+        }
         files.push(text_file(format!("{}.json", refined.name), refined.to_json()));
     }
     let written = write_all(&args.output, &files)?;
