@@ -1,67 +1,172 @@
 //! How much of the surroundings of a corner shows nothing but that corner.
 //!
 //! ```text
-//!        2 ╱╲ 1        the six neighbours of a corner span a hexagon; its sides are the nearest
-//!       ╱────────╲      other edges. With tags in the tiles, cells begin part of the way out.
-//!    3 ╱    ·     ╲ 0
-//!      ╲          ╱
-//!     4 ╲────────╱ 5
+//!        2 ╱╲ 1        the tiles around a corner end at their far sides; in tiles with a tag the
+//!       ╱▒▒▒▒────╲      cells of the tag (▒) are cut out, and what lies between them and the edges
+//!    3 ╱ ▒▒ ·     ╲ 0   stays. From all of them the blur keeps its distance.
+//!      ╲    ▒▒    ╱
+//!     4 ╲──▒▒▒▒──╱ 5
 //! ```
-//!
-//! On a checkerboard the four squares around a corner are bounded by its eight neighbours, with tags
-//! in them by the lines that join the four nearest.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{DMat2, DVec2};
 
 use super::detection::{Grid, GridCorner};
-use crate::target::GridKind;
-
-/// Steps to the neighbours in turn, by the tiling.
-const HEXAGON: [(i32, i32); 6] = [(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)];
-const SQUARE: [(i32, i32); 8] =
-    [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)];
-
-/// The nearest neighbours on a checkerboard: between them lie the diagonals of the squares.
-const DIAMOND: [(i32, i32); 4] = [(0, 1), (1, 0), (0, -1), (-1, 0)];
+use crate::family::Family;
+use crate::lattice::{GridKind, Tile, Vertex};
+use crate::target::{Panel, TagsIn, Target};
 
 /// Blur of the next edges reaches this many standard deviations into the clear: beyond, an edge
 /// changes what is seen by less than 2.5 % of its contrast.
 const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 
-/// Half the side of the largest clear square around every corner of a grid, px, in their order.
-///
-/// `part` is the part of the way to the far side of a triangle, or to the diagonal of a square,
-/// where its tag begins, 1 without tags; `blur_px` is the deviation of the blur.
-/// A corner with no two neighbours in turn has none: 0.
-pub fn clear_squares(grid: &Grid, part: f64, blur_px: f64) -> Vec<f64> {
-    let steps: &[(i32, i32)] = match grid.kind {
-        GridKind::Deltille => &HEXAGON,
-        GridKind::Checker if part < 1.0 => &DIAMOND,
-        GridKind::Checker => &SQUARE,
-    };
-    let places: BTreeMap<(i32, i32), [f64; 2]> =
-        grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
-    let square = |&GridCorner { row, col, x, y, .. }: &GridCorner| {
-        let seen =
-            |(dr, dc): (i32, i32)| places.get(&(row + dr, col + dc)).map(|p| [p[0] - x, p[1] - y]);
-        // A neighbour that is not there lies as far as the one opposite.
-        let neighbour = |(dr, dc): (i32, i32)| {
-            seen((dr, dc)).or_else(|| seen((-dr, -dc)).map(|p| [-p[0], -p[1]]))
-        };
-        let sides = (0..steps.len()).filter_map(|i| {
-            Some(distance(neighbour(steps[i])?, neighbour(steps[(i + 1) % steps.len()])?))
-        });
-        let clear = sides.min_by(f64::total_cmp).unwrap_or(0.0);
-        (part * clear - BLUR_MARGIN_SIGMAS * blur_px).max(0.0) * std::f64::consts::FRAC_1_SQRT_2
-    };
-    grid.corners.iter().map(square).collect()
+/// Where the tags of a target lie.
+#[derive(Clone, Debug, Default)]
+pub struct TagAreas {
+    /// Distance from the edges of a tile to what it shows of a tag, in edges along the other
+    /// edges; the smallest of all panels.
+    inset: f64,
+    /// Tiles with a tag, by panel id.
+    tiles: BTreeMap<u32, BTreeSet<Tile>>,
 }
 
-/// Distance of the origin from the segment a–b.
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    let along = [b[0] - a[0], b[1] - a[1]];
-    let length2 = along[0] * along[0] + along[1] * along[1];
-    let t = -(a[0] * along[0] + a[1] * along[1]) / length2.max(f64::MIN_POSITIVE);
-    let t = t.clamp(0.0, 1.0);
-    (a[0] + t * along[0]).hypot(a[1] + t * along[1])
+impl TagAreas {
+    /// The tags of `target`, of this family.
+    pub fn of(target: &Target, family: &Family) -> Self {
+        let tagged = || target.panels.iter().filter(|panel| !panel.tags.is_empty());
+        let inset = |panel: &Panel| {
+            let at = match panel.tags_in {
+                TagsIn::Black => panel.tag_inset_bits(),
+                TagsIn::White => panel.tag_margin_bits(),
+            };
+            at / family.cells().width(panel.tag_inset_bits())
+        };
+        let tiles = |panel: &Panel| panel.tags.iter().map(|tag| panel.tag_tile(tag)).collect();
+        Self {
+            inset: tagged().map(inset).fold(f64::INFINITY, f64::min),
+            tiles: tagged().map(|panel| (panel.id, tiles(panel))).collect(),
+        }
+    }
+
+    /// Whether a tile of a grid may show a tag: as its panel has them, or any that could where the
+    /// panel is not known.
+    fn has(&self, panel: Option<u32>, tile: Tile) -> bool {
+        match panel {
+            Some(panel) => self.tiles.get(&panel).is_some_and(|tiles| tiles.contains(&tile)),
+            None => !self.tiles.is_empty() && tile == tile.kind().tag_tile(tile.anchor),
+        }
+    }
+}
+
+/// Signed distance from a line, px: a·u + b·v + c.
+type Line = [f64; 3];
+
+/// What lies around a corner, in px from it.
+#[derive(Clone, Debug, Default)]
+pub struct Surroundings {
+    /// Far sides of the tiles, positive towards the corner.
+    sides: Vec<Line>,
+    /// Tags: their sides, positive outside.
+    tags: Vec<Vec<Line>>,
+    /// Directions of the edges that meet at the corner, rising within a half-turn; empty where
+    /// nothing is known.
+    pub edges_rad: Vec<f64>,
+}
+
+impl Surroundings {
+    /// Whether (u, v) px from the corner nothing else is seen under a blur of this deviation.
+    pub fn is_clear(&self, [u, v]: [f64; 2], blur_px: f64) -> bool {
+        self.distance([u, v]) >= BLUR_MARGIN_SIGMAS * blur_px
+    }
+
+    /// Half the side of the largest clear square around the corner, px.
+    pub fn clear_square_px(&self, blur_px: f64) -> f64 {
+        let clear = self.distance([0.0; 2]) - BLUR_MARGIN_SIGMAS * blur_px;
+        clear.max(0.0) * std::f64::consts::FRAC_1_SQRT_2
+    }
+
+    /// Distance from a point to the nearest thing that is not the corner, or less, px.
+    fn distance(&self, [u, v]: [f64; 2]) -> f64 {
+        let from = |[a, b, c]: &Line| a * u + b * v + c;
+        let sides = self.sides.iter().map(from);
+        let outside = |tag: &Vec<Line>| tag.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
+        sides.chain(self.tags.iter().map(outside)).reduce(f64::min).unwrap_or(0.0)
+    }
+}
+
+/// What lies around every corner of a grid, in their order, in pixels `scale` times as large as the
+/// grid's. Of a corner whose neighbours lie in one line nothing is known, and nothing is clear.
+pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
+    let place = |c: &GridCorner| (Vertex::new(c.row, c.col), [c.x / scale, c.y / scale]);
+    let places: BTreeMap<Vertex, [f64; 2]> = grid.corners.iter().map(place).collect();
+    let around = |(vertex, [x, y]): (Vertex, [f64; 2])| {
+        let seen = |step: Vertex| places.get(&(vertex + step)).map(|p| [p[0] - x, p[1] - y]);
+        let usual = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))))?;
+        let place = |step: Vertex| seen(step).unwrap_or_else(|| usual(step));
+        let mut found = Surroundings { edges_rad: edges(grid.kind, place), ..Default::default() };
+        for tile in grid.kind.tiles_around(vertex) {
+            let corners: Vec<Vertex> = tile.vertices().map(|v| v - vertex).collect();
+            let polygon: Vec<[f64; 2]> = corners.iter().map(|&step| place(step)).collect();
+            let n = corners.len();
+            for (i, j) in (0..n).map(|i| (i, (i + 1) % n)) {
+                if corners[i] != Vertex::new(0, 0) && corners[j] != Vertex::new(0, 0) {
+                    found.sides.push(line(polygon[i], polygon[j], [0.0; 2]));
+                }
+            }
+            if tags.has(grid.panel, tile) {
+                found.tags.push(outline(&polygon, tags.inset));
+            }
+        }
+        Some(found)
+    };
+    grid.corners.iter().map(|c| around(place(c)).unwrap_or_default()).collect()
+}
+
+/// The affine map of lattice steps that fits these best; `None` where they lie in one line.
+fn affine(known: impl Iterator<Item = (Vertex, [f64; 2])>) -> Option<impl Fn(Vertex) -> [f64; 2]> {
+    let (mut normal, mut right) = (DMat2::ZERO, [DVec2::ZERO; 2]);
+    for (step, place) in known {
+        let step = DVec2::new(step.row.into(), step.col.into());
+        normal += DMat2::from_cols(step.x * step, step.y * step);
+        right = [0, 1].map(|i| right[i] + place[i] * step);
+    }
+    let rows = (normal.determinant() > 0.5).then(|| right.map(|r| normal.inverse() * r))?;
+    Some(move |v: Vertex| rows.map(|row| row.dot(DVec2::new(v.row.into(), v.col.into()))))
+}
+
+/// Directions of the edges through a corner, along the chords between its neighbours.
+fn edges(kind: GridKind, place: impl Fn(Vertex) -> [f64; 2]) -> Vec<f64> {
+    let (ahead, behind) = kind.steps().split_at(kind.steps().len() / 2);
+    let chord = |(&a, &b): (&Vertex, &Vertex)| {
+        let ([ax, ay], [bx, by]) = (place(a), place(b));
+        (ay - by).atan2(ax - bx).rem_euclid(std::f64::consts::PI)
+    };
+    let mut edges: Vec<f64> = ahead.iter().zip(behind).map(chord).collect();
+    edges.sort_by(f64::total_cmp);
+    edges
+}
+
+/// The sides of what a tile shows of a tag, positive outside.
+fn outline(tile: &[[f64; 2]], inset: f64) -> Vec<Line> {
+    let n = tile.len();
+    // Every corner moves along both edges that meet there.
+    let corner = |i: usize| {
+        let (here, next, last) = (tile[i], tile[(i + 1) % n], tile[(i + n - 1) % n]);
+        [0, 1].map(|k| here[k] + inset * (next[k] + last[k] - 2.0 * here[k]))
+    };
+    let corners: Vec<[f64; 2]> = (0..n).map(corner).collect();
+    let middle = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / n as f64);
+    let sides = (0..n).map(|i| line(corners[i], corners[(i + 1) % n], middle));
+    sides.map(|side| side.map(|c| -c)).collect()
+}
+
+/// The line through two points, positive on the side of a third.
+fn line(a: [f64; 2], b: [f64; 2], inside: [f64; 2]) -> Line {
+    let [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+    let length = dx.hypot(dy).max(f64::MIN_POSITIVE);
+    let [nx, ny] = [-dy / length, dx / length];
+    let offset = -(nx * a[0] + ny * a[1]);
+    let sign = (nx * inside[0] + ny * inside[1] + offset).signum();
+    [sign * nx, sign * ny, sign * offset]
 }

@@ -97,33 +97,65 @@ pub struct Fitted<const K: usize> {
     pub noise: f64,
 }
 
-/// Pixels of a square window around its centre.
+/// Pixels around a corner, by their distance from the pixel in the middle.
 #[derive(Clone, Debug)]
 pub struct Window {
     radius: usize,
     count: usize,
+    /// Columns, padded with zeros to whole vectors.
     u: Vec<f32>,
+    /// Rows alike.
     v: Vec<f32>,
 }
 
 impl Window {
     /// The window of (2 · radius + 1)² pixels; radii above [`MAX_RADIUS`] are cut to it.
     pub fn new(radius: usize) -> Self {
+        Self::of(radius, |_| true)
+    }
+
+    /// Those pixels (u, v) of such a window that are `seen`.
+    pub fn of(radius: usize, seen: impl Fn([f64; 2]) -> bool) -> Self {
         let radius = radius.min(MAX_RADIUS);
-        let side = 2 * radius + 1;
-        let padded = (side * side).next_multiple_of(LANES);
-        let place = |i: usize| i as f32 - radius as f32;
-        Self {
-            radius,
-            count: side * side,
-            u: (0..padded).map(|i| place(i % side)).collect(),
-            v: (0..padded).map(|i| place(i / side)).collect(),
-        }
+        let reach = radius as i32;
+        let places = (-reach..=reach).flat_map(|v| (-reach..=reach).map(move |u| [u, v]));
+        let seen = places.filter(|place| seen(place.map(f64::from)));
+        let (mut u, mut v): (Vec<f32>, Vec<f32>) = seen.map(|[u, v]| (u as f32, v as f32)).unzip();
+        let count = u.len();
+        u.resize(count.next_multiple_of(LANES), 0.0);
+        v.resize(count.next_multiple_of(LANES), 0.0);
+        Self { radius, count, u, v }
     }
 
     /// Half the side, px.
     pub fn radius(&self) -> usize {
         self.radius
+    }
+
+    /// How many pixels.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The pixels, each with its place (u, v); `None` where one lies outside the image.
+    pub fn pixels<'a, T: Intensity>(
+        &'a self,
+        image: &'a Gray<T>,
+        [x, y]: [usize; 2],
+    ) -> Option<impl Iterator<Item = ([f32; 2], f32)> + 'a> {
+        let places = || self.u[..self.count].iter().zip(&self.v[..self.count]);
+        let at = move |u: f32, v: f32| {
+            (x.wrapping_add_signed(u as isize), y.wrapping_add_signed(v as isize))
+        };
+        let inside = places().all(|(&u, &v)| {
+            let (x, y) = at(u, v);
+            x < image.width() && y < image.height()
+        });
+        let read = move |(&u, &v): (&f32, &f32)| {
+            let (x, y) = at(u, v);
+            ([u, v], image.at(x, y).to_f32() / T::FULL_SCALE)
+        };
+        inside.then(|| places().map(read))
     }
 }
 
@@ -224,25 +256,12 @@ impl CornerFitter {
         &mut self,
         image: &Gray<T>,
         window: &Window,
-        [x, y]: [f64; 2],
+        position: [f64; 2],
     ) -> Option<[f64; 2]> {
-        let radius = window.radius as f64;
-        let (x, y) = (x.round(), y.round());
-        let inside = x >= radius
-            && y >= radius
-            && x + radius < image.width() as f64
-            && y + radius < image.height() as f64;
-        if !inside {
-            return None;
-        }
-        let (left, top) = (x as usize - window.radius, y as usize - window.radius);
-        let side = 2 * window.radius + 1;
-        for (row, out) in self.pixels[..window.count].chunks_exact_mut(side).enumerate() {
-            for (out, pixel) in out.iter_mut().zip(&image.row(top + row)[left..left + side]) {
-                *out = pixel.to_f32() / T::FULL_SCALE;
-            }
-        }
-        Some([x, y])
+        let centre = position.map(f64::round);
+        let pixels = window.pixels(image, centre.map(|c| c as usize))?;
+        self.pixels.iter_mut().zip(pixels).for_each(|(out, (_, pixel))| *out = pixel);
+        Some(centre)
     }
 
     /// The normal equations of the pixels at a corner in window coordinates.

@@ -1,13 +1,13 @@
-//! Edges, contrast and blur around a position, from circles: where the model's fit begins.
+//! Edges, contrast and blur around a position: where the model's fit begins.
 //!
-//! A corner of three edges is odd under a half-turn and one of two edges even, so opposite samples
+//! In a grid the edges lead to the neighbours. Of a single corner circles tell them: a corner of three edges is odd under a half-turn and one of two edges even, so opposite samples
 //! are combined and half a circle remains. All ways to divide it into K + 1 runs of equal sign are
 //! tried and the one that separates dark from bright best is taken: unlike roots of a fitted
 //! polynomial it always exists and noise cannot hide an edge.
 
 use std::f64::consts::PI;
 
-use super::corner_model::Corner;
+use super::corner_model::{Corner, Window};
 use crate::raster::{Gray, Intensity};
 
 /// Directions on the half-circle: 7.5° apart, so that the 17° between edges at 75° hold two.
@@ -23,7 +23,40 @@ const MIN_START_RAD: f64 = 15.0 * PI / 180.0;
 /// Circles, as parts of the window's radius.
 const CIRCLES: [f64; 3] = [0.5, 0.7, 0.9];
 
-/// The start around `position`; `None` when the circles leave the image or show no contrast.
+/// The start of a corner with edges in these directions, rising within a half-turn, under a blur of
+/// `blur_px`; `None` when the window leaves the image or shows one side of the edges alone.
+pub fn start_along<const K: usize, T: Intensity>(
+    image: &Gray<T>,
+    position: [f64; 2],
+    window: &Window,
+    edges_rad: [f64; K],
+    blur_px: f64,
+) -> Option<Corner<K>> {
+    let centre = position.map(f64::round);
+    let [x, y] = [0, 1].map(|i| position[i] - centre[i]);
+    let edges = edges_rad.map(f64::sin_cos);
+    let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+    for ([u, v], pixel) in window.pixels(image, centre.map(|c| c as usize))? {
+        let (du, dv) = (f64::from(u) - x, f64::from(v) - y);
+        let right = edges.iter().filter(|(sin, cos)| cos * dv - sin * du > 0.0).count();
+        // The pattern is the product of the signs of the distances from the edges.
+        let class = (K - right) % 2;
+        sums[class] += f64::from(pixel);
+        counts[class] += 1.0;
+    }
+    let [plus, minus] = [0, 1].map(|i| sums[i] / counts[i]);
+    let (level, amplitude) = ((plus + minus) / 2.0, (plus - minus) / 2.0);
+    (amplitude.abs() > f64::EPSILON).then_some(Corner {
+        position,
+        blur_px,
+        amplitude,
+        level,
+        slope: [0.0; 2],
+        angles: edges_rad,
+    })
+}
+
+/// The start around `position`, from circles; `None` when the circles leave the image or show no contrast.
 pub fn start<const K: usize, T: Intensity>(
     image: &Gray<T>,
     position: [f64; 2],

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
+use super::clearance::TagAreas;
 use super::corner_model::CornerFitter;
 use super::detection::{DecodedTag, Detection, Grid, GridCorner};
 use super::grow::{SaddleGrid, grids};
@@ -14,7 +15,7 @@ use super::tiling::{CHECKER, DELTILLE, kind};
 use crate::family::Family;
 use crate::lattice::{GridKind, Vertex};
 use crate::raster::{AnyGray, Gray, Intensity, Pyramid};
-use crate::target::{Panel, TagsIn, Target, least_untagged_corners, zigzag_vertices};
+use crate::target::{Target, least_untagged_corners, zigzag_vertices};
 
 /// Levels of the pyramid: the coarsest sees four times the blur that the finest can.
 const PYRAMID_LEVELS: usize = 3;
@@ -66,8 +67,8 @@ const MODEL_RADIUS: usize = 10;
 pub struct Detector {
     finder: Finder,
     refiner: Refiner,
-    /// Part of the way across a tile where its tag begins; 1 without tags.
-    clear_part: f64,
+    /// Where tiles show something else than their colour.
+    tag_areas: TagAreas,
     labels: Labels,
 }
 
@@ -129,7 +130,7 @@ impl Detector {
             (None, _) => Labels::None,
         };
         let refiner = refiner(kind, config);
-        Self { finder: Finder::of(kind), refiner, clear_part: 1.0, labels }
+        Self { finder: Finder::of(kind), refiner, tag_areas: TagAreas::default(), labels }
     }
 
     /// A detector of a target, whose panels are of one kind; `family` is the family that the target
@@ -151,9 +152,9 @@ impl Detector {
             corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
         });
         let labels = Labels::Target { tags, panels: panels.collect() };
-        let clear_part = family.map_or(1.0, |family| clear_part(target, family));
+        let tag_areas = family.map(|family| TagAreas::of(target, family)).unwrap_or_default();
         let kind = target.panels.first().map_or(GridKind::Deltille, |panel| panel.kind);
-        Self { finder: Finder::of(kind), refiner: refiner(kind, config), clear_part, labels }
+        Self { finder: Finder::of(kind), refiner: refiner(kind, config), tag_areas, labels }
     }
 
     /// Finds grids in one image; `name` is only noted in the result.
@@ -193,7 +194,7 @@ impl Detector {
         grids.retain_mut(|grid| {
             let edge_px = median_edge_px(grid);
             let images = (image, &pyramid);
-            let blur_px = self.refiner.refine_grid(&mut fitter, images, grid, self.clear_part);
+            let blur_px = self.refiner.refine_grid(&mut fitter, images, grid, &self.tag_areas);
             let is_wave =
                 blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(kind::<N>()) * edge_px);
             !grid.tags.is_empty() || grid.corners.len() >= least && !is_wave
@@ -291,20 +292,6 @@ fn median_edge_px(grid: &Grid) -> f64 {
 
 fn refiner(kind: GridKind, config: DetectorConfig) -> Refiner {
     Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
-}
-
-/// Part of the way from a corner to the line between its two neighbours on a tile where the tag in
-/// it begins: u + v of the nearest point of the cells, or of a border in a white square.
-fn clear_part(target: &Target, family: &Family) -> f64 {
-    let cells = family.cells();
-    let begins = |panel: &Panel| {
-        let at = match panel.tags_in {
-            TagsIn::Black => panel.tag_inset_bits(),
-            TagsIn::White => panel.tag_margin_bits(),
-        };
-        2.0 * at / cells.width(panel.tag_inset_bits())
-    };
-    target.panels.iter().filter(|panel| !panel.tags.is_empty()).map(begins).fold(1.0, f64::min)
 }
 
 fn unlabelled(grid: &SaddleGrid) -> Grid {

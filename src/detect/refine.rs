@@ -13,14 +13,18 @@
 //! assert!((refined.position[0] - 20.2).abs() < 1e-3 && refined.cov.is_some());
 //! ```
 
+use super::clearance::Surroundings;
 use super::corner_model::{Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
-use super::corner_start::start;
+use super::corner_start::{start, start_along};
 use super::polynomial::Polynomial;
 use crate::raster::{Gray, Intensity};
 use crate::target::GridKind;
 
 /// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
 pub const MIN_MODEL_RADIUS: usize = 3;
+
+/// Fewest pixels to which the model is fitted: three for each unknown, so that the noise shows.
+const MIN_PIXELS: usize = 30;
 
 /// Half the side of the square around a corner that must be clear for the polynomial, px: a third of
 /// what its usual window reads, where nearly all of its weight lies.
@@ -81,6 +85,24 @@ impl<const K: usize> From<Fitted<K>> for ModelFit {
     }
 }
 
+/// What is known of the surroundings of a corner.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Room<'a> {
+    /// What lies there.
+    pub around: &'a Surroundings,
+    /// Deviation of the blur, px.
+    pub blur_px: f64,
+    /// Nothing beyond this in either coordinate is looked at, px.
+    pub reach_px: f64,
+}
+
+impl Room<'_> {
+    /// Half the side of the largest square that shows nothing else, px.
+    pub fn clear_square_px(&self) -> f64 {
+        self.around.clear_square_px(self.blur_px).min(self.reach_px)
+    }
+}
+
 /// Refines corners of one kind.
 #[derive(Clone, Debug)]
 pub struct Refiner {
@@ -119,26 +141,26 @@ impl Refiner {
 
     /// The corner near `start`, in the whole window.
     pub fn refine<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Refined {
-        self.refine_within(&mut CornerFitter::default(), image, start, f64::INFINITY).0
+        self.refine_within(&mut CornerFitter::default(), image, start, None).0
     }
 
-    /// The corner near `start`, from pixels whose both coordinates are within `clear_px` of it;
-    /// what lies beyond shows something else than the corner. Beside it what the model found.
+    /// The corner near `start`, from pixels that show nothing else. Beside it what the model found.
     pub(super) fn refine_within<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         start: [f64; 2],
-        clear_px: f64,
+        room: Option<Room>,
     ) -> (Refined, Option<ModelFit>) {
         // Where other edges are this near, they would draw the polynomial away from a start that the
         // finder has taken care of.
-        let found = (clear_px >= MIN_POLYNOMIAL_CLEAR_PX)
+        let found = room
+            .is_none_or(|room| room.clear_square_px() >= MIN_POLYNOMIAL_CLEAR_PX)
             .then(|| self.polynomial.refine(image, start, self.iterations))
             .flatten();
         let polynomial = found.map(|corner| corner.position);
         if self.method == Refinement::Model
-            && let Some(fit) = self.model(fitter, image, polynomial.unwrap_or(start), clear_px)
+            && let Some(fit) = self.model(fitter, image, polynomial.unwrap_or(start), room)
         {
             let ModelFit { position, cov, .. } = fit;
             return (Refined { position, cov: Some(cov), status: RefineStatus::Ok }, Some(fit));
@@ -151,29 +173,58 @@ impl Refiner {
         (Refined { position: polynomial.unwrap_or(start), cov: None, status }, None)
     }
 
-    /// The model in the largest window that is clear and lies in the image.
+    /// The model in the largest window of what is clear and lies in the image.
     pub(super) fn model<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         position: [f64; 2],
-        clear_px: f64,
+        room: Option<Room>,
+    ) -> Option<ModelFit> {
+        match self.polynomial {
+            Polynomial::Cubic(_) => self.model_of::<3, T>(fitter, image, position, room),
+            Polynomial::Quadric(_) => self.model_of::<2, T>(fitter, image, position, room),
+        }
+    }
+
+    fn model_of<const K: usize, T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        image: &Gray<T>,
+        position: [f64; 2],
+        room: Option<Room>,
     ) -> Option<ModelFit> {
         let [x, y] = position;
-        let (right, bottom) = (image.width() as f64 - 2.0 - x, image.height() as f64 - 2.0 - y);
-        let room = [x - 1.0, y - 1.0, right, bottom, clear_px];
-        let reach = room.into_iter().fold(f64::INFINITY, f64::min).floor();
-        let window = self.windows.iter().rev().find(|window| window.radius() as f64 <= reach)?;
-        Some(match self.polynomial {
-            Polynomial::Cubic(_) => {
-                let first = start::<3, T>(image, position, window.radius())?;
-                fitter.fit(image, window, &first)?.into()
+        let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 2.0);
+        let reach =
+            [x - 1.0, y - 1.0, right - x, bottom - y].into_iter().fold(f64::INFINITY, f64::min);
+        let Some(room) = room else {
+            let window = self.windows.iter().rev().find(|w| w.radius() as f64 <= reach)?;
+            let first = start::<K, T>(image, position, window.radius())?;
+            return Some(fitter.fit(image, window, &first)?.into());
+        };
+        let radius = room.reach_px.min(self.largest_radius());
+        let whole = self.windows.iter().find(|w| w.radius() as f64 == radius);
+        let whole = whole.filter(|_| radius <= reach.min(room.clear_square_px()));
+        let cut;
+        let window = match whole {
+            Some(window) => window,
+            None => {
+                let centre = position.map(f64::round);
+                cut = Window::of(radius as usize, |[u, v]| {
+                    let [px, py] = [centre[0] + u, centre[1] + v];
+                    let inside = px >= 0.0 && py >= 0.0 && px <= right && py <= bottom;
+                    inside && room.around.is_clear([px - x, py - y], room.blur_px)
+                });
+                &cut
             }
-            Polynomial::Quadric(_) => {
-                let first = start::<2, T>(image, position, window.radius())?;
-                fitter.fit(image, window, &first)?.into()
-            }
-        })
+        };
+        if window.count() < MIN_PIXELS {
+            return None;
+        }
+        let edges = room.around.edges_rad.as_slice().try_into().ok()?;
+        let first = start_along::<K, T>(image, position, window, edges, room.blur_px)?;
+        Some(fitter.fit(image, window, &first)?.into())
     }
 
     pub(super) fn method(&self) -> Refinement {

@@ -8,10 +8,10 @@
 
 use std::collections::BTreeSet;
 
-use super::clearance::clear_squares;
+use super::clearance::{TagAreas, surroundings};
 use super::corner_model::CornerFitter;
 use super::detection::{Grid, GridCorner};
-use super::refine::{MIN_MODEL_RADIUS, ModelFit, RefineStatus, Refined, Refinement, Refiner};
+use super::refine::{MIN_MODEL_RADIUS, ModelFit, RefineStatus, Refined, Refinement, Refiner, Room};
 use crate::raster::{Gray, Intensity, Pyramid};
 
 /// Corners that tell the blur: those with the most room.
@@ -37,16 +37,17 @@ const NEXT_WINDOW: f64 = 0.7;
 
 impl Refiner {
     /// Refines the corners of a grid in place and drops those that are spoilt; the blur in px where
-    /// the model can tell it. `part` as in [`clear_squares`].
+    /// the model can tell it.
     pub(super) fn refine_grid<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         (image, pyramid): (&Gray<T>, &Pyramid),
         grid: &mut Grid,
-        part: f64,
+        tags: &TagAreas,
     ) -> Option<f64> {
         // Of a grid without tags nothing says that its tiles are not plain.
-        let shown = if grid.tags.is_empty() { 1.0 } else { part };
+        let plain = TagAreas::default();
+        let shown = if grid.tags.is_empty() { &plain } else { tags };
         let fine = self.blur(fitter, image, 0, grid, shown);
         let most_px = MAX_BLUR * self.largest_radius();
         let blur_px = fine.filter(|&blur_px| blur_px <= most_px).or_else(|| {
@@ -56,11 +57,18 @@ impl Refiner {
                 .last()
                 .or(fine)
         });
-        let clear = clear_squares(grid, part, blur_px.unwrap_or(USUAL_BLUR_PX));
+        let around = surroundings(grid, tags, 1.0);
+        let known_px = blur_px.unwrap_or(USUAL_BLUR_PX);
+        let rooms = around.iter().map(|around| Room {
+            around,
+            blur_px: known_px,
+            reach_px: self.largest_radius(),
+        });
+        let rooms: Vec<Room> = rooms.collect();
         let starts = grid.corners.iter().map(|corner| [corner.x, corner.y]);
         let refined: Vec<(Refined, Option<ModelFit>)> = starts
-            .zip(&clear)
-            .map(|(start, &clear_px)| self.refine_within(fitter, image, start, clear_px))
+            .zip(&rooms)
+            .map(|(start, &room)| self.refine_within(fitter, image, start, Some(room)))
             .collect();
         let residuals: Vec<f64> =
             refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
@@ -73,14 +81,14 @@ impl Refiner {
             steps.iter().all(|s| places.contains(&(corner.row + s.row, corner.col + s.col)))
         };
         let mut kept = Vec::with_capacity(grid.corners.len());
-        for ((corner, (refined, fit)), &clear_px) in grid.corners.iter().zip(refined).zip(&clear) {
+        for ((corner, (refined, fit)), &room) in grid.corners.iter().zip(refined).zip(&rooms) {
             let clean = fit.is_some_and(|fit| fit.residual <= limit);
-            let modelled =
-                self.method() == Refinement::Model && clear_px >= MIN_MODEL_RADIUS as f64;
+            let modelled = self.method() == Refinement::Model
+                && room.clear_square_px() >= MIN_MODEL_RADIUS as f64;
             let refined = if clean || !modelled || !judged {
                 Some(refined)
             } else {
-                let smaller = self.clean_fit(fitter, image, corner, clear_px, limit);
+                let smaller = self.clean_fit(fitter, image, corner, room, limit);
                 smaller.or_else(|| inner(corner).then_some(refined))
             };
             if let Some(Refined { position: [x, y], cov, .. }) = refined {
@@ -99,36 +107,44 @@ impl Refiner {
         image: &Gray<T>,
         level: usize,
         grid: &Grid,
-        part: f64,
+        tags: &TagAreas,
     ) -> Option<f64> {
         let scale = f64::from(1u32 << level);
-        let clear = clear_squares(grid, part, USUAL_BLUR_PX * scale);
-        let mut order: Vec<usize> = (0..clear.len()).collect();
-        order.sort_by(|&a, &b| clear[b].total_cmp(&clear[a]));
+        let around = surroundings(grid, tags, scale);
+        let clear_px = |i: usize| around[i].clear_square_px(USUAL_BLUR_PX);
+        let mut order: Vec<usize> = (0..around.len()).collect();
+        order.sort_by(|&a, &b| clear_px(b).total_cmp(&clear_px(a)));
         let fits = order.into_iter().take(BLUR_CORNERS).filter_map(|i| {
             let GridCorner { x, y, .. } = grid.corners[i];
             let place = Pyramid::from_level_0(level, [x, y]);
-            self.model(fitter, image, place, clear[i] / scale).map(|fit| scale * fit.blur_px)
+            let room = Room {
+                around: &around[i],
+                blur_px: USUAL_BLUR_PX,
+                reach_px: self.largest_radius(),
+            };
+            self.model(fitter, image, place, Some(room)).map(|fit| scale * fit.blur_px)
         });
         median(fits.collect())
     }
 
-    /// The model in the largest window smaller than `clear_px` that leaves no more than `limit`.
+    /// The model in the largest window smaller than that of `room` that leaves no more than `limit`.
     fn clean_fit<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         corner: &GridCorner,
-        clear_px: f64,
+        room: Room,
         limit: f64,
     ) -> Option<Refined> {
         let least = MIN_MODEL_RADIUS as f64;
-        let first = NEXT_WINDOW * clear_px.min(self.largest_radius());
+        let first = NEXT_WINDOW * room.clear_square_px();
         let sides = std::iter::successors(Some(first), |side| Some(NEXT_WINDOW * side));
         let sides =
             sides.take_while(|&side| side / NEXT_WINDOW > least).map(|side| side.max(least));
-        let mut fits =
-            sides.filter_map(|side| self.model(fitter, image, [corner.x, corner.y], side));
+        let mut fits = sides.filter_map(|side| {
+            let room = Room { reach_px: side.floor(), ..room };
+            self.model(fitter, image, [corner.x, corner.y], Some(room))
+        });
         let fit = fits.find(|fit| fit.residual <= limit)?;
         Some(Refined { position: fit.position, cov: Some(fit.cov), status: RefineStatus::Ok })
     }
