@@ -9,12 +9,13 @@
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2};
 
 use super::detection::{Grid, GridCorner};
 use crate::family::Family;
-use crate::lattice::{GridKind, Tile, Vertex};
+use crate::lattice::{Tile, Vertex};
 use crate::target::{Panel, TagsIn, Target};
 
 /// Blur of the next edges reaches this many standard deviations into the clear: beyond, an edge
@@ -69,15 +70,26 @@ pub struct Surroundings {
     sides: Vec<Line>,
     /// Tags: their sides, positive outside.
     tags: Vec<Vec<Line>>,
-    /// Directions of the edges that meet at the corner, rising within a half-turn; empty where
-    /// nothing is known.
-    pub edges_rad: Vec<f64>,
+    /// The edges through the corner by rising angle; empty where nothing is known.
+    pub edges: Vec<Edge>,
+}
+
+/// An edge through a corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// Direction within a half-turn, radians.
+    pub angle_rad: f64,
+    /// Curvature to the left of that direction (to greater v of u), 1/px.
+    pub bend: f64,
 }
 
 impl Surroundings {
-    /// Whether (u, v) px from the corner nothing else is seen under a blur of this deviation.
-    pub fn is_clear(&self, [u, v]: [f64; 2], blur_px: f64) -> bool {
-        self.distance([u, v]) >= BLUR_MARGIN_SIGMAS * blur_px
+    /// Tells whether nothing else is seen at a place, px from the corner, under a blur of this
+    /// deviation.
+    pub fn clear(&self, blur_px: f64) -> impl Fn([f64; 2]) -> bool {
+        let margin = BLUR_MARGIN_SIGMAS * blur_px;
+        let circle2 = (self.distance([0.0; 2]) - margin).max(0.0).powi(2);
+        move |[u, v]| u * u + v * v < circle2 || self.distance([u, v]) >= margin
     }
 
     /// Half the side of the largest clear square around the corner, px.
@@ -98,13 +110,15 @@ impl Surroundings {
 /// What lies around every corner of a grid, in their order, in pixels `scale` times as large as the
 /// grid's. Of a corner whose neighbours lie in one line nothing is known, and nothing is clear.
 pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
-    let place = |c: &GridCorner| (Vertex::new(c.row, c.col), [c.x / scale, c.y / scale]);
-    let places: BTreeMap<Vertex, [f64; 2]> = grid.corners.iter().map(place).collect();
-    let around = |(vertex, [x, y]): (Vertex, [f64; 2])| {
-        let seen = |step: Vertex| places.get(&(vertex + step)).map(|p| [p[0] - x, p[1] - y]);
+    let places = Places::of(grid, scale);
+    let around = |corner: &GridCorner| {
+        let vertex = Vertex::new(corner.row, corner.col);
+        let [x, y] = places.get(vertex)?;
+        let seen = |step: Vertex| places.get(vertex + step).map(|p| [p[0] - x, p[1] - y]);
         let usual = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))))?;
-        let place = |step: Vertex| seen(step).unwrap_or_else(|| usual(step));
-        let mut found = Surroundings { edges_rad: edges(grid.kind, place), ..Default::default() };
+        let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
+        let edges = edges(grid, &places, vertex, place);
+        let mut found = Surroundings { edges, ..Default::default() };
         for tile in grid.kind.tiles_around(vertex) {
             let corners: Vec<Vertex> = tile.vertices().map(|v| v - vertex).collect();
             let polygon: Vec<[f64; 2]> = corners.iter().map(|&step| place(step)).collect();
@@ -120,7 +134,53 @@ pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surrounding
         }
         Some(found)
     };
-    grid.corners.iter().map(|c| around(place(c)).unwrap_or_default()).collect()
+    grid.corners.iter().map(|corner| around(corner).unwrap_or_default()).collect()
+}
+
+/// The places of corners in the rectangle of rows and columns that they span.
+struct Places {
+    first: Vertex,
+    cols: usize,
+    places: Vec<Option<[f64; 2]>>,
+}
+
+impl Places {
+    fn of(grid: &Grid, scale: f64) -> Self {
+        let range = |of: fn(&GridCorner) -> i32| {
+            let values = || grid.corners.iter().map(of);
+            let first = values().min().unwrap_or(0);
+            (first, values().max().map_or(0, |last| (last - first) as usize + 1))
+        };
+        let ((row, rows), (col, cols)) = (range(|c| c.row), range(|c| c.col));
+        let mut found =
+            Self { first: Vertex::new(row, col), cols, places: vec![None; rows * cols] };
+        for corner in &grid.corners {
+            if let Some(at) = found.index(Vertex::new(corner.row, corner.col)) {
+                found.places[at] = Some([corner.x / scale, corner.y / scale]);
+            }
+        }
+        found
+    }
+
+    fn index(&self, vertex: Vertex) -> Option<usize> {
+        let Vertex { row, col } = vertex - self.first;
+        let (row, col) = (usize::try_from(row).ok()?, usize::try_from(col).ok()?);
+        (col < self.cols).then_some(row * self.cols + col)
+    }
+
+    fn get(&self, vertex: Vertex) -> Option<[f64; 2]> {
+        *self.places.get(self.index(vertex)?)?
+    }
+}
+
+/// Where a vertex lies that is not seen, if the two opposite are: as far as the first of them, or
+/// nearer by as much as that is nearer than the second.
+fn beyond(step: Vertex, seen: impl Fn(Vertex) -> Option<[f64; 2]>) -> Option<[f64; 2]> {
+    let back = Vertex::new(-step.row, -step.col);
+    let first = DVec2::from(seen(back)?);
+    let second = DVec2::from(seen(back + back)?);
+    let shrinks = first.length() / (second - first).length();
+    Some((-first * shrinks.min(1.0)).to_array())
 }
 
 /// The affine map of lattice steps that fits these best; `None` where they lie in one line.
@@ -135,16 +195,50 @@ fn affine(known: impl Iterator<Item = (Vertex, [f64; 2])>) -> Option<impl Fn(Ver
     Some(move |v: Vertex| rows.map(|row| row.dot(DVec2::new(v.row.into(), v.col.into()))))
 }
 
-/// Directions of the edges through a corner, along the chords between its neighbours.
-fn edges(kind: GridKind, place: impl Fn(Vertex) -> [f64; 2]) -> Vec<f64> {
-    let (ahead, behind) = kind.steps().split_at(kind.steps().len() / 2);
-    let chord = |(&a, &b): (&Vertex, &Vertex)| {
-        let ([ax, ay], [bx, by]) = (place(a), place(b));
-        (ay - by).atan2(ax - bx).rem_euclid(std::f64::consts::PI)
+/// The edges through the corner at `vertex`, along the chords between its neighbours.
+fn edges(
+    grid: &Grid,
+    places: &Places,
+    vertex: Vertex,
+    place: impl Fn(Vertex) -> [f64; 2],
+) -> Vec<Edge> {
+    let steps = grid.kind.steps();
+    let at = |v: Vertex| places.get(v).map(DVec2::from);
+    let bend_at = |v: Vertex, step: Vertex| Some(bend([at(v - step)?, at(v)?, at(v + step)?]));
+    let edge = |&step: &Vertex| {
+        let chord = DVec2::from(place(step)) - DVec2::from(place(Vertex::new(0, 0) - step));
+        // Bends change slowly: three along a line tell more than one, and where the line is too short
+        // the next ones are bent like it.
+        let along = [vertex, vertex + step, vertex - step].into_iter();
+        let bend = mean(along.filter_map(|v| bend_at(v, step)))
+            .or_else(|| mean(grid.kind.neighbours(vertex).filter_map(|v| bend_at(v, step))))
+            .unwrap_or(0.0);
+        let angle_rad = chord.to_angle();
+        // Turned by half, left is right.
+        match angle_rad {
+            ..0.0 => Edge { angle_rad: angle_rad + PI, bend: -bend },
+            PI.. => Edge { angle_rad: angle_rad - PI, bend: -bend },
+            _ => Edge { angle_rad, bend },
+        }
     };
-    let mut edges: Vec<f64> = ahead.iter().zip(behind).map(chord).collect();
-    edges.sort_by(f64::total_cmp);
+    let mut edges: Vec<Edge> = steps[..steps.len() / 2].iter().map(edge).collect();
+    edges.sort_by(|a, b| a.angle_rad.total_cmp(&b.angle_rad));
     edges
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (count, sum) = values.fold((0, 0.0), |(count, sum), value| (count + 1, sum + value));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+/// Curvature of the parabola through three points in the second, to the left of the way, 1/px.
+fn bend([a, b, c]: [DVec2; 3]) -> f64 {
+    let along = (c - a).normalize_or_zero();
+    let (before, after) = (b - a, c - b);
+    let (t0, t1) = (along.dot(before), along.dot(after));
+    let slopes = along.perp_dot(after) / t1 - along.perp_dot(before) / t0;
+    let bend = 2.0 * slopes / (t0 + t1);
+    if bend.is_finite() { bend } else { 0.0 }
 }
 
 /// The sides of what a tile shows of a tag, positive outside.

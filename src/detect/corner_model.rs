@@ -2,10 +2,12 @@
 //!
 //! ```text
 //!     I(u,v) = (level + amplitude · f(h₁ … h_K)) · (1 + g_u u + g_v v)
-//!     h_k    = (cos θ_k · (v − y) − sin θ_k · (u − x)) / s
+//!     h_k    = (cos θ_k · (v − y) − sin θ_k · (u − x) − ½ κ_k t²) / s
+//!     t      =  cos θ_k · (u − x) + sin θ_k · (v − y)
 //! ```
 //!
-//! (u, v) are pixels from the window's centre, f is the blurred corner of
+//! Edges have curvatures κ where a lens bends them, which are given: a window is too small to tell
+//! them from the position. (u, v) are pixels from the window's centre, f is the blurred corner of
 //! [`super::blurred_corner`]. The blur s holds the pixel's own box as a variance of 1/12: against
 //! exact integration that costs nothing measurable from 0.5 px of blur upwards (docs/measurements).
 //! The slopes g are drawn to 0 by a weak prior, all else is free.
@@ -84,6 +86,8 @@ pub struct Corner<const K: usize> {
     pub slope: [f64; 2],
     /// Image angles of the edges, rising within a half-turn, radians.
     pub angles: [f64; K],
+    /// Curvatures of the edges, to the left of their directions (to greater v of u), 1/px.
+    pub bends: [f64; K],
 }
 
 /// A fitted corner and what is known about its errors.
@@ -143,19 +147,23 @@ impl Window {
         image: &'a Gray<T>,
         [x, y]: [usize; 2],
     ) -> Option<impl Iterator<Item = ([f32; 2], f32)> + 'a> {
-        let places = || self.u[..self.count].iter().zip(&self.v[..self.count]);
+        let inside = x >= self.radius
+            && y >= self.radius
+            && x + self.radius < image.width()
+            && y + self.radius < image.height();
+        let places = self.u[..self.count].iter().zip(&self.v[..self.count]);
         let at = move |u: f32, v: f32| {
             (x.wrapping_add_signed(u as isize), y.wrapping_add_signed(v as isize))
         };
-        let inside = places().all(|(&u, &v)| {
+        let is_in_image = |(&u, &v): (&f32, &f32)| {
             let (x, y) = at(u, v);
             x < image.width() && y < image.height()
-        });
+        };
         let read = move |(&u, &v): (&f32, &f32)| {
             let (x, y) = at(u, v);
             ([u, v], image.at(x, y).to_f32() / T::FULL_SCALE)
         };
-        inside.then(|| places().map(read))
+        (inside || places.clone().all(is_in_image)).then(|| places.map(read))
     }
 }
 
@@ -267,16 +275,10 @@ impl CornerFitter {
     /// The normal equations of the pixels at a corner in window coordinates.
     fn normal<const K: usize>(&mut self, window: &Window, corner: &Corner<K>) -> Normal {
         let columns = &mut *self.columns;
-        let (mut two, mut three) = ([0.0; 2], [0.0; 3]);
+        let edge = |k: usize| [corner.angles[k], corner.bends[k]];
         match K {
-            2 => {
-                two.copy_from_slice(&corner.angles);
-                fill_checker(columns, &self.pixels, window, corner, two);
-            }
-            _ => {
-                three.copy_from_slice(&corner.angles);
-                fill_deltille(columns, &self.pixels, window, corner, three);
-            }
+            2 => fill_checker(columns, &self.pixels, window, corner, [0, 1].map(edge)),
+            _ => fill_deltille(columns, &self.pixels, window, corner, [0, 1, 2].map(edge)),
         }
         let products = products(columns, ANGLE + K, window.count);
         let mut normal = Normal {
@@ -296,6 +298,14 @@ impl CornerFitter {
 }
 
 impl<const K: usize> Corner<K> {
+    /// The corner with its first J edges; further ones mean nothing.
+    pub fn with_edges<const J: usize>(self) -> Corner<J> {
+        let Self { position, blur_px, amplitude, level, slope, .. } = self;
+        let first = |edges: [f64; K]| std::array::from_fn(|k| edges.get(k).copied().unwrap_or(0.0));
+        let (angles, bends) = (first(self.angles), first(self.bends));
+        Corner { position, blur_px, amplitude, level, slope, angles, bends }
+    }
+
     /// The corner after a step; `None` when the blur leaves what the window can tell, or the light
     /// what exists.
     fn moved(&self, step: &SVector<f64, PARAMS>, radius: usize) -> Option<Self> {
@@ -331,13 +341,13 @@ fn fill_checker<const C: usize>(
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
-    angles: [f64; 2],
+    edges: [[f64; 2]; 2],
 ) {
-    let turn = angles[1] - angles[0];
+    let turn = edges[1][0] - edges[0][0];
     let orthant = Orthant::new(turn.cos());
     let by_angle = turn.sin() as f32;
     let shade = |h| orthant.checker(h);
-    fill(columns, pixels, window, corner, angles, [by_angle, -by_angle], shade);
+    fill(columns, pixels, window, corner, edges, [by_angle, -by_angle], shade);
 }
 
 #[multiversion(targets = "simd")]
@@ -346,28 +356,30 @@ fn fill_deltille<const C: usize>(
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
-    angles: [f64; 3],
+    edges: [[f64; 2]; 3],
 ) {
     // As a closure it is compiled for the target at hand, as a bare function it would not be.
     let shade = |h| deltille(h);
-    fill(columns, pixels, window, corner, angles, [0.0; 3], shade);
+    fill(columns, pixels, window, corner, edges, [0.0; 3], shade);
 }
 
 /// Fills the columns of derivatives and residuals.
 ///
-/// `by_angle` is ∂ρ/∂θ_k.
+/// `edges` are θ_k and κ_k, `by_angle` is ∂ρ/∂θ_k.
 #[inline(always)]
 fn fill<const K: usize, const C: usize>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
-    angles: [f64; K],
+    edges: [[f64; 2]; K],
     by_angle: [f32; K],
     shade: impl Fn([f32; K]) -> Shade<K>,
 ) {
     let [x, y] = corner.position.map(|c| c as f32);
-    let (sines, cosines) = (angles.map(|a| a.sin() as f32), angles.map(|a| a.cos() as f32));
+    let sines = edges.map(|[angle, _]| angle.sin() as f32);
+    let cosines = edges.map(|[angle, _]| angle.cos() as f32);
+    let bends = edges.map(|[_, bend]| (bend * corner.blur_px) as f32);
     let sharpness = (1.0 / corner.blur_px) as f32;
     let (amplitude, level) = (corner.amplitude as f32, corner.level as f32);
     let [gu, gv] = corner.slope.map(|g| g as f32);
@@ -376,17 +388,20 @@ fn fill<const K: usize, const C: usize>(
     for i in 0..n {
         let (u, v) = (us[i], vs[i]);
         let (du, dv) = ((u - x) * sharpness, (v - y) * sharpness);
-        let h: [f32; K] = std::array::from_fn(|k| cosines[k] * dv - sines[k] * du);
+        let along: [f32; K] = std::array::from_fn(|k| cosines[k] * du + sines[k] * dv);
+        let h: [f32; K] = std::array::from_fn(|k| {
+            cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k]
+        });
         let Shade { f, slopes, correlation } = shade(h);
         let gain = 1.0 + gu * u + gv * v;
         let light = amplitude * gain;
         let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, 0.0);
         for k in 0..K {
-            by_x += slopes[k] * sines[k];
-            by_y -= slopes[k] * cosines[k];
+            let bent = bends[k] * along[k];
+            by_x += slopes[k] * (sines[k] + bent * cosines[k]);
+            by_y -= slopes[k] * (cosines[k] - bent * sines[k]);
             by_scale -= slopes[k] * h[k];
-            let along = cosines[k] * du + sines[k] * dv;
-            columns[ANGLE + k][i] = light * (correlation * by_angle[k] - slopes[k] * along);
+            columns[ANGLE + k][i] = light * (correlation * by_angle[k] - slopes[k] * along[k]);
         }
         let brightness = level + amplitude * f;
         columns[X][i] = light * sharpness * by_x;

@@ -23,22 +23,21 @@ const MIN_START_RAD: f64 = 15.0 * PI / 180.0;
 /// Circles, as parts of the window's radius.
 const CIRCLES: [f64; 3] = [0.5, 0.7, 0.9];
 
-/// The start of a corner with edges in these directions, rising within a half-turn, under a blur of
-/// `blur_px`; `None` when the window leaves the image or shows one side of the edges alone.
+/// The start of a corner whose edges have these directions, rising within a half-turn, under a blur of `blur_px`; `None` when the window leaves the image or shows one side of the edges alone.
 pub fn start_along<const K: usize, T: Intensity>(
     image: &Gray<T>,
     position: [f64; 2],
     window: &Window,
-    edges_rad: [f64; K],
+    angles: [f64; K],
     blur_px: f64,
 ) -> Option<Corner<K>> {
     let centre = position.map(f64::round);
     let [x, y] = [0, 1].map(|i| position[i] - centre[i]);
-    let edges = edges_rad.map(f64::sin_cos);
+    let directions = angles.map(f64::sin_cos);
     let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
     for ([u, v], pixel) in window.pixels(image, centre.map(|c| c as usize))? {
         let (du, dv) = (f64::from(u) - x, f64::from(v) - y);
-        let right = edges.iter().filter(|(sin, cos)| cos * dv - sin * du > 0.0).count();
+        let right = directions.iter().filter(|(sin, cos)| cos * dv - sin * du > 0.0).count();
         // The pattern is the product of the signs of the distances from the edges.
         let class = (K - right) % 2;
         sums[class] += f64::from(pixel);
@@ -52,7 +51,8 @@ pub fn start_along<const K: usize, T: Intensity>(
         amplitude,
         level,
         slope: [0.0; 2],
-        angles: edges_rad,
+        angles,
+        bends: [0.0; K],
     })
 }
 
@@ -116,6 +116,7 @@ pub fn start<const K: usize, T: Intensity>(
         level: if odd { mean } else { middle },
         slope: [0.0; 2],
         angles,
+        bends: [0.0; K],
     })
 }
 

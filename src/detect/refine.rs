@@ -13,7 +13,7 @@
 //! assert!((refined.position[0] - 20.2).abs() < 1e-3 && refined.cov.is_some());
 //! ```
 
-use super::clearance::Surroundings;
+use super::clearance::{Edge, Surroundings};
 use super::corner_model::{Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
 use super::corner_start::{start, start_along};
 use super::polynomial::Polynomial;
@@ -22,6 +22,10 @@ use crate::target::GridKind;
 
 /// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
 pub const MIN_MODEL_RADIUS: usize = 3;
+
+/// An edge that leaves its tangent by less than this within the window counts as straight, px: corners
+/// of a real print are a twentieth of a pixel off their places, and bends follow from three.
+const LEAST_SAG_PX: f64 = 0.02;
 
 /// Fewest pixels to which the model is fitted: three for each unknown, so that the noise shows.
 const MIN_PIXELS: usize = 30;
@@ -68,20 +72,40 @@ pub struct Refined {
 /// What the model found, of either kind of corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ModelFit {
-    /// Position, px.
-    pub position: [f64; 2],
-    /// Covariance xx, xy, yy, px².
+    /// The corner; of two edges the last angle means nothing.
+    corner: Corner<3>,
+    /// Covariance xx, xy, yy of its position, px².
     pub cov: [f64; 3],
-    /// Standard deviation of the blur with the pixel's box in it, px.
-    pub blur_px: f64,
     /// Standard deviation of what is left, over half the contrast.
     pub residual: f64,
 }
 
+impl ModelFit {
+    /// Position, px.
+    pub fn position(&self) -> [f64; 2] {
+        self.corner.position
+    }
+
+    /// Whether edges were taken to be bent.
+    pub fn is_bent(&self) -> bool {
+        self.corner.bends != [0.0; 3]
+    }
+
+    /// Standard deviation of the blur with the pixel's box in it, px.
+    pub fn blur_px(&self) -> f64 {
+        self.corner.blur_px
+    }
+}
+
 impl<const K: usize> From<Fitted<K>> for ModelFit {
     fn from(Fitted { corner, cov, noise }: Fitted<K>) -> Self {
-        let Corner { position, blur_px, amplitude, .. } = corner;
-        Self { position, cov, blur_px, residual: noise / amplitude.abs() }
+        Self { corner: corner.with_edges(), cov, residual: noise / corner.amplitude.abs() }
+    }
+}
+
+impl From<ModelFit> for Refined {
+    fn from(fit: ModelFit) -> Self {
+        Self { position: fit.position(), cov: Some(fit.cov), status: RefineStatus::Ok }
     }
 }
 
@@ -97,9 +121,27 @@ pub(super) struct Room<'a> {
 }
 
 impl Room<'_> {
+    /// The pixels of the image that show nothing but the corner at `position`, within a radius.
+    fn window<T: Intensity>(&self, image: &Gray<T>, position: [f64; 2], radius: usize) -> Window {
+        let [x, y] = position;
+        let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 1.0);
+        let is_clear = self.around.clear(self.blur_px);
+        Window::of(radius, |[u, v]| {
+            let [px, py] = [x.round() + u, y.round() + v];
+            let inside = px >= 0.0 && py >= 0.0 && px <= right && py <= bottom;
+            inside && is_clear([px - x, py - y])
+        })
+    }
+
     /// Half the side of the largest square that shows nothing else, px.
     pub fn clear_square_px(&self) -> f64 {
         self.around.clear_square_px(self.blur_px).min(self.reach_px)
+    }
+
+    /// Whether the window shows an edge bent.
+    pub fn shows_bends(&self) -> bool {
+        let sag_px = |edge: &Edge| 0.5 * edge.bend.abs() * self.reach_px.powi(2);
+        self.around.edges.iter().any(|edge| sag_px(edge) > LEAST_SAG_PX)
     }
 }
 
@@ -141,49 +183,82 @@ impl Refiner {
 
     /// The corner near `start`, in the whole window.
     pub fn refine<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Refined {
-        self.refine_within(&mut CornerFitter::default(), image, start, None).0
+        let found = self.polynomial.refine(image, start, self.iterations).map(|c| c.position);
+        let model = || {
+            let mut fitter = CornerFitter::default();
+            let position = found.unwrap_or(start);
+            match self.polynomial {
+                Polynomial::Cubic(_) => self.alone::<3, T>(&mut fitter, image, position),
+                Polynomial::Quadric(_) => self.alone::<2, T>(&mut fitter, image, position),
+            }
+        };
+        let fit = (self.method == Refinement::Model).then(model).flatten();
+        fit.map_or_else(|| self.without_model(start, found), Refined::from)
     }
 
-    /// The corner near `start`, from pixels that show nothing else. Beside it what the model found.
+    /// A corner of a grid near `start`, from pixels that show nothing else. Beside it what the model
+    /// found.
     pub(super) fn refine_within<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         start: [f64; 2],
-        room: Option<Room>,
+        room: Room,
     ) -> (Refined, Option<ModelFit>) {
+        let mut model = |position| {
+            let modelled = self.method == Refinement::Model;
+            modelled.then(|| self.model(fitter, image, position, room, None)).flatten()
+        };
+        if let Some(fit) = model(start) {
+            return (fit.into(), Some(fit));
+        }
         // Where other edges are this near, they would draw the polynomial away from a start that the
         // finder has taken care of.
-        let found = room
-            .is_none_or(|room| room.clear_square_px() >= MIN_POLYNOMIAL_CLEAR_PX)
+        let found = (room.clear_square_px() >= MIN_POLYNOMIAL_CLEAR_PX)
             .then(|| self.polynomial.refine(image, start, self.iterations))
-            .flatten();
-        let polynomial = found.map(|corner| corner.position);
-        if self.method == Refinement::Model
-            && let Some(fit) = self.model(fitter, image, polynomial.unwrap_or(start), room)
-        {
-            let ModelFit { position, cov, .. } = fit;
-            return (Refined { position, cov: Some(cov), status: RefineStatus::Ok }, Some(fit));
+            .flatten()
+            .map(|corner| corner.position);
+        match found.and_then(model) {
+            Some(fit) => (fit.into(), Some(fit)),
+            None => (self.without_model(start, found), None),
         }
+    }
+
+    fn without_model(&self, start: [f64; 2], polynomial: Option<[f64; 2]>) -> Refined {
         let status = match (polynomial, self.method) {
             (None, _) => RefineStatus::Failed,
             (Some(_), Refinement::Polynomial) => RefineStatus::Ok,
             (Some(_), Refinement::Model) => RefineStatus::Polynomial,
         };
-        (Refined { position: polynomial.unwrap_or(start), cov: None, status }, None)
+        Refined { position: polynomial.unwrap_or(start), cov: None, status }
     }
 
-    /// The model in the largest window of what is clear and lies in the image.
+    /// The model of a single corner, in the largest window that lies in the image.
+    fn alone<const K: usize, T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        image: &Gray<T>,
+        position: [f64; 2],
+    ) -> Option<ModelFit> {
+        let reach = distance_to_rim(image, position);
+        let window = self.windows.iter().rev().find(|w| w.radius() as f64 <= reach)?;
+        let first = start::<K, T>(image, position, window.radius())?;
+        Some(fitter.fit(image, window, &first)?.into())
+    }
+
+    /// The model of a corner of a grid, in all of its room that is clear and lies in the image, with
+    /// the bends that the grid shows; from a fit `before`, where there is one.
     pub(super) fn model<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         position: [f64; 2],
-        room: Option<Room>,
+        room: Room,
+        before: Option<&ModelFit>,
     ) -> Option<ModelFit> {
         match self.polynomial {
-            Polynomial::Cubic(_) => self.model_of::<3, T>(fitter, image, position, room),
-            Polynomial::Quadric(_) => self.model_of::<2, T>(fitter, image, position, room),
+            Polynomial::Cubic(_) => self.model_of::<3, T>(fitter, image, position, room, before),
+            Polynomial::Quadric(_) => self.model_of::<2, T>(fitter, image, position, room, before),
         }
     }
 
@@ -192,39 +267,29 @@ impl Refiner {
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         position: [f64; 2],
-        room: Option<Room>,
+        room: Room,
+        before: Option<&ModelFit>,
     ) -> Option<ModelFit> {
-        let [x, y] = position;
-        let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 2.0);
-        let reach =
-            [x - 1.0, y - 1.0, right - x, bottom - y].into_iter().fold(f64::INFINITY, f64::min);
-        let Some(room) = room else {
-            let window = self.windows.iter().rev().find(|w| w.radius() as f64 <= reach)?;
-            let first = start::<K, T>(image, position, window.radius())?;
-            return Some(fitter.fit(image, window, &first)?.into());
-        };
         let radius = room.reach_px.min(self.largest_radius());
-        let whole = self.windows.iter().find(|w| w.radius() as f64 == radius);
-        let whole = whole.filter(|_| radius <= reach.min(room.clear_square_px()));
+        let is_whole = radius <= room.clear_square_px().min(distance_to_rim(image, position));
+        let whole = self.windows.iter().find(|w| w.radius() as f64 == radius && is_whole);
         let cut;
         let window = match whole {
             Some(window) => window,
             None => {
-                let centre = position.map(f64::round);
-                cut = Window::of(radius as usize, |[u, v]| {
-                    let [px, py] = [centre[0] + u, centre[1] + v];
-                    let inside = px >= 0.0 && py >= 0.0 && px <= right && py <= bottom;
-                    inside && room.around.is_clear([px - x, py - y], room.blur_px)
-                });
+                cut = room.window(image, position, radius as usize);
                 &cut
             }
         };
-        if window.count() < MIN_PIXELS {
-            return None;
-        }
-        let edges = room.around.edges_rad.as_slice().try_into().ok()?;
-        let first = start_along::<K, T>(image, position, window, edges, room.blur_px)?;
-        Some(fitter.fit(image, window, &first)?.into())
+        let edges: &[Edge; K] = room.around.edges.as_slice().try_into().ok()?;
+        let bends = edges.map(|edge| if room.shows_bends() { edge.bend } else { 0.0 });
+        let angles = edges.map(|edge| edge.angle_rad);
+        let first = match before {
+            _ if window.count() < MIN_PIXELS => return None,
+            Some(fit) => fit.corner.with_edges(),
+            None => start_along(image, position, window, angles, room.blur_px)?,
+        };
+        Some(fitter.fit(image, window, &Corner { bends, ..first })?.into())
     }
 
     pub(super) fn method(&self) -> Refinement {
@@ -235,4 +300,10 @@ impl Refiner {
     pub(super) fn largest_radius(&self) -> f64 {
         self.windows.last().map_or(0.0, |window| window.radius() as f64)
     }
+}
+
+/// Pixels between a position and the nearest side of the image, where bilinear samples end.
+fn distance_to_rim<T: Intensity>(image: &Gray<T>, [x, y]: [f64; 2]) -> f64 {
+    let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 2.0);
+    [x - 1.0, y - 1.0, right - x, bottom - y].into_iter().fold(f64::INFINITY, f64::min)
 }

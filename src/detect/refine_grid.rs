@@ -8,10 +8,10 @@
 
 use std::collections::BTreeSet;
 
-use super::clearance::{TagAreas, surroundings};
+use super::clearance::{Surroundings, TagAreas, surroundings};
 use super::corner_model::CornerFitter;
 use super::detection::{Grid, GridCorner};
-use super::refine::{MIN_MODEL_RADIUS, ModelFit, RefineStatus, Refined, Refinement, Refiner, Room};
+use super::refine::{MIN_MODEL_RADIUS, ModelFit, Refined, Refinement, Refiner, Room};
 use crate::raster::{Gray, Intensity, Pyramid};
 
 /// Corners that tell the blur: those with the most room.
@@ -57,18 +57,14 @@ impl Refiner {
                 .last()
                 .or(fine)
         });
-        let around = surroundings(grid, tags, 1.0);
         let known_px = blur_px.unwrap_or(USUAL_BLUR_PX);
-        let rooms = around.iter().map(|around| Room {
-            around,
-            blur_px: known_px,
-            reach_px: self.largest_radius(),
-        });
-        let rooms: Vec<Room> = rooms.collect();
-        let starts = grid.corners.iter().map(|corner| [corner.x, corner.y]);
-        let refined: Vec<(Refined, Option<ModelFit>)> = starts
+        let around = surroundings(grid, tags, 1.0);
+        let rooms: Vec<Room> = around.iter().map(|around| self.whole(around, known_px)).collect();
+        let refined: Vec<(Refined, Option<ModelFit>)> = grid
+            .corners
+            .iter()
             .zip(&rooms)
-            .map(|(start, &room)| self.refine_within(fitter, image, start, Some(room)))
+            .map(|(corner, &room)| self.refine_within(fitter, image, [corner.x, corner.y], room))
             .collect();
         let residuals: Vec<f64> =
             refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
@@ -80,23 +76,41 @@ impl Refiner {
             let steps = grid.kind.steps();
             steps.iter().all(|s| places.contains(&(corner.row + s.row, corner.col + s.col)))
         };
-        let mut kept = Vec::with_capacity(grid.corners.len());
+        let (mut kept, mut fits) = (Vec::new(), Vec::new());
         for ((corner, (refined, fit)), &room) in grid.corners.iter().zip(refined).zip(&rooms) {
             let clean = fit.is_some_and(|fit| fit.residual <= limit);
             let modelled = self.method() == Refinement::Model
                 && room.clear_square_px() >= MIN_MODEL_RADIUS as f64;
-            let refined = if clean || !modelled || !judged {
-                Some(refined)
+            let (refined, fit) = if clean || !modelled || !judged {
+                (Some(refined), fit.filter(|_| clean))
             } else {
                 let smaller = self.clean_fit(fitter, image, corner, room, limit);
-                smaller.or_else(|| inner(corner).then_some(refined))
+                (smaller.map(Refined::from).or_else(|| inner(corner).then_some(refined)), smaller)
             };
             if let Some(Refined { position: [x, y], cov, .. }) = refined {
                 kept.push(GridCorner { x, y, cov, ..*corner });
+                fits.push(fit);
             }
         }
         grid.corners = kept;
+        // Now that the places of the corners are known, so are the bends of the edges.
+        let around = surroundings(grid, tags, 1.0);
+        for ((corner, around), fit) in grid.corners.iter_mut().zip(&around).zip(&fits) {
+            let room = self.whole(around, known_px);
+            if let Some(fit) = fit.filter(|fit| fit.is_bent() || room.shows_bends())
+                && let Some(bent) = self.model(fitter, image, fit.position(), room, Some(&fit))
+                && bent.residual <= limit
+            {
+                let [x, y] = bent.position();
+                *corner = GridCorner { x, y, cov: Some(bent.cov), ..*corner };
+            }
+        }
         blur_px
+    }
+
+    /// All that is clear around a corner, in the largest window.
+    fn whole<'a>(&self, around: &'a Surroundings, blur_px: f64) -> Room<'a> {
+        Room { around, blur_px, reach_px: self.largest_radius() }
     }
 
     /// The blur of a grid as `image`, a level of its pyramid, shows it, px of level 0: the median over
@@ -117,12 +131,10 @@ impl Refiner {
         let fits = order.into_iter().take(BLUR_CORNERS).filter_map(|i| {
             let GridCorner { x, y, .. } = grid.corners[i];
             let place = Pyramid::from_level_0(level, [x, y]);
-            let room = Room {
-                around: &around[i],
-                blur_px: USUAL_BLUR_PX,
-                reach_px: self.largest_radius(),
-            };
-            self.model(fitter, image, place, Some(room)).map(|fit| scale * fit.blur_px)
+            // What is a wave shows in the middle of the tiles.
+            let reach_px = clear_px(i).max(MIN_MODEL_RADIUS as f64).floor();
+            let room = Room { around: &around[i], blur_px: USUAL_BLUR_PX, reach_px };
+            self.model(fitter, image, place, room, None).map(|fit| scale * fit.blur_px())
         });
         median(fits.collect())
     }
@@ -135,18 +147,17 @@ impl Refiner {
         corner: &GridCorner,
         room: Room,
         limit: f64,
-    ) -> Option<Refined> {
+    ) -> Option<ModelFit> {
         let least = MIN_MODEL_RADIUS as f64;
-        let first = NEXT_WINDOW * room.clear_square_px();
+        let first = room.clear_square_px();
         let sides = std::iter::successors(Some(first), |side| Some(NEXT_WINDOW * side));
         let sides =
             sides.take_while(|&side| side / NEXT_WINDOW > least).map(|side| side.max(least));
         let mut fits = sides.filter_map(|side| {
             let room = Room { reach_px: side.floor(), ..room };
-            self.model(fitter, image, [corner.x, corner.y], Some(room))
+            self.model(fitter, image, [corner.x, corner.y], room, None)
         });
-        let fit = fits.find(|fit| fit.residual <= limit)?;
-        Some(Refined { position: fit.position, cov: Some(fit.cov), status: RefineStatus::Ok })
+        fits.find(|fit| fit.residual <= limit)
     }
 }
 
