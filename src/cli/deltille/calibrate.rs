@@ -8,10 +8,11 @@ use std::process::ExitCode;
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
+use super::camera_file;
 use super::files::{self, File};
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{self, BoardShape, Loss, Model, Options, Solution, View, Weights};
-use crate::camera::{Camera, Pose};
+use crate::camera::Pose;
 use crate::cli::output;
 use crate::export::calibration;
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
@@ -237,9 +238,7 @@ impl Args {
         let (loss, weights) = (self.robust.into(), self.weights.into());
         let Some(model) = self.model else {
             let path = self.fixed_intrinsics.as_deref().unwrap_or(Path::new(""));
-            let show = || format!("--fixed-intrinsics: {}", path.display());
-            let text = std::fs::read_to_string(path).with_context(show)?;
-            let camera = Camera::from_yaml(&text).with_context(show)?;
+            let camera = camera_file::read("--fixed-intrinsics", path)?;
             let calibrated = calibrate::poses(views, panels, &camera, loss, weights)?;
             ensure!(
                 !calibrated.views.is_empty(),

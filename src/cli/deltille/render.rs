@@ -8,7 +8,7 @@ use glam::{DMat3, DQuat, DVec3};
 use image::{DynamicImage, ImageBuffer, Luma};
 use serde::Serialize;
 
-use super::target_file;
+use super::{camera_file, target_file};
 use crate::camera::{Camera, Pose};
 use crate::cli::output;
 use crate::synth::{Light, TruthCorner, scene_of_target};
@@ -112,9 +112,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !matches!(target.spec, TargetSpec::Solid(_)) && target.panels.len() > 1 {
         bail!("{} has several loose boards: render targets of one board, or solids", target.name);
     }
-    let show = || format!("--camera: {}", args.camera.display());
-    let text = std::fs::read_to_string(&args.camera).with_context(show)?;
-    let camera = Camera::from_yaml(&text).with_context(show)?;
+    let camera = camera_file::read("--camera", &args.camera)?;
     let in_range = |option: &str, value: f64, most: f64| match (0.0..=most).contains(&value) {
         true => Ok(value),
         false => bail!("{option}: {value} is not between 0 and {most}"),
