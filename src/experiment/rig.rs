@@ -211,11 +211,8 @@ pub fn run(
             let views = views(&of_camera, &reference).map_err(failed)?.views;
             cameras.push(RigViews { name: format!("c{index}"), views, known: None });
         }
-        let panels: Vec<PanelPlace> = reference
-            .panels()
-            .into_iter()
-            .map(|target_from_panel| PanelPlace { target_from_panel, covariance: None })
-            .collect();
+        let panels: Vec<PanelPlace> =
+            stated.panels.iter().map(|panel| (&panel.pose).into()).collect();
         for refined in [false, true] {
             let options = RigOptions {
                 model: Model::Radtan,
@@ -291,12 +288,7 @@ fn cube_face(face: usize, [left, lower, right, upper]: [f64; 4]) -> PanelPose {
     let along = DVec3::AXES[(face / 2 + 1) % 3];
     let up = normal.cross(along);
     let middle = along * (left + right) / 2.0 + up * (lower + upper) / 2.0;
-    let translation = normal * CUBE_MM / 2.0 - middle;
-    PanelPose {
-        rotation: DMat3::from_cols(along, up, normal).transpose().to_cols_array(),
-        translation_mm: translation.to_array(),
-        covariance: None,
-    }
+    PanelPose::new(DMat3::from_cols(along, up, normal), normal * CUBE_MM / 2.0 - middle)
 }
 
 /// The target with its panels as they were glued on.
@@ -308,16 +300,11 @@ fn misplaced(target: &Target, seed: u64) -> Target {
     };
     let poses = target.panels.iter().map(|panel| {
         let turn = DMat3::from_quat(DQuat::from_scaled_axis(normal(PLACED_RAD)));
-        let rotation = turn * DMat3::from_cols_array(&panel.pose.rotation).transpose();
         // A panel is turned about its own middle.
         let count = panel.corners.len() as f64;
         let middle = panel.corners.iter().map(|c| DVec3::from(c.target_mm)).sum::<DVec3>() / count;
         let arm = DVec3::from(panel.pose.translation_mm) - middle;
-        PanelPose {
-            rotation: rotation.transpose().to_cols_array(),
-            translation_mm: (middle + turn * arm + normal(PLACED_MM)).to_array(),
-            covariance: None,
-        }
+        PanelPose::new(turn * panel.pose.matrix(), middle + turn * arm + normal(PLACED_MM))
     });
     target.with_poses(&poses.collect::<Vec<_>>())
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::face_page::face_page;
@@ -213,9 +213,7 @@ impl Verifier<'_> {
         let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
             return of_panel();
         };
-        let panel_from_target = DMat3::from_cols_array(&panel.pose.rotation);
-        let origin = DVec3::from(panel.pose.translation_mm);
-        solid.triangle_mm(index).map(|v| (panel_from_target * (v - origin)).truncate())
+        solid.triangle_mm(index).map(|v| panel.pose.panel_from_target(v).truncate())
     }
 }
 

@@ -26,6 +26,7 @@ use super::solve::{self, Options};
 use super::view::View;
 use super::weights::{Weights, Whitening, median};
 use crate::camera::{Camera, Pose};
+use crate::target::PanelPose;
 use start::Start;
 
 pub use solution::{RigCamera, RigFrame, RigSolution};
@@ -62,6 +63,12 @@ pub struct PanelPlace {
     /// Covariance of a turn (rad) and a move (mm) along the target's axes, where it was measured;
     /// `None` where it is as stated.
     pub covariance: Option<[[f64; 6]; 6]>,
+}
+
+impl From<&PanelPose> for PanelPlace {
+    fn from(pose: &PanelPose) -> Self {
+        Self { target_from_panel: pose.to_pose(), covariance: pose.covariance }
+    }
 }
 
 /// A frame does not belong when a camera's corners in it are off by more than so many times the usual,
