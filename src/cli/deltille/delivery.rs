@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use super::files::{File, write_all};
+use super::files::{File, same_file, write_all};
 use super::{target_file, verify};
 use crate::export::obj;
 use crate::family::Family;
@@ -38,9 +38,7 @@ impl Delivery {
 
     /// Whether a file of that name would be written over another one.
     pub fn would_replace(&self, name: &str, other: &Path) -> bool {
-        let [here, there] =
-            [&self.output.join(name), other].map(|path| std::fs::canonicalize(path).ok());
-        here.is_some() && here == there
+        same_file(&self.output.join(name), other)
     }
 
     /// Writes all files or none, says so after `summary`, and compares them with the target.

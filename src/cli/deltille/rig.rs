@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 
 use super::calibrate::{Robust, Weighting, cannot_tell_apart};
-use super::files::{File, text_file, write_all};
+use super::files::{File, same_file, text_file, write_all};
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
     Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews, calibrate_rig,
@@ -114,11 +114,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.refine_target {
         let refined = solution.refined(&target);
         let place = args.output.join(format!("{}.json", refined.name));
-        if place
-            .canonicalize()
-            .ok()
-            .is_some_and(|place| args.target.canonicalize().ok() == Some(place))
-        {
+        if same_file(&place, &args.target) {
             bail!(
                 "-o: {} would overwrite the target that was given: choose another folder",
                 place.display()
