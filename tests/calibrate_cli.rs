@@ -42,10 +42,8 @@ fn json(path: &Path) -> Value {
 }
 
 fn board(rows: u32, cols: u32) -> Target {
-    let tags = Some(TagSpec::default());
     let family = Family::resolve(&TagSpec::default().family).unwrap();
-    let (grid, edge_mm, inverted) = (GridKind::Deltille, 20.0, false);
-    let spec = BoardSpec { grid, rows, cols, edge_mm, boards: 1, board_id: 0, tags, inverted };
+    let spec = BoardSpec::new(GridKind::Deltille, rows, cols, 20.0);
     Target::build("board", &TargetSpec::Board(spec), Some(&family), None).unwrap()
 }
 

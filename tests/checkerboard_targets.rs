@@ -26,8 +26,7 @@ fn deltille(folder: &Path, args: &str) -> std::process::Output {
 
 fn spec(rows: u32, cols: u32, tags_in: TagsIn) -> BoardSpec {
     let tags = Some(TagSpec::for_squares(tags_in));
-    let (grid, edge_mm, boards, board_id) = (GridKind::Checker, 20.0, 1, 4);
-    BoardSpec { grid, rows, cols, edge_mm, boards, board_id, tags, inverted: false }
+    BoardSpec { board_id: 4, tags, ..BoardSpec::new(GridKind::Checker, rows, cols, 20.0) }
 }
 
 fn build(spec: &BoardSpec) -> (Target, Option<Family>) {

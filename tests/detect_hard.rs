@@ -33,18 +33,8 @@ impl Board {
         let tags = TagSpec::default();
         let family = Family::resolve(&tags.family).unwrap();
         let bits_across = f64::from(family.dimension().rows()) + 3.0 * tags.border_bits;
-        let tags = Some(tags);
-        let spec = BoardSpec {
-            grid: deltille::target::GridKind::Deltille,
-            rows: 6,
-            cols: 7,
-            edge_mm: EDGE_MM,
-            boards: 1,
-            board_id: 0,
-            tags,
-            inverted,
-        };
-        let spec = TargetSpec::Board(spec);
+        let plain = BoardSpec::new(deltille::target::GridKind::Deltille, 6, 7, EDGE_MM);
+        let spec = TargetSpec::Board(BoardSpec { inverted, ..plain });
         let target =
             Target::build("board", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
         let sheets = artwork::draw(&target, Some(&family)).unwrap().sheets;

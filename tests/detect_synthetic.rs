@@ -22,16 +22,8 @@ struct Board {
 
 fn board(tags: Option<TagSpec>, inverted: bool) -> Board {
     let family = tags.as_ref().map(|tags| Family::resolve(&tags.family).unwrap());
-    let spec = BoardSpec {
-        grid: GridKind::Deltille,
-        rows: 8,
-        cols: 9,
-        edge_mm: 18.0,
-        boards: 1,
-        board_id: 4,
-        tags,
-        inverted,
-    };
+    let plain = BoardSpec::new(GridKind::Deltille, 8, 9, 18.0);
+    let spec = BoardSpec { board_id: 4, tags, inverted, ..plain };
     let paper = PaperSpec::default();
     let target =
         Target::build("board", &TargetSpec::Board(spec), family.as_ref(), Some(&paper)).unwrap();

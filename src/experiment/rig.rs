@@ -29,8 +29,8 @@ use crate::detect::{Detection, Detector, DetectorConfig};
 use crate::family::{Family, FamilyError};
 use crate::synth::{Light, Scene, scene_of_target};
 use crate::target::{
-    BoardSpec, GridKind, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, TagSpec, TagsIn,
-    Target, TargetError, TargetSpec,
+    BoardSpec, GridKind, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, Target,
+    TargetError, TargetSpec,
 };
 
 /// Cameras of the rig.
@@ -249,22 +249,11 @@ fn target(object: Object) -> Result<(Target, Family), RigExperimentError> {
             edge_mm: ICOSAHEDRON_MM,
             ..SolidSpec::new(SolidShape::Icosahedron)
         }),
-        Object::Cube => TargetSpec::Board(BoardSpec {
-            grid: GridKind::Checker,
-            rows: SQUARES - 1,
-            cols: SQUARES - 1,
-            edge_mm: (CUBE_MM - 2.0 * QUIET_MM) / f64::from(SQUARES),
-            boards: 6,
-            board_id: 0,
-            tags: Some(TagSpec {
-                family: "aprilTag36h11".to_owned(),
-                first_id: 0,
-                spacing: 2,
-                border_bits: 2.0,
-                tags_in: TagsIn::Black,
-            }),
-            inverted: false,
-        }),
+        Object::Cube => {
+            let edge_mm = (CUBE_MM - 2.0 * QUIET_MM) / f64::from(SQUARES);
+            let board = BoardSpec::new(GridKind::Checker, SQUARES - 1, SQUARES - 1, edge_mm);
+            TargetSpec::Board(BoardSpec { boards: 6, ..board })
+        }
     };
     let family = match &spec {
         TargetSpec::Solid(spec) => Family::resolve(&spec.tags.family)?,
