@@ -7,6 +7,7 @@ use anyhow::Context;
 
 use super::files::{File, same_file, write_all};
 use super::{target_file, verify};
+use crate::cli::output::say;
 use crate::export::obj;
 use crate::family::Family;
 use crate::target::Target;
@@ -50,9 +51,9 @@ impl Delivery {
         summary: &str,
     ) -> anyhow::Result<ExitCode> {
         let written = write_all(&self.output, files)?;
-        println!("{summary}");
+        say!("{summary}");
         for path in &written {
-            println!("wrote {}", path.display());
+            say!("wrote {}", path.display());
         }
         let texture = obj::texture_name(&target.name);
         let artifacts: Vec<PathBuf> =
