@@ -23,9 +23,7 @@ fn photograph() -> (Target, Family, Gray<u8>) {
         .expect("a board that fits A3");
     let sheets = artwork::draw(&target, Some(&family)).expect("a board that can be drawn").sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    let corners = &target.panels[0].corners;
-    let centre =
-        corners.iter().map(|c| DVec3::from(c.target_mm)).sum::<DVec3>() / corners.len() as f64;
+    let centre = target.panels[0].middle_mm();
     let eye = centre + 420.0 * DVec3::new(0.4, -0.41, 0.82);
     let pose = Pose::looking_at(eye, centre, DVec3::Y);
     let light = Light { blur_px: 0.8, noise: 0.01, seed: 1, ..Light::default() };

@@ -1,6 +1,9 @@
 //! `deltille checkerboard`: what it writes and refuses, and tagged checkerboards on synthetic
 //! photographs, where the truth is exact.
 
+#[path = "common/view.rs"]
+mod view;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -18,6 +21,7 @@ use glam::DVec3;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use view::tilted;
 
 fn deltille(folder: &Path, args: &str) -> std::process::Output {
     let mut command = Command::cargo_bin("deltille").unwrap();
@@ -81,9 +85,7 @@ fn board(spec: &BoardSpec) -> Board {
     let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
     let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    let corners = &target.panels[0].corners;
-    let sum: DVec3 = corners.iter().map(|corner| DVec3::from(corner.target_mm)).sum();
-    let centre_mm = sum / corners.len() as f64;
+    let centre_mm = target.panels[0].middle_mm();
     Board { detector, scene, centre_mm }
 }
 
@@ -96,10 +98,7 @@ impl Board {
         mm: f64,
         tilt: f64,
     ) -> (Detection, Truth) {
-        let [azimuth, roll] = [0; 2].map(|_| rng.random_range(0.0..std::f64::consts::TAU));
-        let eye = DVec3::new(tilt.sin() * azimuth.cos(), tilt.sin() * azimuth.sin(), tilt.cos());
-        let up = DVec3::new(roll.cos(), roll.sin(), 0.3);
-        let pose = Pose::looking_at(self.centre_mm + mm * eye, self.centre_mm, up);
+        let pose = tilted(rng, self.centre_mm, mm, tilt);
         let light = Light { seed: rng.random(), gradient: [0.5, -0.3], ..Light::default() };
         let image: Gray<u8> =
             self.scene.render(camera, &pose, &light).map(|v| (v * 255.0 + 0.5) as u8);

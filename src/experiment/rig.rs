@@ -290,8 +290,7 @@ fn misplaced(target: &Target, seed: u64) -> Target {
     let poses = target.panels.iter().map(|panel| {
         let turn = DMat3::from_quat(DQuat::from_scaled_axis(normal(PLACED_RAD)));
         // A panel is turned about its own middle.
-        let count = panel.corners.len() as f64;
-        let middle = panel.corners.iter().map(|c| DVec3::from(c.target_mm)).sum::<DVec3>() / count;
+        let middle = panel.middle_mm();
         let arm = DVec3::from(panel.pose.translation_mm) - middle;
         PanelPose::new(turn * panel.pose.matrix(), middle + turn * arm + normal(PLACED_MM))
     });
