@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 use super::clearance::clear_squares;
 use super::corner_model::CornerFitter;
-use super::detection::{Grid, GridCorner};
+use super::detection::{Grid, GridCorner, median};
 use super::refine::{MIN_MODEL_RADIUS, ModelFit, RefineStatus, Refined, Refinement, Refiner};
 use crate::raster::{Gray, Intensity, Pyramid};
 
@@ -132,9 +132,4 @@ impl Refiner {
         let fit = fits.find(|fit| fit.residual <= limit)?;
         Some(Refined { position: fit.position, cov: Some(fit.cov), status: RefineStatus::Ok })
     }
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
