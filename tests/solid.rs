@@ -2,22 +2,15 @@
 
 #[path = "common/command.rs"]
 mod command;
-
-use std::path::Path;
+#[path = "common/folder.rs"]
+mod folder;
 
 use command::{deltille, refused};
 use deltille::export::dsc;
 use deltille::target::{LineKind, Target};
+use folder::names;
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> =
-        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
 
 #[test]
 fn an_icosahedron_needs_no_option() {
