@@ -17,26 +17,13 @@ use glam::DVec3;
 
 /// A board of 10 × 11 corners with tags, seen at 35°.
 fn photograph() -> (Target, Family, Gray<u8>) {
-    let tags = TagSpec::default();
-    let family = Family::resolve(&tags.family).expect("a shipped family");
-    let spec = BoardSpec {
-        grid: GridKind::Deltille,
-        rows: 10,
-        cols: 11,
-        edge_mm: 20.0,
-        boards: 1,
-        board_id: 0,
-        tags: Some(tags),
-        inverted: false,
-    };
-    let spec = TargetSpec::Board(spec);
+    let family = Family::resolve(&TagSpec::default().family).expect("a shipped family");
+    let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 10, 11, 20.0));
     let target = Target::build("board", &spec, Some(&family), Some(&PaperSpec::default()))
         .expect("a board that fits A3");
     let sheets = artwork::draw(&target, Some(&family)).expect("a board that can be drawn").sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    let corners = &target.panels[0].corners;
-    let centre =
-        corners.iter().map(|c| DVec3::from(c.target_mm)).sum::<DVec3>() / corners.len() as f64;
+    let centre = target.panels[0].middle_mm();
     let eye = centre + 420.0 * DVec3::new(0.4, -0.41, 0.82);
     let pose = Pose::looking_at(eye, centre, DVec3::Y);
     let light = Light { blur_px: 0.8, noise: 0.01, seed: 1, ..Light::default() };

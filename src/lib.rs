@@ -16,12 +16,13 @@
 //! | 3 | [`target`] | what exists in the world: panels, corners and tags in millimetres |
 //! | 4 | [`artwork`] | what is drawn, in millimetres, independent of file type |
 //! | 4 | [`detect`] | from pixels to labelled corners |
-//! | 5 | [`export`] | artwork and targets to files and back |
 //! | 5 | [`synth`] | a target seen by a camera, as an image |
 //! | 5 | [`calibrate`] | from detections to calibrated cameras |
-//! | 6 | [`verify`] | an artifact read back from disk and compared with its target |
-//! | 6 | [`experiment`] | simulations that measure the library itself |
-//! | 7 | `cli` | the programs' arguments, progress and messages |
+//! | 6 | [`export`] | artwork, targets and results to files and back |
+//! | 6 | [`report`] | a calibration as a page to look at |
+//! | 7 | [`verify`] | an artifact read back from disk and compared with its target |
+//! | 7 | [`experiment`] | simulations that measure the library itself |
+//! | 8 | `cli` | the programs' arguments, progress and messages |
 //!
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.

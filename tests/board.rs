@@ -1,24 +1,20 @@
 //! `deltille board`: what it writes, its templates, and what it refuses.
 
+#[path = "common/folder.rs"]
+mod folder;
+
 use std::path::Path;
 
 use assert_cmd::Command;
 use deltille::export::dsc;
 use deltille::target::{Target, TargetSpec};
+use folder::names;
 use proptest::prelude::*;
 
 fn deltille(folder: &Path) -> Command {
     let mut command = Command::cargo_bin("deltille").unwrap();
     command.current_dir(folder);
     command
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> =
-        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 fn read(path: &Path) -> Target {

@@ -29,16 +29,8 @@ enum Format {
 const ALL: [Format; 3] = [Format::Pdf, Format::Svg, Format::Png];
 
 fn spec() -> BoardSpec {
-    BoardSpec {
-        grid: GridKind::Deltille,
-        rows: 5,
-        cols: 7,
-        edge_mm: 20.0,
-        boards: 1,
-        board_id: 3,
-        tags: Some(TagSpec { first_id: 17, ..TagSpec::default() }),
-        inverted: false,
-    }
+    let tags = Some(TagSpec { first_id: 17, ..TagSpec::default() });
+    BoardSpec { board_id: 3, tags, ..BoardSpec::new(GridKind::Deltille, 5, 7, 20.0) }
 }
 
 /// A checkerboard with tags from id 17.

@@ -1,40 +1,26 @@
 //! `deltille calibrate`, `rig` and `pose` from files to files, and input that makes no camera.
 
-use std::path::Path;
-use std::process::Output;
+#[path = "common/command.rs"]
+mod command;
 
-use assert_cmd::Command;
+use std::path::Path;
+
+use command::{deltille, refused};
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::detect::{Detection, Grid, GridCorner};
 use deltille::export::detection;
 use deltille::family::Family;
 use deltille::target::{BoardSpec, GridKind, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use glam::{DMat3, DQuat, DVec3};
+use predicates::str::contains;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
-fn deltille(folder: &Path, args: &str) -> Output {
-    let mut command = Command::cargo_bin("deltille").unwrap();
-    command.current_dir(folder).args(args.split_whitespace()).output().unwrap()
-}
-
 /// What a command that has to succeed says on standard output.
 fn done(folder: &Path, args: &str) -> String {
-    let output = deltille(folder, args);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{args}: {said}");
-    String::from_utf8(output.stdout).unwrap()
-}
-
-/// The one line of a command that has to refuse its input.
-fn refused(folder: &Path, args: &str) -> String {
-    let output = deltille(folder, args);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{args}: {said}");
-    assert!(!folder.join("camera.yaml").exists() && !folder.join("camera.json").exists());
-    assert_eq!(said.lines().count(), 1, "{said}");
-    said
+    let result = deltille(folder, args).success();
+    String::from_utf8(result.get_output().stdout.clone()).unwrap()
 }
 
 fn json(path: &Path) -> Value {
@@ -42,10 +28,8 @@ fn json(path: &Path) -> Value {
 }
 
 fn board(rows: u32, cols: u32) -> Target {
-    let tags = Some(TagSpec::default());
     let family = Family::resolve(&TagSpec::default().family).unwrap();
-    let (grid, edge_mm, inverted) = (GridKind::Deltille, 20.0, false);
-    let spec = BoardSpec { grid, rows, cols, edge_mm, boards: 1, board_id: 0, tags, inverted };
+    let spec = BoardSpec::new(GridKind::Deltille, rows, cols, 20.0);
     Target::build("board", &TargetSpec::Board(spec), Some(&family), None).unwrap()
 }
 
@@ -151,15 +135,14 @@ fn wrong_detections_among_good_ones_are_left_out() {
     swap(&mut detections[7]);
     detections[9].grids[0].panel = Some(77);
     let folder = folder(&target, &detections);
-    let output = deltille(folder.path(), CALIBRATE);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{said}");
+    let result = deltille(folder.path(), CALIBRATE).success();
+    let result = result.stdout(contains("12 views, 864 corners, rms 0.05"));
+    let said = String::from_utf8_lossy(&result.get_output().stderr);
     let lines: Vec<&str> = said.lines().collect();
     assert_eq!(lines.len(), 3, "{said}");
     assert!(lines[0].starts_with("warning: left out: 04: the labels are mirrored"), "{said}");
     assert!(lines[1].starts_with("warning: left out: 07: ") && lines[1].contains("exchanged?"));
     assert!(lines[2].starts_with("warning: left out: 09: panel 77 is not on"), "{said}");
-    assert!(String::from_utf8(output.stdout).unwrap().contains("12 views, 864 corners, rms 0.05"));
 }
 
 #[test]
@@ -167,7 +150,11 @@ fn input_that_makes_no_camera_is_refused_by_its_cause() {
     let target = board(8, 9);
     let good = detections(&target, 10, 0.7);
     let said = |target: &Target, detections: &[Detection]| {
-        refused(folder(target, detections).path(), CALIBRATE)
+        let folder = folder(target, detections);
+        let said = refused(folder.path(), CALIBRATE);
+        let written = ["camera.yaml", "camera.json"].map(|name| folder.path().join(name).exists());
+        assert_eq!(written, [false; 2]);
+        said
     };
     let one = said(&target, &good[..1]);
     assert!(one.contains("1 usable views of 1: a calibration needs at least 3"), "{one}");

@@ -1,5 +1,8 @@
 //! Plain checkerboards on synthetic photographs, where the truth is exact.
 
+#[path = "common/view.rs"]
+mod view;
+
 use std::collections::BTreeMap;
 
 use deltille::camera::{Camera, KannalaBrandt, Lens, Pose};
@@ -8,8 +11,9 @@ use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Surface, Truth};
 use deltille::target::GridKind;
 use glam::{DQuat, DVec3};
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use view::tilted;
 
 const ROWS: i32 = 6;
 const COLS: i32 = 9;
@@ -82,11 +86,7 @@ fn covered(right_mm: f64) -> Scene {
 fn seen_from(rng: &mut ChaCha8Rng, distance_mm: f64, tilt: f64) -> Pose {
     let centre =
         DVec3::new(f64::from(COLS - 1) / 2.0 * EDGE_MM, f64::from(ROWS - 1) / 2.0 * EDGE_MM, 0.0);
-    let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
-    let roll = rng.random_range(0.0..std::f64::consts::TAU);
-    let direction = DVec3::new(tilt.sin() * azimuth.cos(), tilt.sin() * azimuth.sin(), tilt.cos());
-    let up = DVec3::new(roll.cos(), roll.sin(), 0.3);
-    Pose::looking_at(centre + distance_mm * direction, centre, up)
+    tilted(rng, centre, distance_mm, tilt)
 }
 
 fn detect(image: &Gray<f32>, kind: GridKind, size: Option<(u32, u32)>) -> Detection {

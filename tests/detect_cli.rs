@@ -1,21 +1,19 @@
 //! `deltille detect`: results in every format, overlays, and images that cannot be read.
 
-use std::path::Path;
+#[path = "common/command.rs"]
+mod command;
 
 use assert_cmd::Command;
+use assert_cmd::assert::Assert;
+use command::{deltille, refused};
 use deltille::export::detection;
 use deltille::target::Target;
-
-fn deltille(folder: &Path, args: &str) -> std::process::Output {
-    let mut command = Command::cargo_bin("deltille").unwrap();
-    command.current_dir(folder).args(args.split_whitespace()).output().unwrap()
-}
+use predicates::str::contains;
 
 /// A folder with a board as `board.json`, `board.dsc` and `sheet/board.png`.
 fn board() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let made = deltille(folder.path(), "board --rows 6 --cols 7 --png --dsc --dpi 200 -o sheet");
-    assert!(made.status.success());
+    deltille(folder.path(), "board --rows 6 --cols 7 --png --dsc --dpi 200 -o sheet").success();
     for name in ["board.json", "board.dsc"] {
         std::fs::rename(folder.path().join("sheet").join(name), folder.path().join(name)).unwrap();
     }
@@ -38,10 +36,7 @@ fn a_rendered_sheet_is_found_with_every_label_in_every_format() {
         let args = format!(
             "detect --target {target} sheet/board.png -o out --format json,orpc,csv --overlay -j 1"
         );
-        let output = deltille(folder.path(), &args);
-        let said = String::from_utf8(output.stdout).unwrap();
-        assert_eq!(output.status.code(), Some(0), "{:?}", String::from_utf8(output.stderr));
-        assert!(said.contains("1 grid, 42 corners"), "{said}");
+        deltille(folder.path(), &args).success().stdout(contains("1 grid, 42 corners"));
 
         let json = std::fs::read_to_string(path("out/board.json")).unwrap();
         let found = detection::read(&json).unwrap();
@@ -84,10 +79,7 @@ fn a_plain_checkerboard_is_found_and_numbered_by_rows() {
     let pixels = image::GrayImage::from_raw(280, 240, board.pixels().to_vec()).unwrap();
     pixels.save(folder.path().join("board.png")).unwrap();
     let args = "detect --grid checker --rows 3 --cols 4 board.png --format json,orpc --overlay";
-    let output = deltille(folder.path(), args);
-    assert_eq!(output.status.code(), Some(0), "{:?}", String::from_utf8(output.stderr));
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert!(said.contains("1 grid, 12 corners"), "{said}");
+    deltille(folder.path(), args).success().stdout(contains("1 grid, 12 corners"));
     let json = std::fs::read_to_string(folder.path().join("board.json")).unwrap();
     let found = detection::read(&json).unwrap();
     for (i, found) in found.grids[0].corners.iter().enumerate() {
@@ -106,9 +98,8 @@ fn unreadable_images_are_counted_and_the_rest_go_on() {
     std::fs::write(folder.path().join("cut.png"), &png[..png.len() / 2]).unwrap();
     std::fs::write(folder.path().join("empty.png"), "").unwrap();
     let args = "detect --grid deltille cut.png empty.png sheet/board.png missing.png -o out";
-    let output = deltille(folder.path(), args);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1));
+    let result = deltille(folder.path(), args).code(1);
+    let said = String::from_utf8_lossy(&result.get_output().stderr);
     for name in ["cut.png", "empty.png", "missing.png", "3 of 4 images failed"] {
         assert_eq!(said.matches(name).count(), 1, "{said}");
     }
@@ -125,19 +116,18 @@ fn folders_patterns_and_lists_are_taken_in_order_and_what_is_done_is_skipped() {
         std::fs::copy(path("sheet/board.png"), path("day").join(name)).unwrap();
     }
     std::fs::write(path("day/notes.txt"), "not a photograph").unwrap();
-    let names = |output: &std::process::Output| {
-        let said = String::from_utf8(output.stdout.clone()).unwrap();
+    let detect = |args: &str| deltille(folder.path(), &format!("detect --grid deltille {args}"));
+    let names = |result: &Assert| {
+        let said = String::from_utf8_lossy(&result.get_output().stdout);
         said.lines().map(|l| l.split(':').next().unwrap().to_owned()).collect::<Vec<_>>()
     };
-    let all = deltille(folder.path(), "detect --grid deltille day -o out");
-    assert_eq!(names(&all), ["day/a.PNG", "day/b.png", "day/c.png"]);
-    let pattern = deltille(folder.path(), "detect --grid deltille day/*.png -o out2");
-    assert_eq!(names(&pattern), ["day/b.png", "day/c.png"]);
+    assert_eq!(names(&detect("day -o out")), ["day/a.PNG", "day/b.png", "day/c.png"]);
+    assert_eq!(names(&detect("day/*.png -o out2")), ["day/b.png", "day/c.png"]);
 
     std::fs::remove_file(path("out/b.json")).unwrap();
-    let rest = deltille(folder.path(), "detect --grid deltille day -o out --skip-existing");
+    let rest = detect("day -o out --skip-existing");
     assert_eq!(names(&rest), ["day/b.png"]);
-    assert!(String::from_utf8(rest.stderr).unwrap().contains("2 of 3 images skipped"));
+    rest.stderr(contains("2 of 3 images skipped"));
 
     let mut listed = Command::cargo_bin("deltille").unwrap();
     listed.current_dir(folder.path()).args(["detect", "--grid", "deltille", "-", "--stream"]);
@@ -154,9 +144,8 @@ fn folders_patterns_and_lists_are_taken_in_order_and_what_is_done_is_skipped() {
 #[test]
 fn a_benchmark_tells_every_stage() {
     let folder = board();
-    let output = deltille(folder.path(), "bench detect --target board.json sheet --repeat 2");
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert!(output.status.success());
+    let result = deltille(folder.path(), "bench detect --target board.json sheet --repeat 2");
+    let said = String::from_utf8(result.success().get_output().stdout.clone()).unwrap();
     assert!(said.starts_with("1 images, 3.87 Mpx and 42.0 corners each"), "{said}");
     for stage in ["pyramid", "saddles", "grids", "labels", "refine", "all"] {
         assert!(said.contains(&format!("\n{stage} ")), "{said}");
@@ -192,10 +181,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
         ("detect --grid deltille - -", "named twice"),
         ("detect --grid deltille sheet --stream --skip-existing", "--skip-existing"),
     ] {
-        let output = deltille(folder.path(), args);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{args}: {said}");
-        assert!(said.starts_with("error: ") && said.lines().count() == 1, "{args}: {said}");
+        let said = refused(folder.path(), args);
         assert!(said.contains(words), "{args}: {said}");
     }
 }

@@ -2,6 +2,9 @@
 //!
 //! Rates over many seeds: `cargo test --release --test detect_hard -- --ignored --nocapture`.
 
+#[path = "common/view.rs"]
+mod view;
+
 use std::collections::BTreeMap;
 
 use deltille::artwork;
@@ -13,8 +16,9 @@ use deltille::synth::{Light, Scene, Surface, Truth, scene_of_sheet};
 use deltille::target::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
 use glam::{DQuat, DVec3};
 use image::ImageFormat;
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use view::tilted;
 
 const EDGE_MM: f64 = 20.0;
 
@@ -33,25 +37,13 @@ impl Board {
         let tags = TagSpec::default();
         let family = Family::resolve(&tags.family).unwrap();
         let bits_across = f64::from(family.dimension().rows()) + 3.0 * tags.border_bits;
-        let tags = Some(tags);
-        let spec = BoardSpec {
-            grid: deltille::target::GridKind::Deltille,
-            rows: 6,
-            cols: 7,
-            edge_mm: EDGE_MM,
-            boards: 1,
-            board_id: 0,
-            tags,
-            inverted,
-        };
-        let spec = TargetSpec::Board(spec);
+        let plain = BoardSpec::new(deltille::target::GridKind::Deltille, 6, 7, EDGE_MM);
+        let spec = TargetSpec::Board(BoardSpec { inverted, ..plain });
         let target =
             Target::build("board", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
         let sheets = artwork::draw(&target, Some(&family)).unwrap().sheets;
         let scene = scene_of_sheet(&target, &sheets[0], 0);
-        let corners = &target.panels[0].corners;
-        let sum: DVec3 = corners.iter().map(|corner| DVec3::from(corner.target_mm)).sum();
-        let centre_mm = sum / corners.len() as f64;
+        let centre_mm = target.panels[0].middle_mm();
         let detector = Detector::for_target(&target, Some(&family), DetectorConfig::default());
         Self { target, scene, centre_mm, detector, bit_mm: EDGE_MM / bits_across }
     }
@@ -60,13 +52,7 @@ impl Board {
     fn view(&self, rng: &mut ChaCha8Rng, bit_px: f64, tilt_rad: f64) -> (Camera, Pose) {
         let camera = Camera::pinhole(640, 480, 0.5);
         let distance_mm = camera.focal_px[0] * self.bit_mm / bit_px;
-        let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
-        let roll = rng.random_range(0.0..std::f64::consts::TAU);
-        let (sin, cos) = tilt_rad.sin_cos();
-        let direction = DVec3::new(sin * azimuth.cos(), sin * azimuth.sin(), cos);
-        let up = DVec3::new(roll.cos(), roll.sin(), 0.3);
-        let eye = self.centre_mm + distance_mm * direction;
-        (camera, Pose::looking_at(eye, self.centre_mm, up))
+        (camera, tilted(rng, self.centre_mm, distance_mm, tilt_rad))
     }
 
     /// What is found of a view through `spoil`.

@@ -1,5 +1,8 @@
 //! Labels and positions on synthetic photographs, where the truth is exact.
 
+#[path = "common/view.rs"]
+mod view;
+
 use std::collections::BTreeMap;
 
 use deltille::artwork;
@@ -10,8 +13,9 @@ use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Truth, scene_of_sheet};
 use deltille::target::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
 use glam::DVec3;
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use view::tilted;
 
 struct Board {
     target: Target,
@@ -22,24 +26,14 @@ struct Board {
 
 fn board(tags: Option<TagSpec>, inverted: bool) -> Board {
     let family = tags.as_ref().map(|tags| Family::resolve(&tags.family).unwrap());
-    let spec = BoardSpec {
-        grid: GridKind::Deltille,
-        rows: 8,
-        cols: 9,
-        edge_mm: 18.0,
-        boards: 1,
-        board_id: 4,
-        tags,
-        inverted,
-    };
+    let plain = BoardSpec::new(GridKind::Deltille, 8, 9, 18.0);
+    let spec = BoardSpec { board_id: 4, tags, inverted, ..plain };
     let paper = PaperSpec::default();
     let target =
         Target::build("board", &TargetSpec::Board(spec), family.as_ref(), Some(&paper)).unwrap();
     let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
     let scene = scene_of_sheet(&target, &sheets[0], 0);
-    let sum: DVec3 =
-        target.panels[0].corners.iter().map(|corner| DVec3::from(corner.target_mm)).sum();
-    let centre_mm = sum / target.panels[0].corners.len() as f64;
+    let centre_mm = target.panels[0].middle_mm();
     Board { target, family, scene, centre_mm }
 }
 
@@ -48,14 +42,8 @@ impl Board {
         Detector::for_target(&self.target, self.family.as_ref(), DetectorConfig::default())
     }
 
-    /// A pose that looks at the board from `tilt` off its normal, turned about the line of sight.
     fn seen_from(&self, rng: &mut ChaCha8Rng, distance_mm: f64, tilt: f64) -> Pose {
-        let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
-        let roll = rng.random_range(0.0..std::f64::consts::TAU);
-        let direction =
-            DVec3::new(tilt.sin() * azimuth.cos(), tilt.sin() * azimuth.sin(), tilt.cos());
-        let up = DVec3::new(roll.cos(), roll.sin(), 0.3);
-        Pose::looking_at(self.centre_mm + distance_mm * direction, self.centre_mm, up)
+        tilted(rng, self.centre_mm, distance_mm, tilt)
     }
 }
 

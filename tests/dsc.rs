@@ -6,23 +6,14 @@ use deltille::export::dsc::{self, Dialect, DscError};
 use deltille::family::Family;
 use deltille::lattice::Vertex;
 use deltille::target::{
-    BoardSpec, Corner, GridKind, ListFormat, Outline, Panel, PanelPose, TagPlacement, TagSpec,
-    TagsIn, Target, TargetSpec,
+    BoardSpec, Corner, GridKind, ListFormat, Outline, Panel, PanelPose, TagPlacement, TagsIn,
+    Target, TargetSpec,
 };
 use proptest::prelude::*;
 
 fn board(rows: u32, cols: u32, edge_mm: f64, boards: u32) -> Target {
-    let tags = Some(TagSpec::default());
-    let spec = BoardSpec {
-        grid: GridKind::Deltille,
-        rows,
-        cols,
-        edge_mm,
-        boards,
-        board_id: 5,
-        tags,
-        inverted: false,
-    };
+    let plain = BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm);
+    let spec = BoardSpec { boards, board_id: 5, ..plain };
     let family = Family::resolve("delTag25h7").unwrap();
     Target::build("board", &TargetSpec::Board(spec), Some(&family), None).unwrap()
 }

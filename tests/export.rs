@@ -14,16 +14,8 @@ use lopdf::Object;
 use tempfile::TempDir;
 
 fn tiny(inverted: bool) -> Artwork {
-    let spec = BoardSpec {
-        grid: GridKind::Deltille,
-        rows: 2,
-        cols: 3,
-        edge_mm: 20.0,
-        boards: 1,
-        board_id: 0,
-        tags: Some(TagSpec { first_id: 4, ..TagSpec::default() }),
-        inverted,
-    };
+    let tags = Some(TagSpec { first_id: 4, ..TagSpec::default() });
+    let spec = BoardSpec { tags, inverted, ..BoardSpec::new(GridKind::Deltille, 2, 3, 20.0) };
     let family = Family::resolve("delTag25h7").unwrap();
     let paper = PaperSpec::default();
     let target = Target::build("tiny", &TargetSpec::Board(spec), Some(&family), Some(&paper));

@@ -21,19 +21,8 @@ const ANGLES_DEG: [f64; 4] = [0.0, 15.0, 37.0, 45.0];
 
 /// One detector for each thing that may be asked for, by name.
 static DETECTORS: LazyLock<Vec<(&str, Detector)>> = LazyLock::new(|| {
-    let tags = TagSpec::default();
-    let family = Family::resolve(&tags.family).unwrap();
-    let spec = BoardSpec {
-        grid: GridKind::Deltille,
-        rows: 10,
-        cols: 11,
-        edge_mm: 20.0,
-        boards: 1,
-        board_id: 0,
-        tags: Some(tags),
-        inverted: false,
-    };
-    let spec = TargetSpec::Board(spec);
+    let family = Family::resolve(&TagSpec::default().family).unwrap();
+    let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 10, 11, 20.0));
     let target = Target::build("board", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
     let config = DetectorConfig::default();
     let grid = |kind, size| Detector::for_grid(kind, size, config.clone());

@@ -1,9 +1,14 @@
 //! Ctrl-C during a search: what is kept, and that going on from it finds the same.
 #![cfg(unix)]
 
+#[path = "common/folder.rs"]
+mod folder;
+
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
+
+use folder::names;
 
 /// Longer than any of these searches needs on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -36,14 +41,6 @@ fn wait_for(what: &str, mut there: impl FnMut() -> bool) {
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> =
-        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 fn verified(file: &Path) -> bool {

@@ -1,10 +1,12 @@
 //! The nets of solids: printed, read back, folded; and nets broken on purpose, each of which must
 //! fail for the right reason.
 
-use std::f64::consts::TAU;
-use std::path::Path;
+#[path = "common/command.rs"]
+mod command;
 
-use assert_cmd::Command;
+use std::f64::consts::TAU;
+
+use command::{deltille, refused};
 use deltille::artwork::{self, Artwork, Part};
 use deltille::export::{pdf, png, sheet_file_name, svg};
 use deltille::family::Family;
@@ -205,11 +207,6 @@ fn pages_that_do_not_join_are_found() {
     assert_fails(&verify(&target, &unnamed, "svg"), &["page B1: label 1 differs"]);
 }
 
-fn deltille(folder: &Path, args: &str) -> assert_cmd::assert::Assert {
-    let mut command = Command::cargo_bin("deltille").unwrap();
-    command.current_dir(folder).args(args.split_whitespace()).assert()
-}
-
 #[test]
 fn every_solid_prints_as_a_net() {
     for (solid, edges, corners) in
@@ -249,9 +246,7 @@ fn nets_that_cannot_be_made_are_refused_in_one_line() {
         ("icosahedron --pdf --face-margin 1mm", "--per-face"),
         ("icosahedron --pdf --paper 50x60mm", "--paper"),
     ] {
-        let result = deltille(folder.path(), args).code(2);
-        let stderr = String::from_utf8_lossy(&result.get_output().stderr).into_owned();
-        assert!(stderr.starts_with("error: ") && stderr.lines().count() == 1, "{args}: {stderr}");
+        let stderr = refused(folder.path(), args);
         assert!(stderr.contains(said), "{args}: {stderr}");
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);

@@ -20,6 +20,13 @@ fn images(folder: &str) -> Option<Vec<std::path::PathBuf>> {
     Some(images)
 }
 
+/// Whether the next corner of a row and of a column, where they are there, lie as on the print.
+fn is_unmirrored(p: &[f64; 2], along: Option<&[f64; 2]>, up: Option<&[f64; 2]>) -> bool {
+    along
+        .zip(up)
+        .is_none_or(|(q, r)| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0)
+}
+
 /// A grid is a lattice seen through a lens: every corner lies near the middle of its opposite
 /// neighbours, and all small triangles have the same, unmirrored handedness.
 fn topology_is_consistent(grid: &Grid) -> bool {
@@ -32,13 +39,7 @@ fn topology_is_consistent(grid: &Grid) -> bool {
             let edge = (q[0] - r[0]).hypot(q[1] - r[1]) / 2.0;
             ((q[0] + r[0]) / 2.0 - p[0]).hypot((q[1] + r[1]) / 2.0 - p[1]) < 0.1 * edge
         });
-        let handed = match (near(0, 1), near(1, 0)) {
-            (Some(q), Some(r)) => {
-                (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0
-            }
-            _ => true,
-        };
-        straight && handed
+        straight && is_unmirrored(p, near(0, 1), near(1, 0))
     })
 }
 
@@ -90,13 +91,7 @@ fn squares_are_consistent(grid: &Grid) -> bool {
             // A row turns by less than 45° at a corner.
             cos > 0.7 && (1.0 / MAX_RATIO..MAX_RATIO).contains(&ratio)
         });
-        let handed = match (near(0, 1), near(1, 0)) {
-            (Some(q), Some(r)) => {
-                (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0
-            }
-            _ => true,
-        };
-        straight && handed
+        straight && is_unmirrored(p, near(0, 1), near(1, 0))
     })
 }
 

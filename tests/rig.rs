@@ -7,7 +7,7 @@ use deltille::calibrate::{
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::family::Family;
 use deltille::target::{SolidShape, SolidSpec, Target, TargetSpec};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -50,14 +50,7 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
     let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
     let family = Family::resolve("delTag25h7").unwrap();
     let target = Target::build("ico", &spec, Some(&family), None).unwrap();
-    let stated: Vec<Pose> = target
-        .panels
-        .iter()
-        .map(|panel| Pose {
-            rotation: DQuat::from_mat3(&DMat3::from_cols_array(&panel.pose.rotation).transpose()),
-            translation: panel.pose.translation_mm.into(),
-        })
-        .collect();
+    let stated: Vec<Pose> = target.panels.iter().map(|panel| panel.pose.to_pose()).collect();
     let panels: Vec<Pose> = stated
         .iter()
         .map(|pose| {

@@ -12,19 +12,8 @@ use deltille::verify::Document;
 use proptest::prelude::*;
 
 fn board() -> (Target, Family) {
-    let tags = TagSpec::default();
-    let family = Family::resolve(&tags.family).unwrap();
-    let spec = BoardSpec {
-        grid: GridKind::Deltille,
-        rows: 5,
-        cols: 6,
-        edge_mm: 20.0,
-        boards: 1,
-        board_id: 0,
-        tags: Some(tags),
-        inverted: false,
-    };
-    let spec = TargetSpec::Board(spec);
+    let family = Family::resolve(&TagSpec::default().family).unwrap();
+    let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 5, 6, 20.0));
     let target = Target::build("board", &spec, Some(&family), Some(&PaperSpec::default()));
     (target.unwrap(), family)
 }

@@ -1,25 +1,16 @@
 //! `deltille icosahedron` and its sisters: what they write, and what proves it.
 
-use std::path::Path;
+#[path = "common/command.rs"]
+mod command;
+#[path = "common/folder.rs"]
+mod folder;
 
-use assert_cmd::Command;
+use command::{deltille, refused};
 use deltille::export::dsc;
 use deltille::target::{LineKind, Target};
+use folder::names;
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
-
-fn deltille(folder: &Path, args: &str) -> assert_cmd::assert::Assert {
-    let mut command = Command::cargo_bin("deltille").unwrap();
-    command.current_dir(folder).args(args.split_whitespace()).assert()
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> =
-        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
 
 #[test]
 fn an_icosahedron_needs_no_option() {
@@ -259,9 +250,7 @@ fn meshes_that_are_no_solids_are_refused() {
     ] {
         std::fs::write(path.join(format!("{name}.obj")), text).unwrap();
         let args = format!("solid --mesh {name}.obj -o out {options}");
-        let result = deltille(path, &args).code(2);
-        let stderr = String::from_utf8_lossy(&result.get_output().stderr).into_owned();
-        assert!(stderr.starts_with("error: ") && stderr.lines().count() == 1, "{name}: {stderr}");
+        let stderr = refused(path, &args);
         assert!(stderr.contains(said), "{name}: {stderr}");
         let of_file = options.is_empty();
         assert!(!of_file || stderr.contains(&format!("{name}.obj")), "{name}: {stderr}");
@@ -543,9 +532,7 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
         ("icosahedron --family delTag16h5", "take --family delTag25h7"),
         ("solid", "--mesh"),
     ] {
-        let result = deltille(folder.path(), args).code(2);
-        let stderr = String::from_utf8_lossy(&result.get_output().stderr).into_owned();
-        assert!(stderr.starts_with("error: ") && stderr.lines().count() == 1, "{args}: {stderr}");
+        let stderr = refused(folder.path(), args);
         assert!(stderr.contains(said), "{args}: {stderr}");
     }
     assert!(names(folder.path()).is_empty());

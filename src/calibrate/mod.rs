@@ -35,6 +35,7 @@ mod solve;
 mod start;
 mod view;
 mod weights;
+mod wrong;
 
 pub use error::CalibrationError;
 pub use grid::UntaggedGrid;

@@ -13,20 +13,12 @@ use super::solution::{Corner, Parameter, Solution, ViewSolution, rms_px};
 use super::start::first_camera;
 use super::view::View;
 use super::weights::{Weights, Whitening, median};
+use super::wrong::{limit_px, median_px};
 use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Pose};
 
 /// Two views of a plane determine focal lengths and principal point if nothing is off; a third
 /// shows whether something is.
 const LEAST_VIEWS: usize = 3;
-
-/// A view does not belong with the others when its median error is more than so many times that of
-/// the median view: blur, light and distance make a few times as much of it, labels that are off by a
-/// tile a hundred times.
-const WRONG_VIEW_RATIO: f64 = 10.0;
-
-/// Nor is it wrong below this: a corner that was found at all is found to the pixel, however much
-/// better the others are.
-const WRONG_VIEW_PX: f64 = 1.0;
 
 /// Boards whose normals differ by less count as parallel. A corner's noise of a twentieth of a
 /// pixel on a board of 500 px already looks like a tilt of one degree.
@@ -223,10 +215,10 @@ impl Search<'_> {
             .map(|frame| {
                 let of_frame = all.blocks.iter().zip(&residuals_of_all);
                 let of_frame = of_frame.filter(|(block, _)| block.frame == frame);
-                median(of_frame.flat_map(|(_, r)| r).map(|[x, y]| x.hypot(*y)).collect())
+                median_px(of_frame.flat_map(|(_, residuals)| residuals))
             })
             .collect();
-        let limit = f64::max(WRONG_VIEW_RATIO * median(medians.clone()), WRONG_VIEW_PX);
+        let limit = limit_px(&medians);
         let belongs = |frame: usize| medians[frame] <= limit;
         let problem = all.with_frames(belongs);
         let kept: Vec<usize> = (0..used.len()).filter(|&f| belongs(f)).map(|f| used[f]).collect();

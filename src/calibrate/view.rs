@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 
 use super::error::CalibrationError;
 use super::grid::UntaggedGrid;
@@ -8,7 +8,7 @@ use super::problem::Observation;
 use super::shape::Shape;
 use crate::camera::Pose;
 use crate::detect::{Detection, Grid};
-use crate::target::{Panel, PanelPose, Target, TargetSpec};
+use crate::target::{Panel, Target, TargetSpec};
 
 /// Corners that a panel needs in a view, so that a few wrong ones show.
 const LEAST_CORNERS: usize = 6;
@@ -68,7 +68,7 @@ impl Reference<'_> {
     pub fn panels(&self) -> Vec<Pose> {
         match self {
             Self::Grid(_) => vec![Pose::IDENTITY],
-            Self::Target(target) => target.panels.iter().map(|p| pose(&p.pose)).collect(),
+            Self::Target(target) => target.panels.iter().map(|p| p.pose.to_pose()).collect(),
         }
     }
 
@@ -197,7 +197,7 @@ fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
     };
     let panel = &target.panels[index];
     check_panel(target, panel, grid)?;
-    let from_target = pose(&panel.pose).inverse();
+    let from_target = panel.pose.to_pose().inverse();
     let places: BTreeMap<(i32, i32), DVec3> = panel
         .corners
         .iter()
@@ -282,13 +282,4 @@ fn is_mirrored(sighting: &Sighting) -> bool {
         Some(((ax - x) * (by - y) - (ay - y) * (bx - x)).signum())
     });
     turns.sum::<f64>() > 0.0
-}
-
-/// The pose of a panel.
-fn pose(panel: &PanelPose) -> Pose {
-    let rotation = DMat3::from_cols_array(&panel.rotation).transpose();
-    Pose {
-        rotation: DQuat::from_mat3(&rotation).normalize(),
-        translation: panel.translation_mm.into(),
-    }
 }

@@ -35,6 +35,26 @@ pub struct Grid {
     pub tags: Vec<DecodedTag>,
 }
 
+impl Grid {
+    /// Median distance of corners that follow each other in a row or column, px; `None` where there
+    /// are none such.
+    pub fn edge_px(&self) -> Option<f64> {
+        let places: BTreeMap<(i32, i32), [f64; 2]> =
+            self.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+        let edges = self.corners.iter().flat_map(|c| {
+            let next = [(c.row, c.col + 1), (c.row + 1, c.col)];
+            next.into_iter().filter_map(|v| places.get(&v)).map(|[x, y]| (c.x - x).hypot(c.y - y))
+        });
+        median(edges.collect())
+    }
+}
+
+/// The middle value.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
 /// A corner in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridCorner {

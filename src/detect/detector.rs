@@ -184,7 +184,8 @@ impl Detector {
         let least = least_untagged_corners(kind::<N>()) as usize;
         grids.retain(|grid| {
             let plausible = grid.corners.len() >= least && !self.labels.exceeded_by(grid);
-            !grid.tags.is_empty() || plausible && median_edge_px(grid) >= MIN_UNTAGGED_EDGE_PX
+            !grid.tags.is_empty()
+                || plausible && grid.edge_px().unwrap_or(0.0) >= MIN_UNTAGGED_EDGE_PX
         });
         report_once(&mut grids);
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
@@ -192,7 +193,7 @@ impl Detector {
         timing.lap("labels");
         let mut fitter = CornerFitter::default();
         grids.retain_mut(|grid| {
-            let edge_px = median_edge_px(grid);
+            let edge_px = grid.edge_px().unwrap_or(0.0);
             let images = (image, &pyramid);
             let blur_px = self.refiner.refine_grid(&mut fitter, images, grid, &self.tag_areas);
             let is_wave =
@@ -272,22 +273,6 @@ fn report_once(grids: &mut Vec<Grid>) {
         }
         !grid.corners.is_empty()
     });
-}
-
-/// Median distance of corners that follow each other in a row or column, px.
-fn median_edge_px(grid: &Grid) -> f64 {
-    let places: BTreeMap<(i32, i32), [f64; 2]> =
-        grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
-    let edges = grid.corners.iter().flat_map(|c| {
-        let next = [(c.row, c.col + 1), (c.row + 1, c.col)];
-        next.into_iter().filter_map(|v| places.get(&v)).map(|[x, y]| (c.x - x).hypot(c.y - y))
-    });
-    let mut edges: Vec<f64> = edges.collect();
-    if edges.is_empty() {
-        return 0.0;
-    }
-    let middle = edges.len() / 2;
-    *edges.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn refiner(kind: GridKind, config: DetectorConfig) -> Refiner {

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 use super::clearance::{Surroundings, TagAreas, surroundings};
 use super::corner_model::CornerFitter;
-use super::detection::{Grid, GridCorner};
+use super::detection::{Grid, GridCorner, median};
 use super::refine::{MIN_MODEL_RADIUS, ModelFit, Refined, Refinement, Refiner, Room};
 use crate::raster::{Gray, Intensity, Pyramid};
 
@@ -159,9 +159,4 @@ impl Refiner {
         });
         fits.find(|fit| fit.residual <= limit)
     }
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -29,8 +29,8 @@ use crate::detect::{Detection, Detector, DetectorConfig};
 use crate::family::{Family, FamilyError};
 use crate::synth::{Light, Scene, scene_of_target};
 use crate::target::{
-    BoardSpec, GridKind, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, TagSpec, TagsIn,
-    Target, TargetError, TargetSpec,
+    BoardSpec, GridKind, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, Target,
+    TargetError, TargetSpec,
 };
 
 /// Cameras of the rig.
@@ -211,11 +211,8 @@ pub fn run(
             let views = views(&of_camera, &reference).map_err(failed)?.views;
             cameras.push(RigViews { name: format!("c{index}"), views, known: None });
         }
-        let panels: Vec<PanelPlace> = reference
-            .panels()
-            .into_iter()
-            .map(|target_from_panel| PanelPlace { target_from_panel, covariance: None })
-            .collect();
+        let panels: Vec<PanelPlace> =
+            stated.panels.iter().map(|panel| (&panel.pose).into()).collect();
         for refined in [false, true] {
             let options = RigOptions {
                 model: Model::Radtan,
@@ -252,22 +249,11 @@ fn target(object: Object) -> Result<(Target, Family), RigExperimentError> {
             edge_mm: ICOSAHEDRON_MM,
             ..SolidSpec::new(SolidShape::Icosahedron)
         }),
-        Object::Cube => TargetSpec::Board(BoardSpec {
-            grid: GridKind::Checker,
-            rows: SQUARES - 1,
-            cols: SQUARES - 1,
-            edge_mm: (CUBE_MM - 2.0 * QUIET_MM) / f64::from(SQUARES),
-            boards: 6,
-            board_id: 0,
-            tags: Some(TagSpec {
-                family: "aprilTag36h11".to_owned(),
-                first_id: 0,
-                spacing: 2,
-                border_bits: 2.0,
-                tags_in: TagsIn::Black,
-            }),
-            inverted: false,
-        }),
+        Object::Cube => {
+            let edge_mm = (CUBE_MM - 2.0 * QUIET_MM) / f64::from(SQUARES);
+            let board = BoardSpec::new(GridKind::Checker, SQUARES - 1, SQUARES - 1, edge_mm);
+            TargetSpec::Board(BoardSpec { boards: 6, ..board })
+        }
     };
     let family = match &spec {
         TargetSpec::Solid(spec) => Family::resolve(&spec.tags.family)?,
@@ -291,12 +277,7 @@ fn cube_face(face: usize, [left, lower, right, upper]: [f64; 4]) -> PanelPose {
     let along = DVec3::AXES[(face / 2 + 1) % 3];
     let up = normal.cross(along);
     let middle = along * (left + right) / 2.0 + up * (lower + upper) / 2.0;
-    let translation = normal * CUBE_MM / 2.0 - middle;
-    PanelPose {
-        rotation: DMat3::from_cols(along, up, normal).transpose().to_cols_array(),
-        translation_mm: translation.to_array(),
-        covariance: None,
-    }
+    PanelPose::new(DMat3::from_cols(along, up, normal), normal * CUBE_MM / 2.0 - middle)
 }
 
 /// The target with its panels as they were glued on.
@@ -308,16 +289,10 @@ fn misplaced(target: &Target, seed: u64) -> Target {
     };
     let poses = target.panels.iter().map(|panel| {
         let turn = DMat3::from_quat(DQuat::from_scaled_axis(normal(PLACED_RAD)));
-        let rotation = turn * DMat3::from_cols_array(&panel.pose.rotation).transpose();
         // A panel is turned about its own middle.
-        let count = panel.corners.len() as f64;
-        let middle = panel.corners.iter().map(|c| DVec3::from(c.target_mm)).sum::<DVec3>() / count;
+        let middle = panel.middle_mm();
         let arm = DVec3::from(panel.pose.translation_mm) - middle;
-        PanelPose {
-            rotation: rotation.transpose().to_cols_array(),
-            translation_mm: (middle + turn * arm + normal(PLACED_MM)).to_array(),
-            covariance: None,
-        }
+        PanelPose::new(turn * panel.pose.matrix(), middle + turn * arm + normal(PLACED_MM))
     });
     target.with_poses(&poses.collect::<Vec<_>>())
 }

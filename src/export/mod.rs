@@ -23,6 +23,7 @@ pub mod rig;
 pub mod stl;
 mod supersample;
 pub mod svg;
+pub mod truth;
 
 use std::path::PathBuf;
 

@@ -59,7 +59,7 @@ pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayErr
 
 /// How many times the photograph is enlarged.
 fn enlargement(width: u32, height: u32, detection: &Detection) -> u32 {
-    let edges = detection.grids.iter().filter_map(|grid| median(edge_lengths(grid)));
+    let edges = detection.grids.iter().filter_map(Grid::edge_px);
     let shortest = edges.fold(READABLE_EDGE_PX, f64::min);
     let wanted = (READABLE_EDGE_PX / shortest.max(1.0)).ceil() as u32;
     let possible = (LARGEST_SIDE_PX / width.max(height).max(1)).max(1);
@@ -103,17 +103,8 @@ fn edges(grid: &Grid) -> Vec<[[f64; 2]; 2]> {
     at.iter().flat_map(joined).collect()
 }
 
-fn edge_lengths(grid: &Grid) -> Vec<f64> {
-    edges(grid).iter().map(|[p, q]| (p[0] - q[0]).hypot(p[1] - q[1])).collect()
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
-}
-
 fn draw_grid(canvas: &mut Pixmap, grid: &Grid, colour: Color, scale: f64) {
-    let Some(edge) = median(edge_lengths(grid)).map(|px| px * scale) else { return };
+    let Some(edge) = grid.edge_px().map(|px| px * scale) else { return };
     // Pixel centres are at integers here, at halves in tiny-skia.
     let at = |[x, y]: [f64; 2]| [(x + 0.5) * scale, (y + 0.5) * scale];
     let line = (LINE_EDGES * edge).clamp(1.0, 12.0);

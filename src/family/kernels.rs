@@ -4,7 +4,12 @@
 //! wider vectors and the population count instruction, and the best that the processor has is
 //! chosen when called: counting bits without that instruction takes several times as long.
 
-use super::lexicode::sweep::{DISTANCE_SHIFT, Leaf};
+/// Bits under a leaf of the sweep of [`super::lexicode`].
+pub(super) const LEAF_BITS: u32 = 9;
+/// Words under a leaf, one bit each.
+pub(super) type Leaf = [u64; 8];
+/// An entry of a list of the sweep: the word, and from this bit on its distance so far.
+const DISTANCE_SHIFT: u32 = 52;
 
 /// Defines `$name`, which runs `$portable` compiled for the processor at hand.
 macro_rules! for_this_processor {
@@ -140,8 +145,9 @@ fn cover_portable(entries: &[u64], balls: &[Leaf], slack: u32) -> Leaf {
     let mut covered = [0; 8];
     for some in entries.chunks(16) {
         for &entry in some {
-            let radius = (u64::from(slack) - (entry >> DISTANCE_SHIFT)).min(9);
-            let ball = &balls[(radius << 9 | entry & 511) as usize];
+            let radius = (u64::from(slack) - (entry >> DISTANCE_SHIFT)).min(LEAF_BITS.into());
+            let centre = entry & ((1 << LEAF_BITS) - 1);
+            let ball = &balls[(radius << LEAF_BITS | centre) as usize];
             covered = std::array::from_fn(|i| covered[i] | ball[i]);
         }
         if covered == [u64::MAX; 8] {

@@ -1,4 +1,4 @@
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 use kurbo::{BezPath, PathEl};
 
 use super::{Scene, Surface};
@@ -29,7 +29,7 @@ pub fn scene_of_sheet(target: &Target, sheet: &Sheet, index: usize) -> Scene {
             corners: Vec::new(),
         });
         surface.corners.extend(panel.corners.iter().map(|corner| {
-            (corner.id, corner.row, corner.col, page_from_panel(placement, corner.panel_mm))
+            (corner.id, corner.row, corner.col, placement.page_from_panel(corner.panel_mm))
         }));
     }
     Scene { surfaces: surface.into_iter().collect() }
@@ -39,24 +39,13 @@ fn rectangle(width: f64, height: f64) -> Vec<[f64; 2]> {
     vec![[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]
 }
 
-fn page_from_panel(placement: &Placement, [x, y]: [f64; 2]) -> [f64; 2] {
-    let (sin, cos) = placement.angle_rad.sin_cos();
-    let [ox, oy] = placement.origin_mm;
-    [ox + cos * x - sin * y, oy + sin * x + cos * y]
-}
-
 fn target_from_page(placement: &Placement, panel: &crate::target::Panel) -> Pose {
     let [ox, oy] = placement.origin_mm;
     let page_from_panel = Pose {
         rotation: DQuat::from_rotation_z(placement.angle_rad),
         translation: DVec3::new(ox, oy, 0.0),
     };
-    let rows = DMat3::from_cols_array(&panel.pose.rotation);
-    let target_from_panel = Pose {
-        rotation: DQuat::from_mat3(&rows.transpose()),
-        translation: DVec3::from_array(panel.pose.translation_mm),
-    };
-    target_from_panel.after(&page_from_panel.inverse())
+    panel.pose.to_pose().after(&page_from_panel.inverse())
 }
 
 /// The filled ones of some shapes as polygons.

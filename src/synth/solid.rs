@@ -1,11 +1,8 @@
-use glam::{DMat3, DQuat, DVec3};
-
 use super::sheet::black_areas;
 use super::{Scene, Surface};
 use crate::artwork::{self, ArtworkError};
-use crate::camera::Pose;
 use crate::family::Family;
-use crate::target::{Panel, PanelPose, Target, TargetSpec};
+use crate::target::{Panel, Target, TargetSpec};
 
 /// The panels of a target where they are in space: the faces of a solid, or boards cut out along
 /// their quiet zone.
@@ -27,7 +24,7 @@ pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene
         let corners = panel.corners.iter().map(|c| (c.id, c.row, c.col, c.panel_mm));
         Ok(Surface {
             panel: panel.id,
-            target_from_surface: pose(&panel.pose),
+            target_from_surface: panel.pose.to_pose(),
             paper_mm,
             black_mm: black_areas(&artwork::panel_shapes(target, panel, family)?),
             corners: corners.collect(),
@@ -35,12 +32,4 @@ pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene
     };
     let surfaces = target.panels.iter().enumerate().map(surface);
     Ok(Scene { surfaces: surfaces.collect::<Result<_, _>>()? })
-}
-
-fn pose(panel: &PanelPose) -> Pose {
-    let rows = DMat3::from_cols_array(&panel.rotation);
-    Pose {
-        rotation: DQuat::from_mat3(&rows.transpose()),
-        translation: DVec3::from_array(panel.translation_mm),
-    }
 }

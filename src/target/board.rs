@@ -173,9 +173,7 @@ mod tests {
 
     fn spec(rows: u32, cols: u32, spacing: u32) -> BoardSpec {
         let tags = Some(TagSpec { spacing, ..TagSpec::default() });
-        let grid = GridKind::Deltille;
-        let (edge_mm, boards, board_id, inverted) = (20.0, 1, 0, false);
-        BoardSpec { grid, rows, cols, edge_mm, boards, board_id, tags, inverted }
+        BoardSpec { tags, ..BoardSpec::new(GridKind::Deltille, rows, cols, 20.0) }
     }
 
     fn panel(spec: &BoardSpec) -> Panel {

@@ -334,10 +334,10 @@ mod tests {
     use crate::target::{BoardSpec, PaperSpec, TagSpec};
 
     fn board(rows: u32, cols: u32, edge_mm: f64, tagged: bool, boards: u32) -> Target {
-        let grid = GridKind::Deltille;
         let tags = tagged.then(TagSpec::default);
         let inverted = rows % 2 == 1;
-        let spec = BoardSpec { grid, rows, cols, edge_mm, boards, board_id: 3, tags, inverted };
+        let plain = BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm);
+        let spec = BoardSpec { boards, board_id: 3, tags, inverted, ..plain };
         let family = Family::resolve("delTag25h7").unwrap();
         let paper = PaperSpec::default();
         Target::build("board", &TargetSpec::Board(spec), Some(&family), Some(&paper)).unwrap()

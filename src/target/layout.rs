@@ -377,8 +377,7 @@ mod tests {
     use crate::target::{Target, TargetSpec};
 
     fn spec(rows: u32, cols: u32, edge_mm: f64) -> BoardSpec {
-        let grid = GridKind::Deltille;
-        BoardSpec { grid, rows, cols, edge_mm, boards: 1, board_id: 0, tags: None, inverted: false }
+        BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm) }
     }
 
     fn build(spec: &BoardSpec, paper: &PaperSpec) -> Result<Target, TargetError> {

@@ -1,5 +1,7 @@
 use std::collections::BTreeSet;
 
+use glam::DVec3;
+
 use super::{Corner, Outline, Panel, TagPlacement, TagsIn};
 use crate::lattice::{Tile, Vertex};
 
@@ -20,6 +22,12 @@ impl Panel {
     /// Whether it is a single tag, with no corner of the lattice around it.
     pub fn is_tag_alone(&self) -> bool {
         self.corners.is_empty() && self.tags.len() == 1
+    }
+
+    /// The mean of its corners in the target frame, mm.
+    pub fn middle_mm(&self) -> DVec3 {
+        let sum: DVec3 = self.corners.iter().map(|corner| DVec3::from(corner.target_mm)).sum();
+        sum / self.corners.len() as f64
     }
 
     /// The corner at a vertex.

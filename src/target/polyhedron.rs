@@ -132,15 +132,9 @@ impl Polyhedron {
         let tile_edge_mm = side / f64::from(tiles);
         let origin = towards[0] * side / 3f64.sqrt() + DVec2::new(1.5, ROW_HEIGHT) * tile_edge_mm;
         let translation = centre + rotation * origin.extend(0.0);
-        let mut rows = [0.0; 9];
-        rows.copy_from_slice(&rotation.transpose().to_cols_array());
         Some(Face {
             outline_mm: outline.map(|p| (p - origin).to_array()),
-            pose: PanelPose {
-                rotation: rows,
-                translation_mm: translation.to_array(),
-                covariance: None,
-            },
+            pose: PanelPose::new(rotation, translation),
             tile_edge_mm,
         })
     }

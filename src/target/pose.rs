@@ -1,6 +1,8 @@
+use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Corner, PanelPose};
+use crate::camera::Pose;
 
 /// Corners within this of their places count as unrotated, in parts of the panel's extent: the
 /// written digits of a flat target.
@@ -16,6 +18,33 @@ impl PanelPose {
         translation_mm: [0.0; 3],
         covariance: None,
     };
+
+    /// A pose that was not measured.
+    pub fn new(rotation: DMat3, translation: DVec3) -> Self {
+        let rotation = rotation.transpose().to_cols_array();
+        Self { rotation, translation_mm: translation.to_array(), covariance: None }
+    }
+
+    /// A pose target_from_panel with its covariance, where it was measured.
+    pub fn from_pose(pose: &Pose, covariance: Option<[[f64; 6]; 6]>) -> Self {
+        Self { covariance, ..Self::new(DMat3::from_quat(pose.rotation), pose.translation) }
+    }
+
+    /// target_from_panel.
+    pub fn to_pose(&self) -> Pose {
+        let rotation = DQuat::from_mat3(&self.matrix()).normalize();
+        Pose { rotation, translation: self.translation_mm.into() }
+    }
+
+    /// The rotation matrix.
+    pub fn matrix(&self) -> DMat3 {
+        DMat3::from_cols_array(&self.rotation).transpose()
+    }
+
+    /// The panel position of a point of the target, mm.
+    pub fn panel_from_target(&self, point: DVec3) -> DVec3 {
+        self.matrix().transpose() * (point - DVec3::from(self.translation_mm))
+    }
 
     /// The target position of a point of the panel's plane, mm.
     pub fn target_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 3] {

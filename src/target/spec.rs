@@ -292,6 +292,15 @@ impl SolidSpec {
 }
 
 impl BoardSpec {
+    /// One board with tags.
+    pub fn new(grid: GridKind, rows: u32, cols: u32, edge_mm: f64) -> Self {
+        let tags = Some(match grid {
+            GridKind::Deltille => TagSpec::default(),
+            GridKind::Checker => TagSpec::for_squares(TagsIn::Black),
+        });
+        Self { grid, rows, cols, edge_mm, boards: 1, board_id: 0, tags, inverted: false }
+    }
+
     /// Checks every number by itself.
     pub(super) fn check(&self) -> Result<(), TargetError> {
         for (option, value) in [("--rows", self.rows), ("--cols", self.cols)] {

@@ -1,6 +1,6 @@
 //! The printed side of a face of a mesh, laid out flat.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use super::document::Page;
 use super::model::Model;
@@ -30,13 +30,11 @@ pub(super) fn face_page(
     let [width, height] =
         [width_mm, height_mm].map(|mm| (mm * px_per_mm).ceil().max(1.0) as usize * SAMPLES);
     let scale = px_per_mm * SAMPLES as f64;
-    let panel_from_target = DMat3::from_cols_array(&panel.pose.rotation);
-    let origin = DVec3::from(panel.pose.translation_mm);
     let texture = &model.texture;
     let size = DVec2::new(texture.width() as f64, texture.height() as f64);
     let mut shades = vec![u8::MAX; width * height];
     for triangle in &model.triangles {
-        let flat = triangle.vertices_mm.map(|v| panel_from_target * (v - origin));
+        let flat = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v));
         let middle = flat.iter().sum::<DVec3>().truncate() / 3.0;
         let inside = |i: usize| {
             let (from, to) = (outline[i], outline[(i + 1) % 3]);

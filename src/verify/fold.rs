@@ -214,7 +214,7 @@ impl Net {
                 net.vertices_mm.insert(vertex, panel.pose.target_from_panel(corner).into());
             }
             net.poses.push(SpaceFromPage {
-                linear: DMat3::from_cols_array(&panel.pose.rotation).transpose(),
+                linear: panel.pose.matrix(),
                 shift: panel.pose.translation_mm.into(),
             });
             net.faces.push(PrintedFace {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::face_page::face_page;
@@ -88,14 +88,13 @@ fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
 /// A camera before a face, from where the target says that it is; on one side of it from where
 /// nothing hides the face, if there is one.
 fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
+    let centre = panel.middle_mm();
     let corners = || panel.corners.iter().map(|c| DVec3::from(c.target_mm));
-    let centre = corners().sum::<DVec3>() / panel.corners.len() as f64;
     let radius = corners().map(|c| c.distance(centre)).fold(0.0, f64::max) + 2.0 * panel.edge_mm;
     let rows = verifier.family.map_or(0, |family| family.dimension().rows());
     let cell_mm = panel.edge_mm / (f64::from(rows) + 3.0 * panel.border_bits.unwrap_or_default());
     let px_per_mm = (CELL_PX / cell_mm).min(MAX_SIDE_PX / (2.0 * radius));
-    let r = panel.pose.rotation;
-    let [x, y, z] = [0, 1, 2].map(|i| DVec3::new(r[i], r[3 + i], r[6 + i]));
+    let [x, y, z] = [0, 1, 2].map(|axis| panel.pose.matrix().col(axis));
     let side = (2.0 * radius * px_per_mm).ceil().max(64.0) as u32;
     let from = |aside: DVec3| {
         let eye = centre + radius * (DISTANCE * z + ASIDE * aside);
@@ -104,7 +103,7 @@ fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
         View { camera, camera_from_target: Pose::looking_at(eye, centre, y) }
     };
     let open = |view: &View| {
-        panel.corners.iter().map(|c| DVec3::from(c.target_mm)).all(|corner| {
+        corners().all(|corner| {
             let pixel = view.camera.project(view.camera_from_target.apply(corner));
             let met = pixel.and_then(|pixel| view.meet(model, pixel));
             met.is_some_and(|met| met.distance(corner) < GRAZING_TOLERANCE_MM)
@@ -213,9 +212,7 @@ impl Verifier<'_> {
         let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
             return of_panel();
         };
-        let panel_from_target = DMat3::from_cols_array(&panel.pose.rotation);
-        let origin = DVec3::from(panel.pose.translation_mm);
-        solid.triangle_mm(index).map(|v| (panel_from_target * (v - origin)).truncate())
+        solid.triangle_mm(index).map(|v| panel.pose.panel_from_target(v).truncate())
     }
 }
 

@@ -14,7 +14,7 @@
 mod solution;
 mod start;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::error::CalibrationError;
 use super::loss::Loss;
@@ -24,8 +24,10 @@ use super::problem::{Block, CameraUnknowns, PanelUnknowns, Prior, Problem};
 use super::settle::{residuals, settle};
 use super::solve::{self, Options};
 use super::view::View;
-use super::weights::{Weights, Whitening, median};
+use super::weights::{Weights, Whitening};
+use super::wrong::{limit_px, median_px};
 use crate::camera::{Camera, Pose};
+use crate::target::PanelPose;
 use start::Start;
 
 pub use solution::{RigCamera, RigFrame, RigSolution};
@@ -64,11 +66,11 @@ pub struct PanelPlace {
     pub covariance: Option<[[f64; 6]; 6]>,
 }
 
-/// A frame does not belong when a camera's corners in it are off by more than so many times the usual,
-/// and by more than so many pixels, for the reasons that a view does not: here the pictures were not
-/// taken at the same moment.
-const WRONG_FRAME_RATIO: f64 = 10.0;
-const WRONG_FRAME_PX: f64 = 1.0;
+impl From<&PanelPose> for PanelPlace {
+    fn from(pose: &PanelPose) -> Self {
+        Self { target_from_panel: pose.to_pose(), covariance: pose.covariance }
+    }
+}
 
 /// Finds the cameras, where they are to each other, where the target was, and on request where its
 /// panels are on it. What an earlier measurement says of these counts as an observation.
@@ -113,12 +115,10 @@ pub fn calibrate_rig(
 }
 
 /// Frames that do not belong, each with the camera that shows it and by how much.
-fn wrong_frames(problem: &Problem) -> std::collections::BTreeMap<usize, (usize, f64)> {
-    let off =
-        |residuals: &Vec<[f64; 2]>| median(residuals.iter().map(|[x, y]| x.hypot(*y)).collect());
-    let medians: Vec<f64> = residuals(problem).iter().map(off).collect();
-    let limit = f64::max(WRONG_FRAME_RATIO * median(medians.clone()), WRONG_FRAME_PX);
-    let mut wrong = std::collections::BTreeMap::new();
+fn wrong_frames(problem: &Problem) -> BTreeMap<usize, (usize, f64)> {
+    let medians: Vec<f64> = residuals(problem).iter().map(median_px).collect();
+    let limit = limit_px(&medians);
+    let mut wrong = BTreeMap::new();
     for (block, off_px) in problem.blocks.iter().zip(medians).filter(|(_, off)| *off > limit) {
         let worst = wrong.entry(block.frame).or_insert((block.camera, off_px));
         if off_px > worst.1 {

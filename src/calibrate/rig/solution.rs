@@ -8,6 +8,7 @@ use crate::calibrate::settle::{residuals, variance};
 use crate::calibrate::solution::{Parameter, rms_px};
 use crate::calibrate::weights::Whitening;
 use crate::camera::{Camera, Pose};
+use crate::target::{PanelPose, Target};
 
 /// Cameras fixed to each other, as their views have them.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,6 +65,15 @@ pub struct RigFrame {
 }
 
 impl RigSolution {
+    /// The target with its panels where they were found, named `<target>-refined`.
+    pub fn refined(&self, target: &Target) -> Target {
+        let poses = self.panels.iter();
+        let poses =
+            poses.map(|panel| PanelPose::from_pose(&panel.target_from_panel, panel.covariance));
+        let name = format!("{}-refined", target.name.trim_end_matches("-refined"));
+        Target { name, ..target.with_poses(&poses.collect::<Vec<_>>()) }
+    }
+
     pub(super) fn new(
         views: &[RigViews],
         frame_name: impl Fn(usize) -> String,

@@ -31,7 +31,7 @@ impl Start {
         let mut cameras = Vec::with_capacity(views.len());
         let mut excluded = Vec::new();
         // camera_from_target by the name of the frame.
-        let mut seen: Vec<BTreeMap<&str, Pose>> = Vec::with_capacity(views.len());
+        let mut seen: Vec<BTreeMap<String, Pose>> = Vec::with_capacity(views.len());
         for camera in views {
             let solution = alone(camera, panels, options)?;
             excluded.extend(
@@ -40,37 +40,30 @@ impl Start {
                     .into_iter()
                     .map(|(name, why)| (format!("{name} of camera {}", camera.name), why)),
             );
-            let names = camera.views.iter().map(|view| (view.name.as_str(), view.name.as_str()));
-            let names: BTreeMap<&str, &str> = names.collect();
-            let poses = solution.views.iter();
-            seen.push(poses.map(|view| (names[view.name.as_str()], view.pose)).collect());
+            seen.push(solution.views.into_iter().map(|view| (view.name, view.pose)).collect());
             cameras.push(solution.camera);
         }
         let camera_from_rig = lay_together(views, &seen)?;
-        let names: BTreeSet<&str> =
-            seen.iter().flat_map(|of_camera| of_camera.keys()).copied().collect();
-        let names: Vec<&str> = names.into_iter().collect();
-        let place: BTreeMap<&str, usize> = names.iter().enumerate().map(|(i, n)| (*n, i)).collect();
-        let of_frame = |name: &&str| {
+        let frames: BTreeSet<&String> =
+            seen.iter().flat_map(|of_camera| of_camera.keys()).collect();
+        let frames: Vec<String> = frames.into_iter().cloned().collect();
+        let of_frame = |name: &String| {
             // Of all cameras the one with the most corners has the best pose.
             let best = (0..views.len()).filter(|&c| seen[c].contains_key(name)).max_by_key(|&c| {
-                let view = views[c].views.iter().find(|view| view.name == **name);
+                let view = views[c].views.iter().find(|view| view.name == *name);
                 view.map_or(0, |v| v.sightings.iter().map(|s| s.observations.len()).sum::<usize>())
             });
             let best = best.unwrap_or_default();
             camera_from_rig[best].inverse().after(&seen[best][name])
         };
-        let rig_from_target = names.iter().map(of_frame).collect();
+        let rig_from_target = frames.iter().map(of_frame).collect();
         let used = views.iter().zip(&seen).map(|(camera, seen)| {
-            let used = camera
-                .views
-                .iter()
-                .enumerate()
-                .filter(|(_, view)| seen.contains_key(view.name.as_str()));
-            used.map(|(index, view)| (place[view.name.as_str()], index)).collect()
+            let views = camera.views.iter().enumerate();
+            let used = views.filter(|(_, view)| seen.contains_key(&view.name));
+            used.filter_map(|(index, view)| Some((frames.binary_search(&view.name).ok()?, index)))
+                .collect()
         });
         let used = used.collect();
-        let frames = names.iter().map(|&name| name.to_owned()).collect();
         Ok(Self { frames, excluded, cameras, camera_from_rig, rig_from_target, used })
     }
 
@@ -110,15 +103,14 @@ impl Start {
 /// camera_from_rig of every camera, along the pairs of cameras that share the most frames.
 fn lay_together(
     views: &[RigViews],
-    seen: &[BTreeMap<&str, Pose>],
+    seen: &[BTreeMap<String, Pose>],
 ) -> Result<Vec<Pose>, CalibrationError> {
     let mut placed: Vec<Option<Pose>> = vec![None; views.len()];
     if let Some(first) = placed.first_mut() {
         *first = Some(Pose::IDENTITY);
     }
     let shared = |a: usize, b: usize| {
-        let common = seen[a].keys().filter(|name| seen[b].contains_key(*name));
-        common.copied().collect::<Vec<&str>>()
+        seen[a].keys().filter(|name| seen[b].contains_key(*name)).collect::<Vec<_>>()
     };
     loop {
         let from = (0..views.len()).filter(|&c| placed[c].is_some());
@@ -138,7 +130,7 @@ fn lay_together(
             });
         }
         let relative: Vec<Pose> =
-            common.iter().map(|name| seen[to][name].after(&seen[from][name].inverse())).collect();
+            common.iter().map(|&name| seen[to][name].after(&seen[from][name].inverse())).collect();
         placed[to] = placed[from].map(|from_rig| middle(&relative).after(&from_rig));
     }
 }

@@ -107,6 +107,17 @@ impl Outcome {
     fn interrupted(family: Option<Family>, message: String) -> Self {
         Self { family, interrupted: Some(message), exit: ExitCode::from(INTERRUPTED) }
     }
+
+    /// What became of a search with checkpoints that ended before it found anything.
+    fn nothing(error: FamilyError, file: &CheckpointFile) -> anyhow::Result<Self> {
+        match error {
+            FamilyError::Cancelled => {
+                let message = format!("no family was written; {}", file.advice());
+                Ok(Self::interrupted(None, message))
+            }
+            error => Err(error.into()),
+        }
+    }
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -303,11 +314,7 @@ impl Args {
                 self.check_found(codes.len())?;
                 Ok(Outcome::whole(lexicode.family_of(name, codes)?))
             }
-            Err(FamilyError::Cancelled) => {
-                let message = format!("no family was written; {}", file.advice());
-                Ok(Outcome::interrupted(None, message))
-            }
-            Err(error) => Err(error.into()),
+            Err(error) => Outcome::nothing(error, file),
         }
     }
 
@@ -343,11 +350,7 @@ impl Args {
                 self.check_found(checkpoint.codes.len())?;
                 Ok(Outcome::whole(family()?))
             }
-            Err(FamilyError::Cancelled) if checkpoint.codes.is_empty() => {
-                let message = format!("no family was written; {}", file.advice());
-                Ok(Outcome::interrupted(None, message))
-            }
-            Err(FamilyError::Cancelled) => {
+            Err(FamilyError::Cancelled) if !checkpoint.codes.is_empty() => {
                 let message = format!(
                     "kept what {rounds} of {} rounds found; {}",
                     search.rounds,
@@ -355,7 +358,7 @@ impl Args {
                 );
                 Ok(Outcome::interrupted(Some(family()?), message))
             }
-            Err(error) => Err(error.into()),
+            Err(error) => Outcome::nothing(error, file),
         }
     }
 

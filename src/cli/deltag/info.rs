@@ -50,16 +50,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         bounds(family.dimension(), family.distance()).linear_programming
     );
     let [rows, cols] = BOARD;
-    let board = tags_of(&TargetSpec::Board(BoardSpec {
-        grid: GridKind::Deltille,
-        rows,
-        cols,
-        edge_mm: 20.0,
-        boards: 1,
-        board_id: 0,
-        tags: Some(TagSpec::default()),
-        inverted: false,
-    }))?;
+    let board = tags_of(&TargetSpec::Board(BoardSpec::new(GridKind::Deltille, rows, cols, 20.0)))?;
     let solid = tags_of(&TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron)))?;
     say!(
         "  enough for      {} boards of {rows} x {cols} corners ({board} tags each) or {} icosahedra \

@@ -8,10 +8,11 @@ use std::process::ExitCode;
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
-use super::files::{self, File};
+use super::camera_file;
+use super::files::{File, text_file, write_all};
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{self, BoardShape, Loss, Model, Options, Solution, View, Weights};
-use crate::camera::{Camera, Pose};
+use crate::camera::Pose;
 use crate::cli::output;
 use crate::export::calibration;
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
@@ -159,10 +160,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let texts = args.format.iter().map(|&format| format.texts(&stem, &solution));
     let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let written: Vec<File> =
-        texts.into_iter().flatten().map(|(name, text)| files::text_file(name, text)).collect();
-    let written = files::write_all(folder.unwrap_or(Path::new(".")), &written)?;
-    let mut written = written;
+    let files = texts.into_iter().flatten().map(|(name, text)| text_file(name, text));
+    let files: Vec<File> = files.collect();
+    let mut written = write_all(folder.unwrap_or(Path::new(".")), &files)?;
     if let Some(page) = &args.report {
         let page = output::file(page, &format!("{stem}-report"), "html")?;
         output::write(&page, args.page(&stem, &solution).as_bytes()).context("--report")?;
@@ -174,13 +174,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(test) = &solution.held_out {
         // Writing to a String cannot fail.
-        let _ = writeln!(
-            text,
-            "held out: {} views, {} corners, rms {:.4} px a coordinate",
-            test.views.len(),
-            test.corner_count(),
-            test.rms_px
-        );
+        let _ = writeln!(text, "held out: {}", totals(test));
     }
     for path in written {
         let _ = writeln!(text, "{}", path.display());
@@ -237,9 +231,7 @@ impl Args {
         let (loss, weights) = (self.robust.into(), self.weights.into());
         let Some(model) = self.model else {
             let path = self.fixed_intrinsics.as_deref().unwrap_or(Path::new(""));
-            let show = || format!("--fixed-intrinsics: {}", path.display());
-            let text = std::fs::read_to_string(path).with_context(show)?;
-            let camera = Camera::from_yaml(&text).with_context(show)?;
+            let camera = camera_file::read("--fixed-intrinsics", path)?;
             let calibrated = calibrate::poses(views, panels, &camera, loss, weights)?;
             ensure!(
                 !calibrated.views.is_empty(),
@@ -341,12 +333,11 @@ fn table(solution: &Solution) -> String {
         let (corners, outliers) = (view.corners.len(), view.outlier_count());
         let _ = writeln!(text, "{:16} {corners:7}  {:.4}  {outliers:8}", view.name, view.rms_px);
     }
-    let _ = writeln!(
-        text,
-        "{} views, {} corners, rms {:.4} px a coordinate",
-        solution.views.len(),
-        solution.corner_count(),
-        solution.rms_px
-    );
+    let _ = writeln!(text, "{}", totals(solution));
     text
+}
+
+fn totals(solution: &Solution) -> String {
+    let (views, corners) = (solution.views.len(), solution.corner_count());
+    format!("{views} views, {corners} corners, rms {:.4} px a coordinate", solution.rms_px)
 }

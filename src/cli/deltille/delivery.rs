@@ -5,8 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use super::files::{File, write_all};
+use super::files::{File, same_file, write_all};
 use super::{target_file, verify};
+use crate::cli::output::say;
 use crate::export::obj;
 use crate::family::Family;
 use crate::target::Target;
@@ -38,9 +39,7 @@ impl Delivery {
 
     /// Whether a file of that name would be written over another one.
     pub fn would_replace(&self, name: &str, other: &Path) -> bool {
-        let [here, there] =
-            [&self.output.join(name), other].map(|path| std::fs::canonicalize(path).ok());
-        here.is_some() && here == there
+        same_file(&self.output.join(name), other)
     }
 
     /// Writes all files or none, says so after `summary`, and compares them with the target.
@@ -52,9 +51,9 @@ impl Delivery {
         summary: &str,
     ) -> anyhow::Result<ExitCode> {
         let written = write_all(&self.output, files)?;
-        println!("{summary}");
+        say!("{summary}");
         for path in &written {
-            println!("wrote {}", path.display());
+            say!("wrote {}", path.display());
         }
         let texture = obj::texture_name(&target.name);
         let artifacts: Vec<PathBuf> =

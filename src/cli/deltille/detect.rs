@@ -11,6 +11,7 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use rayon::prelude::*;
 
+use super::files::same_file;
 use super::finder::FinderArgs;
 use super::images::{Images, Stems};
 use crate::cli::run::{self, BAD_INPUT, FAILED, INTERRUPTED};
@@ -198,12 +199,10 @@ impl Args {
 
     /// A result may not overwrite the target.
     fn check_result(&self, stem: &str) -> anyhow::Result<()> {
-        let target = self.finder.target.as_ref().and_then(|path| path.canonicalize().ok());
-        for result in self.results(stem) {
-            if target.is_some() && result.canonicalize().ok() == target {
-                let shown = result.display();
-                bail!("{shown} would overwrite the target: choose another folder with -o");
-            }
+        let Some(target) = &self.finder.target else { return Ok(()) };
+        if let Some(result) = self.results(stem).iter().find(|result| same_file(result, target)) {
+            let shown = result.display();
+            bail!("{shown} would overwrite the target: choose another folder with -o");
         }
         Ok(())
     }

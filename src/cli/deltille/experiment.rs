@@ -8,6 +8,7 @@ use anyhow::{Context, bail};
 use clap::Subcommand;
 
 use super::images::Images;
+use crate::cli::output::say;
 use crate::cli::{interrupt, output, progress};
 use crate::experiment::{corners, plot, rig, table2};
 
@@ -47,15 +48,8 @@ struct RigArgs {
     #[arg(long, value_name = "N", default_value_t = 30,
           value_parser = clap::value_parser!(u32).range(5..=1000))]
     frames: u32,
-    /// Seed of all random choices
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Threads [default: one per processor]
-    #[arg(short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    jobs: Option<u16>,
-    /// Folder for the results
-    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
-    output: PathBuf,
+    #[command(flatten)]
+    simulation: SimulationArgs,
 }
 
 #[derive(clap::Args)]
@@ -64,6 +58,13 @@ struct CornersArgs {
     #[arg(long, value_name = "N", default_value_t = 1000,
           value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     images: u32,
+    #[command(flatten)]
+    simulation: SimulationArgs,
+}
+
+/// What every simulation takes.
+#[derive(clap::Args)]
+struct SimulationArgs {
     /// Seed of all random choices
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -88,28 +89,42 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
 }
 
+impl SimulationArgs {
+    /// Runs a simulation, which is handed what counts its steps on a bar.
+    fn run<T: Send>(
+        &self,
+        steps: usize,
+        unit: &str,
+        simulation: impl FnOnce(&(dyn Fn() + Sync)) -> T + Send,
+    ) -> anyhow::Result<T> {
+        let bar = progress::bar(steps as u64, unit);
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(self.jobs.unwrap_or(0).into());
+        let result = threads.build()?.install(|| simulation(&|| bar.inc(1)));
+        bar.finish_and_clear();
+        Ok(result)
+    }
+}
+
 fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {
-    let setup = rig::Setup { width: args.width, frames: args.frames as usize, seed: args.seed };
+    let RigArgs { width, frames, simulation } = args;
+    let setup = rig::Setup { width, frames: frames as usize, seed: simulation.seed };
     let pictures = rig::Object::ALL.len() * rig::CAMERAS * setup.frames;
-    let bar = progress::bar(pictures as u64, "pictures");
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
-    let outcomes = threads.build()?.install(|| rig::run(setup, interrupt::flag(), &|| bar.inc(1)));
-    bar.finish_and_clear();
+    let outcomes =
+        simulation.run(pictures, "pictures", |tick| rig::run(setup, interrupt::flag(), tick))?;
     let Some(outcomes) = outcomes? else { bail!("interrupted; nothing was written") };
-    let path = args.output.join("rig.csv");
+    let path = simulation.output.join("rig.csv");
     output::write(&path, rig::csv(&outcomes).as_bytes())?;
     output::print(&format!("{}{}\n", rig::text(&outcomes), path.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
-    let bar = progress::bar(corners::rows_count() as u64, "rows");
+    let CornersArgs { images, simulation } = args;
+    let SimulationArgs { seed, output: folder, .. } = &simulation;
     let interrupted = interrupt::flag();
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
-    let rows = threads
-        .build()?
-        .install(|| corners::run(args.images as usize, args.seed, interrupted, &|| bar.inc(1)));
-    bar.finish_and_clear();
+    let rows = simulation.run(corners::rows_count(), "rows", |tick| {
+        corners::run(images as usize, *seed, interrupted, tick)
+    })?;
     let Some(rows) = rows.filter(|_| !interrupted.load(Ordering::Relaxed)) else {
         bail!("interrupted; nothing was written");
     };
@@ -120,13 +135,9 @@ fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
         ("corners.svg", svg.into_bytes()),
         ("corners.png", png),
     ] {
-        output::write(&args.output.join(name), &content)?;
+        output::write(&folder.join(name), &content)?;
     }
-    println!(
-        "{}: {} fits a point, seed {}",
-        args.output.join("corners.csv").display(),
-        4 * args.images,
-        args.seed
-    );
+    let table = folder.join("corners.csv");
+    say!("{}: {} fits a point, seed {seed}", table.display(), 4 * images);
     Ok(ExitCode::SUCCESS)
 }

@@ -68,6 +68,12 @@ pub fn drawn(name: &str, artwork: Artwork, formats: Formats, dpi: u32) -> Vec<Fi
     files
 }
 
+/// Whether a file that is to be written is one that is there already, by whatever path.
+pub fn same_file(written: &Path, other: &Path) -> bool {
+    let [written, other] = [written, other].map(|path| path.canonicalize().ok());
+    written.is_some() && written == other
+}
+
 /// Writes all files into a folder beside their places, then moves them there: all or none.
 pub fn write_all(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
     let missing: Vec<&Path> =

@@ -6,9 +6,8 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 
 use super::images::Images;
-use super::target_file;
+use super::{camera_file, target_file};
 use crate::calibrate::{self, Loss, Reference, Weights, views};
-use crate::camera::Camera;
 use crate::cli::output::{self, say};
 use crate::cli::run::FAILED;
 use crate::detect::{Detector, DetectorConfig};
@@ -39,11 +38,10 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let target = target_file::read(&args.target).context("--target")?;
     let family = target_file::family(&target, args.family.as_deref())?;
-    let show = || format!("--camera: {}", args.camera.display());
-    let text = std::fs::read_to_string(&args.camera).with_context(show)?;
-    let camera = Camera::from_yaml(&text).with_context(show)?;
+    let camera = camera_file::read("--camera", &args.camera)?;
     let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
     let reference = Reference::Target(&target);
+    let panels = reference.panels();
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
     let (mut lines, mut all, mut without) = (String::new(), 0, 0);
@@ -54,7 +52,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let found = detector.detect_any(&raster::read(&image)?, &name);
         let shown = views(&[(name, found)], &reference)?.views;
         let (loss, weights) = (Loss::default(), Weights::default());
-        let solution = calibrate::poses(&shown, &reference.panels(), &camera, loss, weights)
+        let solution = calibrate::poses(&shown, &panels, &camera, loss, weights)
             .with_context(|| image.display().to_string())?;
         if solution.views.is_empty() {
             without += 1;

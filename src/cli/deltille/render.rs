@@ -4,14 +4,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 use image::{DynamicImage, ImageBuffer, Luma};
-use serde::Serialize;
 
-use super::target_file;
+use super::{camera_file, target_file};
 use crate::camera::{Camera, Pose};
-use crate::cli::output;
-use crate::synth::{Light, TruthCorner, scene_of_target};
+use crate::cli::output::{self, say};
+use crate::export::truth;
+use crate::synth::{Light, scene_of_target};
 use crate::target::TargetSpec;
 
 /// Arguments of `deltille render`.
@@ -25,39 +25,19 @@ pub struct Args {
     camera: PathBuf,
     /// Pose of the target in the camera frame (x right, y down, z forward): rotation vector in
     /// radians and translation in mm
-    #[arg(
-        long,
-        value_name = "RX,RY,RZ,TX,TY,TZ",
-        value_parser = numbers::<6>,
-        allow_hyphen_values = true,
-        conflicts_with = "eye"
-    )]
+    #[arg(long, value_name = "RX,RY,RZ,TX,TY,TZ", value_parser = numbers::<6>,
+          allow_hyphen_values = true, conflicts_with = "eye")]
     pose: Option<[f64; 6]>,
     /// Where the camera stands in the target frame, mm, instead of --pose
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_parser = numbers::<3>,
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
     eye: Option<[f64; 3]>,
     /// What --eye looks at, mm [default: the middle of all corners]
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_parser = numbers::<3>,
-        allow_hyphen_values = true,
-        requires = "eye"
-    )]
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true,
+          requires = "eye")]
     look_at: Option<[f64; 3]>,
     /// What is up in the picture of --eye [default: 0,0,1, or 0,1,0 from straight above or below]
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_parser = numbers::<3>,
-        allow_hyphen_values = true,
-        requires = "eye"
-    )]
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true,
+          requires = "eye")]
     up: Option<[f64; 3]>,
     /// Standard deviation of the blur, px
     #[arg(long, default_value_t = 0.8, value_name = "PX", allow_negative_numbers = true)]
@@ -84,27 +64,6 @@ pub struct Args {
     output: PathBuf,
 }
 
-/// The truth about a picture, as it is written beside it.
-#[derive(Serialize)]
-struct Truth {
-    schema: &'static str,
-    image: String,
-    target: String,
-    camera_from_target: Motion,
-    blur_px: f64,
-    noise: f64,
-    gradient: [f64; 2],
-    seed: u64,
-    corners: Vec<TruthCorner>,
-}
-
-#[derive(Serialize)]
-struct Motion {
-    /// Row-major.
-    rotation: [f64; 9],
-    translation_mm: [f64; 3],
-}
-
 /// Takes a picture of a target and writes it with its truth.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let target = target_file::read(&args.target)?;
@@ -112,9 +71,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !matches!(target.spec, TargetSpec::Solid(_)) && target.panels.len() > 1 {
         bail!("{} has several loose boards: render targets of one board, or solids", target.name);
     }
-    let show = || format!("--camera: {}", args.camera.display());
-    let text = std::fs::read_to_string(&args.camera).with_context(show)?;
-    let camera = Camera::from_yaml(&text).with_context(show)?;
+    let camera = camera_file::read("--camera", &args.camera)?;
     let in_range = |option: &str, value: f64, most: f64| match (0.0..=most).contains(&value) {
         true => Ok(value),
         false => bail!("{option}: {value} is not between 0 and {most}"),
@@ -137,30 +94,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let image = scene.render(&camera, &pose, &light);
     let seen = scene.truth(&camera, &pose, 0.0).corners;
     let path = output::file(&args.output, &format!("{}-view", target.name), "png")?;
-    let truth = Truth {
-        schema: "deltille/truth/1",
-        image: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        target: target.name.clone(),
-        camera_from_target: Motion {
-            rotation: DMat3::from_quat(pose.rotation).transpose().to_cols_array(),
-            translation_mm: pose.translation.to_array(),
-        },
-        blur_px: light.blur_px,
-        noise: light.noise,
-        gradient: light.gradient,
-        seed: light.seed,
-        corners: seen,
-    };
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let truth = truth::write(&name, &target.name, &pose, &light, &seen);
     let picture = match args.bits {
         8 => picture(&camera, image.pixels().iter().map(|v| (v * 255.0 + 0.5) as u8)),
         _ => picture(&camera, image.pixels().iter().map(|v| (v * 65535.0 + 0.5) as u16)),
     };
     let mut png = std::io::Cursor::new(Vec::new());
     picture.context("the picture is empty")?.write_to(&mut png, image::ImageFormat::Png)?;
-    let json = crate::json::to_text(&truth, 2);
-    output::write(&path.with_extension("json"), json.as_bytes())?;
+    output::write(&path.with_extension("json"), truth.as_bytes())?;
     output::write(&path, &png.into_inner())?;
-    println!("{}: {} corners in view", path.display(), truth.corners.len());
+    say!("{}: {} corners in view", path.display(), seen.len());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -5,11 +5,10 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
-use glam::{DMat3, DQuat};
 
 use super::calibrate::{Robust, Weighting, cannot_tell_apart};
-use super::files::{File, text_file, write_all};
-use super::{sightings, target_file};
+use super::files::{File, same_file, text_file, write_all};
+use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
     Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews, calibrate_rig,
 };
@@ -17,7 +16,6 @@ use crate::camera::{Camera, Pose};
 use crate::cli::output::say;
 use crate::export::camera::{colmap, colmap_rig, kalibr};
 use crate::export::rig;
-use crate::target::{PanelPose, Target};
 
 /// Arguments of `deltille rig`.
 #[derive(clap::Args)]
@@ -94,7 +92,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some((name, _)) = args.known.iter().find(|(name, _)| !names.contains(&name.as_str())) {
         bail!("--known: there is no --camera {name}");
     }
-    let panels: Vec<PanelPlace> = target.panels.iter().map(|panel| place(&panel.pose)).collect();
+    let panels: Vec<PanelPlace> = target.panels.iter().map(|panel| (&panel.pose).into()).collect();
     let options = RigOptions {
         model: args.model,
         loss: args.robust.into(),
@@ -114,13 +112,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         files.extend(format.files(&solution).context("--format")?);
     }
     if args.refine_target {
-        let refined = refined(&target, &solution);
+        let refined = solution.refined(&target);
         let place = args.output.join(format!("{}.json", refined.name));
-        if place
-            .canonicalize()
-            .ok()
-            .is_some_and(|place| args.target.canonicalize().ok() == Some(place))
-        {
+        if same_file(&place, &args.target) {
             bail!(
                 "-o: {} would overwrite the target that was given: choose another folder",
                 place.display()
@@ -138,12 +132,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 impl Args {
     fn known(&self, name: &str) -> anyhow::Result<Option<Camera>> {
-        let Some((_, path)) = self.known.iter().find(|(known, _)| known == name) else {
-            return Ok(None);
-        };
-        let show = || format!("--known: {}", path.display());
-        let text = std::fs::read_to_string(path).with_context(show)?;
-        Ok(Some(Camera::from_yaml(&text).with_context(show)?))
+        let known = self.known.iter().find(|(known, _)| known == name);
+        known.map(|(_, path)| camera_file::read("--known", path)).transpose()
     }
 }
 
@@ -162,25 +152,6 @@ impl Format {
             ],
         })
     }
-}
-
-fn place(pose: &PanelPose) -> PanelPlace {
-    let rotation = DMat3::from_cols_array(&pose.rotation).transpose();
-    let rotation = DQuat::from_mat3(&rotation).normalize();
-    let target_from_panel = Pose { rotation, translation: pose.translation_mm.into() };
-    PanelPlace { target_from_panel, covariance: pose.covariance }
-}
-
-/// The target with its panels where they were found.
-fn refined(target: &Target, solution: &RigSolution) -> Target {
-    let pose = |panel: &PanelPlace| PanelPose {
-        rotation: DMat3::from_quat(panel.target_from_panel.rotation).transpose().to_cols_array(),
-        translation_mm: panel.target_from_panel.translation.to_array(),
-        covariance: panel.covariance,
-    };
-    let poses: Vec<PanelPose> = solution.panels.iter().map(pose).collect();
-    let name = format!("{}-refined", target.name.trim_end_matches("-refined"));
-    Target { name, ..target.with_poses(&poses) }
 }
 
 fn summary(solution: &RigSolution) -> String {

@@ -10,7 +10,7 @@
 //! (see `sweep.rs`), and these are taken in the order of the candidates. The codes are the same,
 //! and come in the same order, as if every candidate had been looked at.
 
-pub(super) mod sweep;
+mod sweep;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -12,15 +12,8 @@
 use rayon::prelude::*;
 
 use crate::family::algebra::{Arrangement, CycleSpace};
-use crate::family::kernels::{cover, thin_out};
+use crate::family::kernels::{LEAF_BITS, Leaf, cover, thin_out};
 use crate::family::{Control, FamilyError, Screen};
-
-/// Bits under a leaf.
-const LEAF_BITS: u32 = 9;
-/// Words under a leaf, one bit each.
-pub(in crate::family) type Leaf = [u64; 8];
-/// An entry of a list: the word, and from this bit on its distance so far.
-pub(in crate::family) const DISTANCE_SHIFT: u32 = 52;
 
 /// A sweep made ready: the tree is cut into parts that can be done in any order.
 pub(super) struct Sweep<'a> {
