@@ -81,14 +81,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Experiment::Corners(args) => run_corners(args),
         Experiment::Rig(args) => run_rig(args),
         Experiment::Table2(args) => {
-            let images = Images::of(&[args.folder])?;
-            output::print(&table2::text(&table2::run(images.named())?))?;
+            let images = Images::of(std::slice::from_ref(&args.folder))?;
+            let rows = table2::run(images.named());
+            let rows = rows.with_context(|| args.folder.display().to_string())?;
+            output::print(&table2::text(&rows))?;
             Ok(ExitCode::SUCCESS)
         }
     }
 }
 
 fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {
+    output::check_folder(&args.output).context("-o")?;
     let setup = rig::Setup { width: args.width, frames: args.frames as usize, seed: args.seed };
     let pictures = rig::Object::ALL.len() * rig::CAMERAS * setup.frames;
     let bar = progress::bar(pictures as u64, "pictures");
@@ -103,6 +106,7 @@ fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
+    output::check_folder(&args.output).context("-o")?;
     let bar = progress::bar(corners::rows_count() as u64, "rows");
     let interrupted = interrupt::flag();
     let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
