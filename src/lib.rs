@@ -42,3 +42,4 @@ pub mod report;
 pub mod synth;
 pub mod target;
 pub mod verify;
+mod words;
