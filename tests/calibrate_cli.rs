@@ -192,7 +192,9 @@ fn a_wild_corner_is_told_beside_the_rms_of_the_others() {
 fn a_camera_that_did_not_take_the_pictures_is_named() {
     let target = board(8, 9);
     let folder = folder(&target, &detections(&target, 10, 0.7));
-    let other = Camera { focal_px: [1800.0; 2], centre_px: [300.0, 900.0], ..camera() };
+    let radial = [0.5, 0.0, 0.0];
+    let lens = Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() });
+    let other = Camera { centre_px: [300.0, 900.0], lens, ..camera() };
     std::fs::write(folder.path().join("other.yaml"), other.to_yaml()).unwrap();
     let args = "calibrate corners --target board.json --fixed-intrinsics other.yaml";
     let output = deltille(folder.path(), args);

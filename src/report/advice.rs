@@ -166,7 +166,8 @@ fn parameters(report: &Report, add: &mut impl FnMut(Weight, String)) {
         && let Some(smaller) = model.smaller()
     {
         // What the smaller model does without.
-        let more = model.free().into_iter().zip(smaller.free()).zip(&solution.parameters);
+        let there = smaller.free().into_iter().chain(std::iter::repeat(false));
+        let more = model.free().into_iter().zip(there).zip(&solution.parameters);
         let more: Vec<_> =
             more.filter(|((here, there), _)| *here && !there).map(|(_, p)| p).collect();
         let weak = |p: &&Parameter| p.sd.is_some_and(|sd| p.value.abs() < SIGNIFICANT * sd);
@@ -248,6 +249,65 @@ fn residuals(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, Stri
             add(Weight::Warning, text);
         } else {
             add(Weight::Good, format!("{figures}."));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::calibrate::Solution;
+    use crate::camera::Camera;
+
+    /// What is advised where no parameter of the lens is told from zero.
+    fn advised(model: Model) -> String {
+        let camera = Camera::centred(640, 480, 500.0, model.lens());
+        let values = camera.parameter_names().into_iter().zip(camera.parameters());
+        let parameters = values.zip(model.free());
+        let parameters: Vec<Parameter> = parameters
+            .map(|((name, value), free)| Parameter { name, value, sd: free.then_some(1.0) })
+            .collect();
+        let count = model.free().into_iter().filter(|free| *free).count();
+        let solution = Solution {
+            camera,
+            parameters,
+            covariance: DMatrix::identity(count, count),
+            views: Vec::new(),
+            excluded: Vec::new(),
+            rms_px: 0.1,
+            common_px: None,
+            sigma: 1.0,
+            loose: Vec::new(),
+            shape: None,
+            steps: 1,
+        };
+        let report = Report {
+            title: "camera",
+            model: &model.to_string(),
+            solution: &solution,
+            holdout: None,
+            scale_measured: true,
+            thumbnails: BTreeMap::new(),
+        };
+        let advice = advice(&report, &Survey::new(&solution));
+        advice.into_iter().map(|advice| advice.text + "\n").collect()
+    }
+
+    #[test]
+    fn a_smaller_model_is_advised_where_there_is_one() {
+        for (model, text) in [
+            (Model::Radtan5, "Not told from zero: k3. The model radtan does without"),
+            (Model::Rational, "Not told from zero: k4, k5, k6. The model radtan5 does without"),
+            (Model::KannalaBrandt(5), "Not told from zero: k5. The model kannala-brandt does"),
+        ] {
+            assert!(advised(model).contains(text), "{}", advised(model));
+        }
+        for model in [Model::Pupil, Model::Radtan, Model::KannalaBrandt(4)] {
+            assert!(!advised(model).contains("Not told from zero"), "{}", advised(model));
         }
     }
 }

@@ -165,9 +165,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if solution.calibrated.rms_px > POOR_RMS_PX {
         eprintln!(
-            "warning: corners are off by {:.1} px: the lens is not one of this model (see --model), \
-             or labels are wrong",
-            solution.calibrated.rms_px
+            "warning: corners are off by {:.1} px: {}, or labels are wrong",
+            solution.calibrated.rms_px,
+            match args.model {
+                Some(_) => "the lens is not one of this model (see --model)",
+                None => "the camera was another one, or has changed since",
+            }
         );
     }
     if !solution.calibrated.loose.is_empty() {
