@@ -367,6 +367,24 @@ fn a_rig_is_calibrated_from_pictures() {
         let [turn, step] = found.off(&truth);
         assert!(turn.length() < 1e-3 && step.length() < 0.5, "{found:?} {truth:?}");
     }
+    // A wild corner, and a picture of another target.
+    let path = at.join("corners/right/1.json");
+    let mut wild = json(&path);
+    let x = &mut wild["grids"][0]["corners"][3]["x"];
+    *x = (x.as_f64().unwrap() + 40.0).into();
+    std::fs::write(&path, wild.to_string()).unwrap();
+    let path = at.join("corners/left/3.json");
+    let mut foreign = json(&path);
+    foreign["grids"][0]["panel"] = 99.into();
+    std::fs::write(&path, foreign.to_string()).unwrap();
+    let said = done(at, &format!("rig {cameras} --target ico.json -o rig"));
+    assert!(said.contains("\nright: ") && said.contains(" px without 1 outlier, fx"), "{said}");
+    let rig = json(&at.join("rig/rig.json"));
+    assert_eq!([&rig["cameras"][0]["outliers"], &rig["cameras"][1]["outliers"]], [0, 1]);
+    let excluded = &rig["excluded"][0];
+    assert_eq!([&excluded["camera"], &excluded["view"]], ["left", "3"], "{excluded}");
+    assert_eq!(excluded["panel"], 99);
+
     let wrong = refused(at, &format!("rig {cameras} --camera third=nowhere --target ico.json"));
     assert!(wrong.contains("third") && wrong.contains("nowhere"), "{wrong}");
 }

@@ -72,6 +72,19 @@ pub struct RigFrame {
 }
 
 impl RigSolution {
+    /// How many corners are outliers.
+    pub fn outlier_count(&self) -> usize {
+        self.cameras.iter().map(|camera| camera.outliers).sum()
+    }
+
+    /// [`Self::rms_px`] of the corners that are no outliers.
+    pub fn inlier_rms_px(&self) -> f64 {
+        let inliers = |camera: &RigCamera| (camera.corners - camera.outliers) as f64;
+        let all: f64 = self.cameras.iter().map(inliers).sum();
+        let squares = self.cameras.iter().map(|c| inliers(c) * c.inlier_rms_px.powi(2));
+        (squares.sum::<f64>() / all.max(1.0)).sqrt()
+    }
+
     pub(super) fn new(
         views: &[RigViews],
         frame_name: impl Fn(usize) -> String,

@@ -222,10 +222,11 @@ fn refined(target: &Target, solution: &RigSolution) -> Target {
 
 fn summary(solution: &RigSolution) -> String {
     let mut text = format!(
-        "{}, {}, rms {:.4} px\n",
+        "{}, {}, rms {:.4} px{}\n",
         counted(solution.cameras.len(), "camera"),
         counted(solution.frames.len(), "frame"),
-        solution.rms_px
+        solution.rms_px,
+        without_outliers(solution.outlier_count(), solution.inlier_rms_px())
     );
     for camera in &solution.cameras {
         let [fx, fy] = camera.camera.focal_px;
