@@ -179,7 +179,9 @@ fn a_wild_corner_is_told_beside_the_rms_of_the_others() {
     let mut detections = detections(&target, 10, 0.7);
     detections[3].grids[0].corners[20].x += 60.0;
     let folder = folder(&target, &detections);
-    let said = done(folder.path(), &format!("{CALIBRATE} --print-scale 0.998,1.001"));
+    let output = deltille(folder.path(), &format!("{CALIBRATE} --print-scale 0.998,1.001"));
+    assert_eq!((output.status.code(), &*String::from_utf8_lossy(&output.stderr)), (Some(0), ""));
+    let said = String::from_utf8(output.stdout).unwrap();
     assert!(said.contains("px without 1 outlier"), "{said}");
     let camera = json(&folder.path().join("camera.json"));
     assert_eq!(camera["print_scale"], serde_json::json!([0.998, 1.001]));

@@ -27,8 +27,9 @@ const STRONG_CORRELATION: f64 = 0.98;
 /// have the lens of the model.
 const POOR_RMS_PX: f64 = 1.0;
 
-/// A known camera that leaves more than this part of the image's width is not the one that took the
-/// pictures: a lens that was focused or bumped since leaves a tenth of it.
+/// A known camera that leaves more than this part of the image's width did not take the pictures: poses
+/// take up most of what focal lengths and principal point are off by, and so much is left by another
+/// lens, zoom or crop only.
 const WRONG_CAMERA: f64 = 0.005;
 
 /// Arguments of `deltille calibrate`.
@@ -163,10 +164,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(end) = solution.calibrated.lens_end() {
         eprintln!("warning: {end}");
     }
-    if solution.calibrated.rms_px > POOR_RMS_PX {
+    // A few wild corners are no fault of the model.
+    let rms_px = solution.calibrated.inlier_rms_px();
+    if rms_px > POOR_RMS_PX {
         eprintln!(
-            "warning: corners are off by {:.1} px: {}, or labels are wrong",
-            solution.calibrated.rms_px,
+            "warning: corners are off by {rms_px:.1} px: {}, or labels are wrong",
             match args.model {
                 Some(_) => "the lens is not one of this model (see --model)",
                 None => "the camera was another one, or has changed since",
@@ -207,7 +209,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// Why a known camera cannot have taken the pictures.
 fn wrong_camera(solution: &Solution) -> Option<String> {
-    // A few wild corners are no fault of the camera.
     let (rms_px, width) = (solution.inlier_rms_px(), f64::from(solution.camera.width));
     (rms_px > WRONG_CAMERA * width).then(|| {
         format!(
