@@ -43,3 +43,4 @@ pub mod report;
 pub mod synth;
 pub mod target;
 pub mod verify;
+mod words;

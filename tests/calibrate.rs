@@ -161,7 +161,7 @@ fn wrong_views_and_wrong_corners_are_named_and_do_no_harm() {
     }
     views[6].sightings[0].observations[40].pixel[1] += 2.0;
     let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Radtan)).unwrap();
-    let excluded: Vec<&str> = found.excluded.iter().map(|(name, _)| name.as_str()).collect();
+    let excluded: Vec<&str> = found.excluded.iter().map(|out| out.view.as_str()).collect();
     assert_eq!(excluded, ["3", "11", "20", "21"]);
     let outliers: Vec<_> = found
         .views

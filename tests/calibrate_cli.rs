@@ -4,6 +4,7 @@
 mod command;
 
 use std::path::Path;
+use std::process::Output;
 
 use command::{deltille, refused};
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
@@ -16,6 +17,10 @@ use predicates::str::contains;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
+
+fn output(folder: &Path, args: &str) -> Output {
+    deltille(folder, args).get_output().clone()
+}
 
 /// What a command that has to succeed says on standard output.
 fn done(folder: &Path, args: &str) -> String {
@@ -140,9 +145,130 @@ fn wrong_detections_among_good_ones_are_left_out() {
     let said = String::from_utf8_lossy(&result.get_output().stderr);
     let lines: Vec<&str> = said.lines().collect();
     assert_eq!(lines.len(), 3, "{said}");
-    assert!(lines[0].starts_with("warning: left out: 04: the labels are mirrored"), "{said}");
-    assert!(lines[1].starts_with("warning: left out: 07: ") && lines[1].contains("exchanged?"));
-    assert!(lines[2].starts_with("warning: left out: 09: panel 77 is not on"), "{said}");
+    let out = |name: &str| {
+        let file = Path::new("corners").join(name);
+        format!("warning: left out: {}: ", file.display())
+    };
+    assert!(lines[0].starts_with(&format!("{}the labels are mirrored", out("04.json"))), "{said}");
+    assert!(lines[1].starts_with(&out("07.json")) && lines[1].contains("exchanged?"), "{said}");
+    assert!(lines[2].starts_with(&format!("{}panel 77 is not on", out("09.json"))), "{said}");
+    let camera = json(&folder.path().join("camera.json"));
+    let excluded = camera["excluded"].as_array().unwrap();
+    let of_last = |key: &str| &excluded[2][key];
+    assert_eq!(excluded.len(), 3, "{excluded:?}");
+    assert_eq!((of_last("view"), of_last("image")), (&"09".into(), &"09.png".into()));
+    assert_eq!((of_last("panel"), of_last("corners")), (&77.into(), &72.into()));
+    assert!(of_last("reason").as_str().unwrap().starts_with("panel 77 is not on"), "{excluded:?}");
+}
+
+#[test]
+fn a_wild_corner_is_told_beside_the_rms_of_the_others() {
+    let target = board(8, 9);
+    let mut detections = detections(&target, 10, 0.7);
+    detections[3].grids[0].corners[20].x += 60.0;
+    let folder = folder(&target, &detections);
+    let output = output(folder.path(), &format!("{CALIBRATE} --print-scale 0.998,1.001"));
+    assert_eq!((output.status.code(), &*String::from_utf8_lossy(&output.stderr)), (Some(0), ""));
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("px without 1 outlier"), "{said}");
+    let camera = json(&folder.path().join("camera.json"));
+    assert_eq!(camera["print_scale"], serde_json::json!([0.998, 1.001]));
+    assert_eq!(camera["outliers"], 1);
+    let rms = ["rms_px", "inlier_rms_px"].map(|key| camera[key].as_f64().unwrap());
+    assert!(rms[0] > 1.0 && rms[1] < 0.2, "{rms:?}");
+}
+
+#[test]
+fn a_camera_that_did_not_take_the_pictures_is_named() {
+    let target = board(8, 9);
+    let folder = folder(&target, &detections(&target, 10, 0.7));
+    let radial = [4.0, 0.0, 0.0];
+    let lens = Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() });
+    let other = Camera { focal_px: [200.0; 2], lens, ..camera() };
+    std::fs::write(folder.path().join("other.yaml"), other.to_yaml()).unwrap();
+    let args = "calibrate corners --target board.json --fixed-intrinsics other.yaml";
+    let output = output(folder.path(), args);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("other.yaml: with this camera corners are off by"), "{said}");
+    assert!(!folder.path().join("poses.yaml").exists());
+}
+
+#[test]
+fn a_pole_within_the_image_is_told() {
+    let target = board(8, 9);
+    let folder = folder(&target, &detections(&target, 10, 0.7));
+    // The same lens, its numerator and denominator each with a factor that is zero near r² = 1.44.
+    let [k1, k2] = [-0.17, 0.02];
+    let (zero, pole) = (-1.0 / 1.44, -1.0 / (1.44 + 1e-9));
+    let radial = [k1 + zero, k2 + k1 * zero, k2 * zero];
+    let denominator = [pole, 0.0, 0.0];
+    let lens = BrownConrady { radial, denominator, ..BrownConrady::default() };
+    let lens = Lens::BrownConrady(lens);
+    std::fs::write(folder.path().join("pole.yaml"), Camera { lens, ..camera() }.to_yaml()).unwrap();
+    let args = "calibrate corners --target board.json --fixed-intrinsics pole.yaml";
+    let output = output(folder.path(), &format!("{args} --report page.html"));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    // 1.2 (1 − 0.17 · 1.44 + 0.02 · 1.44²) · 625 px.
+    assert!(said.contains("the lens is good up to 597 px from the principal point"), "{said}");
+    let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+    assert!(page.contains("The lens is good up to 597 px"));
+}
+
+#[test]
+fn the_shape_of_a_sheet_is_taken_along() {
+    let flat = board(8, 9);
+    let mut bent = flat.clone();
+    for corner in &mut bent.panels[0].corners {
+        let [x, y, z] = &mut corner.target_mm;
+        *z += 3.0 * ((*x - 150.0) / 100.0).powi(2) - 2.0 * ((*y - 80.0) / 80.0).powi(2);
+    }
+    let folder = folder(&flat, &detections(&bent, 15, 0.7));
+    let at = folder.path();
+    done(at, &format!("{CALIBRATE} --board-shape --print-scale 1.001,1.002"));
+    let args = "calibrate corners --target board.json --fixed-intrinsics camera.yaml";
+    let rms = |args: &str| {
+        done(at, args);
+        json(&at.join("poses.json"))["rms_px"].as_f64().unwrap()
+    };
+    let with = rms(&format!("{args} --shape camera.json"));
+    let without = rms(args);
+    assert!(with < 0.06 && without > 3.0 * with, "{with} {without}");
+    let said = String::from_utf8(output(at, &format!("{args} --shape poses.json")).stderr).unwrap();
+    assert!(said.contains("--shape: poses.json: no `board_shape` in it"), "{said}");
+}
+
+#[test]
+fn options_that_contradict_each_other_or_the_disk_are_refused() {
+    let target = board(8, 9);
+    let folder = folder(&target, &detections(&target, 4, 0.7));
+    let at = folder.path();
+    std::fs::write(at.join("known.yaml"), camera().to_yaml()).unwrap();
+    std::fs::create_dir(at.join("other")).unwrap();
+    std::fs::create_dir(at.join("blank")).unwrap();
+    image::GrayImage::new(64, 48).save(at.join("blank/0.png")).unwrap();
+    let rig = "rig --camera a=corners --target board.json";
+    let cases = [
+        (format!("{rig} --camera b=./corners"), "a and b have the same folder"),
+        (
+            format!("{rig} --camera b=other --known a=known.yaml --known a=known.yaml"),
+            "--known: a has two files",
+        ),
+        (
+            format!("{rig} --camera b=other -o known.yaml"),
+            "-o: known.yaml is a file where a folder",
+        ),
+        (
+            "calibrate corners --grid deltille --edge -20mm --model radtan".to_owned(),
+            "--edge: -20 mm is not more than 0 mm",
+        ),
+        ("experiment table2 blank".to_owned(), "blank: 0 of 1 images show the board whole"),
+    ];
+    for (args, reason) in cases {
+        let said = refused(at, &args);
+        assert!(said.contains(reason), "{args}: {said}");
+    }
 }
 
 #[test]
@@ -157,7 +283,7 @@ fn input_that_makes_no_camera_is_refused_by_its_cause() {
         said
     };
     let one = said(&target, &good[..1]);
-    assert!(one.contains("1 usable views of 1: a calibration needs at least 3"), "{one}");
+    assert!(one.contains("usable views: 1 of 1; a calibration needs at least 3"), "{one}");
 
     let parallel = said(&target, &detections(&target, 10, 0.001));
     assert!(parallel.contains("all views are parallel"), "{parallel}");
@@ -236,6 +362,26 @@ fn a_rig_is_calibrated_from_pictures() {
     }
     let wrong = refused(at, &format!("rig {cameras} --camera third=nowhere --target ico.json"));
     assert!(wrong.contains("third") && wrong.contains("nowhere"), "{wrong}");
+
+    // A wild corner, and a picture of another target.
+    let path = at.join("corners/right/1.json");
+    let mut wild = json(&path);
+    let x = &mut wild["grids"][0]["corners"][3]["x"];
+    *x = (x.as_f64().unwrap() + 40.0).into();
+    std::fs::write(&path, wild.to_string()).unwrap();
+    let path = at.join("corners/left/3.json");
+    let mut foreign = json(&path);
+    foreign["grids"][0]["panel"] = 99.into();
+    std::fs::write(&path, foreign.to_string()).unwrap();
+    let said = done(at, &format!("rig {cameras} --target ico.json -o rig"));
+    let right = said.lines().find(|line| line.starts_with("right: ")).unwrap();
+    assert!(right.contains(" px without ") && right.contains(" outlier"), "{said}");
+    let rig = json(&at.join("rig/rig.json"));
+    let right = |key: &str| rig["cameras"][1][key].as_f64().unwrap();
+    assert!(right("outliers") >= 1.0 && right("rms_px") > 3.0 * right("inlier_rms_px"), "{said}");
+    let excluded = &rig["excluded"][0];
+    assert_eq!([&excluded["camera"], &excluded["view"]], ["left", "3"], "{excluded}");
+    assert_eq!(excluded["panel"], 99);
 }
 
 fn motion(value: &Value) -> Pose {

@@ -19,6 +19,7 @@ use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Truth, scene_of_sheet};
 use deltille::target::{BoardSpec, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
 use glam::DVec3;
+use predicates::str::contains;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -227,6 +228,11 @@ fn a_checkerboard_is_written_verified_and_found_again() {
     assert!(said.contains("checkerboard.pdf: verified, 30 corners within 0.00"), "{said}");
     let said = run("checkerboard --template t.toml --tags t36h11 --name tags --svg --png --dsc");
     assert!(said.contains("tags.svg: verified") && said.contains("tags.png: verified"), "{said}");
+    let odd = "checkerboard --template t.toml --tags t36h11 --tag-spacing 3 -o odd";
+    let odd = deltille(folder.path(), odd).success();
+    odd.stderr(contains("warning: --tag-spacing 3: with an odd number only every second"));
+    let other = refused(folder.path(), "board --template t.toml");
+    assert!(other.contains("t.toml was made for `checkerboard`, not `board`"), "{other}");
     let said = run("detect --target tags.json tags.png --format orpc,json -o found");
     assert!(said.contains("30 corners, 6 tags"), "{said}");
     let orpc = std::fs::read_to_string(folder.path().join("found/tags.orpc")).unwrap();
@@ -241,6 +247,10 @@ fn what_a_checkerboard_cannot_have_is_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [
         ("checkerboard --rows 5 --cols 6 --tags delTag25h7", "--family: delTag25h7 has triangular"),
+        (
+            "checkerboard --rows 5 --cols 6 --tags 16h5",
+            "--tags: no family of square tags is called `16h5`: give aprilTag16h5 (t16h5)",
+        ),
         ("board --rows 5 --cols 6 --family t36h11", "--family: aprilTag36h11 has square tags"),
         ("board --rows 5 --cols 6 --tags-in white", "--tags-in: the tags of a deltille board"),
         ("checkerboard --rows 5 --cols 6 --tag-spacing 2", "--tag-spacing: there are no tags"),

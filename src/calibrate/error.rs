@@ -53,7 +53,7 @@ pub enum CalibrationError {
     },
     /// Not enough views.
     #[error(
-        "{found} usable views of {all}: a calibration needs at least {needed}, tilted differently \
+        "usable views: {found} of {all}; a calibration needs at least {needed}, tilted differently \
          (20 or more are better)"
     )]
     TooFewViews {

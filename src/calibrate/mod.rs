@@ -20,7 +20,10 @@
 //! and τ (mm).
 
 mod error;
+mod excluded;
 mod grid;
+mod image_circle;
+mod lens_end;
 mod loss;
 mod minimise;
 mod model;
@@ -38,13 +41,16 @@ mod weights;
 mod wrong;
 
 pub use error::CalibrationError;
+pub use excluded::Excluded;
 pub use grid::UntaggedGrid;
+pub use image_circle::ImageCircle;
+pub use lens_end::LensEnd;
 pub use loss::Loss;
 pub use model::{Model, ModelError};
 pub use pose::estimate_pose;
 pub use problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Prior, Problem};
 pub use rig::{PanelPlace, RigCamera, RigFrame, RigOptions, RigSolution, RigViews, calibrate_rig};
-pub use shape::{BoardShape, Shape};
+pub use shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
 pub use solution::{Corner, Parameter, Solution, ViewSolution};
 pub use solve::{Options, calibrate, calibrate_with_shape, poses};
 pub use view::{Reference, Shown, Sighting, View, views};

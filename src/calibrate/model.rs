@@ -102,6 +102,21 @@ impl Model {
         (0..count + self.lens().names().len()).map(|i| i < count + lens).collect()
     }
 
+    /// The next one that has fewer of the same parameters, where there is one.
+    pub fn smaller(self) -> Option<Self> {
+        match self {
+            Self::Radtan5 => Some(Self::Radtan),
+            Self::Rational => Some(Self::Radtan5),
+            Self::ThinPrism => Some(Self::Rational),
+            Self::KannalaBrandt(terms) if terms > TERMS => Some(Self::KannalaBrandt(terms - 1)),
+            Self::Radtan
+            | Self::KannalaBrandt(_)
+            | Self::Eucm
+            | Self::DoubleSphere
+            | Self::Pupil => None,
+        }
+    }
+
     /// The parameters that are found first, while poses are rough: focal lengths and the two
     /// coarsest of the lens.
     pub(super) fn coarse(self) -> Vec<bool> {

@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 /// Coefficients of a shape.
-pub(super) const COUNT: usize = 9;
+pub const COUNT: usize = 9;
 
 /// How a board's sheet differs from its plan: bent, stretched and sheared.
 ///
@@ -16,8 +16,10 @@ pub(super) const COUNT: usize = 9;
 /// in mm. A uniform scale, turns and moves are left out: distance and pose of the views take them up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape {
-    middle: DVec3,
-    reach_mm: f64,
+    /// The middle of the board, in the panel frame.
+    pub middle_mm: DVec3,
+    /// Distance of its farthest corner from there, more than zero.
+    pub reach_mm: f64,
     /// b₁ … b₇, a₁, a₂, mm.
     pub coefficients_mm: [f64; COUNT],
 }
@@ -54,14 +56,14 @@ impl Shape {
     /// The shape of a sheet as planned, with these corners.
     pub(super) fn flat(corners: impl Iterator<Item = DVec3> + Clone) -> Self {
         let count = corners.clone().count().max(1) as f64;
-        let middle = corners.clone().sum::<DVec3>() / count;
-        let reach_mm = corners.map(|p| p.distance(middle)).fold(0.0, f64::max);
-        Self { middle, reach_mm: reach_mm.max(f64::MIN_POSITIVE), coefficients_mm: [0.0; COUNT] }
+        let middle_mm = corners.clone().sum::<DVec3>() / count;
+        let reach_mm = corners.map(|p| p.distance(middle_mm)).fold(0.0, f64::max);
+        Self { middle_mm, reach_mm: reach_mm.max(f64::MIN_POSITIVE), coefficients_mm: [0.0; COUNT] }
     }
 
     /// What each coefficient moves a point of the plan by, in its own units.
     pub(super) fn directions(&self, at: DVec3) -> [DVec3; COUNT] {
-        let DVec3 { x: u, y: v, .. } = (at - self.middle) / self.reach_mm;
+        let DVec3 { x: u, y: v, .. } = (at - self.middle_mm) / self.reach_mm;
         let up = |z: f64| DVec3::new(0.0, 0.0, z);
         [
             up(u * u),

@@ -1,5 +1,7 @@
 use nalgebra::DMatrix;
 
+use super::excluded::Excluded;
+use super::lens_end::LensEnd;
 use super::shape::BoardShape;
 use crate::camera::{Camera, Pose};
 
@@ -15,7 +17,7 @@ pub struct Solution {
     /// The views, in the order given.
     pub views: Vec<ViewSolution>,
     /// Views that do not belong with the others and took no part, and why.
-    pub excluded: Vec<(String, String)>,
+    pub excluded: Vec<Excluded>,
     /// Root mean square error of a coordinate over all views, px: √(Σ(dx² + dy²)/2N).
     pub rms_px: f64,
     /// The deviation that was added to every corner's covariance, px; `None` where corners were
@@ -92,7 +94,28 @@ impl Solution {
 
     /// How many corners took part.
     pub fn corner_count(&self) -> usize {
-        self.views.iter().map(|view| view.corners.len()).sum()
+        self.corners().count()
+    }
+
+    /// How many corners are outliers.
+    pub fn outlier_count(&self) -> usize {
+        self.corners().filter(|corner| corner.outlier).count()
+    }
+
+    /// [`Self::rms_px`] of the corners that are no outliers.
+    pub fn inlier_rms_px(&self) -> f64 {
+        let inliers = self.corners().filter(|corner| !corner.outlier);
+        rms_px(inliers.map(|corner| &corner.residual))
+    }
+
+    /// Where the lens ends to be good, if that is within the image.
+    pub fn lens_end(&self) -> Option<LensEnd> {
+        let seen: Vec<[f64; 2]> = self.corners().map(|corner| corner.pixel).collect();
+        LensEnd::of(&self.camera, &seen)
+    }
+
+    fn corners(&self) -> impl Iterator<Item = &Corner> {
+        self.views.iter().flat_map(|view| &view.corners)
     }
 }
 

@@ -1,6 +1,7 @@
 use glam::DVec3;
 
 use super::error::CalibrationError;
+use super::excluded::Excluded;
 use super::loss::Loss;
 use super::minimise::{Minimum, Until, minimise};
 use super::model::Model;
@@ -28,10 +29,6 @@ const PARALLEL_RAD: f64 = 0.05;
 /// of the focal length: equations that are linear near the solution, as deviations are computed from,
 /// are then off by as much as they say, and the deviation means nothing.
 const LOOSE_FOCAL: f64 = 0.1;
-
-/// A corner is an outlier beyond so many standard deviations: of a million corners with normal
-/// errors four are.
-const OUTLIER_SIGMA: f64 = 5.0;
 
 /// How a camera is calibrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -238,7 +235,7 @@ impl Search<'_> {
                          where the lens model has ended"
                     .to_owned(),
             };
-            (view.name.clone(), why)
+            Excluded::view(view, why)
         });
         let excluded = excluded.collect();
 
@@ -261,7 +258,7 @@ impl Search<'_> {
     fn solution(
         &self,
         kept: &[usize],
-        excluded: Vec<(String, String)>,
+        excluded: Vec<Excluded>,
         minimum: &Minimum,
         whitening: &Whitening,
         f_ratio: f64,
@@ -318,8 +315,7 @@ impl Search<'_> {
         {
             let corners = block.observations.iter().zip(residuals).zip(weights);
             views[block.frame].corners.extend(corners.map(|((seen, &residual), &w)| {
-                let [x, y] = Whitening::apply(w, residual);
-                let outlier = x.hypot(y) > OUTLIER_SIGMA * whitening.sigma;
+                let outlier = whitening.is_outlier(w, residual);
                 let (row, col, pixel) = (seen.row, seen.col, seen.pixel);
                 Corner { panel: block.panel, row, col, pixel, residual, outlier }
             }));

@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 use glam::{DQuat, DVec3};
 
 use super::error::CalibrationError;
+use super::excluded::Excluded;
 use super::grid::UntaggedGrid;
 use super::problem::Observation;
 use super::shape::Shape;
@@ -44,6 +45,13 @@ pub struct Sighting {
     pub observations: Vec<Observation>,
 }
 
+impl View {
+    /// How many corners it shows.
+    pub fn corner_count(&self) -> usize {
+        self.sightings.iter().map(|sighting| sighting.observations.len()).sum()
+    }
+}
+
 impl Sighting {
     /// Moves the corners to where a sheet of this shape has them.
     pub fn bend(&mut self, shape: &Shape) {
@@ -83,20 +91,31 @@ impl Reference<'_> {
         }
     }
 
-    fn sightings(&self, detection: &Detection) -> Result<Vec<Sighting>, String> {
+    /// Id of a panel; `None` on an untagged board.
+    fn panel_id(&self, index: usize) -> Option<u32> {
+        match self {
+            Self::Grid(_) => None,
+            Self::Target(target) => Some(target.panels[index].id),
+        }
+    }
+
+    /// What a detection shows of the panels, or the panel that is wrong in it and why.
+    fn sightings(&self, detection: &Detection) -> Result<Vec<Sighting>, (Option<u32>, String)> {
         match self {
             Self::Grid(board) => {
                 let of_kind = detection.grids.iter().filter(|grid| grid.kind == board.kind);
                 let Some(grid) = of_kind.max_by_key(|grid| grid.corners.len()) else {
                     return Ok(Vec::new());
                 };
-                board.check(grid)?;
+                board.check(grid).map_err(|problem| (None, problem))?;
                 let at = |row, col| board.place(row, col);
                 Ok(vec![Sighting { panel: 0, observations: observations(grid, at) }])
             }
             Self::Target(target) => {
                 let grids = detection.grids.iter();
-                let found = grids.filter_map(|grid| on_target(target, grid).transpose());
+                let found = grids.filter_map(|grid| {
+                    on_target(target, grid).map_err(|problem| (grid.panel, problem)).transpose()
+                });
                 found.collect()
             }
         }
@@ -108,10 +127,10 @@ impl Reference<'_> {
 pub struct Shown {
     /// One for each picture, or for each board in it where several lie about.
     pub views: Vec<View>,
-    /// Names of the detections that show nothing.
-    pub empty: Vec<String>,
-    /// What is wrong with detections that do not belong to the target.
-    pub left_out: Vec<CalibrationError>,
+    /// Positions of the detections that show nothing.
+    pub empty: Vec<usize>,
+    /// Positions of the detections that do not belong to the target, and what is wrong with them.
+    pub left_out: Vec<(usize, Excluded)>,
 }
 
 /// The views of all detections, each with its name; an error where most of those that show
@@ -123,7 +142,8 @@ pub fn views(
     let mut views = Vec::new();
     let mut empty = Vec::new();
     let mut left_out = Vec::new();
-    for (name, detection) in detections {
+    let mut first_wrong = None;
+    for (index, (name, detection)) in detections.iter().enumerate() {
         let size_px = [detection.width, detection.height];
         if let Some((first, other)) = detections.first()
             && size_px != [other.width, other.height]
@@ -136,8 +156,16 @@ pub fn views(
             });
         }
         match sightings(name, detection, reference) {
-            Err(error) => left_out.push(error),
-            Ok(sightings) if sightings.is_empty() => empty.push(name.clone()),
+            Err((panel, error)) => {
+                let told = error.to_string();
+                let reason = told.strip_prefix(&format!("{name}: ")).unwrap_or(&told).to_owned();
+                let (view, image) = (name.clone(), detection.image.clone());
+                let corners = detection.grids.iter().map(|grid| grid.corners.len()).sum();
+                left_out
+                    .push((index, Excluded { camera: None, view, image, panel, corners, reason }));
+                first_wrong.get_or_insert(error);
+            }
+            Ok(sightings) if sightings.is_empty() => empty.push(index),
             Ok(sightings) if reference.is_loose() => {
                 views.extend(sightings.into_iter().map(|sighting| View {
                     name: format!("{name} board {}", sighting.panel),
@@ -153,34 +181,33 @@ pub fn views(
         }
     }
     let all = detections.len() - empty.len();
-    match left_out.first() {
+    match first_wrong {
         Some(first) if 2 * left_out.len() > all => Err(match all {
-            1 => first.clone(),
-            _ => CalibrationError::MostWrong {
-                first: Box::new(first.clone()),
-                wrong: left_out.len(),
-                all,
-            },
+            1 => first,
+            _ => CalibrationError::MostWrong { first: Box::new(first), wrong: left_out.len(), all },
         }),
         _ => Ok(Shown { views, empty, left_out }),
     }
 }
 
-/// What a detection shows of the panels.
+/// What a detection shows of the panels, or the panel that is wrong in it and why.
 fn sightings(
     name: &str,
     detection: &Detection,
     reference: &Reference,
-) -> Result<Vec<Sighting>, CalibrationError> {
+) -> Result<Vec<Sighting>, (Option<u32>, CalibrationError)> {
     let view = || name.to_owned();
-    let mut sightings = reference.sightings(detection).map_err(|problem| match reference {
-        Reference::Grid(_) => CalibrationError::NotTheBoard { view: view(), problem },
-        Reference::Target(_) => CalibrationError::NotOfTarget { view: view(), problem },
+    let found = reference.sightings(detection);
+    let mut sightings = found.map_err(|(panel, problem)| match reference {
+        Reference::Grid(_) => (panel, CalibrationError::NotTheBoard { view: view(), problem }),
+        Reference::Target(_) => (panel, CalibrationError::NotOfTarget { view: view(), problem }),
     })?;
     sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
-    match sightings.iter().any(is_mirrored) {
-        true => Err(CalibrationError::Mirrored { view: view() }),
-        false => Ok(sightings),
+    match sightings.iter().find(|sighting| is_mirrored(sighting)) {
+        Some(wrong) => {
+            Err((reference.panel_id(wrong.panel), CalibrationError::Mirrored { view: view() }))
+        }
+        None => Ok(sightings),
     }
 }
 

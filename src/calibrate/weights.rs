@@ -12,6 +12,10 @@ const HALVINGS: usize = 30;
 /// does not divide by zero.
 const LEAST_SIGMA: f64 = 1e-6;
 
+/// A corner is an outlier beyond so many standard deviations: of a million corners with normal
+/// errors four are.
+const OUTLIER_SIGMA: f64 = 5.0;
+
 /// What is known of the corners' precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weights {
@@ -38,6 +42,12 @@ impl Whitening {
     /// W r.
     pub(super) fn apply([a, b, c]: [f64; 3], [x, y]: [f64; 2]) -> [f64; 2] {
         [a * x, b * x + c * y]
+    }
+
+    /// Whether a corner is farther off than corners are by chance.
+    pub(super) fn is_outlier(&self, weight: [f64; 3], residual: [f64; 2]) -> bool {
+        let [x, y] = Self::apply(weight, residual);
+        x.hypot(y) > OUTLIER_SIGMA * self.sigma
     }
 
     /// Every corner alike.

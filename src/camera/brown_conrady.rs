@@ -1,6 +1,7 @@
 use glam::DVec3;
 
 use super::lens::{Imaged, LensLaw, Ray};
+use super::reach::{product, sign_changes, slope_times_q};
 
 /// Points nearer to the image plane than this part of their distance are not projected: beyond
 /// 89.9° from the axis perspective loses its meaning.
@@ -9,6 +10,10 @@ const MIN_FORWARD: f64 = 0.002;
 /// Steps of the radius in which the way back from the image looks for the undistorted point, in
 /// focal lengths: far less than the length over which any usable polynomial folds back.
 const RADIUS_STEP: f64 = 0.02;
+
+/// No polynomial here makes the image grow with more than the seventh power of r; where a lens does,
+/// its denominator runs to zero.
+const STEEPEST: f64 = 7.0;
 
 /// Newton's iterations from a start within [`RADIUS_STEP`]; five reach the last bit.
 const ITERATIONS: usize = 20;
@@ -193,6 +198,31 @@ impl LensLaw for BrownConrady {
         }
         let valid = self.radial(plane[0] * plane[0] + plane[1] * plane[1]).valid;
         Ray::central(DVec3::new(plane[0], plane[1], 1.0)).filter(|_| valid)
+    }
+
+    /// With ρ = A/B and q = r² the image grows with the power
+    ///
+    /// ```text
+    ///     ∂ ln(r ρ)/∂ ln r = 1 + 2 q (A'/A − B'/B)
+    /// ```
+    ///
+    /// of r, which is to stay between 0, where it folds, and [`STEEPEST`].
+    fn steady_radius(&self) -> Option<f64> {
+        let with_one = |[a, b, c]: [f64; 3]| [1.0, a, b, c];
+        let (above, below) = (with_one(self.radial), with_one(self.denominator));
+        let both = product(&above, &below);
+        let grow = product(&slope_times_q(&above), &below);
+        let fall = product(&above, &slope_times_q(&below));
+        let power_less = |power: f64| {
+            let terms = both.iter().zip(&grow).zip(&fall);
+            terms.map(|((ab, grow), fall)| (1.0 - power) * ab + 2.0 * (grow - fall)).collect()
+        };
+        let ends = [0.0, STEEPEST].map(|power| {
+            let polynomial: Vec<f64> = power_less(power);
+            sign_changes(&polynomial, MIN_FORWARD.powi(-2)).first().copied()
+        });
+        let q = ends.into_iter().flatten().reduce(f64::min)?;
+        Some(q.sqrt() * self.radial(q).rho)
     }
 }
 

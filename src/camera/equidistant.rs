@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::lens::Imaged;
+use super::reach::sign_changes;
 
 /// Steps of the angle in which the way back looks for a root, rad: polynomials of the few terms
 /// in use do not turn twice within it.
@@ -45,6 +46,15 @@ pub(super) fn angle(k: &[f64], wanted: f64) -> Option<f64> {
         theta -= (value - wanted) / slope;
     }
     (0.0..=PI).contains(&theta).then_some(theta)
+}
+
+/// r at the least θ up to π where the polynomial stops growing.
+pub(super) fn steady_radius(k: &[f64]) -> Option<f64> {
+    // ∂r/∂θ as a polynomial of θ².
+    let mut slope = vec![1.0];
+    slope.extend(k.iter().enumerate().map(|(i, k)| (2 * i + 3) as f64 * k));
+    let turn = sign_changes(&slope, PI * PI).first().copied()?;
+    Some(radius(k, turn.sqrt()).0)
 }
 
 /// How the angle of a point changes with its place.

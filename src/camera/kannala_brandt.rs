@@ -56,4 +56,8 @@ impl LensLaw for KannalaBrandt {
         let (sin, cos) = equidistant::angle(&self.k, r)?.sin_cos();
         Ray::central(DVec3::new(sin * x / r, sin * y / r, cos))
     }
+
+    fn steady_radius(&self) -> Option<f64> {
+        equidistant::steady_radius(&self.k)
+    }
 }

@@ -68,6 +68,12 @@ pub trait LensLaw {
 
     /// The ray that is imaged at a point of the normalised plane; `None` where there is none.
     fn ray(&self, at: [f64; 2]) -> Option<Ray>;
+
+    /// Radius on the normalised plane up to which it grows steadily with the angle, without fold or
+    /// pole; `None` where it does so as far as the model sees.
+    fn steady_radius(&self) -> Option<f64> {
+        None
+    }
 }
 
 impl Lens {
@@ -123,5 +129,16 @@ impl Lens {
     /// The ray that is imaged at a point of the normalised plane; `None` where there is none.
     pub fn ray(&self, at: [f64; 2]) -> Option<Ray> {
         self.law().ray(at)
+    }
+
+    /// Radius on the normalised plane up to which it grows steadily with the angle, without fold or
+    /// pole; `None` where it does so as far as the model sees.
+    pub fn steady_radius(&self) -> Option<f64> {
+        self.law().steady_radius()
+    }
+
+    /// Whether it is perspective, and so sees all of the image.
+    pub fn is_perspective(&self) -> bool {
+        matches!(self, Self::BrownConrady(_))
     }
 }

@@ -14,6 +14,7 @@ mod kannala_brandt;
 mod lens;
 mod pose;
 mod pupil;
+mod reach;
 
 use glam::DVec3;
 

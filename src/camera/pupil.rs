@@ -145,4 +145,8 @@ impl LensLaw for Pupil {
         let direction = DVec3::new(sin * plane[0] / r, sin * plane[1] / r, cos);
         Some(Ray { origin: DVec3::Z * self.shift(theta).0, direction })
     }
+
+    fn steady_radius(&self) -> Option<f64> {
+        equidistant::steady_radius(&self.k)
+    }
 }

@@ -68,11 +68,43 @@ pub fn write(path: &Path, content: &[u8]) -> anyhow::Result<()> {
     Ok(atomic::write(path, |file| file.write_all(content))?)
 }
 
+/// Refuses a folder in whose place there is a file.
+pub fn check_folder(folder: &Path) -> anyhow::Result<()> {
+    match folder.ancestors().find(|part| part.is_file()) {
+        Some(file) => bail!("{} is a file where a folder is needed: name a folder", file.display()),
+        None => Ok(()),
+    }
+}
+
 /// Makes the folder that a file goes to, where there is none.
 pub fn make_folder_of(path: &Path) -> anyhow::Result<()> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        check_folder(folder)?;
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
     Ok(())
+}
+
+/// A number with so many places, without a sign where nothing but zeros is left.
+pub(crate) fn fixed(value: f64, places: usize) -> String {
+    let text = format!("{value:.places$}");
+    match text.strip_prefix('-') {
+        Some(zeros) if !zeros.contains(|c: char| matches!(c, '1'..='9')) => zeros.to_owned(),
+        _ => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_not_negative() {
+        for (value, text) in
+            [(-0.0, "0.00"), (-0.004, "0.00"), (-0.006, "-0.01"), (-10.0, "-10.00")]
+        {
+            assert_eq!(fixed(value, 2), text);
+        }
+    }
 }

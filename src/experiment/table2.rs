@@ -17,6 +17,9 @@ use crate::target::GridKind;
 const SIZE: [u32; 2] = [10, 11];
 const EDGE_MM: f64 = 20.0;
 
+/// Images of the board that are needed: three for each half, of which a camera is made.
+const LEAST_VIEWS: usize = 6;
+
 /// A line of the table: root mean square errors of a coordinate, px.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
@@ -33,6 +36,17 @@ pub struct Row {
 /// Why the table was not made.
 #[derive(Debug, thiserror::Error)]
 pub enum Table2Error {
+    /// Too few images of the board.
+    #[error(
+        "{found} of {all} images show the board whole, untagged, of {} × {} corners, and {LEAST_VIEWS} \
+         are needed: name the folder of the paper's photographs", SIZE[0], SIZE[1]
+    )]
+    TooFew {
+        /// How many show it.
+        found: usize,
+        /// How many there are.
+        all: usize,
+    },
     /// An image that cannot be read.
     #[error(transparent)]
     Image(#[from] ImageError),
@@ -47,6 +61,9 @@ pub fn run(images: &[impl AsRef<Path> + Sync]) -> Result<Vec<Row>, Table2Error> 
     let mut rows = Vec::new();
     for refinement in [Refinement::Polynomial, Refinement::Model] {
         let views = detect(images, refinement)?;
+        if views.len() < LEAST_VIEWS {
+            return Err(Table2Error::TooFew { found: views.len(), all: images.len() });
+        }
         let (first, second) = views.split_at(views.len() / 2);
         for model in [Model::Radtan, Model::Radtan5, Model::Rational] {
             let (loss, weights) = (Loss::Squared, Weights::Equal);

@@ -1,16 +1,65 @@
 //! Calibrations as JSON, schema `deltille/calibration/1`: the camera with standard deviations and
 //! correlations, and every view with its pose and residuals.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::motion::Motion;
-use crate::calibrate::Solution;
+use crate::calibrate::{Excluded, SHAPE_COEFFICIENTS as COUNT, Shape, Solution};
+
+/// What a calibration tells of the sheet that was photographed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sheet {
+    /// How the print came out across and up the sheet.
+    pub print_scale: Option<[f64; 2]>,
+    /// How the sheet differs from its plan then.
+    pub shape: Option<Shape>,
+}
+
+/// Why a file tells of no sheet.
+#[derive(Debug, thiserror::Error)]
+pub enum SheetError {
+    /// Not the file of a calibration.
+    #[error("not the .json that `calibrate` writes")]
+    Foreign,
+    /// A calibration without shape.
+    #[error("no `board_shape` in it: make it with `calibrate --board-shape`")]
+    Flat,
+}
+
+#[derive(Deserialize)]
+struct SheetOfFile {
+    schema: String,
+    print_scale: Option<[f64; 2]>,
+    board_shape: Option<StoredShape>,
+}
+
+#[derive(Deserialize)]
+struct StoredShape {
+    middle_mm: [f64; 3],
+    reach_mm: f64,
+    coefficients_mm: [f64; COUNT],
+}
+
+/// Reads the sheet of a calibration that found its shape.
+pub fn read_sheet(text: &str) -> Result<Sheet, SheetError> {
+    let file: SheetOfFile = serde_json::from_str(text).map_err(|_| SheetError::Foreign)?;
+    if file.schema != SCHEMA {
+        return Err(SheetError::Foreign);
+    }
+    let StoredShape { middle_mm, reach_mm, coefficients_mm } =
+        file.board_shape.ok_or(SheetError::Flat)?;
+    if reach_mm.is_nan() || reach_mm <= 0.0 {
+        return Err(SheetError::Foreign);
+    }
+    let shape = Shape { middle_mm: middle_mm.into(), reach_mm, coefficients_mm };
+    Ok(Sheet { print_scale: file.print_scale, shape: Some(shape) })
+}
 
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/calibration/1";
 
 #[derive(Serialize)]
-struct CalibrationFile {
+struct CalibrationFile<'a> {
     schema: &'static str,
     model: String,
     width: u32,
@@ -19,18 +68,24 @@ struct CalibrationFile {
     correlations: Vec<Vec<f64>>,
     loose: Vec<String>,
     rms_px: f64,
+    inlier_rms_px: f64,
+    outliers: usize,
     sigma: f64,
     common_px: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    print_scale: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     board_shape: Option<ShapeOfBoard>,
     views: Vec<View>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    held_out: Option<HeldOut>,
-    excluded: Vec<Excluded>,
+    held_out: Option<HeldOut<'a>>,
+    excluded: &'a [Excluded],
 }
 
 #[derive(Serialize)]
 struct ShapeOfBoard {
+    middle_mm: [f64; 3],
+    reach_mm: f64,
     /// b₁ … b₇, a₁, a₂ of [`crate::calibrate::Shape`].
     coefficients_mm: Vec<f64>,
     sd_mm: Vec<f64>,
@@ -72,25 +127,25 @@ struct Corner {
 }
 
 #[derive(Serialize)]
-struct Excluded {
-    name: String,
-    why: String,
-}
-
-#[derive(Serialize)]
-struct HeldOut {
+struct HeldOut<'a> {
     rms_px: f64,
     views: Vec<View>,
+    excluded: &'a [Excluded],
 }
 
 /// The text of the file; `model` is the name of what was calibrated, `held_out` are the views that
-/// only had their poses found.
-pub fn write(solution: &Solution, model: &str, held_out: Option<&Solution>) -> String {
+/// only had their poses found, `print_scale` is how the print came out across and up its sheet, where
+/// that was measured.
+pub fn write(
+    solution: &Solution,
+    model: &str,
+    held_out: Option<&Solution>,
+    print_scale: Option<[f64; 2]>,
+) -> String {
     let found = solution.found().count();
     let correlations =
         (0..found).map(|i| (0..found).map(|j| solution.correlation(i, j)).collect()).collect();
     let parameters = solution.parameters.iter();
-    let excluded = solution.excluded.iter().cloned();
     let file = CalibrationFile {
         schema: SCHEMA,
         model: model.to_owned(),
@@ -102,9 +157,14 @@ pub fn write(solution: &Solution, model: &str, held_out: Option<&Solution>) -> S
         correlations,
         loose: solution.loose.clone(),
         rms_px: solution.rms_px,
+        inlier_rms_px: solution.inlier_rms_px(),
+        outliers: solution.outlier_count(),
         sigma: solution.sigma,
         common_px: solution.common_px,
+        print_scale,
         board_shape: solution.shape.map(|found| ShapeOfBoard {
+            middle_mm: found.shape.middle_mm.to_array(),
+            reach_mm: found.shape.reach_mm,
             coefficients_mm: found.shape.coefficients_mm.to_vec(),
             sd_mm: found.sd_mm.to_vec(),
             bent_mm: found.bent_mm,
@@ -115,9 +175,10 @@ pub fn write(solution: &Solution, model: &str, held_out: Option<&Solution>) -> S
         held_out: held_out.map(|test| HeldOut {
             rms_px: test.rms_px,
             views: test.views.iter().map(view).collect(),
+            excluded: &test.excluded,
         }),
         views: solution.views.iter().map(view).collect(),
-        excluded: excluded.map(|(name, why)| Excluded { name, why }).collect(),
+        excluded: &solution.excluded,
     };
     crate::json::to_text(&file, 4)
 }

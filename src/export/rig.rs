@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::motion::Motion;
-use crate::calibrate::{Parameter, RigSolution};
+use crate::calibrate::{Excluded, Parameter, RigSolution};
 
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/rig/1";
@@ -14,11 +14,13 @@ struct RigFile<'a> {
     schema: &'static str,
     model: &'a str,
     rms_px: f64,
+    inlier_rms_px: f64,
+    outliers: usize,
     sigma: f64,
     common_px: Option<f64>,
     cameras: Vec<Camera<'a>>,
     frames: Vec<Frame<'a>>,
-    excluded: Vec<Excluded<'a>>,
+    excluded: &'a [Excluded],
 }
 
 #[derive(Serialize)]
@@ -27,7 +29,9 @@ struct Camera<'a> {
     width: u32,
     height: u32,
     rms_px: f64,
+    inlier_rms_px: f64,
     corners: usize,
+    outliers: usize,
     parameters: Vec<Value<'a>>,
     camera_from_rig: Motion,
 }
@@ -46,12 +50,6 @@ struct Frame<'a> {
     rig_from_target: Motion,
 }
 
-#[derive(Serialize)]
-struct Excluded<'a> {
-    view: &'a str,
-    why: &'a str,
-}
-
 /// The text of a rig's file.
 pub fn write(solution: &RigSolution, model: &str) -> String {
     let cameras = solution.cameras.iter().map(|camera| Camera {
@@ -59,7 +57,9 @@ pub fn write(solution: &RigSolution, model: &str) -> String {
         width: camera.camera.width,
         height: camera.camera.height,
         rms_px: camera.rms_px,
+        inlier_rms_px: camera.inlier_rms_px,
         corners: camera.corners,
+        outliers: camera.outliers,
         parameters: camera.parameters.iter().map(value).collect(),
         camera_from_rig: Motion::new(&camera.camera_from_rig, camera.pose_sd),
     });
@@ -68,16 +68,17 @@ pub fn write(solution: &RigSolution, model: &str) -> String {
         rms_px: frame.rms_px,
         rig_from_target: Motion::new(&frame.rig_from_target, Some(frame.pose_sd)),
     });
-    let excluded = solution.excluded.iter().map(|(view, why)| Excluded { view, why });
     let file = RigFile {
         schema: SCHEMA,
         model,
         rms_px: solution.rms_px,
+        inlier_rms_px: solution.inlier_rms_px(),
+        outliers: solution.outlier_count(),
         sigma: solution.sigma,
         common_px: solution.common_px,
         cameras: cameras.collect(),
         frames: frames.collect(),
-        excluded: excluded.collect(),
+        excluded: &solution.excluded,
     };
     crate::json::to_text(&file, 4)
 }

@@ -1,6 +1,8 @@
 //! Plain words on what a calibration lacks. Every rule has its reason; none depends on a camera.
 
 use super::{Report, Survey};
+use crate::calibrate::{Model, Parameter};
+use crate::words::counted;
 
 /// How much a piece of advice matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -78,7 +80,7 @@ fn views(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String))
     if count < VIEWS {
         add(
             Weight::Warning,
-            format!("Only {count} views: take at least {VIEWS}, better 20 to 50."),
+            format!("Only {}: take at least {VIEWS}, better 20 to 50.", counted(count, "view")),
         );
     }
     if survey.planar {
@@ -88,7 +90,7 @@ fn views(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String))
             add(
                 Weight::Warning,
                 format!(
-                    "Only {tilted} views are tilted by more than 20°: focal length and distance are \
+                    "Only {tilted} of {count} views tilted by more than 20°: focal length and distance are \
                      hardly told apart. Tilt the board by 30° to 50°, to all four sides."
                 ),
             );
@@ -103,9 +105,12 @@ fn views(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String))
         few => few.join(", "),
     };
     let excluded: Vec<&str> =
-        report.solution.excluded.iter().map(|(name, _)| name.as_str()).collect();
+        report.solution.excluded.iter().map(|out| out.view.as_str()).collect();
     if !excluded.is_empty() {
-        let text = format!("Left out, because they do not fit the others: {}.", named(excluded));
+        let text = format!(
+            "Left out, because they do not fit the others or the target: {}.",
+            named(excluded)
+        );
         add(Weight::Warning, text);
     }
     let mut rms: Vec<f64> = report.solution.views.iter().map(|view| view.rms_px).collect();
@@ -124,42 +129,57 @@ fn views(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String))
 
 fn coverage(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
     let (covered, reach) = (survey.covered(), survey.reach(report.solution));
+    let of_what = if survey.circle.is_some() { "image circle" } else { "image" };
     if covered < COVERED {
         let text = format!(
-            "Corners cover {:.0} % of the image: bring the board to the empty cells of the map, its \
-             rim may be cut off.",
+            "Corners cover {:.0} % of the {of_what}: bring the board to the empty cells of the map, \
+             its rim may be cut off.",
             100.0 * covered
         );
         add(Weight::Hint, text);
     } else {
-        add(Weight::Good, format!("Corners cover {:.0} % of the image.", 100.0 * covered));
+        add(Weight::Good, format!("Corners cover {:.0} % of the {of_what}.", 100.0 * covered));
     }
     if reach < REACH {
+        let (place, length) = match survey.circle {
+            Some(_) => ("near the rim of the image circle", "radius"),
+            None => ("in the corners of the image", "half diagonal"),
+        };
         let text = format!(
-            "No corner lies in the corners of the image: beyond {:.0} % of its half diagonal the \
-             distortion is extrapolated.",
+            "No corner lies {place}: beyond {:.0} % of its {length} the distortion is extrapolated.",
             100.0 * reach
         );
         add(Weight::Hint, text);
+    }
+    if let Some(end) = report.solution.lens_end() {
+        let text = end.to_string();
+        let mut letters = text.chars();
+        let first = letters.next().map(|letter| letter.to_ascii_uppercase());
+        add(Weight::Warning, first.into_iter().chain(letters).chain(['.']).collect());
     }
 }
 
 fn parameters(report: &Report, add: &mut impl FnMut(Weight, String)) {
     let solution = report.solution;
-    let weak: Vec<&str> = solution
-        .parameters
-        .iter()
-        .skip(crate::camera::PROJECTION_PARAMETERS.len())
-        .filter(|p| p.sd.is_some_and(|sd| p.value.abs() < SIGNIFICANT * sd))
-        .map(|p| p.name.as_str())
-        .collect();
-    if !weak.is_empty() {
-        let text = format!(
-            "Not told from zero: {}. A model without would do, and be safer where there are no \
-             corners.",
-            weak.join(", ")
-        );
-        add(Weight::Hint, text);
+    let model: Option<Model> = report.model.parse().ok();
+    if let Some(model) = model
+        && let Some(smaller) = model.smaller()
+    {
+        // What the smaller model does without.
+        let there = smaller.free().into_iter().chain(std::iter::repeat(false));
+        let more = model.free().into_iter().zip(there).zip(&solution.parameters);
+        let more: Vec<_> =
+            more.filter(|((here, there), _)| *here && !there).map(|(_, p)| p).collect();
+        let weak = |p: &&Parameter| p.sd.is_some_and(|sd| p.value.abs() < SIGNIFICANT * sd);
+        if more.iter().all(weak) {
+            let names: Vec<&str> = more.iter().map(|p| p.name.as_str()).collect();
+            let text = format!(
+                "Not told from zero: {}. The model {smaller} does without, and is safer where there \
+                 are no corners.",
+                names.join(", ")
+            );
+            add(Weight::Hint, text);
+        }
     }
     let names: Vec<&str> = solution.found().collect();
     let mut pairs = Vec::new();
@@ -229,6 +249,65 @@ fn residuals(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, Stri
             add(Weight::Warning, text);
         } else {
             add(Weight::Good, format!("{figures}."));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::calibrate::Solution;
+    use crate::camera::Camera;
+
+    /// What is advised where no parameter of the lens is told from zero.
+    fn advised(model: Model) -> String {
+        let camera = Camera::centred(640, 480, 500.0, model.lens());
+        let values = camera.parameter_names().into_iter().zip(camera.parameters());
+        let parameters = values.zip(model.free());
+        let parameters: Vec<Parameter> = parameters
+            .map(|((name, value), free)| Parameter { name, value, sd: free.then_some(1.0) })
+            .collect();
+        let count = model.free().into_iter().filter(|free| *free).count();
+        let solution = Solution {
+            camera,
+            parameters,
+            covariance: DMatrix::identity(count, count),
+            views: Vec::new(),
+            excluded: Vec::new(),
+            rms_px: 0.1,
+            common_px: None,
+            sigma: 1.0,
+            loose: Vec::new(),
+            shape: None,
+            steps: 1,
+        };
+        let report = Report {
+            title: "camera",
+            model: &model.to_string(),
+            solution: &solution,
+            holdout: None,
+            scale_measured: true,
+            thumbnails: BTreeMap::new(),
+        };
+        let advice = advice(&report, &Survey::new(&solution));
+        advice.into_iter().map(|advice| advice.text + "\n").collect()
+    }
+
+    #[test]
+    fn a_smaller_model_is_advised_where_there_is_one() {
+        for (model, text) in [
+            (Model::Radtan5, "Not told from zero: k3. The model radtan does without"),
+            (Model::Rational, "Not told from zero: k4, k5, k6. The model radtan5 does without"),
+            (Model::KannalaBrandt(5), "Not told from zero: k5. The model kannala-brandt does"),
+        ] {
+            assert!(advised(model).contains(text), "{}", advised(model));
+        }
+        for model in [Model::Pupil, Model::Radtan, Model::KannalaBrandt(4)] {
+            assert!(!advised(model).contains("Not told from zero"), "{}", advised(model));
         }
     }
 }

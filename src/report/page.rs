@@ -61,6 +61,9 @@ fn figures(report: &Report) -> String {
         (solution.views.len().to_string(), "views"),
         (solution.corner_count().to_string(), "corners"),
     ];
+    if solution.outlier_count() > 0 {
+        cells.insert(1, (format!("{:.4} px", solution.inlier_rms_px()), "rms without outliers"));
+    }
     if let Some(holdout) = report.holdout {
         let name = "rms on views held out";
         cells.insert(1, (format!("{:.4} px", holdout.rms_px), name));
@@ -191,12 +194,12 @@ fn views(report: &Report, survey: &Survey) -> String {
             stands.distance_mm
         );
     }
-    let excluded = solution.excluded.iter().map(|(name, why)| {
+    let excluded = solution.excluded.iter().map(|out| {
         format!(
             "<tr><td></td><td class=\"name\">{}</td><td colspan=\"5\" class=\"out\">left out: {}\
              </td></tr>",
-            escaped(name),
-            escaped(why)
+            escaped(&out.view),
+            escaped(&out.reason)
         )
     });
     let excluded: String = excluded.collect();

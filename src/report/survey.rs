@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use crate::calibrate::{Solution, ViewSolution};
+use crate::calibrate::{ImageCircle, Solution, ViewSolution};
 use crate::camera::Camera;
 
 /// Cells of the maps along the longer side of the image.
@@ -22,6 +22,8 @@ pub struct Survey {
     pub views: Vec<SurveyedView>,
     /// Whether the target is a plane.
     pub planar: bool,
+    /// What the lens shows, where that is not all of the image.
+    pub circle: Option<ImageCircle>,
 }
 
 /// The mean residual of a cell, outliers left out.
@@ -70,22 +72,35 @@ impl Survey {
         let views =
             solution.views.iter().map(|view| surveyed(&solution.camera, view, planar)).collect();
         let means_px = inside.iter().map(|residuals| cell_mean(residuals)).collect();
-        Self { size_px, cells, counts, means_px, views, planar }
+        let seen: Vec<[f64; 2]> = corners().map(|corner| corner.pixel).collect();
+        let circle = ImageCircle::of(&solution.camera, &seen);
+        Self { size_px, cells, counts, means_px, views, planar, circle }
     }
 
-    /// Part of the image's cells in which there are corners.
+    /// Part of the cells of the image, or of its circle, in which there are corners.
     pub fn covered(&self) -> f64 {
-        let covered = self.counts.iter().filter(|&&count| count > 0).count();
-        covered as f64 / self.counts.len() as f64
+        let [columns, rows] = self.cells;
+        let is_shown = |index: usize| {
+            let [column, row] = [index % columns, index / columns].map(|v| v as f64 + 0.5);
+            let x = column * self.size_px[0] / columns as f64 - 0.5;
+            let y = row * self.size_px[1] / rows as f64 - 0.5;
+            self.circle.is_none_or(|circle| circle.radius_of([x, y]) <= circle.radius_px)
+        };
+        let shown: Vec<usize> = (0..self.counts.len()).filter(|&index| is_shown(index)).collect();
+        let covered = shown.iter().filter(|&&index| self.counts[index] > 0).count();
+        covered as f64 / shown.len().max(1) as f64
     }
 
     /// Distance of the outermost corner from the middle of the image, as a part of half its
-    /// diagonal.
+    /// diagonal; or from the middle of its circle, as a part of its radius.
     pub fn reach(&self, solution: &Solution) -> f64 {
         let [w, h] = self.size_px;
-        let radius = |[x, y]: [f64; 2]| (x + 0.5 - w / 2.0).hypot(y + 0.5 - h / 2.0);
+        let whole =
+            ImageCircle { centre_px: [w / 2.0 - 0.5, h / 2.0 - 0.5], radius_px: w.hypot(h) / 2.0 };
+        let circle = self.circle.unwrap_or(whole);
         let corners = solution.views.iter().flat_map(|view| &view.corners);
-        corners.map(|corner| radius(corner.pixel)).fold(0.0, f64::max) / (w.hypot(h) / 2.0)
+        let radii = corners.map(|corner| circle.radius_of(corner.pixel));
+        radii.fold(0.0, f64::max) / circle.radius_px
     }
 
     /// Root mean square of the cells' mean residuals in their standard deviations: 1 where

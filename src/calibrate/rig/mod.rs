@@ -17,6 +17,7 @@ mod start;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::error::CalibrationError;
+use super::excluded::Excluded;
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
 use super::model::Model;
@@ -88,12 +89,20 @@ pub fn calibrate_rig(
         .ok_or(CalibrationError::NoStart)?;
     let wrong = wrong_frames(&first.problem);
     for (&frame, (camera, off_px)) in &wrong {
-        let why = format!(
+        let reason = format!(
             "the corners of camera {} are off by {off_px:.1} px: not taken at the same moment, or \
              wrong labels",
             cameras[*camera].name
         );
-        excluded.push((start.frames[frame].clone(), why));
+        let of_frame = first.problem.blocks.iter().filter(|block| block.frame == frame);
+        excluded.push(Excluded {
+            camera: None,
+            view: start.frames[frame].clone(),
+            image: String::new(),
+            panel: None,
+            corners: of_frame.map(|block| block.observations.len()).sum(),
+            reason,
+        });
     }
     let all = start.frames.len();
     if 2 * wrong.len() > all {

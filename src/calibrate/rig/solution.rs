@@ -2,6 +2,8 @@ use nalgebra::DMatrix;
 
 use super::{PanelPlace, RigViews};
 use crate::calibrate::error::CalibrationError;
+use crate::calibrate::excluded::Excluded;
+use crate::calibrate::lens_end::LensEnd;
 use crate::calibrate::minimise::Minimum;
 use crate::calibrate::normal::Covariances;
 use crate::calibrate::settle::{residuals, variance};
@@ -22,7 +24,7 @@ pub struct RigSolution {
     /// Parameters that the views cannot tell apart, see [`super::super::Solution::loose`].
     pub loose: Vec<String>,
     /// Views and frames that took no part, and why.
-    pub excluded: Vec<(String, String)>,
+    pub excluded: Vec<Excluded>,
     /// Root mean square error of a coordinate over all corners, px.
     pub rms_px: f64,
     /// The deviation that was added to every corner's covariance, px; see [`super::Weights`].
@@ -47,8 +49,14 @@ pub struct RigCamera {
     pub pose_sd: Option<[f64; 6]>,
     /// Root mean square error of a coordinate, px.
     pub rms_px: f64,
+    /// The same of the corners that are no outliers, px.
+    pub inlier_rms_px: f64,
     /// How many corners it saw.
     pub corners: usize,
+    /// How many of them are outliers.
+    pub outliers: usize,
+    /// Where its lens ends to be good, if that is within the image.
+    pub lens_end: Option<LensEnd>,
 }
 
 /// A moment at which pictures were taken.
@@ -72,6 +80,19 @@ impl RigSolution {
             poses.map(|panel| PanelPose::from_pose(&panel.target_from_panel, panel.covariance));
         let name = format!("{}-refined", target.name.trim_end_matches("-refined"));
         Target { name, ..target.with_poses(&poses.collect::<Vec<_>>()) }
+    }
+
+    /// How many corners are outliers.
+    pub fn outlier_count(&self) -> usize {
+        self.cameras.iter().map(|camera| camera.outliers).sum()
+    }
+
+    /// [`Self::rms_px`] of the corners that are no outliers.
+    pub fn inlier_rms_px(&self) -> f64 {
+        let inliers = |camera: &RigCamera| (camera.corners - camera.outliers) as f64;
+        let all: f64 = self.cameras.iter().map(inliers).sum();
+        let squares = self.cameras.iter().map(|c| inliers(c) * c.inlier_rms_px.powi(2));
+        (squares.sum::<f64>() / all.max(1.0)).sqrt()
     }
 
     pub(super) fn new(
@@ -124,7 +145,15 @@ impl RigSolution {
                     Parameter { name, value, sd: column.map(|c| covariance[(c, c)].sqrt()) }
                 });
                 let of_camera = |block: &&super::Block| block.camera == index;
-                let blocks = problem.blocks.iter().filter(of_camera);
+                let blocks = || problem.blocks.iter().filter(of_camera);
+                let seen = blocks().flat_map(|block| &block.observations).map(|seen| seen.pixel);
+                let seen: Vec<[f64; 2]> = seen.collect();
+                let of_blocks = problem.blocks.iter().zip(&residuals).zip(&whitening.blocks);
+                let of_blocks = of_blocks.filter(|((block, _), _)| block.camera == index);
+                let corners =
+                    of_blocks.flat_map(|((_, residuals), weights)| residuals.iter().zip(weights));
+                let (off, inliers): (Vec<_>, Vec<_>) =
+                    corners.partition(|(residual, w)| whitening.is_outlier(**w, **residual));
                 RigCamera {
                     name: views.name.clone(),
                     camera: found.camera.clone(),
@@ -132,7 +161,10 @@ impl RigSolution {
                     camera_from_rig: found.camera_from_rig,
                     pose_sd: layout.cameras[index].map(|first| deviations(&covariance, first)),
                     rms_px: rms_of(&|block| block.camera == index),
-                    corners: blocks.map(|block| block.observations.len()).sum(),
+                    inlier_rms_px: rms_px(inliers.into_iter().map(|(residual, _)| residual)),
+                    corners: blocks().map(|block| block.observations.len()).sum(),
+                    outliers: off.len(),
+                    lens_end: LensEnd::of(&found.camera, &seen),
                 }
             });
         let cameras = cameras.collect();

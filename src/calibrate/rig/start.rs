@@ -2,6 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{PanelPlace, RigOptions, RigViews, alone, camera_unknowns, panel_unknowns};
 use crate::calibrate::error::CalibrationError;
+use crate::calibrate::excluded::Excluded;
 use crate::calibrate::problem::{Block, Problem};
 use crate::calibrate::weights::median;
 use crate::camera::{Camera, Pose};
@@ -14,7 +15,7 @@ pub(super) struct Start {
     /// Names of the frames.
     pub frames: Vec<String>,
     /// Views that do not belong, and why.
-    pub excluded: Vec<(String, String)>,
+    pub excluded: Vec<Excluded>,
     cameras: Vec<Camera>,
     camera_from_rig: Vec<Pose>,
     rig_from_target: Vec<Pose>,
@@ -34,12 +35,9 @@ impl Start {
         let mut seen: Vec<BTreeMap<String, Pose>> = Vec::with_capacity(views.len());
         for camera in views {
             let solution = alone(camera, panels, options)?;
-            excluded.extend(
-                solution
-                    .excluded
-                    .into_iter()
-                    .map(|(name, why)| (format!("{name} of camera {}", camera.name), why)),
-            );
+            let name = Some(camera.name.clone());
+            let of_camera = solution.excluded.into_iter();
+            excluded.extend(of_camera.map(|view| Excluded { camera: name.clone(), ..view }));
             seen.push(solution.views.into_iter().map(|view| (view.name, view.pose)).collect());
             cameras.push(solution.camera);
         }

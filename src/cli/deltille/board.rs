@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
 use super::settings::{Plan, Settings};
 use crate::artwork::{self, Artwork};
 use crate::export::{atomic, dsc};
-use crate::family::Family;
+use crate::family::{Family, FamilyError, square_names};
 use crate::target::{GridKind, Target, TargetSpec, id_range};
 
 /// Arguments of both.
@@ -31,13 +31,34 @@ pub struct Args {
 /// Makes a board, writes its files, and verifies what it wrote.
 pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let settings = match &args.template {
-        Some(path) => args.settings.or(Settings::read(path)?),
+        Some(path) => args.settings.or(Settings::read(path, grid)?),
         None => args.settings,
     };
     let plan = settings.plan(grid)?;
     let family = plan.spec.tags.as_ref().map(|tags| Family::resolve(&tags.family)).transpose();
-    let option = if grid == GridKind::Checker { "--tags" } else { "--family" };
-    let family = family.context(option)?;
+    let family = match (family, grid) {
+        (Err(FamilyError::Unknown { name }), GridKind::Checker) => bail!(
+            "--tags: no family of square tags is called `{name}`: give {}, or the path of a .json \
+             family file",
+            square_names()
+                .iter()
+                .map(|name| format!("{name} ({})", name.replacen("aprilTag", "t", 1)))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+        (family, GridKind::Checker) => family.context("--tags")?,
+        (family, GridKind::Deltille) => family.context("--family")?,
+    };
+    if let (Some(tags), GridKind::Checker) = (&plan.spec.tags, grid)
+        && tags.spacing > 1
+        && !tags.spacing.is_multiple_of(2)
+    {
+        eprintln!(
+            "warning: --tag-spacing {}: with an odd number only every second of these squares has the \
+             colour of the tags, with an even one all have it",
+            tags.spacing
+        );
+    }
     let spec = TargetSpec::Board(plan.spec.clone());
     let target = Target::build(&plan.name, &spec, family.as_ref(), Some(&plan.paper))?;
     args.delivery.check_beside(&target)?;

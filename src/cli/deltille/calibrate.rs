@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use super::camera_file;
@@ -14,10 +14,12 @@ use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{self, BoardShape, Loss, Model, Options, Solution, View, Weights};
 use crate::camera::Pose;
 use crate::cli::output;
+use crate::cli::run::{FAILED, report};
 use crate::export::calibration;
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
 use crate::raster::{self, AnyGray};
 use crate::report::{Report, thumbnail};
+use crate::words::counted;
 
 /// Correlations from here on are told: such parameters are hardly told apart.
 const STRONG_CORRELATION: f64 = 0.98;
@@ -25,6 +27,11 @@ const STRONG_CORRELATION: f64 = 0.98;
 /// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
 /// have the lens of the model.
 const POOR_RMS_PX: f64 = 1.0;
+
+/// A known camera that leaves more than this part of the image's width did not take the pictures: poses
+/// take up most of what focal lengths and principal point are off by, and so much is left by another
+/// lens, zoom or crop only.
+const WRONG_CAMERA: f64 = 0.005;
 
 /// Arguments of `deltille calibrate`.
 #[derive(clap::Args)]
@@ -130,34 +137,50 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // Poses of a known camera do not take the place of its calibration.
     let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
     let path = output::file(args.output.as_deref().unwrap_or(Path::new(".")), stem, "yaml")?;
-    let Sightings { views, panels, empty } = args.sightings.read()?;
-    ensure!(!views.is_empty(), "none of {} pictures shows a board of this kind", empty.len());
+    let Sightings { views, panels, empty, left_out, print_scale } = args.sightings.read()?;
+    ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     for picture in &empty {
-        eprintln!("{picture}: no board, left out");
+        eprintln!("{}: no board, left out", picture.display());
     }
     if let Some(folder) = &args.images {
         ensure!(folder.is_dir(), "--images: {} is no folder", folder.display());
+        warn_of_missing(folder, &views);
     }
     if let Some(page) = &args.report {
         let is_page = page.is_dir() || page.extension().is_some_and(|end| end == "html");
         ensure!(is_page, "--report: {} must end in .html, or be a folder", page.display());
     }
-    let solution = args.solve(&views, &panels)?;
-    for (name, why) in &solution.calibrated.excluded {
-        eprintln!("{name}: left out: {why}");
+    let mut solution = args.solve(&views, &panels)?;
+    let of_test = solution.held_out.iter().flat_map(|test| &test.excluded);
+    for out in solution.calibrated.excluded.iter().chain(of_test) {
+        eprintln!("{}: left out: {}", out.view, out.reason);
     }
-    if solution.calibrated.rms_px > POOR_RMS_PX {
+    solution.calibrated.excluded.splice(0..0, left_out);
+    if let (Some(camera), Some(cause)) =
+        (&args.fixed_intrinsics, wrong_camera(&solution.calibrated))
+    {
+        report(&anyhow!("--fixed-intrinsics: {}: {cause}", camera.display()));
+        return Ok(ExitCode::from(FAILED));
+    }
+    if let Some(end) = solution.calibrated.lens_end() {
+        eprintln!("warning: {end}");
+    }
+    // A few wild corners are no fault of the model.
+    let rms_px = solution.calibrated.inlier_rms_px();
+    if rms_px > POOR_RMS_PX {
         eprintln!(
-            "warning: corners are off by {:.1} px: the lens is not one of this model (see --model), \
-             or labels are wrong",
-            solution.calibrated.rms_px
+            "warning: corners are off by {rms_px:.1} px: {}, or labels are wrong",
+            match args.model {
+                Some(_) => "the lens is not one of this model (see --model)",
+                None => "the camera was another one, or has changed since",
+            }
         );
     }
     if !solution.calibrated.loose.is_empty() {
         eprintln!("{}", cannot_tell_apart(&solution.calibrated.loose));
     }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let texts = args.format.iter().map(|&format| format.texts(&stem, &solution));
+    let texts = args.format.iter().map(|&format| format.texts(&stem, &solution, print_scale));
     let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let files = texts.into_iter().flatten().map(|(name, text)| text_file(name, text));
@@ -165,7 +188,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut written = write_all(folder.unwrap_or(Path::new(".")), &files)?;
     if let Some(page) = &args.report {
         let page = output::file(page, &format!("{stem}-report"), "html")?;
-        output::write(&page, args.page(&stem, &solution).as_bytes()).context("--report")?;
+        output::write(&page, args.page(&stem, &solution, print_scale.is_some()).as_bytes())
+            .context("--report")?;
         written.push(page);
     }
     let mut text = table(&solution.calibrated);
@@ -174,13 +198,39 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(test) = &solution.held_out {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "held out: {}", totals(test));
+        let _ = writeln!(text, "held out: {}", headline(test));
     }
     for path in written {
         let _ = writeln!(text, "{}", path.display());
     }
     output::print(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Why a known camera cannot have taken the pictures.
+fn wrong_camera(solution: &Solution) -> Option<String> {
+    let (rms_px, width) = (solution.inlier_rms_px(), f64::from(solution.camera.width));
+    (rms_px > WRONG_CAMERA * width).then(|| {
+        format!(
+            "with this camera corners are off by {rms_px:.1} px, more than {} % of the image's width: \
+             it did not take these pictures, or not with this lens, zoom or crop; nothing was written",
+            100.0 * WRONG_CAMERA
+        )
+    })
+}
+
+/// Tells which pictures of the views are not in a folder.
+fn warn_of_missing(folder: &Path, views: &[View]) {
+    let missing = views.iter().filter(|view| !folder.join(&view.image).is_file());
+    let missing: Vec<&str> = missing.map(|view| view.image.as_str()).collect();
+    if let Some(first) = missing.first() {
+        eprintln!(
+            "warning: --images: {} of {} are not in {}, such as {first}",
+            missing.len(),
+            counted(views.len(), "picture"),
+            folder.display()
+        );
+    }
 }
 
 /// The warning for parameters that the views leave open.
@@ -203,7 +253,7 @@ struct Solved {
 
 impl Args {
     /// The page of a calibration.
-    fn page(&self, stem: &str, solved: &Solved) -> String {
+    fn page(&self, stem: &str, solved: &Solved, scale_measured: bool) -> String {
         let mut thumbnails = BTreeMap::new();
         for view in &solved.calibrated.views {
             let Some(path) = self.images.as_ref().map(|folder| folder.join(&view.image)) else {
@@ -221,7 +271,7 @@ impl Args {
             model: &solved.model,
             solution: &solved.calibrated,
             holdout: solved.held_out.as_ref(),
-            scale_measured: self.sightings.scale_measured(),
+            scale_measured,
             thumbnails,
         };
         report.html()
@@ -249,7 +299,10 @@ impl Args {
         if let Some(every) = every
             && every > views.len()
         {
-            bail!("--holdout: there are only {} views, of which no {every}-th is one", views.len());
+            bail!(
+                "--holdout: there are only {}, so that none is the {every}-th",
+                counted(views.len(), "view")
+            );
         }
         let calibrated = match self.board_shape {
             true => calibrate::calibrate_with_shape(&part(false), panels, options)
@@ -271,7 +324,12 @@ impl Args {
 
 impl Format {
     /// The names and texts of its files.
-    fn texts(self, stem: &str, solved: &Solved) -> anyhow::Result<Vec<(String, String)>> {
+    fn texts(
+        self,
+        stem: &str,
+        solved: &Solved,
+        print_scale: Option<[f64; 2]>,
+    ) -> anyhow::Result<Vec<(String, String)>> {
         let solution = &solved.calibrated;
         let camera = &solution.camera;
         let one = |end: &str, text: String| vec![(format!("{stem}{end}"), text)];
@@ -280,7 +338,12 @@ impl Format {
                 (format!("{stem}.yaml"), camera.to_yaml()),
                 (
                     format!("{stem}.json"),
-                    calibration::write(solution, &solved.model, solved.held_out.as_ref()),
+                    calibration::write(
+                        solution,
+                        &solved.model,
+                        solved.held_out.as_ref(),
+                        print_scale,
+                    ),
                 ),
             ],
             Self::Opencv => one("-opencv.yaml", opencv(camera)?),
@@ -333,11 +396,27 @@ fn table(solution: &Solution) -> String {
         let (corners, outliers) = (view.corners.len(), view.outlier_count());
         let _ = writeln!(text, "{:16} {corners:7}  {:.4}  {outliers:8}", view.name, view.rms_px);
     }
-    let _ = writeln!(text, "{}", totals(solution));
+    text += &headline(solution);
+    text.push('\n');
     text
 }
 
-fn totals(solution: &Solution) -> String {
-    let (views, corners) = (solution.views.len(), solution.corner_count());
-    format!("{views} views, {corners} corners, rms {:.4} px a coordinate", solution.rms_px)
+/// What a calibration is worth, in a line.
+fn headline(solution: &Solution) -> String {
+    let mut text = format!(
+        "{}, {}, rms {:.4} px a coordinate",
+        counted(solution.views.len(), "view"),
+        counted(solution.corner_count(), "corner"),
+        solution.rms_px
+    );
+    text += &without_outliers(solution.outlier_count(), solution.inlier_rms_px());
+    text
+}
+
+/// What is left where corners are outliers, for the end of a line.
+pub fn without_outliers(outliers: usize, inlier_rms_px: f64) -> String {
+    match outliers {
+        0 => String::new(),
+        n => format!(", {inlier_rms_px:.4} px without {}", counted(n, "outlier")),
+    }
 }

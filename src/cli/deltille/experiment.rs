@@ -82,8 +82,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Experiment::Corners(args) => run_corners(args),
         Experiment::Rig(args) => run_rig(args),
         Experiment::Table2(args) => {
-            let images = Images::of(&[args.folder])?;
-            output::print(&table2::text(&table2::run(images.named())?))?;
+            let images = Images::of(std::slice::from_ref(&args.folder))?;
+            let rows = table2::run(images.named());
+            let rows = rows.with_context(|| args.folder.display().to_string())?;
+            output::print(&table2::text(&rows))?;
             Ok(ExitCode::SUCCESS)
         }
     }
@@ -97,6 +99,7 @@ impl SimulationArgs {
         unit: &str,
         simulation: impl FnOnce(&(dyn Fn() + Sync)) -> T + Send,
     ) -> anyhow::Result<T> {
+        output::check_folder(&self.output).context("-o")?;
         let bar = progress::bar(steps as u64, unit);
         let threads = rayon::ThreadPoolBuilder::new().num_threads(self.jobs.unwrap_or(0).into());
         let result = threads.build()?.install(|| simulation(&|| bar.inc(1)));

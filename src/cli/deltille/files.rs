@@ -9,6 +9,7 @@ use anyhow::{Context, anyhow, bail};
 
 use crate::artwork::Artwork;
 use crate::cli::interrupt;
+use crate::cli::output;
 use crate::cli::run::{Interrupted, message};
 use crate::export::{atomic, pdf, png, sheet_file_name, svg};
 
@@ -95,6 +96,7 @@ fn write_here(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
         false => Ok(()),
     };
     let context = || format!("-o: cannot write to {}", folder.display());
+    output::check_folder(folder).context("-o")?;
     fs::create_dir_all(folder).with_context(context)?;
     let paths: Vec<PathBuf> = files.iter().map(|file| folder.join(&file.name)).collect();
     if let Some(path) = paths.iter().find(|path| path.is_dir()) {

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 
 use super::images::Images;
-use super::{camera_file, target_file};
+use super::{camera_file, sightings, target_file};
 use crate::calibrate::{self, Loss, Reference, Weights, views};
 use crate::cli::output::{self, say};
 use crate::cli::run::FAILED;
@@ -26,6 +26,9 @@ pub struct Args {
     /// The camera, as `deltille calibrate`, ROS or OpenCV write it
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
+    /// How the sheet is bent and printed: the .json of `calibrate --board-shape`
+    #[arg(long, value_name = "FILE")]
+    shape: Option<PathBuf>,
     /// Family file, where the target names a family that is not shipped
     #[arg(long)]
     family: Option<String>,
@@ -42,6 +45,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
     let reference = Reference::Target(&target);
     let panels = reference.panels();
+    let sheet = args.shape.as_deref().map(sightings::sheet).transpose()?.unwrap_or_default();
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
     let (mut lines, mut all, mut without) = (String::new(), 0, 0);
@@ -50,13 +54,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         all += 1;
         let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let found = detector.detect_any(&raster::read(&image)?, &name);
-        let shown = views(&[(name, found)], &reference)?.views;
+        let mut shown = views(&[(name, found)], &reference)?.views;
+        sightings::put_on(&sheet, Some(&target), &mut shown)?;
         let (loss, weights) = (Loss::default(), Weights::default());
         let solution = calibrate::poses(&shown, &panels, &camera, loss, weights)
             .with_context(|| image.display().to_string())?;
         if solution.views.is_empty() {
             without += 1;
-            let why = solution.excluded.first().map_or("no target in it", |(_, why)| why);
+            let why = solution.excluded.first().map_or("no target in it", |out| &out.reason);
             eprintln!("{}: {why}", image.display());
         }
         for view in &solution.views {

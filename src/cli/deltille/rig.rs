@@ -6,16 +6,17 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 
-use super::calibrate::{Robust, Weighting, cannot_tell_apart};
+use super::calibrate::{Robust, Weighting, cannot_tell_apart, without_outliers};
 use super::files::{File, same_file, text_file, write_all};
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
-    Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews, calibrate_rig,
+    Excluded, Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews, calibrate_rig,
 };
 use crate::camera::{Camera, Pose};
-use crate::cli::output::say;
+use crate::cli::output::{check_folder, fixed, say};
 use crate::export::camera::{colmap, colmap_rig, kalibr};
 use crate::export::rig;
+use crate::words::counted;
 
 /// Arguments of `deltille rig`.
 #[derive(clap::Args)]
@@ -33,6 +34,9 @@ pub struct Args {
     /// A camera that is known already and kept, with its file
     #[arg(long, value_name = "NAME=FILE", value_parser = named)]
     known: Vec<(String, PathBuf)>,
+    /// How the sheet of a board is bent and printed: the .json of `calibrate --board-shape`
+    #[arg(long, value_name = "FILE")]
+    shape: Option<PathBuf>,
     /// Find where the target's panels are on it, and write that as <target>-refined.json
     #[arg(long)]
     refine_target: bool,
@@ -81,12 +85,24 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(name) = names.iter().find(|name| bad(name)) {
         bail!("--camera: {name} cannot be the name of a file");
     }
+    let mut known: Vec<&str> = args.known.iter().map(|(name, _)| name.as_str()).collect();
+    known.sort_unstable();
+    if let Some(twice) = known.windows(2).find(|pair| pair[0] == pair[1]) {
+        bail!("--known: {} has two files", twice[0]);
+    }
+    check_folders(&args.camera)?;
+    check_folder(&args.output).context("-o")?;
     let target = target_file::read(&args.target).context("--target")?;
     let reference = Reference::Target(&target);
+    let sheet = args.shape.as_deref().map(sightings::sheet).transpose()?.unwrap_or_default();
     let mut cameras = Vec::with_capacity(args.camera.len());
+    let mut left_out: Vec<Excluded> = Vec::new();
     for (name, folder) in &args.camera {
         let read = sightings::read(std::slice::from_ref(folder), &reference);
-        let (views, _) = read.with_context(|| format!("--camera {name}"))?;
+        let (mut views, _, out) = read.with_context(|| format!("--camera {name}"))?;
+        sightings::put_on(&sheet, Some(&target), &mut views)?;
+        let of_camera = |out| Excluded { camera: Some(name.clone()), ..out };
+        left_out.extend(out.into_iter().map(of_camera));
         cameras.push(RigViews { name: name.clone(), views, known: args.known(name)? });
     }
     if let Some((name, _)) = args.known.iter().find(|(name, _)| !names.contains(&name.as_str())) {
@@ -99,10 +115,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         weights: args.weights.into(),
         refine_target: args.refine_target,
     };
-    let solution = calibrate_rig(&cameras, &panels, options)?;
+    let mut solution = calibrate_rig(&cameras, &panels, options)?;
+    for camera in &solution.cameras {
+        if let Some(end) = &camera.lens_end {
+            eprintln!("warning: camera {}: {end}", camera.name);
+        }
+    }
     if !solution.loose.is_empty() {
         eprintln!("{}", cannot_tell_apart(&solution.loose));
     }
+    let text = summary(&solution);
+    solution.excluded.splice(0..0, left_out);
     let mut files =
         vec![text_file("rig.json".to_owned(), rig::write(&solution, &args.model.to_string()))];
     for camera in &solution.cameras {
@@ -123,11 +146,25 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         files.push(text_file(format!("{}.json", refined.name), refined.to_json()));
     }
     let written = write_all(&args.output, &files)?;
-    say!("{}", summary(&solution));
+    say!("{text}");
     for path in written {
         say!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses a folder that is given for two cameras.
+fn check_folders(cameras: &[(String, PathBuf)]) -> anyhow::Result<()> {
+    let mut places: Vec<(PathBuf, &str)> = Vec::new();
+    for (name, folder) in cameras {
+        // What is not there is told where it is read.
+        let Ok(place) = folder.canonicalize() else { continue };
+        if let Some((_, other)) = places.iter().find(|(there, _)| *there == place) {
+            bail!("--camera: {other} and {name} have the same folder, {}", folder.display());
+        }
+        places.push((place, name));
+    }
+    Ok(())
 }
 
 impl Args {
@@ -156,17 +193,22 @@ impl Format {
 
 fn summary(solution: &RigSolution) -> String {
     let mut text = format!(
-        "{} cameras, {} frames, rms {:.4} px\n",
-        solution.cameras.len(),
-        solution.frames.len(),
-        solution.rms_px
+        "{}, {}, rms {:.4} px{}\n",
+        counted(solution.cameras.len(), "camera"),
+        counted(solution.frames.len(), "frame"),
+        solution.rms_px,
+        without_outliers(solution.outlier_count(), solution.inlier_rms_px())
     );
     for camera in &solution.cameras {
         let [fx, fy] = camera.camera.focal_px;
         let at = camera.camera_from_rig.inverse().translation;
         text += &format!(
-            "{}: {} corners, rms {:.4} px, fx {fx:.2}, fy {fy:.2}; at ({:.2}, {:.2}, {:.2}) mm",
-            camera.name, camera.corners, camera.rms_px, at.x, at.y, at.z
+            "{}: {} corners, rms {:.4} px{}, fx {fx:.2}, fy {fy:.2}; at ({}) mm",
+            camera.name,
+            camera.corners,
+            camera.rms_px,
+            without_outliers(camera.outliers, camera.inlier_rms_px),
+            at.to_array().map(|mm| fixed(mm, 2)).join(", ")
         );
         if let Some(sd) = camera.pose_sd {
             let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
@@ -175,8 +217,8 @@ fn summary(solution: &RigSolution) -> String {
         }
         text.push('\n');
     }
-    for (view, why) in &solution.excluded {
-        text += &format!("left out {view}: {why}\n");
+    for out in &solution.excluded {
+        text += &format!("left out {}: {}\n", out.shown(), out.reason);
     }
     text.trim_end().to_owned()
 }

@@ -27,6 +27,10 @@ const DPI: RangeInclusive<u32> = 200..=2400;
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct Settings {
+    /// The command that a template was made for.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    command: Option<String>,
     /// Rows of corners, 2 to 500
     #[arg(long, allow_negative_numbers = true, value_parser = whole(SIDES))]
     rows: Option<u32>,
@@ -51,8 +55,8 @@ pub struct Settings {
     #[arg(long, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
-    /// A tag in every n-th row and column, on a checkerboard where the square has the right colour
-    /// [default: 3, on a checkerboard 2]
+    /// A tag in every n-th row and column, on a checkerboard where the square has the right colour,
+    /// which with an odd n every second has [default: 3, on a checkerboard 2]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
     /// Black border of a tag, in widths of a bit, 0.6 to 10, on a checkerboard at least 1
@@ -151,22 +155,30 @@ pub struct Plan {
 }
 
 impl Settings {
-    /// Reads a template.
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
+    /// Reads a template of boards of a kind.
+    pub fn read(path: &Path, grid: GridKind) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("--template: cannot read {}", path.display()))?;
-        toml::from_str(&text).map_err(|error| {
+        let settings: Self = toml::from_str(&text).map_err(|error| {
             let before = error.span().map_or("", |span| &text[..span.start]);
             let line = before.matches('\n').count() + 1;
             let message = error.message().replace('\n', " ");
             anyhow!("--template: {} line {line}: {message}", path.display())
-        })
+        })?;
+        match settings.command.as_deref().filter(|made_for| *made_for != command(grid)) {
+            Some(made_for) => bail!(
+                "--template: {} was made for `{made_for}`, not `{}`",
+                path.display(),
+                command(grid)
+            ),
+            None => Ok(settings),
+        }
     }
 
     /// The text of a template.
     pub fn to_toml(&self, grid: GridKind) -> String {
-        let settings = toml::to_string(self).expect("plain settings have a TOML form");
-        format!("# Made with `deltille {} --save-template`.\n{settings}", command(grid))
+        let settings = Self { command: Some(command(grid).to_owned()), ..self.clone() };
+        toml::to_string(&settings).expect("plain settings have a TOML form")
     }
 
     /// These settings, and those of a template where these say nothing.
@@ -180,6 +192,7 @@ impl Settings {
         let png = self.png || (template.png && !formats);
         let dsc = self.dsc || template.dsc;
         Self {
+            command: None,
             rows: self.rows.or(template.rows),
             cols: self.cols.or(template.cols),
             edge: self.edge.or(template.edge),

@@ -6,9 +6,10 @@ use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
 use super::target_file;
-use crate::calibrate::{Reference, Shown, UntaggedGrid, View, views};
+use crate::calibrate::{Excluded, Reference, Shown, UntaggedGrid, View, views};
 use crate::camera::Pose;
 use crate::detect::Detection;
+use crate::export::calibration::{self, Sheet};
 use crate::export::detection;
 use crate::target::{GridKind, Target, TargetSpec, parse_length_mm};
 
@@ -31,12 +32,15 @@ pub struct SightingsArgs {
     #[arg(long, requires_all = ["grid", "rows"], value_parser = clap::value_parser!(u32).range(2..=500))]
     cols: Option<u32>,
     /// Length of a tile's edge of the untagged board, such as 20mm
-    #[arg(long, requires = "grid", value_name = "LENGTH", value_parser = length)]
-    edge: Option<f64>,
+    #[arg(long, requires = "grid", value_name = "LENGTH", allow_hyphen_values = true)]
+    edge: Option<String>,
     /// How the print came out, measured length over stated length of the check bars: across and up
     /// the sheet, such as 0.9973,0.9981
     #[arg(long, value_name = "ACROSS,UP", value_parser = scale)]
     print_scale: Option<[f64; 2]>,
+    /// How the sheet is bent and printed, found before: the .json of `calibrate --board-shape`
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["print_scale", "board_shape"])]
+    shape: Option<PathBuf>,
 }
 
 /// A print farther from its size was not printed by mistake alone: the bars were misread.
@@ -68,26 +72,35 @@ pub struct Sightings {
     pub views: Vec<View>,
     /// target_from_panel of each panel.
     pub panels: Vec<Pose>,
-    /// Names of the pictures in which no view was found.
-    pub empty: Vec<String>,
-}
-
-fn length(text: &str) -> Result<f64, String> {
-    let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
-    if mm > 0.0 { Ok(mm) } else { Err("it must be positive".to_owned()) }
+    /// Files of the detections in which no view was found.
+    pub empty: Vec<PathBuf>,
+    /// What does not belong to the target.
+    pub left_out: Vec<Excluded>,
+    /// How the print came out across and up its sheet, where that was measured.
+    pub print_scale: Option<[f64; 2]>,
 }
 
 impl SightingsArgs {
-    /// Whether the scale of the print is given.
-    pub fn scale_measured(&self) -> bool {
-        self.print_scale.is_some()
+    /// What is known of the sheet beforehand.
+    fn sheet(&self) -> anyhow::Result<Sheet> {
+        match &self.shape {
+            Some(path) => sheet(path),
+            None => Ok(Sheet { print_scale: self.print_scale, shape: None }),
+        }
+    }
+
+    fn edge_mm(&self) -> anyhow::Result<Option<f64>> {
+        let Some(text) = &self.edge else { return Ok(None) };
+        let mm = parse_length_mm(text).context("--edge")?;
+        ensure!(mm > 0.0, "--edge: {mm} mm is not more than 0 mm");
+        Ok(Some(mm))
     }
 
     /// Reads everything.
     pub fn read(&self) -> anyhow::Result<Sightings> {
         let target: Option<Target> =
             self.target.as_deref().map(target_file::read).transpose().context("--target")?;
-        let reference = match (&target, self.grid, self.edge) {
+        let reference = match (&target, self.grid, self.edge_mm()?) {
             (Some(target), ..) => Reference::Target(target),
             (None, Some(kind), Some(edge_mm)) => {
                 let kind = match kind {
@@ -101,19 +114,41 @@ impl SightingsArgs {
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
-        let (mut views, empty) = read(&self.detections, &reference)?;
-        if let Some(scale) = self.print_scale {
-            let target = target.as_ref();
-            if target.is_some_and(|target| matches!(target.spec, TargetSpec::Solid(_))) {
-                bail!("--print-scale: the faces of a solid are measured by `rig --refine-target`");
-            }
-            for sighting in views.iter_mut().flat_map(|view| &mut view.sightings) {
-                let angle_rad = target.map_or(0.0, |target| angle_on_sheet(target, sighting.panel));
-                sighting.stretch(scale, angle_rad);
-            }
-        }
-        Ok(Sightings { panels: reference.panels(), views, empty })
+        let (mut views, empty, left_out) = read(&self.detections, &reference)?;
+        let sheet = self.sheet()?;
+        put_on(&sheet, target.as_ref(), &mut views)?;
+        let print_scale = sheet.print_scale;
+        Ok(Sightings { panels: reference.panels(), views, empty, left_out, print_scale })
     }
+}
+
+/// Reads the sheet of an earlier calibration.
+pub fn sheet(path: &Path) -> anyhow::Result<Sheet> {
+    let show = || format!("--shape: {}", path.display());
+    let text = std::fs::read_to_string(path).with_context(show)?;
+    calibration::read_sheet(&text).with_context(show)
+}
+
+/// Moves the corners of all views to where their sheet has them.
+pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> anyhow::Result<()> {
+    let is_solid = target.is_some_and(|target| matches!(target.spec, TargetSpec::Solid(_)));
+    if sheet.print_scale.is_some() && is_solid {
+        bail!("--print-scale: the faces of a solid are measured by `rig --refine-target`");
+    }
+    if sheet.shape.is_some() && target.is_some_and(|target| target.panels.len() > 1) {
+        bail!("--shape: it is that of one board, and the target has several panels");
+    }
+    for sighting in views.iter_mut().flat_map(|view| &mut view.sightings) {
+        if let Some(scale) = sheet.print_scale {
+            let angle_rad = target.map_or(0.0, |target| angle_on_sheet(target, sighting.panel));
+            sighting.stretch(scale, angle_rad);
+        }
+        // The shape was found on corners that the scale had moved.
+        if let Some(shape) = &sheet.shape {
+            sighting.bend(shape);
+        }
+    }
+    Ok(())
 }
 
 /// How a panel is turned on its sheet, rad; 0 where no sheet is described.
@@ -123,23 +158,28 @@ fn angle_on_sheet(target: &Target, panel: usize) -> f64 {
     placements.find(|placement| placement.panel == id).map_or(0.0, |placement| placement.angle_rad)
 }
 
-/// The views that detections show, files or folders of them, and the names of those that show none.
-/// Detections that do not belong to the target are told on standard error.
-pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<(Vec<View>, Vec<String>)> {
+/// Views, files of detections that show none, and what does not belong to the target.
+type Read = (Vec<View>, Vec<PathBuf>, Vec<Excluded>);
+
+/// The views that detections show, files or folders of them. What does not belong to the target is
+/// told on standard error, too.
+pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<Read> {
+    let files = files(paths)?;
     let mut detections = Vec::new();
-    for path in files(paths)? {
+    for path in &files {
         let show = || path.display().to_string();
         let text =
-            std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", show()))?;
+            std::fs::read_to_string(path).with_context(|| format!("cannot read {}", show()))?;
         let found: Detection = detection::read(&text).with_context(show)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         detections.push((name, found));
     }
     let Shown { views, empty, left_out } = views(&detections, reference)?;
-    for error in left_out {
-        eprintln!("warning: left out: {error}");
+    for (index, out) in &left_out {
+        eprintln!("warning: left out: {}: {}", files[*index].display(), out.reason);
     }
-    Ok((views, empty))
+    let empty = empty.into_iter().map(|index| files[index].clone()).collect();
+    Ok((views, empty, left_out.into_iter().map(|(_, out)| out).collect()))
 }
 
 fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
