@@ -17,29 +17,13 @@ pub enum CalibrationError {
         /// Its size.
         other_px: [u32; 2],
     },
-    /// A detection that was made with another target.
-    #[error("{view}: {problem}; the target does not belong to this detection")]
-    NotOfTarget {
-        /// The view.
-        view: String,
-        /// What differs.
-        problem: String,
-    },
-    /// A detection of an untagged board of other size.
+    /// A detection of another target, or with labels that run the wrong way round.
     #[error("{view}: {problem}")]
-    NotTheBoard {
+    WrongDetection {
         /// The view.
         view: String,
-        /// What differs.
+        /// What is wrong with it.
         problem: String,
-    },
-    /// Labels that run the wrong way round.
-    #[error(
-        "{view}: the labels are mirrored: rows and columns are exchanged, or the image was flipped"
-    )]
-    Mirrored {
-        /// The view.
-        view: String,
     },
     /// Most detections are wrong in themselves.
     #[error("{first} ({wrong} of {all} detections are wrong)")]

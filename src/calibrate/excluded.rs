@@ -1,7 +1,5 @@
 use serde::Serialize;
 
-use super::view::View;
-
 /// Something seen that took no part, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Excluded {
@@ -21,18 +19,6 @@ pub struct Excluded {
 }
 
 impl Excluded {
-    /// A view that does not fit as a whole.
-    pub(super) fn view(view: &View, reason: String) -> Self {
-        Self {
-            camera: None,
-            view: view.name.clone(),
-            image: view.image.clone(),
-            panel: None,
-            corners: view.corner_count(),
-            reason,
-        }
-    }
-
     /// The view's name, in a rig with its camera's.
     pub fn shown(&self) -> String {
         match &self.camera {

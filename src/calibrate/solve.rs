@@ -235,7 +235,7 @@ impl Search<'_> {
                          where the lens model has ended"
                     .to_owned(),
             };
-            Excluded::view(view, why)
+            view.excluded(why)
         });
         let excluded = excluded.collect();
 

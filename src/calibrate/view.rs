@@ -14,6 +14,13 @@ use crate::target::{Panel, Target, TargetSpec};
 /// Corners that a panel needs in a view, so that a few wrong ones show.
 const LEAST_CORNERS: usize = 6;
 
+/// What is wrong with labels that run the wrong way round.
+const MIRRORED: &str =
+    "the labels are mirrored: rows and columns are exchanged, or the image was flipped";
+
+/// What follows from labels that are not on the target.
+const OTHER_TARGET: &str = "; the target does not belong to this detection";
+
 /// What was photographed.
 #[derive(Clone, Copy, Debug)]
 pub enum Reference<'a> {
@@ -49,6 +56,18 @@ impl View {
     /// How many corners it shows.
     pub fn corner_count(&self) -> usize {
         self.sightings.iter().map(|sighting| sighting.observations.len()).sum()
+    }
+
+    /// The view as one that does not fit as a whole.
+    pub(super) fn excluded(&self, reason: String) -> Excluded {
+        Excluded {
+            camera: None,
+            view: self.name.clone(),
+            image: self.image.clone(),
+            panel: None,
+            corners: self.corner_count(),
+            reason,
+        }
     }
 }
 
@@ -114,7 +133,8 @@ impl Reference<'_> {
             Self::Target(target) => {
                 let grids = detection.grids.iter();
                 let found = grids.filter_map(|grid| {
-                    on_target(target, grid).map_err(|problem| (grid.panel, problem)).transpose()
+                    let wrong = |problem| (grid.panel, format!("{problem}{OTHER_TARGET}"));
+                    on_target(target, grid).map_err(wrong).transpose()
                 });
                 found.collect()
             }
@@ -155,15 +175,19 @@ pub fn views(
                 other_px: size_px,
             });
         }
-        match sightings(name, detection, reference) {
-            Err((panel, error)) => {
-                let told = error.to_string();
-                let reason = told.strip_prefix(&format!("{name}: ")).unwrap_or(&told).to_owned();
-                let (view, image) = (name.clone(), detection.image.clone());
-                let corners = detection.grids.iter().map(|grid| grid.corners.len()).sum();
-                left_out
-                    .push((index, Excluded { camera: None, view, image, panel, corners, reason }));
-                first_wrong.get_or_insert(error);
+        match sightings(detection, reference) {
+            Err((panel, problem)) => {
+                let wrong = Excluded {
+                    camera: None,
+                    view: name.clone(),
+                    image: detection.image.clone(),
+                    panel,
+                    corners: detection.grids.iter().map(|grid| grid.corners.len()).sum(),
+                    reason: problem.clone(),
+                };
+                left_out.push((index, wrong));
+                let view = name.clone();
+                first_wrong.get_or_insert(CalibrationError::WrongDetection { view, problem });
             }
             Ok(sightings) if sightings.is_empty() => empty.push(index),
             Ok(sightings) if reference.is_loose() => {
@@ -192,21 +216,13 @@ pub fn views(
 
 /// What a detection shows of the panels, or the panel that is wrong in it and why.
 fn sightings(
-    name: &str,
     detection: &Detection,
     reference: &Reference,
-) -> Result<Vec<Sighting>, (Option<u32>, CalibrationError)> {
-    let view = || name.to_owned();
-    let found = reference.sightings(detection);
-    let mut sightings = found.map_err(|(panel, problem)| match reference {
-        Reference::Grid(_) => (panel, CalibrationError::NotTheBoard { view: view(), problem }),
-        Reference::Target(_) => (panel, CalibrationError::NotOfTarget { view: view(), problem }),
-    })?;
+) -> Result<Vec<Sighting>, (Option<u32>, String)> {
+    let mut sightings = reference.sightings(detection)?;
     sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
     match sightings.iter().find(|sighting| is_mirrored(sighting)) {
-        Some(wrong) => {
-            Err((reference.panel_id(wrong.panel), CalibrationError::Mirrored { view: view() }))
-        }
+        Some(wrong) => Err((reference.panel_id(wrong.panel), MIRRORED.to_owned())),
         None => Ok(sightings),
     }
 }

@@ -1,8 +1,8 @@
-//! All corners of a grid refined, each in the largest window that shows nothing but it.
+//! All corners of a grid refined, each by all pixels that show nothing but it.
 //!
 //! How far the next edges reach into a window is known once the blur is: a few corners tell it, on
-//! coarser levels of the pyramid where the finest shows too little of it. What
-//! covers a part of the board may still lie beside a corner; then the model leaves more than
+//! coarser levels of the pyramid where the finest shows too little of it. How a lens bends the edges
+//! is known once the corners are: then they are fitted again. What covers a part of the board may still lie beside a corner; then the model leaves more than
 //! elsewhere in the grid, and smaller windows are tried. A corner at the end of what is seen of the
 //! board that no window shows cleanly is dropped, since what hides the board has drawn it aside.
 
