@@ -137,6 +137,26 @@ pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surrounding
     grid.corners.iter().map(|corner| around(corner).unwrap_or_default()).collect()
 }
 
+/// Where the lines cross that a corner's neighbours make without it, px; `None` of fewer than two lines.
+pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<[f64; 2]> {
+    let places = Places::of(grid, 1.0);
+    let vertex = Vertex::new(corner.row, corner.col);
+    let (mut normal, mut right, mut lines) = (DMat2::ZERO, DVec2::ZERO, 0);
+    let steps = grid.kind.steps();
+    for &s in &steps[..steps.len() / 2] {
+        let ends =
+            [(vertex + s, vertex - s), (vertex + s, vertex + s + s), (vertex - s, vertex - s - s)];
+        let ends = ends.into_iter().find_map(|(a, b)| Some((places.get(a)?, places.get(b)?)));
+        let Some((a, b)) = ends else { continue };
+        let [a, b, c] = line(a, b, [0.0; 2]);
+        let n = DVec2::new(a, b);
+        normal += DMat2::from_cols(n.x * n, n.y * n);
+        right -= c * n;
+        lines += 1;
+    }
+    (lines > 1).then(|| (normal.inverse() * right).to_array())
+}
+
 /// The places of corners in the rectangle of rows and columns that they span.
 struct Places {
     first: Vertex,

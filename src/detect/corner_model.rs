@@ -60,7 +60,7 @@ const MIN_NOISE: f64 = 2e-5;
 const MIN_BLUR_PX: f64 = 0.2;
 
 /// A corner may not leave its start by more than this, px: the start is the polynomial's result.
-const MAX_WAY_PX: f64 = 1.5;
+pub const MAX_WAY_PX: f64 = 1.5;
 
 /// Edges closer than this are one edge, or a wrong minimum: 75° of tilt leave 17°.
 const MIN_ANGLE_RAD: f64 = 6.0 * std::f64::consts::PI / 180.0;

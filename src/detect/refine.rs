@@ -23,9 +23,9 @@ use crate::target::GridKind;
 /// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
 pub const MIN_MODEL_RADIUS: usize = 3;
 
-/// An edge that leaves its tangent by less than this within the window counts as straight, px: corners
-/// of a real print are a twentieth of a pixel off their places, and bends follow from three.
-const LEAST_SAG_PX: f64 = 0.02;
+/// An edge that leaves its tangent by less than this within the window counts as straight, px: it moves
+/// a corner by a third of that, a thousandth of a pixel or two.
+const LEAST_SAG_PX: f64 = 0.005;
 
 /// Fewest pixels to which the model is fitted: three for each unknown, so that the noise shows.
 const MIN_PIXELS: usize = 30;

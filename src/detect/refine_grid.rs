@@ -8,8 +8,8 @@
 
 use std::collections::BTreeSet;
 
-use super::clearance::{Surroundings, TagAreas, surroundings};
-use super::corner_model::CornerFitter;
+use super::clearance::{Surroundings, TagAreas, crossing, surroundings};
+use super::corner_model::{CornerFitter, MAX_WAY_PX};
 use super::detection::{Grid, GridCorner, median};
 use super::refine::{MIN_MODEL_RADIUS, ModelFit, Refined, Refinement, Refiner, Room};
 use crate::raster::{Gray, Intensity, Pyramid};
@@ -58,14 +58,13 @@ impl Refiner {
                 .or(fine)
         });
         let known_px = blur_px.unwrap_or(USUAL_BLUR_PX);
-        let around = surroundings(grid, tags, 1.0);
-        let rooms: Vec<Room> = around.iter().map(|around| self.whole(around, known_px)).collect();
-        let refined: Vec<(Refined, Option<ModelFit>)> = grid
-            .corners
-            .iter()
-            .zip(&rooms)
-            .map(|(corner, &room)| self.refine_within(fitter, image, [corner.x, corner.y], room))
-            .collect();
+        let mut around = surroundings(grid, tags, 1.0);
+        let mut refined = self.refine_each(fitter, image, grid, &around, known_px);
+        let displaced = self.put_back(grid, &refined);
+        if displaced.contains(&true) {
+            around = surroundings(grid, tags, 1.0);
+            refined = self.refine_each(fitter, image, grid, &around, known_px);
+        }
         let residuals: Vec<f64> =
             refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
         // Of edges as sharp as pixels the model makes nothing; then it is no judge of corners.
@@ -77,7 +76,11 @@ impl Refiner {
             steps.iter().all(|s| places.contains(&(corner.row + s.row, corner.col + s.col)))
         };
         let (mut kept, mut fits) = (Vec::new(), Vec::new());
-        for ((corner, (refined, fit)), &room) in grid.corners.iter().zip(refined).zip(&rooms) {
+        for (i, (corner, (refined, fit))) in grid.corners.iter().zip(refined).enumerate() {
+            if displaced[i] && fit.is_none() {
+                continue;
+            }
+            let room = self.whole(&around[i], known_px);
             let clean = fit.is_some_and(|fit| fit.residual <= limit);
             let modelled = self.method() == Refinement::Model
                 && room.clear_square_px() >= MIN_MODEL_RADIUS as f64;
@@ -106,6 +109,41 @@ impl Refiner {
             }
         }
         blur_px
+    }
+
+    /// All corners of a grid, each by itself.
+    fn refine_each<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        image: &Gray<T>,
+        grid: &Grid,
+        around: &[Surroundings],
+        blur_px: f64,
+    ) -> Vec<(Refined, Option<ModelFit>)> {
+        let corners = grid.corners.iter().zip(around);
+        let refined = corners.map(|(corner, around)| {
+            let room = self.whole(around, blur_px);
+            self.refine_within(fitter, image, [corner.x, corner.y], room)
+        });
+        refined.collect()
+    }
+
+    /// Moves corners that the model does not find, as it finds most others, to where their neighbours'
+    /// lines cross, if that is farther than the model looks: a cell of a tag was taken for them.
+    /// Tells which were moved.
+    fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
+        let fitted = refined.iter().filter(|(_, fit)| fit.is_some()).count();
+        let usual = 2 * fitted > refined.len();
+        let place = |(corner, (_, fit)): (&GridCorner, &(_, Option<ModelFit>))| {
+            let lost = usual && fit.is_none();
+            let [x, y] = lost.then(|| crossing(grid, corner)).flatten()?;
+            ((x - corner.x).hypot(y - corner.y) > MAX_WAY_PX).then_some([x, y])
+        };
+        let places: Vec<_> = grid.corners.iter().zip(refined).map(place).collect();
+        for (corner, place) in grid.corners.iter_mut().zip(&places) {
+            [corner.x, corner.y] = place.unwrap_or([corner.x, corner.y]);
+        }
+        places.iter().map(Option::is_some).collect()
     }
 
     /// All that is clear around a corner, in the largest window.
