@@ -23,10 +23,6 @@ use crate::target::GridKind;
 /// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
 pub const MIN_MODEL_RADIUS: usize = 3;
 
-/// An edge that leaves its tangent by less than this within the window counts as straight, px: it moves
-/// a corner by a third of that, a thousandth of a pixel or two.
-const LEAST_SAG_PX: f64 = 0.005;
-
 /// Fewest pixels to which the model is fitted: three for each unknown, so that the noise shows.
 const MIN_PIXELS: usize = 30;
 
@@ -86,11 +82,6 @@ impl ModelFit {
         self.corner.position
     }
 
-    /// Whether edges were taken to be bent.
-    pub fn is_bent(&self) -> bool {
-        self.corner.bends != [0.0; 3]
-    }
-
     /// Standard deviation of the blur with the pixel's box in it, px.
     pub fn blur_px(&self) -> f64 {
         self.corner.blur_px
@@ -136,12 +127,6 @@ impl Room<'_> {
     /// Half the side of the largest square that shows nothing else, px.
     pub fn clear_square_px(&self) -> f64 {
         self.around.clear_square_px(self.blur_px).min(self.reach_px)
-    }
-
-    /// Whether the window shows an edge bent.
-    pub fn shows_bends(&self) -> bool {
-        let sag_px = |edge: &Edge| 0.5 * edge.bend.abs() * self.reach_px.powi(2);
-        self.around.edges.iter().any(|edge| sag_px(edge) > LEAST_SAG_PX)
     }
 }
 
@@ -282,7 +267,7 @@ impl Refiner {
             }
         };
         let edges: &[Edge; K] = room.around.edges.as_slice().try_into().ok()?;
-        let bends = edges.map(|edge| if room.shows_bends() { edge.bend } else { 0.0 });
+        let bends = edges.map(|edge| edge.bend);
         let angles = edges.map(|edge| edge.angle_rad);
         let first = match before {
             _ if window.count() < MIN_PIXELS => return None,

@@ -100,8 +100,8 @@ impl Refiner {
         let around = surroundings(grid, tags, 1.0);
         for ((corner, around), fit) in grid.corners.iter_mut().zip(&around).zip(&fits) {
             let room = self.whole(around, known_px);
-            if let Some(fit) = fit.filter(|fit| fit.is_bent() || room.shows_bends())
-                && let Some(bent) = self.model(fitter, image, fit.position(), room, Some(&fit))
+            if let Some(fit) = fit
+                && let Some(bent) = self.model(fitter, image, fit.position(), room, Some(fit))
                 && bent.residual <= limit
             {
                 let [x, y] = bent.position();
