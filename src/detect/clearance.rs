@@ -284,3 +284,64 @@ fn line(a: [f64; 2], b: [f64; 2], inside: [f64; 2]) -> Line {
     let sign = (nx * inside[0] + ny * inside[1] + offset).signum();
     [sign * nx, sign * ny, sign * offset]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice::GridKind;
+
+    /// A grid of 5 × 5 corners in the picture.
+    fn grid(kind: GridKind, image: impl Fn([f64; 2]) -> [f64; 2]) -> Grid {
+        let corners = (0..25).map(|i| {
+            let (row, col) = (i / 5, i % 5);
+            let [x, y] = image(kind.position(row.into(), col.into()));
+            GridCorner { row, col, id: None, x, y, cov: None }
+        });
+        Grid { kind, panel: None, corners: corners.collect(), tags: Vec::new() }
+    }
+
+    #[test]
+    fn lines_cross_in_the_corner_under_perspective_and_are_not_bent() {
+        let image = |[x, y]: [f64; 2]| {
+            let depth = 1.0 + 0.1 * x - 0.05 * y;
+            [300.0 + 30.0 * (x - 0.2 * y) / depth, 200.0 - 25.0 * y / depth]
+        };
+        for kind in [GridKind::Deltille, GridKind::Checker] {
+            let grid = grid(kind, image);
+            for (corner, around) in
+                grid.corners.iter().zip(surroundings(&grid, &TagAreas::default(), 1.0))
+            {
+                let [x, y] = crossing(&grid, corner).unwrap();
+                assert!((x - corner.x).hypot(y - corner.y) < 1e-9);
+                assert!(around.edges.iter().all(|edge| edge.bend.abs() < 1e-9));
+            }
+        }
+    }
+
+    #[test]
+    fn lines_on_a_cylinder_are_bent_to_the_left_of_their_direction() {
+        // Rows are arcs of radius 400 px that curve towards greater v.
+        let image = |[x, y]: [f64; 2]| {
+            let angle = 0.05 * (x - 2.0);
+            [300.0 + 400.0 * angle.sin(), 200.0 - 20.0 * y + 400.0 * (1.0 - angle.cos())]
+        };
+        let grid = grid(GridKind::Checker, image);
+        let around = surroundings(&grid, &TagAreas::default(), 1.0);
+        let along_row = around[12].edges[0];
+        assert!(along_row.angle_rad.abs() < 1e-9, "{along_row:?}");
+        assert!((400.0 * along_row.bend - 1.0).abs() < 0.01, "{along_row:?}");
+    }
+
+    #[test]
+    fn tags_and_far_sides_are_not_clear_and_what_lies_between_is() {
+        let grid = grid(GridKind::Checker, |[x, y]| [100.0 + 40.0 * x, 300.0 - 40.0 * y]);
+        let tags = TagAreas { inset: 0.25, tiles: BTreeMap::from([(0, BTreeSet::new())]) };
+        let around = &surroundings(&grid, &tags, 1.0)[12];
+        // Cells begin 10 px from both edges; the blur reaches 2 px.
+        let clear = around.clear(1.0);
+        assert!(clear([7.0, 7.0]) && clear([35.0, 6.0]) && clear([-6.0, 35.0]));
+        assert!(!clear([12.0, 12.0]) && !clear([9.0, 20.0]) && !clear([39.0, 0.0]));
+        let square_px = (10.0 - 2.0) * std::f64::consts::FRAC_1_SQRT_2;
+        assert!((around.clear_square_px(1.0) - square_px).abs() < 1e-9);
+    }
+}

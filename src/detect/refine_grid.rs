@@ -45,18 +45,7 @@ impl Refiner {
         grid: &mut Grid,
         tags: &TagAreas,
     ) -> Option<f64> {
-        // Of a grid without tags nothing says that its tiles are not plain.
-        let plain = TagAreas::default();
-        let shown = if grid.tags.is_empty() { &plain } else { tags };
-        let fine = self.blur(fitter, image, 0, grid, shown);
-        let most_px = MAX_BLUR * self.largest_radius();
-        let blur_px = fine.filter(|&blur_px| blur_px <= most_px).or_else(|| {
-            let coarser = pyramid.levels().iter().enumerate().skip(1);
-            coarser
-                .filter_map(|(n, level)| self.blur(fitter, level, n, grid, shown))
-                .last()
-                .or(fine)
-        });
+        let blur_px = self.blur_of_grid(fitter, (image, pyramid), grid, tags);
         let known_px = blur_px.unwrap_or(USUAL_BLUR_PX);
         let mut around = surroundings(grid, tags, 1.0);
         let mut refined = self.refine_each(fitter, image, grid, &around, known_px);
@@ -96,19 +85,31 @@ impl Refiner {
             }
         }
         grid.corners = kept;
-        // Now that the places of the corners are known, so are the bends of the edges.
+        self.follow_bends(fitter, image, grid, &fits, limit, (tags, known_px));
+        blur_px
+    }
+
+    /// Fits the corners again, now that their places tell how the edges are bent; what leaves more
+    /// than `limit` does not count.
+    fn follow_bends<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        image: &Gray<T>,
+        grid: &mut Grid,
+        fits: &[Option<ModelFit>],
+        limit: f64,
+        (tags, blur_px): (&TagAreas, f64),
+    ) {
         let around = surroundings(grid, tags, 1.0);
-        for ((corner, around), fit) in grid.corners.iter_mut().zip(&around).zip(&fits) {
-            let room = self.whole(around, known_px);
-            if let Some(fit) = fit
-                && let Some(bent) = self.model(fitter, image, fit.position(), room, Some(fit))
-                && bent.residual <= limit
-            {
+        for ((corner, around), fit) in grid.corners.iter_mut().zip(&around).zip(fits) {
+            let Some(fit) = fit else { continue };
+            let room = self.whole(around, blur_px);
+            let bent = self.model(fitter, image, fit.position(), room, Some(fit));
+            if let Some(bent) = bent.filter(|fit| fit.residual <= limit) {
                 let [x, y] = bent.position();
                 *corner = GridCorner { x, y, cov: Some(bent.cov), ..*corner };
             }
         }
-        blur_px
     }
 
     /// All corners of a grid, each by itself.
@@ -149,6 +150,28 @@ impl Refiner {
     /// All that is clear around a corner, in the largest window.
     fn whole<'a>(&self, around: &'a Surroundings, blur_px: f64) -> Room<'a> {
         Room { around, blur_px, reach_px: self.largest_radius() }
+    }
+
+    /// The blur of a grid, px: as the finest level of the pyramid shows it that shows enough of it.
+    fn blur_of_grid<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        (image, pyramid): (&Gray<T>, &Pyramid),
+        grid: &Grid,
+        tags: &TagAreas,
+    ) -> Option<f64> {
+        // Of a grid without tags nothing says that its tiles are not plain.
+        let plain = TagAreas::default();
+        let shown = if grid.tags.is_empty() { &plain } else { tags };
+        let fine = self.blur(fitter, image, 0, grid, shown);
+        let most_px = MAX_BLUR * self.largest_radius();
+        fine.filter(|&blur_px| blur_px <= most_px).or_else(|| {
+            let coarser = pyramid.levels().iter().enumerate().skip(1);
+            coarser
+                .filter_map(|(n, level)| self.blur(fitter, level, n, grid, shown))
+                .last()
+                .or(fine)
+        })
     }
 
     /// The blur of a grid as `image`, a level of its pyramid, shows it, px of level 0: the median over
