@@ -22,6 +22,10 @@ use crate::target::{Panel, TagsIn, Target};
 /// changes what is seen by less than 2.5 % of its contrast.
 const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 
+/// Corners lie beside the chords of their neighbours by less than this part of the way to them: lenses
+/// turn an edge by less than 0.3 rad from one corner to the next.
+const MOST_SAG: f64 = 0.15;
+
 /// Where the tags of a target lie.
 #[derive(Clone, Debug, Default)]
 pub struct TagAreas {
@@ -137,24 +141,29 @@ pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surrounding
     grid.corners.iter().map(|corner| around(corner).unwrap_or_default()).collect()
 }
 
-/// Where the lines cross that a corner's neighbours make without it, px; `None` of fewer than two lines.
+/// Where a corner should be that lies beside the lines of its neighbours: where they cross, px. `None`
+/// where it lies as near to them as any lens lets it, and of fewer than two lines.
 pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<[f64; 2]> {
     let places = Places::of(grid, 1.0);
     let vertex = Vertex::new(corner.row, corner.col);
+    let here = DVec2::new(corner.x, corner.y);
     let (mut normal, mut right, mut lines) = (DMat2::ZERO, DVec2::ZERO, 0);
+    let mut nearest_px = f64::INFINITY;
     let steps = grid.kind.steps();
     for &s in &steps[..steps.len() / 2] {
         let ends =
             [(vertex + s, vertex - s), (vertex + s, vertex + s + s), (vertex - s, vertex - s - s)];
         let ends = ends.into_iter().find_map(|(a, b)| Some((places.get(a)?, places.get(b)?)));
         let Some((a, b)) = ends else { continue };
+        nearest_px = nearest_px.min(here.distance(a.into())).min(here.distance(b.into()));
         let [a, b, c] = line(a, b, [0.0; 2]);
         let n = DVec2::new(a, b);
         normal += DMat2::from_cols(n.x * n, n.y * n);
         right -= c * n;
         lines += 1;
     }
-    (lines > 1).then(|| (normal.inverse() * right).to_array())
+    let crossing = (lines > 1).then(|| normal.inverse() * right)?;
+    (here.distance(crossing) > MOST_SAG * nearest_px).then_some(crossing.to_array())
 }
 
 /// The places of corners in the rectangle of rows and columns that they span.
@@ -308,12 +317,14 @@ mod tests {
         };
         for kind in [GridKind::Deltille, GridKind::Checker] {
             let grid = grid(kind, image);
-            for (corner, around) in
-                grid.corners.iter().zip(surroundings(&grid, &TagAreas::default(), 1.0))
-            {
-                let [x, y] = crossing(&grid, corner).unwrap();
-                assert!((x - corner.x).hypot(y - corner.y) < 1e-9);
+            for around in surroundings(&grid, &TagAreas::default(), 1.0) {
                 assert!(around.edges.iter().all(|edge| edge.bend.abs() < 1e-9));
+            }
+            for corner in &grid.corners {
+                assert_eq!(crossing(&grid, corner), None);
+                let mistaken = GridCorner { x: corner.x + 4.0, y: corner.y - 6.0, ..*corner };
+                let [x, y] = crossing(&grid, &mistaken).unwrap();
+                assert!((x - corner.x).hypot(y - corner.y) < 1e-9);
             }
         }
     }
