@@ -308,6 +308,49 @@ fn input_that_makes_no_camera_is_refused_by_its_cause() {
     assert!(foreign.contains("the target does not belong to this detection"), "{foreign}");
 }
 
+#[test]
+fn a_file_of_another_kind_is_not_replaced() {
+    let target = board(8, 9);
+    let folder = folder(&target, &detections(&target, 5, 0.7));
+    let at = folder.path();
+    std::fs::write(at.join("known.yaml"), camera().to_yaml()).unwrap();
+    let pose = "--pose 3.1415926,0,0,-150,80,400";
+    done(at, &format!("render board.json --camera known.yaml {pose} -o photos/00.png"));
+    let before = |name: &str| std::fs::read(at.join(name)).unwrap();
+    let kept = ["board.json", "corners/00.json", "photos/00.json", "photos/00.png"];
+    let contents = kept.map(before);
+    let cases = [
+        (
+            format!("{CALIBRATE} -o board.yaml --report page.html"),
+            "board.json holds deltille/target/1",
+        ),
+        (format!("{CALIBRATE} -o corners/00.yaml"), "corners/00.json holds deltille/detection/1"),
+        (
+            format!("render board.json --camera known.yaml {pose} -o board.png"),
+            "board.json holds deltille/target/1",
+        ),
+        (
+            "detect photos --target board.json -o photos".to_owned(),
+            "photos/00.json holds deltille/truth/1, which would be lost: choose another place with -o",
+        ),
+        (
+            "octahedron --stl --name 00 -o photos".to_owned(),
+            "photos/00.json holds deltille/truth/1",
+        ),
+    ];
+    for (args, reason) in cases {
+        let said = refused(at, &args);
+        assert!(said.contains(reason), "{args}: {said}");
+    }
+    assert_eq!(kept.map(before), contents);
+    for unwanted in ["board.yaml", "page.html", "corners/00.yaml", "board.png", "photos/00.stl"] {
+        assert!(!at.join(unwanted).exists(), "{unwanted}");
+    }
+    // The same kind is: a second run.
+    done(at, &format!("{CALIBRATE} -o again.yaml"));
+    done(at, &format!("{CALIBRATE} -o again.yaml"));
+}
+
 /// An icosahedron before two cameras, rendered, detected, calibrated, and its poses found.
 #[test]
 fn a_rig_is_calibrated_from_pictures() {

@@ -8,9 +8,9 @@ use anyhow::{Context, bail};
 use serde::Serialize;
 
 use super::target_file;
-use crate::cli::output::say;
+use crate::cli::output::{self, say};
 use crate::cli::run::FAILED;
-use crate::export::{atomic, sheet_file_name, stl};
+use crate::export::{sheet_file_name, stl};
 use crate::family::Family;
 use crate::target::Target;
 use crate::verify::{Verdict, Verifier};
@@ -73,7 +73,7 @@ pub fn verify(
     if let Some(path) = report {
         let report = Report::new(target, &verdicts);
         let json = serde_json::to_string_pretty(&report).context("--report")? + "\n";
-        atomic::write(path, |file| file.write_all(json.as_bytes())).context("--report")?;
+        output::write(path, json.as_bytes()).context("--report")?;
     }
     let count = verdicts.len();
     let files = if count == 1 { "file" } else { "files" };
