@@ -12,6 +12,7 @@ use crate::detect::Detection;
 use crate::export::calibration::{self, Sheet};
 use crate::export::detection;
 use crate::target::{GridKind, Target, TargetSpec, parse_length_mm};
+use crate::words::counted;
 
 /// Detections and what they show.
 #[derive(clap::Args)]
@@ -36,7 +37,7 @@ pub struct SightingsArgs {
     edge: Option<String>,
     /// How the print came out, measured length over stated length of the check bars: across and up
     /// the sheet, such as 0.9973,0.9981
-    #[arg(long, value_name = "ACROSS,UP", value_parser = scale)]
+    #[arg(long, value_name = "ACROSS,UP", value_parser = scale, allow_hyphen_values = true)]
     print_scale: Option<[f64; 2]>,
     /// How the sheet is bent and printed, found before: the .json of `calibrate --board-shape`
     #[arg(long, value_name = "FILE", conflicts_with_all = ["print_scale", "board_shape"])]
@@ -164,15 +165,45 @@ type Read = (Vec<View>, Vec<PathBuf>, Vec<Excluded>);
 /// The views that detections show, files or folders of them. What does not belong to the target is
 /// told on standard error, too.
 pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<Read> {
-    let files = files(paths)?;
-    let mut detections = Vec::new();
-    for path in &files {
+    let (mut files, mut detections, mut foreign) = (Vec::new(), Vec::new(), Vec::new());
+    for Place { path, is_named } in places(paths)? {
         let show = || path.display().to_string();
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("cannot read {}", show()))?;
+        let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", show()))?;
+        let Ok(text) = String::from_utf8(bytes) else {
+            bail!(
+                "{}: no text: pictures go to `deltille detect`, what it writes goes here",
+                show()
+            );
+        };
+        if !is_named && detection::is_foreign(&text) {
+            foreign.push(path);
+            continue;
+        }
         let found: Detection = detection::read(&text).with_context(show)?;
+        if let Some(first) = detections.iter().position(|(_, other)| is_same(&found, other)) {
+            let first: &PathBuf = &files[first];
+            eprintln!(
+                "warning: {}: the same picture and corners as in {}, counted once",
+                show(),
+                first.display()
+            );
+            continue;
+        }
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         detections.push((name, found));
+        files.push(path);
+    }
+    if let Some(first) = foreign.first() {
+        let count = counted(foreign.len(), "file");
+        ensure!(
+            !files.is_empty(),
+            "{}: no detection among the .json files: make some with `deltille detect`",
+            first.parent().unwrap_or(first).display()
+        );
+        eprintln!(
+            "left out: {count} in the folder that hold no detection, such as {}",
+            first.display()
+        );
     }
     let Shown { views, empty, left_out } = views(&detections, reference)?;
     for (index, out) in &left_out {
@@ -182,16 +213,29 @@ pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<Read> {
     Ok((views, empty, left_out.into_iter().map(|(_, out)| out).collect()))
 }
 
-fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
+/// Whether two detections are of one picture and found the same in it.
+fn is_same(one: &Detection, other: &Detection) -> bool {
+    !one.grids.is_empty() && one.image == other.image && one.grids == other.grids
+}
+
+/// Where a detection may be.
+struct Place {
+    path: PathBuf,
+    /// Given by name, not only in a folder that was.
+    is_named: bool,
+}
+
+fn places(paths: &[PathBuf]) -> anyhow::Result<Vec<Place>> {
+    let mut places = Vec::new();
     for path in paths {
         if path.is_dir() {
-            files.extend(in_folder(path)?);
+            let inside = in_folder(path)?.into_iter();
+            places.extend(inside.map(|path| Place { path, is_named: false }));
         } else {
-            files.push(path.clone());
+            places.push(Place { path: path.clone(), is_named: true });
         }
     }
-    Ok(files)
+    Ok(places)
 }
 
 /// The JSON files of a folder, in the order of their names.
