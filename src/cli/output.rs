@@ -73,7 +73,7 @@ pub fn check_replaced(path: &Path, schema: Option<&str>) -> anyhow::Result<()> {
     let there = std::fs::read(path).ok().and_then(|text| json::schema(&text).ok().flatten());
     match there {
         Some(there) if schema.map(json::kind) != Some(json::kind(&there)) => bail!(
-            "{} holds {there}, which would be lost: choose another place with -o",
+            "{} holds {there}, which would be lost: choose another place to write to",
             path.display()
         ),
         _ => Ok(()),

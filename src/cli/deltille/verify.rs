@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::target_file;
 use crate::cli::output::{self, say};
 use crate::cli::run::FAILED;
-use crate::export::{sheet_file_name, stl};
+use crate::export::{atomic, sheet_file_name, stl};
 use crate::family::Family;
 use crate::target::Target;
 use crate::verify::{Verdict, Verifier};
@@ -46,6 +46,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             args.target.display()
         );
     }
+    if let Some(path) = &args.report {
+        output::check_replaced(path, Some(SCHEMA)).context("--report")?;
+    }
     verify(&target, family.as_ref(), &artifacts, args.report.as_deref())
 }
 
@@ -73,7 +76,7 @@ pub fn verify(
     if let Some(path) = report {
         let report = Report::new(target, &verdicts);
         let json = serde_json::to_string_pretty(&report).context("--report")? + "\n";
-        output::write(path, json.as_bytes()).context("--report")?;
+        atomic::write(path, |file| file.write_all(json.as_bytes())).context("--report")?;
     }
     let count = verdicts.len();
     let files = if count == 1 { "file" } else { "files" };
@@ -113,6 +116,9 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
     printed.into_iter().chain(meshes).collect()
 }
 
+/// Schema and version of the file of `--report`.
+const SCHEMA: &str = "deltille/verdict/1";
+
 #[derive(Serialize)]
 struct Report<'a> {
     schema: &'static str,
@@ -124,6 +130,6 @@ struct Report<'a> {
 impl<'a> Report<'a> {
     fn new(target: &'a Target, artifacts: &'a [Verdict]) -> Self {
         let passed = artifacts.iter().all(|verdict| verdict.passed);
-        Self { schema: "deltille/verdict/1", target: &target.name, passed, artifacts }
+        Self { schema: SCHEMA, target: &target.name, passed, artifacts }
     }
 }
