@@ -331,7 +331,7 @@ fn a_file_of_another_kind_is_not_replaced() {
         ),
         (
             "detect photos --target board.json -o photos".to_owned(),
-            "photos/00.json holds deltille/truth/1, which would be lost: choose another place with -o",
+            "photos/00.json holds deltille/truth/1, which would be lost: choose another place",
         ),
         (
             "octahedron --stl --name 00 -o photos".to_owned(),
@@ -504,6 +504,19 @@ fn a_rig_is_calibrated_from_pictures() {
         let [turn, step] = found.off(&truth);
         assert!(turn.length() < 1e-3 && step.length() < 0.5, "{found:?} {truth:?}");
     }
+    // A net printed at 101 % makes a larger solid, so much farther away.
+    let pose = "pose left/0.png --target ico.json --camera true.yaml --print-scale";
+    let line: Value = serde_json::from_str(&done(at, &format!("{pose} 1.01"))).unwrap();
+    let first: Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
+    let [larger, planned] = [&line, &first].map(|line| motion(&line["camera_from_target"]));
+    assert!((larger.translation - 1.01 * planned.translation).length() < 1e-3, "{larger:?}");
+    done(at, &format!("rig {cameras} --target ico.json -o larger --print-scale 1.01"));
+    let larger = &json(&at.join("larger/rig.json"))["cameras"][1]["camera_from_rig"];
+    let planned = motion(&rig["cameras"][1]["camera_from_rig"]).translation;
+    assert!((motion(larger).translation - 1.01 * planned).length() < 1e-2, "{larger}");
+    let said = refused(at, &format!("{pose} 1.01,1.02"));
+    assert!(said.contains("--print-scale: faces that are stretched in one direction"), "{said}");
+
     let wrong = refused(at, &format!("rig {cameras} --camera third=nowhere --target ico.json"));
     assert!(wrong.contains("third") && wrong.contains("nowhere"), "{wrong}");
 

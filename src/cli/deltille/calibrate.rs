@@ -62,7 +62,7 @@ pub struct Args {
     format: Vec<Format>,
     /// Find how the sheet of the board is bent, stretched and sheared, too, and whether that is more
     /// than chance
-    #[arg(long, conflicts_with = "fixed_intrinsics")]
+    #[arg(long, conflicts_with_all = ["fixed_intrinsics", "shape"])]
     board_shape: bool,
     /// Write a page that shows what the calibration is worth, and what would make it better
     #[arg(long, value_name = "FILE.html")]

@@ -35,12 +35,19 @@ pub struct SightingsArgs {
     /// Length of a tile's edge of the untagged board, such as 20mm
     #[arg(long, requires = "grid", value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
+    #[command(flatten)]
+    sheet: SheetArgs,
+}
+
+/// What is known of the sheet beforehand.
+#[derive(clap::Args)]
+pub struct SheetArgs {
     /// How the print came out, measured length over stated length of the check bars: across and up
-    /// the sheet, such as 0.9973,0.9981
+    /// the sheet, such as 0.9973,0.9981, or one number for both
     #[arg(long, value_name = "ACROSS,UP", value_parser = scale, allow_hyphen_values = true)]
     print_scale: Option<[f64; 2]>,
     /// How the sheet is bent and printed, found before: the .json of `calibrate --board-shape`
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["print_scale", "board_shape"])]
+    #[arg(long, value_name = "FILE", conflicts_with = "print_scale")]
     shape: Option<PathBuf>,
 }
 
@@ -82,14 +89,6 @@ pub struct Sightings {
 }
 
 impl SightingsArgs {
-    /// What is known of the sheet beforehand.
-    fn sheet(&self) -> anyhow::Result<Sheet> {
-        match &self.shape {
-            Some(path) => sheet(path),
-            None => Ok(Sheet { print_scale: self.print_scale, shape: None }),
-        }
-    }
-
     fn edge_mm(&self) -> anyhow::Result<Option<f64>> {
         let Some(text) = &self.edge else { return Ok(None) };
         let mm = parse_length_mm(text).context("--edge")?;
@@ -116,25 +115,65 @@ impl SightingsArgs {
             ),
         };
         let (mut views, empty, left_out) = read(&self.detections, &reference)?;
-        let sheet = self.sheet()?;
+        let sheet = self.sheet.read()?;
         put_on(&sheet, target.as_ref(), &mut views)?;
+        let mut panels = reference.panels();
+        if let Some(target) = &target {
+            let scale = solid_scale(&sheet, target)?;
+            panels.iter_mut().for_each(|panel| panel.translation *= scale);
+        }
         let print_scale = sheet.print_scale;
-        Ok(Sightings { panels: reference.panels(), views, empty, left_out, print_scale })
+        Ok(Sightings { panels, views, empty, left_out, print_scale })
     }
 }
 
-/// Reads the sheet of an earlier calibration.
-pub fn sheet(path: &Path) -> anyhow::Result<Sheet> {
-    let show = || format!("--shape: {}", path.display());
-    let text = std::fs::read_to_string(path).with_context(show)?;
-    calibration::read_sheet(&text).with_context(show)
+impl SheetArgs {
+    /// The sheet, where nothing is known as it was planned.
+    pub fn read(&self) -> anyhow::Result<Sheet> {
+        let Some(path) = &self.shape else {
+            return Ok(Sheet { print_scale: self.print_scale, shape: None });
+        };
+        let show = || format!("--shape: {}", path.display());
+        let text = std::fs::read_to_string(path).with_context(show)?;
+        calibration::read_sheet(&text).with_context(show)
+    }
+}
+
+/// How much larger than planned a solid is whose net was printed like this; 1 for a board.
+pub fn solid_scale(sheet: &Sheet, target: &Target) -> anyhow::Result<f64> {
+    let Some([across, up]) = sheet.print_scale.filter(|_| is_solid(target)) else {
+        return Ok(1.0);
+    };
+    if across != up {
+        bail!(
+            "--print-scale: faces that are stretched in one direction do not close to the solid that \
+             was planned: give one number for both, or find their places by `rig --refine-target`"
+        );
+    }
+    let with_skeleton = matches!(&target.spec, TargetSpec::Solid(spec) if spec.skeleton.is_some());
+    let mut sheets = target.sheets.iter();
+    if with_skeleton || (target.sheets.len() > 1 && sheets.all(|s| s.placements.len() == 1)) {
+        bail!(
+            "--print-scale: faces that are printed one by one keep their places on the solid: those \
+             are found by `rig --refine-target`"
+        );
+    }
+    Ok(across)
+}
+
+/// Whether panels are fixed to each other in space.
+fn is_solid(target: &Target) -> bool {
+    match target.spec {
+        TargetSpec::Solid(_) => true,
+        TargetSpec::Listed(_) => target.panels.len() > 1,
+        TargetSpec::Board(_) | TargetSpec::Tags(_) => false,
+    }
 }
 
 /// Moves the corners of all views to where their sheet has them.
 pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> anyhow::Result<()> {
-    let is_solid = target.is_some_and(|target| matches!(target.spec, TargetSpec::Solid(_)));
-    if sheet.print_scale.is_some() && is_solid {
-        bail!("--print-scale: the faces of a solid are measured by `rig --refine-target`");
+    if let Some(target) = target {
+        solid_scale(sheet, target)?;
     }
     if sheet.shape.is_some() && target.is_some_and(|target| target.panels.len() > 1) {
         bail!("--shape: it is that of one board, and the target has several panels");
