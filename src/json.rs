@@ -2,7 +2,7 @@
 
 use std::io;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::ser::{CompactFormatter, Formatter, PrettyFormatter};
 
 /// Serialises plain data, indented down to `depth` levels; what lies deeper stays on one line.
@@ -13,6 +13,21 @@ pub(crate) fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
     value.serialize(&mut serializer).expect("plain data has a JSON form");
     text.push(b'\n');
     String::from_utf8(text).expect("JSON is UTF-8")
+}
+
+/// The schema that a JSON text names, such as `deltille/target/1`; `None` where it names none, an
+/// error where it is no JSON object.
+pub(crate) fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {
+    #[derive(Deserialize)]
+    struct Head {
+        schema: Option<String>,
+    }
+    serde_json::from_slice::<Head>(text).map(|head| head.schema)
+}
+
+/// What a schema describes: all but its version.
+pub(crate) fn kind(schema: &str) -> &str {
+    schema.rsplit_once('/').map_or(schema, |(kind, _)| kind)
 }
 
 /// The pretty layout above `depth`, the compact one below.

@@ -308,6 +308,150 @@ fn input_that_makes_no_camera_is_refused_by_its_cause() {
     assert!(foreign.contains("the target does not belong to this detection"), "{foreign}");
 }
 
+#[test]
+fn a_file_of_another_kind_is_not_replaced() {
+    let target = board(8, 9);
+    let folder = folder(&target, &detections(&target, 5, 0.7));
+    let at = folder.path();
+    std::fs::write(at.join("known.yaml"), camera().to_yaml()).unwrap();
+    let pose = "--pose 3.1415926,0,0,-150,80,400";
+    done(at, &format!("render board.json --camera known.yaml {pose} -o photos/00.png"));
+    let before = |name: &str| std::fs::read(at.join(name)).unwrap();
+    let kept = ["board.json", "corners/00.json", "photos/00.json", "photos/00.png"];
+    let contents = kept.map(before);
+    let cases = [
+        (
+            format!("{CALIBRATE} -o board.yaml --report page.html"),
+            "board.json holds deltille/target/1",
+        ),
+        (format!("{CALIBRATE} -o corners/00.yaml"), "corners/00.json holds deltille/detection/1"),
+        (
+            format!("render board.json --camera known.yaml {pose} -o board.png"),
+            "board.json holds deltille/target/1",
+        ),
+        (
+            "detect photos --target board.json -o photos".to_owned(),
+            "photos/00.json holds deltille/truth/1, which would be lost: choose another place",
+        ),
+        (
+            "octahedron --stl --name 00 -o photos".to_owned(),
+            "photos/00.json holds deltille/truth/1",
+        ),
+    ];
+    for (args, reason) in cases {
+        let said = refused(at, &args);
+        assert!(said.contains(reason), "{args}: {said}");
+    }
+    assert_eq!(kept.map(before), contents);
+    for unwanted in ["board.yaml", "page.html", "corners/00.yaml", "board.png", "photos/00.stl"] {
+        assert!(!at.join(unwanted).exists(), "{unwanted}");
+    }
+    // The same kind is: a second run.
+    done(at, &format!("{CALIBRATE} -o again.yaml"));
+    done(at, &format!("{CALIBRATE} -o again.yaml"));
+}
+
+#[test]
+fn what_is_no_detection_is_passed_over_in_a_folder_and_named_where_it_was_meant() {
+    let target = board(8, 9);
+    let folder = folder(&target, &detections(&target, 6, 0.7));
+    let at = folder.path();
+    done(at, &format!("{CALIBRATE} -o corners/camera.yaml"));
+    let again = output(at, CALIBRATE);
+    let said = String::from_utf8(again.stderr).unwrap();
+    assert!(again.status.success(), "{said}");
+    assert!(
+        said.contains("left out: 1 file in the folder that hold no detection, such as"),
+        "{said}"
+    );
+    assert!(String::from_utf8(again.stdout).unwrap().contains("6 views"));
+
+    std::fs::remove_file(at.join("corners/camera.json")).unwrap();
+    std::fs::create_dir(at.join("foreign")).unwrap();
+    std::fs::copy(at.join("board.json"), at.join("foreign/board.json")).unwrap();
+    image::GrayImage::new(64, 48).save(at.join("0.png")).unwrap();
+    let calibrate = |of: &str, with: &str| format!("calibrate {of} --target {with} --model radtan");
+    let cases = [
+        (
+            calibrate("corners camera.json", "board.json"),
+            "camera.json: this is a deltille/calibration/1 file, not a detection",
+        ),
+        (calibrate("foreign", "board.json"), "foreign: no detection among the .json files"),
+        (calibrate("0.png", "board.json"), "0.png: no text: pictures go to `deltille detect`"),
+        (
+            calibrate("corners", "corners/00.json"),
+            "corners/00.json: this is a deltille/detection/1 file, not a target",
+        ),
+        (
+            "calibrate corners --target board.json --fixed-intrinsics camera.json".to_owned(),
+            "camera.json: this is a deltille/calibration/1 file, not a camera: give the .yaml",
+        ),
+        (
+            "calibrate corners --grid checker --edge 20mm --model radtan".to_owned(),
+            "00: the board in it has the other tiling",
+        ),
+        (format!("{CALIBRATE} --print-scale -1,1"), "`-1` is no measured length"),
+        (format!("{CALIBRATE} -o new.yaml --report 0.png/page.html"), "0.png is no folder"),
+    ];
+    for (args, reason) in cases {
+        let said = refused(at, &args);
+        assert!(said.contains(reason), "{args}: {said}");
+    }
+    assert!(!at.join("new.yaml").exists());
+}
+
+#[test]
+fn nothing_counts_twice() {
+    let target = board(8, 9);
+    let all = detections(&target, 6, 0.7);
+    let folder = folder(&target, &all);
+    let at = folder.path();
+    std::fs::copy(at.join("corners/00.json"), at.join("copy.json")).unwrap();
+    let args = CALIBRATE.replace("corners", "corners copy.json corners/01.json");
+    let result = output(at, &args);
+    let [said, warned] =
+        [result.stdout, result.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(said.contains("6 views, 432 corners"), "{said}");
+    for (again, first) in [("copy.json", "corners/00.json"), ("corners/01.json", "corners/01.json")]
+    {
+        let line = format!("warning: {again}: the same picture and corners as in {first}, counted");
+        assert!(warned.contains(&line), "{warned}");
+    }
+
+    let refused_as = |detection: &Detection| {
+        std::fs::write(at.join("corners/00.json"), detection::write(detection)).unwrap();
+        refused(at, CALIBRATE)
+    };
+    let mut grid_twice = all[0].clone();
+    grid_twice.grids.push(grid_twice.grids[0].clone());
+    let said = refused_as(&grid_twice);
+    assert!(said.contains("corners/00.json: grids[1] is grids[0] again"), "{said}");
+    let mut corner_twice = all[0].clone();
+    let first = corner_twice.grids[0].corners[0];
+    corner_twice.grids[0].corners.push(GridCorner { x: first.x + 1.0, ..first });
+    let said = refused_as(&corner_twice);
+    assert!(said.contains("grids[0].corners[72]: another corner has this row and col"), "{said}");
+}
+
+#[test]
+fn a_plain_board_that_is_cut_off_is_called_that() {
+    let mut pictures = detections(&board(8, 9), 6, 0.7);
+    let cut = &mut pictures[2].grids[0];
+    cut.panel = None;
+    cut.corners.truncate(20);
+    for corner in &mut cut.corners {
+        (corner.row, corner.id) = (corner.row - 1, None);
+    }
+    let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 8, 9, 20.0) };
+    let plain = Target::build("board", &TargetSpec::Board(spec), None, None).unwrap();
+    let folder = folder(&plain, &pictures);
+    let result = output(folder.path(), CALIBRATE);
+    let said = String::from_utf8(result.stderr).unwrap();
+    assert!(result.status.success(), "{said}");
+    let reason = "02.json: its rows and columns are not those of the target: without tags they are";
+    assert!(said.contains(reason) && !said.contains("does not belong"), "{said}");
+}
+
 /// An icosahedron before two cameras, rendered, detected, calibrated, and its poses found.
 #[test]
 fn a_rig_is_calibrated_from_pictures() {
@@ -360,6 +504,19 @@ fn a_rig_is_calibrated_from_pictures() {
         let [turn, step] = found.off(&truth);
         assert!(turn.length() < 1e-3 && step.length() < 0.5, "{found:?} {truth:?}");
     }
+    // A net printed at 101 % makes a larger solid, so much farther away.
+    let pose = "pose left/0.png --target ico.json --camera true.yaml --print-scale";
+    let line: Value = serde_json::from_str(&done(at, &format!("{pose} 1.01"))).unwrap();
+    let first: Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
+    let [larger, planned] = [&line, &first].map(|line| motion(&line["camera_from_target"]));
+    assert!((larger.translation - 1.01 * planned.translation).length() < 1e-3, "{larger:?}");
+    done(at, &format!("rig {cameras} --target ico.json -o larger --print-scale 1.01"));
+    let larger = &json(&at.join("larger/rig.json"))["cameras"][1]["camera_from_rig"];
+    let planned = motion(&rig["cameras"][1]["camera_from_rig"]).translation;
+    assert!((motion(larger).translation - 1.01 * planned).length() < 1e-2, "{larger}");
+    let said = refused(at, &format!("{pose} 1.01,1.02"));
+    assert!(said.contains("--print-scale: faces that are stretched in one direction"), "{said}");
+
     let wrong = refused(at, &format!("rig {cameras} --camera third=nowhere --target ico.json"));
     assert!(wrong.contains("third") && wrong.contains("nowhere"), "{wrong}");
 

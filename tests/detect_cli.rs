@@ -171,7 +171,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
         ("detect --target board.json sheet/board.png --max-errors 9", "--max-errors"),
         ("detect --target board.json sheet/board.png --rows 3 --cols 3", "--rows"),
         ("detect --target board.json sheet/board.png --family delTag25h9", "fingerprint"),
-        ("detect --target board.json sheet/board.png", "overwrite the target"),
+        ("detect --target board.json sheet/board.png", "board.json holds deltille/target/1, which"),
         ("detect --grid hexagons sheet/board.png", "hexagons"),
         ("detect --grid deltille sheet/board.png --rows 0 --cols 4", "--rows"),
         ("detect --grid deltille sheet/board.png -j 0", "-j"),

@@ -256,5 +256,5 @@ fn pictures_of_another_moment_are_left_out_and_cameras_without_common_frames_ref
     }
     let error = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap_err();
     assert!(matches!(error, CalibrationError::Apart { .. }), "{error}");
-    assert!(error.to_string().starts_with("c2: no more than 0 frames"), "{error}");
+    assert!(error.to_string().starts_with("c2: no frame shows the target"), "{error}");
 }

@@ -63,7 +63,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
     fs::write(path.join("broken.json"), "{").unwrap();
     fs::create_dir(path.join("alone")).unwrap();
     fs::copy(path.join("b.json"), path.join("alone/b.json")).unwrap();
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 8] = [
         (&["b.json", "empty.pdf"], "empty.pdf"),
         (&["b.json", "cut.pdf"], "cut.pdf"),
         (&["b.json", "absent.png"], "absent.png"),
@@ -71,6 +71,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
         (&["broken.json"], "broken.json"),
         (&["alone/b.json"], "no b.pdf, .svg, .png, .glb, .obj or .stl beside"),
         (&["b.json", "--report", "nowhere/r.json"], "nowhere"),
+        (&["b.json", "--report", "b.json"], "--report: b.json holds deltille/target/1"),
     ];
     for (arguments, reason) in cases {
         let output = deltille(path, &[&["verify"], arguments].concat()).code(2);

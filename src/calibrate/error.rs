@@ -73,9 +73,14 @@ pub enum CalibrationError {
     },
     /// Cameras that nothing ties to the others.
     #[error(
-        "{cameras}: no more than {shared} frames show the target in these and in another camera, \
-         {needed} are needed: pictures of one moment must have the same file name in each folder, \
-         and some must show the target in both cameras"
+        "{cameras}: {} the target in these and in another camera, {needed} are needed: pictures of \
+         one moment must have the same file name in each folder, and some must show the target in \
+         both cameras",
+        match shared {
+            0 => "no frame shows".to_owned(),
+            1 => "only one frame shows".to_owned(),
+            n => format!("no more than {n} frames show"),
+        }
     )]
     Apart {
         /// Their names.

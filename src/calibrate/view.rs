@@ -18,8 +18,15 @@ const LEAST_CORNERS: usize = 6;
 const MIRRORED: &str =
     "the labels are mirrored: rows and columns are exchanged, or the image was flipped";
 
+/// What is wrong with a board of the other tiling.
+const OTHER_KIND: &str = "the board in it has the other tiling: give --grid that of the board";
+
 /// What follows from labels that are not on the target.
 const OTHER_TARGET: &str = "; the target does not belong to this detection";
+
+/// Why labels of a grid without panel are not on the target.
+const CUT_OFF: &str = "its rows and columns are not those of the target: without tags they are known \
+                       only where the board is seen whole, and here a part of it is";
 
 /// What was photographed.
 #[derive(Clone, Copy, Debug)]
@@ -124,7 +131,10 @@ impl Reference<'_> {
             Self::Grid(board) => {
                 let of_kind = detection.grids.iter().filter(|grid| grid.kind == board.kind);
                 let Some(grid) = of_kind.max_by_key(|grid| grid.corners.len()) else {
-                    return Ok(Vec::new());
+                    return match detection.grids.first() {
+                        Some(_) => Err((None, OTHER_KIND.to_owned())),
+                        None => Ok(Vec::new()),
+                    };
                 };
                 board.check(grid).map_err(|problem| (None, problem))?;
                 let at = |row, col| board.place(row, col);
@@ -133,8 +143,7 @@ impl Reference<'_> {
             Self::Target(target) => {
                 let grids = detection.grids.iter();
                 let found = grids.filter_map(|grid| {
-                    let wrong = |problem| (grid.panel, format!("{problem}{OTHER_TARGET}"));
-                    on_target(target, grid).map_err(wrong).transpose()
+                    on_target(target, grid).map_err(|problem| (grid.panel, problem)).transpose()
                 });
                 found.collect()
             }
@@ -236,10 +245,10 @@ fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
     };
     let Some(index) = index else {
         let id = grid.panel.unwrap_or_default();
-        return Err(format!("panel {id} is not on the target {}", target.name));
+        return Err(format!("panel {id} is not on the target {}{OTHER_TARGET}", target.name));
     };
     let panel = &target.panels[index];
-    check_panel(target, panel, grid)?;
+    check_panel(target, panel, grid).map_err(|problem| problem + OTHER_TARGET)?;
     let from_target = panel.pose.to_pose().inverse();
     let places: BTreeMap<(i32, i32), DVec3> = panel
         .corners
@@ -250,11 +259,14 @@ fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
     for corner in &grid.corners {
         match places.get(&(corner.row, corner.col)) {
             Some(&place) => found.push((corner.row, corner.col, place)),
+            None if grid.panel.is_none() && corner.id.is_none() => {
+                return Err(CUT_OFF.to_owned());
+            }
             None => {
                 let swapped = places.contains_key(&(corner.col, corner.row));
                 let hint = if swapped { " (rows and columns exchanged?)" } else { "" };
                 return Err(format!(
-                    "{} has no corner in row {}, column {}{hint}",
+                    "{} has no corner in row {}, column {}{hint}{OTHER_TARGET}",
                     target.name, corner.row, corner.col
                 ));
             }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 
 use crate::export::atomic;
+use crate::json;
 
 /// The file that `-o` means: itself when it ends in the extension, else `<stem>.<extension>` in
 /// that folder. A path that ends in another extension is no folder, unless it is there as one.
@@ -31,8 +32,9 @@ pub fn file(output: &Path, stem: &str, extension: &str) -> anyhow::Result<PathBu
 }
 
 /// Finds out before hours of work, and without a trace, whether a file can be written.
-pub fn check_writable(path: &Path) -> anyhow::Result<()> {
-    let context = || format!("-o: {} cannot be written", path.display());
+pub fn check_writable(option: &str, path: &Path) -> anyhow::Result<()> {
+    let context = || format!("{option}: {} cannot be written", path.display());
+    ensure!(!path.is_dir(), "{}: there is a folder of that name", context());
     let folders = path.ancestors().skip(1);
     let nearest = folders
         .map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
@@ -62,10 +64,38 @@ macro_rules! say {
 }
 pub(crate) use say;
 
+/// Refuses to write a JSON of some schema, or anything else, over a JSON of another kind: it only
+/// has the same name, and may be all that its owner has of a target or a calibration.
+pub fn check_replaced(path: &Path, schema: Option<&str>) -> anyhow::Result<()> {
+    if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json")) {
+        return Ok(());
+    }
+    let there = std::fs::read(path).ok().and_then(|text| json::schema(&text).ok().flatten());
+    match there {
+        Some(there) if schema.map(json::kind) != Some(json::kind(&there)) => bail!(
+            "{} holds {there}, which would be lost: choose another place to write to",
+            path.display()
+        ),
+        _ => Ok(()),
+    }
+}
+
+/// The same for a content that is there already.
+pub fn check_replaced_by(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    check_replaced(path, json::schema(content).ok().flatten().as_deref())
+}
+
 /// Writes a file whole or not at all, making its folder where there is none.
 pub fn write(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    check_replaced_by(path, content)?;
     make_folder_of(path)?;
     Ok(atomic::write(path, |file| file.write_all(content))?)
+}
+
+/// The folder that a file goes to.
+pub fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
 }
 
 /// Refuses a folder in whose place there is a file.

@@ -34,6 +34,14 @@ pub enum TargetFileError {
     /// Not JSON, or cut off.
     #[error("not a target file: {0}; make it anew with `deltille board`")]
     Json(serde_json::Error),
+    /// A file of something else.
+    #[error(
+        "this is a {found} file, not a target: give the .json that was written with the target"
+    )]
+    Kind {
+        /// The schema that the file names.
+        found: String,
+    },
     /// Another schema, or another version of it.
     #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
     Schema {
@@ -71,6 +79,9 @@ impl Target {
             schema: String,
         }
         let head: Head = parse(json)?;
+        if crate::json::kind(&head.schema) != crate::json::kind(SCHEMA) {
+            return Err(TargetFileError::Kind { found: head.schema });
+        }
         if head.schema != SCHEMA {
             return Err(TargetFileError::Schema { found: head.schema });
         }

@@ -17,7 +17,9 @@ use crate::cli::{interrupt, output, output::say, progress};
 use crate::family::best::Best;
 use crate::family::lexicode::{self, Lexicode};
 use crate::family::search::{self, Search};
-use crate::family::{Control, Family, FamilyError, Progress, Rules, Screen, TagWords, check_name};
+use crate::family::{
+    self, Control, Family, FamilyError, Progress, Rules, Screen, TagWords, check_name,
+};
 use crate::lattice::Dimension;
 
 /// Told at the end of `--help`.
@@ -130,7 +132,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let rules = args.rules.rules(args.family)?;
     args.check_replaced(&path)?;
-    output::check_writable(&path)?;
+    output::check_writable("-o", &path)?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
@@ -220,6 +222,8 @@ impl Args {
 
     /// Refuses to lose a file of other tags, or one that is no family file at all.
     fn check_replaced(&self, path: &Path) -> anyhow::Result<()> {
+        // Not even with --force, and before the hours that a search takes.
+        output::check_replaced(path, Some(family::SCHEMA))?;
         if self.force || !path.exists() {
             return Ok(());
         }

@@ -9,7 +9,8 @@ use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
 use super::settings::{Plan, Settings};
 use crate::artwork::{self, Artwork};
-use crate::export::{atomic, dsc};
+use crate::cli::output;
+use crate::export::dsc;
 use crate::family::{Family, FamilyError, square_names};
 use crate::target::{GridKind, Target, TargetSpec, id_range};
 
@@ -66,7 +67,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &summary(&target))?;
     if let Some(path) = &args.save_template {
         let template = settings.with_edge(plan.spec.edge_mm).to_toml(grid);
-        atomic::write(path, |out| out.write_all(template.as_bytes()))?;
+        output::write(path, template.as_bytes()).context("--save-template")?;
     }
     Ok(delivered)
 }

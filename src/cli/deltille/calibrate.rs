@@ -62,7 +62,7 @@ pub struct Args {
     format: Vec<Format>,
     /// Find how the sheet of the board is bent, stretched and sheared, too, and whether that is more
     /// than chance
-    #[arg(long, conflicts_with = "fixed_intrinsics")]
+    #[arg(long, conflicts_with_all = ["fixed_intrinsics", "shape"])]
     board_shape: bool,
     /// Write a page that shows what the calibration is worth, and what would make it better
     #[arg(long, value_name = "FILE.html")]
@@ -146,10 +146,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         ensure!(folder.is_dir(), "--images: {} is no folder", folder.display());
         warn_of_missing(folder, &views);
     }
-    if let Some(page) = &args.report {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let page = args.report.as_ref().map(|page| {
         let is_page = page.is_dir() || page.extension().is_some_and(|end| end == "html");
         ensure!(is_page, "--report: {} must end in .html, or be a folder", page.display());
-    }
+        let page = output::file(page, &format!("{stem}-report"), "html")?;
+        output::check_writable("--report", &page)?;
+        Ok(page)
+    });
+    let page = page.transpose()?;
     let mut solution = args.solve(&views, &panels)?;
     let of_test = solution.held_out.iter().flat_map(|test| &test.excluded);
     for out in solution.calibrated.excluded.iter().chain(of_test) {
@@ -179,15 +184,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !solution.calibrated.loose.is_empty() {
         eprintln!("{}", cannot_tell_apart(&solution.calibrated.loose));
     }
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let texts = args.format.iter().map(|&format| format.texts(&stem, &solution, print_scale));
     let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let files = texts.into_iter().flatten().map(|(name, text)| text_file(name, text));
     let files: Vec<File> = files.collect();
-    let mut written = write_all(folder.unwrap_or(Path::new(".")), &files)?;
-    if let Some(page) = &args.report {
-        let page = output::file(page, &format!("{stem}-report"), "html")?;
+    let mut written = write_all(output::folder_of(&path), &files)?;
+    if let Some(page) = page {
         output::write(&page, args.page(&stem, &solution, print_scale.is_some()).as_bytes())
             .context("--report")?;
         written.push(page);
@@ -201,7 +203,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let _ = writeln!(text, "held out: {}", headline(test));
     }
     for path in written {
-        let _ = writeln!(text, "{}", path.display());
+        let _ = writeln!(text, "wrote {}", path.display());
     }
     output::print(&text)?;
     Ok(ExitCode::SUCCESS)

@@ -7,11 +7,10 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::ValueEnum;
 use rayon::prelude::*;
 
-use super::files::same_file;
 use super::finder::FinderArgs;
 use super::images::{Images, Stems};
 use crate::cli::run::{self, BAD_INPUT, FAILED, INTERRUPTED};
@@ -75,9 +74,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // Clashes among images that are named are found before any work is done.
     let mut named = Stems::default();
     for image in images.named() {
-        args.check_result(&named.claim(image)?)?;
+        args.check_results(&named.claim(image)?)?;
     }
     if let Some(folder) = args.folder() {
+        output::check_folder(folder).context("-o")?;
         fs::create_dir_all(folder)
             .with_context(|| format!("-o: cannot write to {}", folder.display()))?;
     }
@@ -197,14 +197,10 @@ impl Args {
         extensions.chain(overlay).map(|e| folder.join(format!("{stem}.{e}"))).collect()
     }
 
-    /// A result may not overwrite the target.
-    fn check_result(&self, stem: &str) -> anyhow::Result<()> {
-        let Some(target) = &self.finder.target else { return Ok(()) };
-        if let Some(result) = self.results(stem).iter().find(|result| same_file(result, target)) {
-            let shown = result.display();
-            bail!("{shown} would overwrite the target: choose another folder with -o");
-        }
-        Ok(())
+    /// A result may not take the place of a target, or of the truth of a synthetic picture.
+    fn check_results(&self, stem: &str) -> anyhow::Result<()> {
+        let mut results = self.results(stem).into_iter();
+        results.try_for_each(|result| output::check_replaced(&result, Some(detection::SCHEMA)))
     }
 }
 
@@ -234,7 +230,7 @@ fn one_image(
     path: &Path,
     stem: &str,
 ) -> anyhow::Result<Outcome> {
-    args.check_result(stem)?;
+    args.check_results(stem)?;
     if args.skip_existing && args.results(stem).iter().all(|result| result.exists()) {
         return Ok(Outcome::Skipped);
     }

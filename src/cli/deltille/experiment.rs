@@ -117,7 +117,7 @@ fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {
     let Some(outcomes) = outcomes? else { bail!("interrupted; nothing was written") };
     let path = simulation.output.join("rig.csv");
     output::write(&path, rig::csv(&outcomes).as_bytes())?;
-    output::print(&format!("{}{}\n", rig::text(&outcomes), path.display()))?;
+    output::print(&format!("{}wrote {}\n", rig::text(&outcomes), path.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -133,14 +133,15 @@ fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
     };
     let svg = plot::svg(&rows);
     let png = plot::png(&svg).context("the plot cannot be drawn")?;
+    say!("{} fits a point, seed {seed}", 4 * images);
     for (name, content) in [
         ("corners.csv", corners::csv(&rows).into_bytes()),
         ("corners.svg", svg.into_bytes()),
         ("corners.png", png),
     ] {
-        output::write(&folder.join(name), &content)?;
+        let path = folder.join(name);
+        output::write(&path, &content)?;
+        say!("wrote {}", path.display());
     }
-    let table = folder.join("corners.csv");
-    say!("{}: {} fits a point, seed {seed}", table.display(), 4 * images);
     Ok(ExitCode::SUCCESS)
 }

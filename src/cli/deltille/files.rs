@@ -39,7 +39,12 @@ pub struct Formats {
 
 /// A file of text.
 pub fn text_file(name: String, text: String) -> File {
-    File::new(name, move |path| Ok(atomic::write(path, |out| out.write_all(text.as_bytes()))?))
+    bytes_file(name, text.into_bytes())
+}
+
+/// A file of bytes.
+pub fn bytes_file(name: String, bytes: Vec<u8>) -> File {
+    File::new(name, move |path| Ok(atomic::write(path, |out| out.write_all(&bytes))?))
 }
 
 /// The sheets of an artwork in some formats.
@@ -113,6 +118,10 @@ fn write_here(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
         })?;
     }
     check()?;
+    for (file, path) in files.iter().zip(&paths).filter(|(_, path)| path.exists()) {
+        let staged = fs::read(staging.path().join(&file.name));
+        output::check_replaced_by(path, &staged.with_context(context)?)?;
+    }
     for (file, path) in files.iter().zip(&paths) {
         fs::rename(staging.path().join(&file.name), path)
             .with_context(|| format!("cannot write {}", path.display()))?;

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 
 use super::images::Images;
+use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{self, Loss, Reference, Weights, views};
 use crate::cli::output::{self, say};
@@ -26,9 +27,8 @@ pub struct Args {
     /// The camera, as `deltille calibrate`, ROS or OpenCV write it
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    /// How the sheet is bent and printed: the .json of `calibrate --board-shape`
-    #[arg(long, value_name = "FILE")]
-    shape: Option<PathBuf>,
+    #[command(flatten)]
+    sheet: SheetArgs,
     /// Family file, where the target names a family that is not shipped
     #[arg(long)]
     family: Option<String>,
@@ -44,8 +44,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let camera = camera_file::read("--camera", &args.camera)?;
     let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
     let reference = Reference::Target(&target);
-    let panels = reference.panels();
-    let sheet = args.shape.as_deref().map(sightings::sheet).transpose()?.unwrap_or_default();
+    let sheet = args.sheet.read()?;
+    let scale = sightings::solid_scale(&sheet, &target)?;
+    let mut panels = reference.panels();
+    panels.iter_mut().for_each(|panel| panel.translation *= scale);
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
     let (mut lines, mut all, mut without) = (String::new(), 0, 0);

@@ -1,12 +1,13 @@
 //! `deltille render`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 use glam::{DQuat, DVec3};
 use image::{DynamicImage, ImageBuffer, Luma};
 
+use super::files::{bytes_file, text_file, write_all};
 use super::{camera_file, target_file};
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{self, say};
@@ -102,9 +103,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let mut png = std::io::Cursor::new(Vec::new());
     picture.context("the picture is empty")?.write_to(&mut png, image::ImageFormat::Png)?;
-    output::write(&path.with_extension("json"), truth.as_bytes())?;
-    output::write(&path, &png.into_inner())?;
+    let truth_name = Path::new(&*name).with_extension("json").to_string_lossy().into_owned();
+    let files = [text_file(truth_name, truth), bytes_file(name.into_owned(), png.into_inner())];
+    write_all(output::folder_of(&path), &files)?;
     say!("{}: {} corners in view", path.display(), seen.len());
+    if seen.is_empty() {
+        eprintln!(
+            "warning: the camera looks past the target, or at its back: with --eye it looks at the \
+             middle of the target, whose front is on the side of z > 0 where it is a board"
+        );
+    }
     Ok(ExitCode::SUCCESS)
 }
 

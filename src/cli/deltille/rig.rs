@@ -8,6 +8,7 @@ use clap::ValueEnum;
 
 use super::calibrate::{Robust, Weighting, cannot_tell_apart, without_outliers};
 use super::files::{File, same_file, text_file, write_all};
+use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
     Excluded, Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews, calibrate_rig,
@@ -34,11 +35,10 @@ pub struct Args {
     /// A camera that is known already and kept, with its file
     #[arg(long, value_name = "NAME=FILE", value_parser = named)]
     known: Vec<(String, PathBuf)>,
-    /// How the sheet of a board is bent and printed: the .json of `calibrate --board-shape`
-    #[arg(long, value_name = "FILE")]
-    shape: Option<PathBuf>,
+    #[command(flatten)]
+    sheet: SheetArgs,
     /// Find where the target's panels are on it, and write that as <target>-refined.json
-    #[arg(long)]
+    #[arg(long, conflicts_with = "print_scale")]
     refine_target: bool,
     /// How corners far off their prediction count
     #[arg(long, default_value = "huber")]
@@ -94,7 +94,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     check_folder(&args.output).context("-o")?;
     let target = target_file::read(&args.target).context("--target")?;
     let reference = Reference::Target(&target);
-    let sheet = args.shape.as_deref().map(sightings::sheet).transpose()?.unwrap_or_default();
+    let sheet = args.sheet.read()?;
+    let scale = sightings::solid_scale(&sheet, &target)?;
     let mut cameras = Vec::with_capacity(args.camera.len());
     let mut left_out: Vec<Excluded> = Vec::new();
     for (name, folder) in &args.camera {
@@ -108,7 +109,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some((name, _)) = args.known.iter().find(|(name, _)| !names.contains(&name.as_str())) {
         bail!("--known: there is no --camera {name}");
     }
-    let panels: Vec<PanelPlace> = target.panels.iter().map(|panel| (&panel.pose).into()).collect();
+    let mut panels: Vec<PanelPlace> =
+        target.panels.iter().map(|panel| (&panel.pose).into()).collect();
+    panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
     let options = RigOptions {
         model: args.model,
         loss: args.robust.into(),

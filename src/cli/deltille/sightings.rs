@@ -12,6 +12,7 @@ use crate::detect::Detection;
 use crate::export::calibration::{self, Sheet};
 use crate::export::detection;
 use crate::target::{GridKind, Target, TargetSpec, parse_length_mm};
+use crate::words::counted;
 
 /// Detections and what they show.
 #[derive(clap::Args)]
@@ -34,12 +35,19 @@ pub struct SightingsArgs {
     /// Length of a tile's edge of the untagged board, such as 20mm
     #[arg(long, requires = "grid", value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
+    #[command(flatten)]
+    sheet: SheetArgs,
+}
+
+/// What is known of the sheet beforehand.
+#[derive(clap::Args)]
+pub struct SheetArgs {
     /// How the print came out, measured length over stated length of the check bars: across and up
-    /// the sheet, such as 0.9973,0.9981
-    #[arg(long, value_name = "ACROSS,UP", value_parser = scale)]
+    /// the sheet, such as 0.9973,0.9981, or one number for both
+    #[arg(long, value_name = "ACROSS,UP", value_parser = scale, allow_hyphen_values = true)]
     print_scale: Option<[f64; 2]>,
     /// How the sheet is bent and printed, found before: the .json of `calibrate --board-shape`
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["print_scale", "board_shape"])]
+    #[arg(long, value_name = "FILE", conflicts_with = "print_scale")]
     shape: Option<PathBuf>,
 }
 
@@ -81,14 +89,6 @@ pub struct Sightings {
 }
 
 impl SightingsArgs {
-    /// What is known of the sheet beforehand.
-    fn sheet(&self) -> anyhow::Result<Sheet> {
-        match &self.shape {
-            Some(path) => sheet(path),
-            None => Ok(Sheet { print_scale: self.print_scale, shape: None }),
-        }
-    }
-
     fn edge_mm(&self) -> anyhow::Result<Option<f64>> {
         let Some(text) = &self.edge else { return Ok(None) };
         let mm = parse_length_mm(text).context("--edge")?;
@@ -115,25 +115,65 @@ impl SightingsArgs {
             ),
         };
         let (mut views, empty, left_out) = read(&self.detections, &reference)?;
-        let sheet = self.sheet()?;
+        let sheet = self.sheet.read()?;
         put_on(&sheet, target.as_ref(), &mut views)?;
+        let mut panels = reference.panels();
+        if let Some(target) = &target {
+            let scale = solid_scale(&sheet, target)?;
+            panels.iter_mut().for_each(|panel| panel.translation *= scale);
+        }
         let print_scale = sheet.print_scale;
-        Ok(Sightings { panels: reference.panels(), views, empty, left_out, print_scale })
+        Ok(Sightings { panels, views, empty, left_out, print_scale })
     }
 }
 
-/// Reads the sheet of an earlier calibration.
-pub fn sheet(path: &Path) -> anyhow::Result<Sheet> {
-    let show = || format!("--shape: {}", path.display());
-    let text = std::fs::read_to_string(path).with_context(show)?;
-    calibration::read_sheet(&text).with_context(show)
+impl SheetArgs {
+    /// The sheet, where nothing is known as it was planned.
+    pub fn read(&self) -> anyhow::Result<Sheet> {
+        let Some(path) = &self.shape else {
+            return Ok(Sheet { print_scale: self.print_scale, shape: None });
+        };
+        let show = || format!("--shape: {}", path.display());
+        let text = std::fs::read_to_string(path).with_context(show)?;
+        calibration::read_sheet(&text).with_context(show)
+    }
+}
+
+/// How much larger than planned a solid is whose net was printed like this; 1 for a board.
+pub fn solid_scale(sheet: &Sheet, target: &Target) -> anyhow::Result<f64> {
+    let Some([across, up]) = sheet.print_scale.filter(|_| is_solid(target)) else {
+        return Ok(1.0);
+    };
+    if across != up {
+        bail!(
+            "--print-scale: faces that are stretched in one direction do not close to the solid that \
+             was planned: give one number for both, or find their places by `rig --refine-target`"
+        );
+    }
+    let with_skeleton = matches!(&target.spec, TargetSpec::Solid(spec) if spec.skeleton.is_some());
+    let mut sheets = target.sheets.iter();
+    if with_skeleton || (target.sheets.len() > 1 && sheets.all(|s| s.placements.len() == 1)) {
+        bail!(
+            "--print-scale: faces that are printed one by one keep their places on the solid: those \
+             are found by `rig --refine-target`"
+        );
+    }
+    Ok(across)
+}
+
+/// Whether panels are fixed to each other in space.
+fn is_solid(target: &Target) -> bool {
+    match target.spec {
+        TargetSpec::Solid(_) => true,
+        TargetSpec::Listed(_) => target.panels.len() > 1,
+        TargetSpec::Board(_) | TargetSpec::Tags(_) => false,
+    }
 }
 
 /// Moves the corners of all views to where their sheet has them.
 pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> anyhow::Result<()> {
-    let is_solid = target.is_some_and(|target| matches!(target.spec, TargetSpec::Solid(_)));
-    if sheet.print_scale.is_some() && is_solid {
-        bail!("--print-scale: the faces of a solid are measured by `rig --refine-target`");
+    if let Some(target) = target {
+        solid_scale(sheet, target)?;
     }
     if sheet.shape.is_some() && target.is_some_and(|target| target.panels.len() > 1) {
         bail!("--shape: it is that of one board, and the target has several panels");
@@ -164,15 +204,45 @@ type Read = (Vec<View>, Vec<PathBuf>, Vec<Excluded>);
 /// The views that detections show, files or folders of them. What does not belong to the target is
 /// told on standard error, too.
 pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<Read> {
-    let files = files(paths)?;
-    let mut detections = Vec::new();
-    for path in &files {
+    let (mut files, mut detections, mut foreign) = (Vec::new(), Vec::new(), Vec::new());
+    for Place { path, is_named } in places(paths)? {
         let show = || path.display().to_string();
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("cannot read {}", show()))?;
+        let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", show()))?;
+        let Ok(text) = String::from_utf8(bytes) else {
+            bail!(
+                "{}: no text: pictures go to `deltille detect`, what it writes goes here",
+                show()
+            );
+        };
+        if !is_named && detection::is_foreign(&text) {
+            foreign.push(path);
+            continue;
+        }
         let found: Detection = detection::read(&text).with_context(show)?;
+        if let Some(first) = detections.iter().position(|(_, other)| is_same(&found, other)) {
+            let first: &PathBuf = &files[first];
+            eprintln!(
+                "warning: {}: the same picture and corners as in {}, counted once",
+                show(),
+                first.display()
+            );
+            continue;
+        }
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         detections.push((name, found));
+        files.push(path);
+    }
+    if let Some(first) = foreign.first() {
+        let count = counted(foreign.len(), "file");
+        ensure!(
+            !files.is_empty(),
+            "{}: no detection among the .json files: make some with `deltille detect`",
+            first.parent().unwrap_or(first).display()
+        );
+        eprintln!(
+            "left out: {count} in the folder that hold no detection, such as {}",
+            first.display()
+        );
     }
     let Shown { views, empty, left_out } = views(&detections, reference)?;
     for (index, out) in &left_out {
@@ -182,16 +252,29 @@ pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<Read> {
     Ok((views, empty, left_out.into_iter().map(|(_, out)| out).collect()))
 }
 
-fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
+/// Whether two detections are of one picture and found the same in it.
+fn is_same(one: &Detection, other: &Detection) -> bool {
+    !one.grids.is_empty() && one.image == other.image && one.grids == other.grids
+}
+
+/// Where a detection may be.
+struct Place {
+    path: PathBuf,
+    /// Given by name, not only in a folder that was.
+    is_named: bool,
+}
+
+fn places(paths: &[PathBuf]) -> anyhow::Result<Vec<Place>> {
+    let mut places = Vec::new();
     for path in paths {
         if path.is_dir() {
-            files.extend(in_folder(path)?);
+            let inside = in_folder(path)?.into_iter();
+            places.extend(inside.map(|path| Place { path, is_named: false }));
         } else {
-            files.push(path.clone());
+            places.push(Place { path: path.clone(), is_named: true });
         }
     }
-    Ok(files)
+    Ok(places)
 }
 
 /// The JSON files of a folder, in the order of their names.

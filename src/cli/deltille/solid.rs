@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, anyhow, bail};
 
 use super::delivery::Delivery;
-use super::files::{self, File, text_file};
+use super::files::{self, File, bytes_file, text_file};
 use super::settings::DEFAULT_DPI;
 use crate::artwork;
 use crate::cli::output::say;
@@ -332,12 +332,6 @@ impl Args {
         }
         Ok(files)
     }
-}
-
-fn bytes_file(name: String, bytes: Vec<u8>) -> File {
-    File::new(name, move |path| {
-        Ok(crate::export::atomic::write(path, |out| out.write_all(&bytes))?)
-    })
 }
 
 fn length(option: &str, text: &Option<String>) -> anyhow::Result<Option<f64>> {

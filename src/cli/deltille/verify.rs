@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use serde::Serialize;
 
 use super::target_file;
-use crate::cli::output::say;
+use crate::cli::output::{self, say};
 use crate::cli::run::FAILED;
 use crate::export::{atomic, sheet_file_name, stl};
 use crate::family::Family;
@@ -45,6 +45,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             "no {name}.pdf, .svg, .png, .glb, .obj or .stl beside {}: name the files",
             args.target.display()
         );
+    }
+    if let Some(path) = &args.report {
+        output::check_replaced(path, Some(SCHEMA)).context("--report")?;
     }
     verify(&target, family.as_ref(), &artifacts, args.report.as_deref())
 }
@@ -113,6 +116,9 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
     printed.into_iter().chain(meshes).collect()
 }
 
+/// Schema and version of the file of `--report`.
+const SCHEMA: &str = "deltille/verdict/1";
+
 #[derive(Serialize)]
 struct Report<'a> {
     schema: &'static str,
@@ -124,6 +130,6 @@ struct Report<'a> {
 impl<'a> Report<'a> {
     fn new(target: &'a Target, artifacts: &'a [Verdict]) -> Self {
         let passed = artifacts.iter().all(|verdict| verdict.passed);
-        Self { schema: "deltille/verdict/1", target: &target.name, passed, artifacts }
+        Self { schema: SCHEMA, target: &target.name, passed, artifacts }
     }
 }
