@@ -5,7 +5,7 @@ use super::misfit::{MATTERS, SIGNIFICANT, deviate_of_f};
 use super::solution::{Corner, Solution};
 use super::solve::{self, Options, calibrated};
 use super::view::View;
-use super::weights::{Weights, median};
+use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA, Weights, median};
 use super::{Model, SHAPE_COEFFICIENTS};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 
@@ -13,7 +13,7 @@ use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 /// is left beside them does not outweigh them.
 const EXPLAINED: f64 = 0.5;
 
-/// A remedy is as good as the best if it gains this part of what that does: medians of a thousand corners
+/// A remedy is as good as the best if it gains this part of what that does: squares of a thousand corners
 /// are known to a few in a hundred.
 const AS_GOOD: f64 = 0.9;
 
@@ -98,17 +98,24 @@ fn best(solution: &Solution, tried: impl Iterator<Item = (Instead, Solution)>) -
     better.into_iter().find(|(gain, _)| *gain > AS_GOOD * most).map(|(_, remedy)| remedy)
 }
 
-/// How many times smaller squares are, by the median, which does not depend on what counts as an outlier.
+/// How many times smaller the mean square is. What is an outlier where the fit is better counts as just
+/// one in both, so that wild corners are no gain.
 fn gain(solution: &Solution, other: &Solution) -> Option<f64> {
-    let squares = |solution: &Solution| {
+    let squares = |solution: &Solution| -> Vec<f64> {
         let of = |corner: &Corner| corner.residual.iter().map(|r| r * r).sum::<f64>();
-        median(solution.views.iter().flat_map(|view| &view.corners).map(of).collect())
+        solution.views.iter().flat_map(|view| &view.corners).map(of).collect()
+    };
+    let variance = median(squares(other)) / MEDIAN_OF_CHI_SQUARED_2;
+    let most = OUTLIER_SIGMA * OUTLIER_SIGMA * variance;
+    let mean = |solution: &Solution| {
+        let squares = squares(solution);
+        squares.iter().map(|square| square.min(most)).sum::<f64>() / squares.len() as f64
     };
     let unknowns = |solution: &Solution| {
         let of_shape = if solution.shape.is_some() { SHAPE_COEFFICIENTS } else { 0 };
         (solution.found().count() + of_shape) as f64
     };
-    let gain = squares(solution) / squares(other);
+    let gain = mean(solution) / mean(other);
     let more = (unknowns(other) - unknowns(solution)).max(1.0);
     let freedom =
         (2 * other.corner_count()) as f64 - unknowns(other) - 6.0 * other.views.len() as f64;
