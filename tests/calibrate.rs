@@ -306,6 +306,7 @@ fn what_makes_a_calibration_fit_is_found() {
     assert_eq!(of(&camera(Model::Radtan), Model::Radtan), None);
     for (truth, model, better) in [
         (with(Model::Radtan5, 8, -0.02), Model::Radtan, Model::Rational),
+        (with(Model::KannalaBrandt(6), 8, 2e-3), Model::KannalaBrandt(4), Model::KannalaBrandt(6)),
         (camera(Model::Pupil), Model::Eucm, Model::Pupil),
     ] {
         let found = of(&truth, model).unwrap_or_else(|| panic!("{model}"));

@@ -9,9 +9,9 @@ use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA, Weights, median};
 use super::{Model, SHAPE_COEFFICIENTS};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 
-/// Where detections explain at least this part of the squares of the residuals, nothing is sought: what
-/// is left beside them does not outweigh them.
-const EXPLAINED: f64 = 0.5;
+/// Where detections explain at least this part of the squares of the residuals, nothing is sought: what is
+/// left beside them does not matter, whatever it is.
+const EXPLAINED: f64 = 1.0 / (1.0 + MATTERS * MATTERS);
 
 /// A remedy is as good as the best if it gains this part of what that does: squares of a thousand corners
 /// are known to a few in a hundred.
