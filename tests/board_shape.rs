@@ -1,8 +1,8 @@
 //! The shape of a board's sheet: found where it is bent, and called chance where it is not.
 
 use deltille::calibrate::{
-    BoardShape, Loss, Model, Observation, Options, Sighting, View, Weights, calibrate,
-    calibrate_with_shape,
+    BoardShape, Instead, Loss, Misfit, Model, Observation, Options, Sighting, View, Weights,
+    calibrate, calibrate_with_shape, remedy,
 };
 use deltille::camera::{Camera, Pose};
 use glam::{DQuat, DVec3};
@@ -57,6 +57,14 @@ fn a_bent_and_stretched_sheet_is_found() {
     let views = views(offset, 1);
     let flat = calibrate(&views, &[Pose::IDENTITY], OPTIONS).unwrap();
     let found = calibrate_with_shape(&views, &[Pose::IDENTITY], OPTIONS).unwrap();
+    let [Misfit::Target { panel: 0, rms_mm, .. }] = flat.misfits[..] else {
+        panic!("{:?}", flat.misfits)
+    };
+    assert!((0.05..0.5).contains(&rms_mm), "{rms_mm}");
+    assert_eq!(found.misfits, []);
+    let remedy = |solution| remedy(&views, &[Pose::IDENTITY], OPTIONS, solution);
+    assert_eq!(remedy(&flat).unwrap().instead, Instead::Shape);
+    assert_eq!(remedy(&found), None);
     assert!(flat.rms_px > 2.0 * found.rms_px, "{} {}", flat.rms_px, found.rms_px);
     assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.05, "{}", found.rms_px);
     let BoardShape { shape, sd_mm, .. } = found.shape.unwrap();

@@ -1,7 +1,8 @@
 //! Calibration of simulated cameras, whose truth is known, and of views that make none.
 
 use deltille::calibrate::{
-    CalibrationError, Loss, Model, Observation, Options, Sighting, View, Weights, calibrate, poses,
+    CalibrationError, Instead, Loss, Misfit, Model, Observation, Options, Sighting, View, Weights,
+    calibrate, poses, remedy, sufficient,
 };
 use deltille::camera::{Camera, Pose};
 use glam::{DQuat, DVec3};
@@ -245,5 +246,71 @@ fn any_focal_length_is_found() {
         let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Radtan)).unwrap();
         let ratio = found.camera.focal_px[0] / focal;
         assert!((ratio - 1.0).abs() < 1e-4, "{focal}: {ratio}");
+    }
+}
+
+#[test]
+fn a_lens_of_its_model_leaves_no_pattern() {
+    for seed in 0..20 {
+        let (views, _) = simulated(&camera(Model::Radtan), 20, 0.8, 300 + seed);
+        let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Radtan)).unwrap();
+        assert_eq!(found.misfits, [], "seed {seed}");
+    }
+}
+
+/// A lens of a model with one value changed.
+fn with(model: Model, index: usize, value: f64) -> Camera {
+    let camera = camera(model);
+    let mut values = camera.parameters();
+    values[index] = value;
+    camera.with_parameters(&values)
+}
+
+#[test]
+fn a_lens_of_another_model_leaves_a_pattern_over_the_image() {
+    let (views, _) = simulated(&with(Model::Radtan5, 8, -0.02), 25, 0.8, 3);
+    let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Radtan)).unwrap();
+    assert!(
+        matches!(found.misfits[..], [Misfit::Lens { camera: 0, rms_px }, ..] if rms_px > 0.5 * NOISE_PX),
+        "{:?}",
+        found.misfits
+    );
+}
+
+/// A lens that needs no denominator leaves numerator and denominator to chance; one that does needs both.
+#[test]
+fn the_smallest_model_that_holds_a_lens_is_named() {
+    let of = |truth: &Camera, model: Model| {
+        let (views, _) = simulated(truth, 20, 0.8, 5);
+        let found = calibrate(&views, &[Pose::IDENTITY], options(model)).unwrap();
+        (found.loose.len(), sufficient(&views, &[Pose::IDENTITY], options(model), &found))
+    };
+    let mild = camera(Model::Radtan);
+    for model in [Model::Rational, Model::ThinPrism] {
+        let (loose, smaller) = of(&mild, model);
+        assert!(loose > 1 && smaller == Some(Model::Radtan), "{model}: {loose} {smaller:?}");
+    }
+    assert_eq!(of(&mild, Model::Radtan5), (0, Some(Model::Radtan)));
+    assert_eq!(of(&camera(Model::ThinPrism), Model::ThinPrism).1, None);
+    assert_eq!(of(&camera(Model::Radtan5), Model::Radtan5).1, None);
+}
+
+/// A lens of another model is told, and what holds it; one of its own model needs nothing.
+#[test]
+fn what_makes_a_calibration_fit_is_found() {
+    let of = |truth: &Camera, model: Model| {
+        let (views, _) = simulated(truth, 20, 0.8, 5);
+        let found = calibrate(&views, &[Pose::IDENTITY], options(model)).unwrap();
+        remedy(&views, &[Pose::IDENTITY], options(model), &found)
+    };
+    assert_eq!(of(&camera(Model::Radtan), Model::Radtan), None);
+    for (truth, model, better) in [
+        (with(Model::Radtan5, 8, -0.02), Model::Radtan, Model::Rational),
+        (with(Model::KannalaBrandt(6), 8, 2e-3), Model::KannalaBrandt(4), Model::KannalaBrandt(6)),
+        (camera(Model::Pupil), Model::Eucm, Model::Pupil),
+    ] {
+        let found = of(&truth, model).unwrap_or_else(|| panic!("{model}"));
+        assert_eq!(found.instead, Instead::Model(better), "{model}: {found:?}");
+        assert!(found.rms_px < 1.1 * NOISE_PX, "{model}: {found:?}");
     }
 }

@@ -217,6 +217,40 @@ fn a_pole_within_the_image_is_told() {
 }
 
 #[test]
+fn a_calibration_that_does_not_fit_says_why_and_so_does_its_page() {
+    let flat = board(8, 9);
+    let mut bent = flat.clone();
+    for corner in &mut bent.panels[0].corners {
+        let [x, _, z] = &mut corner.target_mm;
+        *z += 2.0 * ((*x - 150.0) / 100.0).powi(2);
+    }
+    let other = BrownConrady { radial: [-0.12, 0.02, 0.0], ..BrownConrady::default() };
+    let other = Camera { lens: Lens::BrownConrady(other), ..camera() };
+    let told = |seen: &Target, args: &str| {
+        let folder = folder(&flat, &detections(seen, 15, 0.7));
+        std::fs::write(folder.path().join("other.yaml"), other.to_yaml()).unwrap();
+        let args = format!("calibrate corners --target board.json {args} --report page.html");
+        let output = output(folder.path(), &args);
+        assert_eq!(output.status.code(), Some(0));
+        let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+        (String::from_utf8(output.stderr).unwrap(), page)
+    };
+    for (seen, args, cause) in [
+        (&bent, "--model radtan", "try --board-shape"),
+        (&flat, "--model radtan --print-scale 1.2,1.1", "--print-scale 1.2,1.1 is not how it was"),
+        (&flat, "--fixed-intrinsics other.yaml", "the camera that was given is another one"),
+        (&flat, "--model rational", "take --model radtan, which holds this lens as well"),
+    ] {
+        let (said, page) = told(seen, args);
+        assert!(said.contains("warning: ") && said.contains(cause), "{args}: {said}");
+        assert!(page.contains("class=\"warning\"") && page.contains(cause), "{args}");
+        assert!(args.contains("rational") || !page.contains("no strong pattern"), "{args}");
+    }
+    let (said, page) = told(&flat, "--model radtan");
+    assert!(said.is_empty() && page.contains("no strong pattern"), "{said}");
+}
+
+#[test]
 fn the_shape_of_a_sheet_is_taken_along() {
     let flat = board(8, 9);
     let mut bent = flat.clone();

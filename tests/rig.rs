@@ -1,8 +1,8 @@
 //! Rigs of simulated cameras: what is found is what was put in, and the stated deviations are true.
 
 use deltille::calibrate::{
-    CalibrationError, Loss, Model, Observation, PanelPlace, RigOptions, RigSolution, RigViews,
-    Sighting, View, Weights, calibrate_rig,
+    CalibrationError, Loss, Misfit, Model, Observation, PanelPlace, RigOptions, RigSolution,
+    RigViews, Sighting, View, Weights, calibrate_rig, wrong_cameras,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::family::Family;
@@ -234,9 +234,33 @@ fn placement_errors_show_unless_the_target_is_refined() {
     let stated = calibrate_rig(&truth.views, &truth.stated, options(false)).unwrap();
     let refined = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
     assert!(stated.rms_px > 2.0 * refined.rms_px, "{} {}", stated.rms_px, refined.rms_px);
+    let first = stated.misfits.first();
+    assert!(matches!(first, Some(Misfit::Target { .. })), "{:?}", stated.misfits);
+    assert_eq!(refined.misfits, []);
     assert!(stated.panels.iter().all(|panel| panel.covariance.is_none()));
     let kept = refined.panels.iter().filter(|panel| panel.covariance.is_none()).count();
     assert_eq!(kept, 1);
+}
+
+#[test]
+fn a_camera_that_is_another_one_is_named() {
+    let mut truth = simulated(5, 20);
+    for (views, camera) in truth.views.iter_mut().zip(&truth.cameras) {
+        views.known = Some(camera.clone());
+    }
+    let wrong = |truth: &Simulated| wrong_cameras(&truth.views, &truth.really(), options(false));
+    assert!(wrong(&truth).is_empty());
+    truth.views[1].known = Some(truth.cameras[2].clone());
+    assert_eq!(wrong(&truth), [1]);
+}
+
+impl Simulated {
+    fn really(&self) -> Vec<PanelPlace> {
+        let panels = self.panels.iter();
+        panels
+            .map(|&target_from_panel| PanelPlace { target_from_panel, covariance: None })
+            .collect()
+    }
 }
 
 #[test]

@@ -10,6 +10,9 @@ use crate::camera::{
 /// Terms of a Kannala–Brandt polynomial unless said otherwise.
 const TERMS: usize = 4;
 
+/// Terms that hold the fisheyes which [`TERMS`] do not; from there on it is not for want of terms.
+const MORE_TERMS: usize = 6;
+
 /// ξ in the two valleys of double sphere.
 const VALLEYS: [f64; 2] = [-0.3, 0.3];
 
@@ -114,6 +117,23 @@ impl Model {
             | Self::Eucm
             | Self::DoubleSphere
             | Self::Pupil => None,
+        }
+    }
+
+    /// Those that may hold a lens where this one does not, the simplest first.
+    pub fn richer(self) -> &'static [Self] {
+        match self {
+            Self::Radtan | Self::Radtan5 => {
+                &[Self::Rational, Self::ThinPrism, Self::KannalaBrandt(TERMS)]
+            }
+            Self::Rational => &[Self::ThinPrism, Self::KannalaBrandt(TERMS)],
+            Self::ThinPrism => &[Self::KannalaBrandt(TERMS)],
+            Self::KannalaBrandt(terms) if terms < MORE_TERMS => {
+                &[Self::KannalaBrandt(MORE_TERMS), Self::Pupil]
+            }
+            Self::KannalaBrandt(_) => &[Self::Pupil],
+            Self::Eucm | Self::DoubleSphere => &[Self::KannalaBrandt(TERMS), Self::Pupil],
+            Self::Pupil => &[],
         }
     }
 

@@ -85,6 +85,8 @@ pub(super) struct Covariances {
     /// The columns that nothing tells apart beyond what rounding leaves; their variances are the
     /// least that they can be.
     pub loose: Vec<usize>,
+    /// The columns whose deviation is [`TIED`] times what it were if all other shared ones were known.
+    pub tied: Vec<usize>,
 }
 
 impl Normal {
@@ -212,24 +214,24 @@ impl Normal {
             reduced -= b * inverse * b.transpose();
             inverses.push(inverse);
         }
-        let (shared, loose) = self.invert_reduced(reduced);
+        let (shared, loose, tied) = self.invert_reduced(reduced);
         let frames = self.frames.iter().zip(inverses).map(|(frame, inverse)| {
             let through = &frame.b * inverse;
             let carried = through.tr_mul(&shared) * &through;
             inverse + Matrix6::from_fn(|i, j| carried[(i, j)])
         });
-        Some(Covariances { frames: frames.collect(), shared, loose })
+        Some(Covariances { frames: frames.collect(), shared, loose, tied })
     }
 
-    /// The inverse of the reduced equations, and the columns that they leave open.
-    fn invert_reduced(&self, reduced: DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
+    /// The inverse of the reduced equations, and the columns that they leave open, and tie to others.
+    fn invert_reduced(&self, reduced: DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>, Vec<usize>) {
         let n = reduced.nrows();
         if n == 0 {
-            return (reduced, Vec::new());
+            return (reduced, Vec::new(), Vec::new());
         }
         let scale = DVector::from_fn(n, |i, _| 1.0 / self.a[(i, i)].max(f64::MIN_POSITIVE).sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| reduced[(i, j)] * scale[i] * scale[j]);
-        let eigen = scaled.symmetric_eigen();
+        let eigen = scaled.clone().symmetric_eigen();
         let mut inverse = DMatrix::zeros(n, n);
         let mut loose = BTreeSet::new();
         for (&value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
@@ -239,8 +241,10 @@ impl Normal {
             }
             inverse += direction * direction.transpose() / value.max(SINGULAR);
         }
+        let is_tied = |&i: &usize| inverse[(i, i)] * scaled[(i, i)] > TIED * TIED;
+        let tied = (0..n).filter(is_tied).collect();
         let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-        (inverse, loose.into_iter().collect())
+        (inverse, loose.into_iter().collect(), tied)
     }
 }
 
@@ -251,6 +255,11 @@ const SINGULAR: f64 = 1e-14;
 /// An unknown takes part in a direction if it moves by this part of what the one does that moves
 /// most.
 const INVOLVED: f64 = 0.3;
+
+/// From here on the number of a parameter means nothing by itself. What fits as well is then a valley a
+/// thousand times as long as it is wide; deviations are those of a straight one, and a bend by a
+/// thousandth of its length leads out of that. Terms of a polynomial stay below while there are few.
+const TIED: f64 = 1000.0;
 
 /// Solves symmetric equations after scaling their diagonal to 1.
 fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64>> {

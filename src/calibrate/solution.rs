@@ -2,6 +2,7 @@ use nalgebra::DMatrix;
 
 use super::excluded::Excluded;
 use super::lens_end::LensEnd;
+use super::misfit::Misfit;
 use super::shape::BoardShape;
 use crate::camera::{Camera, Pose};
 
@@ -27,10 +28,13 @@ pub struct Solution {
     /// precise, else in units of what its covariance says. All covariances are scaled by its square.
     pub sigma: f64,
     /// Names of parameters that the views cannot tell apart: some change of them together moves no
-    /// corner. Their deviations are the least that they can be.
+    /// corner, and their deviations are the least that they can be; or hardly any, so that neither the
+    /// value nor the deviation of one alone means anything.
     pub loose: Vec<String>,
     /// The shape of the board's sheet, where it was to be found.
     pub shape: Option<BoardShape>,
+    /// Patterns in the residuals that noise does not make, the strongest first.
+    pub misfits: Vec<Misfit>,
     /// Steps of the last bundle adjustment.
     pub steps: usize,
 }

@@ -4,6 +4,7 @@ use super::error::CalibrationError;
 use super::excluded::Excluded;
 use super::loss::Loss;
 use super::minimise::{Minimum, Until, minimise};
+use super::misfit::misfits;
 use super::model::Model;
 use super::normal::Covariances;
 use super::pose::{blocks, estimate_pose, fixed};
@@ -63,7 +64,7 @@ pub fn calibrate_with_shape(
     calibrated(views, panels, options, true)
 }
 
-fn calibrated(
+pub(super) fn calibrated(
     views: &[View],
     panels: &[Pose],
     options: Options,
@@ -105,6 +106,20 @@ pub fn poses(
     loss: Loss,
     weights: Weights,
 ) -> Result<Solution, CalibrationError> {
+    let kept = vec![false; camera.parameters().len()];
+    given(views, panels, camera, loss, weights, kept, false)
+}
+
+/// [`poses`], and the parameters of the camera that are `free`, and the shape of the board.
+pub(super) fn given(
+    views: &[View],
+    panels: &[Pose],
+    camera: &Camera,
+    loss: Loss,
+    weights: Weights,
+    free: Vec<bool>,
+    with_shape: bool,
+) -> Result<Solution, CalibrationError> {
     if let Some(view) = views.iter().find(|view| view.size_px != [camera.width, camera.height]) {
         return Err(CalibrationError::MixedSizes {
             first: "the camera".to_owned(),
@@ -115,7 +130,7 @@ pub fn poses(
     }
     let poses = views.iter().map(|view| estimate_pose(camera, panels, &view.sightings)).collect();
     let search = Search { views, panels, camera: camera.clone(), poses };
-    search.finish(vec![false; camera.parameters().len()], loss, weights, false)
+    search.finish(free, loss, weights, with_shape)
 }
 
 fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
@@ -267,8 +282,10 @@ impl Search<'_> {
         let CameraUnknowns { camera, free, .. } = &problem.cameras[0];
         let names = camera.parameter_names();
         let open = || CalibrationError::Undetermined { parameters: "the poses".to_owned() };
-        let Covariances { shared, frames, loose } = normal.covariances().ok_or_else(open)?;
-        let loose = layout.parameters[0].iter().filter(|(_, column)| loose.contains(column));
+        let Covariances { shared, frames, loose, tied } = normal.covariances().ok_or_else(open)?;
+        let loose = layout.parameters[0].iter().filter(|(i, column)| {
+            loose.contains(column) || *i >= PROJECTION_PARAMETERS.len() && tied.contains(column)
+        });
         let loose = loose.map(|&(i, _)| names[i].clone()).collect();
         let variance = variance(minimum);
         let covariance = shared * variance;
@@ -334,6 +351,7 @@ impl Search<'_> {
             sigma: variance.sqrt(),
             loose,
             shape,
+            misfits: misfits(problem, whitening),
             steps: *steps,
         })
     }

@@ -3,7 +3,7 @@
 use super::problem::Problem;
 
 /// The median of a squared distance in the plane whose coordinates have variance 1: 2 ln 2.
-const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
+pub(super) const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
 
 /// Halvings of the interval in which the common deviation is sought: to 1e-9 of its upper end.
 const HALVINGS: usize = 30;
@@ -14,7 +14,7 @@ const LEAST_SIGMA: f64 = 1e-6;
 
 /// A corner is an outlier beyond so many standard deviations: of a million corners with normal
 /// errors four are.
-const OUTLIER_SIGMA: f64 = 5.0;
+pub(super) const OUTLIER_SIGMA: f64 = 5.0;
 
 /// What is known of the corners' precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Plain words on what a calibration lacks. Every rule has its reason; none depends on a camera.
 
-use super::{Report, Survey};
+use super::{Given, Report, Survey, cannot_tell_apart, causes};
 use crate::calibrate::{Model, Parameter};
 use crate::words::counted;
 
@@ -64,7 +64,7 @@ pub fn advice(report: &Report, survey: &Survey) -> Vec<Advice> {
     coverage(report, survey, &mut add);
     parameters(report, &mut add);
     residuals(report, survey, &mut add);
-    if !report.scale_measured {
+    if report.print_scale.is_none() {
         let text =
             "Distances are as true as the print: measure both check bars of the sheet and give \
                     --print-scale. Focal lengths and distortion do not depend on it."
@@ -152,11 +152,15 @@ fn coverage(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, Strin
         add(Weight::Hint, text);
     }
     if let Some(end) = report.solution.lens_end() {
-        let text = end.to_string();
-        let mut letters = text.chars();
-        let first = letters.next().map(|letter| letter.to_ascii_uppercase());
-        add(Weight::Warning, first.into_iter().chain(letters).chain(['.']).collect());
+        add(Weight::Warning, sentence(&end.to_string()));
     }
+}
+
+/// With a capital and a full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|letter| letter.to_ascii_uppercase());
+    first.into_iter().chain(letters).chain(['.']).collect()
 }
 
 fn parameters(report: &Report, add: &mut impl FnMut(Weight, String)) {
@@ -181,6 +185,11 @@ fn parameters(report: &Report, add: &mut impl FnMut(Weight, String)) {
             add(Weight::Hint, text);
         }
     }
+    let is_loose = |name: &str| solution.loose.iter().any(|loose| loose == name);
+    if !solution.loose.is_empty() {
+        let text = cannot_tell_apart(&solution.loose, report.sufficient);
+        add(Weight::Warning, sentence(&text));
+    }
     let names: Vec<&str> = solution.found().collect();
     let mut pairs = Vec::new();
     for i in 0..names.len() {
@@ -188,7 +197,8 @@ fn parameters(report: &Report, add: &mut impl FnMut(Weight, String)) {
             let correlation = solution.correlation(i, j);
             // Square pixels tie the two focal lengths to each other; that is no loss.
             let focal = [names[j], names[i]] == ["fx", "fy"];
-            if correlation.abs() > CORRELATED && !focal {
+            let told = is_loose(names[i]) && is_loose(names[j]);
+            if correlation.abs() > CORRELATED && !focal && !told {
                 pairs.push(format!("{} with {}", names[j], names[i]));
             }
         }
@@ -211,13 +221,19 @@ fn residuals(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, Stri
     let means = survey.means_px.iter().flatten().map(|cell| cell.mean_px);
     let count = means.clone().count().max(1) as f64;
     let size = (means.map(|[x, y]| (x * x + y * y) / 2.0).sum::<f64>() / count).sqrt();
-    match survey.pattern() {
+    let model = report.model.parse().ok();
+    let given = Given { model, print_scale: report.print_scale, remedy: report.remedy };
+    let causes = causes(solution, given);
+    for cause in &causes {
+        add(Weight::Warning, sentence(cause));
+    }
+    match survey.pattern().filter(|_| causes.is_empty()) {
         Some(pattern) if pattern > PATTERN && size > PATTERN_PART * solution.rms_px => add(
             Weight::Hint,
             format!(
                 "Residuals leave a pattern over the image, {pattern:.1} times what chance makes and \
-                 {size:.3} px strong: the model does not describe this lens wholly, or the board is \
-                 not flat. Try a richer model."
+                 {size:.3} px strong: less than noise, but the model does not describe this lens \
+                 wholly, or the board is not flat. Try a richer model, or --board-shape."
             ),
         ),
         Some(_) => {
@@ -283,6 +299,7 @@ mod tests {
             sigma: 1.0,
             loose: Vec::new(),
             shape: None,
+            misfits: Vec::new(),
             steps: 1,
         };
         let report = Report {
@@ -290,7 +307,9 @@ mod tests {
             model: &model.to_string(),
             solution: &solution,
             holdout: None,
-            scale_measured: true,
+            print_scale: Some([1.0; 2]),
+            sufficient: None,
+            remedy: None,
             thumbnails: BTreeMap::new(),
         };
         let advice = advice(&report, &Survey::new(&solution));

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 /// Room around the axes for their numbers and names.
-const LEFT: f64 = 52.0;
+const LEFT: f64 = 64.0;
 const BELOW: f64 = 40.0;
 const ABOVE: f64 = 10.0;
 const RIGHT: f64 = 12.0;

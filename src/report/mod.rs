@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!   solution ─ survey ─→ what the views cover and show ─┬─ plots ──→ SVG
-//!                                                       ├─ advice ─→ words
+//!       └───── causes ─→ why it does not fit ───────────├─ advice ─→ words
 //!                                                       └─ page ───→ HTML
 //! ```
 //!
@@ -11,6 +11,7 @@
 
 mod advice;
 mod axes;
+mod causes;
 mod page;
 mod plots;
 mod survey;
@@ -18,9 +19,10 @@ mod thumbnail;
 
 use std::collections::BTreeMap;
 
-use crate::calibrate::Solution;
+use crate::calibrate::{Model, Remedy, Solution};
 
 pub use advice::{Advice, Weight, advice};
+pub use causes::{Given, cannot_tell_apart, causes, causes_of_rig};
 pub use survey::{Survey, SurveyedView};
 pub use thumbnail::thumbnail;
 
@@ -35,8 +37,12 @@ pub struct Report<'a> {
     pub solution: &'a Solution,
     /// The same camera on views that took no part in it.
     pub holdout: Option<&'a Solution>,
-    /// Whether the scale of the print was measured.
-    pub scale_measured: bool,
+    /// How the print came out, where that was measured.
+    pub print_scale: Option<[f64; 2]>,
+    /// A smaller model that holds the lens as well, where parameters cannot be told apart.
+    pub sufficient: Option<Model>,
+    /// What makes it fit where it does not.
+    pub remedy: Option<Remedy>,
     /// Small pictures of the views, by name, as PNG; see [`thumbnail`].
     pub thumbnails: BTreeMap<String, Vec<u8>>,
 }

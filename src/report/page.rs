@@ -4,11 +4,14 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 
-use super::{Report, Survey, Weight, advice, plots};
+use super::{Report, Survey, SurveyedView, Weight, advice, plots};
 use crate::calibrate::{Parameter, Solution, ViewSolution};
 
 /// Views in the table: all, or where there are more the worst ones.
 const MOST_VIEWS: usize = 300;
+
+/// Correlations from here on are drawn in a blue on which white is read better than ink.
+const STRONG: f64 = 0.85;
 
 const STYLE: &str = include_str!("page.css");
 
@@ -92,9 +95,11 @@ fn parameters(solution: &Solution) -> String {
             let cells = (0..names.len()).map(|j| {
                 let c = solution.correlation(i, j);
                 let hue = if c < 0.0 { "var(--below)" } else { "var(--above)" };
+                // Ink is hard to read on the full blue.
+                let strong = if c > STRONG { " class=\"strong\"" } else { "" };
                 let share = (100.0 * c.abs()).round();
                 format!(
-                    "<td style=\"background:color-mix(in srgb,{hue} {share}%,transparent)\">{}</td>",
+                    "<td{strong} style=\"background:color-mix(in srgb,{hue} {share}%,transparent)\">{}</td>",
                     format!("{c:.2}").replace('-', "−")
                 )
             });
@@ -137,7 +142,9 @@ fn drawings(solution: &Solution, survey: &Survey) -> String {
         (plots::coverage(survey), "Corners in each part of the image.".to_owned()),
         (
             plots::scatter(solution),
-            "Residuals of all corners; a round cloud is noise, anything else is not.".to_owned(),
+            "Residuals of all corners; a round cloud is noise, anything else is not. Rings on the rim \
+             lie beyond it."
+                .to_owned(),
         ),
         (
             plots::histogram(solution),
@@ -146,7 +153,8 @@ fn drawings(solution: &Solution, survey: &Survey) -> String {
         ),
         (
             plots::against_radius(solution),
-            "Errors of corners, and the rms of rings per coordinate. It should be level."
+            "Errors of corners, and the rms of rings per coordinate. It should be level. Circles on \
+             the rim lie beyond it."
                 .to_owned(),
         ),
     ];
@@ -173,26 +181,18 @@ fn views(report: &Report, survey: &Survey) -> String {
         order.truncate(MOST_VIEWS);
         order.sort_unstable();
     }
-    let worst = solution.views.iter().map(|view| view.rms_px).fold(f64::MIN_POSITIVE, f64::max);
+    let held_out = report.holdout.map(|holdout| (holdout, Survey::new(holdout)));
+    let of_test =
+        held_out.iter().flat_map(|(holdout, survey)| holdout.views.iter().zip(&survey.views));
+    let of_test: Vec<(&ViewSolution, &SurveyedView)> = of_test.collect();
+    let every = solution.views.iter().chain(of_test.iter().map(|(view, _)| *view));
+    let worst = every.map(|view| view.rms_px).fold(f64::MIN_POSITIVE, f64::max);
     let mut rows = String::new();
     for index in order {
-        let (view, stands) = (&solution.views[index], &survey.views[index]);
-        let tilt = stands.tilt_rad.map_or("–".to_owned(), |t| format!("{:.0}°", t.to_degrees()));
-        let outliers = view.outlier_count();
-        let _ = write!(
-            rows,
-            "<tr><td>{}</td><td class=\"name\">{}</td><td class=\"number\">{}</td>\
-             <td class=\"number\">{:.4}<div class=\"meter\" style=\"width:{:.0}%\"></div></td>\
-             <td class=\"number{}\">{outliers}</td><td class=\"number\">{tilt}</td>\
-             <td class=\"number\">{:.0}</td></tr>",
-            picture(report, view),
-            escaped(&view.name),
-            view.corners.len(),
-            view.rms_px,
-            100.0 * view.rms_px / worst,
-            if outliers > 0 { " out" } else { "" },
-            stands.distance_mm
-        );
+        rows += &row(report, &solution.views[index], &survey.views[index], worst, "");
+    }
+    for (view, stands) in of_test {
+        rows += &row(report, view, stands, worst, " (held out)");
     }
     let excluded = solution.excluded.iter().map(|out| {
         format!(
@@ -211,6 +211,31 @@ fn views(report: &Report, survey: &Survey) -> String {
         "<section><h2>Views</h2>{note}<table class=\"plain views\"><tr><th></th><th>view</th>\
          <th>corners</th><th>rms, px</th><th>outliers</th><th>tilt</th><th>distance, mm</th></tr>\
          {rows}{excluded}</table></section>\n"
+    )
+}
+
+/// A view in the table; `worst` is the largest rms in it, px.
+fn row(
+    report: &Report,
+    view: &ViewSolution,
+    stands: &SurveyedView,
+    worst: f64,
+    note: &str,
+) -> String {
+    let tilt = stands.tilt_rad.map_or("–".to_owned(), |t| format!("{:.0}°", t.to_degrees()));
+    let outliers = view.outlier_count();
+    format!(
+        "<tr><td>{}</td><td class=\"name\">{}{note}</td><td class=\"number\">{}</td>\
+         <td class=\"number\">{:.4}<div class=\"meter\" style=\"width:{:.0}%\"></div></td>\
+         <td class=\"number{}\">{outliers}</td><td class=\"number\">{tilt}</td>\
+         <td class=\"number\">{:.0}</td></tr>",
+        picture(report, view),
+        escaped(&view.name),
+        view.corners.len(),
+        view.rms_px,
+        100.0 * view.rms_px / worst,
+        if outliers > 0 { " out" } else { "" },
+        stands.distance_mm
     )
 }
 

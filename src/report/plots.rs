@@ -13,6 +13,9 @@ const MAP: f64 = 430.0;
 /// Most dots of a scatter plot: more only make the page heavy.
 const MOST_DOTS: usize = 6000;
 
+/// Radius of the ring that marks a corner beyond the rim of a plot, user units.
+const BEYOND: f64 = 3.0;
+
 /// Bins of the histogram on either side of zero.
 const BINS: usize = 20;
 
@@ -51,6 +54,14 @@ pub(super) fn scatter(solution: &Solution) -> String {
         let [dx, dy] = corner.residual;
         if dx.abs() <= range && dy.abs() <= range {
             axes.dot(dx, -dy, 1.3, if corner.outlier { "dot out" } else { "dot" });
+        }
+    }
+    for corner in corners(solution) {
+        // On the way from the middle, where it leaves the plot.
+        let [dx, dy] = corner.residual;
+        let beyond = dx.abs().max(dy.abs()) / range;
+        if beyond > 1.0 {
+            axes.dot(dx / beyond, -dy / beyond, BEYOND, "beyond");
         }
     }
     axes.svg(["right, px", "up, px"], "Residuals of all corners")
@@ -100,6 +111,17 @@ fn middle(survey: &Survey, index: usize) -> [f64; 2] {
     [0, 1].map(|i| (at[i] as f64 + 0.5) / survey.cells[i] as f64 * survey.size_px[i] - 0.5)
 }
 
+/// As much of an arrow as the image has room for.
+fn within(survey: &Survey, from: [f64; 2], arrow: [f64; 2]) -> [f64; 2] {
+    let room = |i: usize| match arrow[i] {
+        v if v > 0.0 => (survey.size_px[i] - 0.5 - from[i]) / v,
+        v if v < 0.0 => (-0.5 - from[i]) / v,
+        _ => 1.0,
+    };
+    let part = room(0).min(room(1)).min(1.0);
+    arrow.map(|v| part * v)
+}
+
 /// Mean residuals over the image, and by how much the arrows are enlarged.
 pub(super) fn residual_map(survey: &Survey) -> (String, f64) {
     let cell = survey.size_px[0] / survey.cells[0] as f64;
@@ -114,7 +136,7 @@ pub(super) fn residual_map(survey: &Survey) -> (String, f64) {
     for (index, mean) in survey.means_px.iter().enumerate() {
         let Some(mean) = mean else { continue };
         let [x, y] = middle(survey, index);
-        let [dx, dy] = mean.mean_px.map(|v| v * scale);
+        let [dx, dy] = within(survey, [x, y], mean.mean_px.map(|v| v * scale));
         // Means that chance explains are pale.
         let chance = length(mean.mean_px) < 3.0 * mean.sd_px;
         axes.line(&[[x, y], [x + dx, y + dy]], if chance { "arrow pale" } else { "arrow" });
@@ -158,6 +180,11 @@ pub(super) fn against_radius(solution: &Solution) -> String {
         let error = corner.residual[0].hypot(corner.residual[1]);
         if error <= top {
             axes.dot(radius(corner), error, 1.1, if corner.outlier { "dot out" } else { "dot" });
+        }
+    }
+    for corner in corners(solution) {
+        if corner.residual[0].hypot(corner.residual[1]) > top {
+            axes.dot(radius(corner), top, BEYOND, "beyond");
         }
     }
     let mut rings = [(0.0, 0usize); RINGS];

@@ -22,6 +22,7 @@ use super::loss::Loss;
 use super::minimise::{Until, minimise};
 use super::model::Model;
 use super::problem::{Block, CameraUnknowns, PanelUnknowns, Prior, Problem};
+use super::remedy::{Instead, remedy_of_given};
 use super::settle::{residuals, settle};
 use super::solve::{self, Options};
 use super::view::View;
@@ -181,6 +182,24 @@ fn alone(
         camera: views.name.clone(),
         error: Box::new(error),
     })
+}
+
+/// The cameras that were given and that their own pictures speak against: other ones, or changed since.
+pub fn wrong_cameras(
+    cameras: &[RigViews],
+    panels: &[PanelPlace],
+    options: RigOptions,
+) -> Vec<usize> {
+    let poses: Vec<Pose> = panels.iter().map(|panel| panel.target_from_panel).collect();
+    let is_wrong = |views: &RigViews| {
+        let (Some(camera), Ok(alone)) = (&views.known, alone(views, panels, options)) else {
+            return false;
+        };
+        let RigOptions { loss, weights, .. } = options;
+        let remedy = remedy_of_given(&views.views, &poses, camera, loss, weights, &alone);
+        remedy.is_some_and(|remedy| remedy.instead == Instead::Camera)
+    };
+    (0..cameras.len()).filter(|&index| is_wrong(&cameras[index])).collect()
 }
 
 /// What is unknown of the cameras: the poses of all but the first.

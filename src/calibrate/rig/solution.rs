@@ -5,11 +5,12 @@ use crate::calibrate::error::CalibrationError;
 use crate::calibrate::excluded::Excluded;
 use crate::calibrate::lens_end::LensEnd;
 use crate::calibrate::minimise::Minimum;
+use crate::calibrate::misfit::{Misfit, misfits};
 use crate::calibrate::normal::Covariances;
 use crate::calibrate::settle::{residuals, variance};
 use crate::calibrate::solution::{Parameter, rms_px};
 use crate::calibrate::weights::Whitening;
-use crate::camera::{Camera, Pose};
+use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 use crate::target::{PanelPose, Target};
 
 /// Cameras fixed to each other, as their views have them.
@@ -31,6 +32,8 @@ pub struct RigSolution {
     pub common_px: Option<f64>,
     /// A-posteriori standard deviation of a coordinate, see [`super::super::Solution::sigma`].
     pub sigma: f64,
+    /// Patterns in the residuals that noise does not make, the strongest first.
+    pub misfits: Vec<Misfit>,
 }
 
 /// A camera of a rig.
@@ -106,14 +109,16 @@ impl RigSolution {
             parameters: parameters.join(", "),
         };
         let covariances = normal.covariances().ok_or_else(|| open(&["the poses".to_owned()]))?;
-        let Covariances { shared, frames, loose } = covariances;
+        let Covariances { shared, frames, loose, tied } = covariances;
         let is_loose = |first: &Option<usize>| {
             first.is_some_and(|first| (first..first + 6).any(|column| loose.contains(&column)))
         };
         let of_cameras = views.iter().zip(&problem.cameras).zip(&layout.parameters);
         let of_cameras = of_cameras.flat_map(|((views, found), parameters)| {
             let names = found.camera.parameter_names();
-            let loose = parameters.iter().filter(|(_, column)| loose.contains(column));
+            let loose = parameters.iter().filter(|(i, column)| {
+                loose.contains(column) || *i >= PROJECTION_PARAMETERS.len() && tied.contains(column)
+            });
             loose.map(move |&(i, _)| format!("{} of {}", names[i], views.name))
         });
         let loose_parameters = of_cameras.collect();
@@ -190,6 +195,7 @@ impl RigSolution {
             rms_px: rms_px(residuals.iter().flatten()),
             common_px: whitening.common_px,
             sigma: variance.sqrt(),
+            misfits: misfits(problem, whitening),
         })
     }
 }

@@ -11,22 +11,18 @@ use clap::ValueEnum;
 use super::camera_file;
 use super::files::{File, text_file, write_all};
 use super::sightings::{Sightings, SightingsArgs};
-use crate::calibrate::{self, BoardShape, Loss, Model, Options, Solution, View, Weights};
+use crate::calibrate::{self, BoardShape, Loss, Model, Options, Remedy, Solution, View, Weights};
 use crate::camera::Pose;
 use crate::cli::output;
 use crate::cli::run::{FAILED, report};
 use crate::export::calibration;
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
 use crate::raster::{self, AnyGray};
-use crate::report::{Report, thumbnail};
+use crate::report::{Given, Report, cannot_tell_apart, causes, thumbnail};
 use crate::words::counted;
 
 /// Correlations from here on are told: such parameters are hardly told apart.
 const STRONG_CORRELATION: f64 = 0.98;
-
-/// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
-/// have the lens of the model.
-const POOR_RMS_PX: f64 = 1.0;
 
 /// A known camera that leaves more than this part of the image's width did not take the pictures: poses
 /// take up most of what focal lengths and principal point are off by, and so much is left by another
@@ -170,19 +166,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(end) = solution.calibrated.lens_end() {
         eprintln!("warning: {end}");
     }
-    // A few wild corners are no fault of the model.
-    let rms_px = solution.calibrated.inlier_rms_px();
-    if rms_px > POOR_RMS_PX {
-        eprintln!(
-            "warning: corners are off by {rms_px:.1} px: {}, or labels are wrong",
-            match args.model {
-                Some(_) => "the lens is not one of this model (see --model)",
-                None => "the camera was another one, or has changed since",
-            }
-        );
+    let given = Given { model: args.model, print_scale, remedy: solution.remedy };
+    for cause in causes(&solution.calibrated, given) {
+        eprintln!("warning: {cause}");
     }
     if !solution.calibrated.loose.is_empty() {
-        eprintln!("{}", cannot_tell_apart(&solution.calibrated.loose));
+        let text = cannot_tell_apart(&solution.calibrated.loose, solution.sufficient);
+        eprintln!("warning: {text}");
     }
     let texts = args.format.iter().map(|&format| format.texts(&stem, &solution, print_scale));
     let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
@@ -190,7 +180,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let files: Vec<File> = files.collect();
     let mut written = write_all(output::folder_of(&path), &files)?;
     if let Some(page) = page {
-        output::write(&page, args.page(&stem, &solution, print_scale.is_some()).as_bytes())
+        output::write(&page, args.page(&stem, &solution, print_scale).as_bytes())
             .context("--report")?;
         written.push(page);
     }
@@ -235,27 +225,20 @@ fn warn_of_missing(folder: &Path, views: &[View]) {
     }
 }
 
-/// The warning for parameters that the views leave open.
-pub fn cannot_tell_apart(parameters: &[String]) -> String {
-    format!(
-        "warning: the views cannot tell apart {}: where corners were seen the camera is right, \
-         beyond them it may not be; fill the corners of the image, or choose a model with fewer \
-         parameters",
-        parameters.join(", ")
-    )
-}
-
 /// What came of a command.
 struct Solved {
     /// Name of the model, or `fixed`.
     model: String,
     calibrated: Solution,
     held_out: Option<Solution>,
+    /// A smaller model that does as well, sought where parameters cannot be told apart.
+    sufficient: Option<Model>,
+    remedy: Option<Remedy>,
 }
 
 impl Args {
     /// The page of a calibration.
-    fn page(&self, stem: &str, solved: &Solved, scale_measured: bool) -> String {
+    fn page(&self, stem: &str, solved: &Solved, print_scale: Option<[f64; 2]>) -> String {
         let mut thumbnails = BTreeMap::new();
         for view in &solved.calibrated.views {
             let Some(path) = self.images.as_ref().map(|folder| folder.join(&view.image)) else {
@@ -273,7 +256,9 @@ impl Args {
             model: &solved.model,
             solution: &solved.calibrated,
             holdout: solved.held_out.as_ref(),
-            scale_measured,
+            print_scale,
+            sufficient: solved.sufficient,
+            remedy: solved.remedy,
             thumbnails,
         };
         report.html()
@@ -289,7 +274,15 @@ impl Args {
                 !calibrated.views.is_empty(),
                 "no view shows the target as this camera sees it"
             );
-            return Ok(Solved { model: "fixed".to_owned(), calibrated, held_out: None });
+            let remedy =
+                calibrate::remedy_of_given(views, panels, &camera, loss, weights, &calibrated);
+            return Ok(Solved {
+                model: "fixed".to_owned(),
+                calibrated,
+                held_out: None,
+                sufficient: None,
+                remedy,
+            });
         };
         let options = Options { model, loss, weights };
         let every = self.holdout.map(|n| n as usize);
@@ -320,7 +313,12 @@ impl Args {
             true => None,
             false => Some(calibrate::poses(&test, panels, &calibrated.camera, loss, weights)?),
         };
-        Ok(Solved { model: model.to_string(), calibrated, held_out })
+        let remedy = calibrate::remedy(&part(false), panels, options, &calibrated);
+        let sufficient = match calibrated.loose.is_empty() {
+            true => None,
+            false => calibrate::sufficient(&part(false), panels, options, &calibrated),
+        };
+        Ok(Solved { model: model.to_string(), calibrated, held_out, sufficient, remedy })
     }
 }
 

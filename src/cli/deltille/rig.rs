@@ -3,20 +3,22 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::ValueEnum;
 
-use super::calibrate::{Robust, Weighting, cannot_tell_apart, without_outliers};
+use super::calibrate::{Robust, Weighting, without_outliers};
 use super::files::{File, same_file, text_file, write_all};
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
     Excluded, Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews, calibrate_rig,
+    wrong_cameras,
 };
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{check_folder, fixed, say};
 use crate::export::camera::{colmap, colmap_rig, kalibr};
 use crate::export::rig;
+use crate::report::{cannot_tell_apart, causes_of_rig};
 use crate::words::counted;
 
 /// Arguments of `deltille rig`.
@@ -118,14 +120,28 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         weights: args.weights.into(),
         refine_target: args.refine_target,
     };
-    let mut solution = calibrate_rig(&cameras, &panels, options)?;
+    let wrong = wrong_cameras(&cameras, &panels, options);
+    let of_wrong = wrong.iter().map(|&camera| cameras[camera].name.as_str());
+    let of_wrong: Vec<&str> = of_wrong.collect();
+    let mut solution =
+        calibrate_rig(&cameras, &panels, options).map_err(|error| match of_wrong.as_slice() {
+            [] => anyhow!(error),
+            names => anyhow!(error).context(format!(
+                "--known: the camera given for {} did not take its pictures",
+                names.join(", ")
+            )),
+        })?;
     for camera in &solution.cameras {
         if let Some(end) = &camera.lens_end {
             eprintln!("warning: camera {}: {end}", camera.name);
         }
     }
+    let is_given = |name: &str| args.known.iter().any(|(known, _)| known == name);
+    for cause in causes_of_rig(&solution, args.model, is_given, &wrong, args.refine_target) {
+        eprintln!("warning: {cause}");
+    }
     if !solution.loose.is_empty() {
-        eprintln!("{}", cannot_tell_apart(&solution.loose));
+        eprintln!("warning: {}", cannot_tell_apart(&solution.loose, None));
     }
     let text = summary(&solution);
     solution.excluded.splice(0..0, left_out);

@@ -1,0 +1,296 @@
+//! Patterns in the residuals that noise does not make.
+//!
+//! ```text
+//!   over the image    the mean residual of a cell, against how it differs between views
+//!   over the target   the move of a corner in space that explains its residuals in all views best,
+//!                     against what is left
+//! ```
+//!
+//! Both are analyses of variance: what a pattern explains, for each of its unknowns, over what is left,
+//! for each of its degrees of freedom, is F. Cameras and poses have taken up their part of every pattern
+//! before, so that F is rather too small than too large. Outliers take no part.
+
+use std::collections::BTreeMap;
+
+use glam::{DMat3, DVec3};
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+use super::problem::Problem;
+use super::weights::Whitening;
+
+/// Cells of the image along its longer side: the rings that a wrong polynomial leaves between the
+/// middle and the rim are a few, and a cell is well within one of them.
+const CELLS: f64 = 16.0;
+
+/// A normal deviate is larger once in a thousand times.
+pub(super) const SIGNIFICANT: f64 = 3.09;
+
+/// A pattern matters from this part of the remaining noise on. Deviations take every residual for
+/// independent; a pattern is the same in all views, so that it does not average out, and with half of the
+/// noise it outweighs what the noise leaves of a parameter as soon as a few corners bear on it.
+pub(super) const MATTERS: f64 = 0.5;
+
+/// A direction in which views move a corner by less than this part of what they do in the best one is
+/// not sought: its information is the square. All views came from the same side then.
+const BLIND: f64 = 0.03;
+
+/// Fewest views of a corner: two coordinates each, and its move has three.
+const LEAST_VIEWS: usize = 3;
+
+/// A pattern that noise does not make, and that matters beside the noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Misfit {
+    /// Residuals depend on the place in the image: the lens is not what the model says.
+    Lens {
+        /// Index of the camera.
+        camera: usize,
+        /// Root mean square of the pattern, px a coordinate.
+        rms_px: f64,
+    },
+    /// Residuals depend on the place on the target: its corners are not where they are said to be.
+    Target {
+        /// Index of the panel that shows it most.
+        panel: usize,
+        /// Root mean square of the pattern, px a coordinate.
+        rms_px: f64,
+        /// The same of what moves the corners in space, mm. What poses and camera take up is not in it.
+        rms_mm: f64,
+    },
+}
+
+/// A corner in a view; whitened.
+struct Seen {
+    block: usize,
+    camera: usize,
+    panel: usize,
+    cell: [i32; 2],
+    label: [i32; 2],
+    residual: [f64; 2],
+    /// The residual by the corner's place on the panel, 1/mm.
+    by_place: [DVec3; 2],
+}
+
+/// What can leave a pattern.
+#[derive(Clone, Copy, PartialEq)]
+enum Source {
+    Lens(usize),
+    Target,
+}
+
+/// What a source explains of the residuals.
+#[derive(Default)]
+struct Explained {
+    /// By index of the corner.
+    fitted: Vec<(usize, [f64; 2])>,
+    /// Sums of squares: of all, and of the means or moves.
+    all: f64,
+    explained: f64,
+    unknowns: f64,
+    left: f64,
+    freedom: f64,
+    /// By panel: what is explained; and Σ|move|², Σ of its variances by that of the residuals, corners.
+    by_panel: BTreeMap<usize, f64>,
+    moves: [f64; 3],
+}
+
+/// The patterns of a problem's residuals, the strongest first. Each is taken out before weaker ones are
+/// looked for: corners of the board and places in the image go together where all views are alike.
+pub(super) fn misfits(problem: &Problem, whitening: &Whitening) -> Vec<Misfit> {
+    let (mut seen, px) = seen(problem, whitening);
+    let mut open: Vec<Source> = (0..problem.cameras.len()).map(Source::Lens).collect();
+    open.push(Source::Target);
+    let mut found = Vec::new();
+    loop {
+        let patterns = open.iter().enumerate().filter_map(|(index, &source)| {
+            let explained = match source {
+                Source::Lens(camera) => over_image(&seen, camera),
+                Source::Target => over_target(&seen),
+            };
+            let part = explained.pattern()?;
+            Some((index, part, explained))
+        });
+        let strongest = patterns.max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((index, part, explained)) = strongest else { return found };
+        let rms_px = px * (part * explained.all / (2 * explained.fitted.len()) as f64).sqrt();
+        found.push(match open.remove(index) {
+            Source::Lens(camera) => Misfit::Lens { camera, rms_px },
+            Source::Target => {
+                let most = explained.by_panel.iter().max_by(|a, b| a.1.total_cmp(b.1));
+                Misfit::Target {
+                    panel: most.map_or(0, |(&panel, _)| panel),
+                    rms_px,
+                    rms_mm: explained.rms_mm(),
+                }
+            }
+        });
+        for (index, [x, y]) in explained.fitted {
+            let residual = &mut seen[index].residual;
+            *residual = [residual[0] - x, residual[1] - y];
+        }
+    }
+}
+
+/// The corners that are no outliers, and how many px a whitened coordinate is worth.
+fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
+    let mut all = Vec::new();
+    let (mut px, mut white) = (0.0, 0.0);
+    for (index, (block, weights)) in problem.blocks.iter().zip(&whitening.blocks).enumerate() {
+        let unknowns = &problem.cameras[block.camera];
+        let camera = &unknowns.camera;
+        let cell_px = f64::from(camera.width.max(camera.height)) / CELLS;
+        let camera_from_panel = unknowns.camera_from_rig.rotation
+            * problem.frames[block.frame].rotation
+            * problem.panels[block.panel].target_from_panel.rotation;
+        let panel_from_camera = DMat3::from_quat(camera_from_panel.conjugate());
+        for (corner, &w) in block.observations.iter().zip(weights) {
+            let at = camera.project_with_derivatives(problem.camera_point(block, corner));
+            let Some(at) = at else { continue };
+            let residual = [corner.pixel[0] - at.pixel[0], corner.pixel[1] - at.pixel[1]];
+            if whitening.is_outlier(w, residual) {
+                continue;
+            }
+            let [x, y] = at.by_point.map(|row| panel_from_camera * DVec3::from(row));
+            let [a, b, c] = w;
+            let whitened = Whitening::apply(w, residual);
+            px += residual.iter().map(|v| v * v).sum::<f64>();
+            white += whitened.iter().map(|v| v * v).sum::<f64>();
+            all.push(Seen {
+                block: index,
+                camera: block.camera,
+                panel: block.panel,
+                cell: corner.pixel.map(|v| (v / cell_px).floor() as i32),
+                label: [corner.row, corner.col],
+                residual: whitened,
+                by_place: [a * x, b * x + c * y],
+            });
+        }
+    }
+    let px = if white > 0.0 { (px / white).sqrt() } else { 0.0 };
+    (all, px)
+}
+
+/// Means of cells. Corners of one view in one cell share what is wrong with that view, so that a
+/// view's mean counts as one.
+fn over_image(seen: &[Seen], camera: usize) -> Explained {
+    let mut cells: BTreeMap<[i32; 2], BTreeMap<usize, Vec<usize>>> = BTreeMap::new();
+    for (index, corner) in seen.iter().enumerate().filter(|(_, c)| c.camera == camera) {
+        cells.entry(corner.cell).or_default().entry(corner.block).or_default().push(index);
+    }
+    let mut found = Explained::default();
+    let mean_of = |corners: &mut dyn Iterator<Item = usize>| {
+        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        for index in corners {
+            sum = [0, 1].map(|i| sum[i] + seen[index].residual[i]);
+            count += 1.0;
+        }
+        (sum.map(|v| v / count), count)
+    };
+    for views in cells.values().filter(|views| views.len() > 1) {
+        let (mean, count) = mean_of(&mut views.values().flatten().copied());
+        found.explained += count * square(mean);
+        found.unknowns += 2.0;
+        found.freedom += 2.0 * (views.len() - 1) as f64;
+        for corners in views.values() {
+            let (of_view, count) = mean_of(&mut corners.iter().copied());
+            found.left += count * square([of_view[0] - mean[0], of_view[1] - mean[1]]);
+            for &index in corners {
+                found.all += square(seen[index].residual);
+                found.fitted.push((index, mean));
+            }
+        }
+    }
+    found
+}
+
+/// Moves of corners in space.
+fn over_target(seen: &[Seen]) -> Explained {
+    let mut corners: BTreeMap<(usize, [i32; 2]), Vec<usize>> = BTreeMap::new();
+    for (index, corner) in seen.iter().enumerate() {
+        corners.entry((corner.panel, corner.label)).or_default().push(index);
+    }
+    let mut found = Explained::default();
+    for ((panel, _), views) in corners.iter().filter(|(_, views)| views.len() >= LEAST_VIEWS) {
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let mut all = 0.0;
+        for corner in views.iter().map(|&index| &seen[index]) {
+            for (by, residual) in corner.by_place.iter().zip(corner.residual) {
+                let by = Vector3::from(by.to_array());
+                normal += by * by.transpose();
+                right += by * residual;
+            }
+            all += square(corner.residual);
+        }
+        let eigen = SymmetricEigen::new(normal);
+        let most = eigen.eigenvalues.max();
+        let (mut moved, mut variances, mut unknowns) = (Vector3::zeros(), 0.0, 0.0);
+        for (&value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if value > BLIND * BLIND * most {
+                moved += direction * (direction.dot(&right) / value);
+                variances += 1.0 / value;
+                unknowns += 1.0;
+            }
+        }
+        let explained = right.dot(&moved);
+        found.all += all;
+        found.explained += explained;
+        found.unknowns += unknowns;
+        found.left += all - explained;
+        found.freedom += (2 * views.len()) as f64 - unknowns;
+        *found.by_panel.entry(*panel).or_default() += explained - unknowns;
+        let [squares, noise, count] = &mut found.moves;
+        *squares += moved.norm_squared();
+        *noise += variances;
+        *count += 1.0;
+        let moved = DVec3::new(moved.x, moved.y, moved.z);
+        let fitted = |&index: &usize| (index, seen[index].by_place.map(|by| by.dot(moved)));
+        found.fitted.extend(views.iter().map(fitted));
+    }
+    found
+}
+
+impl Explained {
+    /// The part of all squares that the pattern makes, where that is more than chance and matters.
+    fn pattern(&self) -> Option<f64> {
+        let noise = self.left / self.freedom;
+        let pattern = self.explained - self.unknowns * noise;
+        let f_ratio = self.explained / self.unknowns / noise;
+        let is_sure = deviate_of_f(f_ratio, self.unknowns, self.freedom) > SIGNIFICANT;
+        let matters = pattern > MATTERS * MATTERS * (self.all - pattern);
+        (is_sure && matters).then_some(pattern / self.all)
+    }
+
+    fn rms_mm(&self) -> f64 {
+        let [squares, noise, count] = self.moves;
+        let noise = noise * self.left / self.freedom;
+        ((squares - noise).max(0.0) / count).sqrt()
+    }
+}
+
+/// The normal deviate as rare as a value of the F distribution, by Paulson's cube roots; no
+/// number where there is no freedom.
+pub(super) fn deviate_of_f(f_ratio: f64, unknowns: f64, freedom: f64) -> f64 {
+    let (a, b) = (2.0 / (9.0 * unknowns), 2.0 / (9.0 * freedom));
+    let root = f_ratio.cbrt();
+    ((1.0 - b) * root - (1.0 - a)) / (b * root * root + a).sqrt()
+}
+
+fn square([x, y]: [f64; 2]) -> f64 {
+    x * x + y * y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tables of the F distribution, once in a thousand.
+    #[test]
+    fn one_in_a_thousand_is_three_deviations() {
+        for (unknowns, freedom, f_ratio) in
+            [(10.0, 10.0, 8.754), (10.0, 60.0, 3.54), (60.0, 120.0, 1.95)]
+        {
+            let z = deviate_of_f(f_ratio, unknowns, freedom);
+            assert!((z - 3.09).abs() < 0.06, "{unknowns} {freedom}: {z}");
+        }
+        assert!(deviate_of_f(f64::NAN, 0.0, 0.0).is_nan());
+    }
+}
