@@ -119,7 +119,7 @@ pub enum CalibrationError {
     /// The views leave parameters open.
     #[error(
         "the views do not determine {parameters}: tilt the board more, fill the corners of the \
-         image, or choose another model: this one may have too many parameters, or not hold the lens"
+         image, or choose another model: this one has too many parameters, or does not hold the lens"
     )]
     Undetermined {
         /// The parameters' names.
