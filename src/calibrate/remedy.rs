@@ -4,6 +4,7 @@ use super::loss::Loss;
 use super::misfit::{MATTERS, SIGNIFICANT, deviate_of_f};
 use super::solution::{Corner, Solution};
 use super::solve::{self, Options, calibrated};
+use super::start::evenly;
 use super::view::View;
 use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA, Weights, median};
 use super::{Model, SHAPE_COEFFICIENTS};
@@ -16,6 +17,25 @@ const EXPLAINED: f64 = 1.0 / (1.0 + MATTERS * MATTERS);
 /// A remedy is as good as the best if it gains this part of what that does: squares of a thousand corners
 /// are known to a few in a hundred.
 const AS_GOOD: f64 = 0.9;
+
+/// Views that are calibrated anew, evenly over the sequence: what matters shows in so many, and trying must
+/// not take longer than the calibration itself.
+const TRIAL_VIEWS: usize = 12;
+
+/// The views on which other calibrations are tried, and what this one makes of them.
+pub(super) fn trial(
+    views: &[View],
+    panels: &[Pose],
+    options: Options,
+    solution: &Solution,
+) -> Option<(Vec<View>, Solution)> {
+    let sample: Vec<View> = evenly(views, TRIAL_VIEWS).cloned().collect();
+    let of_sample = match sample.len() < views.len() {
+        true => calibrated(&sample, panels, options, solution.shape.is_some()).ok()?,
+        false => solution.clone(),
+    };
+    Some((sample, of_sample))
+}
 
 /// What makes the residuals of a calibration smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,14 +69,15 @@ pub fn remedy(
         return None;
     }
     let with_shape = solution.shape.is_some();
+    let (views, solution) = trial(views, panels, options, solution)?;
     let models = options.model.richer().iter().map(|&model| {
-        let other = calibrated(views, panels, Options { model, ..options }, with_shape);
+        let other = calibrated(&views, panels, Options { model, ..options }, with_shape);
         (Instead::Model(model), other)
     });
     let shape = (panels.len() == 1 && !with_shape)
-        .then(|| (Instead::Shape, calibrated(views, panels, options, true)));
+        .then(|| (Instead::Shape, calibrated(&views, panels, options, true)));
     let tried = shape.into_iter().chain(models);
-    best(solution, tried.filter_map(|(instead, other)| Some((instead, other.ok()?))))
+    best(&solution, tried.filter_map(|(instead, other)| Some((instead, other.ok()?))))
 }
 
 /// The same where the camera was given: whether it is another one, or the board is bent.

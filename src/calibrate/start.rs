@@ -67,7 +67,7 @@ fn largest_panel(view: &View) -> Option<Vec<Observation>> {
 }
 
 /// At most so many of the items, evenly over their sequence.
-fn evenly<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
+pub(super) fn evenly<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
     let count = items.len().min(most);
     (0..count).map(move |i| &items[i * items.len() / count])
 }

@@ -1,5 +1,6 @@
 use super::misfit::{SIGNIFICANT, deviate_of_f};
 use super::model::Model;
+use super::remedy::trial;
 use super::solution::Solution;
 use super::solve::{Options, calibrated};
 use super::view::View;
@@ -16,12 +17,13 @@ pub fn sufficient(
     options: Options,
     solution: &Solution,
 ) -> Option<Model> {
+    let (views, solution) = trial(views, panels, options, solution)?;
     let mut found = None;
     let mut next = options.model.smaller();
     while let Some(model) = next {
         let options = Options { model, ..options };
-        let smaller = calibrated(views, panels, options, solution.shape.is_some());
-        if !smaller.is_ok_and(|smaller| holds_as_well(&smaller, solution)) {
+        let smaller = calibrated(&views, panels, options, solution.shape.is_some());
+        if !smaller.is_ok_and(|smaller| holds_as_well(&smaller, &solution)) {
             break;
         }
         found = Some(model);
