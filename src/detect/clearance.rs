@@ -76,6 +76,8 @@ pub struct Surroundings {
     tags: Vec<Vec<Line>>,
     /// The edges through the corner by rising angle; empty where nothing is known.
     pub edges: Vec<Edge>,
+    /// Whether all its neighbours are in the grid.
+    pub is_inner: bool,
 }
 
 /// An edge through a corner.
@@ -122,7 +124,8 @@ pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surrounding
         let usual = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))))?;
         let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
         let edges = edges(grid, &places, vertex, place);
-        let mut found = Surroundings { edges, ..Default::default() };
+        let is_inner = grid.kind.steps().iter().all(|&step| seen(step).is_some());
+        let mut found = Surroundings { edges, is_inner, ..Default::default() };
         for tile in grid.kind.tiles_around(vertex) {
             let corners: Vec<Vertex> = tile.vertices().map(|v| v - vertex).collect();
             let polygon: Vec<[f64; 2]> = corners.iter().map(|&step| place(step)).collect();

@@ -6,8 +6,6 @@
 //! elsewhere in the grid, and smaller windows are tried. A corner at the end of what is seen of the
 //! board that no window shows cleanly is dropped, since what hides the board has drawn it aside.
 
-use std::collections::BTreeSet;
-
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings};
 use super::corner_model::{CornerFitter, MAX_WAY_PX};
 use super::detection::{Grid, GridCorner, median};
@@ -56,14 +54,8 @@ impl Refiner {
         }
         let residuals: Vec<f64> =
             refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
-        // Of edges as sharp as pixels the model makes nothing; then it is no judge of corners.
-        let judged = 2 * residuals.len() > refined.len();
+        let judged = is_judge(&refined);
         let limit = (MAX_RESIDUAL_RATIO * median(residuals).unwrap_or(0.0)).max(MIN_RESIDUAL);
-        let places: BTreeSet<(i32, i32)> = grid.corners.iter().map(|c| (c.row, c.col)).collect();
-        let inner = |corner: &GridCorner| {
-            let steps = grid.kind.steps();
-            steps.iter().all(|s| places.contains(&(corner.row + s.row, corner.col + s.col)))
-        };
         let (mut kept, mut fits) = (Vec::new(), Vec::new());
         for (i, (corner, (refined, fit))) in grid.corners.iter().zip(refined).enumerate() {
             if displaced[i] && fit.is_none() {
@@ -77,7 +69,10 @@ impl Refiner {
                 (Some(refined), fit.filter(|_| clean))
             } else {
                 let smaller = self.clean_fit(fitter, image, corner, room, limit);
-                (smaller.map(Refined::from).or_else(|| inner(corner).then_some(refined)), smaller)
+                (
+                    smaller.map(Refined::from).or_else(|| around[i].is_inner.then_some(refined)),
+                    smaller,
+                )
             };
             if let Some(Refined { position: [x, y], cov, .. }) = refined {
                 kept.push(GridCorner { x, y, cov, ..*corner });
@@ -133,10 +128,9 @@ impl Refiner {
     /// lines cross, if that is farther than the model looks: a cell of a tag was taken for them.
     /// Tells which were moved.
     fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
-        let fitted = refined.iter().filter(|(_, fit)| fit.is_some()).count();
-        let usual = 2 * fitted > refined.len();
+        let judged = is_judge(refined);
         let place = |(corner, (_, fit)): (&GridCorner, &(_, Option<ModelFit>))| {
-            let lost = usual && fit.is_none();
+            let lost = judged && fit.is_none();
             let [x, y] = lost.then(|| crossing(grid, corner)).flatten()?;
             ((x - corner.x).hypot(y - corner.y) > MAX_WAY_PX).then_some([x, y])
         };
@@ -220,4 +214,11 @@ impl Refiner {
         });
         fits.find(|fit| fit.residual <= limit)
     }
+}
+
+/// Whether the model finds most corners of a grid. Of edges as sharp as pixels it makes nothing; then it
+/// is no judge of corners.
+fn is_judge(refined: &[(Refined, Option<ModelFit>)]) -> bool {
+    let fitted = refined.iter().filter(|(_, fit)| fit.is_some()).count();
+    2 * fitted > refined.len()
 }
