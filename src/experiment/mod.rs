@@ -2,6 +2,7 @@
 
 mod bound;
 pub mod corners;
+pub mod photographs;
 pub mod plot;
 pub mod rig;
 pub mod table2;

@@ -8,9 +8,13 @@ use anyhow::{Context, bail};
 use clap::Subcommand;
 
 use super::images::Images;
+use super::target_file;
 use crate::cli::output::say;
 use crate::cli::{interrupt, output, progress};
+use crate::experiment::photographs::axes::Axis;
+use crate::experiment::photographs::{self, Kind, Subject, table};
 use crate::experiment::{corners, plot, rig, table2};
+use crate::family::Family;
 
 /// Arguments of `deltille experiment`.
 #[derive(clap::Args)]
@@ -24,6 +28,9 @@ enum Experiment {
     /// Precision of refined corners against blur, noise and tilt, with the Cramér–Rao bound:
     /// corners.csv, corners.svg and corners.png
     Corners(CornersArgs),
+    /// Detection on photographs of a printed page of which everything is known, one thing spoiled at
+    /// a time: photographs.csv and photographs.json
+    Photographs(PhotographsArgs),
     /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube whose
     /// panels are misplaced, with and without refining them: rig.csv
     Rig(RigArgs),
@@ -62,6 +69,33 @@ struct CornersArgs {
     simulation: SimulationArgs,
 }
 
+#[derive(clap::Args)]
+struct PhotographsArgs {
+    /// What is varied: blur, motion, noise, jpeg, tone, exposure, contrast, tilt, distance, covers,
+    /// glare, curl, scale, mosaic, sharpening, light, background [default: all]
+    #[arg(long, value_name = "AXIS", value_delimiter = ',')]
+    axis: Vec<Axis>,
+    /// Boards of 20 mm: deltille and checker, with tags; deltille-untagged, checker-untagged; all
+    #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "deltille",
+          value_parser = ["deltille", "deltille-untagged", "checker", "checker-untagged", "all"])]
+    kind: Vec<String>,
+    /// Photograph the first page of this target instead: the .json of `deltille board` …
+    #[arg(long, value_name = "FILE", conflicts_with = "kind")]
+    target: Option<PathBuf>,
+    /// Family file, where the target names a family that is not shipped
+    #[arg(long, requires = "target")]
+    family: Option<String>,
+    /// Photographs at each level
+    #[arg(long, value_name = "N", default_value_t = 6,
+          value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    views: u32,
+    /// Write all pictures with their truth to this folder
+    #[arg(long, value_name = "FOLDER")]
+    images: Option<PathBuf>,
+    #[command(flatten)]
+    simulation: SimulationArgs,
+}
+
 /// What every simulation takes.
 #[derive(clap::Args)]
 struct SimulationArgs {
@@ -80,6 +114,7 @@ struct SimulationArgs {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     match args.experiment {
         Experiment::Corners(args) => run_corners(args),
+        Experiment::Photographs(args) => run_photographs(args),
         Experiment::Rig(args) => run_rig(args),
         Experiment::Table2(args) => {
             let images = Images::of(std::slice::from_ref(&args.folder))?;
@@ -144,4 +179,63 @@ fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
         say!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn run_photographs(args: PhotographsArgs) -> anyhow::Result<ExitCode> {
+    let subjects = args.subjects()?;
+    let PhotographsArgs { axis, views, images, simulation, .. } = args;
+    if let Some(folder) = &images {
+        output::check_folder(folder).context("--images")?;
+        std::fs::create_dir_all(folder).context("--images")?;
+    }
+    let setup = photographs::Setup {
+        views: views.into(),
+        seed: simulation.seed,
+        axes: if axis.is_empty() { &Axis::ALL } else { &axis },
+        images: images.as_deref(),
+    };
+    let interrupted = interrupt::flag();
+    let steps = subjects.len() * setup.photographs();
+    let rows = simulation.run(steps, "photographs", |tick| {
+        subjects.iter().try_fold(Some(Vec::new()), |rows, subject| {
+            let Some(mut rows) = rows else { return Ok(None) };
+            let more = photographs::run(subject, &setup, interrupted, tick)?;
+            Ok::<_, photographs::PhotographError>(more.map(|more| {
+                rows.extend(more);
+                rows
+            }))
+        })
+    })?;
+    let Some(rows) = rows? else { bail!("interrupted; no result was written") };
+    output::print(&table::text(&rows))?;
+    let files = [
+        ("photographs.csv", table::csv(&rows)),
+        ("photographs.json", table::json(&rows, simulation.seed)),
+    ];
+    for (name, content) in files {
+        let path = simulation.output.join(name);
+        output::write(&path, content.as_bytes())?;
+        say!("wrote {}", path.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl PhotographsArgs {
+    /// What is photographed.
+    fn subjects(&self) -> anyhow::Result<Vec<Subject>> {
+        if let Some(path) = &self.target {
+            let target = target_file::read(path)?;
+            let family = target_file::family(&target, self.family.as_deref())?;
+            let subject = Subject::new(&target.name, &target, family.as_ref());
+            return Ok(vec![subject.with_context(|| path.display().to_string())?]);
+        }
+        let wanted =
+            |kind: &Kind| self.kind.iter().any(|name| name == kind.name() || name == "all");
+        let subject = |kind: Kind| {
+            let tags = kind.spec().tags;
+            let family = tags.map(|tags| Family::resolve(&tags.family)).transpose()?;
+            Ok(Subject::of_kind(kind, family.as_ref())?)
+        };
+        Kind::ALL.into_iter().filter(wanted).map(subject).collect()
+    }
 }

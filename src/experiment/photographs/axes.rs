@@ -1,0 +1,206 @@
+//! What is varied, one thing at a time.
+
+use super::scene::{Background, Mosaic, Scene, Tone};
+
+/// What is varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// Standard deviation of the blur, px.
+    Blur,
+    /// Straight move during the exposure, px.
+    Motion,
+    /// Noise, % of full scale.
+    Noise,
+    /// Quality of JPEG compression.
+    Jpeg,
+    /// Tone curve.
+    Tone,
+    /// Gain of the exposure.
+    Exposure,
+    /// Light of paper to light of ink.
+    Contrast,
+    /// Angle between sheet and sensor, degrees.
+    Tilt,
+    /// Size of a tag's bit, px.
+    Distance,
+    /// Part of the corners that is covered, %.
+    Covers,
+    /// Number of glare spots.
+    Glare,
+    /// Sag of the bent sheet, % of the board's width.
+    Curl,
+    /// Width to which the picture is enlarged or reduced, px.
+    Scale,
+    /// Interpolation of colours.
+    Mosaic,
+    /// Sharpening, times what a blur takes away.
+    Sharpening,
+    /// Light from one side of the picture to the other.
+    Light,
+    /// What lies around the page.
+    Background,
+}
+
+/// One level of an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// Its value or name, in tables and file names.
+    pub name: String,
+    /// The default scene with that one thing changed.
+    pub scene: Scene,
+}
+
+impl Axis {
+    /// All, in the order of the report.
+    pub const ALL: [Self; 17] = [
+        Self::Blur,
+        Self::Motion,
+        Self::Noise,
+        Self::Jpeg,
+        Self::Tone,
+        Self::Exposure,
+        Self::Contrast,
+        Self::Tilt,
+        Self::Distance,
+        Self::Covers,
+        Self::Glare,
+        Self::Curl,
+        Self::Scale,
+        Self::Mosaic,
+        Self::Sharpening,
+        Self::Light,
+        Self::Background,
+    ];
+
+    /// Its name on the command line and in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Blur => "blur",
+            Self::Motion => "motion",
+            Self::Noise => "noise",
+            Self::Jpeg => "jpeg",
+            Self::Tone => "tone",
+            Self::Exposure => "exposure",
+            Self::Contrast => "contrast",
+            Self::Tilt => "tilt",
+            Self::Distance => "distance",
+            Self::Covers => "covers",
+            Self::Glare => "glare",
+            Self::Curl => "curl",
+            Self::Scale => "scale",
+            Self::Mosaic => "mosaic",
+            Self::Sharpening => "sharpening",
+            Self::Light => "light",
+            Self::Background => "background",
+        }
+    }
+
+    /// What its levels are, for plots.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Blur => "blur, px",
+            Self::Motion => "motion, px",
+            Self::Noise => "noise, % of full scale",
+            Self::Jpeg => "JPEG quality",
+            Self::Tone => "tone curve",
+            Self::Exposure => "exposure, times",
+            Self::Contrast => "contrast, to 1",
+            Self::Tilt => "tilt, °",
+            Self::Distance => "size of a bit, px",
+            Self::Covers => "covered, %",
+            Self::Glare => "glare spots",
+            Self::Curl => "sag of the sheet, % of the board",
+            Self::Scale => "enlarged or reduced to px wide",
+            Self::Mosaic => "mosaic",
+            Self::Sharpening => "sharpening, times",
+            Self::Light => "light across the picture, ± %",
+            Self::Background => "background",
+        }
+    }
+
+    /// Its levels.
+    pub fn levels(self) -> Vec<Level> {
+        let numbers = |values: &[f64], set: fn(&mut Scene, f64)| {
+            values
+                .iter()
+                .map(|&value| {
+                    let mut scene = Scene::default();
+                    set(&mut scene, value);
+                    Level { name: format!("{value}"), scene }
+                })
+                .collect()
+        };
+        let named = |scenes: Vec<(&str, Scene)>| {
+            scenes.into_iter().map(|(name, scene)| Level { name: name.to_owned(), scene }).collect()
+        };
+        let scene = Scene::default;
+        match self {
+            Self::Blur => numbers(&[0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0], |s, v| s.blur_px = v),
+            Self::Motion => numbers(&[0.0, 1.5, 3.0, 5.0, 7.0, 10.0, 15.0], |s, v| s.motion_px = v),
+            Self::Noise => {
+                numbers(&[0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0], |s, v| s.noise = v / 100.0)
+            }
+            Self::Jpeg => {
+                numbers(&[95.0, 92.0, 85.0, 75.0, 50.0, 35.0, 20.0], |s, v| s.jpeg = Some(v as u8))
+            }
+            Self::Tone => named(vec![
+                ("linear", Scene { tone: Tone::Linear, ..scene() }),
+                ("1.4", Scene { tone: Tone::Gamma(1.4), ..scene() }),
+                ("1.8", Scene { tone: Tone::Gamma(1.8), ..scene() }),
+                ("2.2", Scene { tone: Tone::Gamma(2.2), ..scene() }),
+                ("2.6", Scene { tone: Tone::Gamma(2.6), ..scene() }),
+                ("sRGB", Scene { tone: Tone::Srgb, ..scene() }),
+                ("soft s", Scene { tone: Tone::SoftS, ..scene() }),
+                ("steep s", Scene { tone: Tone::SteepS, ..scene() }),
+            ]),
+            Self::Exposure => {
+                numbers(&[0.02, 0.05, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0], |s, v| s.exposure = v)
+            }
+            Self::Contrast => {
+                numbers(&[1.1, 1.2, 1.5, 2.0, 4.0, 16.0, 50.0], |s, v| s.contrast = v)
+            }
+            Self::Tilt => numbers(&[0.0, 15.0, 30.0, 45.0, 55.0, 65.0, 70.0, 75.0], |s, v| {
+                s.tilt_deg = Some(v);
+            }),
+            Self::Distance => {
+                numbers(&[8.0, 6.0, 4.0, 3.0, 2.0, 1.5, 1.25, 1.0], |s, v| s.bit_px = v)
+            }
+            Self::Covers => {
+                numbers(&[0.0, 10.0, 20.0, 40.0, 60.0, 75.0], |s, v| s.covered = v / 100.0)
+            }
+            Self::Glare => numbers(&[0.0, 1.0, 2.0, 3.0, 5.0], |s, v| s.glare = v as u32),
+            Self::Curl => numbers(&[0.0, 1.0, 2.0, 4.0, 8.0, 12.0], |s, v| s.curl = v / 100.0),
+            Self::Scale => {
+                numbers(&[600.0, 960.0, 1600.0, 2400.0, 4000.0, 6000.0, 8000.0, 12000.0], |s, v| {
+                    s.width_px = Some(v as u32)
+                })
+            }
+            Self::Mosaic => named(vec![
+                ("none", scene()),
+                ("bilinear", Scene { mosaic: Mosaic::Bilinear, ..scene() }),
+                ("edges", Scene { mosaic: Mosaic::Edges, ..scene() }),
+            ]),
+            Self::Sharpening => numbers(&[0.0, 0.3, 0.6, 1.0, 1.5, 2.5], |s, v| s.sharpening = v),
+            Self::Light => {
+                numbers(&[0.0, 15.0, 30.0, 60.0, 80.0], |s, v| s.gradient = 2.0 * v / 100.0)
+            }
+            Self::Background => named(vec![
+                ("plain", Scene { background: Background::Plain, ..scene() }),
+                ("texture", scene()),
+                ("clutter", Scene { background: Background::Clutter, ..scene() }),
+            ]),
+        }
+    }
+}
+
+impl std::str::FromStr for Axis {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|axis| axis.name() == text);
+        found.ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.iter().map(|axis| axis.name()).collect();
+            format!("`{text}` is none of {}", names.join(", "))
+        })
+    }
+}

@@ -1,0 +1,243 @@
+//! Detection on photographs of a printed page, of which everything is known.
+//!
+//! ```text
+//! page ─▶ view ─▶ optics ─▶ sensor ─▶ file ─▶ detector
+//!   └───────┴── truth ───────────────────────▶ score
+//! ```
+//!
+//! A target's PDF is written and drawn by hayro ([`page`]); nothing of [`crate::synth`] takes part, nor
+//! of [`crate::camera`]. Where its corners are, its own paths say. The page is seen by a pinhole camera
+//! with a bending lens ([`view`]), blurred and lit ([`optics`]), partly covered ([`covers`]) and recorded
+//! ([`sensor`]). One thing at a time is varied ([`axes`]) from a scene that is always the same
+//! ([`scene`]), with the same poses at every level.
+//!
+//! What it does not show: print that is not black and white, depth of field, lateral colour, rolling
+//! shutters, noise reduction.
+
+pub mod axes;
+mod background;
+pub mod covers;
+mod mips;
+mod mosaic;
+pub mod optics;
+pub mod page;
+mod paths;
+pub mod photograph;
+pub mod scene;
+pub mod score;
+mod sensor;
+pub mod table;
+pub mod view;
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+use self::axes::{Axis, Level};
+use self::page::PrintedPage;
+use self::photograph::{Photograph, take};
+use self::score::{Score, score};
+use self::table::Row;
+use crate::artwork::ArtworkError;
+use crate::detect::{Detector, DetectorConfig};
+use crate::export::{ExportError, atomic};
+use crate::family::Family;
+use crate::target::{BoardSpec, GridKind, PaperSpec, Target, TargetSpec};
+use crate::verify::DocumentError;
+
+/// Why a page cannot be photographed.
+#[derive(Debug, thiserror::Error)]
+pub enum PhotographError {
+    /// The target says nothing about paper.
+    #[error("the target has no sheet to print: give the .json that was written with its files")]
+    NoSheet,
+    /// Its first sheet is larger than the paper.
+    #[error("the target's sheet is printed on several pages: choose paper that holds it")]
+    SeveralPages,
+    /// No paths meet where a corner should be.
+    #[error("the paths of the PDF do not meet at {at_mm:?} mm, where corner {id} should be")]
+    NoCorner {
+        /// Which corner.
+        id: u32,
+        /// Where it is stated, mm.
+        at_mm: [f64; 2],
+    },
+    /// The PDF's content cannot be followed.
+    #[error("the PDF's paths cannot be read: {0}")]
+    Paths(String),
+    /// It cannot be drawn.
+    #[error(transparent)]
+    Artwork(#[from] ArtworkError),
+    /// It cannot be written.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    /// It cannot be read back.
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    /// There is no place for a temporary file, or for a picture.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    /// A picture cannot be written.
+    #[error(transparent)]
+    Write(#[from] atomic::WriteError),
+}
+
+/// Boards that are made for the experiment where no target is given: 10 × 11 corners, or 9 × 12 on
+/// checkerboards, 20 mm apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kind {
+    /// Deltille or checkerboard.
+    pub grid: GridKind,
+    /// With the default tags.
+    pub tagged: bool,
+}
+
+impl Kind {
+    /// All four.
+    pub const ALL: [Self; 4] = [
+        Self { grid: GridKind::Deltille, tagged: true },
+        Self { grid: GridKind::Deltille, tagged: false },
+        Self { grid: GridKind::Checker, tagged: true },
+        Self { grid: GridKind::Checker, tagged: false },
+    ];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match (self.grid, self.tagged) {
+            (GridKind::Deltille, true) => "deltille",
+            (GridKind::Deltille, false) => "deltille-untagged",
+            (GridKind::Checker, true) => "checker",
+            (GridKind::Checker, false) => "checker-untagged",
+        }
+    }
+
+    /// The board.
+    pub fn spec(self) -> BoardSpec {
+        let [rows, cols] = match self.grid {
+            GridKind::Deltille => [10, 11],
+            GridKind::Checker => [9, 12],
+        };
+        let spec = BoardSpec::new(self.grid, rows, cols, 20.0);
+        if self.tagged { spec } else { BoardSpec { tags: None, ..spec } }
+    }
+}
+
+/// What is photographed, and by what it is looked for.
+pub struct Subject {
+    /// Its name in tables and file names.
+    pub name: String,
+    page: PrintedPage,
+    detector: Detector,
+}
+
+impl Subject {
+    /// A target that is there already. `family` is the family of its tags.
+    pub fn new(
+        name: &str,
+        target: &Target,
+        family: Option<&Family>,
+    ) -> Result<Self, PhotographError> {
+        let page = PrintedPage::new(target, family)?;
+        let detector = Detector::for_target(target, family, DetectorConfig::default());
+        Ok(Self { name: name.to_owned(), page, detector })
+    }
+
+    /// One of the boards of the experiment; `family` is that of its spec.
+    pub fn of_kind(kind: Kind, family: Option<&Family>) -> Result<Self, PhotographError> {
+        let (spec, paper) = (TargetSpec::Board(kind.spec()), PaperSpec::default());
+        let target = Target::build(kind.name(), &spec, family, Some(&paper))
+            .expect("the boards of the experiment can be made");
+        Self::new(kind.name(), &target, family)
+    }
+}
+
+/// How often, and where pictures go.
+pub struct Setup<'a> {
+    /// Photographs at each level.
+    pub views: u64,
+    /// Seed of all random choices.
+    pub seed: u64,
+    /// What is varied.
+    pub axes: &'a [Axis],
+    /// Folder for the pictures with their truth.
+    pub images: Option<&'a Path>,
+}
+
+impl Setup<'_> {
+    /// How many photographs will be taken of one subject, which is how often progress is reported.
+    pub fn photographs(&self) -> usize {
+        self.axes.iter().map(|axis| axis.levels().len()).sum::<usize>() * self.views as usize
+    }
+}
+
+/// Photographs a subject at every level of the axes; `None` when cancelled.
+///
+/// But for times, the result depends on the subject and the setup alone.
+pub fn run(
+    subject: &Subject,
+    setup: &Setup,
+    cancel: &AtomicBool,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Option<Vec<Row>>, PhotographError> {
+    let mut rows = Vec::new();
+    for &axis in setup.axes {
+        for level in axis.levels() {
+            let scores: Result<Vec<Option<Score>>, PhotographError> = (0..setup.views)
+                .into_par_iter()
+                .map(|view| {
+                    if cancel.load(Ordering::Relaxed) {
+                        return Ok(None);
+                    }
+                    let score = one(subject, setup, axis, &level, view)?;
+                    progress();
+                    Ok(Some(score))
+                })
+                .collect();
+            let Some(scores) = scores?.into_iter().collect::<Option<Vec<Score>>>() else {
+                return Ok(None);
+            };
+            rows.push(Row::new(&subject.name, axis, &level, &scores));
+        }
+    }
+    Ok(Some(rows))
+}
+
+fn one(
+    subject: &Subject,
+    setup: &Setup,
+    axis: Axis,
+    level: &Level,
+    view: u64,
+) -> Result<Score, PhotographError> {
+    let photograph = take(&subject.page, &level.scene, setup.seed, view);
+    if let Some(folder) = setup.images {
+        let level_name = level.name.replace(' ', "-");
+        let stem = format!("{}-{}-{level_name}-{view}", subject.name, axis.name());
+        save(&photograph, subject, level, &folder.join(stem))?;
+    }
+    let found = subject.detector.detect(&photograph.image, "");
+    Ok(score(&found, &photograph, level.scene.scale(), subject.page.half_turn))
+}
+
+/// Writes a picture, and its truth beside it.
+fn save(
+    photograph: &Photograph,
+    subject: &Subject,
+    level: &Level,
+    path: &Path,
+) -> Result<(), PhotographError> {
+    let Photograph { image, corners, .. } = photograph;
+    let name = |extension: &str| {
+        // A level's name may hold a point.
+        let mut name = path.as_os_str().to_owned();
+        name.push(extension);
+        std::path::PathBuf::from(name)
+    };
+    let picture = table::png(image);
+    let file_name = name(".png").file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let truth = table::truth(&file_name, &subject.name, &level.scene, corners);
+    atomic::write(&name(".png"), |out| out.write_all(&picture))?;
+    atomic::write(&name(".json"), |out| out.write_all(truth.as_bytes()))?;
+    Ok(())
+}

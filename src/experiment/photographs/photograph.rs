@@ -1,0 +1,228 @@
+//! One photograph with its truth: a scene, and what chance adds to it.
+//!
+//! Poses, lights, covers and noise come from streams of their own, so that a level of an axis shows
+//! the same poses as any other, and only what it changes is changed.
+
+use std::f64::consts::TAU;
+
+use glam::{DMat3, DVec2, DVec3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+use super::background::{grain, texture};
+use super::covers::Covers;
+use super::mips::{Beyond, Mips};
+use super::optics::{Light, Setting, Spot, expose};
+use super::page::{PageCorner, PrintedPage};
+use super::scene::{MOST_TILT_DEG, Scene};
+use super::sensor::record;
+use super::view::{Curl, View};
+use crate::raster::Gray;
+
+/// A corner nearer to a cover's outline or to the border than this counts neither as seen nor as
+/// hidden, px of the sensor.
+const CLEAR_PX: f64 = 3.0;
+
+/// Glare takes a corner when less than this part of its contrast is left.
+const LEAST_CONTRAST: f64 = 0.5;
+
+/// Focal length in widths of the picture: 53° across.
+const FOCAL_WIDTHS: f64 = 1.0;
+
+/// Range of the lens's coefficient.
+const LENS: std::ops::Range<f64> = -0.02..0.12;
+
+/// How far the middle of the board may be off the middle of the picture, of its height.
+const OFF_CENTRE: f64 = 0.06;
+
+/// Whether a corner can be seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sight {
+    /// It can.
+    Visible,
+    /// It is next to a cover's outline or the border of the picture.
+    Beside,
+    /// Glare has left too little of it.
+    Glared,
+    /// It is under a cover.
+    Covered,
+}
+
+/// A corner where it truly is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TrueCorner {
+    /// Its id in the target.
+    pub id: u32,
+    /// Its panel.
+    pub panel: u32,
+    /// Lattice row.
+    pub row: i32,
+    /// Lattice column.
+    pub col: i32,
+    /// Position, px; pixel centres at integers.
+    pub x: f64,
+    /// Position, px, downwards.
+    pub y: f64,
+    /// Whether it can be seen.
+    pub sight: Sight,
+}
+
+/// A photograph and what is true of it.
+pub struct Photograph {
+    /// What the file holds.
+    pub image: Gray<u8>,
+    /// All corners within the picture.
+    pub corners: Vec<TrueCorner>,
+    /// Length of a tile's edge in the middle of the board before it is tilted, px.
+    pub edge_px: f64,
+}
+
+/// Streams of chance.
+#[derive(Clone, Copy)]
+enum Chance {
+    Pose,
+    Light,
+    Covers,
+    Background,
+    Noise,
+}
+
+fn chance(seed: u64, view: u64, of: Chance) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(view << 8 | of as u64);
+    rng
+}
+
+/// Takes a photograph. The same page, scene, seed and view give the same bytes.
+pub fn take(page: &PrintedPage, scene: &Scene, seed: u64, view: u64) -> Photograph {
+    let rng = |of| chance(seed, view, of);
+    let camera = pose(page, scene, &mut rng(Chance::Pose));
+    let seen: Vec<(&PageCorner, [f64; 2])> = page
+        .corners
+        .iter()
+        .filter_map(|corner| Some((corner, camera.px_from_page(corner.page_mm)?)))
+        .collect();
+    let places: Vec<[f64; 2]> = seen.iter().map(|(_, place)| *place).collect();
+    let covers = Covers::over(&places, scene.covered, view % 2 == 1, &mut rng(Chance::Covers));
+    let light = light(scene, &places, &mut rng(Chance::Light));
+    let background = texture(scene.background, &mut rng(Chance::Background));
+    let skin = (!covers.is_empty())
+        .then(|| Mips::new(grain(0.5, 0.06, &mut rng(Chance::Covers)), Beyond::Again));
+    let setting = Setting {
+        page,
+        view: &camera,
+        covers: &covers,
+        background: &background,
+        skin: skin.as_ref(),
+        light: &light,
+    };
+    let image = record(&expose(&setting, scene), scene, &mut rng(Chance::Noise));
+
+    let size_px = camera.size_px;
+    let scale = scene.scale();
+    let corners = seen
+        .into_iter()
+        .filter(|(_, [x, y])| {
+            let within = |v: f64, size: usize| (-0.5..size as f64 - 0.5).contains(&v);
+            within(*x, size_px[0]) && within(*y, size_px[1])
+        })
+        .map(|(&PageCorner { id, panel, row, col, .. }, place)| {
+            let sight = sight(place, scene, size_px, &covers, &light);
+            let [x, y] = place.map(|v| (v + 0.5) * scale - 0.5);
+            TrueCorner { id, panel, row, col, x, y, sight }
+        })
+        .collect();
+    Photograph { image, corners, edge_px: scale * scene.bit_px * page.edge_mm / page.bit_mm }
+}
+
+fn pose(page: &PrintedPage, scene: &Scene, rng: &mut ChaCha8Rng) -> View {
+    let [width, height] = scene.size_px.map(|size| size as f64);
+    let focal_px = FOCAL_WIDTHS * width;
+    let (middle_mm, board_mm) = page.board_mm();
+    // Chance is asked for the same numbers in every scene.
+    let (roll, towards) = (rng.random_range(0.0..TAU), rng.random_range(0.0..TAU));
+    let any_tilt = rng.random_range(0.0..MOST_TILT_DEG);
+    let offset = DVec2::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
+    let lens = rng.random_range(LENS);
+    let (bent_along, bent_up) = (rng.random_range(0.0..TAU), rng.random_bool(0.5));
+
+    let tilt = scene.tilt_deg.unwrap_or(any_tilt).to_radians();
+    let axis = DVec3::new(towards.cos(), towards.sin(), 0.0);
+    let rotation = DMat3::from_axis_angle(axis, tilt)
+        * DMat3::from_rotation_z(roll)
+        * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+    let distance_mm = focal_px * page.bit_mm / scene.bit_px;
+    let off_mm = offset * OFF_CENTRE * height * distance_mm / focal_px;
+    let curl = (scene.curl > 0.0).then(|| {
+        // Sag h over the width w: ρ = w² / 8h.
+        let width_mm = board_mm[0].max(board_mm[1]);
+        let radius_mm = width_mm / (8.0 * scene.curl);
+        let radius_mm = if bent_up { radius_mm } else { -radius_mm };
+        Curl { radius_mm, along: DVec2::from_angle(bent_along) }
+    });
+    View {
+        size_px: scene.size_px,
+        focal_px,
+        lens,
+        middle_mm,
+        rotation,
+        translation_mm: off_mm.extend(distance_mm),
+        curl,
+    }
+}
+
+fn light(scene: &Scene, places: &[[f64; 2]], rng: &mut ChaCha8Rng) -> Light {
+    let [width, height] = scene.size_px.map(|size| size as f64);
+    let from = DVec2::from_angle(rng.random_range(0.0..TAU));
+    let motion = DVec2::from_angle(rng.random_range(0.0..TAU));
+    let n = places.len().max(1) as f64;
+    let middle = places.iter().map(|&place| DVec2::from(place)).sum::<DVec2>() / n;
+    let reach = places.iter().map(|&p| DVec2::from(p).distance(middle)).fold(1.0, f64::max);
+    let spots = (0..scene.glare)
+        .map(|_| {
+            let turn = DVec2::from_angle(rng.random_range(0.0..TAU));
+            let at = middle + turn * reach * rng.random_range(0.0..0.8);
+            let sigma_px = [0.12, 0.06].map(|part| reach * part * rng.random_range(0.8..1.4));
+            let along = DVec2::from_angle(rng.random_range(0.0..TAU));
+            Spot { at, sigma_px, along, peak: rng.random_range(1.5..3.0) }
+        })
+        .collect();
+    Light {
+        slope: from * scene.gradient / width.hypot(height),
+        vignetting: scene.vignetting,
+        spots,
+        motion,
+    }
+}
+
+/// Whether a corner can be seen.
+fn sight(
+    place: [f64; 2],
+    scene: &Scene,
+    size_px: [usize; 2],
+    covers: &Covers,
+    light: &Light,
+) -> Sight {
+    let inside = |axis: usize| {
+        let v = place[axis];
+        v >= CLEAR_PX && v <= size_px[axis] as f64 - 1.0 - CLEAR_PX
+    };
+    let cover_px = covers.distance(place);
+    if cover_px < -CLEAR_PX {
+        return Sight::Covered;
+    }
+    if cover_px < CLEAR_PX || !inside(0) || !inside(1) {
+        return Sight::Beside;
+    }
+    let even = light.even_part(place, size_px);
+    let recorded =
+        |reflected: f64, glare: f64| (scene.exposure * (reflected * even + glare)).clamp(0.0, 1.0);
+    let contrast =
+        |glare| recorded(scene.white, glare) - recorded(scene.white / scene.contrast, glare);
+    match contrast(light.glare(place)) < LEAST_CONTRAST * contrast(0.0) {
+        true => Sight::Glared,
+        false => Sight::Visible,
+    }
+}

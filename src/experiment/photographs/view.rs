@@ -1,0 +1,174 @@
+//! Where the camera stands, how its lens bends and how the sheet lies: pixels to the page and back.
+//!
+//! Written for this experiment alone, so that it shares no mistake with [`crate::camera`]. With the
+//! page's frame in the middle of the board, x right, y up, z towards the viewer,
+//!
+//! ```text
+//! sheet    X(u, v) = b · ρ sin(u/ρ) + b⊥ · v + z · ρ (1 − cos(u/ρ))      bent along b, flat for ρ = ∞
+//! camera   P = R X + t,  n = (P_x, P_y) / P_z
+//! lens     n = m (1 + k |m|²),  pixel = centre + f m
+//! ```
+//!
+//! so that rendering, which goes from pixels to the page, is closed in form.
+
+use glam::{DMat3, DVec2, DVec3};
+
+/// Iterations of Newton's method for the lens; it converges quadratically.
+const LENS_ITERATIONS: u32 = 20;
+
+/// A view is its own inverse within this, px; where it is not, the sheet hides the place.
+const SAME_PX: f64 = 1e-3;
+
+/// A view of a sheet.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Width and height of the picture, px.
+    pub size_px: [usize; 2],
+    /// Focal length, px.
+    pub focal_px: f64,
+    /// k of the lens.
+    pub lens: f64,
+    /// Middle of the board on the page, mm.
+    pub middle_mm: [f64; 2],
+    /// R.
+    pub rotation: DMat3,
+    /// t, mm.
+    pub translation_mm: DVec3,
+    /// How the sheet is bent; `None` for a flat one.
+    pub curl: Option<Curl>,
+}
+
+/// A sheet bent to a cylinder.
+#[derive(Clone, Copy, Debug)]
+pub struct Curl {
+    /// Radius ρ, mm; its sign says to which side.
+    pub radius_mm: f64,
+    /// Direction b on the page.
+    pub along: DVec2,
+}
+
+impl View {
+    /// Where a pixel looks on the page, mm; `None` where it looks past the bent sheet.
+    pub fn page_from_px(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let [cx, cy] = self.centre_px();
+        let m = DVec2::new(x - cx, y - cy) / self.focal_px;
+        let n = m * (1.0 + self.lens * m.length_squared());
+        let from_camera = self.rotation.transpose();
+        let ray = from_camera * n.extend(1.0);
+        let eye = -(from_camera * self.translation_mm);
+        let place = match self.curl {
+            None => {
+                let s = -eye.z / ray.z;
+                (s > 0.0).then(|| (eye + s * ray).truncate())?
+            }
+            Some(curl) => curl.hit(eye, ray)?,
+        };
+        Some([place.x + self.middle_mm[0], place.y + self.middle_mm[1]])
+    }
+
+    /// Where a place of the page is seen, px; `None` behind the camera and where the sheet hides it.
+    pub fn px_from_page(&self, page_mm: [f64; 2]) -> Option<[f64; 2]> {
+        let place = DVec2::from(page_mm) - DVec2::from(self.middle_mm);
+        let on_sheet = self.curl.map_or(place.extend(0.0), |curl| curl.bent(place));
+        let p = self.rotation * on_sheet + self.translation_mm;
+        if p.z <= 0.0 {
+            return None;
+        }
+        let n = p.truncate() / p.z;
+        // |n| = r (1 + k r²), solved for r.
+        let length = n.length();
+        let mut r = length;
+        for _ in 0..LENS_ITERATIONS {
+            r -= (r * (1.0 + self.lens * r * r) - length) / (1.0 + 3.0 * self.lens * r * r);
+        }
+        let m = if length > 0.0 { n * (r / length) } else { n };
+        let [cx, cy] = self.centre_px();
+        let px = [cx + self.focal_px * m.x, cy + self.focal_px * m.y];
+        let [u, v] = self.page_from_px(px)?;
+        let off_mm = (u - page_mm[0]).hypot(v - page_mm[1]);
+        (off_mm * self.focal_px / p.z < SAME_PX).then_some(px)
+    }
+
+    fn centre_px(&self) -> [f64; 2] {
+        self.size_px.map(|size| 0.5 * (size as f64 - 1.0))
+    }
+}
+
+impl Curl {
+    /// Place in space of a place on the flat sheet.
+    fn bent(&self, place: DVec2) -> DVec3 {
+        let (rho, across) = (self.radius_mm, self.along.perp());
+        let (u, v) = (place.dot(self.along), place.dot(across));
+        let (sin, cos) = (u / rho).sin_cos();
+        (self.along * (rho * sin) + across * v).extend(rho * (1.0 - cos))
+    }
+
+    /// Place on the flat sheet that a ray meets first.
+    fn hit(&self, eye: DVec3, ray: DVec3) -> Option<DVec2> {
+        let (rho, across) = (self.radius_mm, self.along.perp());
+        let flat = |p: DVec3| [p.truncate().dot(self.along), p.truncate().dot(across)];
+        let ([ou, ov], [du, dv]) = (flat(eye), flat(ray));
+        let oz = eye.z - rho;
+        // The circle u² + (z − ρ)² = ρ².
+        let a = du * du + ray.z * ray.z;
+        let b = ou * du + oz * ray.z;
+        let c = ou * ou + oz * oz - rho * rho;
+        let root = b * b - a * c;
+        if root < 0.0 {
+            return None;
+        }
+        let root = root.sqrt();
+        [(-b - root) / a, (-b + root) / a].into_iter().filter(|&s| s > 0.0).find_map(|s| {
+            let (u, w) = (ou + s * du, oz + s * ray.z);
+            // The half of the cylinder on which the sheet lies.
+            (w * rho < 0.0).then(|| {
+                let u = rho * (u / rho).asin();
+                self.along * u + across * (ov + s * dv)
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A view of a sheet of 200 × 150 mm.
+    fn view(curl: Option<Curl>) -> View {
+        View {
+            size_px: [640, 480],
+            focal_px: 700.0,
+            lens: -0.12,
+            middle_mm: [100.0, 75.0],
+            rotation: DMat3::from_rotation_x(0.6)
+                * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)),
+            translation_mm: DVec3::new(5.0, -3.0, 400.0),
+            curl,
+        }
+    }
+
+    #[test]
+    fn the_page_is_where_it_is_seen() {
+        let along = DVec2::new(0.8, 0.6);
+        for curl in
+            [None, Some(Curl { radius_mm: 300.0, along }), Some(Curl { radius_mm: -300.0, along })]
+        {
+            let view = view(curl);
+            for place in [[100.0, 75.0], [3.0, 140.0], [190.0, 20.0]] {
+                let [x, y] = view.px_from_page(place).unwrap();
+                let [u, v] = view.page_from_px([x, y]).unwrap();
+                assert!((u - place[0]).hypot(v - place[1]) < 1e-9, "{curl:?} {place:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_slight_bend_is_nearly_flat() {
+        let curl = Curl { radius_mm: 1e7, along: DVec2::X };
+        let (flat, bent) = (view(None), view(Some(curl)));
+        let place = [20.0, 130.0];
+        let ([x, y], [u, v]) =
+            (flat.px_from_page(place).unwrap(), bent.px_from_page(place).unwrap());
+        assert!((x - u).hypot(y - v) < 0.01);
+    }
+}
