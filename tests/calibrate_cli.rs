@@ -54,7 +54,13 @@ fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8
         GridCorner { row, col, id, x: x + off(), y: y + off(), cov: None }
     });
     let corners = corners.collect();
-    let grid = Grid { kind: panel.kind, panel: Some(panel.id), corners, tags: Vec::new() };
+    let grid = Grid {
+        kind: panel.kind,
+        panel: Some(panel.id),
+        mirrored: false,
+        corners,
+        tags: Vec::new(),
+    };
     Detection {
         image: String::new(),
         width: camera.width,

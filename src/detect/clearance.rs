@@ -309,7 +309,7 @@ mod tests {
             let [x, y] = image(kind.position(row.into(), col.into()));
             GridCorner { row, col, id: None, x, y, cov: None }
         });
-        Grid { kind, panel: None, corners: corners.collect(), tags: Vec::new() }
+        Grid { kind, panel: None, mirrored: false, corners: corners.collect(), tags: Vec::new() }
     }
 
     #[test]

@@ -29,6 +29,9 @@ pub struct Grid {
     pub kind: GridKind,
     /// Panel of the target, once known.
     pub panel: Option<u32>,
+    /// Whether it is seen as in a mirror. Its labels, if any, are those of the print.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub mirrored: bool,
     /// Corners, ordered by row, then column.
     pub corners: Vec<GridCorner>,
     /// Tags that were decoded and agree with the labelling.
@@ -47,6 +50,10 @@ impl Grid {
         });
         median(edges.collect())
     }
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// The middle value.

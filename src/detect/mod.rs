@@ -10,7 +10,8 @@
 //! 4. `links` joins corners along clean edges (`edge`).
 //! 5. `grow` starts from four corners, grows tile by tile and fills the gaps, where tiles are narrow
 //!    in the frame of their neighbours (`rectified`).
-//! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns.
+//! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns; `labels`
+//!    gives them to the grids.
 //! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`, in windows
 //!    that `refine_grid` chooses by blur (`clearance`) and by what else they show.
 //!
@@ -27,6 +28,7 @@ mod detector;
 mod edge;
 mod grow;
 mod label;
+mod labels;
 mod links;
 mod outline;
 mod polynomial;

@@ -32,6 +32,9 @@ pub struct FinderArgs {
     /// Most bits of a tag that may be corrected [default: ⌊(h−1)/2⌋ of its family]
     #[arg(long, value_name = "BITS", conflicts_with = "grid")]
     max_errors: Option<u32>,
+    /// Label boards that are seen as in a mirror too
+    #[arg(long)]
+    allow_mirrored: bool,
     /// How corners are refined
     #[arg(long, value_name = "METHOD", default_value = "model")]
     refine: Method,
@@ -56,8 +59,11 @@ impl FinderArgs {
         if self.target.is_none() && self.grid.is_none() {
             bail!("give --target FILE, or --grid deltille or checker for untagged boards");
         }
-        let config =
-            DetectorConfig { max_bit_errors: self.max_errors, refinement: self.refine.into() };
+        let config = DetectorConfig {
+            max_bit_errors: self.max_errors,
+            allow_mirrored: self.allow_mirrored,
+            refinement: self.refine.into(),
+        };
         let Some(path) = &self.target else {
             let kind = match self.grid {
                 Some(Kind::Checker) => GridKind::Checker,

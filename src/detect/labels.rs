@@ -1,0 +1,212 @@
+//! How the corners of a grid get absolute labels: by tags, by an outline, or not at all.
+//!
+//! A picture may show a board as in a mirror, flopped by a scanner, a projector or the camera's driver. Its grid
+//! is a right-handed lattice like any other, but lies on the panel with rows and columns exchanged. Labels
+//! of such a grid belong to no view of the print, so they are given only where they are asked for.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::detection::{DecodedTag, Grid, GridCorner};
+use super::detector::DetectorConfig;
+use super::grow::SaddleGrid;
+use super::label::{Labelled, TagLabeller};
+use super::outline::{fit_outline, fit_rectangle};
+use crate::family::Family;
+use crate::lattice::{GridKind, LatticeMap, Vertex};
+use crate::raster::{Gray, Intensity};
+use crate::target::{Target, zigzag_vertices};
+
+/// How corners get absolute labels.
+#[derive(Clone, Debug)]
+pub struct Labels {
+    source: Source,
+    allow_mirrored: bool,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    /// They do not.
+    None,
+    /// By the outline of a board that is seen whole.
+    Outline(BTreeSet<Vertex>),
+    /// By the rows and columns of a checkerboard that is seen whole.
+    Rectangle((u32, u32)),
+    /// By the tags of a target, or by the outlines of its untagged panels.
+    Target { tags: Option<TagLabeller>, panels: Vec<TargetPanel> },
+}
+
+/// What the detector must know of a panel.
+#[derive(Clone, Debug)]
+struct TargetPanel {
+    id: u32,
+    kind: GridKind,
+    /// Rows and columns.
+    size: (u32, u32),
+    inverted: bool,
+    tagged: bool,
+    corner_ids: BTreeMap<Vertex, u32>,
+}
+
+impl Labels {
+    /// By the rows and columns of an untagged board, where they are known.
+    pub fn of_size(kind: GridKind, size: Option<(u32, u32)>, config: &DetectorConfig) -> Self {
+        let source = match (size, kind) {
+            (Some((rows, cols)), GridKind::Deltille) => {
+                Source::Outline(zigzag_vertices(rows, cols).collect())
+            }
+            (Some(size), GridKind::Checker) => Source::Rectangle(size),
+            (None, _) => Source::None,
+        };
+        Self { source, allow_mirrored: config.allow_mirrored }
+    }
+
+    /// By the tags of a target, and the outlines of its untagged panels.
+    pub fn of_target(target: &Target, family: Option<&Family>, config: &DetectorConfig) -> Self {
+        let tags = family.and_then(|family| {
+            let max_errors = config.max_bit_errors.unwrap_or(family.correctable());
+            TagLabeller::new(target, family, max_errors)
+        });
+        let panels = target.panels.iter().map(|panel| TargetPanel {
+            id: panel.id,
+            kind: panel.kind,
+            size: (panel.matrix[1], panel.matrix[0]),
+            inverted: panel.inverted,
+            tagged: !panel.tags.is_empty(),
+            corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
+        });
+        let source = Source::Target { tags, panels: panels.collect() };
+        Self { source, allow_mirrored: config.allow_mirrored }
+    }
+
+    /// The panels in a grid; the grid itself with relative labels where there are none.
+    pub fn label<T: Intensity>(&self, image: &Gray<T>, grid: &SaddleGrid) -> Vec<Grid> {
+        match &self.source {
+            Source::None => vec![unlabelled(grid)],
+            Source::Outline(outline) => {
+                vec![self.on_outline(grid, |grid| fit_outline(grid, outline, false))]
+            }
+            Source::Rectangle(size) => {
+                vec![self.on_outline(grid, |grid| fit_rectangle(grid, *size, false))]
+            }
+            Source::Target { tags, panels } => {
+                let by_tags = tags.as_ref().map_or_else(Vec::new, |tags| tags.label(image, grid));
+                if by_tags.is_empty() {
+                    let by_outline = on_untagged_panel(grid, panels);
+                    return vec![by_outline.unwrap_or_else(|| unlabelled(grid))];
+                }
+                // What hangs on to labelled panels without being part of one is not reported.
+                by_tags.iter().map(|l| on_panel(grid, &panels[l.panel], l)).collect()
+            }
+        }
+    }
+
+    /// Whether a grid that no tag vouches for has more corners than anything that is looked for: a
+    /// halftone, a fabric or a tiled floor is as regular as a board, but seldom as small.
+    pub fn exceeded_by(&self, grid: &Grid) -> bool {
+        let most = match &self.source {
+            Source::None => usize::MAX,
+            Source::Outline(outline) => outline.len(),
+            Source::Rectangle((rows, cols)) => *rows as usize * *cols as usize,
+            Source::Target { panels, .. } => {
+                panels.iter().map(|panel| panel.corner_ids.len()).max().unwrap_or(0)
+            }
+        };
+        grid.corners.len() > most
+    }
+
+    /// A grid on the outline of an untagged board, which a mirror image may fit as well.
+    fn on_outline(
+        &self,
+        grid: &SaddleGrid,
+        fit: impl Fn(&SaddleGrid) -> Option<LatticeMap>,
+    ) -> Grid {
+        if let Some(map) = fit(grid) {
+            return relabelled(grid, |v| Some((map.apply(v), None)), None, Vec::new());
+        }
+        let Some(map) = fit(&mirror_image(grid)) else { return unlabelled(grid) };
+        let labelled = if self.allow_mirrored {
+            relabelled(grid, |v| Some((map.apply(mirrored(v)), None)), None, Vec::new())
+        } else {
+            unlabelled(grid)
+        };
+        Grid { mirrored: true, ..labelled }
+    }
+}
+
+/// Where a vertex lies in the mirror: rows and columns are exchanged, which leaves upright tiles upright and
+/// dark squares dark.
+pub(super) fn mirrored(vertex: Vertex) -> Vertex {
+    Vertex::new(vertex.col, vertex.row)
+}
+
+/// A grid with the vertices that it has in a mirror: that of a flopped picture, turned the right way.
+pub(super) fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
+    grid.iter().map(|(&vertex, &placed)| (mirrored(vertex), placed)).collect()
+}
+
+/// Leaves out of grids of one panel what a larger one, which comes before, has already: beside a tag of
+/// few pixels corners may be found twice, a pixel apart.
+pub(super) fn report_once(grids: &mut Vec<Grid>) {
+    let (mut corners, mut tags) = (BTreeSet::new(), BTreeSet::new());
+    grids.retain_mut(|grid| {
+        if let Some(panel) = grid.panel {
+            grid.corners.retain(|corner| corners.insert((panel, corner.row, corner.col)));
+            grid.tags.retain(|tag| tags.insert((panel, tag.row, tag.col)));
+        }
+        !grid.corners.is_empty()
+    });
+}
+
+fn unlabelled(grid: &SaddleGrid) -> Grid {
+    relabelled(grid, |v| Some((v, None)), None, Vec::new())
+}
+
+fn on_panel(grid: &SaddleGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid {
+    let label = |v: Vertex| {
+        let vertex = *labelled.vertices.get(&v)?;
+        Some((vertex, panel.corner_ids.get(&vertex).copied()))
+    };
+    relabelled(grid, label, Some(panel.id), labelled.tags.clone())
+}
+
+/// The grid on the one untagged panel whose outline it fills.
+fn on_untagged_panel(grid: &SaddleGrid, panels: &[TargetPanel]) -> Option<Grid> {
+    let mut fitting = panels.iter().filter(|panel| !panel.tagged).filter_map(|panel| {
+        let map = match panel.kind {
+            GridKind::Deltille => {
+                let outline = panel.corner_ids.keys().copied().collect();
+                fit_outline(grid, &outline, panel.inverted)
+            }
+            GridKind::Checker => fit_rectangle(grid, panel.size, panel.inverted),
+        };
+        Some((panel, map?))
+    });
+    let (panel, map) = fitting.next()?;
+    if fitting.next().is_some() {
+        return None;
+    }
+    let label = |v| {
+        let vertex = map.apply(v);
+        Some((vertex, panel.corner_ids.get(&vertex).copied()))
+    };
+    Some(relabelled(grid, label, Some(panel.id), Vec::new()))
+}
+
+/// A grid with new labels, ordered by them; corners without a label are left out.
+fn relabelled(
+    grid: &SaddleGrid,
+    label: impl Fn(Vertex) -> Option<(Vertex, Option<u32>)>,
+    panel: Option<u32>,
+    tags: Vec<DecodedTag>,
+) -> Grid {
+    let mut corners: Vec<GridCorner> = grid
+        .iter()
+        .filter_map(|(&vertex, placed)| {
+            let (Vertex { row, col }, id) = label(vertex)?;
+            let [x, y] = placed.position;
+            Some(GridCorner { row, col, id, x, y, cov: None })
+        })
+        .collect();
+    corners.sort_by_key(|corner| (corner.row, corner.col));
+    Grid { kind: GridKind::Deltille, panel, mirrored: false, corners, tags }
+}
