@@ -21,8 +21,8 @@
 //! | 6 | [`export`] | artwork, targets and results to files and back |
 //! | 6 | [`report`] | a calibration as a page to look at |
 //! | 7 | [`verify`] | an artifact read back from disk and compared with its target |
-//! | 7 | [`experiment`] | simulations that measure the library itself |
-//! | 8 | `cli` | the programs' arguments, progress and messages |
+//! | 8 | [`experiment`] | simulations that measure the library itself |
+//! | 9 | `cli` | the programs' arguments, progress and messages |
 //!
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.

@@ -48,6 +48,11 @@ pub fn svg(rows: &[Row]) -> String {
             panel(&mut body, origin, kind, sweep, &rows);
         }
     }
+    page([width, height], &body)
+}
+
+/// Shapes on a white page.
+pub(super) fn page([width, height]: [f64; 2], body: &str) -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
          viewBox=\"0 0 {width} {height}\">\n<rect width=\"100%\" height=\"100%\" \
@@ -118,7 +123,8 @@ fn panel(body: &mut String, [left, top]: [f64; 2], kind: GridKind, sweep: Sweep,
     line(body, &bound, BOUND_COLOUR, 1.6, "6 4");
 }
 
-fn line(body: &mut String, points: &[[f64; 2]], colour: &str, width: f64, dash: &str) {
+/// A line through points, in user units.
+pub(super) fn line(body: &mut String, points: &[[f64; 2]], colour: &str, width: f64, dash: &str) {
     let places: Vec<String> = points
         .iter()
         .filter(|[_, y]| y.is_finite())
@@ -134,7 +140,7 @@ fn line(body: &mut String, points: &[[f64; 2]], colour: &str, width: f64, dash: 
 }
 
 /// Writes text whose given part (0 start, 1 end) lies at a place; returns its width.
-fn write(body: &mut String, label: &str, [x, y]: [f64; 2], anchor: f64) -> f64 {
+pub(super) fn write(body: &mut String, label: &str, [x, y]: [f64; 2], anchor: f64) -> f64 {
     const SIZE: f64 = 14.0;
     let Ok((path, width)) = text::outline(label, SIZE) else { return 0.0 };
     let placed = Affine::new([1.0, 0.0, 0.0, -1.0, x - anchor * width, y]) * path;

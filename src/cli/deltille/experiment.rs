@@ -29,7 +29,7 @@ enum Experiment {
     /// corners.csv, corners.svg and corners.png
     Corners(CornersArgs),
     /// Detection on photographs of a printed page of which everything is known, one thing spoiled at
-    /// a time: photographs.csv and photographs.json
+    /// a time: photographs.csv, .json, .svg and .png
     Photographs(PhotographsArgs),
     /// The paper's §4.4: a rig of four cameras, calibrated with an icosahedron and with a cube whose
     /// panels are misplaced, with and without refining them: rig.csv
@@ -208,13 +208,16 @@ fn run_photographs(args: PhotographsArgs) -> anyhow::Result<ExitCode> {
     })?;
     let Some(rows) = rows? else { bail!("interrupted; no result was written") };
     output::print(&table::text(&rows))?;
+    let svg = photographs::plot::svg(&rows);
     let files = [
-        ("photographs.csv", table::csv(&rows)),
-        ("photographs.json", table::json(&rows, simulation.seed)),
+        ("photographs.csv", table::csv(&rows).into_bytes()),
+        ("photographs.json", table::json(&rows, simulation.seed).into_bytes()),
+        ("photographs.png", plot::png(&svg).context("the plot cannot be drawn")?),
+        ("photographs.svg", svg.into_bytes()),
     ];
     for (name, content) in files {
         let path = simulation.output.join(name);
-        output::write(&path, content.as_bytes())?;
+        output::write(&path, &content)?;
         say!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)

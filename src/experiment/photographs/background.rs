@@ -1,6 +1,8 @@
 //! What lies around the page, and the skin of what covers it: seeded textures without end.
 
-use rand::Rng;
+use std::sync::OnceLock;
+
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::mips::{Beyond, Mips};
@@ -16,19 +18,50 @@ pub(super) const TEXELS_PER_MM: f64 = 3.0;
 /// Things in a cluttered texture.
 const THINGS: usize = 400;
 
-/// Its grey values are how much light it sends back, 0 to 255.
-pub(super) fn texture(kind: Background, rng: &mut ChaCha8Rng) -> Mips {
-    let tone = rng.random_range(0.25..0.6);
-    let picture = match kind {
-        Background::Plain => Gray::from_fn(SIDE, SIDE, |_, _| (tone * 255.0) as u8),
-        Background::Texture => grain(tone, 0.12, rng),
-        Background::Clutter => clutter(grain(tone, 0.05, rng), rng),
-    };
-    Mips::new(picture, Beyond::Again)
+/// Stream of chance for textures; photographs take theirs from lower ones.
+const STREAM: u64 = 1 << 63;
+
+/// All textures of a run, made when they are first seen.
+pub struct Studio {
+    pub(super) seed: u64,
+    backgrounds: [OnceLock<Mips>; 3],
+    skin: OnceLock<Mips>,
+}
+
+impl Studio {
+    /// The studio of a seed.
+    pub fn new(seed: u64) -> Self {
+        Self { seed, backgrounds: Default::default(), skin: OnceLock::new() }
+    }
+
+    /// What lies around the page: how much light it sends back, 0 to 255.
+    pub(super) fn background(&self, kind: Background) -> &Mips {
+        self.backgrounds[kind as usize].get_or_init(|| {
+            let mut rng = self.rng(1 + kind as u64);
+            let tone: f64 = rng.random_range(0.3..0.5);
+            let picture = match kind {
+                Background::Plain => Gray::from_fn(SIDE, SIDE, |_, _| (tone * 255.0) as u8),
+                Background::Texture => grain(tone, 0.12, &mut rng),
+                Background::Clutter => clutter(grain(tone, 0.05, &mut rng), &mut rng),
+            };
+            Mips::new(picture, Beyond::Again)
+        })
+    }
+
+    /// Grain about 128.
+    pub(super) fn skin(&self) -> &Mips {
+        self.skin.get_or_init(|| Mips::new(grain(0.5, 0.06, &mut self.rng(0)), Beyond::Again))
+    }
+
+    fn rng(&self, texture: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(STREAM + texture);
+        rng
+    }
 }
 
 /// Noise of all sizes from 256 texels down, each weaker than the larger ones.
-pub(super) fn grain(mean: f64, contrast: f64, rng: &mut ChaCha8Rng) -> Gray<u8> {
+fn grain(mean: f64, contrast: f64, rng: &mut ChaCha8Rng) -> Gray<u8> {
     const LARGEST: usize = 256;
     const WEAKER: f64 = 0.72;
     let mut sum = vec![0.0f64; SIDE * SIDE];

@@ -21,6 +21,9 @@ pub struct Covers(Vec<Stroke>);
 /// Steps by which a hand is moved in.
 const STEPS: u32 = 200;
 
+/// Most hands that are held over a board; two cover half of it.
+const MOST_HANDS: u32 = 6;
+
 /// Most things that are laid on a board until enough of it is covered.
 const MOST_THINGS: usize = 500;
 
@@ -50,11 +53,11 @@ impl Covers {
             }
             return covers;
         }
-        // One hand for a third of the board, a second from elsewhere for what is missing.
+        // A hand for each third of the board, from all around.
         let first = rng.random_range(0.0..std::f64::consts::TAU);
-        let side = rng.random_range(2.0..4.3);
-        for (hand, turn) in [first, first + side].into_iter().enumerate() {
-            let share = if hand == 0 { part.min(0.35) } else { part };
+        for hand in 1..=MOST_HANDS {
+            let turn = first + f64::from(hand) * rng.random_range(2.0..2.8);
+            let share = part.min(f64::from(hand) / 3.0);
             let shape = hand_shape(reach, rng);
             let towards = DVec2::from_angle(turn);
             for step in 0..STEPS {

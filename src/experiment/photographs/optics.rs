@@ -36,8 +36,10 @@ pub(super) struct Setting<'a> {
     pub view: &'a View,
     pub covers: &'a Covers,
     pub background: &'a Mips,
-    /// Skin of the covers, where there are any.
-    pub skin: Option<&'a Mips>,
+    /// Where on the background's texture the page lies, texels.
+    pub shift: DVec2,
+    /// Skin of the covers.
+    pub skin: &'a Mips,
     pub light: &'a Light,
 }
 
@@ -158,11 +160,10 @@ fn sample_row(
     count: usize,
     place: &dyn Fn(usize) -> f64,
 ) -> Vec<f32> {
-    let &Setting { page, view, background, skin, .. } = setting;
+    let &Setting { page, view, background, shift, skin, .. } = setting;
     let covers = setting.covers.in_row(y);
     let step = 1.0 / SUBPIXELS as f64;
     let (white, black) = (scene.white as f32, (scene.white / scene.contrast) as f32);
-    let flat = View { curl: None, ..view.clone() };
     let mut samples = Vec::with_capacity(count);
     let mut areas: Option<(Footprint, Footprint)> = None;
     for k in 0..count {
@@ -174,7 +175,7 @@ fn sample_row(
                 (page.footprint(across, down), background.footprint(texels(across), texels(down)))
             });
         }
-        if let Some(skin) = skin.filter(|_| !covers.is_empty())
+        if !covers.is_empty()
             && let Some(tone) = covers.tone(at)
         {
             // The skin has its grain in the picture, not on the page.
@@ -191,8 +192,9 @@ fn sample_row(
         let light = match seen.and_then(|place| page.whiteness(place, on_page)) {
             Some(whiteness) => black + (white - black) * whiteness,
             None => {
-                let [u, v] = flat.page_from_px(at).unwrap_or([0.0; 2]);
-                let texel = [u * TEXELS_PER_MM, v * TEXELS_PER_MM];
+                let table = if view.curl.is_none() { seen } else { view.table_from_px(at) };
+                let [u, v] = table.unwrap_or([0.0; 2]);
+                let texel = [u * TEXELS_PER_MM + shift.x, v * TEXELS_PER_MM + shift.y];
                 background.area(texel, around) / 255.0 * white
             }
         };
@@ -203,8 +205,7 @@ fn sample_row(
 
 /// What a step to the right and a step down are on the page, mm.
 fn sides(view: &View, [x, y]: [f64; 2], step: f64) -> Option<[[f64; 2]; 2]> {
-    let flat = View { curl: None, ..view.clone() };
-    let look = |at| view.page_from_px(at).or_else(|| flat.page_from_px(at));
+    let look = |at| view.page_from_px(at).or_else(|| view.table_from_px(at));
     let (here, right, below) = (look([x, y])?, look([x + step, y])?, look([x, y + step])?);
     Some([right, below].map(|[u, v]| [u - here[0], v - here[1]]))
 }

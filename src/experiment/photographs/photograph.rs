@@ -10,14 +10,13 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-use super::background::{grain, texture};
+use super::background::Studio;
 use super::covers::Covers;
-use super::mips::{Beyond, Mips};
 use super::optics::{Light, Setting, Spot, expose};
 use super::page::{PageCorner, PrintedPage};
 use super::scene::{MOST_TILT_DEG, Scene};
 use super::sensor::record;
-use super::view::{Curl, View};
+use super::view::{Curl, Place, View};
 use crate::raster::Gray;
 
 /// A corner nearer to a cover's outline or to the border than this counts neither as seen nor as
@@ -96,7 +95,8 @@ fn chance(seed: u64, view: u64, of: Chance) -> ChaCha8Rng {
 }
 
 /// Takes a photograph. The same page, scene, seed and view give the same bytes.
-pub fn take(page: &PrintedPage, scene: &Scene, seed: u64, view: u64) -> Photograph {
+pub fn take(page: &PrintedPage, studio: &Studio, scene: &Scene, view: u64) -> Photograph {
+    let seed = studio.seed;
     let rng = |of| chance(seed, view, of);
     let camera = pose(page, scene, &mut rng(Chance::Pose));
     let seen: Vec<(&PageCorner, [f64; 2])> = page
@@ -107,15 +107,15 @@ pub fn take(page: &PrintedPage, scene: &Scene, seed: u64, view: u64) -> Photogra
     let places: Vec<[f64; 2]> = seen.iter().map(|(_, place)| *place).collect();
     let covers = Covers::over(&places, scene.covered, view % 2 == 1, &mut rng(Chance::Covers));
     let light = light(scene, &places, &mut rng(Chance::Light));
-    let background = texture(scene.background, &mut rng(Chance::Background));
-    let skin = (!covers.is_empty())
-        .then(|| Mips::new(grain(0.5, 0.06, &mut rng(Chance::Covers)), Beyond::Again));
+    let mut around = rng(Chance::Background);
+    let shift = DVec2::new(around.random_range(0.0..1e3), around.random_range(0.0..1e3));
     let setting = Setting {
         page,
         view: &camera,
         covers: &covers,
-        background: &background,
-        skin: skin.as_ref(),
+        background: studio.background(scene.background),
+        shift,
+        skin: studio.skin(),
         light: &light,
     };
     let image = record(&expose(&setting, scene), scene, &mut rng(Chance::Noise));
@@ -167,9 +167,8 @@ fn pose(page: &PrintedPage, scene: &Scene, rng: &mut ChaCha8Rng) -> View {
         focal_px,
         lens,
         middle_mm,
-        rotation,
-        translation_mm: off_mm.extend(distance_mm),
         curl,
+        place: Place::new(rotation, off_mm.extend(distance_mm)),
     }
 }
 

@@ -115,7 +115,7 @@ fn half_turned(truth: &[TrueCorner]) -> BTreeMap<u32, u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::{Grid, GridCorner};
+    use crate::detect::{Detector, DetectorConfig, Grid, GridCorner};
     use crate::lattice::GridKind;
     use crate::raster::Gray;
 
@@ -143,15 +143,12 @@ mod tests {
             y: 10.0,
             cov: Some([0.01, 0.0, 0.01]),
         };
-        let corners = reports.iter().enumerate().map(corner).collect();
-        let grid = Grid { kind: GridKind::Checker, panel: Some(0), corners, tags: Vec::new() };
-        let detection = Detection {
-            image: String::new(),
-            width: 200,
-            height: 20,
-            grids: vec![grid],
-            timing_ms: BTreeMap::new(),
-        };
+        let plain = Detector::for_grid(GridKind::Checker, None, DetectorConfig::default());
+        let mut detection = plain.detect(&truth().image, "");
+        let head = r#"{"kind": "checker", "panel": 0, "corners": [], "tags": []}"#;
+        let mut grid: Grid = serde_json::from_str(head).unwrap();
+        grid.corners = reports.iter().enumerate().map(corner).collect();
+        detection.grids = vec![grid];
         score(&detection, &truth(), 1.0, half_turn)
     }
 

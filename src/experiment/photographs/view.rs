@@ -30,12 +30,30 @@ pub struct View {
     pub lens: f64,
     /// Middle of the board on the page, mm.
     pub middle_mm: [f64; 2],
-    /// R.
-    pub rotation: DMat3,
-    /// t, mm.
-    pub translation_mm: DVec3,
     /// How the sheet is bent; `None` for a flat one.
     pub curl: Option<Curl>,
+    /// How the camera stands to it.
+    pub place: Place,
+}
+
+/// How the camera stands to the sheet.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// R.
+    rotation: DMat3,
+    /// t, mm.
+    translation_mm: DVec3,
+    /// Rᵀ, and the camera in the frame of the sheet, −Rᵀ t.
+    turn_back: DMat3,
+    eye_mm: DVec3,
+}
+
+impl Place {
+    /// From R and t.
+    pub fn new(rotation: DMat3, translation_mm: DVec3) -> Self {
+        let turn_back = rotation.transpose();
+        Self { rotation, translation_mm, turn_back, eye_mm: -(turn_back * translation_mm) }
+    }
 }
 
 /// A sheet bent to a cylinder.
@@ -49,28 +67,34 @@ pub struct Curl {
 
 impl View {
     /// Where a pixel looks on the page, mm; `None` where it looks past the bent sheet.
-    pub fn page_from_px(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn page_from_px(&self, px: [f64; 2]) -> Option<[f64; 2]> {
+        let Some(curl) = self.curl else { return self.table_from_px(px) };
+        let place = curl.hit(self.place.eye_mm, self.ray(px))?;
+        Some([place.x + self.middle_mm[0], place.y + self.middle_mm[1]])
+    }
+
+    /// Where a pixel looks on the plane in which the page would lie were it flat, mm; `None` at and
+    /// above its horizon.
+    pub fn table_from_px(&self, px: [f64; 2]) -> Option<[f64; 2]> {
+        let (eye, ray) = (self.place.eye_mm, self.ray(px));
+        let s = -eye.z / ray.z;
+        (s > 0.0)
+            .then(|| [eye.x + s * ray.x + self.middle_mm[0], eye.y + s * ray.y + self.middle_mm[1]])
+    }
+
+    /// Direction into which a pixel looks, in the frame of the sheet.
+    fn ray(&self, [x, y]: [f64; 2]) -> DVec3 {
         let [cx, cy] = self.centre_px();
         let m = DVec2::new(x - cx, y - cy) / self.focal_px;
         let n = m * (1.0 + self.lens * m.length_squared());
-        let from_camera = self.rotation.transpose();
-        let ray = from_camera * n.extend(1.0);
-        let eye = -(from_camera * self.translation_mm);
-        let place = match self.curl {
-            None => {
-                let s = -eye.z / ray.z;
-                (s > 0.0).then(|| (eye + s * ray).truncate())?
-            }
-            Some(curl) => curl.hit(eye, ray)?,
-        };
-        Some([place.x + self.middle_mm[0], place.y + self.middle_mm[1]])
+        self.place.turn_back * n.extend(1.0)
     }
 
     /// Where a place of the page is seen, px; `None` behind the camera and where the sheet hides it.
     pub fn px_from_page(&self, page_mm: [f64; 2]) -> Option<[f64; 2]> {
         let place = DVec2::from(page_mm) - DVec2::from(self.middle_mm);
         let on_sheet = self.curl.map_or(place.extend(0.0), |curl| curl.bent(place));
-        let p = self.rotation * on_sheet + self.translation_mm;
+        let p = self.place.rotation * on_sheet + self.place.translation_mm;
         if p.z <= 0.0 {
             return None;
         }
@@ -140,10 +164,11 @@ mod tests {
             focal_px: 700.0,
             lens: -0.12,
             middle_mm: [100.0, 75.0],
-            rotation: DMat3::from_rotation_x(0.6)
-                * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)),
-            translation_mm: DVec3::new(5.0, -3.0, 400.0),
             curl,
+            place: Place::new(
+                DMat3::from_rotation_x(0.6) * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)),
+                DVec3::new(5.0, -3.0, 400.0),
+            ),
         }
     }
 
