@@ -8,7 +8,7 @@
 //! A target's PDF is written and drawn by hayro ([`page`]); nothing of [`crate::synth`] takes part, nor
 //! of [`crate::camera`]. Where its corners are, its own paths say. The page is seen by a pinhole camera
 //! with a bending lens ([`view`]), blurred and lit ([`optics`]), partly covered ([`covers`]) and recorded
-//! ([`sensor`]). One thing at a time is varied ([`axes`]) from a scene that is always the same
+//! (`sensor`). One thing at a time is varied ([`axes`]) from a scene that is always the same
 //! ([`scene`]), with the same poses at every level.
 //!
 //! What it does not show: print that is not black and white, depth of field, lateral colour, rolling

@@ -1,7 +1,7 @@
 //! The light that falls on each pixel of the sensor.
 //!
-//! The scene is sampled [`SUBPIXELS`] times along both axes of a pixel, each sample an area of the page
-//! itself ([`super::mips`]), and blurred and gathered in one step: a pixel is the integral of the
+//! The scene is sampled `SUBPIXELS` times along both axes of a pixel, each sample an area of the page
+//! itself (`mips`), and blurred and gathered in one step: a pixel is the integral of the
 //! picture over its square, convolved with a Gaussian,
 //!
 //! ```text
