@@ -32,8 +32,8 @@ pub struct FinderArgs {
     /// Most bits of a tag that may be corrected [default: ⌊(h−1)/2⌋ of its family]
     #[arg(long, value_name = "BITS", conflicts_with = "grid")]
     max_errors: Option<u32>,
-    /// Label boards that are seen as in a mirror too
-    #[arg(long)]
+    /// Label untagged boards of known size that are seen as in a mirror too
+    #[arg(long, requires = "grid")]
     allow_mirrored: bool,
     /// How corners are refined
     #[arg(long, value_name = "METHOD", default_value = "model")]
