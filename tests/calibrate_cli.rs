@@ -66,6 +66,8 @@ fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8
         width: camera.width,
         height: camera.height,
         grids: vec![grid],
+        tone: None,
+        reasons: Vec::new(),
         timing_ms: Default::default(),
     }
 }

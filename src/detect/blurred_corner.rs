@@ -39,9 +39,60 @@ pub struct Shade<const K: usize> {
     pub correlation: f32,
 }
 
+/// The brightness around a corner of K edges.
+///
+/// A trait, since its methods are compiled for the processor of the loop that they are inlined into; closures
+/// that are called twice are not.
+pub trait Pattern<const K: usize> {
+    /// The brightness at distances h from the edges.
+    fn at(&self, h: [f32; K]) -> Shade<K>;
+}
+
 /// Three edges.
+#[derive(Clone, Copy, Debug)]
+pub struct Deltille;
+
+impl Pattern<3> for Deltille {
+    #[inline(always)]
+    fn at(&self, h: [f32; 3]) -> Shade<3> {
+        deltille(h)
+    }
+}
+
+impl Pattern<2> for Orthant {
+    #[inline(always)]
+    fn at(&self, h: [f32; 2]) -> Shade<2> {
+        self.checker(h)
+    }
+}
+
+/// The corner of a picture that was sharpened: (1 + α)·f(h) − α·f(h/w). A pattern of edges is linear in the
+/// point spread function, so this is exact where the mask is a Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub struct Haloed<P> {
+    /// Without the halo.
+    pub pattern: P,
+    /// α.
+    pub strength: f32,
+    /// 1/w.
+    pub narrower: f32,
+}
+
+impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
+    #[inline(always)]
+    fn at(&self, h: [f32; K]) -> Shade<K> {
+        let (sharp, wide) = (self.pattern.at(h), self.pattern.at(h.map(|h| h * self.narrower)));
+        let both = |sharp: f32, wide: f32| sharp + self.strength * (sharp - wide);
+        Shade {
+            f: both(sharp.f, wide.f),
+            slopes: std::array::from_fn(|k| both(sharp.slopes[k], wide.slopes[k] * self.narrower)),
+            correlation: both(sharp.correlation, wide.correlation),
+        }
+    }
+}
+
 #[inline(always)]
-pub fn deltille([h1, h2, h3]: [f32; 3]) -> Shade<3> {
+fn deltille([h1, h2, h3]: [f32; 3]) -> Shade<3> {
     Shade {
         f: erf_sqrt_half(h1) - erf_sqrt_half(h2) + erf_sqrt_half(h3),
         slopes: [SLOPE * bell(h1), -SLOPE * bell(h2), SLOPE * bell(h3)],
@@ -104,7 +155,7 @@ fn bell(h: f32) -> f32 {
 
 /// erf(h/√2), by Abramowitz and Stegun 7.1.26; error below 2·10⁻⁷.
 #[inline(always)]
-fn erf_sqrt_half(h: f32) -> f32 {
+pub(super) fn erf_sqrt_half(h: f32) -> f32 {
     let t = 1.0 / (1.0 + 0.327_591_1 * FRAC_1_SQRT_2 * h.abs());
     let poly = t
         * (0.254_829_6

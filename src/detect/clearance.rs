@@ -8,15 +8,18 @@
 //!     4 ╲──▒▒▒▒──╱ 5
 //! ```
 
+use std::cell::LazyCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2};
 
 use super::detection::{Grid, GridCorner};
+use super::local_map::{Bend, LocalMap};
+use super::tiling::{CHECKER, DELTILLE};
 use crate::family::Family;
 use crate::lattice::{Tile, Vertex};
-use crate::target::{Panel, TagsIn, Target};
+use crate::target::{GridKind, Panel, TagsIn, Target};
 
 /// Blur of the next edges reaches this many standard deviations into the clear: beyond, an edge
 /// changes what is seen by less than 2.5 % of its contrast.
@@ -117,11 +120,21 @@ impl Surroundings {
 /// grid's. Of a corner whose neighbours lie in one line nothing is known, and nothing is clear.
 pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
     let places = Places::of(grid, scale);
+    let bend = LazyCell::new(|| places.bend(grid));
     let around = |corner: &GridCorner| {
         let vertex = Vertex::new(corner.row, corner.col);
         let [x, y] = places.get(vertex)?;
         let seen = |step: Vertex| places.get(vertex + step).map(|p| [p[0] - x, p[1] - y]);
-        let usual = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))))?;
+        let near = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))));
+        // Of a corner by itself those beyond its neighbours tell where these would be.
+        let map = match &near {
+            Some(_) => None,
+            None => Some(places.map_about(grid.kind, vertex, *bend)?),
+        };
+        let usual = |step| match &near {
+            Some(near) => near(step),
+            None => map.map_or([0.0; 2], |map| map.along(step)),
+        };
         let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
         let edges = edges(grid, &places, vertex, place);
         let is_inner = grid.kind.steps().iter().all(|&step| seen(step).is_some());
@@ -202,6 +215,21 @@ impl Places {
 
     fn get(&self, vertex: Vertex) -> Option<[f64; 2]> {
         *self.places.get(self.index(vertex)?)?
+    }
+
+    fn bend(&self, grid: &Grid) -> Bend {
+        let vertices = grid.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
+        match grid.kind {
+            GridKind::Deltille => Bend::of::<DELTILLE>(vertices, |v| self.get(v), 0),
+            GridKind::Checker => Bend::of::<CHECKER>(vertices, |v| self.get(v), 0),
+        }
+    }
+
+    fn map_about(&self, kind: GridKind, vertex: Vertex, bend: Bend) -> Option<LocalMap> {
+        match kind {
+            GridKind::Deltille => LocalMap::about::<DELTILLE>(vertex, |v| self.get(v), bend),
+            GridKind::Checker => LocalMap::about::<CHECKER>(vertex, |v| self.get(v), bend),
+        }
     }
 }
 
@@ -300,7 +328,6 @@ fn line(a: [f64; 2], b: [f64; 2], inside: [f64; 2]) -> Line {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lattice::GridKind;
 
     /// A grid of 5 × 5 corners in the picture.
     fn grid(kind: GridKind, image: impl Fn([f64; 2]) -> [f64; 2]) -> Grid {

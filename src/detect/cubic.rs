@@ -94,6 +94,17 @@ impl CubicFit {
         start: [f64; 2],
         iterations: usize,
     ) -> Option<Umbilic> {
+        self.walk(image, start, iterations, CONVERGED_PX)
+    }
+
+    /// [`Self::refine`] that ends with a step shorter than `converged_px`.
+    pub fn walk<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        start: [f64; 2],
+        iterations: usize,
+        converged_px: f64,
+    ) -> Option<Umbilic> {
         let radius = self.fit.radius() as f64;
         let mut position = start;
         let mut surface = self.surface(image, position)?;
@@ -108,7 +119,7 @@ impl CubicFit {
             if step > radius || way > radius {
                 return None;
             }
-            if step < CONVERGED_PX || iteration >= iterations {
+            if step < converged_px || iteration >= iterations {
                 break;
             }
             surface = self.surface(image, position)?;

@@ -2,6 +2,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::curve::ToneEstimate;
+use super::reason::Reason;
+use crate::raster::Pyramid;
 use crate::target::GridKind;
 
 /// What was found in one image.
@@ -15,6 +18,11 @@ pub struct Detection {
     pub height: u32,
     /// Grids: labelled ones by panel id, then the others, largest first.
     pub grids: Vec<Grid>,
+    /// What was found of the camera's tone curve, where it was looked for.
+    pub tone: Option<ToneEstimate>,
+    /// Why there are no labels, where labels were looked for and no grid has any; and why there are no grids.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<Reason>,
     /// Milliseconds per stage.
     pub timing_ms: BTreeMap<String, f64>,
 }
@@ -49,6 +57,22 @@ impl Grid {
             next.into_iter().filter_map(|v| places.get(&v)).map(|[x, y]| (c.x - x).hypot(c.y - y))
         });
         median(edges.collect())
+    }
+
+    /// Expresses positions in px of a level of the pyramid.
+    pub(super) fn moved_to_level(&mut self, level: usize) {
+        for corner in &mut self.corners {
+            [corner.x, corner.y] = Pyramid::from_level_0(level, [corner.x, corner.y]);
+        }
+    }
+
+    /// Undoes [`Self::moved_to_level`], for covariances too.
+    pub(super) fn moved_from_level(&mut self, level: usize) {
+        let area = 4f64.powi(level as i32);
+        for corner in &mut self.corners {
+            [corner.x, corner.y] = Pyramid::to_level_0(level, [corner.x, corner.y]);
+            corner.cov = corner.cov.map(|cov| cov.map(|entry| area * entry));
+        }
     }
 }
 

@@ -5,19 +5,28 @@ use std::time::Instant;
 
 use super::clearance::TagAreas;
 use super::corner_model::CornerFitter;
+use super::curve::{Tone, ToneEstimate};
 use super::detection::{Detection, Grid};
 use super::grow::grids;
+use super::label::Budget;
 use super::labels::{Labels, report_once};
+use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
+use super::refine_grid::sharp_level;
 use super::saddles::SaddleFinder;
 use super::tiling::{CHECKER, DELTILLE, kind};
+use super::why;
 use crate::family::Family;
 use crate::lattice::GridKind;
-use crate::raster::{AnyGray, Gray, Intensity, Pyramid};
+use crate::raster::{AnyGray, Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
 use crate::target::{Target, least_untagged_corners};
 
-/// Levels of the pyramid: the coarsest sees four times the blur that the finest can.
+/// Most levels of the pyramid that every image has: the coarsest sees four times the blur that the finest can.
 const PYRAMID_LEVELS: usize = 3;
+
+/// Larger images have more, as long as a level is no narrower than this: an enlarged or blurred image
+/// shows no less than a small one, where a dozen corners in line are ten pixels apart.
+const MIN_FURTHER_SIDE: usize = 150;
 
 /// A level narrower than this shows no grid.
 const MIN_LEVEL_SIDE: usize = 24;
@@ -35,6 +44,12 @@ const fn max_untagged_blur(kind: GridKind) -> f64 {
     }
 }
 
+/// Grids that are told why they have no labels: the largest ones.
+const MOST_REASONS: usize = 3;
+
+/// A grid of the other tiling with fewer corners is no reason to ask whether that was meant.
+const LEAST_OTHER_CORNERS: usize = 20;
+
 /// Options of a detector.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DetectorConfig {
@@ -45,6 +60,8 @@ pub struct DetectorConfig {
     pub allow_mirrored: bool,
     /// How the positions of corners are refined.
     pub refinement: Refinement,
+    /// The camera's tone curve.
+    pub tone: Tone,
 }
 
 /// Radius of the polynomial that refines, px: the reference detector's.
@@ -131,42 +148,119 @@ impl Detector {
         name: &str,
     ) -> Detection {
         let mut timing = Timing::start();
-        let pyramid = Pyramid::new(image, PYRAMID_LEVELS, MIN_LEVEL_SIDE);
+        let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
         timing.lap("pyramid");
         let saddles = finder.find(&pyramid);
         timing.lap("saddles");
         let found = grids(finder, &pyramid, &saddles);
         timing.lap("grids");
-        let mut grids: Vec<Grid> =
-            found.iter().flat_map(|grid| self.labels.label(image, grid)).collect();
-        grids.iter_mut().for_each(|grid| grid.kind = kind::<N>());
+        let mut budget = Budget::default();
+        let mut grids: Vec<(Grid, Option<Reason>)> =
+            found.iter().flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
+        grids.iter_mut().for_each(|(grid, _)| grid.kind = kind::<N>());
         let least = least_untagged_corners(kind::<N>()) as usize;
-        grids.retain(|grid| {
+        let mut too_small = None;
+        grids.retain(|(grid, _)| {
             let plausible = grid.corners.len() >= least && !self.labels.exceeded_by(grid);
-            !grid.tags.is_empty()
-                || plausible && grid.edge_px().unwrap_or(0.0) >= MIN_UNTAGGED_EDGE_PX
+            let edge_px = grid.edge_px().unwrap_or(0.0);
+            if plausible && edge_px < MIN_UNTAGGED_EDGE_PX {
+                let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+                too_small.get_or_insert_with(|| Reason::new(ReasonKind::TooSmall, figures));
+            }
+            is_vouched_for(grid) || plausible && edge_px >= MIN_UNTAGGED_EDGE_PX
         });
         report_once(&mut grids);
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
-        grids.sort_by_key(|grid| grid.panel.unwrap_or(u32::MAX));
+        grids.sort_by_key(|(grid, _)| grid.panel.unwrap_or(u32::MAX));
         timing.lap("labels");
         let mut fitter = CornerFitter::default();
-        grids.retain_mut(|grid| {
-            let edge_px = grid.edge_px().unwrap_or(0.0);
-            let images = (image, &pyramid);
-            let blur_px = self.refiner.refine_grid(&mut fitter, images, grid, &self.tag_areas);
-            let is_wave =
-                blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(kind::<N>()) * edge_px);
-            !grid.tags.is_empty() || grid.corners.len() >= least && !is_wave
-        });
+        let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
+        let (tone, are_waves) = self.refine(&mut fitter, (image, &pyramid), &mut refined);
+        let refined = refined.into_iter().zip(reasons).zip(are_waves);
+        let grids: Vec<(Grid, Option<Reason>)> = refined
+            .filter(|((grid, _), is_wave)| {
+                is_vouched_for(grid) || grid.corners.len() >= least && !is_wave
+            })
+            .map(|(grid, _)| grid)
+            .collect();
         timing.lap("refine");
+        let reasons = if grids.is_empty() {
+            vec![too_small.unwrap_or_else(|| self.nothing_found::<N>(&pyramid, saddles.len()))]
+        } else if self.labels.are_wanted() && grids.iter().all(|(_, reason)| reason.is_some()) {
+            let of_grid = |(i, (_, reason)): (usize, &(Grid, Option<Reason>))| {
+                Some(Reason { grid: Some(i), ..reason.clone()? })
+            };
+            grids.iter().enumerate().filter_map(of_grid).take(MOST_REASONS).collect()
+        } else {
+            Vec::new()
+        };
         Detection {
             image: name.to_owned(),
             width: image.width() as u32,
             height: image.height() as u32,
-            grids,
+            grids: grids.into_iter().map(|(grid, _)| grid).collect(),
+            tone,
+            reasons,
             timing_ms: timing.laps,
         }
+    }
+
+    /// Refines all grids on the level of the pyramid that suits their blur; the tone curve that was found,
+    /// and for each grid whether the blur leaves of it but a wave.
+    fn refine<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        (image, pyramid): (&Gray<T>, &Pyramid),
+        grids: &mut [Grid],
+    ) -> (Option<ToneEstimate>, Vec<bool>) {
+        let blurs = self.refiner.blurs(fitter, (image, pyramid), grids, &self.tag_areas);
+        match sharp_level(&blurs, pyramid.levels().len()) {
+            0 => self.refine_blurred(fitter, image, grids, &blurs),
+            level => {
+                let above = pyramid.above(level);
+                let image = above.in_full_scale();
+                grids.iter_mut().for_each(|grid| grid.moved_to_level(level));
+                let blurs = self.refiner.blurs(fitter, (&image, &above), grids, &self.tag_areas);
+                let found = self.refine_blurred(fitter, &image, grids, &blurs);
+                grids.iter_mut().for_each(|grid| grid.moved_from_level(level));
+                found
+            }
+        }
+    }
+
+    /// [`Self::refine`] in an image that shows the grids under these blurs, px.
+    fn refine_blurred<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        image: &Gray<T>,
+        grids: &mut [Grid],
+        blurs: &[Option<f64>],
+    ) -> (Option<ToneEstimate>, Vec<bool>) {
+        let optics = self.refiner.optics(fitter, image, (grids, blurs), &self.tag_areas);
+        let refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
+            let edge_px = grid.edge_px().unwrap_or(0.0);
+            self.refiner.refine_grid(fitter, image, grid, &self.tag_areas, (&optics, blur_px));
+            blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
+        };
+        let are_waves = grids.iter_mut().zip(blurs).map(refine).collect();
+        (optics.tone, are_waves)
+    }
+
+    /// Why there are no grids in a picture with so many corners.
+    fn nothing_found<const N: usize>(&self, pyramid: &Pyramid, corners: usize) -> Reason {
+        // At half the size, which takes a quarter of the time.
+        let half = pyramid.levels().get(1).map(|level| {
+            let to_one = 1.0 / PYRAMID_FULL_SCALE;
+            Pyramid::new(&level.map(|v| f32::from(v) * to_one), PYRAMID_LEVELS - 1, MIN_LEVEL_SIDE)
+        });
+        let others = half.map_or(0, |half| match kind::<N>() {
+            GridKind::Deltille => most_corners(&SaddleFinder::<CHECKER>::new(), &half),
+            GridKind::Checker => most_corners(&SaddleFinder::<DELTILLE>::new(), &half),
+        });
+        if others >= LEAST_OTHER_CORNERS {
+            return Reason::new(ReasonKind::OtherTiling, [("corners", others as f64)]);
+        }
+        why::nothing_found(pyramid, corners)
     }
 
     /// [`Self::detect`] for an image of either depth.
@@ -178,8 +272,27 @@ impl Detector {
     }
 }
 
+/// Whether tags, or the outline of a mirrored board, tell that a grid is one.
+fn is_vouched_for(grid: &Grid) -> bool {
+    !grid.tags.is_empty() || grid.mirrored
+}
+
+/// Corners of the largest grid of a tiling.
+fn most_corners<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid) -> usize {
+    let saddles = finder.find(pyramid);
+    grids(finder, pyramid, &saddles).iter().map(|grid| grid.len()).max().unwrap_or(0)
+}
+
 fn refiner(kind: GridKind, config: DetectorConfig) -> Refiner {
     Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
+        .with_tone(config.tone)
+}
+
+/// Number of levels of an image's pyramid.
+fn levels_of<T: Intensity>(image: &Gray<T>) -> usize {
+    let side = image.width().min(image.height());
+    let fitting = (side / MIN_FURTHER_SIDE).checked_ilog2().unwrap_or(0) as usize + 1;
+    fitting.max(PYRAMID_LEVELS)
 }
 
 /// Stopwatch of the stages.

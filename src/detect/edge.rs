@@ -3,7 +3,7 @@
 use super::saddles::Saddle;
 use super::sectors::turn;
 use super::tiling::kind;
-use crate::raster::Gray;
+use crate::raster::Pyramid;
 use crate::target::GridKind;
 
 /// Largest angle between the chord of an edge and the rays at its ends. Over one tile a fisheye
@@ -24,7 +24,7 @@ const SIDE: f64 = 0.08;
 /// lens may be ten times as long as wide, and the samples stay on its near half.
 const SQUARE_SIDE: f64 = 0.04;
 
-/// The least distance of the samples from the edge, px.
+/// The least distance of the samples from the edge, px of the level.
 const MIN_SIDE_PX: f64 = 1.2;
 
 /// A sample must leave the level by this part of the corners' amplitude.
@@ -39,14 +39,18 @@ const ALLOWED_FAILURES: usize = 1;
 /// The edge is taken as the cubic through both corners with the directions of both rays, which is
 /// the circular arc of the paper where the rays agree with one.
 pub fn is_clean<const N: usize>(
-    image: &Gray<i16>,
+    pyramid: &Pyramid,
     a: &Saddle<N>,
     i: usize,
     b: &Saddle<N>,
     j: usize,
 ) -> bool {
-    let [ax, ay] = a.position;
-    let (dx, dy) = (b.position[0] - ax, b.position[1] - ay);
+    // The coarser of the levels that show the corners sharply shows the edge between them.
+    let level = a.level.max(b.level);
+    let image = &pyramid.levels()[level];
+    let [ax, ay] = Pyramid::from_level_0(level, a.position);
+    let [bx, by] = Pyramid::from_level_0(level, b.position);
+    let (dx, dy) = (bx - ax, by - ay);
     let length = dx.hypot(dy);
     let chord = dy.atan2(dx);
     // Slopes of the curve against its chord at the two ends.
@@ -101,17 +105,19 @@ pub fn is_clean<const N: usize>(
 mod tests {
     use super::super::sectors::Sectors;
     use super::*;
+    use crate::raster::Gray;
 
     /// Dark above the arc y = 50 + bulge, bright below; corners at x = 20 and x = 80.
-    fn scene(bulge: f64) -> (Gray<i16>, Saddle<6>, Saddle<6>) {
+    fn scene(bulge: f64) -> (Gray<u16>, Saddle<6>, Saddle<6>) {
         let image = Gray::from_fn(100, 100, |x, y| {
             let t = (x as f64 - 20.0) / 60.0;
-            if (y as f64) < 50.0 + 4.0 * bulge * t * (1.0 - t) { 100 } else { 700 }
+            if (y as f64) < 50.0 + 4.0 * bulge * t * (1.0 - t) { 6400 } else { 44800 }
         });
         let slope = (4.0 * bulge / 60.0).atan();
         let saddle = |x: f64, rays| Saddle {
             position: [x, 49.5],
             sectors: Sectors { rays, level: 400.0, amplitude: 250.0 },
+            level: 0,
         };
         let mut from = [0.0; 6];
         let mut to = [0.0; 6];
@@ -124,6 +130,7 @@ mod tests {
     fn straight_and_bent_edges_are_clean_in_both_directions() {
         for bulge in [-6.0, 0.0, 6.0] {
             let (image, a, b) = scene(bulge);
+            let image = Pyramid::new(&image, 1, 8);
             assert!(is_clean(&image, &a, 0, &b, 3), "bulge {bulge}");
             assert!(is_clean(&image, &b, 3, &a, 0), "bulge {bulge}, backwards");
         }
@@ -132,8 +139,8 @@ mod tests {
     #[test]
     fn wrong_colours_and_flat_images_are_not() {
         let (image, a, b) = scene(0.0);
-        let negative = image.map(|v| 800 - v);
-        assert!(!is_clean(&negative, &a, 0, &b, 3));
-        assert!(!is_clean(&Gray::new(100, 100), &a, 0, &b, 3));
+        for image in [image.map(|v| 51200 - v), Gray::new(100, 100)] {
+            assert!(!is_clean(&Pyramid::new(&image, 1, 8), &a, 0, &b, 3));
+        }
     }
 }

@@ -7,18 +7,27 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
 use super::edge::{MAX_CHORD_RAD, is_clean};
 use super::links::{Link, Links, facing_ray, links};
+use super::local_map::{Bend, LocalMap};
+use super::parts::join;
 use super::rectified::Rectified;
-use super::saddles::{Saddle, SaddleFinder};
+use super::saddles::{Saddle, SaddleFinder, merge_px};
 use super::sectors::turn;
 use super::tiling::{kind, neighbours, step, tiles_at};
 use crate::lattice::Vertex;
-use crate::raster::{Gray, Pyramid};
+use crate::raster::Pyramid;
 use crate::target::GridKind;
 
 /// Largest distance of a corner from where its neighbours predict it, over the edge length.
 const MAX_SURPRISE: f64 = 0.2;
+
+/// Corners nearer to each other than this part of an edge are the same: under blur and motion one may be
+/// found twice.
+const SAME_PART: f64 = 0.2;
 
 /// A corner's place in a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,20 +50,22 @@ pub type SaddleGrid = BTreeMap<Vertex, PlacedSaddle>;
 
 /// A corner in a grid while it grows.
 #[derive(Clone, Copy, Debug)]
-struct GrownSaddle<const N: usize> {
-    saddle: Saddle<N>,
+pub struct GrownSaddle<const N: usize> {
+    /// The corner.
+    pub saddle: Saddle<N>,
     /// Ray k points along step `k + turn` (mod N) of the lattice.
-    turn: usize,
+    pub turn: usize,
 }
 
 impl<const N: usize> GrownSaddle<N> {
     /// The ray along step `k` of the lattice.
-    fn ray(&self, k: usize) -> usize {
+    pub fn ray(&self, k: usize) -> usize {
         (k + N - self.turn) % N
     }
 }
 
-type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
+/// A grid while it grows.
+pub type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
 
 /// All grids among the saddles, largest first.
 pub fn grids<const N: usize>(
@@ -62,31 +73,91 @@ pub fn grids<const N: usize>(
     pyramid: &Pyramid,
     saddles: &[Saddle<N>],
 ) -> Vec<SaddleGrid> {
-    let image = &pyramid.levels()[0];
-    let links = links(image, saddles);
+    let links = links(pyramid, saddles);
     let mut taken = vec![false; saddles.len()];
-    let mut grids = Vec::new();
+    let index = SaddleIndex::of(saddles);
+    let (mut growing, mut members) = (Vec::new(), Vec::new());
     for seed in seeds(&links) {
         if seed.iter().any(|&(corner, _)| taken[corner]) {
             continue;
         }
         let places = grow(&links, &seed, &taken);
-        let mut grid: Growing<N> = places
-            .iter()
-            .map(|(&corner, place)| {
-                taken[corner] = true;
-                (place.vertex, GrownSaddle { saddle: saddles[corner], turn: place.turn })
-            })
-            .collect();
+        let mut own: BTreeMap<usize, Vertex> = BTreeMap::new();
+        let mut grid: Growing<N> = BTreeMap::new();
+        for (corner, Place { vertex, turn }) in places {
+            own.insert(corner, vertex);
+            grid.insert(vertex, GrownSaddle { saddle: saddles[corner], turn });
+        }
         fill_gaps(finder, pyramid, &mut grid);
-        let plain = |grown: GrownSaddle<N>| PlacedSaddle {
-            position: grown.saddle.position,
-            amplitude: grown.saddle.sectors.amplitude,
-        };
-        grids.push(grid.into_iter().map(|(v, grown)| (v, plain(grown))).collect());
+        // What is found in a gap may have been found before, without its links.
+        grid.retain(|&vertex, grown| match index.same(&grown.saddle) {
+            Some(corner) if taken[corner] => false,
+            Some(corner) => *own.entry(corner).or_insert(vertex) == vertex,
+            None => true,
+        });
+        own.keys().for_each(|&corner| taken[corner] = true);
+        growing.push(grid);
+        members.push(own);
     }
+    let mut grids: Vec<SaddleGrid> = join(pyramid, saddles, growing, members)
+        .into_iter()
+        .map(|(mut grid, has_grown)| {
+            if has_grown {
+                fill_gaps(finder, pyramid, &mut grid);
+            }
+            grid.into_iter().map(|(v, grown)| (v, plain(&grown))).collect()
+        })
+        .collect();
     grids.sort_by_key(|grid: &SaddleGrid| std::cmp::Reverse(grid.len()));
-    without_tag_cells::<N>(grids)
+    let mut grids = without_tag_cells::<N>(grids);
+    each_once(&mut grids);
+    grids
+}
+
+fn plain<const N: usize>(grown: &GrownSaddle<N>) -> PlacedSaddle {
+    PlacedSaddle { position: grown.saddle.position, amplitude: grown.saddle.sectors.amplitude }
+}
+
+/// Saddles by place.
+struct SaddleIndex(RTree<GeomWithData<[f64; 2], usize>>);
+
+impl SaddleIndex {
+    fn of<const N: usize>(saddles: &[Saddle<N>]) -> Self {
+        let places = saddles.iter().enumerate().map(|(i, s)| GeomWithData::new(s.position, i));
+        Self(RTree::bulk_load(places.collect()))
+    }
+
+    /// The saddle that is the same as another one.
+    fn same<const N: usize>(&self, saddle: &Saddle<N>) -> Option<usize> {
+        let reach_px = merge_px(saddle.level);
+        let nearest = self.0.nearest_neighbor(saddle.position)?;
+        let [x, y] = *nearest.geom();
+        let distance = (x - saddle.position[0]).hypot(y - saddle.position[1]);
+        (distance < reach_px).then_some(nearest.data)
+    }
+}
+
+/// Leaves out of grids the corners that are in a larger one, or under another vertex of the same.
+fn each_once(grids: &mut Vec<SaddleGrid>) {
+    let mut places: RTree<[f64; 2]> = RTree::new();
+    for grid in grids.iter_mut() {
+        let whole = grid.clone();
+        grid.retain(|&vertex, placed| {
+            let [x, y] = placed.position;
+            let neighbours = Vertex::STEPS.iter().filter_map(|&step| whole.get(&(vertex + step)));
+            let nearest_px = neighbours
+                .map(|p| (p.position[0] - x).hypot(p.position[1] - y))
+                .reduce(f64::min)
+                .unwrap_or(0.0);
+            let same2 = (SAME_PART * nearest_px).powi(2);
+            let is_new = places.locate_within_distance([x, y], same2).next().is_none();
+            if is_new {
+                places.insert([x, y]);
+            }
+            is_new
+        });
+    }
+    grids.retain(|grid| !grid.is_empty());
 }
 
 /// Drops grids that lie within one tile of a larger grid: the cells of a tag are a tiling too.
@@ -279,7 +350,7 @@ fn fill_gaps<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid, grid: 
 }
 
 /// Where the straight (or evenly bent) rows through `vertex` continue to, and the length of an
-/// edge there; `None` unless two rows predict it.
+/// edge there; `None` unless two rows predict it, or two neighbours and those around them.
 fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<([f64; 2], f64)> {
     let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
     let mut sum = [0.0; 2];
@@ -296,7 +367,14 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<([f64; 2
         edge += (p[0] - q[0]).hypot(p[1] - q[1]);
         count += 1.0;
     }
-    (count >= 2.0).then(|| ([sum[0] / count, sum[1] / count], edge / count))
+    if count >= 2.0 {
+        return Some(([sum[0] / count, sum[1] / count], edge / count));
+    }
+    // The first quad of a grid has no rows, but two of its corners beside the vertex.
+    let beside: Vec<[f64; 2]> = neighbours::<N>(vertex).into_iter().filter_map(at).collect();
+    let map = (beside.len() >= 2).then(|| LocalMap::about::<N>(vertex, at, Bend::usual()))??;
+    let px = |p: &[f64; 2]| (p[0] - map.place[0]).hypot(p[1] - map.place[1]);
+    Some((map.place, beside.iter().map(px).sum::<f64>() / beside.len() as f64))
 }
 
 /// The corner at `vertex`, if one is found near `position`, as the image shows it or in the frame of
@@ -310,14 +388,17 @@ fn corner_near<const N: usize>(
     edge_px: f64,
 ) -> Option<GrownSaddle<N>> {
     let reach = (MAX_SURPRISE * edge_px).max(1.0);
-    let image = &pyramid.levels()[0];
-    let at_place = |saddle| placed_at(image, grid, vertex, saddle);
-    finder.near(image, position, reach).and_then(at_place).or_else(|| {
+    let neighbours = neighbours::<N>(vertex);
+    // What is blurred around it is best looked for where its neighbours were found.
+    let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
+    let level = levels.max().unwrap_or(0);
+    let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);
+    finder.near(pyramid, level, position, reach).and_then(at_place).or_else(|| {
         let seen = |k: usize| grid.get(&(vertex + step::<N>(k))).map(|g| g.saddle.position);
         let edge = |k: usize| seen(k).map(|p| [p[0] - position[0], p[1] - position[1]]);
         (0..N).find_map(|k| {
             Rectified::new::<N>(position, k, [edge(k)?, edge(k + 1)?])?
-                .find(finder, image)
+                .find(finder, pyramid, level)
                 .and_then(at_place)
         })
     })
@@ -325,7 +406,7 @@ fn corner_near<const N: usize>(
 
 /// A corner at `vertex` of a grid, if it has clean edges to two neighbours that agree on its turn.
 fn placed_at<const N: usize>(
-    image: &Gray<i16>,
+    pyramid: &Pyramid,
     grid: &Growing<N>,
     vertex: Vertex,
     saddle: Saddle<N>,
@@ -336,7 +417,7 @@ fn placed_at<const N: usize>(
         let Some(other) = grid.get(&neighbour) else { continue };
         let back = other.ray(k + N / 2);
         if let Some(ray) = facing_ray(&other.saddle, back, &saddle)
-            && is_clean(image, &other.saddle, back, &saddle, ray)
+            && is_clean(pyramid, &other.saddle, back, &saddle, ray)
         {
             votes[(k + N - ray) % N] += 1;
         }

@@ -9,8 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::detection::{DecodedTag, Grid, GridCorner};
 use super::detector::DetectorConfig;
 use super::grow::SaddleGrid;
-use super::label::{Labelled, TagLabeller};
+use super::label::{Budget, Labelled, TagLabeller};
 use super::outline::{fit_outline, fit_rectangle};
+use super::reason::{Reason, ReasonKind};
+use super::why;
 use crate::family::Family;
 use crate::lattice::{GridKind, LatticeMap, Vertex};
 use crate::raster::{Gray, Intensity};
@@ -32,7 +34,7 @@ enum Source {
     /// By the rows and columns of a checkerboard that is seen whole.
     Rectangle((u32, u32)),
     /// By the tags of a target, or by the outlines of its untagged panels.
-    Target { tags: Option<TagLabeller>, panels: Vec<TargetPanel> },
+    Target { tags: Option<Box<TagLabeller>>, panels: Vec<TargetPanel> },
 }
 
 /// What the detector must know of a panel.
@@ -62,10 +64,8 @@ impl Labels {
 
     /// By the tags of a target, and the outlines of its untagged panels.
     pub fn of_target(target: &Target, family: Option<&Family>, config: &DetectorConfig) -> Self {
-        let tags = family.and_then(|family| {
-            let max_errors = config.max_bit_errors.unwrap_or(family.correctable());
-            TagLabeller::new(target, family, max_errors)
-        });
+        let tags =
+            family.and_then(|family| TagLabeller::new(target, family, config.max_bit_errors));
         let panels = target.panels.iter().map(|panel| TargetPanel {
             id: panel.id,
             kind: panel.kind,
@@ -74,63 +74,102 @@ impl Labels {
             tagged: !panel.tags.is_empty(),
             corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
         });
-        let source = Source::Target { tags, panels: panels.collect() };
+        let source = Source::Target { tags: tags.map(Box::new), panels: panels.collect() };
         Self { source, allow_mirrored: config.allow_mirrored }
     }
 
-    /// The panels in a grid; the grid itself with relative labels where there are none.
-    pub fn label<T: Intensity>(&self, image: &Gray<T>, grid: &SaddleGrid) -> Vec<Grid> {
+    /// The panels in a grid; the grid itself with relative labels where there are none, and why there are
+    /// none.
+    pub fn label<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        grid: &SaddleGrid,
+        budget: &mut Budget,
+    ) -> Vec<(Grid, Option<Reason>)> {
+        let size = (image.width(), image.height());
         match &self.source {
-            Source::None => vec![unlabelled(grid)],
+            Source::None => vec![(unlabelled(grid), None)],
             Source::Outline(outline) => {
-                vec![self.on_outline(grid, |grid| fit_outline(grid, outline, false))]
+                let fit = |grid: &SaddleGrid| fit_outline(grid, outline, false);
+                vec![self.on_outline(grid, outline.len(), size, fit)]
             }
-            Source::Rectangle(size) => {
-                vec![self.on_outline(grid, |grid| fit_rectangle(grid, *size, false))]
+            Source::Rectangle(rectangle) => {
+                let fit = |grid: &SaddleGrid| fit_rectangle(grid, *rectangle, false);
+                let expected = rectangle.0 as usize * rectangle.1 as usize;
+                vec![self.on_outline(grid, expected, size, fit)]
             }
             Source::Target { tags, panels } => {
-                let by_tags = tags.as_ref().map_or_else(Vec::new, |tags| tags.label(image, grid));
-                if by_tags.is_empty() {
-                    let by_outline = on_untagged_panel(grid, panels);
-                    return vec![by_outline.unwrap_or_else(|| unlabelled(grid))];
+                let evidence = tags.as_ref().map(|tags| tags.label(image, grid, budget));
+                let found = evidence.as_ref().map_or(&[][..], |evidence| &evidence.found);
+                if found.is_empty() {
+                    if let Some(by_outline) = on_untagged_panel(grid, panels) {
+                        return vec![(by_outline, None)];
+                    }
+                    let why = match &evidence {
+                        Some(evidence) => why::no_labels(evidence, grid, size),
+                        None => why::no_outline(grid, self.most_corners(), size),
+                    };
+                    return vec![(unlabelled(grid), Some(why))];
+                }
+                if !self.allow_mirrored && found.iter().any(|labelled| labelled.mirrored) {
+                    return vec![in_mirror(grid)];
                 }
                 // What hangs on to labelled panels without being part of one is not reported.
-                by_tags.iter().map(|l| on_panel(grid, &panels[l.panel], l)).collect()
+                found.iter().map(|l| (on_panel(grid, &panels[l.panel], l), None)).collect()
             }
         }
+    }
+
+    /// Whether labels are looked for.
+    pub fn are_wanted(&self) -> bool {
+        !matches!(self.source, Source::None)
     }
 
     /// Whether a grid that no tag vouches for has more corners than anything that is looked for: a
     /// halftone, a fabric or a tiled floor is as regular as a board, but seldom as small.
     pub fn exceeded_by(&self, grid: &Grid) -> bool {
-        let most = match &self.source {
+        grid.corners.len() > self.most_corners()
+    }
+
+    /// Corners of the largest thing that is looked for.
+    fn most_corners(&self) -> usize {
+        match &self.source {
             Source::None => usize::MAX,
             Source::Outline(outline) => outline.len(),
             Source::Rectangle((rows, cols)) => *rows as usize * *cols as usize,
             Source::Target { panels, .. } => {
                 panels.iter().map(|panel| panel.corner_ids.len()).max().unwrap_or(0)
             }
-        };
-        grid.corners.len() > most
+        }
     }
 
     /// A grid on the outline of an untagged board, which a mirror image may fit as well.
     fn on_outline(
         &self,
         grid: &SaddleGrid,
+        expected: usize,
+        size: (usize, usize),
         fit: impl Fn(&SaddleGrid) -> Option<LatticeMap>,
-    ) -> Grid {
+    ) -> (Grid, Option<Reason>) {
         if let Some(map) = fit(grid) {
-            return relabelled(grid, |v| Some((map.apply(v), None)), None, Vec::new());
+            let label = |v| Some((map.apply(v), None));
+            return (relabelled(grid, label, None, Vec::new()), None);
         }
-        let Some(map) = fit(&mirror_image(grid)) else { return unlabelled(grid) };
-        let labelled = if self.allow_mirrored {
-            relabelled(grid, |v| Some((map.apply(mirrored(v)), None)), None, Vec::new())
-        } else {
-            unlabelled(grid)
+        let Some(map) = fit(&mirror_image(grid)) else {
+            return (unlabelled(grid), Some(why::no_outline(grid, expected, size)));
         };
-        Grid { mirrored: true, ..labelled }
+        if !self.allow_mirrored {
+            return in_mirror(grid);
+        }
+        let label = |v| Some((map.apply(mirrored(v)), None));
+        (Grid { mirrored: true, ..relabelled(grid, label, None, Vec::new()) }, None)
     }
+}
+
+/// A grid seen as in a mirror, which gets no labels.
+fn in_mirror(grid: &SaddleGrid) -> (Grid, Option<Reason>) {
+    let why = Reason::new(ReasonKind::Mirrored, [("corners", grid.len() as f64)]);
+    (Grid { mirrored: true, ..unlabelled(grid) }, Some(why))
 }
 
 /// Where a vertex lies in the mirror: rows and columns are exchanged, which leaves upright tiles upright and
@@ -146,9 +185,9 @@ pub(super) fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
 
 /// Leaves out of grids of one panel what a larger one, which comes before, has already: beside a tag of
 /// few pixels corners may be found twice, a pixel apart.
-pub(super) fn report_once(grids: &mut Vec<Grid>) {
+pub(super) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) {
     let (mut corners, mut tags) = (BTreeSet::new(), BTreeSet::new());
-    grids.retain_mut(|grid| {
+    grids.retain_mut(|(grid, _)| {
         if let Some(panel) = grid.panel {
             grid.corners.retain(|corner| corners.insert((panel, corner.row, corner.col)));
             grid.tags.retain(|tag| tags.insert((panel, tag.row, tag.col)));
@@ -166,7 +205,8 @@ fn on_panel(grid: &SaddleGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid
         let vertex = *labelled.vertices.get(&v)?;
         Some((vertex, panel.corner_ids.get(&vertex).copied()))
     };
-    relabelled(grid, label, Some(panel.id), labelled.tags.clone())
+    let labels = relabelled(grid, label, Some(panel.id), labelled.tags.clone());
+    Grid { mirrored: labelled.mirrored, ..labels }
 }
 
 /// The grid on the one untagged panel whose outline it fills.

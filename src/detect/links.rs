@@ -1,19 +1,17 @@
 //! Which corner follows which along each of the rays.
 
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
-
 use super::edge::{MAX_CHORD_RAD, is_clean};
+use super::places::Places;
 use super::saddles::Saddle;
 use super::sectors::turn;
-use crate::raster::Gray;
+use crate::raster::Pyramid;
 
 /// Nearest corners looked at: up to six neighbours, the twelve behind them, and as many strangers.
 const NEAREST: usize = 36;
 
 /// Contrasts of neighbouring corners differ by less than this factor: light falls off slowly, and
 /// what is weaker is noise on the paper beside the board.
-const MAX_CONTRAST_RATIO: f64 = 3.0;
+pub const MAX_CONTRAST_RATIO: f64 = 3.0;
 
 /// The far end of an edge: a corner, and which of its rays looks back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,20 +26,33 @@ pub struct Link {
 pub type Links<const N: usize> = [Option<Link>; N];
 
 /// For every corner the links along its N rays; links are mutual.
-pub fn links<const N: usize>(image: &Gray<i16>, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
-    let places = saddles.iter().enumerate().map(|(i, s)| GeomWithData::new(s.position, i));
-    let tree = RTree::bulk_load(places.collect());
-    let mut found: Vec<Links<N>> = saddles
-        .iter()
-        .enumerate()
-        .map(|(index, saddle)| {
-            let near: Vec<usize> = tree
-                .nearest_neighbor_iter(saddle.position)
-                .map(|place| place.data)
-                .filter(|&other| other != index)
-                .take(NEAREST)
-                .collect();
-            std::array::from_fn(|ray| nearest_along(image, saddles, saddle, ray, &near))
+pub fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
+    let positions: Vec<[f64; 2]> = saddles.iter().map(|saddle| saddle.position).collect();
+    let places = Places::new(&positions);
+    let mut found: Vec<Links<N>> = (0..saddles.len())
+        .map(|index| {
+            let saddle = &saddles[index];
+            let mut links: Links<N> = [None; N];
+            for corner in places.nearest(index, NEAREST) {
+                let other = &saddles[corner];
+                if !are_alike(saddle, other) {
+                    continue;
+                }
+                let chord = chord_rad(saddle, other);
+                for i in (0..N).filter(|&i| is_along(saddle, i, chord)) {
+                    // The nearest corner along a ray counts.
+                    if links[i].is_none()
+                        && let Some(j) = ray_back(chord, i, other)
+                        && is_clean(pyramid, saddle, i, other, j)
+                    {
+                        links[i] = Some(Link { corner, ray: j });
+                    }
+                }
+                if links.iter().all(Option::is_some) {
+                    break;
+                }
+            }
+            links
         })
         .collect();
     for a in 0..found.len() {
@@ -56,37 +67,34 @@ pub fn links<const N: usize>(image: &Gray<i16>, saddles: &[Saddle<N>]) -> Vec<Li
     found
 }
 
-/// The nearest corner that a clean edge joins to ray `i` of `saddle`.
-fn nearest_along<const N: usize>(
-    image: &Gray<i16>,
-    saddles: &[Saddle<N>],
-    saddle: &Saddle<N>,
-    i: usize,
-    near: &[usize],
-) -> Option<Link> {
-    near.iter().find_map(|&corner| {
-        let other = &saddles[corner];
-        let j = facing_ray(saddle, i, other)?;
-        is_clean(image, saddle, i, other, j).then_some(Link { corner, ray: j })
-    })
-}
-
 /// The ray of `b` that looks back along ray `i` of `a`; `None` when they do not face each other.
 ///
 /// Opposite ends of an edge see its dark side on opposite hands, so the rays differ in parity, and
 /// their contrasts are alike.
 pub fn facing_ray<const N: usize>(a: &Saddle<N>, i: usize, b: &Saddle<N>) -> Option<usize> {
+    let chord = chord_rad(a, b);
+    (are_alike(a, b) && is_along(a, i, chord)).then(|| ray_back(chord, i, b)).flatten()
+}
+
+/// Whether the contrasts of two corners may be those of neighbours.
+fn are_alike<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> bool {
     let (ours, theirs) = (a.sectors.amplitude, b.sectors.amplitude);
-    if ours.max(theirs) > MAX_CONTRAST_RATIO * ours.min(theirs) {
-        return None;
-    }
-    let [dx, dy] = [b.position[0] - a.position[0], b.position[1] - a.position[1]];
-    let chord = dy.atan2(dx);
-    if turn(chord, a.sectors.rays[i]).abs() > MAX_CHORD_RAD {
-        return None;
-    }
+    ours.max(theirs) <= MAX_CONTRAST_RATIO * ours.min(theirs)
+}
+
+/// Image angle of the way from one corner to another.
+fn chord_rad<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> f64 {
+    (b.position[1] - a.position[1]).atan2(b.position[0] - a.position[0])
+}
+
+fn is_along<const N: usize>(saddle: &Saddle<N>, i: usize, chord: f64) -> bool {
+    turn(chord, saddle.sectors.rays[i]).abs() <= MAX_CHORD_RAD
+}
+
+/// The ray of a corner that looks back to where ray `i` of another comes from.
+fn ray_back<const N: usize>(chord: f64, i: usize, saddle: &Saddle<N>) -> Option<usize> {
     let back = chord + std::f64::consts::PI;
-    let off = |j: usize| turn(back, b.sectors.rays[j]).abs();
+    let off = |j: usize| turn(back, saddle.sectors.rays[j]).abs();
     let j = (0..N).filter(|j| j % 2 != i % 2).min_by(|&p, &q| off(p).total_cmp(&off(q)))?;
     (off(j) <= MAX_CHORD_RAD).then_some(j)
 }

@@ -9,7 +9,8 @@
 //! 3. `sectors` reads the six or four half-edges with their colours.
 //! 4. `links` joins corners along clean edges (`edge`).
 //! 5. `grow` starts from four corners, grows tile by tile and fills the gaps, where tiles are narrow
-//!    in the frame of their neighbours (`rectified`).
+//!    in the frame of their neighbours (`rectified`). `parts` joins what a cover separates, by where
+//!    the map of a grid (`local_map`) goes on.
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns; `labels`
 //!    gives them to the grids.
 //! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`, in windows
@@ -22,29 +23,41 @@ mod clearance;
 mod cone_fit;
 mod corner_model;
 mod corner_start;
+mod correlation;
 mod cubic;
+mod curve;
 mod detection;
 mod detector;
 mod edge;
+mod grid_light;
 mod grow;
 mod label;
 mod labels;
 mod links;
+mod local_map;
+mod optics;
 mod outline;
+mod parts;
+mod places;
 mod polynomial;
 mod quadric;
+mod reason;
 mod rectified;
 mod refine;
 mod refine_grid;
 mod ring;
 mod saddles;
 mod sectors;
-mod small_cells;
+mod soft_cells;
+mod tag_words;
 mod tags;
 mod tile_map;
 mod tiling;
+mod why;
 
 pub use corner_model::SLOPE_PRIOR;
+pub use curve::{Tone, ToneEstimate};
 pub use detection::{DecodedTag, Detection, Grid, GridCorner};
 pub use detector::{Detector, DetectorConfig};
+pub use reason::{Reason, ReasonKind};
 pub use refine::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};

@@ -1,14 +1,21 @@
 //! The paper's fit for either tiling: a cubic surface ([`super::cubic`]) or a quadric
 //! ([`super::quadric`]), and the form of its highest degree, whose zeros are the edges.
 
-use super::cubic::CubicFit;
-use super::quadric::QuadricFit;
+use super::cubic::{CubicFit, Umbilic};
+use super::quadric::{QuadricFit, QuadricSaddle};
 use crate::raster::{Gray, Intensity};
 use crate::target::GridKind;
 
 /// Most iterations of the fits; the reference detector's.
 const CUBIC_ITERATIONS: usize = 5;
 const QUADRIC_ITERATIONS: usize = 20;
+
+/// Most iterations of a first look; the paper's.
+const FIND_ITERATIONS: usize = 5;
+
+/// A first look ends with a step shorter than this, px: what is left is far less, and corners are told
+/// apart, and from where they should be, by tenths of a pixel.
+const FOUND_PX: f64 = 0.03;
 
 /// A fit of one degree in one window.
 #[derive(Clone, Debug)]
@@ -35,6 +42,18 @@ pub struct FittedCorner {
     pub position: [f64; 2],
     /// The form there.
     pub form: Form,
+}
+
+impl From<Umbilic> for FittedCorner {
+    fn from(found: Umbilic) -> Self {
+        Self { position: found.position, form: Form::Cubic(found.surface.form()) }
+    }
+}
+
+impl From<QuadricSaddle> for FittedCorner {
+    fn from(found: QuadricSaddle) -> Self {
+        Self { position: found.position, form: Form::Quadratic(found.form) }
+    }
 }
 
 impl Form {
@@ -76,14 +95,17 @@ impl Polynomial {
         iterations: usize,
     ) -> Option<FittedCorner> {
         match self {
-            Self::Cubic(fit) => fit.refine(image, start, iterations).map(|found| FittedCorner {
-                position: found.position,
-                form: Form::Cubic(found.surface.form()),
-            }),
-            Self::Quadric(fit) => fit.refine(image, start, iterations).map(|found| FittedCorner {
-                position: found.position,
-                form: Form::Quadratic(found.form),
-            }),
+            Self::Cubic(fit) => fit.refine(image, start, iterations).map(FittedCorner::from),
+            Self::Quadric(fit) => fit.refine(image, start, iterations).map(FittedCorner::from),
+        }
+    }
+
+    /// [`Self::refine`] as closely as a first look needs.
+    pub fn find<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<FittedCorner> {
+        let (most, found_px) = (FIND_ITERATIONS, FOUND_PX);
+        match self {
+            Self::Cubic(fit) => fit.walk(image, start, most, found_px).map(FittedCorner::from),
+            Self::Quadric(fit) => fit.walk(image, start, most, found_px).map(FittedCorner::from),
         }
     }
 }

@@ -45,6 +45,17 @@ impl QuadricFit {
         start: [f64; 2],
         iterations: usize,
     ) -> Option<QuadricSaddle> {
+        self.walk(image, start, iterations, CONVERGED_PX)
+    }
+
+    /// [`Self::refine`] that ends with a step shorter than `converged_px`.
+    pub fn walk<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        start: [f64; 2],
+        iterations: usize,
+        converged_px: f64,
+    ) -> Option<QuadricSaddle> {
         let radius = self.fit.radius() as f64;
         let mut position = start;
         for iteration in 1.. {
@@ -56,7 +67,7 @@ impl QuadricFit {
             if step > radius || way > radius {
                 return None;
             }
-            if step < CONVERGED_PX || iteration >= iterations {
+            if step < converged_px || iteration >= iterations {
                 let [c1, c2, c3, ..] = coefficients;
                 return Some(QuadricSaddle { position, form: [c1, c2, c3] });
             }

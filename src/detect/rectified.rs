@@ -17,7 +17,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::saddles::{Saddle, SaddleFinder};
 use super::sectors::Sectors;
-use crate::raster::Gray;
+use crate::raster::{Gray, Pyramid};
 
 /// Length of an edge in the patch, px: the widest fit of the finder reaches eight and stays within
 /// the tiles around the corner.
@@ -54,35 +54,42 @@ impl Rectified {
             .then_some(Self { place: place.into(), image_from_patch })
     }
 
-    /// The corner that lies nearest to the place.
+    /// The corner that lies nearest to the place, as a level of the pyramid shows it.
     pub fn find<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
-        image: &Gray<i16>,
+        pyramid: &Pyramid,
+        level: usize,
     ) -> Option<Saddle<N>> {
+        let image = &pyramid.levels()[level];
         let centre = Vector2::repeat(HALF_SIDE as f64);
-        let in_image = |at: Vector2<f64>| self.place + self.image_from_patch * (at - centre);
+        let in_level_0 = |at: Vector2<f64>| self.place + self.image_from_patch * (at - centre);
+        let in_image = |at| Vector2::from(Pyramid::from_level_0(level, in_level_0(at).into()));
         let side = 2 * HALF_SIDE + 1;
         let inside = [[0, 0], [side, 0], [0, side], [side, side]].into_iter().all(|[x, y]| {
             let at = in_image(Vector2::new(x as f64, y as f64));
             at.x >= 0.0
                 && at.y >= 0.0
-                && at.x <= (image.width() - 1) as f64
-                && at.y <= (image.height() - 1) as f64
+                && at.x < (image.width() - 1) as f64
+                && at.y < (image.height() - 1) as f64
         });
         if !inside {
             return None;
         }
+        let origin = in_image(Vector2::zeros());
+        let [right, below] =
+            [Vector2::x(), Vector2::y()].map(|step: Vector2<f64>| in_image(step) - origin);
         let patch = Gray::from_fn(side, side, |x, y| {
-            let at = in_image(Vector2::new(x as f64, y as f64));
-            (image.bilinear(at.x, at.y) + 0.5) as i16
+            let [along, down] = [x as f64, y as f64];
+            let at = [0, 1].map(|i| origin[i] + along * right[i] + down * below[i]);
+            (image.bilinear_inside(at[0], at[1]) + 0.5) as i16
         });
-        let found = finder.near(&patch, centre.into(), MAX_WAY * EDGE_PX)?;
+        let found = finder.near_in(&patch, centre.into(), MAX_WAY * EDGE_PX)?;
         let turned = |ray: f64| {
             let along = self.image_from_patch * Vector2::new(ray.cos(), ray.sin());
             along.y.atan2(along.x)
         };
         let sectors = Sectors { rays: found.sectors.rays.map(turned), ..found.sectors };
-        Some(Saddle { position: in_image(found.position.into()).into(), sectors })
+        Some(Saddle { position: in_level_0(found.position.into()).into(), sectors, level })
     }
 }

@@ -9,6 +9,7 @@
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings};
 use super::corner_model::{CornerFitter, MAX_WAY_PX};
 use super::detection::{Grid, GridCorner, median};
+use super::optics::{Optics, REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
 use super::refine::{MIN_MODEL_RADIUS, ModelFit, Refined, Refinement, Refiner, Room};
 use crate::raster::{Gray, Intensity, Pyramid};
 
@@ -30,38 +31,102 @@ const MAX_RESIDUAL_RATIO: f64 = 3.0;
 /// median says nothing.
 const MIN_RESIDUAL: f64 = 0.05;
 
+/// Blur of which a picture loses nothing when it is sampled once a pixel, px: its spectrum falls to a
+/// ten-thousandth at the highest frequency.
+const SHARP_PX: f64 = 1.4;
+
 /// A window is followed by one that is smaller by this factor.
 const NEXT_WINDOW: f64 = 0.7;
 
 impl Refiner {
-    /// Refines the corners of a grid in place and drops those that are spoilt; the blur in px where
-    /// the model can tell it.
+    /// The blur of each grid in px, where the model can tell it.
+    pub(super) fn blurs<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        images: (&Gray<T>, &Pyramid),
+        grids: &[Grid],
+        tags: &TagAreas,
+    ) -> Vec<Option<f64>> {
+        grids.iter().map(|grid| self.blur_of_grid(fitter, images, grid, tags)).collect()
+    }
+
+    /// What the grids of a picture, with these blurs, have in common.
+    pub(super) fn optics<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        image: &Gray<T>,
+        (grids, blurs): (&[Grid], &[Option<f64>]),
+        tags: &TagAreas,
+    ) -> Optics {
+        if self.method() == Refinement::Polynomial {
+            return self.known.clone();
+        }
+        let around: Vec<(&Grid, Vec<Surroundings>, f64)> = grids
+            .iter()
+            .zip(blurs)
+            .filter_map(|(grid, blur)| Some((grid, surroundings(grid, tags, 1.0), (*blur)?)))
+            .filter(|(_, _, blur_px)| *blur_px <= MAX_BLUR * self.largest_radius())
+            .collect();
+        let mut places: Vec<(f64, usize, usize)> = Vec::new();
+        for (g, (_, around, blur_px)) in around.iter().enumerate() {
+            let clear = around.iter().map(|around| around.clear_square_px(*blur_px));
+            places.extend(clear.enumerate().map(|(i, clear_px)| (clear_px, g, i)));
+        }
+        places.retain(|(clear_px, ..)| *clear_px >= MIN_MODEL_RADIUS as f64);
+        places.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Those with the most room lie where the board is nearest; light differs from there to elsewhere.
+        places.truncate(SAMPLES.max(places.len() / 2));
+        places.sort_by_key(|&(_, g, i)| (g, i));
+        let count = places.len();
+        let taken = (0..count.min(SAMPLES)).map(|i| places[i * count / SAMPLES.min(count)]);
+        let samples = taken.filter_map(|(_, g, i)| {
+            let (grid, around, blur_px) = &around[g];
+            let room = self.whole(&around[i], *blur_px, &self.known);
+            let reach_px = room.reach_px.min(REACH_PX.max(REACH_SIGMAS * blur_px)).round();
+            let room = Room { reach_px, ..room };
+            let GridCorner { x, y, .. } = grid.corners[i];
+            let fit = self.model(fitter, image, [x, y], room, None)?;
+            let window = self.window(image, [x, y], room).into_owned();
+            Some(Sample {
+                window,
+                centre: [x.round(), y.round()],
+                corner: fit.corner,
+                residual: fit.residual,
+            })
+        });
+        let samples = samples.collect();
+        self.joint_optics(fitter, image, samples)
+    }
+
+    /// Refines the corners of a grid in place, under its blur in px, and drops those that are spoilt.
     pub(super) fn refine_grid<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
-        (image, pyramid): (&Gray<T>, &Pyramid),
+        image: &Gray<T>,
         grid: &mut Grid,
         tags: &TagAreas,
-    ) -> Option<f64> {
-        let blur_px = self.blur_of_grid(fitter, (image, pyramid), grid, tags);
+        (optics, blur_px): (&Optics, Option<f64>),
+    ) {
         let known_px = blur_px.unwrap_or(USUAL_BLUR_PX);
         let mut around = surroundings(grid, tags, 1.0);
-        let mut refined = self.refine_each(fitter, image, grid, &around, known_px);
+        let mut refined = self.refine_each(fitter, image, grid, &around, (known_px, optics));
         let displaced = self.put_back(grid, &refined);
         if displaced.contains(&true) {
             around = surroundings(grid, tags, 1.0);
-            refined = self.refine_each(fitter, image, grid, &around, known_px);
+            refined = self.refine_each(fitter, image, grid, &around, (known_px, optics));
         }
         let residuals: Vec<f64> =
             refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
         let judged = is_judge(&refined);
-        let limit = (MAX_RESIDUAL_RATIO * median(residuals).unwrap_or(0.0)).max(MIN_RESIDUAL);
+        // What the picture has in common takes away what it leaves at most corners, not at all.
+        let usual = median(residuals).unwrap_or(0.0).max(optics.plain_residual);
+        let limit = (MAX_RESIDUAL_RATIO * usual).max(MIN_RESIDUAL);
         let (mut kept, mut fits) = (Vec::new(), Vec::new());
         for (i, (corner, (refined, fit))) in grid.corners.iter().zip(refined).enumerate() {
             if displaced[i] && fit.is_none() {
                 continue;
             }
-            let room = self.whole(&around[i], known_px);
+            let room = self.whole(&around[i], known_px, optics);
             let clean = fit.is_some_and(|fit| fit.residual <= limit);
             let modelled = self.method() == Refinement::Model
                 && room.clear_square_px() >= MIN_MODEL_RADIUS as f64;
@@ -80,8 +145,7 @@ impl Refiner {
             }
         }
         grid.corners = kept;
-        self.follow_bends(fitter, image, grid, &fits, limit, (tags, known_px));
-        blur_px
+        self.follow_bends(fitter, image, grid, &fits, limit, (tags, known_px, optics));
     }
 
     /// Fits the corners again, now that their places tell how the edges are bent; what leaves more
@@ -93,12 +157,12 @@ impl Refiner {
         grid: &mut Grid,
         fits: &[Option<ModelFit>],
         limit: f64,
-        (tags, blur_px): (&TagAreas, f64),
+        (tags, blur_px, optics): (&TagAreas, f64, &Optics),
     ) {
         let around = surroundings(grid, tags, 1.0);
         for ((corner, around), fit) in grid.corners.iter_mut().zip(&around).zip(fits) {
             let Some(fit) = fit else { continue };
-            let room = self.whole(around, blur_px);
+            let room = self.whole(around, blur_px, optics);
             let bent = self.model(fitter, image, fit.position(), room, Some(fit));
             if let Some(bent) = bent.filter(|fit| fit.residual <= limit) {
                 let [x, y] = bent.position();
@@ -114,11 +178,11 @@ impl Refiner {
         image: &Gray<T>,
         grid: &Grid,
         around: &[Surroundings],
-        blur_px: f64,
+        (blur_px, optics): (f64, &Optics),
     ) -> Vec<(Refined, Option<ModelFit>)> {
         let corners = grid.corners.iter().zip(around);
         let refined = corners.map(|(corner, around)| {
-            let room = self.whole(around, blur_px);
+            let room = self.whole(around, blur_px, optics);
             self.refine_within(fitter, image, [corner.x, corner.y], room)
         });
         refined.collect()
@@ -142,8 +206,8 @@ impl Refiner {
     }
 
     /// All that is clear around a corner, in the largest window.
-    fn whole<'a>(&self, around: &'a Surroundings, blur_px: f64) -> Room<'a> {
-        Room { around, blur_px, reach_px: self.largest_radius() }
+    fn whole<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
+        Room { around, blur_px, reach_px: self.largest_radius(), optics }
     }
 
     /// The blur of a grid, px: as the finest level of the pyramid shows it that shows enough of it.
@@ -157,15 +221,15 @@ impl Refiner {
         // Of a grid without tags nothing says that its tiles are not plain.
         let plain = TagAreas::default();
         let shown = if grid.tags.is_empty() { &plain } else { tags };
-        let fine = self.blur(fitter, image, 0, grid, shown);
         let most_px = MAX_BLUR * self.largest_radius();
-        fine.filter(|&blur_px| blur_px <= most_px).or_else(|| {
-            let coarser = pyramid.levels().iter().enumerate().skip(1);
-            coarser
-                .filter_map(|(n, level)| self.blur(fitter, level, n, grid, shown))
-                .last()
-                .or(fine)
-        })
+        let mut known = self.blur(fitter, image, 0, grid, shown);
+        for (n, level) in pyramid.levels().iter().enumerate().skip(1) {
+            if known.is_some_and(|blur_px| blur_px <= most_px * f64::from(1u32 << (n - 1))) {
+                break;
+            }
+            known = self.blur(fitter, level, n, grid, shown).or(known);
+        }
+        known
     }
 
     /// The blur of a grid as `image`, a level of its pyramid, shows it, px of level 0: the median over
@@ -188,7 +252,8 @@ impl Refiner {
             let place = Pyramid::from_level_0(level, [x, y]);
             // What is a wave shows in the middle of the tiles.
             let reach_px = clear_px(i).max(MIN_MODEL_RADIUS as f64).floor();
-            let room = Room { around: &around[i], blur_px: USUAL_BLUR_PX, reach_px };
+            let optics = &self.known;
+            let room = Room { around: &around[i], blur_px: USUAL_BLUR_PX, reach_px, optics };
             self.model(fitter, image, place, room, None).map(|fit| scale * fit.blur_px())
         });
         median(fits.collect())
@@ -214,6 +279,14 @@ impl Refiner {
         });
         fits.find(|fit| fit.residual <= limit)
     }
+}
+
+/// The level of the pyramid, of so many, on which a picture is refined: the coarsest on which its sharpest
+/// grid is no sharper than [`SHARP_PX`]. An enlarged picture shows on the finest level little but the
+/// middle of the edges, and the grain of all pixels around is the same.
+pub(super) fn sharp_level(blurs: &[Option<f64>], levels: usize) -> usize {
+    let Some(blur_px) = blurs.iter().copied().flatten().reduce(f64::min) else { return 0 };
+    (1..levels).rfind(|&n| blur_px >= SHARP_PX * f64::from(1u32 << n)).unwrap_or(0)
 }
 
 /// Whether the model finds most corners of a grid. Of edges as sharp as pixels it makes nothing; then it

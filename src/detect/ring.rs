@@ -26,11 +26,25 @@
 //! the ring's mean m. At a corner, however narrow its sectors, these agree: blur makes the centre
 //! the mean over all directions. On the middle of a bar they differ by half of |α| or more, and on
 //! all but the widest by more than the 0.7|α| at which R vanishes.
+//!
+//! Most of an image shows nothing, and what cannot reach the threshold need not be known. So pixels
+//! are looked at in blocks: R is at most 4.5|α|², and of |α|² the octagon
+//!
+//! ```text
+//!     |z| ≤ max(|Re z|, |Im z|) + ½ min(|Re z|, |Im z|)
+//! ```
+//!
+//! is an upper bound, at most 12 % too large, that 16-bit additions give. Where it passes the
+//! threshold, a second look leaves out edges by lower bounds of what is taken away from it: of β, of V (half
+//! the square of the range of what it is the variance of, or a sixth of the square of Σ|d|, the sum of the
+//! six differences of opposite samples), or of c − m. Only blocks that pass both somewhere are computed, so that nothing is missed.
+
+use std::ops::Range;
 
 use multiversion::multiversion;
 
 use super::tiling::kind;
-use crate::raster::Gray;
+use crate::raster::{Gray, bands};
 use crate::target::GridKind;
 
 /// Offsets of half the ring, near 0°, 30°, …, 150°; the other half is opposite. Radius 3.6 to 4 px:
@@ -45,6 +59,13 @@ const RADIUS: usize = 4;
 /// closer than a ring's radius, so half of it suppresses only echoes.
 const SUPPRESSION_RADIUS: usize = 2;
 
+/// Rows of which a maximum must be the strongest.
+const WINDOW_ROWS: usize = 2 * SUPPRESSION_RADIUS + 1;
+
+/// Pixels that are looked at in one go: a vector of 16-bit numbers. Twice as many would leave a third
+/// more of a photograph to compute.
+const BLOCK: usize = 16;
+
 /// A pixel whose neighbourhood looks like a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
@@ -56,128 +77,402 @@ pub struct Candidate {
     pub response: f32,
 }
 
+/// The least R of interest, and what follows from it.
+#[derive(Clone, Copy, Debug)]
+struct Threshold {
+    response: f32,
+    /// No |6α| of a deltille corner up to this reaches it.
+    odd: i16,
+    /// No |12α| of a checkerboard corner up to this reaches it.
+    even: i16,
+}
+
+impl Threshold {
+    fn new(min_amplitude: f32) -> Self {
+        // The bounds are rounded down by up to a half.
+        let below = |harmonic: f32| (harmonic.floor() - 1.0) as i16;
+        Self {
+            response: 4.5 * min_amplitude * min_amplitude,
+            odd: below(6.0 * min_amplitude),
+            even: below(12.0 * min_amplitude),
+        }
+    }
+}
+
 /// All local maxima of R, for corners with N rays, above `4.5·min_amplitude²`, where `min_amplitude` is the smallest amplitude
-/// |α| of interest in units of the image (values of at most 10 bits).
+/// |α| of interest in units of the image (values of at most 10 bits). In reading order.
 pub fn candidates<const N: usize>(image: &Gray<i16>, min_amplitude: f32) -> Vec<Candidate> {
     let (width, height) = (image.width(), image.height());
     let margin = RADIUS + SUPPRESSION_RADIUS;
     if width <= 2 * margin || height <= 2 * margin {
         return Vec::new();
     }
-    let threshold = 4.5 * min_amplitude * min_amplitude;
-    let rows = 2 * SUPPRESSION_RADIUS + 1;
-    // A rolling window of response rows: row y lives at y mod rows.
-    let mut window = vec![vec![0.0f32; width]; rows];
+    let threshold = Threshold::new(min_amplitude);
+    let rows = margin..height - margin;
+    bands(rows, width, |band| candidates_in_rows::<N>(image, band, threshold))
+}
+
+/// The maxima in some rows.
+fn candidates_in_rows<const N: usize>(
+    image: &Gray<i16>,
+    rows: Range<usize>,
+    threshold: Threshold,
+) -> Vec<Candidate> {
+    let columns = image.width() - 2 * RADIUS;
+    // A rolling window of response rows: row y lives at y mod WINDOW_ROWS.
+    let mut window: [ResponseRow; WINDOW_ROWS] = std::array::from_fn(|_| ResponseRow::new(columns));
     let mut found = Vec::new();
-    for y in RADIUS..height - RADIUS {
-        response_row::<N>(image, y, &mut window[y % rows][RADIUS..width - RADIUS]);
-        if y >= RADIUS + rows - 1 {
-            maxima_of_row(&window, y - SUPPRESSION_RADIUS, threshold, &mut found);
+    let first = rows.start - SUPPRESSION_RADIUS;
+    for y in first..rows.end + SUPPRESSION_RADIUS {
+        window[y % WINDOW_ROWS].compute::<N>(image, [RADIUS, y], threshold);
+        if y >= first + WINDOW_ROWS - 1 {
+            maxima_of_row(&window, y - SUPPRESSION_RADIUS, threshold.response, &mut found);
         }
     }
     found
 }
 
-/// R of row `y` for columns RADIUS .. width − RADIUS.
-fn response_row<const N: usize>(image: &Gray<i16>, y: usize, out: &mut [f32]) {
-    let n = out.len();
-    let at = |dx: isize, dy: isize| {
-        let row = image.row(y.wrapping_add_signed(dy));
-        &row[RADIUS.wrapping_add_signed(dx)..][..n]
+/// Most maxima that [`maxima_near`] gives: the corner, if there is one, is among the strongest.
+const MAXIMA_NEAR: usize = 8;
+
+/// Farthest that [`maxima_near`] looks, px.
+const MAX_REACH: usize = 24;
+
+/// Places around a pixel, within `reach` px of it in either coordinate, from which a fit may reach a
+/// corner: the strongest of those where R, be it what it may, is the greatest of nine. The nearest
+/// come first.
+pub fn maxima_near<const N: usize>(
+    image: &Gray<i16>,
+    place: [usize; 2],
+    reach: usize,
+) -> Vec<[usize; 2]> {
+    let reach = reach.min(MAX_REACH);
+    // The border of the area is computed too, but has no maxima.
+    let span = |i: usize, side: usize| {
+        let first = place[i].saturating_sub(reach + 1).max(RADIUS);
+        first..(place[i] + reach + 2).min(side.saturating_sub(RADIUS))
     };
-    let ring = HALF_RING.map(|(dx, dy)| [at(dx, dy), at(-dx, -dy)]);
-    match kind::<N>() {
-        GridKind::Deltille => odd_responses(ring, out),
-        GridKind::Checker => even_responses(ring, at(0, 0), out),
+    let (columns, rows) = (span(0, image.width()), span(1, image.height()));
+    if columns.len() < 3 || rows.len() < 3 {
+        return Vec::new();
+    }
+    // Whole blocks are faster than what is left of one.
+    let whole = columns.len().next_multiple_of(BLOCK);
+    let fits = columns.start + whole + RADIUS <= image.width();
+    let computed = if fits { whole } else { columns.len() };
+    let all = Threshold { response: f32::INFINITY, odd: -1, even: -1 };
+    let mut window: [ResponseRow; 3] = std::array::from_fn(|_| ResponseRow::new(computed));
+    let mut found: Vec<Candidate> = Vec::new();
+    for y in rows.clone() {
+        window[y % 3].compute::<N>(image, [columns.start, y], all);
+        if y < rows.start + 2 {
+            continue;
+        }
+        let [above, here, below] = [y - 2, y - 1, y].map(|y| &window[y % 3].responses);
+        for u in 1..columns.len() - 1 {
+            let response = here[u];
+            let is_maximum = [here, above, below]
+                .iter()
+                .all(|row| row[u - 1..=u + 1].iter().all(|&other| other <= response));
+            if is_maximum {
+                found.push(Candidate { x: columns.start + u, y: y - 1, response });
+            }
+        }
+    }
+    found.sort_by(|a, b| b.response.total_cmp(&a.response));
+    found.truncate(MAXIMA_NEAR);
+    let distance2 = |c: &Candidate| c.x.abs_diff(place[0]).pow(2) + c.y.abs_diff(place[1]).pow(2);
+    found.sort_by_key(distance2);
+    found.into_iter().map(|c| [c.x, c.y]).collect()
+}
+
+/// What is known of a block of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Block {
+    /// Nothing in it reaches the threshold; all is 0.
+    Weak,
+    /// Computed, and nothing in it exceeds the threshold.
+    Computed,
+    /// Computed, and something does.
+    Promising,
+}
+
+/// R of a row for columns RADIUS .. width − RADIUS; 0 where it cannot reach the threshold.
+#[derive(Clone, Debug)]
+struct ResponseRow {
+    responses: Vec<f32>,
+    blocks: Vec<Block>,
+}
+
+/// A row of pixels at each place of the ring, opposite ones together.
+type Ring<'a> = [[&'a [i16]; 2]; 6];
+
+impl ResponseRow {
+    fn new(columns: usize) -> Self {
+        let blocks = vec![Block::Weak; columns.div_ceil(BLOCK)];
+        Self { responses: vec![0.0; columns], blocks }
+    }
+
+    /// The responses of row `y` from column `x` on.
+    fn compute<const N: usize>(
+        &mut self,
+        image: &Gray<i16>,
+        [x, y]: [usize; 2],
+        threshold: Threshold,
+    ) {
+        let n = self.responses.len();
+        let at = |dx: isize, dy: isize| {
+            let row = image.row(y.wrapping_add_signed(dy));
+            &row[x.wrapping_add_signed(dx)..][..n]
+        };
+        let ring: Ring = HALF_RING.map(|(dx, dy)| [at(dx, dy), at(-dx, -dy)]);
+        match kind::<N>() {
+            GridKind::Deltille => odd_row(ring, threshold, &mut self.responses, &mut self.blocks),
+            GridKind::Checker => {
+                even_row(ring, at(0, 0), threshold, &mut self.responses, &mut self.blocks);
+            }
+        }
     }
 }
 
 /// R of deltille corners at places whose opposite samples are given.
+#[allow(clippy::needless_range_loop, reason = "one index for all rows, so that vectors show")]
 #[multiversion(targets = "simd")]
-fn odd_responses(ring: [[&[i16]; 2]; 6], out: &mut [f32]) {
-    let n = out.len();
-    let ring = ring.map(|pair| pair.map(|row| &row[..n]));
-    for i in 0..n {
-        let odd: [i16; 6] = std::array::from_fn(|k| ring[k][0][i] - ring[k][1][i]);
-        let even: [i16; 6] = std::array::from_fn(|k| ring[k][0][i] + ring[k][1][i]);
-        // Third harmonic, 6α, and first harmonic with weights 8·cos 30°k ≈ 8, 7, 4, 0: 48β.
-        let c3 = i32::from(odd[0] - odd[2] + odd[4]);
-        let s3 = i32::from(odd[1] - odd[3] + odd[5]);
-        let c1 = i32::from(8 * odd[0] + 7 * (odd[1] - odd[5]) + 4 * (odd[2] - odd[4]));
-        let s1 = i32::from(8 * odd[3] + 7 * (odd[2] + odd[4]) + 4 * (odd[1] + odd[5]));
-        let sum: i32 = even.iter().map(|&e| i32::from(e)).sum();
-        let squares: i32 = even.iter().map(|&e| i32::from(e) * i32::from(e)).sum();
-        let alpha = (c3 * c3 + s3 * s3) as f32 * (4.5 / 36.0);
-        let beta = (c1 * c1 + s1 * s1) as f32 * (1.0 / 2304.0);
-        let variance = squares as f32 - (sum * sum) as f32 * (1.0 / 6.0);
-        out[i] = alpha - beta - 0.5 * variance;
+fn odd_row(ring: Ring, threshold: Threshold, out: &mut [f32], states: &mut [Block]) {
+    let whole = out.len() / BLOCK;
+    let pixels = in_blocks(ring, whole);
+    let (responses, rest) = out.as_chunks_mut::<BLOCK>();
+    let (responses, states) =
+        (&mut responses[..whole], &mut states[..whole + 1 - usize::from(rest.is_empty())]);
+    for b in 0..whole {
+        let mut may_reach = false;
+        for i in 0..BLOCK {
+            let odd = |k: usize| pixels[k][0][b][i] - pixels[k][1][b][i];
+            let c3 = odd(0) - odd(2) + odd(4);
+            let s3 = odd(1) - odd(3) + odd(5);
+            may_reach |= octagon(c3, s3) > threshold.odd;
+        }
+        if may_reach && threshold.odd >= 0 {
+            may_reach = false;
+            for i in 0..BLOCK {
+                let mut odd = [0i16; 6];
+                let (mut least, mut most) = (i16::MAX, i16::MIN);
+                for k in 0..6 {
+                    odd[k] = pixels[k][0][b][i] - pixels[k][1][b][i];
+                    let even = pixels[k][0][b][i] + pixels[k][1][b][i];
+                    least = least.min(even);
+                    most = most.max(even);
+                }
+                let alpha = octagon(odd[0] - odd[2] + odd[4], odd[1] - odd[3] + odd[5]);
+                // 6β but for the rounding: R < 0 where it is 2.1213 times 6α.
+                let (d1, d2) = (odd[1] - odd[5], odd[2] + odd[4]);
+                let c1 = odd[0] + d1 - (d1 >> 3) + ((odd[2] - odd[4]) >> 1);
+                let s1 = odd[3] + d2 - (d2 >> 3) + ((odd[1] + odd[5]) >> 1);
+                // V is no less than half the square of the range; R < 0 where that is 0.7071 of 6α.
+                let is_edge = (c1.abs().max(s1.abs()) - 2 > 2 * alpha + (alpha >> 2))
+                    | (most - least > (alpha >> 1) + (alpha >> 2) + 1);
+                may_reach |= (alpha > threshold.odd) & !is_edge;
+            }
+        }
+        if may_reach {
+            let mut block = [0.0; BLOCK];
+            for i in 0..BLOCK {
+                block[i] = odd_response(|k, side| pixels[k][side][b][i]);
+            }
+            responses[b] = block;
+            states[b] = state(&block, threshold.response);
+        } else if states[b] != Block::Weak {
+            responses[b] = [0.0; BLOCK];
+            states[b] = Block::Weak;
+        }
+    }
+    // What is left at the end of the row is too short to be worth a look.
+    for (i, response) in rest.iter_mut().enumerate() {
+        *response = odd_response(|k, side| ring[k][side][whole * BLOCK + i]);
+        states[whole] = Block::Promising;
     }
 }
 
 /// R of checkerboard corners at places whose opposite samples are given, and the centres.
+#[allow(clippy::needless_range_loop, reason = "one index for all rows, so that vectors show")]
 #[multiversion(targets = "simd")]
-fn even_responses(ring: [[&[i16]; 2]; 6], centre: &[i16], out: &mut [f32]) {
-    let n = out.len();
-    let ring = ring.map(|pair| pair.map(|row| &row[..n]));
-    let centre = &centre[..n];
-    for i in 0..n {
-        let odd: [i16; 6] = std::array::from_fn(|k| ring[k][0][i] - ring[k][1][i]);
-        let even: [i16; 6] = std::array::from_fn(|k| ring[k][0][i] + ring[k][1][i]);
-        // Second harmonic with the weights 2·cos 60°k and 2·sin 60°k/√3: 12α.
-        let c2 = i32::from(2 * (even[0] - even[3]) + even[1] - even[2] - even[4] + even[5]);
-        let s2 = i32::from(even[1] + even[2] - even[4] - even[5]);
-        // Plain sums: closures would not be compiled for the target.
-        let mut sum = 0;
-        let mut squares = 0;
-        for k in 0..6 {
-            sum += i32::from(even[k]);
-            squares += i32::from(odd[k]) * i32::from(odd[k]);
+fn even_row(
+    ring: Ring,
+    centre: &[i16],
+    threshold: Threshold,
+    out: &mut [f32],
+    states: &mut [Block],
+) {
+    let whole = out.len() / BLOCK;
+    let pixels = in_blocks(ring, whole);
+    let centres = &centre.as_chunks::<BLOCK>().0[..whole];
+    let (responses, rest) = out.as_chunks_mut::<BLOCK>();
+    let (responses, states) =
+        (&mut responses[..whole], &mut states[..whole + 1 - usize::from(rest.is_empty())]);
+    for b in 0..whole {
+        let mut may_reach = false;
+        for i in 0..BLOCK {
+            let even = |k: usize| pixels[k][0][b][i] + pixels[k][1][b][i];
+            let (e14, e52) = (even(1) - even(4), even(5) - even(2));
+            let c2 = 2 * (even(0) - even(3)) + e14 + e52;
+            // √3 of it, or slightly more.
+            let s2 = (e14 - e52).abs();
+            may_reach |= octagon(c2, 2 * s2 - (s2 >> 2)) > threshold.even;
         }
-        let alpha = (c2 * c2 + 3 * s2 * s2) as f32 * (4.5 / 144.0);
-        // 12(c − m)
-        let off = (12 * i32::from(centre[i]) - sum) as f32;
-        out[i] = alpha - 0.5 * squares as f32 - off * off * (9.0 / 144.0);
+        if may_reach && threshold.even >= 0 {
+            may_reach = false;
+            for i in 0..BLOCK {
+                let (mut even, mut differences) = ([0i16; 6], 0i16);
+                for k in 0..6 {
+                    even[k] = pixels[k][0][b][i] + pixels[k][1][b][i];
+                    differences += (pixels[k][0][b][i] - pixels[k][1][b][i]).abs();
+                }
+                let (e14, e52) = (even[1] - even[4], even[5] - even[2]);
+                let s2 = (e14 - e52).abs();
+                let alpha = octagon(2 * (even[0] - even[3]) + e14 + e52, 2 * s2 - (s2 >> 2));
+                // V is no less than a sixth of their square, and R < 0 where they are 0.6124 of 12α.
+                // 12(c − m) leaves R < 0 where it is 0.7071 of 12α.
+                let sum = even[0] + even[1] + even[2] + even[3] + even[4] + even[5];
+                let off = (12 * centres[b][i] - sum).abs();
+                let is_edge = (differences > (alpha >> 1) + (alpha >> 3) + 2)
+                    | (off > (alpha >> 1) + (alpha >> 2) + 1);
+                may_reach |= (alpha > threshold.even) & !is_edge;
+            }
+        }
+        if may_reach {
+            let mut block = [0.0; BLOCK];
+            for i in 0..BLOCK {
+                block[i] = even_response(|k, side| pixels[k][side][b][i], centres[b][i]);
+            }
+            responses[b] = block;
+            states[b] = state(&block, threshold.response);
+        } else if states[b] != Block::Weak {
+            responses[b] = [0.0; BLOCK];
+            states[b] = Block::Weak;
+        }
+    }
+    for (i, response) in rest.iter_mut().enumerate() {
+        let place = whole * BLOCK + i;
+        *response = even_response(|k, side| ring[k][side][place], centre[place]);
+        states[whole] = Block::Promising;
     }
 }
 
-/// Whether any value exceeds the threshold.
-#[multiversion(targets = "simd")]
-fn any_above(values: &[f32], threshold: f32) -> bool {
-    values.iter().fold(false, |any, &value| any | (value > threshold))
+/// The first `count` blocks of each row. (A loop: closures handed to the standard library would not
+/// be compiled for the target, and the lengths would be forgotten.)
+#[inline(always)]
+fn in_blocks<'a>(ring: Ring<'a>, count: usize) -> [[&'a [[i16; BLOCK]]; 2]; 6] {
+    let mut blocks: [[&'a [[i16; BLOCK]]; 2]; 6] = [[&[]; 2]; 6];
+    for k in 0..6 {
+        for side in 0..2 {
+            blocks[k][side] = &ring[k][side].as_chunks::<BLOCK>().0[..count];
+        }
+    }
+    blocks
+}
+
+/// Of a block that has been computed.
+#[inline(always)]
+fn state(responses: &[f32; BLOCK], threshold: f32) -> Block {
+    let mut any = false;
+    for &response in responses {
+        any |= response > threshold;
+    }
+    if any { Block::Promising } else { Block::Computed }
+}
+
+/// No less than the length of a vector, up to half a unit of rounding.
+#[inline(always)]
+fn octagon(x: i16, y: i16) -> i16 {
+    let (x, y) = (x.abs(), y.abs());
+    x.max(y) + (x.min(y) >> 1)
+}
+
+/// R of a deltille corner; `at` gives the sample of a pair and a side.
+#[inline(always)]
+fn odd_response(at: impl Fn(usize, usize) -> i16) -> f32 {
+    let (mut odd, mut even) = ([0i16; 6], [0i16; 6]);
+    for k in 0..6 {
+        odd[k] = at(k, 0) - at(k, 1);
+        even[k] = at(k, 0) + at(k, 1);
+    }
+    // Third harmonic, 6α, and first harmonic with weights 8·cos 30°k ≈ 8, 7, 4, 0: 48β.
+    let c3 = i32::from(odd[0] - odd[2] + odd[4]);
+    let s3 = i32::from(odd[1] - odd[3] + odd[5]);
+    let c1 = i32::from(8 * odd[0] + 7 * (odd[1] - odd[5]) + 4 * (odd[2] - odd[4]));
+    let s1 = i32::from(8 * odd[3] + 7 * (odd[2] + odd[4]) + 4 * (odd[1] + odd[5]));
+    // Plain sums: closures would not be compiled for the target.
+    let (mut sum, mut squares) = (0i16, 0);
+    for even in even {
+        sum += even;
+        squares += i32::from(even) * i32::from(even);
+    }
+    let sum = i32::from(sum);
+    let alpha = (c3 * c3 + s3 * s3) as f32 * (4.5 / 36.0);
+    let beta = (c1 * c1 + s1 * s1) as f32 * (1.0 / 2304.0);
+    let variance = squares as f32 - (sum * sum) as f32 * (1.0 / 6.0);
+    alpha - beta - 0.5 * variance
+}
+
+/// R of a checkerboard corner; `at` gives the sample of a pair and a side.
+#[inline(always)]
+fn even_response(at: impl Fn(usize, usize) -> i16, centre: i16) -> f32 {
+    let (mut odd, mut even) = ([0i16; 6], [0i16; 6]);
+    for k in 0..6 {
+        odd[k] = at(k, 0) - at(k, 1);
+        even[k] = at(k, 0) + at(k, 1);
+    }
+    // Second harmonic with the weights 2·cos 60°k and 2·sin 60°k/√3: 12α.
+    let c2 = i32::from(2 * (even[0] - even[3]) + even[1] - even[2] - even[4] + even[5]);
+    let s2 = i32::from(even[1] + even[2] - even[4] - even[5]);
+    let (mut sum, mut squares) = (0i16, 0);
+    for k in 0..6 {
+        sum += even[k];
+        squares += i32::from(odd[k]) * i32::from(odd[k]);
+    }
+    let alpha = (c2 * c2 + 3 * (s2 * s2)) as f32 * (4.5 / 144.0);
+    // 12(c − m)
+    let off = f32::from(12 * centre - sum);
+    alpha - 0.5 * squares as f32 - off * off * (9.0 / 144.0)
 }
 
 /// Appends the maxima of row `y`, whose neighbouring rows are all in the window.
-fn maxima_of_row(window: &[Vec<f32>], y: usize, threshold: f32, found: &mut Vec<Candidate>) {
-    let rows = window.len();
-    let width = window[0].len();
-    let centre = &window[y % rows];
-    let margin = RADIUS + SUPPRESSION_RADIUS;
-    /// Values looked at in one go; few rows of few images have a candidate among so many.
-    const BLOCK: usize = 64;
-    let blocks =
-        (margin..width - margin).step_by(BLOCK).map(|x| x..(x + BLOCK).min(width - margin));
-    let promising = blocks.filter(|block| any_above(&centre[block.clone()], threshold));
-    for x in promising.flatten() {
-        let response = centre[x];
-        if response <= threshold {
-            continue;
-        }
-        let columns = x - SUPPRESSION_RADIUS..=x + SUPPRESSION_RADIUS;
-        // Ties go to the later pixel in reading order, so exactly one of equal neighbours stays.
-        let is_maximum = (y - SUPPRESSION_RADIUS..=y + SUPPRESSION_RADIUS).all(|v| {
-            let row = &window[v % rows];
-            columns
-                .clone()
-                .all(|u| if (v, u) > (y, x) { row[u] < response } else { row[u] <= response })
-        });
-        if is_maximum {
-            found.push(Candidate { x, y, response });
+fn maxima_of_row(
+    window: &[ResponseRow; WINDOW_ROWS],
+    y: usize,
+    threshold: f32,
+    found: &mut Vec<Candidate>,
+) {
+    let ResponseRow { responses: centre, blocks } = &window[y % WINDOW_ROWS];
+    // Those that have all their neighbours.
+    let inner = SUPPRESSION_RADIUS..centre.len() - SUPPRESSION_RADIUS;
+    for (b, _) in blocks.iter().enumerate().filter(|&(_, &block)| block == Block::Promising) {
+        let places = (b * BLOCK).max(inner.start)..((b + 1) * BLOCK).min(inner.end);
+        for (i, response) in places.map(|i| (i, centre[i])) {
+            if response <= threshold {
+                continue;
+            }
+            let near = i - SUPPRESSION_RADIUS..=i + SUPPRESSION_RADIUS;
+            // Ties go to the later pixel in reading order, so exactly one of equal neighbours stays.
+            let is_maximum = (y - SUPPRESSION_RADIUS..=y + SUPPRESSION_RADIUS).all(|v| {
+                let row = &window[v % WINDOW_ROWS].responses[near.clone()];
+                let (before, rest) = row.split_at(if v < y { row.len() } else { 0 });
+                let (same, after) = rest.split_at(if v == y { SUPPRESSION_RADIUS + 1 } else { 0 });
+                before.iter().chain(same).all(|&other| other <= response)
+                    && after.iter().all(|&other| other < response)
+            });
+            if is_maximum {
+                found.push(Candidate { x: i + RADIUS, y, response });
+            }
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
     use super::*;
     use crate::raster::Pyramid;
 
@@ -240,6 +535,30 @@ mod tests {
                 let bar = strongest::<4>(&Pyramid::new(&sharp, 1, 8).levels()[0].clone());
                 assert!(bar < checker / 8.0, "{half_width}: {bar} of {checker}");
             }
+        }
+    }
+
+    #[test]
+    fn what_is_passed_over_holds_no_candidate() {
+        // Sectors of all sizes at all angles, edges, and noise of all strengths.
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let image = Gray::from_fn(300, 200, |x, y| {
+            let (u, v) = ((x % 50) as f64 - 24.3, (y % 40) as f64 - 19.6);
+            let sectors = ((x / 50 + y / 40) % 7) as f64;
+            let star = (v.atan2(u) + 0.01 * x as f64).mul_add(sectors / 2.0, 0.4).sin();
+            let noise = random.random_range(-1.0..1.0) * (y / 40) as f64 * 30.0;
+            (512.0 + 450.0 * star.signum() + noise) as i16
+        });
+        let image = Gray::from_fn(300, 200, |x, y| image.at(x, y).clamp(0, 1023));
+        for min_amplitude in [1.0, 6.0, 20.0, 60.0] {
+            let threshold = Threshold::new(min_amplitude);
+            let whole = Threshold { odd: -1, even: -1, ..threshold };
+            let rows = 6..194;
+            let odd = |t| candidates_in_rows::<6>(&image, rows.clone(), t);
+            let even = |t| candidates_in_rows::<4>(&image, rows.clone(), t);
+            assert!(odd(threshold).len() > 3 && even(threshold).len() > 3);
+            assert_eq!(odd(threshold), odd(whole));
+            assert_eq!(even(threshold), even(whole));
         }
     }
 

@@ -1,9 +1,10 @@
 //! Corners one by one: candidates of all pyramid levels, fitted, read and merged.
 
 use rstar::RTree;
+use rstar::primitives::GeomWithData;
 
 use super::polynomial::{FittedCorner, Polynomial};
-use super::ring::{Candidate, candidates};
+use super::ring::{Candidate, candidates, maxima_near};
 use super::sectors::{Sectors, contrast_around};
 use super::tiling::kind;
 use crate::raster::{Gray, Pyramid};
@@ -15,10 +16,7 @@ const FIT_RADII: [usize; 3] = [2, 3, 4];
 /// Index of the usual fit.
 const USUAL: usize = 1;
 
-/// Iterations of the fit; the paper's.
-const FIT_ITERATIONS: usize = 5;
-
-/// Finer and coarser candidates of one corner converge to points closer than this, px.
+/// Finer and coarser candidates of one corner converge to points closer than this, px of the level.
 const MERGE_PX: f64 = 1.5;
 
 /// The weakest harmonic searched for, of 1023: a contrast of 3 grey levels in 8 bits, where
@@ -38,17 +36,17 @@ pub struct Saddle<const N: usize> {
     pub position: [f64; 2],
     /// Its edges and brightness.
     pub sectors: Sectors<N>,
+    /// The level of the pyramid on which it was read: the finest that shows it sharply.
+    pub level: usize,
 }
 
-/// A blurred corner shows less than this part of its contrast on the smallest circle: half of it
-/// would make it a corner at full resolution.
+/// A corner is blurred on a level where it shows less than this part of the contrast that it has on
+/// the next coarser one, on the smallest circle of either: blur of more than two pixels. The coarser
+/// level then shows its edges better, and averages the grain that an enlarged picture has.
 const MAX_BLURRED_CONTRAST: f64 = 0.5;
 
-/// Distance between the starts of a search, px: the fit converges from that far.
-const START_STEP_PX: f64 = 2.0;
-
-/// Most rings of starts around an uncertain place.
-const MAX_START_RINGS: i32 = 4;
+/// And its middle leaves the level between dark and bright by less than this part of that contrast.
+const MAX_BLURRED_SHIFT: f64 = 0.3;
 
 /// A corner moves by less than this when the window grows by one, px: it looks the same at every
 /// size. What is made up of two things at different distances does not. The paper's choice; corners
@@ -70,43 +68,63 @@ impl<const N: usize> SaddleFinder<N> {
 
     /// All saddles of an image, in reading order.
     pub fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
-        let noise = HARMONIC_NOISE * sample_noise(&pyramid.levels()[0]);
+        let mut noise = 0.0f32;
         let mut saddles = Merged::<N>::default();
         for (n, level) in pyramid.levels().iter().enumerate() {
-            let mut candidates = candidates::<N>(level, MIN_AMPLITUDE);
-            drop_noise(&mut candidates, NOISE_FACTOR * noise);
+            // Grain that pixels share stays when they are averaged.
+            noise = noise.max(HARMONIC_NOISE * sample_noise(level));
+            let candidates = candidates_above_noise::<N>(level, NOISE_FACTOR * noise);
             for candidate in candidates {
                 let start = [candidate.x as f64, candidate.y as f64];
+                // What lies on a corner of a finer level is that corner.
+                if n > 0 && saddles.is_known(Pyramid::to_level_0(n, start), n) {
+                    continue;
+                }
                 let fit = &self.fits[USUAL];
-                let Some(on_level) = fit.refine(level, start, FIT_ITERATIONS) else {
+                let Some(on_level) = fit.find(level, start) else {
                     continue;
                 };
-                let coarse = Pyramid::to_level_0(n, on_level.position);
-                if !saddles.is_free(coarse) {
+                let place = Pyramid::to_level_0(n, on_level.position);
+                if !saddles.is_free(place, n) {
                     continue;
                 }
                 let Some(sectors) = Sectors::read(level, on_level.position, &on_level.form) else {
                     continue;
                 };
-                let described = Saddle { position: coarse, sectors };
-                // What a coarse level shows is looked for again at full resolution; a corner that
-                // is too blurred for that stays as it was found.
+                let described = Saddle { position: place, sectors, level: n };
+                let is_stable = self.is_stable(level, on_level.position, USUAL);
                 let saddle = match n {
-                    0 if self.is_stable(level, coarse, USUAL) => Some(described),
+                    0 if is_stable => Some(described),
                     0 => self.narrow(pyramid, start),
-                    _ => self
-                        .near(&pyramid.levels()[0], coarse, f64::from(1u32 << n))
-                        .or_else(|| is_blurred(pyramid, &described).then_some(described)),
+                    _ => self.sharpest(pyramid, described, is_stable),
                 };
-                saddles.extend(saddle);
+                if let Some(saddle) = saddle {
+                    saddles.add(saddle, is_blurred::<N>(pyramid, saddle.level, saddle.position));
+                }
             }
         }
-        let mut all = saddles.all;
+        let mut all = saddles.all();
         all.sort_by(|a, b| {
             let key = |s: &Saddle<N>| [s.position[1], s.position[0]];
             key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
         });
         all
+    }
+
+    /// What a coarse level shows, followed to finer ones as long as these show it sharply. What is sharp
+    /// on a level, and no corner there, is none on a coarser one either: a thin line beside an edge,
+    /// say.
+    fn sharpest(&self, pyramid: &Pyramid, coarse: Saddle<N>, is_stable: bool) -> Option<Saddle<N>> {
+        let mut found = coarse;
+        while found.level > 0 {
+            let finer = found.level - 1;
+            if is_blurred::<N>(pyramid, finer, found.position) {
+                return (found.level < coarse.level || is_stable).then_some(found);
+            }
+            let reach_px = f64::from(1u32 << found.level);
+            found = self.near(pyramid, finer, found.position, reach_px)?;
+        }
+        Some(found)
     }
 
     /// The saddle of a checkerboard that a narrower fit reaches: squares seen at the rim of a
@@ -119,44 +137,62 @@ impl<const N: usize> SaddleFinder<N> {
     }
 
     fn at_size(&self, pyramid: &Pyramid, start: [f64; 2], size: usize) -> Option<Saddle<N>> {
-        let corner = self.fits[size].refine(&pyramid.levels()[0], start, FIT_ITERATIONS)?;
-        self.describe(&pyramid.levels()[0], &corner, size)
+        let corner = self.fits[size].find(&pyramid.levels()[0], start)?;
+        self.describe(&pyramid.levels()[0], 0, &corner, size)
     }
 
-    /// What a fit at full resolution has reached, if it is a corner.
-    fn describe(&self, image: &Gray<i16>, corner: &FittedCorner, size: usize) -> Option<Saddle<N>> {
+    /// What a fit in an image that stands for a level has reached, if it is a corner; px of the image.
+    fn describe(
+        &self,
+        image: &Gray<i16>,
+        level: usize,
+        corner: &FittedCorner,
+        size: usize,
+    ) -> Option<Saddle<N>> {
         let sectors = Sectors::read(image, corner.position, &corner.form)?;
-        let saddle = Saddle { position: corner.position, sectors };
+        let saddle = Saddle { position: corner.position, sectors, level };
         self.is_stable(image, corner.position, size).then_some(saddle)
     }
 
     /// Whether the next wider fit finds a corner in the same place.
     fn is_stable(&self, image: &Gray<i16>, [x, y]: [f64; 2], size: usize) -> bool {
-        let wider = self.fits[size + 1].refine(image, [x, y], FIT_ITERATIONS);
+        let wider = self.fits[size + 1].find(image, [x, y]);
         let moved = wider.map(|corner| (corner.position[0] - x).hypot(corner.position[1] - y));
         moved.is_some_and(|moved_px| moved_px < STABLE_PX)
     }
 
-    /// The first saddle that the fit reaches from starts ever further from `place`, if it lies
+    /// [`Self::near_in`] a level of a pyramid; places and reach in px of level 0.
+    pub fn near(
+        &self,
+        pyramid: &Pyramid,
+        level: usize,
+        place: [f64; 2],
+        reach_px: f64,
+    ) -> Option<Saddle<N>> {
+        let on_level = Pyramid::from_level_0(level, place);
+        let reach_px = reach_px / f64::from(1u32 << level);
+        let found = self.near_in(&pyramid.levels()[level], on_level, reach_px)?;
+        Some(Saddle { position: Pyramid::to_level_0(level, found.position), level, ..found })
+    }
+
+    /// The first saddle that the fit reaches from starts further and further from `place`, if it lies
     /// within `reach_px` of it.
-    pub fn near(&self, image: &Gray<i16>, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
+    pub fn near_in(&self, image: &Gray<i16>, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
         let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
-        let rings = ((reach_px / START_STEP_PX).ceil() as i32).clamp(1, MAX_START_RINGS);
-        let step = reach_px / f64::from(rings);
-        let starts = (-rings..=rings).flat_map(|v| (-rings..=rings).map(move |u| (u, v)));
-        let mut starts: Vec<(i32, i32)> =
-            starts.filter(|&(u, v)| u * u + v * v <= rings * rings).collect();
-        starts.sort_by_key(|&(u, v)| (u * u + v * v, v, u));
+        // From the place itself, and from wherever a corner may be seen.
+        let pixel = place.map(|c| c.max(0.0).round() as usize);
+        let maxima = maxima_near::<N>(image, pixel, reach_px.ceil() as usize);
+        let mut starts =
+            std::iter::once(place).chain(maxima.into_iter().map(|p| p.map(|c| c as f64)));
         let sizes: &[usize] = match kind::<N>() {
             GridKind::Deltille => &[USUAL],
             GridKind::Checker => &[USUAL, USUAL - 1],
         };
         // Many starts lead to the same place, which is looked at once with each fit.
         let mut refused: Vec<([f64; 2], usize)> = Vec::new();
-        starts.into_iter().find_map(|(u, v)| {
-            let start = [place[0] + f64::from(u) * step, place[1] + f64::from(v) * step];
+        starts.find_map(|start| {
             let saddle = sizes.iter().find_map(|&size| {
-                let corner = self.fits[size].refine(image, start, FIT_ITERATIONS)?;
+                let corner = self.fits[size].find(image, start)?;
                 let position = corner.position;
                 let same = |&(other, with): &([f64; 2], usize)| {
                     with == size && distance(position, other) < STABLE_PX
@@ -164,7 +200,7 @@ impl<const N: usize> SaddleFinder<N> {
                 if refused.iter().any(same) {
                     return None;
                 }
-                let saddle = self.describe(image, &corner, size);
+                let saddle = self.describe(image, 0, &corner, size);
                 if saddle.is_none() {
                     refused.push((position, size));
                 }
@@ -175,50 +211,99 @@ impl<const N: usize> SaddleFinder<N> {
     }
 }
 
-/// Drops candidates whose harmonic is weaker than `min_amplitude`, or than a quarter of that of the
+/// Candidates on a level whose harmonic is no weaker than `noise`, or than a quarter of that of the
 /// ninth strongest where this is less: an image that is all board has no plain part to tell its noise
 /// from, but then it has at least as many corners as a grid.
-fn drop_noise(candidates: &mut Vec<Candidate>, min_amplitude: f32) {
+fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<Candidate> {
     const STRONGEST: usize = 9;
     const PART: f32 = 0.25;
-    if candidates.len() < STRONGEST {
-        return;
+    let ninth = |candidates: &[Candidate]| {
+        let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
+        (responses.len() >= STRONGEST)
+            .then(|| *responses.select_nth_unstable_by(STRONGEST - 1, |a, b| b.total_cmp(a)).1)
+    };
+    // Nearly always there are nine that stand clear; what is weak need then not be looked for.
+    if noise > MIN_AMPLITUDE {
+        let found = candidates::<N>(level, noise);
+        if ninth(&found).is_some_and(|ninth| PART * PART * ninth >= 4.5 * noise * noise) {
+            return found;
+        }
     }
-    let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
-    let (_, &mut ninth, _) = responses.select_nth_unstable_by(STRONGEST - 1, |a, b| b.total_cmp(a));
-    let threshold = (4.5 * min_amplitude * min_amplitude).min(PART * PART * ninth);
-    candidates.retain(|candidate| candidate.response > threshold);
+    let mut found = candidates::<N>(level, MIN_AMPLITUDE);
+    if let Some(ninth) = ninth(&found) {
+        let threshold = (4.5 * noise * noise).min(PART * PART * ninth);
+        found.retain(|candidate| candidate.response > threshold);
+    }
+    found
 }
 
-/// Whether full resolution shows next to nothing where a coarse level shows a corner. What is sharp
-/// there, and no corner, is none on a coarse level either: a thin line beside an edge, say.
-fn is_blurred<const N: usize>(pyramid: &Pyramid, coarse: &Saddle<N>) -> bool {
-    let fine = contrast_around::<N>(&pyramid.levels()[0], coarse.position);
-    fine.is_some_and(|amplitude| amplitude < MAX_BLURRED_CONTRAST * coarse.sectors.amplitude)
+/// Whether a level shows a corner blurred; the coarsest never does, and no place at the border. Blur leaves
+/// in the middle the level between dark and bright; a gap between dots, which looks like a corner where
+/// blur closes it, has its own brightness.
+fn is_blurred<const N: usize>(pyramid: &Pyramid, level: usize, position: [f64; 2]) -> bool {
+    let contrast = |n: usize| {
+        contrast_around::<N>(pyramid.levels().get(n)?, Pyramid::from_level_0(n, position))
+    };
+    contrast(level).zip(contrast(level + 1)).is_some_and(|(fine, coarse)| {
+        fine.1 < MAX_BLURRED_CONTRAST * coarse.1
+            && (fine.0 - coarse.0).abs() < MAX_BLURRED_SHIFT * coarse.1
+    })
 }
 
 /// Saddles with an index of their places, so that a corner found twice is kept once.
 struct Merged<const N: usize> {
-    all: Vec<Saddle<N>>,
-    places: RTree<[f64; 2]>,
+    /// With what is known better from coarser levels left out.
+    all: Vec<Option<Saddle<N>>>,
+    /// Whether the level of a saddle shows it blurred.
+    blurred: Vec<bool>,
+    places: RTree<GeomWithData<[f64; 2], usize>>,
 }
 
 impl<const N: usize> Default for Merged<N> {
     fn default() -> Self {
-        Self { all: Vec::new(), places: RTree::new() }
+        Self { all: Vec::new(), blurred: Vec::new(), places: RTree::new() }
     }
 }
 
+/// The distance within which saddles of a level are the same, px of level 0.
+pub fn merge_px(level: usize) -> f64 {
+    MERGE_PX * f64::from(1u32 << level)
+}
+
 impl<const N: usize> Merged<N> {
-    fn is_free(&self, position: [f64; 2]) -> bool {
-        self.places.locate_within_distance(position, MERGE_PX * MERGE_PX).next().is_none()
+    /// Saddles within a distance that is the merging distance of a level, px.
+    fn within(&self, position: [f64; 2], level: usize) -> impl Iterator<Item = (usize, Saddle<N>)> {
+        let near = self.places.locate_within_distance(position, merge_px(level).powi(2));
+        near.filter_map(|place| Some((place.data, self.all[place.data]?)))
     }
 
-    fn extend(&mut self, saddle: Option<Saddle<N>>) {
-        if let Some(saddle) = saddle.filter(|saddle| self.is_free(saddle.position)) {
-            self.places.insert(saddle.position);
-            self.all.push(saddle);
+    /// Whether a corner that is as good as what `level` shows lies about as near as a candidate to its own.
+    fn is_known(&self, position: [f64; 2], level: usize) -> bool {
+        self.within(position, level).any(|(i, other)| !(self.blurred[i] && other.level < level))
+    }
+
+    /// Whether nothing is known to be there that is as good as what `level` shows.
+    fn is_free(&self, position: [f64; 2], level: usize) -> bool {
+        let distance = |[x, y]: [f64; 2]| (x - position[0]).hypot(y - position[1]);
+        self.within(position, level).all(|(i, other)| {
+            self.blurred[i] && other.level < level
+                || distance(other.position) >= merge_px(other.level)
+        })
+    }
+
+    fn add(&mut self, saddle: Saddle<N>, blurred: bool) {
+        let same: Vec<(usize, Saddle<N>)> = self.within(saddle.position, saddle.level).collect();
+        if !same.iter().all(|(i, other)| self.blurred[*i] && other.level < saddle.level) {
+            return;
         }
+        same.into_iter().for_each(|(i, _)| self.all[i] = None);
+        self.places.insert(GeomWithData::new(saddle.position, self.all.len()));
+        self.all.push(Some(saddle));
+        self.blurred.push(blurred);
+    }
+
+    fn all(self) -> Vec<Saddle<N>> {
+        self.all.into_iter().flatten().collect()
     }
 }
 

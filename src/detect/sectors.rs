@@ -82,10 +82,15 @@ impl<const N: usize> Sectors<N> {
     }
 }
 
-/// Mean deviation from the mean on the smallest circle around a place; `None` at the border.
-pub fn contrast_around<const N: usize>(image: &Gray<i16>, position: [f64; 2]) -> Option<f64> {
+/// The level half-way between dark and bright and the mean deviation from it on the smallest circle around
+/// a place; `None` at the border.
+pub fn contrast_around<const N: usize>(
+    image: &Gray<i16>,
+    position: [f64; 2],
+) -> Option<(f64, f64)> {
     let smallest = RADII_PX.into_iter().fold(f64::INFINITY, f64::min);
-    Circle::<N>::sample(image, position, smallest).map(|circle| circle.amplitude())
+    let circle = Circle::<N>::sample(image, position, smallest)?;
+    Some((circle.level, circle.amplitude()))
 }
 
 /// A sign change at an image angle; `rising` when brightness grows with the angle.
@@ -113,15 +118,17 @@ impl<const N: usize> Circle<N> {
         if !inside {
             return None;
         }
-        let at = |[cos, sin]: [f64; 2]| inside_sample(image, x + radius * cos, y + radius * sin);
-        let values: [f64; SAMPLES] = DIRECTIONS.map(at);
+        let mut values = [0.0; SAMPLES];
+        for (value, [cos, sin]) in values.iter_mut().zip(DIRECTIONS.iter()) {
+            *value = image.bilinear_inside(x + radius * cos, y + radius * sin);
+        }
         let mean = values.iter().sum::<f64>() / SAMPLES as f64;
         let level = match kind::<N>() {
             // Opposite sectors have opposite colours, so the mean is the level of the edges.
             GridKind::Deltille => mean,
             GridKind::Checker => between_classes(&values, mean),
         };
-        let centre = inside_sample(image, x, y) - mean;
+        let centre = image.bilinear_inside(x, y) - mean;
         Some(Self { level, deviations: values.map(|v| v - level), centre })
     }
 
@@ -203,17 +210,6 @@ impl<const N: usize> Circle<N> {
     }
 }
 
-/// [`Gray::bilinear`] of a place that is known to lie in the image, less its last row and column.
-fn inside_sample(image: &Gray<i16>, x: f64, y: f64) -> f64 {
-    let (left, top) = (x as usize, y as usize);
-    let (fx, fy) = (x - left as f64, y - top as f64);
-    let at = |row: &[i16]| {
-        let pair = &row[left..left + 2];
-        f64::from(pair[0]) * (1.0 - fx) + f64::from(pair[1]) * fx
-    };
-    at(image.row(top)) * (1.0 - fy) + at(image.row(top + 1)) * fy
-}
-
 /// Unit vectors towards the samples.
 static DIRECTIONS: LazyLock<[[f64; 2]; SAMPLES]> = LazyLock::new(|| {
     std::array::from_fn(|k| {
@@ -277,8 +273,16 @@ fn ordered_rays<const N: usize>(crossings: &[Crossing; N]) -> Option<[f64; N]> {
 
 /// The turn from `from` to `to`, −π to π.
 pub fn turn(from: f64, to: f64) -> f64 {
-    let turn = (to - from).rem_euclid(TAU);
-    if turn > PI { turn - TAU } else { turn }
+    let turn = to - from;
+    // Most angles need no division to be brought into range.
+    let turn = if turn.abs() < 3.0 * PI { turn } else { turn.rem_euclid(TAU) };
+    if turn > PI {
+        turn - TAU
+    } else if turn <= -PI {
+        turn + TAU
+    } else {
+        turn
+    }
 }
 
 #[cfg(test)]

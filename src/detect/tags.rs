@@ -1,38 +1,46 @@
-//! Reading tags out of tiles.
+//! Reading tags out of tiles: for every cell the odds that it is white.
 
+use std::collections::BTreeMap;
+
+use super::grid_light::{ClearDepth, GridLight};
 use super::grow::SaddleGrid;
-use super::small_cells;
+use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
 use super::tile_map::TileMap;
-use crate::family::{Decoded, Decoder, Family};
-use crate::lattice::{GridKind, TagCells, Tile};
+use crate::family::Family;
+use crate::lattice::{GridKind, TagCells, Tile, Vertex};
 use crate::raster::{Gray, Intensity};
 use crate::target::{Panel, TagsIn};
 
-/// Where the white beside an edge is sampled: distance from the edge in barycentric units.
-const OUTSIDE: f64 = 0.12;
+/// The contrast at the edges of a tile must be this part of that at its corners.
+const MIN_CONTRAST: f64 = 0.4;
 
-/// Places along an edge where white and border are sampled.
-const ALONG: [f64; 3] = [0.3, 0.5, 0.7];
+/// Samples this much brighter than the white around are no paper, in contrasts.
+const GLARE: f64 = 0.35;
 
-/// The border must be darker than the white by this part of the contrast of the tile's corners.
-const MIN_CONTRAST: f64 = 0.5;
+/// The part of the image's full scale from which a pixel may be saturated.
+const SATURATED: f64 = 0.985;
 
-/// Cells with shorter sides than this are read together where one by one they make no code, px:
-/// larger ones show their own brightness in the middle.
-const SMALL_CELL_PX: f64 = 5.0;
+/// Depth to which bright tiles without tags are looked into, and dark ones, in tile coordinates.
+const PLAIN_DEPTH: f64 = 0.2;
 
-/// Blurs that are tried then, px: that of a sharp photograph, and with some motion or defocus.
-const SMALL_CELL_BLURS_PX: [f64; 2] = [0.8, 1.2];
+/// The least depth, where a tag leaves no more.
+const LEAST_DEPTH: f64 = 0.06;
 
-/// The cells of a tile, read as a word.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The cells of a tile.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     /// The tile, in the grid's vertices.
     pub tile: Tile,
-    /// Bits as cells of the tile in the coordinates of [`Tile::frame`].
-    pub word: u64,
-    /// The nearest code, where one is near enough.
-    pub decoded: Option<Decoded>,
+    /// Half the logarithm of the odds that a cell is of the colour around the border, by bit in the
+    /// coordinates of [`Tile::frame`].
+    pub half_odds: Vec<f32>,
+}
+
+impl Reading {
+    /// The most likely word.
+    pub fn word(&self) -> u64 {
+        self.half_odds.iter().rev().fold(0, |word, odds| word << 1 | u64::from(*odds > 0.0))
+    }
 }
 
 /// How the tags of a panel lie in their tiles.
@@ -53,140 +61,161 @@ impl TagPlace {
     }
 }
 
+/// Black and white beside edges of tiles that were looked at, by their vertex and direction.
+type EdgeLevels = BTreeMap<(Vertex, usize), Option<[f64; 2]>>;
+
 /// Reads the tags of one family that lie alike in their tiles.
 #[derive(Clone, Debug)]
 pub struct TagReader {
-    cells: TagCells,
+    kind: GridKind,
     tags_in: TagsIn,
-    /// Where the white around the border is sampled, inside the tile's edges in tile coordinates;
-    /// negative is outside.
-    white_at: f64,
-    /// Where the border is sampled.
-    border_at: f64,
-    /// Centre of each bit's cell, and the points of the cell that are averaged: its centre, and
-    /// half-way from there to its corners.
-    samples: Vec<([f64; 2], Vec<[f64; 2]>)>,
-    /// Border and margin together, bit-widths.
-    inset_bits: f64,
-    decoder: Decoder,
-    max_errors: u32,
+    model: CellModel,
+    clear: ClearDepth,
+    /// For each bit the one whose cell takes its place in a mirror.
+    mirror: Vec<usize>,
+}
+
+/// What was read in a grid.
+#[derive(Clone, Debug, Default)]
+pub struct Read {
+    /// Tiles that may carry a tag.
+    pub readings: Vec<Reading>,
+    /// The median length of a bit, px.
+    pub bit_px: f64,
+    /// Deviation of the blur, px.
+    pub blur_px: f64,
 }
 
 impl TagReader {
-    /// A reader for tags that lie so in their tiles; corrects up to `max_errors` bits.
-    pub fn new(family: &Family, place: TagPlace, max_errors: u32) -> Self {
+    /// A reader for tags that lie so in their tiles.
+    pub fn new(family: &Family, place: TagPlace) -> Self {
         let TagPlace { border_bits, margin_bits, tags_in } = place;
         let cells = family.cells();
-        let inset = margin_bits + border_bits;
-        let width = cells.width(inset);
-        let samples = |bit: u32| {
-            let centre = cells.centre(bit, inset);
-            let half_way = |c: [f64; 2]| [0, 1].map(|i| (c[i] + centre[i]) / 2.0);
-            let corners = cells.corners(bit, inset).into_iter().map(half_way);
-            (centre, std::iter::once(centre).chain(corners).collect())
+        let inset_bits = margin_bits + border_bits;
+        let width = cells.width(inset_bits);
+        let depth = |bits: f64| (bits / width).clamp(LEAST_DEPTH, PLAIN_DEPTH);
+        let clear = match tags_in {
+            TagsIn::Black => ClearDepth { dark: depth(border_bits), bright: PLAIN_DEPTH },
+            TagsIn::White => ClearDepth { dark: PLAIN_DEPTH, bright: depth(margin_bits) },
         };
-        Self {
-            tags_in,
-            inset_bits: inset,
-            white_at: match tags_in {
-                TagsIn::Black => -OUTSIDE,
-                TagsIn::White => 0.5 * margin_bits / width,
-            },
-            border_at: (margin_bits + 0.5 * border_bits) / width,
-            samples: (0..cells.dimension().bits()).map(samples).collect(),
-            decoder: Decoder::new(family),
-            max_errors,
-            cells,
+        let model = CellModel::new(&cells, inset_bits, margin_bits);
+        Self { kind: family.kind(), tags_in, model, clear, mirror: mirror(&cells) }
+    }
+
+    /// Reads tiles of a grid whose corners are known: those that may carry a tag of a board that is not
+    /// inverted, or of one that is; no more than `most` of them, spread over the grid.
+    pub fn read<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        grid: &SaddleGrid,
+        inverted: bool,
+        most: usize,
+    ) -> Read {
+        let ClearDepth { dark, bright } = self.clear;
+        let clear = if inverted { ClearDepth { dark: bright, bright: dark } } else { self.clear };
+        let Some(light) = GridLight::of(image, grid, self.kind, clear) else {
+            return Read::default();
+        };
+        let dark = (self.tags_in == TagsIn::Black) != inverted;
+        let tiles: Vec<Tile> = grid
+            .keys()
+            .flat_map(|&v| self.kind.tiles_at(v))
+            .filter(|tile| tile.is_dark() == dark)
+            .filter(|tile| tile.vertices().all(|v| grid.contains_key(&v)))
+            .collect();
+        let every = tiles.len().div_ceil(most.max(1)).max(1);
+        let (mut mixings, mut levels) = (Mixings::new(), BTreeMap::new());
+        let mut bits_px = Vec::new();
+        let mut readings = Vec::new();
+        for &tile in tiles.iter().step_by(every) {
+            if let Some((reading, bit_px)) =
+                self.read_tile(image, grid, tile, &light, (&mut mixings, &mut levels))
+            {
+                readings.push(reading);
+                bits_px.push(bit_px);
+            }
+        }
+        let bit_px = super::detection::median(bits_px).unwrap_or(0.0);
+        Read { readings, bit_px, blur_px: light.blur_px() }
+    }
+
+    /// A reading as it would be in a mirror.
+    pub fn mirrored(&self, reading: &Reading) -> Reading {
+        let tile = reading.tile;
+        Reading {
+            tile: Tile { anchor: Vertex::new(tile.anchor.col, tile.anchor.row), ..tile },
+            half_odds: self.mirror.iter().map(|&bit| reading.half_odds[bit]).collect(),
         }
     }
 
-    /// The layout of the cells.
-    pub fn cells(&self) -> &TagCells {
-        &self.cells
-    }
-
-    /// Most bits that are corrected.
-    pub fn max_errors(&self) -> u32 {
-        self.max_errors
-    }
-
-    /// Reads every tile of a grid whose corners are known and whose border can be told from the
-    /// white around it: tiles of the right colour as they are, others as tags of an inverted board.
-    pub fn read_all<T: Intensity>(&self, image: &Gray<T>, grid: &SaddleGrid) -> Vec<Reading> {
-        let tiles = grid.keys().flat_map(|&v| self.cells.kind().tiles_at(v));
-        tiles.filter_map(|tile| self.read(image, grid, tile)).collect()
-    }
-
-    fn read<T: Intensity>(
+    fn read_tile<T: Intensity>(
         &self,
         image: &Gray<T>,
         grid: &SaddleGrid,
         tile: Tile,
-    ) -> Option<Reading> {
+        light: &GridLight,
+        (mixings, edges): (&mut Mixings, &mut EdgeLevels),
+    ) -> Option<(Reading, f64)> {
         let map = TileMap::new(grid, tile)?;
-        let sample = |point: [f64; 2]| {
-            let [x, y] = map.image_from_tile(point);
-            let inside = x >= 0.0
-                && y >= 0.0
-                && x <= (image.width() - 1) as f64
-                && y <= (image.height() - 1) as f64;
-            inside.then(|| f64::from(image.bilinear(x, y)))
-        };
-        let kind = self.cells.kind();
-        let around = Plane::fit(edge_points(kind, self.white_at), sample)?;
-        let border = Plane::fit(edge_points(kind, self.border_at), sample)?;
-        let contrast = around.at(kind.middle()) - border.at(kind.middle());
-        let sign = if tile.is_dark() == (self.tags_in == TagsIn::Black) { 1.0 } else { -1.0 };
-        if sign * contrast < MIN_CONTRAST * corner_contrast::<T>(grid, tile) {
+        let levels = light.levels(image, grid, tile, edges)?;
+        let middle = self.kind.middle();
+        let [_, contrast] = levels.at(middle);
+        if contrast < MIN_CONTRAST * corner_contrast::<T>(grid, tile) {
             return None;
         }
-        let mut word = 0;
-        for (bit, (centre, points)) in self.samples.iter().enumerate() {
-            let mut sum = 0.0;
-            for &point in points {
-                sum += sample(point)?;
+        let width = self.model.width();
+        let at = |u: f64, v: f64| map.image_from_tile([middle[0] + u, middle[1] + v]);
+        let step = |p: [f64; 2], q: [f64; 2]| [0, 1].map(|i| (p[i] - q[i]) / (0.5 * width));
+        let along = [step(at(0.25, 0.0), at(-0.25, 0.0)), step(at(0.0, 0.25), at(0.0, -0.25))];
+        let (covariance, area_px2) = in_tile(light.blur_px2, along)?;
+        let noise = light.noise;
+        let mixing = self.model.mixing(TileBlur { covariance, area_px2, noise }, mixings)?;
+        let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
+        // Cells of the colour around the border are 1, on inverted boards dark ones.
+        let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);
+        let full = SATURATED * f64::from(T::FULL_SCALE);
+        let mut samples = Vec::with_capacity(self.model.points().len());
+        for &point in self.model.points() {
+            let [x, y] = map.image_from_tile(point);
+            if !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
+                samples.push(Sample::Erased);
+                continue;
             }
-            let threshold = (around.at(*centre) + border.at(*centre)) / 2.0;
-            // A cell of the colour around the border is a 1, on inverted boards as well.
-            let one = sign * (sum / points.len() as f64 - threshold) > 0.0;
-            word |= u64::from(one) << bit;
-        }
-        let decode = |word| self.decoder.decode(word, self.max_errors);
-        let mut reading = Reading { tile, word, decoded: decode(word) };
-        if reading.decoded.is_none()
-            && longest_side_px(kind, &map) / self.cells.width(self.inset_bits) < SMALL_CELL_PX
-        {
-            let levels = |point: [f64; 2]| [border.at(point), around.at(point)];
-            let words = SMALL_CELL_BLURS_PX.into_iter().filter_map(|blur_px| {
-                small_cells::word(image, &map, &self.cells, self.inset_bits, blur_px, levels)
+            let value = f64::from(image.bilinear(x, y));
+            let [dark, contrast] = levels.at(point);
+            let brightness = (value - dark) / contrast;
+            let share = light.share(brightness).clamp(-0.5, 1.5) as f32;
+            let saturated = value >= full;
+            samples.push(if contrast <= 0.0 || contrast.is_nan() || brightness > 1.0 + GLARE {
+                Sample::Erased
+            } else if saturated && light.clipped_share < 1.0 {
+                Sample::AtLeast(light.clipped_share as f32)
+            } else {
+                Sample::Share(share)
             });
-            let readings = words.map(|word| Reading { tile, word, decoded: decode(word) });
-            reading = readings.into_iter().find(|r| r.decoded.is_some()).unwrap_or(reading);
         }
-        Some(reading)
+        if inverted {
+            for sample in &mut samples {
+                *sample = match *sample {
+                    Sample::Share(share) => Sample::Share(1.0 - share),
+                    Sample::AtLeast(share) => Sample::Share(1.0 - share),
+                    Sample::Erased => Sample::Erased,
+                };
+            }
+        }
+        let half_odds = mixing.half_odds(&samples);
+        let length = |[x, y]: [f64; 2]| x.hypot(y);
+        Some((Reading { tile, half_odds }, length(along[0]).max(length(along[1]))))
     }
 }
 
-/// The longest side of a tile, px.
-fn longest_side_px(kind: GridKind, map: &TileMap) -> f64 {
-    let [a, b, c] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|point| map.image_from_tile(point));
-    let length = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
-    let along = length(a, b).max(length(a, c));
-    if kind == GridKind::Deltille { along.max(length(b, c)) } else { along }
-}
-
-/// Points along the edges of a tile, `inside` it in tile coordinates (negative: outside).
-fn edge_points(kind: GridKind, inside: f64) -> impl Iterator<Item = [f64; 2]> {
-    let left = 1.0 - kind.insets() * inside;
-    ALONG.into_iter().flat_map(move |t| {
-        let t = inside + t * left;
-        let far = 1.0 - inside;
-        let last: &[[f64; 2]] = match kind {
-            GridKind::Deltille => &[[t, far - t]],
-            GridKind::Checker => &[[t, far], [far, t]],
-        };
-        [[t, inside], [inside, t]].into_iter().chain(last.to_vec())
-    })
+/// For each bit the one whose cell takes its place when rows and columns are exchanged.
+fn mirror(cells: &TagCells) -> Vec<usize> {
+    let of = |cell: &crate::lattice::Cell| {
+        let mirrored = crate::lattice::Cell { row: cell.col, col: cell.row, upright: cell.upright };
+        cells.cells().iter().position(|&other| other == mirrored)
+    };
+    cells.cells().iter().enumerate().map(|(bit, cell)| of(cell).unwrap_or(bit)).collect()
 }
 
 /// Contrast between dark and bright around the corners of a tile, in units of the image.
@@ -194,29 +223,4 @@ fn corner_contrast<T: Intensity>(grid: &SaddleGrid, tile: Tile) -> f64 {
     let amplitudes = tile.vertices().filter_map(|v| grid.get(&v));
     let least = amplitudes.map(|p| p.amplitude).fold(f64::INFINITY, f64::min);
     2.0 * least * f64::from(T::FULL_SCALE / crate::raster::PYRAMID_FULL_SCALE)
-}
-
-/// Brightness as a plane over tile coordinates.
-struct Plane([f64; 3]);
-
-impl Plane {
-    /// Least squares; `None` when a sample is missing.
-    fn fit(
-        points: impl Iterator<Item = [f64; 2]>,
-        sample: impl Fn([f64; 2]) -> Option<f64>,
-    ) -> Option<Self> {
-        let mut normal = nalgebra::Matrix3::zeros();
-        let mut right = nalgebra::Vector3::zeros();
-        for [u, v] in points {
-            let row = nalgebra::Vector3::new(1.0, u, v);
-            normal += row * row.transpose();
-            right += row * sample([u, v])?;
-        }
-        let solution = normal.try_inverse()? * right;
-        Some(Self([solution.x, solution.y, solution.z]))
-    }
-
-    fn at(&self, [u, v]: [f64; 2]) -> f64 {
-        self.0[0] + self.0[1] * u + self.0[2] * v
-    }
 }

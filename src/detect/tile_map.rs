@@ -1,4 +1,4 @@
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{RowVector2, SMatrix, SVector};
 
 use super::grow::SaddleGrid;
 use crate::lattice::{Tile, Vertex};
@@ -33,26 +33,21 @@ impl TileMap {
         }
         let known: Vec<(Vertex, [f64; 2])> =
             around.iter().filter_map(|v| Some((*v, at(v)?))).collect();
-        let mut design = DMatrix::zeros(known.len() + 3, 6);
-        let mut x = DVector::zeros(known.len() + 3);
-        let mut y = DVector::zeros(known.len() + 3);
-        for (i, (vertex, position)) in known.iter().enumerate() {
+        let mut normal = SMatrix::<f64, 6, 6>::zeros();
+        let mut right = SMatrix::<f64, 6, 2>::zeros();
+        for k in 3..6 {
+            normal[(k, k)] = BENDING_PENALTY * BENDING_PENALTY;
+        }
+        for (vertex, position) in &known {
             let weight = if own.clone().any(|v| v == *vertex) { OWN_WEIGHT } else { 1.0 };
-            let [u, v] = tile_coordinates(tile.frame(), *vertex);
-            for (j, monomial) in monomials([u, v]).into_iter().enumerate() {
-                design[(i, j)] = weight * monomial;
-            }
-            x[i] = weight * position[0];
-            y[i] = weight * position[1];
+            let row = SVector::from(monomials(tile_coordinates(tile.frame(), *vertex)));
+            let row = row * weight;
+            normal += row * row.transpose();
+            right += row * (RowVector2::from(*position) * weight);
         }
-        for k in 0..3 {
-            design[(known.len() + k, 3 + k)] = BENDING_PENALTY;
-        }
-        let svd = design.svd(true, true);
-        let solve = |b: &DVector<f64>| -> Option<[f64; 6]> {
-            svd.solve(b, 1e-12).ok()?.as_slice().try_into().ok()
-        };
-        Some(Self { coefficients: [solve(&x)?, solve(&y)?] })
+        let solution = normal.cholesky()?.solve(&right);
+        let column = |k: usize| std::array::from_fn(|i| solution[(i, k)]);
+        Some(Self { coefficients: [column(0), column(1)] })
     }
 
     /// Image position of the tile point (u, v), px.

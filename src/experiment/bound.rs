@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, Matrix2};
 
-use crate::detect::SLOPE_PRIOR;
+use crate::detect::{SLOPE_PRIOR, Tone};
 use crate::synth::SimulatedCorner;
 
 /// Step of the difference quotients, in the parameters' units; errors are of its square.
@@ -15,8 +15,14 @@ const STEP: f64 = 1e-3;
 /// Directions over which the length of an error is averaged.
 const DIRECTIONS: usize = 64;
 
-/// The least covariance of a position estimated from the (2 · radius + 1)² pixels around it.
-pub fn covariance(corner: &SimulatedCorner, radius: usize, noise: f64) -> Option<Matrix2<f64>> {
+/// The least covariance of a position estimated from the (2 · radius + 1)² pixels around it, of a camera whose
+/// tone curve is known.
+pub fn covariance(
+    corner: &SimulatedCorner,
+    radius: usize,
+    noise: f64,
+    tone: Tone,
+) -> Option<Matrix2<f64>> {
     let centre = corner.position.map(|c| c.round() as usize);
     // Slopes act about the corner; whence they are counted changes level and contrast alone.
     let local = SimulatedCorner { light_centre: corner.position, ..corner.clone() };
@@ -36,10 +42,10 @@ pub fn covariance(corner: &SimulatedCorner, radius: usize, noise: f64) -> Option
     let columns: Vec<Vec<f64>> = moves
         .iter()
         .map(|shift| {
-            let image = |d: f64| {
+            let image = |d: f64| -> Vec<f64> {
                 let mut moved = local.clone();
                 shift(&mut moved, d);
-                moved.window(centre, radius)
+                moved.window(centre, radius).into_iter().map(|light| tone.grey(light)).collect()
             };
             let (up, down) = (image(STEP), image(-STEP));
             up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * STEP * noise)).collect()

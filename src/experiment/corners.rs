@@ -15,7 +15,7 @@ use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 
 use super::bound;
-use crate::detect::{RefineStatus, Refinement, Refiner};
+use crate::detect::{RefineStatus, Refinement, Refiner, Tone};
 use crate::raster::Gray;
 use crate::synth::SimulatedCorner;
 use crate::target::GridKind;
@@ -46,11 +46,13 @@ pub enum Sweep {
     Noise,
     /// Tilt, degrees; in the other sweeps uniform up to 60°.
     Tilt,
+    /// Gamma of the camera: grey = light^(1/γ), before the noise.
+    Tone,
 }
 
 impl Sweep {
-    /// All, in the paper's order.
-    pub const ALL: [Self; 3] = [Self::Blur, Self::Noise, Self::Tilt];
+    /// All, the paper's in its order.
+    pub const ALL: [Self; 4] = [Self::Blur, Self::Noise, Self::Tilt, Self::Tone];
 
     /// The values.
     pub fn values(self) -> &'static [f64] {
@@ -58,6 +60,7 @@ impl Sweep {
             Self::Blur => &[0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0],
             Self::Noise => &[0.5, 1.0, 2.0, 3.0, 4.0, 5.0],
             Self::Tilt => &[0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 75.0],
+            Self::Tone => &[1.0, 1.2, 1.4, 1.8, 2.2, 2.6],
         }
     }
 
@@ -67,21 +70,29 @@ impl Sweep {
             Self::Blur => "blur_px",
             Self::Noise => "noise_percent",
             Self::Tilt => "tilt_deg",
+            Self::Tone => "gamma",
         }
     }
 }
 
 /// What is measured.
-pub const METHODS: [Method; 4] =
-    [Method::Polynomial(1), Method::Polynomial(2), Method::Polynomial(5), Method::Model];
+pub const METHODS: [Method; 5] = [
+    Method::Polynomial(1),
+    Method::Polynomial(2),
+    Method::Polynomial(5),
+    Method::Model,
+    Method::ModelWithTone,
+];
 
 /// A way to refine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// The paper's, after so many iterations.
     Polynomial(usize),
-    /// The model, from the polynomial's result.
+    /// The model of a linear camera, from the polynomial's result.
     Model,
+    /// The model, with the tone curve estimated from this one corner.
+    ModelWithTone,
 }
 
 impl Method {
@@ -90,6 +101,7 @@ impl Method {
         match self {
             Self::Polynomial(t) => format!("polynomial t = {t}"),
             Self::Model => "model".to_owned(),
+            Self::ModelWithTone => "model, tone auto".to_owned(),
         }
     }
 
@@ -99,6 +111,9 @@ impl Method {
                 Refiner::new(kind, Refinement::Polynomial, WINDOW_PX).with_iterations(t)
             }
             Self::Model => Refiner::new(kind, Refinement::Model, WINDOW_PX),
+            Self::ModelWithTone => {
+                Refiner::new(kind, Refinement::Model, WINDOW_PX).with_tone(Tone::Auto)
+            }
         }
     }
 }
@@ -133,12 +148,14 @@ pub fn rows_count() -> usize {
     2 * METHODS.len() * Sweep::ALL.iter().map(|sweep| sweep.values().len()).sum::<usize>()
 }
 
-/// Runs the experiment with `images` images a point; `None` when cancelled.
+/// Runs the experiment with `images` images a point, of a camera with this tone curve where it is not
+/// varied; `None` when cancelled.
 ///
 /// The result depends on `images` and `seed` alone. `progress` is called once a row.
 pub fn run(
     images: usize,
     seed: u64,
+    tone: Tone,
     cancel: &AtomicBool,
     progress: &(dyn Fn() + Sync),
 ) -> Option<Vec<Row>> {
@@ -147,7 +164,7 @@ pub fn run(
     for kind in [GridKind::Deltille, GridKind::Checker] {
         for sweep in Sweep::ALL {
             for &value in sweep.values() {
-                rows.extend(point(kind, sweep, value, [seed, stream], images, cancel)?);
+                rows.extend(point(kind, sweep, value, tone, [seed, stream], images, cancel)?);
                 METHODS.iter().for_each(|_| progress());
                 stream += 1;
             }
@@ -161,6 +178,7 @@ pub fn point(
     kind: GridKind,
     sweep: Sweep,
     value: f64,
+    tone: Tone,
     [seed, stream]: [u64; 2],
     images: usize,
     cancel: &AtomicBool,
@@ -172,7 +190,7 @@ pub fn point(
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(stream << 32 | image as u64);
             (!cancel.load(Ordering::Relaxed))
-                .then(|| sample(kind, sweep, value, &mut rng, &refiners))
+                .then(|| sample(kind, sweep, value, tone, &mut rng, &refiners))
         })
         .collect();
     let samples = samples?;
@@ -218,6 +236,7 @@ fn sample(
     kind: GridKind,
     sweep: Sweep,
     value: f64,
+    tone: Tone,
     rng: &mut ChaCha8Rng,
     refiners: &[Refiner; METHODS.len()],
 ) -> Sample {
@@ -226,7 +245,9 @@ fn sample(
         Sweep::Blur => (value, NOISE, tilt_deg),
         Sweep::Noise => (BLUR_PX, value / 100.0, tilt_deg),
         Sweep::Tilt => (BLUR_PX, NOISE, value),
+        Sweep::Tone => (BLUR_PX, NOISE, tilt_deg),
     };
+    let tone = if sweep == Sweep::Tone { Tone::Gamma(value) } else { tone };
     let centre = (SIDE / 2) as f64;
     let truth = [centre + rng.random_range(-0.5..0.5), centre + rng.random_range(-0.5..0.5)];
     let lines = match kind {
@@ -240,6 +261,9 @@ fn sample(
         ..SimulatedCorner::seen_from(lines, axis, tilt_deg.to_radians(), truth, blur_px)
     };
     let mut image = corner.render(SIDE, SIDE);
+    for pixel in image.pixels_mut() {
+        *pixel = tone.grey(f64::from(*pixel)) as f32;
+    }
     add_noise(&mut image, noise, rng);
     let starts = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
         .map(|[u, v]| [truth[0].floor() + u, truth[1].floor() + v]);
@@ -253,7 +277,7 @@ fn sample(
         found.then_some(Outcome { error_px: dx.hypot(dy), nees })
     };
     Sample {
-        bound_px: bound::covariance(&corner, WINDOW_PX / 2, noise)
+        bound_px: bound::covariance(&corner, WINDOW_PX / 2, noise, tone)
             .and_then(|covariance| bound::mean_length(&covariance)),
         outcomes: std::array::from_fn(|m| starts.map(|start| outcome(&refiners[m], start))),
     }
@@ -310,8 +334,9 @@ mod tests {
         for (kind, model_px, polynomial_px) in
             [(GridKind::Deltille, 0.0070_f64, 0.0117), (GridKind::Checker, 0.0085, 0.0171)]
         {
-            let rows = point(kind, Sweep::Blur, 1.0, [1, 0], 200, &never).unwrap();
-            let (polynomial, model) = (&rows[2], &rows[3]);
+            let rows = point(kind, Sweep::Blur, 1.0, Tone::Linear, [1, 0], 200, &never).unwrap();
+            let (polynomial, model, toned) = (&rows[2], &rows[3], &rows[4]);
+            assert!(toned.error_px[0] < 1.03 * model.error_px[0], "{toned:?}");
             assert!(polynomial.error_px[0] < polynomial_px, "{polynomial:?}");
             assert!(model.error_px[0] < model_px.min(1.25 * model.bound_px), "{model:?}");
             assert!(model.error_px[0] > 0.85 * model.bound_px, "better than possible: {model:?}");
@@ -321,14 +346,30 @@ mod tests {
         }
     }
 
+    /// A curve of gamma 2.2 moves the corner of a linear model by more than the noise does; a curve that is
+    /// estimated brings it back.
+    #[test]
+    fn tone_curves_are_found_from_the_corner() {
+        let never = AtomicBool::new(false);
+        for (kind, model_px) in [(GridKind::Deltille, 0.0095), (GridKind::Checker, 0.0115)] {
+            let gamma = Sweep::Tone;
+            let rows = point(kind, gamma, 2.2, Tone::Linear, [1, 0], 200, &never).unwrap();
+            let toned = &rows[4];
+            assert!(toned.error_px[0] < model_px, "{toned:?}");
+            assert!(toned.error_px[0] < 1.25 * toned.bound_px, "{toned:?}");
+            assert!((toned.nees.unwrap() - 2.0).abs() < 0.6, "{toned:?}");
+        }
+    }
+
     #[test]
     fn results_depend_on_the_seed_alone_and_stop_when_told() {
         let run = |seed| {
             let never = AtomicBool::new(false);
-            csv(&point(GridKind::Checker, Sweep::Tilt, 45.0, [seed, 0], 8, &never).unwrap())
+            csv(&point(GridKind::Checker, Sweep::Tilt, 45.0, Tone::Linear, [seed, 0], 8, &never)
+                .unwrap())
         };
         assert_eq!(run(1), run(1));
         assert_ne!(run(1), run(2));
-        assert!(super::run(1, 1, &AtomicBool::new(true), &|| ()).is_none());
+        assert!(super::run(1, 1, Tone::Linear, &AtomicBool::new(true), &|| ()).is_none());
     }
 }

@@ -28,13 +28,16 @@ fn colour(method: Method) -> &'static str {
         Method::Polynomial(2) => "#4292c6",
         Method::Polynomial(_) => "#08519c",
         Method::Model => "#d94801",
+        Method::ModelWithTone => "#238b45",
     }
 }
 
 /// The plot as SVG.
 pub fn svg(rows: &[Row]) -> String {
-    let (width, height) =
-        (3.0 * (PANEL[0] + MARGIN[0]) + 20.0, HEAD + 2.0 * (PANEL[1] + MARGIN[1]) + 4.0);
+    let (width, height) = (
+        Sweep::ALL.len() as f64 * (PANEL[0] + MARGIN[0]) + 20.0,
+        HEAD + 2.0 * (PANEL[1] + MARGIN[1]) + 4.0,
+    );
     let mut body = String::new();
     legend(&mut body);
     for (j, kind) in [GridKind::Deltille, GridKind::Checker].into_iter().enumerate() {
@@ -97,6 +100,7 @@ fn panel(body: &mut String, [left, top]: [f64; 2], kind: GridKind, sweep: Sweep,
     let step = match sweep {
         Sweep::Tilt => 15.0,
         Sweep::Blur | Sweep::Noise => 1.0,
+        Sweep::Tone => 0.5,
     };
     for tick in (0..).map(|n| f64::from(n) * step).take_while(|&tick| tick <= last) {
         let bottom = top + PANEL[1];
@@ -109,6 +113,7 @@ fn panel(body: &mut String, [left, top]: [f64; 2], kind: GridKind, sweep: Sweep,
         Sweep::Blur => "blur, px",
         Sweep::Noise => "noise, percent",
         Sweep::Tilt => "tilt, °",
+        Sweep::Tone => "gamma of the tone curve",
     };
     write(body, axis, [left + PANEL[0] / 2.0, bottom + 38.0], 0.5);
     write(body, &format!("{}: mean error, px", name(kind)), [left, top - 8.0], 0.0);

@@ -5,6 +5,11 @@ pub trait Intensity: Copy + Default + Send + Sync + PartialOrd + 'static {
 
     /// The value as a float, in the type's own units.
     fn to_f32(self) -> f32;
+
+    /// Pixels as bytes, if that is what they are: what works on bytes is faster.
+    fn as_bytes(_pixels: &[Self]) -> Option<&[u8]> {
+        None
+    }
 }
 
 impl Intensity for u8 {
@@ -13,6 +18,10 @@ impl Intensity for u8 {
     #[inline(always)]
     fn to_f32(self) -> f32 {
         f32::from(self)
+    }
+
+    fn as_bytes(pixels: &[Self]) -> Option<&[u8]> {
+        Some(pixels)
     }
 }
 
@@ -122,6 +131,23 @@ impl<T: Intensity> Gray<T> {
         let upper = self.at(x0, y0).to_f32() * (1.0 - fx) + self.at(x1, y0).to_f32() * fx;
         let lower = self.at(x0, y1).to_f32() * (1.0 - fx) + self.at(x1, y1).to_f32() * fx;
         upper * (1.0 - fy) + lower * fy
+    }
+
+    /// [`Self::bilinear`] of a place that is known to lie in the image, less its last row and column.
+    #[inline(always)]
+    pub fn bilinear_inside(&self, x: f64, y: f64) -> f64 {
+        // By way of signed numbers, which processors convert at once.
+        let (left, top) = (x as i32, y as i32);
+        let (fx, fy) = ((x - f64::from(left)) as f32, (y - f64::from(top)) as f32);
+        let first = top as usize * self.width + left as usize;
+        let upper = &self.data[first..first + 2];
+        let lower = &self.data[first + self.width..first + self.width + 2];
+        let across = |pair: &[T]| {
+            let (a, b) = (pair[0].to_f32(), pair[1].to_f32());
+            a + fx * (b - a)
+        };
+        let (upper, lower) = (across(upper), across(lower));
+        f64::from(upper + fy * (lower - upper))
     }
 
     /// The image in another pixel type.

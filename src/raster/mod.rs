@@ -2,12 +2,14 @@
 //!
 //! Row-major, y down, pixel centres at integer coordinates.
 
+mod bands;
 mod blur;
 mod coverage;
 mod gray;
 pub mod io;
 mod pyramid;
 
+pub use bands::{bands, fill_bands};
 pub use blur::gaussian;
 pub use coverage::Coverage;
 pub use gray::{Gray, Intensity};

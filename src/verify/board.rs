@@ -7,7 +7,7 @@ use super::fit::AffineMap;
 use super::fold::Seen;
 use super::tiles::{MAX_INK_ERROR, PlacedPanel};
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
-use crate::detect::{Detection, Detector, DetectorConfig, GridCorner};
+use crate::detect::{Detection, Detector, DetectorConfig, GridCorner, Tone};
 use crate::target::{Corner, Panel, SheetLayout};
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
@@ -103,7 +103,11 @@ fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
     else {
         return;
     };
-    let any_grid = Detector::for_grid(kind, None, DetectorConfig::default());
+    let any_grid = Detector::for_grid(
+        kind,
+        None,
+        DetectorConfig { tone: Tone::Linear, ..DetectorConfig::default() },
+    );
     let grids = any_grid.detect(&page.blurred(), "page").grids;
     let found: usize = grids.iter().map(|grid| grid.corners.len()).sum();
     let stated = verdict.corners;

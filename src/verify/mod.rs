@@ -48,7 +48,7 @@ mod verdict;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::detect::{Detector, DetectorConfig};
+use crate::detect::{Detector, DetectorConfig, Tone};
 use crate::export::sheet_file_name;
 use crate::family::Family;
 use crate::target::{SheetLayout, SheetPage, Target};
@@ -145,7 +145,11 @@ impl<'a> Verifier<'a> {
                 return Err(VerifyError::Family { needed, given });
             }
         }
-        let detector = Detector::for_target(target, family, DetectorConfig::default());
+        let detector = Detector::for_target(
+            target,
+            family,
+            DetectorConfig { tone: Tone::Linear, ..DetectorConfig::default() },
+        );
         Ok(Self { target, family, detector, cancel: None })
     }
 

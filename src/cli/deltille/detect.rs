@@ -267,5 +267,9 @@ fn summary(path: &Path, found: &Detection) -> String {
     if tags > 0 {
         line += &format!(", {}", count(tags, "tag"));
     }
-    line + "\n"
+    line += "\n";
+    for reason in &found.reasons {
+        line += &format!("  {reason}\n");
+    }
+    line
 }

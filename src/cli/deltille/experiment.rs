@@ -11,6 +11,7 @@ use super::images::Images;
 use super::target_file;
 use crate::cli::output::say;
 use crate::cli::{interrupt, output, progress};
+use crate::detect::Tone;
 use crate::experiment::photographs::axes::Axis;
 use crate::experiment::photographs::{self, Kind, Subject, table};
 use crate::experiment::{corners, plot, rig, table2};
@@ -65,6 +66,9 @@ struct CornersArgs {
     #[arg(long, value_name = "N", default_value_t = 1000,
           value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     images: u32,
+    /// Tone curve of the simulated camera where it is not varied: linear, srgb, or a gamma such as 2.2
+    #[arg(long, value_name = "CURVE", default_value = "linear")]
+    tone: Tone,
     #[command(flatten)]
     simulation: SimulationArgs,
 }
@@ -157,11 +161,14 @@ fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
-    let CornersArgs { images, simulation } = args;
+    let CornersArgs { images, tone, simulation } = args;
+    if tone == Tone::Auto {
+        bail!("--tone: a simulated camera has a curve that is known: linear, srgb or a gamma");
+    }
     let SimulationArgs { seed, output: folder, .. } = &simulation;
     let interrupted = interrupt::flag();
     let rows = simulation.run(corners::rows_count(), "rows", |tick| {
-        corners::run(images as usize, *seed, interrupted, tick)
+        corners::run(images as usize, *seed, tone, interrupted, tick)
     })?;
     let Some(rows) = rows.filter(|_| !interrupted.load(Ordering::Relaxed)) else {
         bail!("interrupted; nothing was written");

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 
 use super::refine::Method;
 use super::target_file;
-use crate::detect::{Detector, DetectorConfig};
+use crate::detect::{Detector, DetectorConfig, Tone};
 use crate::target::{GridKind, Target};
 
 /// Options that say what to look for.
@@ -38,6 +38,10 @@ pub struct FinderArgs {
     /// How corners are refined
     #[arg(long, value_name = "METHOD", default_value = "model")]
     refine: Method,
+    /// The camera's tone curve: linear, srgb, a gamma such as 2.2, or auto: estimated from the corners of
+    /// each picture
+    #[arg(long, value_name = "CURVE", default_value = "auto")]
+    tone: Tone,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -63,6 +67,7 @@ impl FinderArgs {
             max_bit_errors: self.max_errors,
             allow_mirrored: self.allow_mirrored,
             refinement: self.refine.into(),
+            tone: self.tone,
         };
         let Some(path) = &self.target else {
             let kind = match self.grid {

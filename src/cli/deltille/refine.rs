@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 
 use crate::cli::output;
-use crate::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};
+use crate::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
 use crate::raster::{self, AnyGray};
 use crate::target::GridKind;
 
@@ -31,6 +31,9 @@ pub struct Args {
     /// the largest 4r + 1 within it
     #[arg(long, value_name = "PIXELS", default_value_t = 21, value_parser = window)]
     window: usize,
+    /// The camera's tone curve: linear, srgb, a gamma such as 2.2, or auto: estimated from all these corners
+    #[arg(long, value_name = "CURVE", default_value = "auto")]
+    tone: Tone,
     /// File for the results [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -76,10 +79,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Kind::Deltille => GridKind::Deltille,
         Kind::Checker => GridKind::Checker,
     };
-    let refiner = Refiner::new(kind, args.method.into(), args.window);
+    let refiner = Refiner::new(kind, args.method.into(), args.window).with_tone(args.tone);
     let refined: Vec<Refined> = match raster::read(&args.image)? {
-        AnyGray::U8(image) => seeds.iter().map(|&seed| refiner.refine(&image, seed)).collect(),
-        AnyGray::U16(image) => seeds.iter().map(|&seed| refiner.refine(&image, seed)).collect(),
+        AnyGray::U8(image) => refiner.refine_all(&image, &seeds),
+        AnyGray::U16(image) => refiner.refine_all(&image, &seeds),
     };
     let table = table(&refined);
     match &args.output {

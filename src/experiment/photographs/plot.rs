@@ -6,7 +6,7 @@ use crate::experiment::plot::{line, page, write};
 
 /// Size of a panel's axes and the room around it, in user units.
 const PANEL: [f64; 2] = [250.0, 130.0];
-const MARGIN: [f64; 2] = [72.0, 64.0];
+const MARGIN: [f64; 2] = [72.0, 88.0];
 const HEAD: f64 = 50.0;
 
 /// One colour a subject, in their order.
@@ -26,14 +26,14 @@ struct Column {
 
 const COLUMNS: [Column; 4] = [
     Column {
-        label: "recall, % (dashed: found at all)",
+        label: "recall (dashed: found), %",
         range: [0.0, 100.0],
         guides: &[0.0, 25.0, 50.0, 75.0, 100.0],
         value: |row| Some(100.0 * row.recall),
         other: Some(|row| Some(100.0 * row.found)),
     },
     Column {
-        label: "rms of a coordinate, px (dashed: p95 of the distance)",
+        label: "error, rms (dashed: p95), px",
         range: [0.002, 1.0],
         guides: &[0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0],
         value: |row| row.rms_px,
@@ -124,7 +124,8 @@ fn panel(
         write(body, &level.name, [x(index), bottom + 17.0 + lower], 0.5);
     }
     line(body, &[[left, top], [left, bottom], [right, bottom]], "#444444", 1.2, "");
-    write(body, &format!("{}: {}", axis.label(), column.label), [left - 40.0, top - 9.0], 0.0);
+    write(body, column.label, [left - 40.0, top - 9.0], 0.0);
+    write(body, axis.label(), [left + 0.5 * PANEL[0], bottom + 48.0], 0.5);
     for (rows, colour) in curves {
         let mut curve = |value: fn(&Row) -> Option<f64>, width: f64, dash: &str| {
             let at = |row: &&Row| {

@@ -102,6 +102,12 @@ impl Decoder {
         }
     }
 
+    /// The word of a code that was recognised, without its errors.
+    pub fn word(&self, decoded: Decoded) -> u64 {
+        let code = self.codes.get(decoded.id as usize).copied().unwrap_or(0);
+        (0..decoded.turns).fold(code, |word, _| self.words.turn(word))
+    }
+
     fn decode_beyond(&self, word: u64, max_errors: u32) -> Option<Decoded> {
         // Turning the word back by k turns is comparing it with every code turned k times.
         let mut turned_back = [word; 4];

@@ -1,0 +1,162 @@
+//! How far the noise of a picture is from white, and what that does to positions.
+//!
+//! Demosaicing, JPEG and enlargement leave residuals r that depend on their neighbours, and where a model
+//! holds only nearly they are larger at the edges, which is where a position comes from. With c the
+//! influence of the pixels on a position (δx = Σ c r), ρ the residuals' correlation at a lag and R the noise's
+//! covariance, the variance of x is cᵀRc instead of σ² cᵀc:
+//!
+//! ```text
+//!     factor = Σ c² r²/(1 − H) / (σ² Σ c²) · (1 + Σ_lags ρ(lag) Σ c(p) c(p + lag) / Σ c²)
+//! ```
+//!
+//! pooled over corners of a picture. A fit takes out of its residuals what looks like its parameters:
+//! E[r rᵀ] = σ² (1 − H) with the hat matrix H of white noise, which is added again.
+
+use multiversion::multiversion;
+
+/// Residuals of a corner, and how its parameters answer to its pixels.
+#[derive(Clone, Debug)]
+pub struct Influence {
+    /// Pixels, counted from any.
+    pub places: Vec<[i32; 2]>,
+    /// Pixels minus model.
+    pub residuals: Vec<f32>,
+    /// Influence on x and y.
+    pub on_position: [Vec<f32>; 2],
+    /// Columns Q with H = Q Qᵀ.
+    pub hat: Vec<Vec<f32>>,
+    /// Standard deviation of the residuals.
+    pub noise: f64,
+}
+
+/// Largest lags, px: of sensors and JPEG, and of enlarged pictures, whose grain is wider.
+const LAGS_PX: [i32; 2] = [2, 6];
+
+/// Mean correlation at the largest lag above which larger ones are looked at.
+const WIDE: f64 = 0.05;
+
+/// Factors that are believed: sharpened noise falls in half, enlarging by six gives 36.
+const FACTORS: [f64; 2] = [0.5, 40.0];
+
+/// Corners from which correlations are told; the sums of ten vary by some per cent.
+pub const CORNERS: usize = 10;
+
+/// Factor of the covariances of positions against those under white noise.
+pub fn inflation(corners: &[Influence]) -> f64 {
+    let corners = &corners[..corners.len().min(CORNERS)];
+    if corners.is_empty() {
+        return 1.0;
+    }
+    let (narrow, rim) = lagged(corners, LAGS_PX[0]);
+    let lags = if rim > WIDE { lagged(corners, LAGS_PX[1]).0 } else { narrow };
+    let factor = uneven(corners) * lags;
+    if factor.is_finite() { factor.clamp(FACTORS[0], FACTORS[1]) } else { 1.0 }
+}
+
+/// How much larger residuals are where positions come from.
+fn uneven(corners: &[Influence]) -> f64 {
+    let (mut seen, mut white) = (0.0, 0.0);
+    for corner in corners {
+        for i in 0..corner.residuals.len() {
+            let hat: f32 = corner.hat.iter().map(|q| q[i] * q[i]).sum();
+            let square = f64::from(corner.residuals[i].powi(2) / (1.0 - hat).max(0.1));
+            let influence: f32 = corner.on_position.iter().map(|c| c[i] * c[i]).sum();
+            seen += f64::from(influence) * square / corner.noise.powi(2);
+            white += f64::from(influence);
+        }
+    }
+    seen / white
+}
+
+/// The part of the lags, and the mean correlation at the largest.
+fn lagged(corners: &[Influence], reach: i32) -> (f64, f64) {
+    let lags: Vec<[i32; 2]> = (0..=reach)
+        .flat_map(|v| (-reach..=reach).map(move |u| [u, v]))
+        .filter(|&[u, v]| v > 0 || u > 0)
+        .collect();
+    let mut pairs = vec![0.0; lags.len()];
+    let mut products = vec![0.0; lags.len()];
+    let mut influences = vec![0.0; lags.len()];
+    let (mut square, mut count, mut white) = (0.0, 0.0, 0.0);
+    for corner in corners {
+        let field = Field::of(corner, reach);
+        let spread = |values: &[f32]| field.spread(values);
+        let mask = spread(&vec![1.0; corner.residuals.len()]);
+        let residual = spread(&corner.residuals);
+        let on_position = [0, 1].map(|i| spread(&corner.on_position[i]));
+        let hat: Vec<Vec<f32>> = corner.hat.iter().map(|q| spread(q)).collect();
+        let variance = corner.noise.powi(2);
+        let all = hat.iter().map(|q| dot(q, q)).sum::<f64>();
+        square += dot(&residual, &residual) / variance + all;
+        count += dot(&mask, &mask);
+        white += on_position.iter().map(|c| dot(c, c)).sum::<f64>();
+        for (k, lag) in lags.iter().enumerate() {
+            let offset = field.offset(*lag);
+            let product = |a: &[f32]| dot(&a[..a.len() - offset], &a[offset..]);
+            let taken = hat.iter().map(|q| product(q)).sum::<f64>();
+            pairs[k] += product(&mask);
+            products[k] += product(&residual) / variance + taken;
+            influences[k] += on_position.iter().map(|c| product(c)).sum::<f64>();
+        }
+    }
+    let scale = square / count;
+    let correlation = |k: usize| products[k] / (pairs[k] * scale);
+    let part = (0..lags.len()).map(|k| 2.0 * correlation(k) * influences[k] / white).sum::<f64>();
+    let rim: Vec<f64> = (0..lags.len())
+        .filter(|&k| lags[k].iter().any(|l| l.abs() == reach) && lags[k].contains(&0))
+        .map(correlation)
+        .collect();
+    (1.0 + part, rim.iter().sum::<f64>() / rim.len() as f64)
+}
+
+/// A rectangle of pixels with room for lags at its sides.
+struct Field {
+    first: [i32; 2],
+    width: usize,
+    height: usize,
+    places: Vec<usize>,
+}
+
+impl Field {
+    fn of(corner: &Influence, reach: i32) -> Self {
+        let ends = |i: usize| {
+            let values = || corner.places.iter().map(|p| p[i]);
+            (values().min().unwrap_or(0), values().max().unwrap_or(0))
+        };
+        let ((left, right), (top, bottom)) = (ends(0), ends(1));
+        let width = (right - left + 1 + reach) as usize;
+        let height = (bottom - top + 1 + reach) as usize;
+        let mut field = Self { first: [left, top], width, height, places: Vec::new() };
+        field.places = corner.places.iter().map(|&place| field.index(place)).collect();
+        field
+    }
+
+    fn index(&self, [u, v]: [i32; 2]) -> usize {
+        (v - self.first[1]) as usize * self.width + (u - self.first[0]) as usize
+    }
+
+    fn offset(&self, [u, v]: [i32; 2]) -> usize {
+        (v * self.width as i32 + u) as usize
+    }
+
+    fn spread(&self, values: &[f32]) -> Vec<f32> {
+        let mut field = vec![0.0; self.width * self.height];
+        self.places.iter().zip(values).for_each(|(&place, &value)| field[place] = value);
+        field
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    const LANES: usize = 16;
+    let mut sums = [0.0f32; LANES];
+    let (a, a_rest) = a.as_chunks::<LANES>();
+    let (b, b_rest) = b.as_chunks::<LANES>();
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..LANES {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    f64::from(sums.iter().sum::<f32>() + rest)
+}

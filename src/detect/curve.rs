@@ -1,0 +1,301 @@
+//! Tone curves: what a camera makes of light.
+//!
+//! A curve is kept as its inverse, the light q(y) of a grey value y, which is smooth where the curve itself
+//! is steep: near black. Where it is not known its logarithmic slope is a polynomial of the grey values
+//! of the board,
+//!
+//! ```text
+//!     ln q'(y) = p₁ t + p₂ t² + p₃ t³ + const,      t = (y − middle)/half
+//! ```
+//!
+//! so that it rises whatever the p are; 0 is a linear camera. A corner sees the piece between its own
+//! black (S = −1) and white (S = 1), in its own units:
+//!
+//! ```text
+//!     T(S) = S + (1 − S²)·(κ₀ + κ₁ S + … + κ₅ S⁵)
+//! ```
+//!
+//! through the curve at eight places. Between a twentieth of the light and all of it that is within 0.3 % of
+//! gamma 2.6. The constant κ₀ is the κ of METHOD §6, κ₁ its κ₃.
+
+use serde::{Deserialize, Serialize};
+
+/// The tone curve of a camera, as the user tells it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Tone {
+    /// Estimated from the corners of each picture.
+    #[default]
+    Auto,
+    /// Grey values are linear in light.
+    Linear,
+    /// That of sRGB (IEC 61966-2-1).
+    Srgb,
+    /// Grey = light^(1/γ).
+    Gamma(f64),
+}
+
+/// Gammas that cameras have; outside, the curve's ends are steeper than grey values tell.
+const GAMMAS: std::ops::RangeInclusive<f64> = 0.3..=4.0;
+
+impl Tone {
+    /// The grey value of a light, both of full scale; linear where the curve is not known.
+    pub fn grey(self, light: f64) -> f64 {
+        match self {
+            Self::Auto | Self::Linear => light,
+            Self::Srgb if light <= 0.003_130_8 => 12.92 * light,
+            Self::Srgb => 1.055 * light.powf(1.0 / 2.4) - 0.055,
+            Self::Gamma(gamma) => light.max(0.0).powf(1.0 / gamma),
+        }
+    }
+}
+
+impl std::str::FromStr for Tone {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "linear" => Ok(Self::Linear),
+            "srgb" => Ok(Self::Srgb),
+            _ => match text.parse() {
+                Ok(gamma) if GAMMAS.contains(&gamma) => Ok(Self::Gamma(gamma)),
+                _ => Err("not auto, linear, srgb or a gamma from 0.3 to 4".to_owned()),
+            },
+        }
+    }
+}
+
+/// The tone curve that was found in a picture, over the median black and white of its corners.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ToneEstimate {
+    /// Median black of the corners, of full scale.
+    pub black: f64,
+    /// Median white.
+    pub white: f64,
+    /// Curvature κ₀ between them: grey = middle + half·(S + (1 − S²)(κ₀ + κ₁ S + …)); 0 is linear,
+    /// negative brightens.
+    pub kappa: f64,
+    /// Its standard deviation.
+    pub kappa_deviation: f64,
+    /// The next term, κ₁.
+    pub kappa_odd: f64,
+    /// Whether it differs from a line by more than its deviation explains, and was used.
+    pub used: bool,
+}
+
+/// Parameters of a curve that is not known.
+pub const TONE_PARAMS: usize = 3;
+
+/// Terms of a corner's piece of a curve.
+pub const TERMS: usize = 6;
+
+/// Grey values that are tabulated; beyond full scale for corners whose white is clipped.
+const LOWEST: f64 = -0.5;
+const STEP: f64 = 1.0 / 128.0;
+const NODES: usize = 385;
+
+/// Where a power has its toe, of full scale: half of sRGB's. Below it is a line.
+const TOE: f64 = 0.02;
+
+/// The polynomial of the logarithmic slope is constant this far beyond the grey values it was made for.
+const REACH: f64 = 1.25;
+
+/// Largest sum of light over difference of light that slopes of the light are scaled by.
+const MAX_RATIO: f64 = 20.0;
+
+/// The light of grey values, tabulated with its slope.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    light: Vec<f64>,
+    slope: Vec<f64>,
+}
+
+/// The piece of a curve between a corner's black and white.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Piece {
+    /// κ₀ … κ₅.
+    pub terms: [f32; TERMS],
+    /// Mean of the light of both over half the difference.
+    pub ratio: f32,
+}
+
+impl Curve {
+    /// The curve that is known by name; `None` where it is a line, or not known.
+    pub fn of(tone: Tone) -> Option<Self> {
+        match tone {
+            Tone::Auto | Tone::Linear => None,
+            Tone::Srgb => Some(Self::with_slope(|y| {
+                if y <= 0.04045 {
+                    1.0 / 12.92
+                } else {
+                    2.4 / 1.055 * ((y + 0.055) / 1.055).powf(1.4)
+                }
+            })),
+            Tone::Gamma(gamma) => Some(Self::with_slope(|y| gamma * y.max(TOE).powf(gamma - 1.0))),
+        }
+    }
+
+    /// The curve with these parameters over grey values from `range[0]` to `range[1]`.
+    pub fn estimated(params: [f64; TONE_PARAMS], [low, high]: [f64; 2]) -> Self {
+        let (middle, half) = ((low + high) / 2.0, ((high - low) / 2.0).max(1e-6));
+        let [p1, p2, p3] = params;
+        Self::with_slope(|y| {
+            let t = ((y - middle) / half).clamp(-REACH, REACH);
+            (t * (p1 + t * (p2 + t * p3))).exp()
+        })
+    }
+
+    fn with_slope(slope: impl Fn(f64) -> f64) -> Self {
+        let at = |i: f64| slope(LOWEST + i * STEP);
+        let mut light = Vec::with_capacity(NODES);
+        let mut sum = 0.0;
+        let mut zero = 0.0;
+        for i in 0..NODES {
+            light.push(sum);
+            let i = i as f64;
+            if LOWEST + i * STEP == 0.0 {
+                zero = sum;
+            }
+            // Simpson's rule.
+            sum += STEP / 6.0 * (at(i) + 4.0 * at(i + 0.5) + at(i + 1.0));
+        }
+        light.iter_mut().for_each(|q| *q -= zero);
+        Self { light, slope: (0..NODES).map(|i| at(i as f64)).collect() }
+    }
+
+    /// The light of a grey value.
+    fn light(&self, grey: f64) -> f64 {
+        let place = (grey - LOWEST) / STEP;
+        let i = (place.max(0.0) as usize).min(NODES - 2);
+        let t = place - i as f64;
+        if !(0.0..=1.0).contains(&t) {
+            let end = if t < 0.0 { 0 } else { NODES - 1 };
+            return self.light[end] + (place - end as f64) * STEP * self.slope[end];
+        }
+        // Hermite's cubic.
+        let [q0, q1] = [self.light[i], self.light[i + 1]];
+        let [d0, d1] = [self.slope[i] * STEP, self.slope[i + 1] * STEP];
+        let rise = q1 - q0;
+        q0 + t * (d0 + t * ((3.0 * rise - 2.0 * d0 - d1) + t * (d0 + d1 - 2.0 * rise)))
+    }
+
+    /// The grey value of a light.
+    fn grey(&self, light: f64) -> f64 {
+        let i = self.light.partition_point(|&q| q < light).clamp(1, NODES - 1) - 1;
+        let [q0, q1] = [self.light[i], self.light[i + 1]];
+        let first = LOWEST + STEP * i as f64;
+        let mut grey = first + STEP * ((light - q0) / (q1 - q0).max(f64::MIN_POSITIVE));
+        let slope = self.slope[i].max(self.slope[i + 1]).max(1e-9);
+        for _ in 0..2 {
+            grey += (light - self.light(grey)) / slope;
+        }
+        grey
+    }
+
+    /// The piece of a corner of this level and amplitude, grey values.
+    pub fn piece(&self, level: f64, amplitude: f64) -> Piece {
+        let [dark, bright] = [level - amplitude, level + amplitude].map(|y| self.light(y));
+        let (middle, half) = ((bright + dark) / 2.0, (bright - dark) / 2.0);
+        if half.abs() < 1e-9 {
+            return Piece::line(level, amplitude);
+        }
+        let excess = PLACES.map(|s| {
+            let grey = (self.grey(middle + half * s) - level) / amplitude;
+            (grey - s) / (1.0 - s * s)
+        });
+        let ratio = (middle / half).clamp(-MAX_RATIO, MAX_RATIO) as f32;
+        Piece { terms: interpolated(excess).map(|k| k as f32), ratio }
+    }
+}
+
+impl Piece {
+    /// That of a linear camera.
+    pub fn line(level: f64, amplitude: f64) -> Self {
+        let ratio = (level / amplitude).clamp(-MAX_RATIO, MAX_RATIO);
+        Self { terms: [0.0; TERMS], ratio: if ratio.is_finite() { ratio as f32 } else { 0.0 } }
+    }
+
+    /// T(S) and its derivative.
+    #[inline(always)]
+    pub fn at(&self, s: f32) -> (f32, f32) {
+        let (mut sum, mut slope) = (0.0, 0.0);
+        for &term in self.terms.iter().rev() {
+            slope = slope * s + sum;
+            sum = sum * s + term;
+        }
+        let rest = 1.0 - s * s;
+        (s + rest * sum, 1.0 - 2.0 * s * sum + rest * slope)
+    }
+}
+
+/// Chebyshev's places between −1 and 1: cos(kπ/7).
+const PLACES: [f64; TERMS] = [
+    0.900_968_867_902_419_1,
+    0.623_489_801_858_733_5,
+    0.222_520_933_956_314_4,
+    -0.222_520_933_956_314_4,
+    -0.623_489_801_858_733_5,
+    -0.900_968_867_902_419_1,
+];
+
+/// Coefficients of the polynomial with these values at [`PLACES`]: Newton's divided differences.
+fn interpolated(values: [f64; TERMS]) -> [f64; TERMS] {
+    let mut divided = values;
+    for order in 1..TERMS {
+        for i in (order..TERMS).rev() {
+            divided[i] = (divided[i] - divided[i - 1]) / (PLACES[i] - PLACES[i - order]);
+        }
+    }
+    let mut terms = [0.0; TERMS];
+    for i in (0..TERMS).rev() {
+        // terms ← terms·(S − Sᵢ) + dᵢ
+        for j in (1..TERMS).rev() {
+            terms[j] = terms[j - 1] - PLACES[i] * terms[j];
+        }
+        terms[0] = divided[i] - PLACES[i] * terms[0];
+    }
+    terms
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A corner's piece against the curve itself.
+    #[test]
+    fn pieces_follow_their_curves() {
+        for tone in [Tone::Gamma(1.6), Tone::Gamma(2.6), Tone::Srgb] {
+            let curve = |light| tone.grey(light);
+            let known = Curve::of(tone).unwrap();
+            let [black, white] = [0.05, 0.6];
+            let (level, amplitude) =
+                ((curve(white) + curve(black)) / 2.0, (curve(white) - curve(black)) / 2.0);
+            let piece = known.piece(level, amplitude);
+            for i in -100..=100 {
+                let s = f64::from(i) / 100.0;
+                let light = (white + black) / 2.0 + (white - black) / 2.0 * s;
+                let (t, _) = piece.at(s as f32);
+                let grey = level + amplitude * f64::from(t);
+                assert!((grey - curve(light)).abs() < 2e-3, "{tone:?} at {s}: {grey}");
+            }
+            let (up, down) = (piece.at(0.31).0, piece.at(0.29).0);
+            assert!((piece.at(0.3).1 - (up - down) / 0.02).abs() < 1e-3);
+            assert!((f64::from(piece.ratio) - (white + black) / (white - black)).abs() < 0.02);
+        }
+    }
+
+    #[test]
+    fn no_parameters_are_a_line() {
+        let piece = Curve::estimated([0.0; 3], [0.1, 0.8]).piece(0.4, -0.3);
+        assert!(piece.terms.iter().all(|k| k.abs() < 1e-6));
+        assert!((piece.ratio + 4.0 / 3.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn names_of_tones() {
+        assert_eq!("2.2".parse(), Ok(Tone::Gamma(2.2)));
+        assert_eq!("srgb".parse(), Ok(Tone::Srgb));
+        assert!("7".parse::<Tone>().is_err() && "log".parse::<Tone>().is_err());
+    }
+}

@@ -1,0 +1,131 @@
+//! Points by their neighbourhood: a square of buckets over all of them.
+
+/// Points in buckets about as many as they are, so that a bucket holds few.
+#[derive(Clone, Debug)]
+pub struct Places<'a> {
+    points: &'a [[f64; 2]],
+    origin: [f64; 2],
+    side_px: f64,
+    cols: usize,
+    rows: usize,
+    /// Where the points of each bucket begin in `order`; one more than there are buckets.
+    starts: Vec<u32>,
+    /// Indices of points, bucket by bucket.
+    order: Vec<u32>,
+}
+
+impl<'a> Places<'a> {
+    /// An index of finite points.
+    pub fn new(points: &'a [[f64; 2]]) -> Self {
+        let bound = |pick: fn(f64, f64) -> f64, i: usize| points.iter().map(|p| p[i]).reduce(pick);
+        let low = [0, 1].map(|i| bound(f64::min, i).unwrap_or(0.0));
+        let high = [0, 1].map(|i| bound(f64::max, i).unwrap_or(0.0));
+        let [width, height] = [0, 1].map(|i| high[i] - low[i]);
+        let count = points.len().max(1) as f64;
+        // Of points in a line there are as many buckets as points.
+        let side_px = (width * height / count).sqrt().max(width.max(height) / count).max(1.0);
+        let cells = |length: f64| (length / side_px) as usize + 1;
+        let mut found = Self {
+            points,
+            origin: low,
+            side_px,
+            cols: cells(width),
+            rows: cells(height),
+            starts: Vec::new(),
+            order: vec![0; points.len()],
+        };
+        let buckets: Vec<usize> = points.iter().map(|&p| found.bucket(p)).collect();
+        let mut starts = vec![0u32; found.cols * found.rows + 1];
+        buckets.iter().for_each(|&bucket| starts[bucket + 1] += 1);
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        for (i, &bucket) in buckets.iter().enumerate() {
+            found.order[next[bucket] as usize] = i as u32;
+            next[bucket] += 1;
+        }
+        found.starts = starts;
+        found
+    }
+
+    fn cell(&self, point: [f64; 2]) -> [usize; 2] {
+        // Conversions saturate, so points outside fall to the border.
+        let along = |i: usize| ((point[i] - self.origin[i]) / self.side_px) as usize;
+        [along(0).min(self.cols - 1), along(1).min(self.rows - 1)]
+    }
+
+    fn bucket(&self, point: [f64; 2]) -> usize {
+        let [col, row] = self.cell(point);
+        row * self.cols + col
+    }
+
+    /// The `count` points nearest to one of them, nearest first, without itself.
+    pub fn nearest(&self, index: usize, count: usize) -> Vec<usize> {
+        let here = self.points[index];
+        let [col, row] = self.cell(here).map(|c| c as isize);
+        let mut near: Vec<(f64, usize)> = Vec::with_capacity(4 * count);
+        let reach = self.cols.max(self.rows) as isize;
+        for ring in 0..=reach {
+            // What lies beyond the rings so far is farther away than this.
+            let complete_px = (ring - 1).max(0) as f64 * self.side_px;
+            if near.iter().filter(|(d2, _)| *d2 <= complete_px * complete_px).count() >= count {
+                break;
+            }
+            for y in (row - ring).max(0)..=(row + ring).min(self.rows as isize - 1) {
+                let whole = (y - row).abs() == ring;
+                let step = if whole { 1 } else { (2 * ring).max(1) as usize };
+                for x in (col - ring..=col + ring).step_by(step) {
+                    if x < 0 || x >= self.cols as isize {
+                        continue;
+                    }
+                    let bucket = y as usize * self.cols + x as usize;
+                    let places = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
+                    near.extend(self.order[places].iter().map(|&i| i as usize).filter_map(|i| {
+                        let [dx, dy] = [0, 1].map(|k| self.points[i][k] - here[k]);
+                        (i != index).then_some((dx * dx + dy * dy, i))
+                    }));
+                }
+            }
+        }
+        let by_distance =
+            |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if near.len() > count {
+            near.select_nth_unstable_by(count, by_distance);
+            near.truncate(count);
+        }
+        near.sort_unstable_by(by_distance);
+        near.into_iter().map(|(_, i)| i).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+
+    #[test]
+    fn the_nearest_are_those_that_a_search_of_all_finds() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        for (count, [width, height]) in
+            [(1, [5.0, 5.0]), (7, [900.0, 0.0]), (40, [3.0, 700.0]), (300, [640.0, 480.0])]
+        {
+            let mut point = || [random.random::<f64>() * width, random.random::<f64>() * height];
+            // Some of them crowded, and two in one place.
+            let mut points: Vec<_> = (0..count).map(|_| point()).collect();
+            points.extend((0..count / 2).map(|_| point().map(|c| 0.05 * c)));
+            points.push(points[0]);
+            let places = Places::new(&points);
+            for i in 0..points.len() {
+                let distance =
+                    |j: usize| (points[i][0] - points[j][0]).hypot(points[i][1] - points[j][1]);
+                let mut all: Vec<usize> = (0..points.len()).filter(|&j| j != i).collect();
+                all.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+                let found = places.nearest(i, 12);
+                let expected: Vec<f64> = all.iter().take(12).map(|&j| distance(j)).collect();
+                assert_eq!(found.iter().map(|&j| distance(j)).collect::<Vec<_>>(), expected);
+            }
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Why a picture, or a grid in it, has no labels: as data, and as a sentence.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Why something has no labels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reason {
+    /// What is the matter.
+    pub kind: ReasonKind,
+    /// Index of the grid that it is about; `None` for the whole picture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grid: Option<usize>,
+    /// What was measured, by names with units, such as `bit_px`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub figures: BTreeMap<String, f64>,
+}
+
+/// What may be the matter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReasonKind {
+    /// Nothing in the picture looks like a corner, and nothing tells why: `corners`.
+    NoCorners,
+    /// The brightest pixels are dark: `brightest`, a part of full scale.
+    TooDark,
+    /// Most of the picture is saturated: `saturated`, a part of its pixels.
+    Overexposed,
+    /// Edges are wider than corners could be found with: `blur_px`.
+    TooBlurred,
+    /// Corners are there, but in no grid that could be told from chance: `corners`.
+    NoGrid,
+    /// Tiles are too small to be sure of them: `edge_px`, `needed_edge_px`.
+    TooSmall,
+    /// The corners are those of the other tiling: `corners`.
+    OtherTiling,
+    /// Cells of tags are too small or too blurred to be read: `bit_px`, `blur_px`, `needed_bit_px`.
+    UnreadableTags,
+    /// No tile is seen whole that could carry a tag: `corners`.
+    NoTiles,
+    /// Tiles were read, and show no code: `tiles`.
+    NoTags,
+    /// Clear codes of the family, but of ids that the target does not have: `tags`, `id`, one of them.
+    OtherIds,
+    /// Clear cells that are no code of the family: `tiles`.
+    OtherFamily,
+    /// The grid is seen as in a mirror: `corners`.
+    Mirrored,
+    /// The grid could lie in more than one way: `corners`.
+    Ambiguous,
+    /// The grid is less, or more, than the whole board whose outline would label it: `corners`, `expected`.
+    NotWhole,
+    /// The same, and it ends at the border of the picture: `corners`, and `expected` where there are no tags.
+    CutByBorder,
+    /// The picture holds more grids than are worth the time.
+    TooManyGrids,
+}
+
+impl Reason {
+    /// A reason with what was measured.
+    pub(super) fn new<const N: usize>(kind: ReasonKind, figures: [(&str, f64); N]) -> Self {
+        let figures = figures.map(|(name, figure)| (name.to_owned(), figure)).into();
+        Self { kind, grid: None, figures }
+    }
+
+    fn figure(&self, name: &str) -> f64 {
+        self.figures.get(name).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl fmt::Display for Reason {
+    /// A sentence without its full stop.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let figure = |name| self.figure(name);
+        match self.kind {
+            ReasonKind::NoCorners => write!(f, "nothing in the picture looks like a corner"),
+            ReasonKind::TooDark => write!(
+                f,
+                "too dark: the brightest pixels are at {:.1} % of full scale; expose longer",
+                100.0 * figure("brightest")
+            ),
+            ReasonKind::Overexposed => write!(
+                f,
+                "overexposed: {:.0} % of the picture is saturated; expose shorter",
+                100.0 * figure("saturated")
+            ),
+            ReasonKind::TooBlurred => write!(
+                f,
+                "too blurred: the sharpest edges are {:.1} px wide; focus, or hold still",
+                figure("blur_px")
+            ),
+            ReasonKind::NoGrid => {
+                write!(f, "{} corners, but no grid of them", figure("corners"))
+            }
+            ReasonKind::TooSmall => write!(
+                f,
+                "tiles of {:.1} px are too small; go nearer, until they have {:.0} px",
+                figure("edge_px"),
+                figure("needed_edge_px")
+            ),
+            ReasonKind::OtherTiling => {
+                write!(f, "the {} corners are those of the other tiling", figure("corners"))
+            }
+            ReasonKind::UnreadableTags => write!(
+                f,
+                "a tag's cells have {:.1} px under a blur of {:.1} px; they could be read from {:.1} px on, \
+                 nearer or sharper",
+                figure("bit_px"),
+                figure("blur_px"),
+                figure("needed_bit_px")
+            ),
+            ReasonKind::NoTiles => {
+                write!(
+                    f,
+                    "among {} corners no tile that could carry a tag is whole",
+                    figure("corners")
+                )
+            }
+            ReasonKind::NoTags => {
+                write!(f, "no tag is seen in {} tiles that could carry one", figure("tiles"))
+            }
+            ReasonKind::OtherIds => write!(
+                f,
+                "{} tags have ids that the target does not have, {} for one: is it another target?",
+                figure("tags"),
+                figure("id")
+            ),
+            ReasonKind::OtherFamily => write!(
+                f,
+                "{} tiles are read without doubt and are no tags of the target's family",
+                figure("tiles")
+            ),
+            ReasonKind::Mirrored => write!(
+                f,
+                "a grid of {} corners is seen as in a mirror; flip the picture, or allow mirrored labels",
+                figure("corners")
+            ),
+            ReasonKind::Ambiguous => {
+                write!(f, "a grid of {} corners could lie in more than one way", figure("corners"))
+            }
+            ReasonKind::NotWhole => write!(
+                f,
+                "a grid of {} corners is not the whole board of {}",
+                figure("corners"),
+                figure("expected")
+            ),
+            ReasonKind::CutByBorder => write!(
+                f,
+                "a grid of {} corners is cut by the border of the picture",
+                figure("corners")
+            ),
+            ReasonKind::TooManyGrids => {
+                write!(f, "the picture holds more grids than are worth the time")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_come_back_from_json() {
+        let figures = [("bit_px", 1.0), ("blur_px", 3.5), ("needed_bit_px", 2.5)];
+        let reason = Reason::new(ReasonKind::UnreadableTags, figures);
+        let text = serde_json::to_string(&reason).unwrap();
+        assert!(text.contains(r#""kind":"unreadable_tags""#), "{text}");
+        assert_eq!(serde_json::from_str::<Reason>(&text).unwrap(), reason);
+        assert!(reason.to_string().contains("1.0 px under a blur of 3.5 px"));
+    }
+}

@@ -1,0 +1,334 @@
+//! What the pixels of a tile say about the cells of a tag in it, all cells from all samples at once.
+//!
+//! On a scale of border 0 and white 1 a sample p sees the cells c by the share W of each in its blurred
+//! surroundings, and of the white beyond the border. With s = ±1 for cells of white and black,
+//!
+//! ```text
+//!     x(p) = ½ Σ W(p,c) (1 + s(c)) + white(p) + error of the levels + noise
+//!     m    = K (x − ½ Σ W − white),     K = (WᵀW/σ² + 1)⁻¹ Wᵀ/σ²
+//! ```
+//!
+//! is the expectation of s, v its variance, and m/v half the logarithm of the odds that the cell is white. Errors
+//! of the levels, a plane, are unknown like the cells and solved for with them.
+//!
+//! The shares depend on the blur in the tile's own coordinates alone, so neighbouring tiles have them in common:
+//! K is made once, and a tile costs a multiplication.
+//!
+//! Limits: cells are taken as independent, though their errors are not where the blur is wide.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use nalgebra::{DMatrix, Matrix2};
+
+use super::blurred_corner::erf_sqrt_half;
+use crate::lattice::{GridKind, TagCells};
+
+/// A triangle is divided into 3² parts, of which a square has two.
+const DIVISIONS: usize = 3;
+
+/// Deviation of the blur that is added, bit-widths: about that of a part of a cell, which stands for the part.
+const PART_BLUR_BITS: f64 = 0.14;
+
+/// Steps in which blurs are told apart: by a seventh of their deviation, and by a fifth of their correlation.
+const LOG_VARIANCE_STEP: f64 = 0.3;
+const CORRELATION_STEP: f64 = 0.2;
+
+/// Deviation of a sample by what the model leaves out, over the contrast: places, the shape of the blur, dirt.
+const MODEL_ERROR: f64 = 0.05;
+
+/// Deviation of the levels, over the contrast, and of their slopes over a tile.
+const LEVEL_ERROR: f64 = 0.15;
+const SLOPE_ERROR: f64 = 0.2;
+
+/// Half the logarithm of the odds at which a cell is as sure as print is: one in two hundred is dirty.
+const MOST_HALF_ODDS: f64 = 2.6;
+
+/// Rounds in which samples that tell nothing, or only that they are white, take what the others say.
+const ROUNDS: usize = 6;
+
+/// Where the cells are sampled, and how the blur mixes them.
+#[derive(Clone, Debug)]
+pub struct CellModel {
+    kind: GridKind,
+    bits: usize,
+    /// Length of the tile's edge, bit-widths.
+    width: f64,
+    /// Distance from the tile's edges to the border of the tag.
+    margin_bits: f64,
+    /// Samples, in tile coordinates.
+    points: Vec<[f64; 2]>,
+    /// Parts of the cells: the bit, and their middle in tile coordinates.
+    parts: Vec<(usize, [f64; 2])>,
+}
+
+/// The blur in a tile's coordinates, and the noise.
+#[derive(Clone, Copy, Debug)]
+pub struct TileBlur {
+    /// Covariance uu, uv, vv, bit-widths².
+    pub covariance: [f64; 3],
+    /// Area of a bit-width squared of tile coordinates, px².
+    pub area_px2: f64,
+    /// Deviation of a sample, over the contrast.
+    pub noise: f64,
+}
+
+/// K and what belongs to it.
+#[derive(Debug)]
+pub struct Mixing {
+    bits: usize,
+    /// ½ Σ W + white, by sample.
+    middle: Vec<f32>,
+    /// By bit.
+    gain: Vec<Vec<f32>>,
+    /// ½ W by sample.
+    half_shares: Vec<Vec<f32>>,
+    /// 1/v by bit.
+    inverse_variance: Vec<f32>,
+    /// By sample, the deviation of what it would show if nothing were known of the cells.
+    spread: Vec<f32>,
+}
+
+/// Mixings that were made already.
+pub type Mixings = BTreeMap<[i32; 3], Rc<Mixing>>;
+
+/// A sample of a tile on the scale of black 0 and white 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sample {
+    /// It is so.
+    Share(f32),
+    /// At least so.
+    AtLeast(f32),
+    /// Nothing is known.
+    Erased,
+}
+
+impl CellModel {
+    /// Of tags whose cells begin `inset_bits` from the edges of their tiles, and whose border begins `margin_bits`
+    /// from them.
+    pub fn new(cells: &TagCells, inset_bits: f64, margin_bits: f64) -> Self {
+        let bits = cells.dimension().bits();
+        let points = (0..bits).flat_map(|bit| {
+            let centre = cells.centre(bit, inset_bits);
+            let corners = cells.corners(bit, inset_bits);
+            let half_way = move |c: [f64; 2]| [0, 1].map(|i| 0.5 * (c[i] + centre[i]));
+            std::iter::once(centre).chain(corners.into_iter().map(half_way))
+        });
+        let parts = (0..bits).flat_map(|bit| {
+            let middles = parts_of(&cells.corners(bit, inset_bits));
+            middles.into_iter().map(move |middle| (bit as usize, middle))
+        });
+        Self {
+            kind: cells.kind(),
+            bits: bits as usize,
+            width: cells.width(inset_bits),
+            margin_bits,
+            points: points.collect(),
+            parts: parts.collect(),
+        }
+    }
+
+    /// Where a tile is sampled, in its coordinates.
+    pub fn points(&self) -> &[[f64; 2]] {
+        &self.points
+    }
+
+    /// Length of the tile's edge, bit-widths.
+    pub fn width(&self) -> f64 {
+        self.width
+    }
+
+    /// The mixing under a blur, or one as good as the same.
+    pub fn mixing(&self, blur: TileBlur, known: &mut Mixings) -> Option<Rc<Mixing>> {
+        let [uu, uv, vv] = blur.covariance;
+        // Isotropic on the print.
+        let [puu, puv] = match self.kind {
+            GridKind::Deltille => [4.0 / 3.0, -2.0 / 3.0],
+            GridKind::Checker => [1.0, 0.0],
+        };
+        let part = PART_BLUR_BITS * PART_BLUR_BITS;
+        let (uu, uv, vv) = (uu + part * puu, uv + part * puv, vv + part * puu);
+        let key = [
+            (uu.ln() / LOG_VARIANCE_STEP).round() as i32,
+            (vv.ln() / LOG_VARIANCE_STEP).round() as i32,
+            (uv / (uu * vv).sqrt() / CORRELATION_STEP).round() as i32,
+        ];
+        if let Some(mixing) = known.get(&key) {
+            return Some(Rc::clone(mixing));
+        }
+        let [uu, vv] = [key[0], key[1]].map(|k| (f64::from(k) * LOG_VARIANCE_STEP).exp());
+        let correlation = (f64::from(key[2]) * CORRELATION_STEP).clamp(-0.95, 0.95);
+        let covariance = [uu, correlation * (uu * vv).sqrt(), vv];
+        let mixing = Rc::new(self.make(covariance, blur.area_px2, blur.noise)?);
+        known.insert(key, Rc::clone(&mixing));
+        Some(mixing)
+    }
+
+    fn make(&self, [uu, uv, vv]: [f64; 3], area_px2: f64, noise: f64) -> Option<Mixing> {
+        let determinant = uu * vv - uv * uv;
+        if determinant <= 0.0 || determinant.is_nan() {
+            return None;
+        }
+        let (n, bits) = (self.points.len(), self.bits);
+        let mut design = DMatrix::<f64>::zeros(n, bits + 3);
+        let part_area = 1.0 / (self.parts.len() / bits) as f64 * self.cell_area();
+        let gain = part_area / (std::f64::consts::TAU * determinant.sqrt());
+        for (i, point) in self.points.iter().enumerate() {
+            for &(bit, part) in &self.parts {
+                let [du, dv] = [0, 1].map(|k| (point[k] - part[k]) * self.width);
+                let distance2 = (vv * du * du - 2.0 * uv * du * dv + uu * dv * dv) / determinant;
+                if distance2 < 16.0 {
+                    design[(i, bit)] += 0.5 * gain * (-0.5 * distance2).exp();
+                }
+            }
+            design[(i, bits)] = LEVEL_ERROR;
+            let [mu, mv] = self.kind.middle();
+            design[(i, bits + 1)] = SLOPE_ERROR * (point[0] - mu);
+            design[(i, bits + 2)] = SLOPE_ERROR * (point[1] - mv);
+        }
+        let white: Vec<f64> =
+            self.points.iter().map(|&p| self.white_beyond(p, [uu, uv, vv])).collect();
+        // Samples closer than pixels share their noise.
+        let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
+        let variance = (noise * noise + MODEL_ERROR * MODEL_ERROR) * samples_px2.max(1.0);
+        let mut normal = design.tr_mul(&design) / variance;
+        for i in 0..bits + 3 {
+            normal[(i, i)] += 1.0;
+        }
+        let inverse = normal.cholesky()?.inverse();
+        let gain = &inverse * design.transpose() / variance;
+        let half_shares: Vec<Vec<f32>> =
+            (0..n).map(|i| (0..bits).map(|c| design[(i, c)] as f32).collect()).collect();
+        let middle =
+            (0..n).map(|i| (white[i] + (0..bits).map(|c| design[(i, c)]).sum::<f64>()) as f32);
+        let row = |c: usize| (0..n).map(|i| gain[(c, i)] as f32).collect();
+        let inverse_variance = |c: usize| (1.0 / inverse[(c, c)].max(1e-3)) as f32;
+        let spread =
+            half_shares.iter().map(|row| row.iter().map(|w| w * w).sum::<f32>().sqrt()).collect();
+        Some(Mixing {
+            bits,
+            middle: middle.collect(),
+            gain: (0..bits).map(row).collect(),
+            half_shares,
+            inverse_variance: (0..bits).map(inverse_variance).collect(),
+            spread,
+        })
+    }
+
+    /// Area of a cell in squared bit-widths of the coordinates.
+    fn cell_area(&self) -> f64 {
+        match self.kind {
+            GridKind::Deltille => 0.5,
+            GridKind::Checker => 1.0,
+        }
+    }
+
+    /// How much of the white around the border a point sees.
+    fn white_beyond(&self, [u, v]: [f64; 2], [uu, uv, vv]: [f64; 3]) -> f64 {
+        let beyond = |inside_bits: f64, variance: f64| {
+            0.5 - 0.5 * f64::from(erf_sqrt_half((inside_bits / variance.sqrt()) as f32))
+        };
+        let (u, v, margin, width) = (u * self.width, v * self.width, self.margin_bits, self.width);
+        let far = match self.kind {
+            GridKind::Deltille => beyond(width - u - v - margin, uu + 2.0 * uv + vv),
+            GridKind::Checker => beyond(width - u - margin, uu) + beyond(width - v - margin, vv),
+        };
+        (beyond(u - margin, uu) + beyond(v - margin, vv) + far).min(1.0)
+    }
+}
+
+impl Mixing {
+    /// Half the logarithm of the odds that each cell is white.
+    pub fn half_odds(&self, samples: &[Sample]) -> Vec<f32> {
+        let whole = samples.iter().all(|sample| matches!(sample, Sample::Share(_)));
+        let mut off_middle: Vec<f32> = samples
+            .iter()
+            .zip(&self.middle)
+            .map(|(sample, middle)| match sample {
+                Sample::Share(share) => share - middle,
+                Sample::AtLeast(share) => (share - middle).max(0.0),
+                Sample::Erased => 0.0,
+            })
+            .collect();
+        let mut means = self.means(&off_middle);
+        if !whole {
+            for _ in 0..ROUNDS {
+                for (i, sample) in samples.iter().enumerate() {
+                    let predicted = || -> f32 {
+                        self.half_shares[i].iter().zip(&means).map(|(w, m)| w * m).sum()
+                    };
+                    match sample {
+                        Sample::Share(_) => {}
+                        Sample::AtLeast(share) => {
+                            let least = share - self.middle[i];
+                            off_middle[i] = mean_above(least, predicted(), self.spread[i]);
+                        }
+                        Sample::Erased => off_middle[i] = predicted(),
+                    }
+                }
+                means = self.means(&off_middle);
+            }
+        }
+        let most = MOST_HALF_ODDS as f32;
+        let odds = means.iter().zip(&self.inverse_variance);
+        odds.map(|(mean, inverse_variance)| (mean * inverse_variance).clamp(-most, most)).collect()
+    }
+
+    fn means(&self, off_middle: &[f32]) -> Vec<f32> {
+        let of_bit = |gain: &Vec<f32>| {
+            let mut lanes = [0.0f32; 8];
+            let (whole, rest) = (gain.chunks_exact(8), gain.len() / 8 * 8);
+            for (gain, off) in whole.zip(off_middle.chunks_exact(8)) {
+                for k in 0..8 {
+                    lanes[k] += gain[k] * off[k];
+                }
+            }
+            let rest = gain[rest..].iter().zip(&off_middle[rest..]).map(|(g, o)| g * o);
+            lanes.iter().sum::<f32>() + rest.sum::<f32>()
+        };
+        self.gain[..self.bits].iter().map(of_bit).collect()
+    }
+}
+
+/// Mean of what is normally distributed with this mean and deviation, where it is at least `least`.
+fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
+    let deviation = deviation.max(1e-3);
+    let at = (least - mean) / deviation;
+    let above = 0.5 - 0.5 * erf_sqrt_half(at);
+    if above < 1e-4 {
+        return least;
+    }
+    let density = (-0.5 * at * at).exp() / std::f32::consts::TAU.sqrt();
+    mean + deviation * density / above
+}
+
+/// Middles of the equal triangles that a cell is divided into.
+fn parts_of(cell: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let third = 1.0 / (3.0 * DIVISIONS as f64);
+    let rows = (0..DIVISIONS).flat_map(|j| (0..DIVISIONS - j).map(move |i| (i, j)));
+    let parts: Vec<[f64; 2]> = rows
+        .flat_map(|(i, j)| {
+            let upright = [3 * i + 1, 3 * j + 1];
+            let inverted = (i + j + 1 < DIVISIONS).then_some([3 * i + 2, 3 * j + 2]);
+            [Some(upright), inverted].into_iter().flatten()
+        })
+        .map(|part| part.map(|thirds| thirds as f64 * third))
+        .collect();
+    let a = cell[0];
+    let triangles = cell[1..].windows(2);
+    let middles = triangles.flat_map(|bc| {
+        let [b, c] = [bc[0], bc[1]];
+        parts.iter().map(move |[s, t]| [0, 1].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k])))
+    });
+    middles.collect()
+}
+
+/// A covariance in px² as that of a tile's coordinates, whose steps along u and v are these vectors, px.
+pub fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [[f64; 2]; 2]) -> Option<([f64; 3], f64)> {
+    let jacobian = Matrix2::new(a[0], b[0], a[1], b[1]);
+    let determinant = jacobian.determinant().abs();
+    let inverse = jacobian.try_inverse()?;
+    let covariance = Matrix2::new(xx, xy, xy, yy);
+    let mapped = inverse * covariance * inverse.transpose();
+    Some(([mapped[(0, 0)], mapped[(0, 1)], mapped[(1, 1)]], determinant))
+}

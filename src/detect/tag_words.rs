@@ -1,0 +1,129 @@
+//! The words that the tags of a target may show, and what a tile's cells say about each.
+
+use crate::family::Family;
+
+/// How many codes the cells' frequencies in the family count for, against those of the target.
+const FAMILY_WEIGHT: f64 = 16.0;
+
+/// Frequencies are no nearer to 0 and 1.
+const LEAST_FREQUENCY: f64 = 0.05;
+
+/// Codes of a target in all their turns.
+#[derive(Clone, Debug)]
+pub struct TargetWords {
+    ids: Vec<u32>,
+    turns: usize,
+    /// Of code i turned k times: word i · turns + k.
+    words: Vec<u64>,
+    /// How often each cell is white, by turn.
+    frequencies: Vec<Vec<f32>>,
+}
+
+impl TargetWords {
+    /// Those of some codes of a family.
+    pub fn new(family: &Family, ids: Vec<u32>) -> Self {
+        let cells = family.cells();
+        let turns = usize::from(family.kind().turns());
+        let bits = family.dimension().bits() as usize;
+        let all_turns = |code: u64| {
+            let mut all = vec![code];
+            while all.len() < turns {
+                all.push(cells.rotate(all[all.len() - 1]));
+            }
+            all
+        };
+        let words: Vec<u64> =
+            ids.iter().flat_map(|&id| all_turns(family.code(id).unwrap_or(0))).collect();
+        let white = |codes: &mut dyn Iterator<Item = u64>| {
+            let mut counts = vec![0.0; bits];
+            for code in codes {
+                for (bit, count) in counts.iter_mut().enumerate() {
+                    *count += f64::from((code >> bit & 1) as u8);
+                }
+            }
+            counts
+        };
+        let of_family = white(&mut family.codes().iter().copied());
+        let of_target = white(&mut ids.iter().filter_map(|&id| family.code(id)));
+        let frequency = |bit: usize| {
+            let in_family = of_family[bit] / family.len().max(1) as f64;
+            let frequency =
+                (of_target[bit] + FAMILY_WEIGHT * in_family) / (ids.len() as f64 + FAMILY_WEIGHT);
+            frequency.clamp(LEAST_FREQUENCY, 1.0 - LEAST_FREQUENCY) as f32
+        };
+        let mut frequencies = vec![(0..bits).map(frequency).collect::<Vec<f32>>()];
+        while frequencies.len() < turns {
+            let last = &frequencies[frequencies.len() - 1];
+            frequencies
+                .push(cells.rotation().iter().map(|&from| last[usize::from(from)]).collect());
+        }
+        Self { ids, turns, words, frequencies }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.words.len()
+    }
+
+    /// How many turns each code has.
+    pub fn turns(&self) -> usize {
+        self.turns
+    }
+
+    /// The id of a code.
+    pub fn id(&self, code: usize) -> u32 {
+        self.ids[code]
+    }
+
+    /// The index of an id's code.
+    pub fn code_of(&self, id: u32) -> Option<usize> {
+        self.ids.binary_search(&id).ok()
+    }
+
+    /// A word.
+    pub fn word(&self, index: usize) -> u64 {
+        self.words[index]
+    }
+
+    /// Λ of every word, nats: how much more likely the cells are if they show that word than any that is
+    /// drawn by the cells' frequencies.
+    pub fn evidence(&self, half_odds: &[f32]) -> Vec<f32> {
+        let bytes = half_odds.len().div_ceil(8);
+        // Sum of the half odds of the white cells, byte by byte.
+        let mut sums = vec![[0.0f32; 256]; bytes];
+        for (byte, sums) in sums.iter_mut().enumerate() {
+            for value in 1..256usize {
+                let lowest = value.trailing_zeros() as usize;
+                let odds = half_odds.get(8 * byte + lowest).copied().unwrap_or(0.0);
+                sums[value] = sums[value & (value - 1)] + odds;
+            }
+        }
+        let total: f32 = half_odds.iter().sum();
+        let unrelated = self.unrelated(half_odds);
+        let evidence = |(index, &word): (usize, &u64)| {
+            let white: f32 = sums
+                .iter()
+                .enumerate()
+                .map(|(byte, sums)| sums[(word >> (8 * byte) & 0xff) as usize])
+                .sum();
+            2.0 * white - total - unrelated[index % self.turns]
+        };
+        self.words.iter().enumerate().map(evidence).collect()
+    }
+
+    /// Λ of any word, nats.
+    pub fn evidence_of(&self, word: u64, half_odds: &[f32]) -> f32 {
+        let sign = |bit: usize| if word >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        let sum: f32 = half_odds.iter().enumerate().map(|(bit, odds)| sign(bit) * odds).sum();
+        sum - self.unrelated(half_odds)[0]
+    }
+
+    /// Σ ln( p e^l + (1 − p) e^−l ), by turn.
+    fn unrelated(&self, half_odds: &[f32]) -> Vec<f32> {
+        let of_turn = |frequencies: &Vec<f32>| {
+            let cells = half_odds.iter().zip(frequencies);
+            cells.map(|(l, p)| (p * l.exp() + (1.0 - p) * (-l).exp()).ln()).sum()
+        };
+        self.frequencies.iter().map(of_turn).collect()
+    }
+}

@@ -1,0 +1,146 @@
+//! What a picture without labels can tell of the reason.
+
+use super::detection::median;
+use super::grow::SaddleGrid;
+use super::label::TagEvidence;
+use super::reason::{Reason, ReasonKind};
+use crate::lattice::GridKind;
+use crate::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
+
+/// A picture whose brightest pixels are under this part of full scale is too dark to show a board in
+/// more than a dozen grey levels.
+const DARK: f64 = 0.06;
+
+/// A picture more of which is saturated than this shows nothing else.
+const MOSTLY_SATURATED: f64 = 0.6;
+
+/// From this part of full scale on a pixel is saturated.
+const SATURATED: f64 = 0.985;
+
+/// Blur that hides corners on all levels of the pyramid, px.
+const HIDING_BLUR_PX: f64 = 6.0;
+
+/// Cells are read from this length on, px, however sharp they are; a board of them, tag for tag at twice that.
+const LEAST_BIT_PX: f64 = 1.25;
+
+/// And from this length on in deviations of the blur.
+const LEAST_BIT_BLURS: f64 = 1.0;
+
+/// Why nothing was found in a picture with so many corners of its tiling.
+pub fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
+    let level = &pyramid.levels()[0];
+    let [low, high] = range(level);
+    let brightest = high / f64::from(PYRAMID_FULL_SCALE);
+    if brightest < DARK {
+        return Reason::new(ReasonKind::TooDark, [("brightest", brightest)]);
+    }
+    let limit = (SATURATED * f64::from(PYRAMID_FULL_SCALE)) as i16;
+    let bright = level.pixels().iter().filter(|&&v| v >= limit).count();
+    let saturated = bright as f64 / level.pixels().len().max(1) as f64;
+    if saturated > MOSTLY_SATURATED {
+        return Reason::new(ReasonKind::Overexposed, [("saturated", saturated)]);
+    }
+    let blur_px = sharpest_edge_px(level, high - low);
+    if blur_px > HIDING_BLUR_PX {
+        return Reason::new(ReasonKind::TooBlurred, [("blur_px", blur_px)]);
+    }
+    if corners > 0 {
+        return Reason::new(ReasonKind::NoGrid, [("corners", corners as f64)]);
+    }
+    Reason::new(ReasonKind::NoCorners, [])
+}
+
+/// Why the tags of a grid gave no labels.
+pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: (usize, usize)) -> Reason {
+    let corners = ("corners", grid.len() as f64);
+    if evidence.is_ambiguous {
+        return Reason::new(ReasonKind::Ambiguous, [corners]);
+    }
+    if evidence.is_cut_short {
+        return Reason::new(ReasonKind::TooManyGrids, []);
+    }
+    if let Some(&id) = evidence.foreign_ids.first() {
+        let tags = evidence.foreign_ids.len() as f64;
+        return Reason::new(ReasonKind::OtherIds, [("tags", tags), ("id", f64::from(id))]);
+    }
+    if evidence.tiles == 0 {
+        return Reason::new(ReasonKind::NoTiles, [corners]);
+    }
+    let (bit_px, blur_px) = (evidence.bit_px, evidence.blur_px);
+    let needed_bit_px = LEAST_BIT_PX.max(LEAST_BIT_BLURS * blur_px);
+    if bit_px < needed_bit_px {
+        let figures = [("bit_px", bit_px), ("blur_px", blur_px), ("needed_bit_px", needed_bit_px)];
+        return Reason::new(ReasonKind::UnreadableTags, figures);
+    }
+    if evidence.no_codes > 1 {
+        return Reason::new(ReasonKind::OtherFamily, [("tiles", evidence.no_codes as f64)]);
+    }
+    if ends_at_border(grid, size) {
+        return Reason::new(ReasonKind::CutByBorder, [corners]);
+    }
+    Reason::new(ReasonKind::NoTags, [("tiles", evidence.tiles as f64)])
+}
+
+/// Why a grid is not labelled by an outline of so many corners.
+pub fn no_outline(grid: &SaddleGrid, expected: usize, size: (usize, usize)) -> Reason {
+    let figures = [("corners", grid.len() as f64), ("expected", expected as f64)];
+    let kind = if grid.len() < expected && ends_at_border(grid, size) {
+        ReasonKind::CutByBorder
+    } else {
+        ReasonKind::NotWhole
+    };
+    Reason::new(kind, figures)
+}
+
+/// Whether some corner lies less than an edge's length from the border of the picture.
+fn ends_at_border(grid: &SaddleGrid, (width, height): (usize, usize)) -> bool {
+    let kind = GridKind::Checker;
+    let lengths = grid.iter().flat_map(|(&v, placed)| {
+        let [x, y] = placed.position;
+        let beside = kind.neighbours(v).filter_map(|n| grid.get(&n));
+        beside.map(move |other| (other.position[0] - x).hypot(other.position[1] - y))
+    });
+    let Some(edge_px) = median(lengths.collect()) else { return false };
+    grid.values().any(|placed| {
+        let [x, y] = placed.position;
+        x.min(y).min(width as f64 - x).min(height as f64 - y) < edge_px
+    })
+}
+
+/// Darkest and brightest pixels, but for one in a thousand.
+fn range(level: &Gray<i16>) -> [f64; 2] {
+    let mut counts = vec![0usize; PYRAMID_FULL_SCALE as usize + 1];
+    for &value in level.pixels() {
+        counts[(value.max(0) as usize).min(PYRAMID_FULL_SCALE as usize)] += 1;
+    }
+    let few = level.pixels().len() / 1000;
+    let reaches = |sum: &mut usize, value: usize| {
+        *sum += counts[value];
+        *sum > few
+    };
+    let (mut below, mut above) = (0, 0);
+    let low = (0..counts.len()).find(|&value| reaches(&mut below, value)).unwrap_or(0);
+    let high = (0..counts.len()).rev().find(|&value| reaches(&mut above, value)).unwrap_or(0);
+    [low as f64, high as f64]
+}
+
+/// Deviation of the blur of the steepest edges, px, taken to have all of the contrast: an edge of contrast c is as
+/// steep as c / (√2π σ).
+fn sharpest_edge_px(level: &Gray<i16>, contrast: f64) -> f64 {
+    let steps = (1..level.height()).flat_map(|y| {
+        let (row, above) = (level.row(y), level.row(y - 1));
+        (1..row.len()).map(move |x| {
+            let (dx, dy) = (i32::from(row[x] - row[x - 1]), i32::from(row[x] - above[x]));
+            dx.abs().max(dy.abs())
+        })
+    });
+    let mut counts = vec![0usize; PYRAMID_FULL_SCALE as usize + 1];
+    steps.for_each(|step| counts[(step as usize).min(PYRAMID_FULL_SCALE as usize)] += 1);
+    let few = level.pixels().len() / 5000;
+    let mut sum = 0;
+    let steepest = (0..counts.len()).rev().find(|&step| {
+        sum += counts[step];
+        sum > few
+    });
+    contrast / (std::f64::consts::TAU.sqrt() * steepest.unwrap_or(0).max(1) as f64)
+}
