@@ -85,6 +85,9 @@ const MAX_RESIDUAL: f64 = 0.35;
 /// A position less certain than this is none, px.
 const MAX_SIGMA_PX: f64 = 1.0;
 
+/// Limits of a sensor that nothing reaches.
+const UNLIMITED: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+
 /// A corner of K edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner<const K: usize> {
@@ -200,7 +203,7 @@ impl Default for CornerFitter {
         Self {
             pixels: Box::new([0.0; MAX_PIXELS]),
             columns: Box::new([[0.0; MAX_PIXELS]; PARAMS + 1]),
-            limits: [f32::NEG_INFINITY, f32::INFINITY],
+            limits: UNLIMITED,
         }
     }
 }
@@ -292,8 +295,28 @@ impl CornerFitter {
         optics: &Optics,
     ) -> Option<Fitted<K>> {
         let centre = self.load(image, window, start.position)?;
-        let local = |p: [f64; 2]| [p[0] - centre[0], p[1] - centre[1]];
-        let start = Corner { position: local(start.position), ..*start };
+        let local = [0, 1].map(|i| start.position[i] - centre[i]);
+        let start = Corner { position: local, ..*start };
+        let mut fitted = self.descend(window, &start, optics);
+        if fitted.is_none() && self.limits != UNLIMITED {
+            // Black and white may lie just there: a drawn page has no others, and nothing but them.
+            self.limits = UNLIMITED;
+            fitted = self.descend(window, &start, optics);
+        }
+        fitted.map(|fitted| {
+            let position = [0, 1].map(|i| fitted.corner.position[i] + centre[i]);
+            Fitted { corner: Corner { position, ..fitted.corner }, ..fitted }
+        })
+    }
+
+    /// [`Self::fit`] to the pixels that are loaded, in window coordinates.
+    fn descend<const K: usize>(
+        &mut self,
+        window: &Window,
+        start: &Corner<K>,
+        optics: &Optics,
+    ) -> Option<Fitted<K>> {
+        let start = *start;
         let freedom = (window.count - (ANGLE + K)) as f64;
         let mut corner = start;
         let mut damping = 1e-3;
@@ -305,7 +328,12 @@ impl CornerFitter {
         let mut converged = false;
         for _ in 1..MAX_EVALUATIONS {
             let noise = noise(&normal, &corner, freedom);
-            let (matrix, gradient) = with_prior(&normal, &corner, noise);
+            let (mut matrix, mut gradient) = with_prior(&normal, &corner, noise);
+            if corner.blur_px <= MIN_BLUR_PX && gradient[LN_BLUR] < 0.0 {
+                // No sharper than that.
+                (0..PARAMS).for_each(|i| (matrix[(i, LN_BLUR)], matrix[(LN_BLUR, i)]) = (0.0, 0.0));
+                (matrix[(LN_BLUR, LN_BLUR)], gradient[LN_BLUR]) = (1.0, 0.0);
+            }
             let mut damped = matrix;
             for i in 0..PARAMS {
                 damped[(i, i)] *= 1.0 + damping;
@@ -345,9 +373,8 @@ impl CornerFitter {
             && corner.edges_are_apart()
             && noise < MAX_RESIDUAL * corner.amplitude.abs()
             && inverse[(X, X)] + inverse[(Y, Y)] < MAX_SIGMA_PX * MAX_SIGMA_PX;
-        let position = [corner.position[0] + centre[0], corner.position[1] + centre[1]];
         trusted.then_some(Fitted {
-            corner: Corner { position, ..corner },
+            corner,
             cov: [(X, X), (X, Y), (Y, Y)].map(|at| optics.inflation * inverse[at]),
             noise,
         })
@@ -368,8 +395,8 @@ impl CornerFitter {
             (low, high) = (low.min(pixel), high.max(pixel));
         }
         self.limits = [
-            if low <= 0.0 { low } else { f32::NEG_INFINITY },
-            if high >= 1.0 { high } else { f32::INFINITY },
+            if low <= 0.0 { low } else { UNLIMITED[0] },
+            if high >= 1.0 { high } else { UNLIMITED[1] },
         ];
         Some(centre)
     }
@@ -523,13 +550,12 @@ impl<const K: usize> Corner<K> {
         Some(moved)
     }
 
-    /// The corner after a step; `None` when the blur leaves what the window can tell, or the light
-    /// what exists.
+    /// The corner after a step; `None` when it leaves what the window can tell.
     fn moved(&self, step: &SVector<f64, PARAMS>, radius: usize) -> Option<Self> {
         let mut corner = *self;
         corner.position[0] += step[X];
         corner.position[1] += step[Y];
-        corner.blur_px *= step[LN_BLUR].clamp(-1.0, 1.0).exp();
+        corner.blur_px = (corner.blur_px * step[LN_BLUR].clamp(-1.0, 1.0).exp()).max(MIN_BLUR_PX);
         corner.amplitude += step[AMPLITUDE];
         corner.level += step[LEVEL];
         for (i, slope) in corner.slope.iter_mut().enumerate() {
@@ -539,7 +565,7 @@ impl<const K: usize> Corner<K> {
             *angle += step[ANGLE + k];
         }
         let reach = radius as f64;
-        let sensible = (MIN_BLUR_PX..=reach).contains(&corner.blur_px)
+        let sensible = corner.blur_px <= reach
             && corner.position.iter().all(|c| c.abs() < reach)
             && corner.edges_are_apart();
         sensible.then_some(corner)

@@ -41,7 +41,14 @@ const BLUR_STEPS: i32 = 26;
 const SATURATED: f64 = 0.985;
 
 /// Shares of white that may be as bright as the sensor tells: white is exposed up to eight times too much.
-const CLIPPED_SHARES: [f64; 7] = [0.85, 0.65, 0.5, 0.35, 0.25, 0.18, 0.12];
+const CLIPPED_SHARES: [f64; 8] = [1.0, 0.85, 0.65, 0.5, 0.35, 0.25, 0.18, 0.12];
+
+/// Less clipping is believed unless it leaves so many times the squares that more would leave: sharp edges of
+/// a drawn page, where all white is full scale, fit any share.
+const CLIPPING_GAIN: f64 = 1.5;
+
+/// Deviation of a sample that any picture has, of full scale: half a step of 8 bits.
+const LEAST_DEVIATION: f64 = 0.002;
 
 /// Largest curvature of a tone curve: that of gamma 2.6 between white and a black of a twentieth is 0.4.
 const MOST_CURVATURE: f64 = 0.45;
@@ -124,7 +131,8 @@ impl GridLight {
             return None;
         }
         if 2 * saturated > count {
-            light.clipped_share = clipped_share(&by_direction);
+            let least = LEAST_DEVIATION * f64::from(T::FULL_SCALE);
+            light.clipped_share = clipped_share(&by_direction, least);
         }
         let (mut curvature, mut power) = (0.0, 0.0);
         let (mut squares, mut freedom) = (0.0, 0.0);
@@ -356,12 +364,16 @@ fn best_width(profiles: &[Profile], clipped_share: f64) -> (f64, f64) {
     (LEAST_BLUR_PX * BLUR_STEP.powi(best as i32), all[best])
 }
 
-/// θ: with which the edges of all directions leave least.
-fn clipped_share(by_direction: &[Vec<Profile>]) -> f64 {
+/// θ: the largest with which the edges of all directions leave nearly the least, or no more than samples of this
+/// deviation do.
+fn clipped_share(by_direction: &[Vec<Profile>], deviation: f64) -> f64 {
     let left =
         |share: f64| by_direction.iter().map(|profiles| best_width(profiles, share).1).sum::<f64>();
+    let samples = ACROSS * by_direction.iter().map(Vec::len).sum::<usize>();
     let tried = CLIPPED_SHARES.map(|share| (left(share), share));
-    tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or(1.0, |(_, share)| share)
+    let least = tried.iter().map(|(left, _)| *left).fold(f64::INFINITY, f64::min);
+    let limit = CLIPPING_GAIN * least.max(samples as f64 * deviation * deviation);
+    tried.into_iter().find(|(left, _)| *left <= limit).map_or(1.0, |(_, share)| share)
 }
 
 /// The covariance Σ whose variances nᵀΣn are those given, as nearly as one can; a little rounder where the directions
