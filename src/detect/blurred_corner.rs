@@ -37,6 +37,8 @@ pub struct Shade<const K: usize> {
     pub slopes: [f32; K],
     /// ∂f/∂ρ; 0 where edges do not interact.
     pub correlation: f32,
+    /// ∂f/∂α, of the strength of a halo; 0 without one.
+    pub halo: f32,
 }
 
 /// The brightness around a corner of K edges.
@@ -87,6 +89,7 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
             f: both(sharp.f, wide.f),
             slopes: std::array::from_fn(|k| both(sharp.slopes[k], wide.slopes[k] * self.narrower)),
             correlation: both(sharp.correlation, wide.correlation),
+            halo: sharp.f - wide.f,
         }
     }
 }
@@ -97,6 +100,7 @@ fn deltille([h1, h2, h3]: [f32; 3]) -> Shade<3> {
         f: erf_sqrt_half(h1) - erf_sqrt_half(h2) + erf_sqrt_half(h3),
         slopes: [SLOPE * bell(h1), -SLOPE * bell(h2), SLOPE * bell(h3)],
         correlation: 0.0,
+        halo: 0.0,
     }
 }
 
@@ -143,6 +147,7 @@ impl Orthant {
                 SLOPE * bell(h2) * erf_sqrt_half(towards_2 / self.sine),
             ],
             correlation: FRAC_2_PI / self.sine * exp_negative(exponent),
+            halo: 0.0,
         }
     }
 }

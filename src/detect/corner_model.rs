@@ -43,6 +43,9 @@ const MAX_PIXELS: usize = ((2 * MAX_RADIUS + 1) * (2 * MAX_RADIUS + 1)).next_mul
 /// Parameters of three edges; two leave the last one unused.
 const PARAMS: usize = 10;
 
+/// Columns that are multiplied with each other: parameters, residual, and what fills blocks of four.
+const BLOCKED: usize = (PARAMS + 1usize).next_multiple_of(4);
+
 /// Places of the parameters: x, y, ln s, amplitude, level, g_u, g_v, then the angles.
 const X: usize = 0;
 const Y: usize = 1;
@@ -61,11 +64,18 @@ const MAX_EVALUATIONS: usize = 25;
 
 /// The iteration ends with a step whose squared length, in standard deviations of the estimate, is
 /// below this; the next would be smaller by orders of magnitude.
-const CONVERGED: f64 = 0.01;
+const CONVERGED: f64 = 0.25;
+
+/// A rough fit ends with a step below these: in position, px, blur, by its logarithm, and angles. What is neglected
+/// is of the order of their squares.
+const ROUGH_PX: f64 = 0.15;
+const ROUGH_LN_BLUR: f64 = 0.15;
+const ROUGH_RAD: f64 = 0.05;
 
 /// Black and white that differ by less than this part of the contrast have the same piece of a tone curve:
 /// its curvature, at most a third, changes by as small a part of itself.
 const SAME_LIGHT: f64 = 0.01;
+const ROUGHLY_SAME_LIGHT: f64 = 0.1;
 
 /// Noise assumed at least, of the amplitude, so that noiseless images converge too.
 const MIN_NOISE: f64 = 2e-5;
@@ -87,6 +97,15 @@ const MAX_SIGMA_PX: f64 = 1.0;
 
 /// Limits of a sensor that nothing reaches.
 const UNLIMITED: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+
+/// How far a fit goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Accuracy {
+    /// To some hundredths of a pixel: a start for another fit.
+    Rough,
+    /// As far as the noise allows.
+    Full,
+}
 
 /// A corner of K edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,6 +146,8 @@ pub struct Window {
     u: Vec<f32>,
     /// Rows alike.
     v: Vec<f32>,
+    /// Pixels beside each other: the first, and how many.
+    runs: Vec<([i32; 2], usize)>,
 }
 
 impl Window {
@@ -139,13 +160,30 @@ impl Window {
     pub fn of(radius: usize, seen: impl Fn([f64; 2]) -> bool) -> Self {
         let radius = radius.min(MAX_RADIUS);
         let reach = radius as i32;
-        let places = (-reach..=reach).flat_map(|v| (-reach..=reach).map(move |u| [u, v]));
-        let seen = places.filter(|place| seen(place.map(f64::from)));
-        let (mut u, mut v): (Vec<f32>, Vec<f32>) = seen.map(|[u, v]| (u as f32, v as f32)).unzip();
-        let count = u.len();
-        u.resize(count.next_multiple_of(LANES), 0.0);
-        v.resize(count.next_multiple_of(LANES), 0.0);
-        Self { radius, count, u, v }
+        let room = (2 * radius + 1).pow(2).next_multiple_of(LANES);
+        let mut window = Self {
+            radius,
+            count: 0,
+            u: Vec::with_capacity(room),
+            v: Vec::with_capacity(room),
+            runs: Vec::with_capacity(2 * radius + 1),
+        };
+        for v in -reach..=reach {
+            let mut before = None;
+            for u in (-reach..=reach).filter(|&u| seen([f64::from(u), f64::from(v)])) {
+                match window.runs.last_mut() {
+                    Some((_, length)) if before == Some(u - 1) => *length += 1,
+                    _ => window.runs.push(([u, v], 1)),
+                }
+                before = Some(u);
+                window.u.push(u as f32);
+                window.v.push(v as f32);
+            }
+        }
+        window.count = window.u.len();
+        window.u.resize(window.count.next_multiple_of(LANES), 0.0);
+        window.v.resize(window.count.next_multiple_of(LANES), 0.0);
+        window
     }
 
     /// Half the side, px.
@@ -158,34 +196,44 @@ impl Window {
         self.count
     }
 
-    /// The pixels, each with its place (u, v); `None` where one lies outside the image.
-    pub fn pixels<'a, T: Intensity>(
-        &'a self,
-        image: &'a Gray<T>,
-        [x, y]: [usize; 2],
-    ) -> Option<impl Iterator<Item = ([f32; 2], f32)> + 'a> {
-        let inside = x >= self.radius
-            && y >= self.radius
-            && x + self.radius < image.width()
-            && y + self.radius < image.height();
-        let places = self.u[..self.count].iter().zip(&self.v[..self.count]);
-        let at = move |u: f32, v: f32| {
-            (x.wrapping_add_signed(u as isize), y.wrapping_add_signed(v as isize))
-        };
-        let is_in_image = |(&u, &v): (&f32, &f32)| {
-            let (x, y) = at(u, v);
-            x < image.width() && y < image.height()
-        };
-        let read = move |(&u, &v): (&f32, &f32)| {
-            let (x, y) = at(u, v);
-            ([u, v], image.at(x, y).to_f32() / T::FULL_SCALE)
-        };
-        (inside || places.clone().all(is_in_image)).then(|| places.map(read))
+    /// Columns and rows of the pixels.
+    pub fn places(&self) -> [&[f32]; 2] {
+        [&self.u[..self.count], &self.v[..self.count]]
+    }
+
+    /// Takes the pixels around `centre`, full scale 1; `None` where one lies outside the image.
+    fn read<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        centre: [f64; 2],
+        pixels: &mut [f32; MAX_PIXELS],
+    ) -> Option<()> {
+        let [x, y] = centre.map(|c| c as i32);
+        let to_one = 1.0 / T::FULL_SCALE;
+        let mut rest = &mut pixels[..];
+        for &([u, v], length) in &self.runs {
+            let (first, row) = (usize::try_from(x + u).ok()?, usize::try_from(y + v).ok()?);
+            if row >= image.height() {
+                return None;
+            }
+            let (run, after) = rest.split_at_mut(length);
+            let shown = image.row(row).get(first..first + length)?;
+            run.iter_mut().zip(shown).for_each(|(to, from)| *to = from.to_f32() * to_one);
+            rest = after;
+        }
+        Some(())
     }
 }
 
+/// What all corners have in common is told by further rows: amplitude · (1 − S²), S, and derivatives by the two
+/// parameters of astigmatism and by the strength of the halo.
+const RISE: usize = PARAMS + 1;
+const SHADE: usize = PARAMS + 2;
+const ASTIGMATISM: usize = PARAMS + 3;
+const HALO: usize = PARAMS + 5;
+
 /// One row a parameter, then the residual; a column a pixel.
-type Columns = [[f32; MAX_PIXELS]; PARAMS + 1];
+type Columns = [[f32; MAX_PIXELS]; PARAMS + 6];
 
 /// Fits corners; holds the work space, so one fitter serves one thread.
 #[derive(Clone, Debug)]
@@ -202,10 +250,21 @@ impl Default for CornerFitter {
     fn default() -> Self {
         Self {
             pixels: Box::new([0.0; MAX_PIXELS]),
-            columns: Box::new([[0.0; MAX_PIXELS]; PARAMS + 1]),
+            columns: Box::new([[0.0; MAX_PIXELS]; PARAMS + 6]),
             limits: UNLIMITED,
         }
     }
+}
+
+/// A parameter that all corners of a picture have in common.
+#[derive(Clone, Debug)]
+pub(super) enum Common {
+    /// One of the tone curve: the optics with it a step further.
+    Tone { moved: Box<Optics>, step: f32 },
+    /// The first or second of astigmatism.
+    Astigmatism(usize),
+    /// The strength of the halo.
+    Halo,
 }
 
 /// The normal equations of a corner and the optics.
@@ -244,6 +303,9 @@ struct Look<const K: usize> {
     /// Correlation of the blur along the first two normals, and its derivatives by their angles.
     rho: f64,
     rho_by_angle: [f64; 2],
+    /// ∂ ln s_k/∂e and ∂ρ/∂e of both parameters of astigmatism.
+    by_astigmatism: [[f64; K]; 2],
+    rho_by_astigmatism: [f64; 2],
     /// Curve between black and white.
     piece: Piece,
     /// Strength of the halo, and its width over that of the blur.
@@ -268,7 +330,19 @@ impl<const K: usize> Look<K> {
             product(tangents[0], normals[1]) / lengths - rho * by_turn[0],
             product(normals[0], tangents[1]) / lengths - rho * by_turn[1],
         ];
+        let parts = |a: [f64; 2], b: [f64; 2]| {
+            [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
+        };
+        let by_astigmatism: [[f64; K]; 2] = [0, 1].map(|e| {
+            std::array::from_fn(|k| parts(normals[k], normals[k])[e] / (2.0 * squares[k]))
+        });
+        let rho_by_astigmatism = [0, 1].map(|e| {
+            let [first, second] = [by_astigmatism[e][0], by_astigmatism[e][1]];
+            parts(normals[0], normals[1])[e] / lengths - rho * (first + second)
+        });
         Self {
+            by_astigmatism,
+            rho_by_astigmatism,
             sharpness: squares.map(|square| 1.0 / (corner.blur_px * square.sqrt())),
             by_turn,
             rho,
@@ -292,16 +366,16 @@ impl CornerFitter {
         image: &Gray<T>,
         window: &Window,
         start: &Corner<K>,
-        optics: &Optics,
+        (optics, accuracy): (&Optics, Accuracy),
     ) -> Option<Fitted<K>> {
         let centre = self.load(image, window, start.position)?;
         let local = [0, 1].map(|i| start.position[i] - centre[i]);
         let start = Corner { position: local, ..*start };
-        let mut fitted = self.descend(window, &start, optics);
+        let mut fitted = self.descend(window, &start, (optics, accuracy));
         if fitted.is_none() && self.limits != UNLIMITED {
             // Black and white may lie just there: a drawn page has no others, and nothing but them.
             self.limits = UNLIMITED;
-            fitted = self.descend(window, &start, optics);
+            fitted = self.descend(window, &start, (optics, accuracy));
         }
         fitted.map(|fitted| {
             let position = [0, 1].map(|i| fitted.corner.position[i] + centre[i]);
@@ -314,19 +388,19 @@ impl CornerFitter {
         &mut self,
         window: &Window,
         start: &Corner<K>,
-        optics: &Optics,
+        (optics, accuracy): (&Optics, Accuracy),
     ) -> Option<Fitted<K>> {
         let start = *start;
         let freedom = (window.count - (ANGLE + K)) as f64;
         let mut corner = start;
         let mut damping = 1e-3;
-        // The curve's piece is held, so that steps know all that they change, and made anew for what came
-        // of it.
+        // The curve's piece is held, so that steps know all that they change, and made anew after the first
+        // step, which finds the light, and for what came of them all.
         let mut toned = start;
         let mut piece = optics.piece(toned.level, toned.amplitude);
         let mut normal = self.normal(window, &corner, (optics, piece));
         let mut converged = false;
-        for _ in 1..MAX_EVALUATIONS {
+        for evaluations in 1..MAX_EVALUATIONS {
             let noise = noise(&normal, &corner, freedom);
             let (mut matrix, mut gradient) = with_prior(&normal, &corner, noise);
             if corner.blur_px <= MIN_BLUR_PX && gradient[LN_BLUR] < 0.0 {
@@ -343,16 +417,29 @@ impl CornerFitter {
                 damping *= 10.0;
                 continue;
             };
-            if step.dot(&(matrix * step)) < CONVERGED * noise * noise && damping < 0.1 {
-                corner = moved;
+            let is_toned_anew = |tolerance| optics.is_toned() && !moved.is_lit_like(&toned, tolerance);
+            let (is_last, tolerance) = match accuracy {
+                Accuracy::Full => {
+                    let small = step.dot(&(matrix * step)) < CONVERGED * noise * noise;
+                    (small, SAME_LIGHT)
+                }
+                Accuracy::Rough => (is_rough(&step), ROUGHLY_SAME_LIGHT),
+            };
+            if is_last && damping < 0.1 {
                 converged = true;
-                if !optics.is_toned() || corner.is_lit_like(&toned) {
+                corner = moved;
+                if !is_toned_anew(tolerance) {
+                    normal.cost = (normal.cost - gradient.dot(&step)).max(0.0);
                     break;
                 }
-                toned = corner;
+                toned = moved;
                 piece = optics.piece(toned.level, toned.amplitude);
                 normal = self.normal(window, &corner, (optics, piece));
                 continue;
+            }
+            if evaluations == 1 && is_toned_anew(SAME_LIGHT) {
+                toned = moved;
+                piece = optics.piece(toned.level, toned.amplitude);
             }
             let there = self.normal(window, &moved, (optics, piece));
             let weight = (noise / SLOPE_PRIOR).powi(2);
@@ -388,17 +475,24 @@ impl CornerFitter {
         position: [f64; 2],
     ) -> Option<[f64; 2]> {
         let centre = position.map(f64::round);
-        let pixels = window.pixels(image, centre.map(|c| c as usize))?;
-        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-        for (out, (_, pixel)) in self.pixels.iter_mut().zip(pixels) {
-            *out = pixel;
-            (low, high) = (low.min(pixel), high.max(pixel));
-        }
+        window.read(image, centre, &mut self.pixels)?;
+        let (low, high) = ends(&self.pixels[..window.count]);
         self.limits = [
             if low <= 0.0 { low } else { UNLIMITED[0] },
             if high >= 1.0 { high } else { UNLIMITED[1] },
         ];
         Some(centre)
+    }
+
+    /// The pixels around a position, full scale 1; `None` where one lies outside the image.
+    pub(super) fn pixels<T: Intensity>(
+        &mut self,
+        image: &Gray<T>,
+        window: &Window,
+        position: [f64; 2],
+    ) -> Option<&[f32]> {
+        self.load(image, window, position)?;
+        Some(&self.pixels[..window.count])
     }
 
     /// The normal equations of the pixels at a corner in window coordinates.
@@ -408,9 +502,8 @@ impl CornerFitter {
         corner: &Corner<K>,
         optics: (&Optics, Piece),
     ) -> Normal {
-        self.fill(window, corner, optics);
-        let columns = &mut *self.columns;
-        let products = products(columns, ANGLE + K, window.count);
+        self.fill::<K, false>(window, corner, optics);
+        let products = products(&mut self.columns, window.count);
         let mut normal = Normal {
             matrix: SMatrix::identity(),
             gradient: SVector::zeros(),
@@ -427,44 +520,55 @@ impl CornerFitter {
     }
 
     /// The normal equations at a corner in picture coordinates, from the window around the pixel `centre`, with
-    /// the parameters of the optics behind its own, each of which is told by optics that are `moved` by a
-    /// step; `None` outside the image.
+    /// the parameters of the optics behind its own; `None` outside the image.
     pub(super) fn joint<const K: usize, T: Intensity>(
         &mut self,
         image: &Gray<T>,
         (window, centre): (&Window, [f64; 2]),
         corner: &Corner<K>,
         optics: &Optics,
-        moved: &[(Optics, f32)],
+        common: &[Common],
     ) -> Option<Joint> {
         self.load(image, window, centre)?;
         let position = [0, 1].map(|i| corner.position[i] - centre[i]);
         let corner = Corner { position, ..*corner };
         let params = ANGLE + K;
-        let mut rows: Vec<Vec<f32>> = Vec::with_capacity(moved.len());
         let toned = |optics: &Optics| optics.piece(corner.level, corner.amplitude);
-        for (moved, step) in moved {
-            self.fill(window, &corner, (moved, toned(moved)));
-            rows.push(self.columns[PARAMS][..window.count].iter().map(|r| -r / step).collect());
-        }
-        self.fill(window, &corner, (optics, toned(optics)));
-        let residual = self.columns[PARAMS][..window.count].to_vec();
-        for (row, (_, step)) in rows.iter_mut().zip(moved) {
-            row.iter_mut().zip(&residual).for_each(|(d, r)| *d += r / step);
-        }
-        let own = self.columns[..params].iter().map(|column| column[..window.count].to_vec());
-        let rows: Vec<Vec<f32>> = own.chain(rows).chain([residual]).collect();
+        let piece = toned(optics);
+        self.fill::<K, true>(window, &corner, (optics, piece));
+        let column = |i: usize| &self.columns[i][..window.count];
+        let of_tone = |moved: &Optics, step: f32| -> Vec<f32> {
+            let there = toned(moved).terms;
+            let slopes = std::array::from_fn(|j| (there[j] - piece.terms[j]) / step);
+            let slopes = Piece { terms: slopes, ratio: 0.0 };
+            column(RISE).iter().zip(column(SHADE)).map(|(rise, s)| rise * slopes.bulge(*s)).collect()
+        };
+        let of_tones: Vec<Vec<f32>> = common
+            .iter()
+            .filter_map(|common| match common {
+                Common::Tone { moved, step } => Some(of_tone(moved, *step)),
+                _ => None,
+            })
+            .collect();
+        let mut of_tones = of_tones.iter();
+        let of_common = common.iter().map(|common| match common {
+            Common::Tone { .. } => of_tones.next().map_or(&[][..], |row| row),
+            Common::Astigmatism(i) => column(ASTIGMATISM + i),
+            Common::Halo => column(HALO),
+        });
+        let own = (0..params).map(column);
+        let rows: Vec<&[f32]> = own.chain(of_common).chain([column(PARAMS)]).collect();
         let n = rows.len() - 1;
         let mut matrix = DMatrix::zeros(n, n);
         let mut gradient = DVector::zeros(n);
         for i in 0..n {
-            gradient[i] = dot(&rows[i], &rows[n]);
+            gradient[i] = dot(rows[i], rows[n]);
             for j in i..n {
-                matrix[(i, j)] = dot(&rows[i], &rows[j]);
+                matrix[(i, j)] = dot(rows[i], rows[j]);
                 matrix[(j, i)] = matrix[(i, j)];
             }
         }
-        let cost = dot(&rows[n], &rows[n]);
+        let cost = dot(rows[n], rows[n]);
         let noise = (cost / (window.count - params) as f64).sqrt();
         let noise = noise.max(MIN_NOISE * corner.amplitude.abs());
         let weight = (noise / SLOPE_PRIOR).powi(2);
@@ -514,8 +618,9 @@ impl CornerFitter {
         })
     }
 
-    /// Fills the columns of a corner in window coordinates.
-    fn fill<const K: usize>(
+    /// Fills the columns of a corner in window coordinates; those of what corners have in common where it is
+    /// `JOINT`ly fitted.
+    fn fill<const K: usize, const JOINT: bool>(
         &mut self,
         window: &Window,
         corner: &Corner<K>,
@@ -523,13 +628,35 @@ impl CornerFitter {
     ) {
         let look = Look::of(corner, optics, piece, self.limits);
         let (columns, pixels) = (&mut *self.columns, &*self.pixels);
-        match (K, optics.has_halo()) {
-            (2, false) => fill_checker(columns, pixels, window, corner, &look),
-            (2, true) => fill_checker_with_halo(columns, pixels, window, corner, &look),
-            (_, false) => fill_deltille(columns, pixels, window, corner, &look),
-            (_, true) => fill_deltille_with_halo(columns, pixels, window, corner, &look),
+        match (K, JOINT, optics.has_halo()) {
+            (2, false, false) => fill_checker(columns, pixels, window, corner, &look),
+            (2, ..) => fill_checker_with_halo::<K, JOINT>(columns, pixels, window, corner, &look),
+            (_, false, false) => fill_deltille(columns, pixels, window, corner, &look),
+            _ => fill_deltille_with_halo::<K, JOINT>(columns, pixels, window, corner, &look),
         }
     }
+}
+
+/// Whether a step is so short that a rough fit ends with it.
+fn is_rough(step: &SVector<f64, PARAMS>) -> bool {
+    step[X].hypot(step[Y]) < ROUGH_PX
+        && step[LN_BLUR].abs() < ROUGH_LN_BLUR
+        && step.iter().skip(ANGLE).all(|turn| turn.abs() < ROUGH_RAD)
+}
+
+/// The least and the greatest.
+#[multiversion(targets = "simd")]
+fn ends(values: &[f32]) -> (f32, f32) {
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    for chunk in chunks {
+        for k in 0..LANES {
+            low[k] = low[k].min(chunk[k]);
+            high[k] = high[k].max(chunk[k]);
+        }
+    }
+    let low = low.iter().chain(rest).copied().fold(f32::INFINITY, f32::min);
+    (low, high.iter().chain(rest).copied().fold(f32::NEG_INFINITY, f32::max))
 }
 
 impl<const K: usize> Corner<K> {
@@ -572,9 +699,9 @@ impl<const K: usize> Corner<K> {
     }
 
     /// Whether black and white are where another has them, as far as a tone curve's piece can tell.
-    fn is_lit_like(&self, other: &Self) -> bool {
+    fn is_lit_like(&self, other: &Self, tolerance: f64) -> bool {
         let change = (self.level - other.level).abs().max((self.amplitude - other.amplitude).abs());
-        change <= SAME_LIGHT * self.amplitude.abs()
+        change <= tolerance * self.amplitude.abs()
     }
 
     fn edges_are_apart(&self) -> bool {
@@ -592,18 +719,19 @@ fn fill_checker<const C: usize>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    fill(columns, pixels, window, corner, look, Orthant::new(look.rho));
+    fill::<2, C, false>(columns, pixels, window, corner, look, Orthant::new(look.rho));
 }
 
 #[multiversion(targets = "simd")]
-fn fill_checker_with_halo<const C: usize>(
+fn fill_checker_with_halo<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    fill(columns, pixels, window, corner, look, look.haloed(Orthant::new(look.rho)));
+    let pattern = look.haloed(Orthant::new(look.rho));
+    fill::<2, C, JOINT>(columns, pixels, window, corner, look, pattern);
 }
 
 #[multiversion(targets = "simd")]
@@ -614,23 +742,23 @@ fn fill_deltille<const C: usize>(
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    fill(columns, pixels, window, corner, look, Deltille);
+    fill::<3, C, false>(columns, pixels, window, corner, look, Deltille);
 }
 
 #[multiversion(targets = "simd")]
-fn fill_deltille_with_halo<const C: usize>(
+fn fill_deltille_with_halo<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    fill(columns, pixels, window, corner, look, look.haloed(Deltille));
+    fill::<3, C, JOINT>(columns, pixels, window, corner, look, look.haloed(Deltille));
 }
 
 /// Fills the columns of derivatives and residuals.
 #[inline(always)]
-fn fill<const K: usize, const C: usize>(
+fn fill<const K: usize, const C: usize, const JOINT: bool>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
@@ -648,6 +776,9 @@ fn fill<const K: usize, const C: usize>(
     let by_turn: [f32; K] = std::array::from_fn(|k| look.by_turn[k] as f32);
     let by_angle: [f32; K] =
         std::array::from_fn(|k| look.rho_by_angle.get(k).map_or(0.0, |&by| by as f32));
+    let by_astigmatism: [[f32; K]; 2] =
+        [0, 1].map(|e| std::array::from_fn(|k| look.by_astigmatism[e][k] as f32));
+    let rho_by_astigmatism = look.rho_by_astigmatism.map(|by| by as f32);
     let (amplitude, level) = (corner.amplitude as f32, corner.level as f32);
     let [gu, gv] = corner.slope.map(|g| g as f32);
     let (piece, [low, high]) = (look.piece, look.limits);
@@ -660,10 +791,11 @@ fn fill<const K: usize, const C: usize>(
         let h: [f32; K] = std::array::from_fn(|k| {
             cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k]
         });
-        let Shade { f, slopes, correlation } = pattern.at(h);
+        let Shade { f, slopes, correlation, halo } = pattern.at(h);
         let change = gu * u + gv * v;
         let gain = 1.0 + change;
-        let (tone, steepness) = piece.at(f * gain + change * piece.ratio);
+        let shade = f * gain + change * piece.ratio;
+        let (tone, steepness) = piece.at(shade);
         let model = level + amplitude * tone;
         let seen = if model > low && model < high { 1.0 } else { 0.0 };
         let by_shade = amplitude * steepness * seen;
@@ -686,6 +818,18 @@ fn fill<const K: usize, const C: usize>(
         columns[SLOPE][i] = u * by_light;
         columns[SLOPE + 1][i] = v * by_light;
         columns[PARAMS][i] = pixels[i] - model.max(low).min(high);
+        if JOINT {
+            columns[RISE][i] = amplitude * seen * (1.0 - shade * shade);
+            columns[SHADE][i] = shade;
+            columns[HALO][i] = light * halo;
+            for e in 0..2 {
+                let mut by = correlation * rho_by_astigmatism[e];
+                for k in 0..K {
+                    by -= slopes[k] * h[k] * by_astigmatism[e][k];
+                }
+                columns[ASTIGMATISM + e][i] = light * by;
+            }
+        }
     }
 }
 
@@ -724,26 +868,36 @@ fn with_prior<const K: usize>(
     (matrix, gradient)
 }
 
-/// Products of each two of the first `params` columns and the last, over `count` pixels; only the
-/// upper half is filled.
+/// Products of each two of the first columns and the residual, over `count` pixels; only the upper half is filled.
 #[multiversion(targets = "simd")]
-fn products(columns: &mut Columns, params: usize, count: usize) -> [[f64; PARAMS + 1]; PARAMS + 1] {
+fn products(columns: &mut Columns, count: usize) -> [[f64; BLOCKED]; BLOCKED] {
     let padded = count.next_multiple_of(LANES).min(MAX_PIXELS);
-    for column in columns.iter_mut() {
+    for column in columns.iter_mut().take(PARAMS + 1) {
         column[count..padded].fill(0.0);
     }
-    let mut products = [[0.0; PARAMS + 1]; PARAMS + 1];
-    for i in (0..params).chain([PARAMS]) {
-        for j in (i..params).chain([PARAMS]) {
-            let (a, _) = columns[i][..padded].as_chunks::<LANES>();
-            let (b, _) = columns[j][..padded].as_chunks::<LANES>();
-            let mut sums = [0.0f32; LANES];
-            for (a, b) in a.iter().zip(b) {
+    let mut products = [[0.0; BLOCKED]; BLOCKED];
+    // Two columns with four others at once: eight sums that do not wait for each other.
+    for i in (0..BLOCKED).step_by(2) {
+        for j in (i / 4 * 4..BLOCKED).step_by(4) {
+            let [a0, a1] = [0, 1].map(|k| columns[i + k][..padded].as_chunks::<LANES>().0);
+            let [b0, b1, b2, b3] =
+                [0, 1, 2, 3].map(|k| columns[j + k][..padded].as_chunks::<LANES>().0);
+            let mut sums = [[[0.0f32; LANES]; 4]; 2];
+            for n in 0..a0.len().min(a1.len()).min(b0.len()).min(b1.len()).min(b2.len()).min(b3.len())
+            {
                 for k in 0..LANES {
-                    sums[k] += a[k] * b[k];
+                    let b = [b0[n][k], b1[n][k], b2[n][k], b3[n][k]];
+                    for (m, b) in b.into_iter().enumerate() {
+                        sums[0][m][k] += a0[n][k] * b;
+                        sums[1][m][k] += a1[n][k] * b;
+                    }
                 }
             }
-            products[i][j] = f64::from(sums.iter().sum::<f32>());
+            for (row, sums) in sums.iter().enumerate() {
+                for (m, sums) in sums.iter().enumerate() {
+                    products[i + row][j + m] = f64::from(sums.iter().sum::<f32>());
+                }
+            }
         }
     }
     products

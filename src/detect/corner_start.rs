@@ -7,6 +7,8 @@
 
 use std::f64::consts::PI;
 
+use multiversion::multiversion;
+
 use super::corner_model::{Corner, Window};
 use crate::raster::{Gray, Intensity};
 
@@ -23,27 +25,22 @@ const MIN_START_RAD: f64 = 15.0 * PI / 180.0;
 /// Circles, as parts of the window's radius.
 const CIRCLES: [f64; 3] = [0.5, 0.7, 0.9];
 
-/// The start of a corner whose edges have these directions, rising within a half-turn, under a blur of `blur_px`; `None` when the window leaves the image or shows one side of the edges alone.
-pub fn start_along<const K: usize, T: Intensity>(
-    image: &Gray<T>,
-    position: [f64; 2],
+/// The start of a corner whose edges have these directions, rising within a half-turn, under a blur of `blur_px`,
+/// from the pixels of a window; `None` when it shows one side of the edges alone.
+pub fn start_along<const K: usize>(
     window: &Window,
+    pixels: &[f32],
+    position: [f64; 2],
     angles: [f64; K],
     blur_px: f64,
 ) -> Option<Corner<K>> {
-    let centre = position.map(f64::round);
-    let [x, y] = [0, 1].map(|i| position[i] - centre[i]);
-    let directions = angles.map(f64::sin_cos);
-    let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
-    for ([u, v], pixel) in window.pixels(image, centre.map(|c| c as usize))? {
-        let (du, dv) = (f64::from(u) - x, f64::from(v) - y);
-        let right = directions.iter().filter(|(sin, cos)| cos * dv - sin * du > 0.0).count();
-        // The pattern is the product of the signs of the distances from the edges.
-        let class = (K - right) % 2;
-        sums[class] += f64::from(pixel);
-        counts[class] += 1.0;
-    }
-    let [plus, minus] = [0, 1].map(|i| sums[i] / counts[i]);
+    let offset = [0, 1].map(|i| (position[i] - position[i].round()) as f32);
+    let directions = angles.map(|angle| [angle.cos() as f32, angle.sin() as f32]);
+    let sums = match K {
+        2 => sums_of_two(window.places(), pixels, offset, &directions),
+        _ => sums_of_three(window.places(), pixels, offset, &directions),
+    };
+    let [plus, minus] = sums.map(|[sum, count]| f64::from(sum / count));
     let (level, amplitude) = ((plus + minus) / 2.0, (plus - minus) / 2.0);
     (amplitude.abs() > f64::EPSILON).then_some(Corner {
         position,
@@ -54,6 +51,56 @@ pub fn start_along<const K: usize, T: Intensity>(
         angles,
         bends: [0.0; K],
     })
+}
+
+#[multiversion(targets = "simd")]
+fn sums_of_two(
+    places: [&[f32]; 2],
+    pixels: &[f32],
+    offset: [f32; 2],
+    directions: &[[f32; 2]],
+) -> [[f32; 2]; 2] {
+    sums::<2>(places, pixels, offset, directions)
+}
+
+#[multiversion(targets = "simd")]
+fn sums_of_three(
+    places: [&[f32]; 2],
+    pixels: &[f32],
+    offset: [f32; 2],
+    directions: &[[f32; 2]],
+) -> [[f32; 2]; 2] {
+    sums::<3>(places, pixels, offset, directions)
+}
+
+/// Sum and number of the pixels where the pattern, the product of the signs of the distances from the edges, is
+/// positive, and where it is not.
+#[inline(always)]
+fn sums<const K: usize>(
+    [us, vs]: [&[f32]; 2],
+    pixels: &[f32],
+    [x, y]: [f32; 2],
+    directions: &[[f32; 2]],
+) -> [[f32; 2]; 2] {
+    const LANES: usize = 16;
+    let (mut sums, mut counts, mut all) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
+    let n = us.len().min(vs.len()).min(pixels.len());
+    for first in (0..n).step_by(LANES) {
+        for k in 0..LANES.min(n - first) {
+            let (du, dv) = (us[first + k] - x, vs[first + k] - y);
+            let mut sign = 1.0f32;
+            for [cos, sin] in &directions[..K] {
+                sign *= if cos * dv - sin * du > 0.0 { 1.0 } else { -1.0 };
+            }
+            let here = 0.5 + 0.5 * sign;
+            sums[k] += here * pixels[first + k];
+            counts[k] += here;
+            all[k] += pixels[first + k];
+        }
+    }
+    let total = |lanes: [f32; LANES]| lanes.iter().sum::<f32>();
+    let (sum, count) = (total(sums), total(counts));
+    [[sum, count], [total(all) - sum, n as f32 - count]]
 }
 
 /// The start around `position`, from circles; `None` when the circles leave the image or show no contrast.

@@ -92,13 +92,17 @@ pub const TERMS: usize = 6;
 
 /// Grey values that are tabulated; beyond full scale for corners whose white is clipped.
 const LOWEST: f64 = -0.5;
-const STEP: f64 = 1.0 / 128.0;
-const NODES: usize = 385;
+const STEP: f64 = 1.0 / 64.0;
+const NODES: usize = 193;
+
+/// Distance δ from black and white below which the slope of an estimated curve no longer rises or falls: grey
+/// values nearer than that are few, and sRGB has twice as much.
+const END: f64 = 0.03;
 
 /// Where a power has its toe, of full scale: half of sRGB's. Below it is a line.
 const TOE: f64 = 0.02;
 
-/// The polynomial of the logarithmic slope is constant this far beyond the grey values it was made for.
+/// The slope is constant this far beyond the grey values it was made for.
 const REACH: f64 = 1.25;
 
 /// Largest sum of light over difference of light that slopes of the light are scaled by.
@@ -140,28 +144,30 @@ impl Curve {
     pub fn estimated(params: [f64; TONE_PARAMS], [low, high]: [f64; 2]) -> Self {
         let (middle, half) = ((low + high) / 2.0, ((high - low) / 2.0).max(1e-6));
         let [p1, p2, p3] = params;
-        Self::with_slope(|y| {
-            let t = ((y - middle) / half).clamp(-REACH, REACH);
-            (t * (p1 + t * (p2 + t * p3))).exp()
-        })
+        let ln_slope = |y: f64| {
+            let y = y.clamp(middle - REACH * half, middle + REACH * half);
+            let [to_black, to_white] = [y, 1.0 - y].map(|d| (d.max(0.0) + END).ln());
+            p1 * to_black + p2 * (y - middle) / half + p3 * to_white
+        };
+        let at_middle = ln_slope(middle);
+        Self::with_slope(|y| (ln_slope(y) - at_middle).exp())
     }
 
     fn with_slope(slope: impl Fn(f64) -> f64) -> Self {
-        let at = |i: f64| slope(LOWEST + i * STEP);
+        // At the nodes and half-way between them.
+        let slopes: Vec<f64> =
+            (0..2 * NODES - 1).map(|i| slope(LOWEST + 0.5 * STEP * i as f64)).collect();
         let mut light = Vec::with_capacity(NODES);
         let mut sum = 0.0;
-        let mut zero = 0.0;
-        for i in 0..NODES {
-            light.push(sum);
-            let i = i as f64;
-            if LOWEST + i * STEP == 0.0 {
-                zero = sum;
-            }
+        light.push(sum);
+        for three in slopes.windows(3).step_by(2) {
             // Simpson's rule.
-            sum += STEP / 6.0 * (at(i) + 4.0 * at(i + 0.5) + at(i + 1.0));
+            sum += STEP / 6.0 * (three[0] + 4.0 * three[1] + three[2]);
+            light.push(sum);
         }
+        let zero = light[(-LOWEST / STEP) as usize];
         light.iter_mut().for_each(|q| *q -= zero);
-        Self { light, slope: (0..NODES).map(|i| at(i as f64)).collect() }
+        Self { light, slope: slopes.into_iter().step_by(2).collect() }
     }
 
     /// The light of a grey value.
@@ -226,6 +232,12 @@ impl Piece {
         }
         let rest = 1.0 - s * s;
         (s + rest * sum, 1.0 - 2.0 * s * sum + rest * slope)
+    }
+
+    /// (T(S) − S)/(1 − S²).
+    #[inline(always)]
+    pub fn bulge(&self, s: f32) -> f32 {
+        self.terms.iter().rev().fold(0.0, |sum, term| sum * s + term)
     }
 }
 

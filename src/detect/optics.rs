@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::corner_model::{Corner, CornerFitter, Joint, Window};
+use super::corner_model::{Common, Corner, CornerFitter, Joint, Window};
 use super::correlation::{self, Influence};
 use super::curve::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
 use super::detection::median;
@@ -26,13 +26,14 @@ pub const REACH_SIGMAS: f64 = 5.0;
 /// Width of a halo over that of the blur: masks of 1 to 2 px on pictures of 0.7 to 1 px of blur.
 const HALO_WIDTH: f64 = 2.0;
 
-/// Prior deviations of the parameters: sRGB has (1.3, −0.6, 0.2) between a twelfth of the light and all,
+/// Prior deviations of the parameters: gamma 2.6 has (1.6, 0, 0), smooth steps have −0.5 at both ends,
 /// halos of 0.5 are strong, and a blur twice as wide in one direction has an astigmatism of 0.6.
-const PRIOR: [f64; PARAMS] = [2.0, 1.0, 0.5, 0.3, 0.3, 0.5];
+const PRIOR: [f64; PARAMS] = [2.0, 1.0, 1.0, 0.3, 0.3, 0.5];
 
 /// The parameters: the curve's, the astigmatism's, the halo's.
 const PARAMS: usize = TONE_PARAMS + 3;
-const GROUPS: [&[usize]; 3] = [&[0, 1, 2], &[3, 4], &[5]];
+const GROUPS: [&[usize]; 3] = [&[0, 1, 2], &[3, 4], &[HALO]];
+const HALO: usize = PARAMS - 1;
 
 /// A group is used when chance has it with less than 1 : 1000: χ² of three, two and one degrees of freedom.
 const CHI2: [f64; 3] = [16.3, 13.8, 10.8];
@@ -130,11 +131,22 @@ impl Optics {
         }
     }
 
-    /// The optics with one parameter a step further, and the step.
-    pub fn moved(&self, parameter: usize) -> (Self, f32) {
+    /// The optics with one parameter a [`STEP`] further.
+    fn moved(&self, parameter: usize) -> Self {
         let mut params = self.vector();
         params[parameter] += STEP;
-        (self.with(&params), STEP as f32)
+        self.with(&params)
+    }
+
+    /// A parameter, for the corners' equations.
+    fn common(&self, parameter: usize) -> Common {
+        match parameter {
+            0..TONE_PARAMS => {
+                Common::Tone { moved: Box::new(self.moved(parameter)), step: STEP as f32 }
+            }
+            HALO => Common::Halo,
+            _ => Common::Astigmatism(parameter - TONE_PARAMS),
+        }
     }
 
     fn vector(&self) -> [f64; PARAMS] {
@@ -228,7 +240,7 @@ impl Optics {
             let here = terms(self);
             let slopes = DVector::from_iterator(
                 active.len(),
-                active.iter().map(|&p| (terms(&self.moved(p).0)[0] - here[0]) / STEP),
+                active.iter().map(|&p| (terms(&self.moved(p))[0] - here[0]) / STEP),
             );
             [here[0], slopes.dot(&(cov * &slopes)).max(0.0).sqrt(), here[1]]
         })
@@ -390,12 +402,12 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
 
     fn equations(&mut self, optics: &Optics) -> Vec<Option<Joint>> {
         let Self { fitter, image, members, active } = self;
-        let moved: Vec<(Optics, f32)> = active.iter().map(|&p| optics.moved(p)).collect();
+        let common: Vec<Common> = active.iter().map(|&p| optics.common(p)).collect();
         members
             .iter()
             .map(|member| {
                 let window = (&member.window, member.centre);
-                fitter.joint(image, window, &member.corner, optics, &moved)
+                fitter.joint(image, window, &member.corner, optics, &common)
             })
             .collect()
     }

@@ -16,7 +16,7 @@
 use std::borrow::Cow;
 
 use super::clearance::{Edge, Surroundings};
-use super::corner_model::{Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
+use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
 use super::corner_start::{start, start_along};
 use super::curve::Tone;
 use super::optics::{Optics, SAMPLES, Sample};
@@ -306,11 +306,11 @@ impl Refiner {
         let reach = distance_to_rim(image, position);
         let window = self.windows.iter().rev().find(|w| w.radius() as f64 <= reach)?;
         let first = start::<K, T>(image, position, window.radius())?;
-        Some((window, fitter.fit(image, window, &first, optics)?.into()))
+        Some((window, fitter.fit(image, window, &first, (optics, Accuracy::Full))?.into()))
     }
 
     /// The model of a corner of a grid, in all of its room that is clear and lies in the image, with
-    /// the bends that the grid shows; from a fit `before`, where there is one.
+    /// the bends that the grid shows: as good as the noise allows from a fit `before`, and such a fit without.
     pub(super) fn model<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
@@ -338,16 +338,19 @@ impl Refiner {
         let edges: &[Edge; K] = room.around.edges.as_slice().try_into().ok()?;
         let bends = edges.map(|edge| edge.bend);
         let angles = edges.map(|edge| edge.angle_rad);
-        let first = match before {
+        let (first, accuracy) = match before {
             _ if window.count() < MIN_PIXELS => return None,
-            Some(fit) => fit.corner.with_edges(),
-            None => start_along(image, position, window, angles, room.blur_px)?,
+            Some(fit) => (fit.corner.with_edges(), Accuracy::Full),
+            None => {
+                let pixels = fitter.pixels(image, window, position)?;
+                (start_along(window, pixels, position, angles, room.blur_px)?, Accuracy::Rough)
+            }
         };
         let first = Corner { bends, ..first };
         // What a picture has in common may not be common to its rim.
         let fit = fitter
-            .fit(image, window, &first, room.optics)
-            .or_else(|| fitter.fit(image, window, &first, &self.known))?;
+            .fit(image, window, &first, (room.optics, accuracy))
+            .or_else(|| fitter.fit(image, window, &first, (&self.known, accuracy)))?;
         Some(fit.into())
     }
 
