@@ -27,8 +27,8 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::blurred_corner::{Deltille, Haloed, Orthant, Pattern, Shade};
 use super::correlation::Influence;
-use super::curve::Piece;
-use super::optics::Optics;
+use super::curve::{Piece, TONE_PARAMS};
+use super::optics::{Optics, STEP};
 use crate::raster::{Gray, Intensity};
 
 /// Largest radius of a window, px.
@@ -231,9 +231,13 @@ const RISE: usize = PARAMS + 1;
 const SHADE: usize = PARAMS + 2;
 const ASTIGMATISM: usize = PARAMS + 3;
 const HALO: usize = PARAMS + 5;
+/// Derivatives by the parameters of the tone curve.
+const TONE: usize = PARAMS + 6;
+/// All of them, in blocks of four.
+const ALL: usize = (TONE + TONE_PARAMS).next_multiple_of(4);
 
 /// One row a parameter, then the residual; a column a pixel.
-type Columns = [[f32; MAX_PIXELS]; PARAMS + 6];
+type Columns = [[f32; MAX_PIXELS]; ALL];
 
 /// Fits corners; holds the work space, so one fitter serves one thread.
 #[derive(Clone, Debug)]
@@ -250,7 +254,7 @@ impl Default for CornerFitter {
     fn default() -> Self {
         Self {
             pixels: Box::new([0.0; MAX_PIXELS]),
-            columns: Box::new([[0.0; MAX_PIXELS]; PARAMS + 6]),
+            columns: Box::new([[0.0; MAX_PIXELS]; ALL]),
             limits: UNLIMITED,
         }
     }
@@ -259,8 +263,8 @@ impl Default for CornerFitter {
 /// A parameter that all corners of a picture have in common.
 #[derive(Clone, Debug)]
 pub(super) enum Common {
-    /// One of the tone curve: the optics with it a step further.
-    Tone { moved: Box<Optics>, step: f32 },
+    /// One of the tone curve, and the optics with it a [`STEP`] further.
+    Tone { parameter: usize, moved: Box<Optics> },
     /// The first or second of astigmatism.
     Astigmatism(usize),
     /// The strength of the halo.
@@ -503,7 +507,7 @@ impl CornerFitter {
         optics: (&Optics, Piece),
     ) -> Normal {
         self.fill::<K, false>(window, corner, optics);
-        let products = products(&mut self.columns, window.count);
+        let products = products::<BLOCKED>(&mut self.columns, window.count);
         let mut normal = Normal {
             matrix: SMatrix::identity(),
             gradient: SVector::zeros(),
@@ -536,39 +540,30 @@ impl CornerFitter {
         let toned = |optics: &Optics| optics.piece(corner.level, corner.amplitude);
         let piece = toned(optics);
         self.fill::<K, true>(window, &corner, (optics, piece));
-        let column = |i: usize| &self.columns[i][..window.count];
-        let of_tone = |moved: &Optics, step: f32| -> Vec<f32> {
-            let there = toned(moved).terms;
-            let slopes = std::array::from_fn(|j| (there[j] - piece.terms[j]) / step);
-            let slopes = Piece { terms: slopes, ratio: 0.0 };
-            column(RISE).iter().zip(column(SHADE)).map(|(rise, s)| rise * slopes.bulge(*s)).collect()
-        };
-        let of_tones: Vec<Vec<f32>> = common
-            .iter()
-            .filter_map(|common| match common {
-                Common::Tone { moved, step } => Some(of_tone(moved, *step)),
-                _ => None,
-            })
-            .collect();
-        let mut of_tones = of_tones.iter();
-        let of_common = common.iter().map(|common| match common {
-            Common::Tone { .. } => of_tones.next().map_or(&[][..], |row| row),
-            Common::Astigmatism(i) => column(ASTIGMATISM + i),
-            Common::Halo => column(HALO),
-        });
-        let own = (0..params).map(column);
-        let rows: Vec<&[f32]> = own.chain(of_common).chain([column(PARAMS)]).collect();
-        let n = rows.len() - 1;
-        let mut matrix = DMatrix::zeros(n, n);
-        let mut gradient = DVector::zeros(n);
-        for i in 0..n {
-            gradient[i] = dot(rows[i], rows[n]);
-            for j in i..n {
-                matrix[(i, j)] = dot(rows[i], rows[j]);
-                matrix[(j, i)] = matrix[(i, j)];
-            }
+        let columns = &mut *self.columns;
+        let mut rows: Vec<usize> = (0..params).collect();
+        for common in common {
+            rows.push(match common {
+                Common::Tone { parameter, moved } => {
+                    let there = toned(moved).terms;
+                    let slopes = std::array::from_fn(|j| (there[j] - piece.terms[j]) / STEP as f32);
+                    let slopes = Piece { terms: slopes, ratio: 0.0 };
+                    for i in 0..window.count {
+                        columns[TONE + parameter][i] =
+                            columns[RISE][i] * slopes.bulge(columns[SHADE][i]);
+                    }
+                    TONE + parameter
+                }
+                Common::Astigmatism(i) => ASTIGMATISM + i,
+                Common::Halo => HALO,
+            });
         }
-        let cost = dot(rows[n], rows[n]);
+        let products = products::<ALL>(columns, window.count);
+        let product = |i: usize, j: usize| products[i.min(j)][i.max(j)];
+        let n = rows.len();
+        let mut matrix = DMatrix::from_fn(n, n, |i, j| product(rows[i], rows[j]));
+        let mut gradient = DVector::from_fn(n, |i, _| product(rows[i], PARAMS));
+        let cost = product(PARAMS, PARAMS);
         let noise = (cost / (window.count - params) as f64).sqrt();
         let noise = noise.max(MIN_NOISE * corner.amplitude.abs());
         let weight = (noise / SLOPE_PRIOR).powi(2);
@@ -833,21 +828,6 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
     }
 }
 
-/// Sum of products, in runs that a vector holds.
-#[multiversion(targets = "simd")]
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let (a, a_rest) = a.as_chunks::<LANES>();
-    let (b, b_rest) = b.as_chunks::<LANES>();
-    let mut sums = [0.0f32; LANES];
-    for (a, b) in a.iter().zip(b) {
-        for k in 0..LANES {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    f64::from(sums.iter().sum::<f32>() + rest)
-}
-
 /// The noise that the residuals show.
 fn noise<const K: usize>(normal: &Normal, corner: &Corner<K>, freedom: f64) -> f64 {
     (normal.cost / freedom).sqrt().max(MIN_NOISE * corner.amplitude.abs())
@@ -868,37 +848,65 @@ fn with_prior<const K: usize>(
     (matrix, gradient)
 }
 
-/// Products of each two of the first columns and the residual, over `count` pixels; only the upper half is filled.
+/// Products of each two of the first N columns, over `count` pixels; only the upper half is filled.
 #[multiversion(targets = "simd")]
-fn products(columns: &mut Columns, count: usize) -> [[f64; BLOCKED]; BLOCKED] {
+fn products<const N: usize>(columns: &mut Columns, count: usize) -> [[f64; N]; N] {
     let padded = count.next_multiple_of(LANES).min(MAX_PIXELS);
-    for column in columns.iter_mut().take(PARAMS + 1) {
+    for column in columns.iter_mut().take(N) {
         column[count..padded].fill(0.0);
     }
-    let mut products = [[0.0; BLOCKED]; BLOCKED];
-    // Two columns with four others at once: eight sums that do not wait for each other.
-    for i in (0..BLOCKED).step_by(2) {
-        for j in (i / 4 * 4..BLOCKED).step_by(4) {
-            let [a0, a1] = [0, 1].map(|k| columns[i + k][..padded].as_chunks::<LANES>().0);
-            let [b0, b1, b2, b3] =
-                [0, 1, 2, 3].map(|k| columns[j + k][..padded].as_chunks::<LANES>().0);
-            let mut sums = [[[0.0f32; LANES]; 4]; 2];
-            for n in 0..a0.len().min(a1.len()).min(b0.len()).min(b1.len()).min(b2.len()).min(b3.len())
-            {
-                for k in 0..LANES {
-                    let b = [b0[n][k], b1[n][k], b2[n][k], b3[n][k]];
-                    for (m, b) in b.into_iter().enumerate() {
-                        sums[0][m][k] += a0[n][k] * b;
-                        sums[1][m][k] += a1[n][k] * b;
-                    }
-                }
-            }
+    let mut products = [[0.0; N]; N];
+    for i in (0..N).step_by(2) {
+        for j in (i / 4 * 4..N).step_by(4) {
+            let sums = products_of_blocks(&columns[i..i + 2], &columns[j..j + 4], padded);
             for (row, sums) in sums.iter().enumerate() {
-                for (m, sums) in sums.iter().enumerate() {
-                    products[i + row][j + m] = f64::from(sums.iter().sum::<f32>());
-                }
+                products[i + row][j..j + 4].copy_from_slice(sums);
             }
         }
     }
     products
+}
+
+/// Products of two columns with four others: eight sums that do not wait for each other. They are named one by
+/// one so that each is a vector.
+#[inline(always)]
+fn products_of_blocks(
+    two: &[[f32; MAX_PIXELS]],
+    four: &[[f32; MAX_PIXELS]],
+    count: usize,
+) -> [[f64; 4]; 2] {
+    let (a, _) = two[0][..count].as_chunks::<LANES>();
+    let (b, _) = two[1][..count].as_chunks::<LANES>();
+    let (c, _) = four[0][..count].as_chunks::<LANES>();
+    let (d, _) = four[1][..count].as_chunks::<LANES>();
+    let (e, _) = four[2][..count].as_chunks::<LANES>();
+    let (f, _) = four[3][..count].as_chunks::<LANES>();
+    let [mut ac, mut ad, mut ae, mut af] = [[0.0; LANES]; 4];
+    let [mut bc, mut bd, mut be, mut bf] = [[0.0; LANES]; 4];
+    for (((((a, b), c), d), e), f) in a.iter().zip(b).zip(c).zip(d).zip(e).zip(f) {
+        for k in 0..LANES {
+            ac[k] += a[k] * c[k];
+            ad[k] += a[k] * d[k];
+            ae[k] += a[k] * e[k];
+            af[k] += a[k] * f[k];
+            bc[k] += b[k] * c[k];
+            bd[k] += b[k] * d[k];
+            be[k] += b[k] * e[k];
+            bf[k] += b[k] * f[k];
+        }
+    }
+    [[sum(&ac), sum(&ad), sum(&ae), sum(&af)], [sum(&bc), sum(&bd), sum(&be), sum(&bf)]]
+}
+
+/// The sum of a vector, in pairs.
+#[inline(always)]
+fn sum(lanes: &[f32; LANES]) -> f64 {
+    let (mut eight, mut four) = ([0.0; LANES / 2], [0.0; LANES / 4]);
+    for k in 0..LANES / 2 {
+        eight[k] = lanes[k] + lanes[k + LANES / 2];
+    }
+    for k in 0..LANES / 4 {
+        four[k] = eight[k] + eight[k + LANES / 4];
+    }
+    f64::from(four.iter().sum::<f32>())
 }

@@ -42,7 +42,7 @@ const CHI2: [f64; 3] = [16.3, 13.8, 10.8];
 const WORTH_A_LOOK: f64 = 0.5;
 
 /// Steps of difference quotients, and of the parameters at most.
-const STEP: f64 = 0.01;
+pub const STEP: f64 = 0.01;
 const MAX_STEP: f64 = 0.7;
 
 /// Most iterations; four are usual.
@@ -142,7 +142,7 @@ impl Optics {
     fn common(&self, parameter: usize) -> Common {
         match parameter {
             0..TONE_PARAMS => {
-                Common::Tone { moved: Box::new(self.moved(parameter)), step: STEP as f32 }
+                Common::Tone { parameter, moved: Box::new(self.moved(parameter)) }
             }
             HALO => Common::Halo,
             _ => Common::Astigmatism(parameter - TONE_PARAMS),
