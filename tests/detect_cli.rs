@@ -91,6 +91,51 @@ fn a_plain_checkerboard_is_found_and_numbered_by_rows() {
     assert!(orpc.lines().nth(16).unwrap().starts_with("-1,11,0,"), "{orpc}");
 }
 
+/// Flopped sheets of a tagged and of an untagged target, and of an untagged board of known size: told, and
+/// labelled as on the print where that is asked for.
+#[test]
+fn mirrored_boards_are_told_and_labelled_where_that_is_allowed() {
+    let folder = board();
+    deltille(folder.path(), "board --rows 6 --cols 7 --untagged --png --dpi 200 -o plain")
+        .success();
+    let flop = |from: &str, to: &str| {
+        let page = image::open(folder.path().join(from)).unwrap();
+        page.fliph().save(folder.path().join(to)).unwrap();
+    };
+    flop("sheet/board.png", "tagged.png");
+    flop("plain/board.png", "untagged.png");
+    for (what, image, printed) in [
+        ("--target board.json", "tagged", "board.json"),
+        ("--target plain/board.json", "untagged", "plain/board.json"),
+        ("--grid deltille --rows 6 --cols 7", "untagged", "plain/board.json"),
+    ] {
+        let detected = |options: &str| {
+            let args = format!("detect {what} {image}.png -o out {options}");
+            let said = deltille(folder.path(), &args).success();
+            let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+            let json = std::fs::read_to_string(folder.path().join(format!("out/{image}.json")));
+            (said, detection::read(&json.unwrap()).unwrap())
+        };
+        let (said, found) = detected("");
+        assert!(said.contains("42 corners") && said.contains("mirror"), "{what}: {said}");
+        assert!(found.grids[0].mirrored && found.grids[0].panel.is_none(), "{what}");
+        assert!(found.grids[0].corners.iter().all(|corner| corner.id.is_none()), "{what}");
+
+        let (_, found) = detected("--allow-mirrored");
+        let target = folder.path().join(printed);
+        let target = Target::from_json(&std::fs::read_to_string(target).unwrap()).unwrap();
+        assert!(found.grids[0].mirrored && found.grids[0].corners.len() == 42, "{what}");
+        assert_eq!(found.grids[0].panel.is_some(), what.contains("target"), "{what}");
+        for (i, corner) in found.grids[0].corners.iter().enumerate() {
+            let on_print = &target.panels[0].corners[i];
+            assert_eq!((corner.row, corner.col), (on_print.row, on_print.col), "{what}");
+            let [x, y] = image_of(&target, i, 200.0);
+            let x = f64::from(found.width) - 1.0 - x;
+            assert!((corner.x - x).hypot(corner.y - y) < 0.2, "{what}: {corner:?} at {x}, {y}");
+        }
+    }
+}
+
 #[test]
 fn unreadable_images_are_counted_and_the_rest_go_on() {
     let folder = board();
@@ -173,6 +218,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
         ("detect --target board.json sheet/board.png --family delTag25h9", "fingerprint"),
         ("detect --target board.json sheet/board.png", "board.json holds deltille/target/1, which"),
         ("detect --grid hexagons sheet/board.png", "hexagons"),
+        ("detect --grid deltille sheet/board.png --allow-mirrored", "--rows and --cols"),
         ("detect --grid deltille sheet/board.png --rows 0 --cols 4", "--rows"),
         ("detect --grid deltille sheet/board.png -j 0", "-j"),
         ("detect --grid deltille sheet/board.png other/board.png", "board.json"),

@@ -11,11 +11,21 @@
 //! where p is how often the cell is white in the codes of the target and its family. Over codes drawn so, e^Λ has the
 //! mean 1 whatever the tile shows, and so has the product over tiles; hence by Markov's inequality a placement has
 //! more evidence than E by chance less often than e^−E (the value is an *e-value*). Nothing needs to be known of the
-//! picture for that, and cells of which little is known still add up. A tile may be hidden: it counts against a placement no
-//! more than a hidden tile would, unless it clearly shows another code.
+//! picture for that, and cells of which little is known still add up.
+//!
+//! Tiles without tags are predicted too: they are plain. A tile may be hidden, and then shows cells as drawn, so that
+//! e^Λ gives way to h + (1 − h) e^Λ; what is clearly a code, or plain, is not hidden. A placement must
+//! explain the tiles better than each of two boards that are not the target:
+//!
+//! - one with tags in the same tiles, but other codes, of the target or not;
+//! - one whose tiles are plain, or show any code, as they like, whatever part of them is plain.
+//!
+//! The first asks the codes alone, so that no pattern of plain tiles labels a board whose tags are not read; the second
+//! counts tags where none are predicted, plain tiles where tags are, and tiles beyond the end of the panel. Being held
+//! against the better of the two, and that with its best codes, the evidence only becomes less.
 //!
 //! Limits: codes are taken as drawn from their family; placements of parts of the same board by
-//! other lattices are not thought of.
+//! other lattices are not thought of. Faces of a solid may lie in one grid, so there nothing counts beyond a panel.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -27,7 +37,7 @@ use super::tags::{Read, Reading, TagPlace, TagReader};
 use crate::family::{Decoder, Family};
 use crate::lattice::{LatticeMap, Orientation, Tile, Vertex};
 use crate::raster::{Gray, Intensity};
-use crate::target::{Panel, Target};
+use crate::target::{Panel, TagsIn, Target};
 
 /// The chance that a tag is hidden or spoiled, so that its tile tells nothing of it.
 const SPOILT: f64 = 1.0 / 16.0;
@@ -43,8 +53,11 @@ const MIN_LEAD: f64 = 6.0 * std::f64::consts::LN_2;
 /// With so much evidence, nats, nobody asks what a mirror would show.
 const BEYOND_DOUBT: f64 = 40.0;
 
-/// A tile shows another code than a placement predicts where that code has this many nats more.
+/// A code that the target does not have is named where it has so much evidence, nats.
 const CLEARLY_OTHER: f64 = 7.0;
+
+/// Parts of a board's tiles that may be plain: from tags in nearly all tiles to one in a corner of the board.
+const PLAIN_PARTS: [f64; 5] = [1.0 / 16.0, 1.0 / 4.0, 1.0 / 2.0, 3.0 / 4.0, 15.0 / 16.0];
 
 /// Evidence of a tile for a placement to be proposed by it, nats.
 const PROPOSING: f64 = 1.0;
@@ -101,6 +114,8 @@ pub struct TagEvidence {
     pub no_codes: usize,
     /// Whether a placement has evidence enough, but another one nearly as much.
     pub is_ambiguous: bool,
+    /// Tiles that agree and that disagree with a placement which would have evidence enough but for the latter.
+    pub contradicted: Option<[usize; 2]>,
     /// Whether the budget ended before the grid was read.
     pub is_cut_short: bool,
 }
@@ -118,6 +133,8 @@ pub struct TagLabeller {
     max_errors: Option<u32>,
     words: TargetWords,
     panels: Vec<LabelPanel>,
+    /// Whether panels may lie in one grid, as the faces of a solid.
+    panels_abut: bool,
     /// Panels and tiles of each code of the target.
     places: Vec<Vec<(usize, Tile)>>,
 }
@@ -130,6 +147,8 @@ struct LabelPanel {
     corners: BTreeSet<Vertex>,
     /// Index of the code in each tile.
     tags: BTreeMap<Tile, usize>,
+    /// All tiles of the colour that tags are in.
+    tiles: BTreeSet<Tile>,
 }
 
 /// What the tiles of a grid say, all read alike and seen from the same side.
@@ -141,8 +160,31 @@ struct Sight {
     readings: Vec<Reading>,
     /// Λ of each reading and word of the target.
     evidence: Vec<Vec<f32>>,
-    /// The most evidence of each reading for any word, and what a placement must pay that predicts another.
-    best: Vec<(f32, f64)>,
+    shown: Vec<Shown>,
+}
+
+/// What a tile shows, whatever a placement predicts: logarithms of likelihoods, over that of drawn cells.
+#[derive(Clone, Copy, Debug)]
+struct Shown {
+    /// If it is plain.
+    plain: f64,
+    /// The word of the target that fits best.
+    word: usize,
+    /// If it shows drawn cells or one of all codes, whichever fits better; with `word`, and without it.
+    code: [f64; 2],
+    /// If it belongs to a board of which these parts are plain.
+    of_board: [[f64; PLAIN_PARTS.len()]; 2],
+}
+
+/// A tile under a placement.
+#[derive(Clone, Copy, Debug)]
+struct Judged {
+    /// Logarithm of its likelihood, over that of drawn cells.
+    predicted: f64,
+    /// The same on a board with other codes.
+    other_code: f64,
+    /// The same on a board that shows what it likes, as far as the tile is of the panel.
+    of_board: Option<[f64; PLAIN_PARTS.len()]>,
 }
 
 /// How a grid lies on a panel: `map` takes the grid, in a mirror if `sight` is mirrored, to the panel.
@@ -159,6 +201,7 @@ struct Placement {
 struct Placed {
     placements: Vec<Placement>,
     is_ambiguous: bool,
+    contradicted: Option<[usize; 2]>,
 }
 
 impl TagLabeller {
@@ -187,8 +230,11 @@ impl TagLabeller {
                 places[code].push((index, tile));
             }
             let corners = panel_vertices(panel);
-            panels.push(LabelPanel { reader, inverted: panel.inverted, corners, tags });
+            let in_dark = panel.tags_in == TagsIn::Black;
+            let tiles = panel.tiles().into_iter().filter(|t| t.is_dark() == in_dark).collect();
+            panels.push(LabelPanel { reader, inverted: panel.inverted, corners, tags, tiles });
         }
+        let panels_abut = target.panels.windows(2).any(|pair| pair[0].pose != pair[1].pose);
         let readers = tag_places.iter().map(|&place| TagReader::new(family, place)).collect();
         (!ids.is_empty()).then(|| Self {
             readers,
@@ -199,6 +245,7 @@ impl TagLabeller {
             max_errors,
             words: TargetWords::new(family, ids),
             panels,
+            panels_abut,
             places,
         })
     }
@@ -256,6 +303,7 @@ impl TagLabeller {
             placed = self.place(&sights, grid);
         }
         evidence.is_ambiguous = placed.is_ambiguous;
+        evidence.contradicted = placed.contradicted;
         let labelled = |placement: &Placement| self.labelled(&sights, grid, placement);
         evidence.found = placed.placements.iter().map(labelled).collect();
         let mut taken = BTreeSet::new();
@@ -278,8 +326,9 @@ impl TagLabeller {
         readings: Vec<Reading>,
         noted: &mut TagEvidence,
     ) -> Sight {
+        let plain = self.readers[reader].plain_word();
         let mut evidence = Vec::with_capacity(readings.len());
-        let mut best = Vec::with_capacity(readings.len());
+        let mut shown = Vec::with_capacity(readings.len());
         for reading in &readings {
             let word = reading.word();
             let mut of_words = self.words.evidence(&reading.half_odds);
@@ -290,35 +339,58 @@ impl TagLabeller {
                     }
                 }
             }
-            let most = of_words.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            let among = |words: usize| (words.max(1) as f64).ln();
-            let mut clearest = (most, f64::from(most) - among(self.words.len()));
-            // Another code of the family, where none of the target's fits.
-            if let Some(decoded) = self.decoder.decode(word, self.sure_errors)
-                && self.words.code_of(decoded.id).is_none()
-            {
-                let evidence =
-                    self.words.evidence_of(self.decoder.word(decoded), &reading.half_odds);
-                let clear = f64::from(evidence) - among(self.family_words);
-                if evidence > most && clear > CLEARLY_OTHER {
-                    clearest = (evidence, clear);
-                    noted.foreign_ids.insert(decoded.id);
-                }
-            } else if is_word(reading) && f64::from(most) < 0.0 {
-                noted.no_codes += 1;
-            }
-            best.push((clearest.0, clearest.1.max(0.0)));
+            shown.push(self.shown((reading, plain), &of_words, noted));
             evidence.push(of_words);
         }
         let index = readings.iter().enumerate().map(|(i, reading)| (reading.tile, i)).collect();
-        Sight { reader, inverted, mirrored, index, readings, evidence, best }
+        Sight { reader, inverted, mirrored, index, readings, evidence, shown }
+    }
+
+    /// What a tile shows, by its evidence for all words; `plain` is what it shows without a tag.
+    fn shown(
+        &self,
+        (reading, plain): (&Reading, u64),
+        of_words: &[f32],
+        noted: &mut TagEvidence,
+    ) -> Shown {
+        let among = |words: usize| (words.max(1) as f64).ln();
+        let (mut word, mut most, mut second) = (0, f32::NEG_INFINITY, f32::NEG_INFINITY);
+        for (index, &evidence) in of_words.iter().enumerate() {
+            if evidence > most {
+                (word, second, most) = (index, most, evidence);
+            } else {
+                second = second.max(evidence);
+            }
+        }
+        let of_target = |evidence: f32| f64::from(evidence) - among(of_words.len());
+        let mut code = [most, second].map(|evidence| of_target(evidence).max(0.0));
+        // Another code of the family, where none of the target's fits.
+        if let Some(decoded) = self.decoder.decode(reading.word(), self.sure_errors)
+            && self.words.code_of(decoded.id).is_none()
+        {
+            let evidence = self.words.evidence_of(self.decoder.word(decoded), &reading.half_odds);
+            let clear = f64::from(evidence) - among(self.family_words);
+            if evidence > most {
+                code = code.map(|code| code.max(clear));
+                if clear > CLEARLY_OTHER {
+                    noted.foreign_ids.insert(decoded.id);
+                }
+            }
+        } else if is_word(reading) && most < 0.0 {
+            noted.no_codes += 1;
+        }
+        let plain = f64::from(self.words.evidence_of(plain, &reading.half_odds));
+        let of_board = code.map(|code| {
+            PLAIN_PARTS.map(|part| (part * plain.exp() + (1.0 - part) * code.exp()).ln())
+        });
+        Shown { plain, word, code, of_board }
     }
 
     /// The placements that the sights of a grid are evidence for, those with the most first.
     fn place(&self, sights: &[Sight], grid: &SaddleGrid) -> Placed {
         let proposals = self.proposals(sights);
         let tiles: usize = sights.iter().map(|sight| sight.readings.len()).sum();
-        let ways = (tiles * self.words.len()).max(1) as f64;
+        let ways = ((tiles * self.words.len()).max(1) as f64).ln();
         let mut placed = Placed::default();
         let mut taken = BTreeSet::new();
         loop {
@@ -326,13 +398,21 @@ impl TagLabeller {
                 .iter()
                 .map(|placement| {
                     let sight = &sights[placement.sight];
-                    let evidence = self.evidence(sight, placement, &taken) - ways.ln();
+                    let evidence = self.evidence(sight, placement, &taken) - ways;
                     Placement { evidence, ..*placement }
                 })
                 .filter(|placement| placement.evidence >= MIN_EVIDENCE)
                 .collect();
             judged.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-            let Some((best, others)) = judged.split_first() else { return placed };
+            let Some((best, others)) = judged.split_first() else {
+                if placed.placements.is_empty()
+                    && let Some(first) = proposals.first()
+                    && first.evidence - ways >= MIN_EVIDENCE
+                {
+                    placed.contradicted = Some(self.agreement(&sights[first.sight], first));
+                }
+                return placed;
+            };
             let vertices = self.on_panel(sights, grid, best);
             let rivals =
                 others.iter().take_while(|other| other.evidence > best.evidence - MIN_LEAD);
@@ -386,22 +466,65 @@ impl TagLabeller {
 
     /// Evidence for a placement in nats, from tiles none of whose corners is taken.
     fn evidence(&self, sight: &Sight, placement: &Placement, taken: &BTreeSet<Vertex>) -> f64 {
+        let (mut predicted, mut other_codes) = (0.0, 0.0);
+        let mut of_board = [0.0; PLAIN_PARTS.len()];
+        for tile in self.judged(sight, placement, taken) {
+            predicted += tile.predicted;
+            other_codes += tile.other_code;
+            for (sum, part) in of_board.iter_mut().zip(tile.of_board.unwrap_or_default()) {
+                *sum += part;
+            }
+        }
+        predicted - of_board.into_iter().fold(other_codes, f64::max)
+    }
+
+    /// How many tiles agree with a placement, and how many do not.
+    fn agreement(&self, sight: &Sight, placement: &Placement) -> [usize; 2] {
+        let of_board = |tile: &Judged| {
+            tile.of_board.map_or(0.0, |parts| parts.into_iter().fold(f64::NEG_INFINITY, f64::max))
+        };
+        let against = |tile: &Judged| tile.predicted < of_board(tile) - PROPOSING;
+        let (against, agreeing): (Vec<Judged>, Vec<Judged>) =
+            self.judged(sight, placement, &BTreeSet::new()).partition(against);
+        [agreeing.len(), against.len()]
+    }
+
+    /// The tiles of a grid under a placement, but for those of whose corners some is taken.
+    fn judged(
+        &self,
+        sight: &Sight,
+        placement: &Placement,
+        taken: &BTreeSet<Vertex>,
+    ) -> impl Iterator<Item = Judged> {
+        let panel = &self.panels[placement.panel];
+        let turns = sight.readings.first().map_or(0, |r| turns_of(placement.map, r.tile));
         let free = |tile: Tile| {
             let side = |v: Vertex| if sight.mirrored { mirrored(v) } else { v };
-            tile.vertices().all(|v| !taken.contains(&side(v)))
+            taken.is_empty() || tile.vertices().all(|v| !taken.contains(&side(v)))
         };
-        self.expected(placement)
-            .filter_map(|(tile, code, turns)| {
-                let reading = *sight.index.get(&tile)?;
-                free(tile).then(|| {
-                    let evidence = sight.evidence[reading][self.words.turns() * code + turns];
-                    let (most, paid) = sight.best[reading];
-                    let odds = SPOILT + (1.0 - SPOILT) * f64::from(evidence).exp();
-                    let other = f64::from(most - evidence) > CLEARLY_OTHER;
-                    odds.ln() - if other { paid } else { 0.0 }
-                })
-            })
-            .sum()
+        let tiles = sight.readings.iter().zip(&sight.evidence).zip(&sight.shown);
+        tiles.filter(move |((reading, _), _)| free(reading.tile)).filter_map(
+            move |((reading, evidence), shown)| {
+                let tile = placement.map.apply_tile(reading.tile);
+                if let Some(code) = panel.tags.get(&tile) {
+                    let word = self.words.turns() * code + turns;
+                    // Other codes than that.
+                    let but = usize::from(shown.word == word);
+                    let predicted = or_spoilt(evidence[word].into());
+                    let (other_code, of_board) = (shown.code[but], shown.of_board[but]);
+                    Some(Judged { predicted, other_code, of_board: Some(of_board) })
+                } else if panel.tiles.contains(&tile) {
+                    let predicted = or_spoilt(shown.plain);
+                    let of_board = Some(shown.of_board[0]);
+                    Some(Judged { predicted, other_code: predicted, of_board })
+                } else if self.panels_abut {
+                    None
+                } else {
+                    let predicted = SPOILT.ln();
+                    Some(Judged { predicted, other_code: predicted, of_board: None })
+                }
+            },
+        )
     }
 
     /// Grid tile, in the mirror if need be, code and turns of every tag of a panel under a placement.
@@ -458,6 +581,17 @@ impl TagLabeller {
             tags,
         }
     }
+}
+
+/// Logarithm of the likelihood of a tile, over that of drawn cells, that shows what is predicted or is spoilt.
+fn or_spoilt(evidence: f64) -> f64 {
+    (SPOILT + (1.0 - SPOILT) * evidence.exp()).ln()
+}
+
+/// How often a tag is turned counter-clockwise, by 120° or 90°, in a grid tile that this map puts on a panel.
+fn turns_of(panel_from_grid: LatticeMap, on_grid: Tile) -> usize {
+    let a = panel_from_grid.inverse().apply(panel_from_grid.apply_tile(on_grid).frame()[0]);
+    on_grid.vertices().position(|v| v == a).unwrap_or(0)
 }
 
 /// Whether the cells of a tile are told without doubt, and are not all the same.

@@ -102,8 +102,12 @@ impl Labels {
                 let evidence = tags.as_ref().map(|tags| tags.label(image, grid, budget));
                 let found = evidence.as_ref().map_or(&[][..], |evidence| &evidence.found);
                 if found.is_empty() {
-                    if let Some(by_outline) = on_untagged_panel(grid, panels) {
+                    if let Some(by_outline) = on_untagged_panel(grid, panels, false) {
                         return vec![(by_outline, None)];
+                    }
+                    if let Some(in_a_mirror) = on_untagged_panel(grid, panels, true) {
+                        let allowed = self.allow_mirrored;
+                        return vec![if allowed { (in_a_mirror, None) } else { in_mirror(grid) }];
                     }
                     let why = match &evidence {
                         Some(evidence) => why::no_labels(evidence, grid, size),
@@ -209,15 +213,16 @@ fn on_panel(grid: &SaddleGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid
     Grid { mirrored: labelled.mirrored, ..labels }
 }
 
-/// The grid on the one untagged panel whose outline it fills.
-fn on_untagged_panel(grid: &SaddleGrid, panels: &[TargetPanel]) -> Option<Grid> {
+/// The grid, as it is seen or in a mirror, on the one untagged panel whose outline it fills.
+fn on_untagged_panel(grid: &SaddleGrid, panels: &[TargetPanel], is_mirrored: bool) -> Option<Grid> {
+    let turned = if is_mirrored { mirror_image(grid) } else { grid.clone() };
     let mut fitting = panels.iter().filter(|panel| !panel.tagged).filter_map(|panel| {
         let map = match panel.kind {
             GridKind::Deltille => {
                 let outline = panel.corner_ids.keys().copied().collect();
-                fit_outline(grid, &outline, panel.inverted)
+                fit_outline(&turned, &outline, panel.inverted)
             }
-            GridKind::Checker => fit_rectangle(grid, panel.size, panel.inverted),
+            GridKind::Checker => fit_rectangle(&turned, panel.size, panel.inverted),
         };
         Some((panel, map?))
     });
@@ -226,10 +231,11 @@ fn on_untagged_panel(grid: &SaddleGrid, panels: &[TargetPanel]) -> Option<Grid> 
         return None;
     }
     let label = |v| {
-        let vertex = map.apply(v);
+        let vertex = map.apply(if is_mirrored { mirrored(v) } else { v });
         Some((vertex, panel.corner_ids.get(&vertex).copied()))
     };
-    Some(relabelled(grid, label, Some(panel.id), Vec::new()))
+    let labels = relabelled(grid, label, Some(panel.id), Vec::new());
+    Some(Grid { mirrored: is_mirrored, ..labels })
 }
 
 /// A grid with new labels, ordered by them; corners without a label are left out.

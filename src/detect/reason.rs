@@ -45,6 +45,8 @@ pub enum ReasonKind {
     NoTags,
     /// Clear codes of the family, but of ids that the target does not have: `tags`, `id`, one of them.
     OtherIds,
+    /// Tags of the target, but tiles around them that are not as on the target: `agreeing`, `disagreeing` tiles.
+    OtherLayout,
     /// Clear cells that are no code of the family: `tiles`.
     OtherFamily,
     /// The grid is seen as in a mirror: `corners`.
@@ -127,6 +129,13 @@ impl fmt::Display for Reason {
                 "{} tags have ids that the target does not have, {} for one: is it another target?",
                 figure("tags"),
                 figure("id")
+            ),
+            ReasonKind::OtherLayout => write!(
+                f,
+                "tags of the target, but {} of {} tiles are not as they are around them on the target: is it another \
+                 target?",
+                figure("disagreeing"),
+                figure("agreeing") + figure("disagreeing")
             ),
             ReasonKind::OtherFamily => write!(
                 f,

@@ -139,6 +139,14 @@ impl TagReader {
         Read { readings, bit_px, blur_px: light.blur_px() }
     }
 
+    /// What a tile without a tag shows: it is of one colour all over.
+    pub fn plain_word(&self) -> u64 {
+        match self.tags_in {
+            TagsIn::Black => 0,
+            TagsIn::White => u64::MAX,
+        }
+    }
+
     /// A reading as it would be in a mirror.
     pub fn mirrored(&self, reading: &Reading) -> Reading {
         let tile = reading.tile;

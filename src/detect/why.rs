@@ -63,6 +63,10 @@ pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: (usize, usize)
         let tags = evidence.foreign_ids.len() as f64;
         return Reason::new(ReasonKind::OtherIds, [("tags", tags), ("id", f64::from(id))]);
     }
+    if let Some([agreeing, disagreeing]) = evidence.contradicted {
+        let figures = [("agreeing", agreeing as f64), ("disagreeing", disagreeing as f64)];
+        return Reason::new(ReasonKind::OtherLayout, figures);
+    }
     if evidence.tiles == 0 {
         return Reason::new(ReasonKind::NoTiles, [corners]);
     }

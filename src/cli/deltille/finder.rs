@@ -32,8 +32,8 @@ pub struct FinderArgs {
     /// Most bits of a tag that may be corrected [default: ⌊(h−1)/2⌋ of its family]
     #[arg(long, value_name = "BITS", conflicts_with = "grid")]
     max_errors: Option<u32>,
-    /// Label untagged boards of known size that are seen as in a mirror too
-    #[arg(long, requires = "grid")]
+    /// Label boards that are seen as in a mirror too
+    #[arg(long)]
     allow_mirrored: bool,
     /// How corners are refined
     #[arg(long, value_name = "METHOD", default_value = "model")]
@@ -62,6 +62,9 @@ impl FinderArgs {
     pub fn detector(&self) -> anyhow::Result<(Option<Target>, Detector)> {
         if self.target.is_none() && self.grid.is_none() {
             bail!("give --target FILE, or --grid deltille or checker for untagged boards");
+        }
+        if self.allow_mirrored && self.target.is_none() && self.rows.is_none() {
+            bail!("--allow-mirrored needs labels: give --target FILE, or --rows and --cols");
         }
         let config = DetectorConfig {
             max_bit_errors: self.max_errors,
