@@ -1,8 +1,6 @@
 //! Corners one by one: candidates of all pyramid levels, fitted, read and merged.
 
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
-
+use super::buckets::Buckets;
 use super::polynomial::{FittedCorner, Polynomial};
 use super::ring::{Candidate, candidates, maxima_near};
 use super::sectors::{Sectors, contrast_around};
@@ -69,7 +67,8 @@ impl<const N: usize> SaddleFinder<N> {
     /// All saddles of an image, in reading order.
     pub fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
         let mut noise = 0.0f32;
-        let mut saddles = Merged::<N>::default();
+        let finest = &pyramid.levels()[0];
+        let mut saddles = Merged::<N>::new(finest.width(), finest.height());
         for (n, level) in pyramid.levels().iter().enumerate() {
             // Grain that pixels share stays when they are averaged.
             noise = noise.max(HARMONIC_NOISE * sample_noise(level));
@@ -256,13 +255,7 @@ struct Merged<const N: usize> {
     all: Vec<Option<Saddle<N>>>,
     /// Whether the level of a saddle shows it blurred.
     blurred: Vec<bool>,
-    places: RTree<GeomWithData<[f64; 2], usize>>,
-}
-
-impl<const N: usize> Default for Merged<N> {
-    fn default() -> Self {
-        Self { all: Vec::new(), blurred: Vec::new(), places: RTree::new() }
-    }
+    places: Buckets,
 }
 
 /// The distance within which saddles of a level are the same, px of level 0.
@@ -271,10 +264,15 @@ pub fn merge_px(level: usize) -> f64 {
 }
 
 impl<const N: usize> Merged<N> {
+    /// Of an image of this size.
+    fn new(width: usize, height: usize) -> Self {
+        Self { all: Vec::new(), blurred: Vec::new(), places: Buckets::new(width, height) }
+    }
+
     /// Saddles within a distance that is the merging distance of a level, px.
     fn within(&self, position: [f64; 2], level: usize) -> impl Iterator<Item = (usize, Saddle<N>)> {
-        let near = self.places.locate_within_distance(position, merge_px(level).powi(2));
-        near.filter_map(|place| Some((place.data, self.all[place.data]?)))
+        let near = self.places.within(position, merge_px(level));
+        near.filter_map(|(i, _)| Some((i, self.all[i]?)))
     }
 
     /// Whether a corner that is as good as what `level` shows lies about as near as a candidate to its own.
@@ -297,7 +295,7 @@ impl<const N: usize> Merged<N> {
             return;
         }
         same.into_iter().for_each(|(i, _)| self.all[i] = None);
-        self.places.insert(GeomWithData::new(saddle.position, self.all.len()));
+        self.places.insert(saddle.position);
         self.all.push(Some(saddle));
         self.blurred.push(blurred);
     }
