@@ -27,6 +27,10 @@ const HARMONIC_NOISE: f32 = 0.408;
 /// Candidates must stand above the noise by this factor; at five, one pixel in a million passes.
 const NOISE_FACTOR: f32 = 5.0;
 
+/// No board has more corners than one in so many pixels: tiles of seven pixels are the least that are told
+/// from waves. Noise has twice as many candidates.
+const LEAST_TILE_PX2: usize = 40;
+
 /// A corner with N rays in the image: a monkey saddle, or a saddle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Saddle<const N: usize> {
@@ -233,7 +237,18 @@ fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<
         let threshold = (4.5 * noise * noise).min(PART * PART * ninth);
         found.retain(|candidate| candidate.response > threshold);
     }
+    strongest(&mut found, level.pixels().len() / LEAST_TILE_PX2);
     found
+}
+
+/// Keeps the strongest candidates, so many.
+fn strongest(candidates: &mut Vec<Candidate>, count: usize) {
+    if candidates.len() <= count || count == 0 {
+        return;
+    }
+    let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
+    let least = *responses.select_nth_unstable_by(count - 1, |a, b| b.total_cmp(a)).1;
+    candidates.retain(|candidate| candidate.response >= least);
 }
 
 /// Whether a level shows a corner blurred; the coarsest never does, and no place at the border. Blur leaves
