@@ -7,9 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
-
+use super::buckets::Buckets;
 use super::edge::{MAX_CHORD_RAD, is_clean};
 use super::links::{Link, Links, facing_ray, links};
 use super::local_map::{Bend, LocalMap};
@@ -75,7 +73,10 @@ pub fn grids<const N: usize>(
 ) -> Vec<SaddleGrid> {
     let links = links(pyramid, saddles);
     let mut taken = vec![false; saddles.len()];
-    let index = SaddleIndex::of(saddles);
+    let finest = &pyramid.levels()[0];
+    let no_places = Buckets::new(finest.width(), finest.height());
+    let mut index = no_places.clone();
+    saddles.iter().for_each(|saddle| index.insert(saddle.position));
     let (mut growing, mut members) = (Vec::new(), Vec::new());
     for seed in seeds(&links) {
         if seed.iter().any(|&(corner, _)| taken[corner]) {
@@ -90,7 +91,7 @@ pub fn grids<const N: usize>(
         }
         fill_gaps(finder, pyramid, &mut grid);
         // What is found in a gap may have been found before, without its links.
-        grid.retain(|&vertex, grown| match index.same(&grown.saddle) {
+        grid.retain(|&vertex, grown| match same(&index, &grown.saddle) {
             Some(corner) if taken[corner] => false,
             Some(corner) => *own.entry(corner).or_insert(vertex) == vertex,
             None => true,
@@ -110,7 +111,7 @@ pub fn grids<const N: usize>(
         .collect();
     grids.sort_by_key(|grid: &SaddleGrid| std::cmp::Reverse(grid.len()));
     let mut grids = without_tag_cells::<N>(grids);
-    each_once(&mut grids);
+    each_once(&mut grids, no_places);
     grids
 }
 
@@ -118,28 +119,15 @@ fn plain<const N: usize>(grown: &GrownSaddle<N>) -> PlacedSaddle {
     PlacedSaddle { position: grown.saddle.position, amplitude: grown.saddle.sectors.amplitude }
 }
 
-/// Saddles by place.
-struct SaddleIndex(RTree<GeomWithData<[f64; 2], usize>>);
-
-impl SaddleIndex {
-    fn of<const N: usize>(saddles: &[Saddle<N>]) -> Self {
-        let places = saddles.iter().enumerate().map(|(i, s)| GeomWithData::new(s.position, i));
-        Self(RTree::bulk_load(places.collect()))
-    }
-
-    /// The saddle that is the same as another one.
-    fn same<const N: usize>(&self, saddle: &Saddle<N>) -> Option<usize> {
-        let reach_px = merge_px(saddle.level);
-        let nearest = self.0.nearest_neighbor(saddle.position)?;
-        let [x, y] = *nearest.geom();
-        let distance = (x - saddle.position[0]).hypot(y - saddle.position[1]);
-        (distance < reach_px).then_some(nearest.data)
-    }
+/// The known saddle that is the same as another one.
+fn same<const N: usize>(places: &Buckets, saddle: &Saddle<N>) -> Option<usize> {
+    let near = places.within(saddle.position, merge_px(saddle.level));
+    near.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(i, _)| i)
 }
 
-/// Leaves out of grids the corners that are in a larger one, or under another vertex of the same.
-fn each_once(grids: &mut Vec<SaddleGrid>) {
-    let mut places: RTree<[f64; 2]> = RTree::new();
+/// Leaves out of grids the corners that are in a larger one, or under another vertex of the same; no
+/// `places` are known at first.
+fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
     for grid in grids.iter_mut() {
         let whole = grid.clone();
         grid.retain(|&vertex, placed| {
@@ -149,8 +137,7 @@ fn each_once(grids: &mut Vec<SaddleGrid>) {
                 .map(|p| (p.position[0] - x).hypot(p.position[1] - y))
                 .reduce(f64::min)
                 .unwrap_or(0.0);
-            let same2 = (SAME_PART * nearest_px).powi(2);
-            let is_new = places.locate_within_distance([x, y], same2).next().is_none();
+            let is_new = places.within([x, y], SAME_PART * nearest_px).next().is_none();
             if is_new {
                 places.insert([x, y]);
             }

@@ -9,6 +9,12 @@ use crate::raster::Pyramid;
 /// Nearest corners looked at: up to six neighbours, the twelve behind them, and as many strangers.
 const NEAREST: usize = 36;
 
+/// Below the squared cosine of [`MAX_CHORD_RAD`].
+const LEAST_ALONG: f64 = 0.9;
+
+/// So many are looked at first; inside a board that is enough.
+const FIRST: usize = 12;
+
 /// Contrasts of neighbouring corners differ by less than this factor: light falls off slowly, and
 /// what is weaker is noise on the paper beside the board.
 pub const MAX_CONTRAST_RATIO: f64 = 3.0;
@@ -29,32 +35,18 @@ pub type Links<const N: usize> = [Option<Link>; N];
 pub fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
     let positions: Vec<[f64; 2]> = saddles.iter().map(|saddle| saddle.position).collect();
     let places = Places::new(&positions);
-    let mut found: Vec<Links<N>> = (0..saddles.len())
-        .map(|index| {
-            let saddle = &saddles[index];
-            let mut links: Links<N> = [None; N];
-            for corner in places.nearest(index, NEAREST) {
-                let other = &saddles[corner];
-                if !are_alike(saddle, other) {
-                    continue;
-                }
-                let chord = chord_rad(saddle, other);
-                for i in (0..N).filter(|&i| is_along(saddle, i, chord)) {
-                    // The nearest corner along a ray counts.
-                    if links[i].is_none()
-                        && let Some(j) = ray_back(chord, i, other)
-                        && is_clean(pyramid, saddle, i, other, j)
-                    {
-                        links[i] = Some(Link { corner, ray: j });
-                    }
-                }
-                if links.iter().all(Option::is_some) {
-                    break;
-                }
-            }
-            links
-        })
-        .collect();
+    let directions = |saddle: &Saddle<N>| saddle.sectors.rays.map(|ray| [ray.cos(), ray.sin()]);
+    let directions: Vec<Directions<N>> = saddles.iter().map(directions).collect();
+    let corners = Corners { pyramid, saddles, directions: &directions };
+    let mut found: Vec<Links<N>> = vec![[None; N]; saddles.len()];
+    for index in 0..saddles.len() {
+        let first = places.nearest(index, FIRST);
+        corners.link_to(&mut found, index, &first);
+        if found[index].contains(&None) {
+            let all = places.nearest(index, NEAREST);
+            corners.link_to(&mut found, index, &all[first.len()..]);
+        }
+    }
     for a in 0..found.len() {
         for i in 0..N {
             if let Some(Link { corner, ray }) = found[a][i]
@@ -65,6 +57,56 @@ pub fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Li
         }
     }
     found
+}
+
+/// Unit vectors along rays.
+type Directions<const N: usize> = [[f64; 2]; N];
+
+/// The corners to be linked.
+struct Corners<'a, const N: usize> {
+    pyramid: &'a Pyramid,
+    saddles: &'a [Saddle<N>],
+    directions: &'a [Directions<N>],
+}
+
+impl<const N: usize> Corners<'_, N> {
+    /// Links a corner along its rays that have no link to those of `others`, nearest first, that they lead
+    /// to: the nearest corner along a ray counts.
+    fn link_to(&self, found: &mut [Links<N>], index: usize, others: &[usize]) {
+        let saddle = &self.saddles[index];
+        let mut links = found[index];
+        for &corner in others {
+            let other = &self.saddles[corner];
+            let open = |i: usize| links[i].is_none() && self.may_be_along(index, i, other.position);
+            let open: [bool; N] = std::array::from_fn(open);
+            if !open.contains(&true) || !are_alike(saddle, other) {
+                continue;
+            }
+            let chord = chord_rad(saddle, other);
+            for i in (0..N).filter(|&i| open[i] && is_along(saddle, i, chord)) {
+                let Some(ray) = ray_back(chord, i, other) else { continue };
+                // What has been followed from the other end is clean.
+                let back = Some(Link { corner: index, ray: i });
+                let is_known = corner < index && found[corner][ray] == back;
+                if is_known || is_clean(self.pyramid, saddle, i, other, ray) {
+                    links[i] = Some(Link { corner, ray });
+                }
+            }
+            if !links.contains(&None) {
+                break;
+            }
+        }
+        found[index] = links;
+    }
+
+    /// Whether [`is_along`] may say that a place lies along a ray: without angles, and not too strictly.
+    fn may_be_along(&self, index: usize, i: usize, place: [f64; 2]) -> bool {
+        let [x, y] = self.saddles[index].position;
+        let (dx, dy) = (place[0] - x, place[1] - y);
+        let [cos, sin] = self.directions[index][i];
+        let along = dx * cos + dy * sin;
+        along > 0.0 && along * along >= LEAST_ALONG * (dx * dx + dy * dy)
+    }
 }
 
 /// The ray of `b` that looks back along ray `i` of `a`; `None` when they do not face each other.

@@ -12,10 +12,12 @@
 //! by which it may be wrong, however many corners there are and wherever they lie; few of them on one
 //! side predict little, and say so.
 
+use std::sync::LazyLock;
+
 use nalgebra::{Matrix6, Vector6};
 
 use super::tiling::kind;
-use crate::lattice::Vertex;
+use crate::lattice::{GridKind, Vertex};
 
 /// Second derivatives in edges of a grid that shows none: over one tile a steep view or a wide lens changes
 /// the next edge by so much, one deviation.
@@ -32,6 +34,24 @@ const MOST: usize = 20;
 
 /// Half the side of the square of vertices that is looked through.
 const REACH: i32 = 5;
+
+/// The steps to all vertices of that square with their lengths on the print, shortest first.
+static STEPS: LazyLock<[Vec<(f64, Vertex)>; 2]> = LazyLock::new(|| {
+    [GridKind::Deltille, GridKind::Checker].map(|kind| {
+        let offsets = (-REACH..=REACH).flat_map(|r| (-REACH..=REACH).map(move |c| (r, c)));
+        let mut steps: Vec<(f64, Vertex)> = offsets
+            .map(|(row, col)| (length(kind, Vertex::new(row, col)), Vertex::new(row, col)))
+            .collect();
+        steps.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        steps
+    })
+});
+
+/// Length of a step on the print, in edges.
+fn length(kind: GridKind, step: Vertex) -> f64 {
+    let [x, y] = kind.position(step.row.into(), step.col.into());
+    x.hypot(y)
+}
 
 /// How a grid is bent.
 #[derive(Clone, Copy, Debug)]
@@ -88,20 +108,13 @@ impl LocalMap {
         at: impl Fn(Vertex) -> Option<[f64; 2]>,
         bend: Bend,
     ) -> Option<Self> {
-        let offsets = (-REACH..=REACH).flat_map(|r| (-REACH..=REACH).map(move |c| (r, c)));
-        let distance = |v: Vertex| {
-            let [x, y] = kind::<N>().position(v.row.into(), v.col.into());
-            x.hypot(y)
+        let steps = match kind::<N>() {
+            GridKind::Deltille => &STEPS[0],
+            GridKind::Checker => &STEPS[1],
         };
-        let mut known: Vec<(f64, Vertex, [f64; 2])> = offsets
-            .filter_map(|(row, col)| {
-                let step = Vertex::new(row, col);
-                Some((distance(step), step, at(vertex + step)?))
-            })
-            .collect();
-        known.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        known.truncate(MOST);
-        let edge_px = edge_px(&known, distance)?;
+        let known = steps.iter().filter_map(|&(far, step)| Some((far, step, at(vertex + step)?)));
+        let known: Vec<(f64, Vertex, [f64; 2])> = known.take(MOST).collect();
+        let edge_px = edge_px(&known, |step| length(kind::<N>(), step))?;
         // The prior of the second derivatives; next to none of the others.
         let mut normal = Matrix6::from_diagonal(&Vector6::from_fn(|i, _| match i {
             0..3 => 1e-9,

@@ -19,6 +19,7 @@
 //! Both tilings go the same way; `tiling` says where they differ.
 
 mod blurred_corner;
+mod buckets;
 mod clearance;
 mod cone_fit;
 mod corner_model;

@@ -59,31 +59,33 @@ pub fn join<const N: usize>(
     order.sort_by_key(|&i| std::cmp::Reverse(grids[i].len()));
     let mut has_grown = vec![false; grids.len()];
     for base in order {
-        let mut trial = 0;
-        while trial < SIGMAS.len() && grids[base].len() >= LEAST {
-            if adopt((pyramid, saddles), &mut grids, &mut owners, base, SIGMAS[trial]) {
-                has_grown[base] = true;
-                trial = 0;
-            } else {
-                trial += 1;
+        while grids[base].len() >= LEAST {
+            let bend = bend(&grids[base]);
+            let candidates = candidates(saddles, &grids[base], &owners, base, bend);
+            // Nothing changes before something is adopted.
+            let mut adopt = |sigma| {
+                adopt((pyramid, saddles), &mut grids, &mut owners, base, (&candidates, bend, sigma))
+            };
+            if !SIGMAS.into_iter().any(&mut adopt) {
+                break;
             }
+            has_grown[base] = true;
         }
     }
     grids.into_iter().zip(has_grown).filter(|(grid, _)| !grid.is_empty()).collect()
 }
 
-/// Adds to a grid what its map says belongs to it, where it says so with a deviation of at most `sigma`;
-/// whether anything did.
+/// Adds to a grid those candidates of which its map says that they belong to it, where it says so with a
+/// deviation of at most `sigma`; whether anything did.
 fn adopt<const N: usize>(
     (pyramid, saddles): (&Pyramid, &[Saddle<N>]),
     grids: &mut [Growing<N>],
     owners: &mut Owners,
     base: usize,
-    sigma: f64,
+    (candidates, bend, sigma): (&[(usize, Vertex)], Bend, f64),
 ) -> bool {
     let mut adopted = false;
-    let bend = bend(&grids[base]);
-    for (index, vertex) in candidates(saddles, &grids[base], owners, base, bend) {
+    for &(index, vertex) in candidates {
         if grids[base].contains_key(&vertex) {
             continue;
         }

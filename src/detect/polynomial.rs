@@ -61,6 +61,11 @@ impl Form {
     /// along the edges, that of degree two about there.
     pub fn at(&self, angle: f64) -> f64 {
         let (v, u) = angle.sin_cos();
+        self.towards([u, v])
+    }
+
+    /// [`Self::at`] the angle of a unit vector.
+    pub fn towards(&self, [u, v]: [f64; 2]) -> f64 {
         match *self {
             Form::Cubic([a, b, c, d]) => {
                 a * u * u * u + b * u * u * v + c * u * v * v + d * v * v * v

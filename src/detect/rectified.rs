@@ -31,6 +31,10 @@ const MAX_WAY: f64 = 0.4;
 /// Half the side of the patch, px: that reach, and the way.
 const HALF_SIDE: usize = 16;
 
+/// A view whose axes differ by less than this factor shows nothing that the picture does not show as well:
+/// sectors seen at 45° are still 40° wide.
+const LEAST_STRETCH: f64 = 1.5;
+
 /// An affine view of the surroundings of a place.
 pub struct Rectified {
     place: Vector2<f64>,
@@ -54,13 +58,24 @@ impl Rectified {
             .then_some(Self { place: place.into(), image_from_patch })
     }
 
-    /// The corner that lies nearest to the place, as a level of the pyramid shows it.
+    /// Whether the patch shows more than a level of the pyramid by itself: tiles that are narrow there, or
+    /// too small.
+    fn shows_more(&self, level: usize) -> bool {
+        let axes = self.image_from_patch.singular_values() / f64::from(1u32 << level);
+        axes[1] < 1.0 || axes[0] > LEAST_STRETCH * axes[1]
+    }
+
+    /// The corner that lies nearest to the place, as a level of the pyramid shows it, if the patch shows
+    /// more than that.
     pub fn find<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
         pyramid: &Pyramid,
         level: usize,
     ) -> Option<Saddle<N>> {
+        if !self.shows_more(level) {
+            return None;
+        }
         let image = &pyramid.levels()[level];
         let centre = Vector2::repeat(HALF_SIDE as f64);
         let in_level_0 = |at: Vector2<f64>| self.place + self.image_from_patch * (at - centre);

@@ -171,10 +171,11 @@ pub fn maxima_near<const N: usize>(
         let [above, here, below] = [y - 2, y - 1, y].map(|y| &window[y % 3].responses);
         for u in 1..columns.len() - 1 {
             let response = here[u];
-            let is_maximum = [here, above, below]
-                .iter()
-                .all(|row| row[u - 1..=u + 1].iter().all(|&other| other <= response));
-            if is_maximum {
+            if here[u - 1].max(here[u + 1]) <= response
+                && [above, below]
+                    .iter()
+                    .all(|row| row[u - 1].max(row[u]).max(row[u + 1]) <= response)
+            {
                 found.push(Candidate { x: columns.start + u, y: y - 1, response });
             }
         }
@@ -202,6 +203,8 @@ enum Block {
 struct ResponseRow {
     responses: Vec<f32>,
     blocks: Vec<Block>,
+    /// Which blocks of the row are worth a second look.
+    flags: Vec<bool>,
 }
 
 /// A row of pixels at each place of the ring, opposite ones together.
@@ -210,7 +213,8 @@ type Ring<'a> = [[&'a [i16]; 2]; 6];
 impl ResponseRow {
     fn new(columns: usize) -> Self {
         let blocks = vec![Block::Weak; columns.div_ceil(BLOCK)];
-        Self { responses: vec![0.0; columns], blocks }
+        let flags = vec![false; columns / BLOCK];
+        Self { responses: vec![0.0; columns], blocks, flags }
     }
 
     /// The responses of row `y` from column `x` on.
@@ -226,136 +230,216 @@ impl ResponseRow {
             &row[x.wrapping_add_signed(dx)..][..n]
         };
         let ring: Ring = HALF_RING.map(|(dx, dy)| [at(dx, dy), at(-dx, -dy)]);
+        let Self { responses, blocks, flags } = self;
         match kind::<N>() {
-            GridKind::Deltille => odd_row(ring, threshold, &mut self.responses, &mut self.blocks),
-            GridKind::Checker => {
-                even_row(ring, at(0, 0), threshold, &mut self.responses, &mut self.blocks);
-            }
+            GridKind::Deltille => odd_row(ring, threshold, flags, responses, blocks),
+            GridKind::Checker => even_row(ring, at(0, 0), threshold, flags, responses, blocks),
         }
     }
 }
 
 /// R of deltille corners at places whose opposite samples are given.
-#[allow(clippy::needless_range_loop, reason = "one index for all rows, so that vectors show")]
 #[multiversion(targets = "simd")]
-fn odd_row(ring: Ring, threshold: Threshold, out: &mut [f32], states: &mut [Block]) {
+fn odd_row(
+    ring: Ring,
+    threshold: Threshold,
+    flags: &mut [bool],
+    out: &mut [f32],
+    states: &mut [Block],
+) {
     let whole = out.len() / BLOCK;
-    let pixels = in_blocks(ring, whole);
-    let (responses, rest) = out.as_chunks_mut::<BLOCK>();
-    let (responses, states) =
-        (&mut responses[..whole], &mut states[..whole + 1 - usize::from(rest.is_empty())]);
+    let blocks = in_blocks(ring, whole);
+    let flags = &mut flags[..whole];
+    // All blocks are looked at before any is computed: nothing to be guessed, and no look waits.
     for b in 0..whole {
-        let mut may_reach = false;
-        for i in 0..BLOCK {
-            let odd = |k: usize| pixels[k][0][b][i] - pixels[k][1][b][i];
-            let c3 = odd(0) - odd(2) + odd(4);
-            let s3 = odd(1) - odd(3) + odd(5);
-            may_reach |= octagon(c3, s3) > threshold.odd;
-        }
-        if may_reach && threshold.odd >= 0 {
-            may_reach = false;
-            for i in 0..BLOCK {
-                let mut odd = [0i16; 6];
-                let (mut least, mut most) = (i16::MAX, i16::MIN);
-                for k in 0..6 {
-                    odd[k] = pixels[k][0][b][i] - pixels[k][1][b][i];
-                    let even = pixels[k][0][b][i] + pixels[k][1][b][i];
-                    least = least.min(even);
-                    most = most.max(even);
-                }
-                let alpha = octagon(odd[0] - odd[2] + odd[4], odd[1] - odd[3] + odd[5]);
-                // 6β but for the rounding: R < 0 where it is 2.1213 times 6α.
-                let (d1, d2) = (odd[1] - odd[5], odd[2] + odd[4]);
-                let c1 = odd[0] + d1 - (d1 >> 3) + ((odd[2] - odd[4]) >> 1);
-                let s1 = odd[3] + d2 - (d2 >> 3) + ((odd[1] + odd[5]) >> 1);
-                // V is no less than half the square of the range; R < 0 where that is 0.7071 of 6α.
-                let is_edge = (c1.abs().max(s1.abs()) - 2 > 2 * alpha + (alpha >> 2))
-                    | (most - least > (alpha >> 1) + (alpha >> 2) + 1);
-                may_reach |= (alpha > threshold.odd) & !is_edge;
-            }
-        }
-        if may_reach {
-            let mut block = [0.0; BLOCK];
-            for i in 0..BLOCK {
-                block[i] = odd_response(|k, side| pixels[k][side][b][i]);
-            }
-            responses[b] = block;
-            states[b] = state(&block, threshold.response);
+        flags[b] = odd_may_reach(block(&blocks, b), threshold);
+    }
+    let (responses, rest) = out.as_chunks_mut::<BLOCK>();
+    for b in 0..whole {
+        let pixels = block(&blocks, b);
+        if flags[b] && (threshold.odd < 0 || odd_is_no_edge(pixels, threshold)) {
+            responses[b] = odd_block(pixels);
+            states[b] = state(&responses[b], threshold.response);
         } else if states[b] != Block::Weak {
             responses[b] = [0.0; BLOCK];
             states[b] = Block::Weak;
         }
     }
-    // What is left at the end of the row is too short to be worth a look.
-    for (i, response) in rest.iter_mut().enumerate() {
-        *response = odd_response(|k, side| ring[k][side][whole * BLOCK + i]);
-        states[whole] = Block::Promising;
+    if rest.is_empty() {
+        return;
+    }
+    states[whole] = Block::Promising;
+    if let Some(pixels) = last_block(ring) {
+        rest.copy_from_slice(&odd_block(pixels)[BLOCK - rest.len()..]);
+    } else {
+        for (i, response) in rest.iter_mut().enumerate() {
+            *response = odd_response(|k, side| ring[k][side][i]);
+        }
     }
 }
 
+/// Whether the bound of |α| passes the threshold somewhere in a block.
+#[inline(always)]
+fn odd_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
+    let mut may_reach = false;
+    for i in 0..BLOCK {
+        let odd = |k: usize| pixels[k][0][i] - pixels[k][1][i];
+        let c3 = odd(0) - odd(2) + odd(4);
+        let s3 = odd(1) - odd(3) + odd(5);
+        may_reach |= octagon(c3, s3) > threshold.odd;
+    }
+    may_reach
+}
+
+/// Whether it does where no edge takes R below zero.
+#[inline(always)]
+fn odd_is_no_edge(pixels: Pixels, threshold: Threshold) -> bool {
+    let mut may_reach = false;
+    for i in 0..BLOCK {
+        let mut odd = [0i16; 6];
+        let (mut least, mut most) = (i16::MAX, i16::MIN);
+        for k in 0..6 {
+            odd[k] = pixels[k][0][i] - pixels[k][1][i];
+            let even = pixels[k][0][i] + pixels[k][1][i];
+            least = least.min(even);
+            most = most.max(even);
+        }
+        let alpha = octagon(odd[0] - odd[2] + odd[4], odd[1] - odd[3] + odd[5]);
+        // 6β but for the rounding: R < 0 where it is 2.1213 times 6α.
+        let (d1, d2) = (odd[1] - odd[5], odd[2] + odd[4]);
+        let c1 = odd[0] + d1 - (d1 >> 3) + ((odd[2] - odd[4]) >> 1);
+        let s1 = odd[3] + d2 - (d2 >> 3) + ((odd[1] + odd[5]) >> 1);
+        // V is no less than half the square of the range; R < 0 where that is 0.7071 of 6α.
+        let is_edge = (c1.abs().max(s1.abs()) - 2 > 2 * alpha + (alpha >> 2))
+            | (most - least > (alpha >> 1) + (alpha >> 2) + 1);
+        may_reach |= (alpha > threshold.odd) & !is_edge;
+    }
+    may_reach
+}
+
+#[inline(always)]
+fn odd_block(pixels: Pixels) -> [f32; BLOCK] {
+    let mut responses = [0.0; BLOCK];
+    for i in 0..BLOCK {
+        responses[i] = odd_response(|k, side| pixels[k][side][i]);
+    }
+    responses
+}
+
 /// R of checkerboard corners at places whose opposite samples are given, and the centres.
-#[allow(clippy::needless_range_loop, reason = "one index for all rows, so that vectors show")]
 #[multiversion(targets = "simd")]
 fn even_row(
     ring: Ring,
     centre: &[i16],
     threshold: Threshold,
+    flags: &mut [bool],
     out: &mut [f32],
     states: &mut [Block],
 ) {
     let whole = out.len() / BLOCK;
-    let pixels = in_blocks(ring, whole);
+    let blocks = in_blocks(ring, whole);
     let centres = &centre.as_chunks::<BLOCK>().0[..whole];
-    let (responses, rest) = out.as_chunks_mut::<BLOCK>();
-    let (responses, states) =
-        (&mut responses[..whole], &mut states[..whole + 1 - usize::from(rest.is_empty())]);
+    let flags = &mut flags[..whole];
     for b in 0..whole {
-        let mut may_reach = false;
-        for i in 0..BLOCK {
-            let even = |k: usize| pixels[k][0][b][i] + pixels[k][1][b][i];
-            let (e14, e52) = (even(1) - even(4), even(5) - even(2));
-            let c2 = 2 * (even(0) - even(3)) + e14 + e52;
-            // √3 of it, or slightly more.
-            let s2 = (e14 - e52).abs();
-            may_reach |= octagon(c2, 2 * s2 - (s2 >> 2)) > threshold.even;
-        }
-        if may_reach && threshold.even >= 0 {
-            may_reach = false;
-            for i in 0..BLOCK {
-                let (mut even, mut differences) = ([0i16; 6], 0i16);
-                for k in 0..6 {
-                    even[k] = pixels[k][0][b][i] + pixels[k][1][b][i];
-                    differences += (pixels[k][0][b][i] - pixels[k][1][b][i]).abs();
-                }
-                let (e14, e52) = (even[1] - even[4], even[5] - even[2]);
-                let s2 = (e14 - e52).abs();
-                let alpha = octagon(2 * (even[0] - even[3]) + e14 + e52, 2 * s2 - (s2 >> 2));
-                // V is no less than a sixth of their square, and R < 0 where they are 0.6124 of 12α.
-                // 12(c − m) leaves R < 0 where it is 0.7071 of 12α.
-                let sum = even[0] + even[1] + even[2] + even[3] + even[4] + even[5];
-                let off = (12 * centres[b][i] - sum).abs();
-                let is_edge = (differences > (alpha >> 1) + (alpha >> 3) + 2)
-                    | (off > (alpha >> 1) + (alpha >> 2) + 1);
-                may_reach |= (alpha > threshold.even) & !is_edge;
-            }
-        }
-        if may_reach {
-            let mut block = [0.0; BLOCK];
-            for i in 0..BLOCK {
-                block[i] = even_response(|k, side| pixels[k][side][b][i], centres[b][i]);
-            }
-            responses[b] = block;
-            states[b] = state(&block, threshold.response);
+        flags[b] = even_may_reach(block(&blocks, b), threshold);
+    }
+    let (responses, rest) = out.as_chunks_mut::<BLOCK>();
+    for b in 0..whole {
+        let pixels = block(&blocks, b);
+        if flags[b] && (threshold.even < 0 || even_is_no_edge(pixels, &centres[b], threshold)) {
+            responses[b] = even_block(pixels, &centres[b]);
+            states[b] = state(&responses[b], threshold.response);
         } else if states[b] != Block::Weak {
             responses[b] = [0.0; BLOCK];
             states[b] = Block::Weak;
         }
     }
-    for (i, response) in rest.iter_mut().enumerate() {
-        let place = whole * BLOCK + i;
-        *response = even_response(|k, side| ring[k][side][place], centre[place]);
-        states[whole] = Block::Promising;
+    if rest.is_empty() {
+        return;
     }
+    states[whole] = Block::Promising;
+    if let (Some(pixels), Some(centres)) = (last_block(ring), centre.last_chunk()) {
+        rest.copy_from_slice(&even_block(pixels, centres)[BLOCK - rest.len()..]);
+    } else {
+        for (i, response) in rest.iter_mut().enumerate() {
+            *response = even_response(|k, side| ring[k][side][i], centre[i]);
+        }
+    }
+}
+
+/// Whether the bound of |α| passes the threshold somewhere in a block.
+#[inline(always)]
+fn even_may_reach(pixels: Pixels, threshold: Threshold) -> bool {
+    let mut may_reach = false;
+    for i in 0..BLOCK {
+        let even = |k: usize| pixels[k][0][i] + pixels[k][1][i];
+        let (e14, e52) = (even(1) - even(4), even(5) - even(2));
+        let c2 = 2 * (even(0) - even(3)) + e14 + e52;
+        // √3 of it, or slightly more.
+        let s2 = (e14 - e52).abs();
+        may_reach |= octagon(c2, 2 * s2 - (s2 >> 2)) > threshold.even;
+    }
+    may_reach
+}
+
+/// Whether it does where neither an edge nor a bar takes R below zero.
+#[inline(always)]
+fn even_is_no_edge(pixels: Pixels, centres: &[i16; BLOCK], threshold: Threshold) -> bool {
+    let mut may_reach = false;
+    for i in 0..BLOCK {
+        let (mut even, mut differences) = ([0i16; 6], 0i16);
+        for k in 0..6 {
+            even[k] = pixels[k][0][i] + pixels[k][1][i];
+            differences += (pixels[k][0][i] - pixels[k][1][i]).abs();
+        }
+        let (e14, e52) = (even[1] - even[4], even[5] - even[2]);
+        let s2 = (e14 - e52).abs();
+        let alpha = octagon(2 * (even[0] - even[3]) + e14 + e52, 2 * s2 - (s2 >> 2));
+        // V is no less than a sixth of their square, and R < 0 where they are 0.6124 of 12α.
+        // 12(c − m) leaves R < 0 where it is 0.7071 of 12α.
+        let sum = even[0] + even[1] + even[2] + even[3] + even[4] + even[5];
+        let off = (12 * centres[i] - sum).abs();
+        let is_edge = (differences > (alpha >> 1) + (alpha >> 3) + 2)
+            | (off > (alpha >> 1) + (alpha >> 2) + 1);
+        may_reach |= (alpha > threshold.even) & !is_edge;
+    }
+    may_reach
+}
+
+#[inline(always)]
+fn even_block(pixels: Pixels, centres: &[i16; BLOCK]) -> [f32; BLOCK] {
+    let mut responses = [0.0; BLOCK];
+    for i in 0..BLOCK {
+        responses[i] = even_response(|k, side| pixels[k][side][i], centres[i]);
+    }
+    responses
+}
+
+/// A block of each of the rows of a ring.
+type Pixels<'a> = [[&'a [i16; BLOCK]; 2]; 6];
+
+/// Block `b`. (A loop, as below.)
+#[inline(always)]
+fn block<'a>(blocks: &[[&'a [[i16; BLOCK]]; 2]; 6], b: usize) -> Pixels<'a> {
+    let mut pixels = [[&[0; BLOCK]; 2]; 6];
+    for k in 0..6 {
+        for side in 0..2 {
+            pixels[k][side] = &blocks[k][side][b];
+        }
+    }
+    pixels
+}
+
+/// The last pixels of each row, as many as a block has, if there are so many.
+#[inline(always)]
+fn last_block<'a>(ring: Ring<'a>) -> Option<Pixels<'a>> {
+    let mut pixels: Pixels<'a> = [[&[0; BLOCK]; 2]; 6];
+    for k in 0..6 {
+        for side in 0..2 {
+            pixels[k][side] = ring[k][side].last_chunk()?;
+        }
+    }
+    Some(pixels)
 }
 
 /// The first `count` blocks of each row. (A loop: closures handed to the standard library would not
@@ -436,6 +520,25 @@ fn even_response(at: impl Fn(usize, usize) -> i16, centre: i16) -> f32 {
     alpha - 0.5 * squares as f32 - off * off * (9.0 / 144.0)
 }
 
+/// Whether some of the middle one of three rows reach a threshold and none of the four places next to
+/// them is stronger.
+#[multiversion(targets = "simd")]
+fn may_hold_maximum(rows: [&Vec<f32>; 3], places: Range<usize>, threshold: f32) -> bool {
+    let part = |row: usize, from: usize| &rows[row][from..from + places.len()];
+    let (above, below) = (part(0, places.start), part(2, places.start));
+    let here = part(1, places.start);
+    let (left, right) = (part(1, places.start - 1), part(1, places.start + 1));
+    let mut may = false;
+    for i in 0..here.len() {
+        may |= (here[i] > threshold)
+            & (here[i] >= left[i])
+            & (here[i] >= right[i])
+            & (here[i] >= above[i])
+            & (here[i] >= below[i]);
+    }
+    may
+}
+
 /// Appends the maxima of row `y`, whose neighbouring rows are all in the window.
 fn maxima_of_row(
     window: &[ResponseRow; WINDOW_ROWS],
@@ -443,17 +546,25 @@ fn maxima_of_row(
     threshold: f32,
     found: &mut Vec<Candidate>,
 ) {
-    let ResponseRow { responses: centre, blocks } = &window[y % WINDOW_ROWS];
+    let ResponseRow { responses: centre, blocks, .. } = &window[y % WINDOW_ROWS];
+    let [above, below] = [y - 1, y + 1].map(|v| &window[v % WINDOW_ROWS].responses);
     // Those that have all their neighbours.
     let inner = SUPPRESSION_RADIUS..centre.len() - SUPPRESSION_RADIUS;
     for (b, _) in blocks.iter().enumerate().filter(|&(_, &block)| block == Block::Promising) {
         let places = (b * BLOCK).max(inner.start)..((b + 1) * BLOCK).min(inner.end);
+        if !may_hold_maximum([above, centre, below], places.clone(), threshold) {
+            continue;
+        }
         for (i, response) in places.map(|i| (i, centre[i])) {
-            if response <= threshold {
+            // Ties go to the later pixel in reading order, so exactly one of equal neighbours stays.
+            // Most fall short of one of the four next to them.
+            let may_be = response > threshold
+                && centre[i - 1].max(above[i]) <= response
+                && centre[i + 1].max(below[i]) < response;
+            if !may_be {
                 continue;
             }
             let near = i - SUPPRESSION_RADIUS..=i + SUPPRESSION_RADIUS;
-            // Ties go to the later pixel in reading order, so exactly one of equal neighbours stays.
             let is_maximum = (y - SUPPRESSION_RADIUS..=y + SUPPRESSION_RADIUS).all(|v| {
                 let row = &window[v % WINDOW_ROWS].responses[near.clone()];
                 let (before, rest) = row.split_at(if v < y { row.len() } else { 0 });
@@ -559,6 +670,56 @@ mod tests {
             assert!(odd(threshold).len() > 3 && even(threshold).len() > 3);
             assert_eq!(odd(threshold), odd(whole));
             assert_eq!(even(threshold), even(whole));
+        }
+    }
+
+    /// R pixel by pixel, and its maxima by looking at all of the window.
+    fn one_by_one<const N: usize>(image: &Gray<i16>, min_amplitude: f32) -> Vec<Candidate> {
+        let response = |x: usize, y: usize| {
+            let at = |k: usize, side: usize| {
+                let sign = if side == 0 { 1 } else { -1 };
+                let (dx, dy) = HALF_RING[k];
+                image.at(x.wrapping_add_signed(sign * dx), y.wrapping_add_signed(sign * dy))
+            };
+            match kind::<N>() {
+                GridKind::Deltille => odd_response(at),
+                GridKind::Checker => even_response(at, image.at(x, y)),
+            }
+        };
+        let reach = SUPPRESSION_RADIUS as isize;
+        let window = || (-reach..=reach).flat_map(|v| (-reach..=reach).map(move |u| (v, u)));
+        let margin = RADIUS + SUPPRESSION_RADIUS;
+        let mut found = Vec::new();
+        for y in margin..image.height() - margin {
+            for x in margin..image.width() - margin {
+                let here = response(x, y);
+                let strongest = window().all(|(v, u)| {
+                    let other = response(x.wrapping_add_signed(u), y.wrapping_add_signed(v));
+                    if (v, u) > (0, 0) { other < here } else { other <= here }
+                });
+                if here > 4.5 * min_amplitude * min_amplitude && strongest {
+                    found.push(Candidate { x, y, response: here });
+                }
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn blocks_of_rows_of_any_length_find_what_single_pixels_do() {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        for width in [13, 20, 24, 33, 40, 71] {
+            let image = Gray::from_fn(width, 40, |_, _| random.random_range(0..1024));
+            for min_amplitude in [6.0, 60.0] {
+                assert_eq!(
+                    candidates::<6>(&image, min_amplitude),
+                    one_by_one::<6>(&image, min_amplitude)
+                );
+                assert_eq!(
+                    candidates::<4>(&image, min_amplitude),
+                    one_by_one::<4>(&image, min_amplitude)
+                );
+            }
         }
     }
 

@@ -1,8 +1,6 @@
 //! Corners one by one: candidates of all pyramid levels, fitted, read and merged.
 
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
-
+use super::buckets::Buckets;
 use super::polynomial::{FittedCorner, Polynomial};
 use super::ring::{Candidate, candidates, maxima_near};
 use super::sectors::{Sectors, contrast_around};
@@ -28,6 +26,10 @@ const HARMONIC_NOISE: f32 = 0.408;
 
 /// Candidates must stand above the noise by this factor; at five, one pixel in a million passes.
 const NOISE_FACTOR: f32 = 5.0;
+
+/// No board has more corners than one in so many pixels: tiles of seven pixels are the least that are told
+/// from waves. Noise has twice as many candidates.
+const LEAST_TILE_PX2: usize = 40;
 
 /// A corner with N rays in the image: a monkey saddle, or a saddle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +71,8 @@ impl<const N: usize> SaddleFinder<N> {
     /// All saddles of an image, in reading order.
     pub fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
         let mut noise = 0.0f32;
-        let mut saddles = Merged::<N>::default();
+        let finest = &pyramid.levels()[0];
+        let mut saddles = Merged::<N>::new(finest.width(), finest.height());
         for (n, level) in pyramid.levels().iter().enumerate() {
             // Grain that pixels share stays when they are averaged.
             noise = noise.max(HARMONIC_NOISE * sample_noise(level));
@@ -234,7 +237,18 @@ fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<
         let threshold = (4.5 * noise * noise).min(PART * PART * ninth);
         found.retain(|candidate| candidate.response > threshold);
     }
+    strongest(&mut found, level.pixels().len() / LEAST_TILE_PX2);
     found
+}
+
+/// Keeps the strongest candidates, so many.
+fn strongest(candidates: &mut Vec<Candidate>, count: usize) {
+    if candidates.len() <= count || count == 0 {
+        return;
+    }
+    let mut responses: Vec<f32> = candidates.iter().map(|c| c.response).collect();
+    let least = *responses.select_nth_unstable_by(count - 1, |a, b| b.total_cmp(a)).1;
+    candidates.retain(|candidate| candidate.response >= least);
 }
 
 /// Whether a level shows a corner blurred; the coarsest never does, and no place at the border. Blur leaves
@@ -256,13 +270,7 @@ struct Merged<const N: usize> {
     all: Vec<Option<Saddle<N>>>,
     /// Whether the level of a saddle shows it blurred.
     blurred: Vec<bool>,
-    places: RTree<GeomWithData<[f64; 2], usize>>,
-}
-
-impl<const N: usize> Default for Merged<N> {
-    fn default() -> Self {
-        Self { all: Vec::new(), blurred: Vec::new(), places: RTree::new() }
-    }
+    places: Buckets,
 }
 
 /// The distance within which saddles of a level are the same, px of level 0.
@@ -271,10 +279,15 @@ pub fn merge_px(level: usize) -> f64 {
 }
 
 impl<const N: usize> Merged<N> {
+    /// Of an image of this size.
+    fn new(width: usize, height: usize) -> Self {
+        Self { all: Vec::new(), blurred: Vec::new(), places: Buckets::new(width, height) }
+    }
+
     /// Saddles within a distance that is the merging distance of a level, px.
     fn within(&self, position: [f64; 2], level: usize) -> impl Iterator<Item = (usize, Saddle<N>)> {
-        let near = self.places.locate_within_distance(position, merge_px(level).powi(2));
-        near.filter_map(|place| Some((place.data, self.all[place.data]?)))
+        let near = self.places.within(position, merge_px(level));
+        near.filter_map(|(i, _)| Some((i, self.all[i]?)))
     }
 
     /// Whether a corner that is as good as what `level` shows lies about as near as a candidate to its own.
@@ -297,7 +310,7 @@ impl<const N: usize> Merged<N> {
             return;
         }
         same.into_iter().for_each(|(i, _)| self.all[i] = None);
-        self.places.insert(GeomWithData::new(saddle.position, self.all.len()));
+        self.places.insert(saddle.position);
         self.all.push(Some(saddle));
         self.blurred.push(blurred);
     }

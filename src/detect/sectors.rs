@@ -20,6 +20,8 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
+use multiversion::multiversion;
+
 use super::polynomial::Form;
 use super::tiling::kind;
 use crate::raster::Gray;
@@ -118,10 +120,7 @@ impl<const N: usize> Circle<N> {
         if !inside {
             return None;
         }
-        let mut values = [0.0; SAMPLES];
-        for (value, [cos, sin]) in values.iter_mut().zip(DIRECTIONS.iter()) {
-            *value = image.bilinear_inside(x + radius * cos, y + radius * sin);
-        }
+        let values = on_circle(image, [x, y], radius, &DIRECTIONS);
         let mean = values.iter().sum::<f64>() / SAMPLES as f64;
         let level = match kind::<N>() {
             // Opposite sectors have opposite colours, so the mean is the level of the edges.
@@ -151,20 +150,22 @@ impl<const N: usize> Circle<N> {
 
     /// Whether the sectors between given rays are dark and bright in turn, on the average.
     fn alternates(&self, rays: &[f64; N]) -> bool {
-        let amplitude = self.amplitude();
-        (0..N).all(|i| {
-            let width = -turn(rays[i], rays[(i + 1) % N]);
-            let inside = (0..SAMPLES).filter(|&k| {
-                let behind = (rays[i] - angle_of(k as f64)).rem_euclid(TAU);
-                behind > 0.0 && behind < width
-            });
-            let (mut sum, mut count) = (0.0, 0.0);
-            for k in inside {
-                sum += self.deviations[k];
-                count += 1.0;
+        // How far behind the first ray the others are; rays run against the samples.
+        let behind = rays.map(|ray| in_one_turn(rays[0] - ray));
+        let (mut sums, mut counts) = ([0.0; N], [0.0; N]);
+        for (k, deviation) in self.deviations.iter().enumerate() {
+            let here = in_one_turn(rays[0] - angle_of(k as f64));
+            let sector = (0..N).rfind(|&i| behind[i] <= here).unwrap_or(0);
+            // What lies on a ray belongs to neither side.
+            if behind[sector] < here {
+                sums[sector] += deviation;
+                counts[sector] += 1.0;
             }
-            let darkness = if i % 2 == 0 { -sum } else { sum };
-            count > 0.0 && darkness / count > MIN_SECTOR * amplitude
+        }
+        let limit = MIN_SECTOR * self.amplitude();
+        (0..N).all(|i| {
+            let darkness = if i % 2 == 0 { -sums[i] } else { sums[i] };
+            counts[i] > 0.0 && darkness / counts[i] > limit
         })
     }
 
@@ -206,17 +207,71 @@ impl<const N: usize> Circle<N> {
         let low = self.deviations[(a + start) % SAMPLES];
         let high = self.deviations[(a + start + 1) % SAMPLES];
         let fraction = if low == high { 0.5 } else { low / (low - high) };
-        Crossing { angle: angle_of((a + start) as f64 + fraction), rising: to > from }
+        Crossing { angle: angle_of(((a + start) % SAMPLES) as f64 + fraction), rising: to > from }
     }
 }
 
 /// Unit vectors towards the samples.
-static DIRECTIONS: LazyLock<[[f64; 2]; SAMPLES]> = LazyLock::new(|| {
-    std::array::from_fn(|k| {
-        let (sin, cos) = angle_of(k as f64).sin_cos();
-        [cos, sin]
-    })
+static DIRECTIONS: LazyLock<Directions> = LazyLock::new(|| {
+    let angles: [f64; SAMPLES] = std::array::from_fn(|k| angle_of(k as f64));
+    Directions { cos: angles.map(f64::cos), sin: angles.map(f64::sin) }
 });
+
+/// Cosines and sines of the angles of samples.
+struct Directions {
+    cos: [f64; SAMPLES],
+    sin: [f64; SAMPLES],
+}
+
+/// Bilinear samples on a circle in an image, in steps that vectors can take.
+#[multiversion(targets = "simd")]
+fn on_circle(
+    image: &Gray<i16>,
+    [x, y]: [f64; 2],
+    radius: f64,
+    directions: &Directions,
+) -> [f64; SAMPLES] {
+    let width = image.width();
+    let pixels = image.pixels();
+    let (mut first, mut fx, mut fy) = ([0u32; SAMPLES], [0.0f32; SAMPLES], [0.0f32; SAMPLES]);
+    for k in 0..SAMPLES {
+        let u = x + radius * directions.cos[k];
+        let v = y + radius * directions.sin[k];
+        // By way of signed numbers, which processors convert at once.
+        let (left, top) = (u as i32, v as i32);
+        fx[k] = (u - f64::from(left)) as f32;
+        fy[k] = (v - f64::from(top)) as f32;
+        first[k] = top as u32 * width as u32 + left as u32;
+    }
+    let mut corners = [[0i16; SAMPLES]; 4];
+    for k in 0..SAMPLES {
+        let first = first[k] as usize;
+        let (upper, lower) = (&pixels[first..first + 2], &pixels[first + width..first + width + 2]);
+        corners[0][k] = upper[0];
+        corners[1][k] = upper[1];
+        corners[2][k] = lower[0];
+        corners[3][k] = lower[1];
+    }
+    let mut values = [0.0; SAMPLES];
+    for k in 0..SAMPLES {
+        let (a, b) = (f32::from(corners[0][k]), f32::from(corners[1][k]));
+        let (c, d) = (f32::from(corners[2][k]), f32::from(corners[3][k]));
+        let (upper, lower) = (a + fx[k] * (b - a), c + fx[k] * (d - c));
+        values[k] = f64::from(upper + fy[k] * (lower - upper));
+    }
+    values
+}
+
+/// An angle between 0 and 2π; most need no division for that.
+fn in_one_turn(angle: f64) -> f64 {
+    if (0.0..TAU).contains(&angle) {
+        angle
+    } else if (-TAU..0.0).contains(&angle) {
+        angle + TAU
+    } else {
+        angle.rem_euclid(TAU)
+    }
+}
 
 fn angle_of(sample: f64) -> f64 {
     sample * TAU / SAMPLES as f64
@@ -225,17 +280,13 @@ fn angle_of(sample: f64) -> f64 {
 /// The level half-way between the means of what is above and of what is below it.
 fn between_classes(values: &[f64; SAMPLES], mean: f64) -> f64 {
     let mut level = mean;
+    let total = SAMPLES as f64 * mean;
     for _ in 0..LEVEL_STEPS {
-        let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
-        for &value in values {
-            let class = usize::from(value > level);
-            sums[class] += value;
-            counts[class] += 1.0;
-        }
-        if counts.contains(&0.0) {
+        let [above, count] = above_level(values, level);
+        if count == 0.0 || count == SAMPLES as f64 {
             return mean;
         }
-        let next = (sums[0] / counts[0] + sums[1] / counts[1]) / 2.0;
+        let next = ((total - above) / (SAMPLES as f64 - count) + above / count) / 2.0;
         if next == level {
             break;
         }
@@ -244,18 +295,41 @@ fn between_classes(values: &[f64; SAMPLES], mean: f64) -> f64 {
     level
 }
 
+/// Sum and number of the values above a level.
+#[multiversion(targets = "simd")]
+fn above_level(values: &[f64; SAMPLES], level: f64) -> [f64; 2] {
+    const LANES: usize = 8;
+    let (mut sums, mut counts) = ([0.0; LANES], [0.0; LANES]);
+    for group in values.as_chunks::<LANES>().0 {
+        for i in 0..LANES {
+            let one = if group[i] > level { 1.0 } else { 0.0 };
+            sums[i] += one * group[i];
+            counts[i] += one;
+        }
+    }
+    let (mut sum, mut count) = (0.0, 0.0);
+    for i in 0..LANES {
+        sum += sums[i];
+        count += counts[i];
+    }
+    [sum, count]
+}
+
 /// The zeros of the form around the circle; `None` unless all roots are real.
 fn roots<const N: usize>(form: &Form) -> Option<[Crossing; N]> {
-    let values: [f64; SAMPLES] = std::array::from_fn(|k| form.at(angle_of(k as f64)));
-    let mut crossings = Vec::with_capacity(N);
+    let Directions { cos, sin } = &*DIRECTIONS;
+    let values: [f64; SAMPLES] = std::array::from_fn(|k| form.towards([cos[k], sin[k]]));
+    let mut crossings = [Crossing { angle: 0.0, rising: false }; N];
+    let mut count = 0;
     for k in 0..SAMPLES {
         let (from, to) = (values[k], values[(k + 1) % SAMPLES]);
         if (from > 0.0) != (to > 0.0) && from != to {
             let angle = angle_of(k as f64 + from / (from - to));
-            crossings.push(Crossing { angle, rising: to > from });
+            *crossings.get_mut(count)? = Crossing { angle, rising: to > from };
+            count += 1;
         }
     }
-    crossings.try_into().ok()
+    (count == N).then_some(crossings)
 }
 
 /// Rays in the order of [`Sectors::rays`]; `None` when opposite ones are not in line.
@@ -340,6 +414,19 @@ mod tests {
         assert!(Sectors::<6>::read(&Gray::new(41, 41), place, &FLAT).is_none());
         assert!(Sectors::<4>::read(&Gray::new(41, 41), place, &FLAT).is_none());
         assert!(Sectors::<6>::read(&Gray::new(3, 3), [1.0, 1.0], &FLAT).is_none());
+    }
+
+    #[test]
+    fn circles_are_sampled_as_single_places_are() {
+        let image = Gray::from_fn(33, 29, |x, y| ((x * x * 31 + y * y * 17 + x * y) % 1024) as i16);
+        for (centre, radius) in [([9.3, 12.9], 8.0), ([16.0, 14.5], 4.5), ([25.99, 3.5], 3.5)] {
+            let values = on_circle(&image, centre, radius, &DIRECTIONS);
+            for (k, value) in values.into_iter().enumerate() {
+                let (sin, cos) = angle_of(k as f64).sin_cos();
+                let [x, y] = [centre[0] + radius * cos, centre[1] + radius * sin];
+                assert_eq!(value, image.bilinear_inside(x, y));
+            }
+        }
     }
 
     #[test]

@@ -120,6 +120,17 @@ impl<T: Intensity> Gray<T> {
     /// An empty image reads 0.
     #[inline]
     pub fn bilinear(&self, x: f64, y: f64) -> f32 {
+        let inside =
+            x >= 0.0 && y >= 0.0 && x + 1.0 < self.width as f64 && y + 1.0 < self.height as f64;
+        if inside {
+            let (left, top) = (x as i32, y as i32);
+            let (fx, fy) = ((x - f64::from(left)) as f32, (y - f64::from(top)) as f32);
+            let first = top as usize * self.width + left as usize;
+            let blended = |pair: &[T]| pair[0].to_f32() * (1.0 - fx) + pair[1].to_f32() * fx;
+            let upper = blended(&self.data[first..first + 2]);
+            let lower = blended(&self.data[first + self.width..first + self.width + 2]);
+            return upper * (1.0 - fy) + lower * fy;
+        }
         if self.data.is_empty() {
             return 0.0;
         }
