@@ -74,7 +74,7 @@ pub struct ToneEstimate {
     /// Median white.
     pub white: f64,
     /// Curvature κ₀ between them: grey = middle + half·(S + (1 − S²)(κ₀ + κ₁ S + …)); 0 is linear,
-    /// negative brightens.
+    /// positive brightens.
     pub kappa: f64,
     /// Its standard deviation.
     pub kappa_deviation: f64,

@@ -208,19 +208,19 @@ impl Optics {
         let mut optics = known.clone();
         if !active.is_empty() {
             problem.active = active;
-            let cov;
+            let mut cov;
             (optics, cov) = problem.adjusted(&known);
             let vector = optics.vector();
             let used = problem.supported(&vector, &cov, 1.0);
             if used.len() < problem.active.len() {
-                optics = known.with(&problem.without(&vector, &cov, &used));
+                let without = problem.without(&vector, &cov, &used);
                 problem.active = used;
+                optics = known.with(&without);
+                if !problem.active.is_empty() {
+                    (optics, cov) = problem.adjusted(&optics);
+                }
             }
-            if !problem.active.is_empty() {
-                let cov;
-                (optics, cov) = problem.adjusted(&optics);
-                found = tone(&optics, &cov, &problem.active, true).or(found);
-            }
+            found = tone(&optics, &cov, &problem.active, true).or(found);
         }
         let inflation = problem.inflation(&optics);
         Self { tone: found, inflation, ..optics }
