@@ -89,8 +89,13 @@ pub const MAX_WAY_PX: f64 = 1.5;
 /// Edges closer than this are one edge, or a wrong minimum: 75° of tilt leave 17°.
 const MIN_ANGLE_RAD: f64 = 6.0 * std::f64::consts::PI / 180.0;
 
-/// Residuals larger than this part of the amplitude: the window shows something else.
+/// Residuals larger than this part of the amplitude: the window shows something else, unless they differ from
+/// pixel to pixel as much as noise does.
 const MAX_RESIDUAL: f64 = 0.35;
+
+/// Mean squared difference of neighbouring residuals over that of white noise, von Neumann's ratio, above which they
+/// are noise; of what has a shape it is a fraction.
+const MIN_WHITENESS: f64 = 0.7;
 
 /// A position less certain than this is none, px.
 const MAX_SIGMA_PX: f64 = 1.0;
@@ -462,7 +467,8 @@ impl CornerFitter {
         let trusted = converged
             && way <= MAX_WAY_PX
             && corner.edges_are_apart()
-            && noise < MAX_RESIDUAL * corner.amplitude.abs()
+            && (noise < MAX_RESIDUAL * corner.amplitude.abs()
+                || self.whiteness(window) > MIN_WHITENESS)
             && inverse[(X, X)] + inverse[(Y, Y)] < MAX_SIGMA_PX * MAX_SIGMA_PX;
         trusted.then_some(Fitted {
             corner,
@@ -497,6 +503,22 @@ impl CornerFitter {
     ) -> Option<&[f32]> {
         self.load(image, window, position)?;
         Some(&self.pixels[..window.count])
+    }
+
+    /// Von Neumann's ratio of the residuals along the rows: 1 for white noise.
+    fn whiteness(&self, window: &Window) -> f64 {
+        let mut rest = &self.columns[PARAMS][..window.count];
+        let (mut differences, mut squares) = ((0.0, 0.0), 0.0);
+        for &(_, length) in &window.runs {
+            let (run, after) = rest.split_at(length);
+            for pair in run.windows(2) {
+                differences.0 += f64::from(pair[1] - pair[0]).powi(2);
+                differences.1 += 2.0;
+            }
+            squares += run.iter().map(|r| f64::from(r * r)).sum::<f64>();
+            rest = after;
+        }
+        differences.0 / differences.1 / (squares / window.count as f64)
     }
 
     /// The normal equations of the pixels at a corner in window coordinates.

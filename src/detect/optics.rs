@@ -201,10 +201,11 @@ impl Optics {
                 optics.curvature([black, white], cov, active)?;
             Some(ToneEstimate { black, white, kappa, kappa_deviation, kappa_odd, used })
         };
-        // A first step tells what is worth looking for.
-        let (vector, cov) = problem.first_step(&known);
+        // A first step tells what is worth looking for. What the model lacks there scatters the gradients: that is
+        // no reason to look away, but the deviation that is reported.
+        let (vector, under_noise, cov) = problem.first_step(&known);
         let mut found = tone(&known.with(&vector), &cov, &problem.active, false);
-        let active = problem.supported(&vector, &cov, WORTH_A_LOOK);
+        let active = problem.supported(&vector, &under_noise, WORTH_A_LOOK);
         let mut optics = known.clone();
         if !active.is_empty() {
             problem.active = active;
@@ -292,18 +293,19 @@ struct Reduced {
 }
 
 impl<const K: usize, T: Intensity> Problem<'_, K, T> {
-    /// Where a first step leads, and the covariance there.
-    fn first_step(&mut self, optics: &Optics) -> ([f64; PARAMS], DMatrix<f64>) {
+    /// Where a first step leads, and the covariances there: under the noise alone, and by the scatter too.
+    fn first_step(&mut self, optics: &Optics) -> ([f64; PARAMS], DMatrix<f64>, DMatrix<f64>) {
         let count = self.active.len();
+        let unknown = || DMatrix::identity(count, count);
         let equations = self.equations(optics);
         let reduced = self.reduced(&equations, &weights(&equations), optics);
         let mut vector = optics.vector();
         let Some(factor) = reduced.matrix.clone().cholesky() else {
-            return (vector, DMatrix::identity(count, count));
+            return (vector, unknown(), unknown());
         };
         let step = factor.solve(&reduced.gradient);
         self.active.iter().zip(step.iter()).for_each(|(&p, s)| vector[p] += s);
-        (vector, covariance(&reduced).unwrap_or_else(|| DMatrix::identity(count, count)))
+        (vector, factor.inverse(), covariance(&reduced).unwrap_or_else(unknown))
     }
 
     /// The active parameters of groups that differ from nothing by more than this part of what counts.

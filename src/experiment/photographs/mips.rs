@@ -33,8 +33,9 @@ impl Mips {
     /// The mean over a parallelogram around (x, y), in pixels of the first level, whose sides are
     /// `across` and `down`.
     ///
-    /// The level is chosen by the parallelogram's narrow side, so that nothing is blurred by more than
-    /// that; along the other as many samples are taken as it is longer.
+    /// The level is the first whose pixels are no smaller than the parallelogram's narrow side: samples that lie
+    /// farther apart than pixels would displace edges along the rows by a sixteenth of that side. Along
+    /// the other as many are taken as it is longer.
     pub fn area(&self, [x, y]: [f64; 2], footprint: &Footprint) -> f32 {
         let scale = footprint.scale;
         let level = &self.levels[footprint.level.min(self.levels.len() - 1)];
@@ -81,9 +82,9 @@ impl Footprint {
         let spread = (0.5 * (xx - yy)).hypot(xy);
         let (long, short) = ((mean + spread).max(0.0).sqrt(), (mean - spread).max(0.0).sqrt());
         let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
-        let level = (short.max(1.0).log2().floor() as usize).min(levels - 1);
+        let level = (short.max(1.0).log2().ceil() as usize).min(levels - 1);
         let texel = (1u32 << level) as f64;
-        let samples = ((long / short.max(texel)).round() as u32).clamp(1, MOST_SAMPLES);
+        let samples = ((long / texel).ceil() as u32).clamp(1, MOST_SAMPLES);
         Self { level, scale: 1.0 / texel, samples, long: [long * angle.cos(), long * angle.sin()] }
     }
 }
