@@ -136,6 +136,34 @@ fn halftones_of_dots_that_do_not_meet() {
     }
 }
 
+/// Where a screen comes to 50 % its dots meet as squares of a checkerboard do, whatever is asked for.
+#[test]
+fn halftones_and_dithers_of_gradients() {
+    for (period_px, angle) in [(10.0, 45.0), (14.0, 20.0), (20.0, 70.0)] {
+        // From white to black across the picture, once or in three bands.
+        let images = [1.0, 3.0].map(|bands| {
+            let tone = |x: f64| 2.0 * (bands * x / WIDTH as f64).fract() - 1.0;
+            photograph(|x, y| spots(turned(angle, period_px, [x, y]), 2.0 * tone(x + 0.3 * y)))
+        });
+        nothing_in(images.map(|image| (format!("gradient, {period_px} px at {angle}°"), image)));
+    }
+    // Ordered dithers with a matrix of 4 × 4.
+    const MATRIX: [[f64; 4]; 4] = [
+        [0.0, 8.0, 2.0, 10.0],
+        [12.0, 4.0, 14.0, 6.0],
+        [3.0, 11.0, 1.0, 9.0],
+        [15.0, 7.0, 13.0, 5.0],
+    ];
+    for cell_px in [8.0, 10.0, 12.0] {
+        let image = photograph(|x, y| {
+            let cell = |c: f64| (c / cell_px).floor().max(0.0) as usize % 4;
+            let level = (MATRIX[cell(y)][cell(x)] + 0.5) / 16.0;
+            f64::from((x + 0.5 * y) / (1.4 * WIDTH as f64) > level)
+        });
+        nothing_in([(format!("dither of {cell_px} px"), image)]);
+    }
+}
+
 /// At 50 % cos u + cos v is a checkerboard, exactly, three waves are a deltille grid, and round dots
 /// are joined by blur where the gaps are small. Without a size there is nothing to tell them from a
 /// part of a board; with one there is: they do not end.

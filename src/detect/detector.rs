@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use super::beyond::go_on;
 use super::clearance::TagAreas;
 use super::corner_model::CornerFitter;
 use super::curve::{Tone, ToneEstimate};
@@ -168,6 +169,11 @@ impl Detector {
                 too_small.get_or_insert_with(|| Reason::new(ReasonKind::TooSmall, figures));
             }
             is_vouched_for(grid) || plausible && edge_px >= MIN_UNTAGGED_EDGE_PX
+        });
+        let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
+        let mut goes_on = go_on(&pyramid.levels()[0], &all).into_iter();
+        grids.retain(|(grid, _)| {
+            goes_on.next() != Some(true) || is_vouched_for(grid) || grid.panel.is_some()
         });
         report_once(&mut grids);
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.

@@ -13,11 +13,13 @@
 //!    the map of a grid (`local_map`) goes on.
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns; `labels`
 //!    gives them to the grids.
+//!    `beyond` refuses checkerboards without tags whose pattern goes on where they end.
 //! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`, in windows
 //!    that `refine_grid` chooses by blur (`clearance`) and by what else they show.
 //!
 //! Both tilings go the same way; `tiling` says where they differ.
 
+mod beyond;
 mod blurred_corner;
 mod buckets;
 mod clearance;

@@ -1,0 +1,303 @@
+//! Whether a pattern goes on where a grid ends.
+//!
+//! A board ends: beyond its last squares lies paper, a table, or what covers it, and nothing of that keeps
+//! to the board's rows and columns. A screen of dots, a dither, a moiré or a field of random cells shows
+//! checkerboard corners only where its dots happen to meet; where they no longer do, dots and gaps go on
+//! at the same places. So two rows of squares are looked at beyond every end of a grid, and of those
+//! that are next to each other in a row it is counted how many are as different as black and white.
+//!
+//! ```text
+//!     ░░ ██ ░░ ██        ·  ·  ·  ·         squares of a grid (left), and what is beyond
+//!     ██ ░░ ██ ░░        ·  ·  ·  ·         its last row: paper, of one brightness, or
+//!     ──+──+──+──        ──+──+──+──        dots, which alternate as squares would
+//!     ░░ ██ ░░ ██        ░░ ██ ░░ ██
+//! ```
+//!
+//! Dots alternate everywhere, random cells half of the time, around boards a few in a hundred do. What
+//! lies beyond the picture, or where another grid begins, says nothing.
+
+use std::collections::BTreeMap;
+
+use super::buckets::Buckets;
+use super::detection::{Grid, median};
+use super::tiling::{CHECKER, step};
+use crate::lattice::{GridKind, Vertex};
+use crate::raster::Gray;
+
+/// Largest part of the pairs of squares beyond a board that differ as black and white do.
+const MOST_DIFFERENT: f64 = 0.2;
+
+/// The same beyond the complete squares of a grid. Single corners that stand apart are what a cover leaves of
+/// a board, with more of it beyond that is not covered; or gaps between dots, which all alternate.
+const MOST_DIFFERENT_SQUARES: f64 = 0.6;
+
+/// Fewer pairs than this say nothing.
+const LEAST_PAIRS: usize = 6;
+
+/// Rows of squares that are looked at beyond an end.
+const ROWS: i32 = 2;
+
+/// Squares are sampled in the middle and at so many edges from it along rows and columns: on a dot that
+/// is much smaller than its square too.
+const AROUND: f64 = 0.12;
+
+/// A square this near to the corner of another grid, in edges, is one of that grid.
+const OTHER_GRID: f64 = 1.0;
+
+type Point = [f64; 2];
+
+/// Tells of each grid of a picture, of which `image` is the finest level, whether its pattern goes on where
+/// it ends. Six sectors that alternate do not come by chance, so of deltille grids it tells nothing.
+pub fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
+    let mut corners = Buckets::new(image.width(), image.height());
+    let mut owners = Vec::new();
+    let several = if grids.len() > 1 { grids } else { &[] };
+    for (i, grid) in several.iter().enumerate() {
+        for corner in &grid.corners {
+            corners.insert([corner.x, corner.y]);
+            owners.push(i);
+        }
+    }
+    let goes_on = |(i, grid): (usize, &&Grid)| {
+        let is_others = |place, reach| corners.within(place, reach).any(|(c, _)| owners[c] != i);
+        let goes_on = |lattice: &Lattice, most| lattice.goes_on(is_others, most);
+        grid.kind == GridKind::Checker && {
+            let all = Lattice::of(image, grid);
+            goes_on(&all, MOST_DIFFERENT) || goes_on(&all.squares(), MOST_DIFFERENT_SQUARES)
+        }
+    };
+    grids.iter().enumerate().map(goes_on).collect()
+}
+
+/// A square beyond the end of a grid, as one of the corners there predicts it.
+#[derive(Clone, Copy, Debug)]
+struct Square {
+    middle: Point,
+    /// An edge away from the grid, and one along its end.
+    edges: [Point; 2],
+}
+
+/// The corners of a grid in a picture.
+struct Lattice<'a> {
+    image: &'a Gray<i16>,
+    corners: BTreeMap<Vertex, Point>,
+}
+
+impl<'a> Lattice<'a> {
+    fn of(image: &'a Gray<i16>, grid: &Grid) -> Self {
+        let corner = |c: &super::GridCorner| (Vertex::new(c.row, c.col), [c.x, c.y]);
+        Self { image, corners: grid.corners.iter().map(corner).collect() }
+    }
+
+    /// The corners of complete squares.
+    fn squares(&self) -> Self {
+        let square =
+            |v: Vertex| [[0, 0], [0, 1], [1, 0], [1, 1]].map(|[r, c]| v + Vertex::new(r, c));
+        let squares = self.corners.keys().map(|&v| square(v));
+        let complete = squares.filter(|vs| vs.iter().all(|v| self.corners.contains_key(v)));
+        let corners = complete.flatten().map(|v| (v, self.corners[&v])).collect();
+        Self { image: self.image, corners }
+    }
+
+    /// Whether more than some part of what is beyond alternates; `is_others` tells whether a corner of
+    /// another grid is within a distance of a place, px.
+    fn goes_on(&self, is_others: impl Fn(Point, f64) -> bool, most: f64) -> bool {
+        let Some(contrast) = self.contrast() else { return false };
+        let (mut pairs, mut different) = (0, 0);
+        for k in 0..CHECKER {
+            let values = self.values_beyond(k, &is_others);
+            let along = along_end(k);
+            for (&square, value) in &values {
+                if let Some(next) = values.get(&(square + along)) {
+                    pairs += 1;
+                    different += usize::from((value - next).abs() >= 0.5 * contrast);
+                }
+            }
+        }
+        pairs >= LEAST_PAIRS && different as f64 > most * pairs as f64
+    }
+
+    /// Brightness of the squares beyond the ends in direction `k`, by their lowest, leftmost vertices.
+    fn values_beyond(
+        &self,
+        k: usize,
+        is_others: impl Fn(Point, f64) -> bool,
+    ) -> BTreeMap<Vertex, f64> {
+        let mut squares: BTreeMap<Vertex, Vec<Square>> = BTreeMap::new();
+        for (&vertex, &corner) in &self.corners {
+            let Some(edges) = self.end(vertex, corner, k) else { continue };
+            for row in 1..=ROWS {
+                for side in [0, -1] {
+                    let near = vertex + times(step::<CHECKER>(k), row) + times(along_end(k), side);
+                    let vertices = [near, near + along_end(k)];
+                    let vertices =
+                        vertices.map(|v| [v, v + step::<CHECKER>(k)]).into_iter().flatten();
+                    let vertices: Vec<Vertex> = vertices.collect();
+                    if vertices.iter().any(|v| self.corners.contains_key(v)) {
+                        continue;
+                    }
+                    let [out, along] = [f64::from(row) + 0.5, f64::from(side) + 0.5];
+                    let middle = moved(corner, edges, [out, along]);
+                    let first = vertices.into_iter().min();
+                    let square = Square { middle, edges };
+                    squares.entry(first.unwrap_or(near)).or_default().push(square);
+                }
+            }
+        }
+        let value = |(vertex, predicted): (Vertex, Vec<Square>)| {
+            let count = predicted.len() as f64;
+            let mean =
+                |i: usize| predicted.iter().map(|square| square.middle[i]).sum::<f64>() / count;
+            let middle = [mean(0), mean(1)];
+            let edges = predicted[0].edges;
+            let reach_px = OTHER_GRID * edges[0][0].hypot(edges[0][1]);
+            let value = self.value(Square { middle, edges })?;
+            (!is_others(middle, reach_px)).then_some((vertex, value))
+        };
+        squares.into_iter().filter_map(value).collect()
+    }
+
+    /// The edges at a corner behind which the grid ends in direction `k`: the one away from it, and one along
+    /// its end.
+    fn end(&self, vertex: Vertex, corner: Point, k: usize) -> Option<[Point; 2]> {
+        let at = |v: Vertex| self.corners.get(&v).copied();
+        let way = step::<CHECKER>(k);
+        if at(vertex + way).is_some() {
+            return None;
+        }
+        let before = at(vertex - way)?;
+        let along = match (at(vertex + along_end(k)), at(vertex - along_end(k))) {
+            (Some(next), Some(last)) => difference(next, last).map(|c| c / 2.0),
+            (Some(next), None) => difference(next, corner),
+            (None, Some(last)) => difference(corner, last),
+            (None, None) => return None,
+        };
+        Some([difference(corner, before), along])
+    }
+
+    /// Difference between the bright squares of the grid and the dark ones.
+    fn contrast(&self) -> Option<f64> {
+        let mut values = [Vec::new(), Vec::new()];
+        for (&vertex, &corner) in &self.corners {
+            let at = |row, col| self.corners.get(&(vertex + Vertex::new(row, col))).copied();
+            let (Some(right), Some(above), Some(across)) = (at(0, 1), at(1, 0), at(1, 1)) else {
+                continue;
+            };
+            let edges = [difference(right, corner), difference(above, corner)];
+            let middle = [0, 1].map(|i| (corner[i] + right[i] + above[i] + across[i]) / 4.0);
+            let parity = (vertex.row + vertex.col).rem_euclid(2) as usize;
+            values[parity].extend(self.value(Square { middle, edges }));
+        }
+        let [even, odd] = values.map(median);
+        Some((even? - odd?).abs())
+    }
+
+    /// Brightness about the middle of a square; `None` where it lies outside the picture.
+    fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
+        const PLACES: [[f64; 2]; 5] =
+            [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
+        let (width, height) = (self.image.width() as f64, self.image.height() as f64);
+        let mut sum = 0.0;
+        for place in PLACES {
+            let [x, y] = moved(middle, edges, place);
+            if x < 0.0 || y < 0.0 || x + 1.0 >= width || y + 1.0 >= height {
+                return None;
+            }
+            sum += self.image.bilinear_inside(x, y);
+        }
+        Some(sum / PLACES.len() as f64)
+    }
+}
+
+/// The step along an end in direction `k`, up or to the right.
+fn along_end(k: usize) -> Vertex {
+    step::<CHECKER>((k + 1) % 2)
+}
+
+fn times(step: Vertex, count: i32) -> Vertex {
+    Vertex::new(count * step.row, count * step.col)
+}
+
+fn difference(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+/// A place moved by multiples of two edges.
+fn moved(place: Point, edges: [Point; 2], by: [f64; 2]) -> Point {
+    [0, 1].map(|i| place[i] + by[0] * edges[0][i] + by[1] * edges[1][i])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::GridCorner;
+    use super::*;
+
+    const EDGE_PX: f64 = 20.0;
+
+    /// A grid of 5 × 6 corners in the middle of a picture.
+    fn grid() -> Grid {
+        let corner = |row: i32, col: i32| GridCorner {
+            row,
+            col,
+            id: None,
+            x: 100.0 + EDGE_PX * f64::from(col),
+            y: 200.0 - EDGE_PX * f64::from(row),
+            cov: None,
+        };
+        let corners = (0..5).flat_map(|row| (0..6).map(move |col| corner(row, col))).collect();
+        Grid { kind: GridKind::Checker, panel: None, mirrored: false, corners, tags: Vec::new() }
+    }
+
+    /// Squares inside the grid's outermost ones, and something beyond.
+    fn picture(beyond: impl Fn(i32, i32) -> i16) -> Gray<i16> {
+        Gray::from_fn(300, 300, |x, y| {
+            let col = ((x as f64 - 100.0) / EDGE_PX).floor() as i32;
+            let row = ((200.0 - y as f64) / EDGE_PX).floor() as i32;
+            let inside = (-1..5).contains(&row) && (-1..6).contains(&col);
+            match inside {
+                true if (row + col) % 2 == 0 => 100,
+                true => 800,
+                false => beyond(row, col),
+            }
+        })
+    }
+
+    fn goes_on(image: &Gray<i16>) -> bool {
+        go_on(image, &[&grid()]) == [true]
+    }
+
+    #[test]
+    fn paper_and_tables_end_a_board() {
+        assert!(!goes_on(&picture(|_, _| 800)));
+        assert!(!goes_on(&picture(|row, _| if row < 0 { 50 } else { 850 })));
+        // A margin of one square, then something dark.
+        let margin = |row, col| (-2..6).contains(&row) && (-2..7).contains(&col);
+        assert!(!goes_on(&picture(|row, col| if margin(row, col) { 800 } else { 100 })));
+    }
+
+    #[test]
+    fn dots_and_random_cells_go_on() {
+        assert!(goes_on(&picture(|row, col| if (row + col) % 2 == 0 { 100 } else { 800 })));
+        // Every second dot of every second row, as in a dither.
+        assert!(goes_on(&picture(|row, col| if row % 2 == 0 && col % 2 == 0 { 100 } else { 800 })));
+        let random = |row: i32, col: i32| (row * 7919 + col * 104_729).rem_euclid(101) % 2;
+        assert!(goes_on(&picture(|row, col| if random(row, col) == 0 { 100 } else { 800 })));
+    }
+
+    #[test]
+    fn what_belongs_to_another_grid_says_nothing() {
+        let image = picture(|row, col| if (row + col) % 2 == 0 { 100 } else { 800 });
+        let mut around = grid();
+        around.corners.clear();
+        for row in -4..9 {
+            for col in -4..10 {
+                if !(-1..6).contains(&row) || !(-1..7).contains(&col) {
+                    let (x, y) =
+                        (100.0 + EDGE_PX * f64::from(col), 200.0 - EDGE_PX * f64::from(row));
+                    around.corners.push(GridCorner { row, col, id: None, x, y, cov: None });
+                }
+            }
+        }
+        assert!(!go_on(&image, &[&grid(), &around])[0]);
+    }
+}
