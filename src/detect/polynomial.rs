@@ -57,14 +57,8 @@ impl From<QuadricSaddle> for FittedCorner {
 }
 
 impl Form {
-    /// The form in direction `angle`: large where the image is bright. That of degree three is zero
+    /// The form along a unit vector: large where the image is bright. That of degree three is zero
     /// along the edges, that of degree two about there.
-    pub fn at(&self, angle: f64) -> f64 {
-        let (v, u) = angle.sin_cos();
-        self.towards([u, v])
-    }
-
-    /// [`Self::at`] the angle of a unit vector.
     pub fn towards(&self, [u, v]: [f64; 2]) -> f64 {
         match *self {
             Form::Cubic([a, b, c, d]) => {
@@ -117,8 +111,6 @@ impl Polynomial {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::{FRAC_PI_2, PI};
-
     use super::*;
 
     #[test]
@@ -129,13 +121,17 @@ mod tests {
         });
         let fit = Polynomial::new(GridKind::Deltille, 3);
         let form = fit.refine(&monkey, [32.0, 32.0], 5).unwrap().form;
-        assert!(form.at(0.0) > 0.0 && form.at(PI) < 0.0);
+        assert!(form.towards([1.0, 0.0]) > 0.0 && form.towards([-1.0, 0.0]) < 0.0);
         let saddle = Gray::from_fn(64, 64, |x, y| {
             let (u, v) = (x as f32 - 32.0, y as f32 - 32.0);
             0.01 * (u * u - v * v)
         });
         let fit = Polynomial::new(GridKind::Checker, 3);
         let form = fit.refine(&saddle, [32.0, 32.0], 5).unwrap().form;
-        assert!(form.at(0.0) > 0.0 && form.at(FRAC_PI_2) < 0.0 && form.at(PI) > 0.0);
+        assert!(
+            form.towards([1.0, 0.0]) > 0.0
+                && form.towards([0.0, 1.0]) < 0.0
+                && form.towards([-1.0, 0.0]) > 0.0
+        );
     }
 }

@@ -39,6 +39,8 @@
 //! the square of the range of what it is the variance of, or a sixth of the square of Σ|d|, the sum of the
 //! six differences of opposite samples), or of c − m. Only blocks that pass both somewhere are computed, so that nothing is missed.
 
+#![allow(clippy::needless_range_loop, reason = "one index for all rows, so that vectors show")]
+
 use std::ops::Range;
 
 use multiversion::multiversion;

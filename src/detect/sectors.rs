@@ -447,10 +447,16 @@ mod tests {
         let monkey = Form::Cubic([1.0, 0.0, -3.0, 0.0]);
         let rays: [f64; 6] = ordered_rays(&roots(&monkey).unwrap()).unwrap();
         assert!(turn(rays[0], rays[3] + PI).abs() < 1e-9);
-        assert!(monkey.at(rays[0] - 0.3) < 0.0, "dark after an even ray");
+        assert!(
+            monkey.towards([(rays[0] - 0.3).cos(), (rays[0] - 0.3).sin()]) < 0.0,
+            "dark after an even ray"
+        );
         let saddle = Form::Quadratic([1.0, 0.0, -1.0]);
         let rays: [f64; 4] = ordered_rays(&roots(&saddle).unwrap()).unwrap();
         assert!(turn(rays[0], rays[2] + PI).abs() < 1e-9);
-        assert!(saddle.at(rays[0] - 0.3) < 0.0, "dark after an even ray");
+        assert!(
+            saddle.towards([(rays[0] - 0.3).cos(), (rays[0] - 0.3).sin()]) < 0.0,
+            "dark after an even ray"
+        );
     }
 }
