@@ -63,7 +63,11 @@ pub fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
         let goes_on = |lattice: &Lattice, most| lattice.goes_on(is_others, most);
         grid.kind == GridKind::Checker && {
             let all = Lattice::of(image, grid);
-            goes_on(&all, MOST_DIFFERENT) || goes_on(&all.squares(), MOST_DIFFERENT_SQUARES)
+            goes_on(&all, MOST_DIFFERENT) || {
+                let squares = all.squares();
+                let stand_apart = squares.corners.len() < all.corners.len();
+                stand_apart && goes_on(&squares, MOST_DIFFERENT_SQUARES)
+            }
         }
     };
     grids.iter().enumerate().map(goes_on).collect()
@@ -91,12 +95,15 @@ impl<'a> Lattice<'a> {
 
     /// The corners of complete squares.
     fn squares(&self) -> Self {
-        let square =
-            |v: Vertex| [[0, 0], [0, 1], [1, 0], [1, 1]].map(|[r, c]| v + Vertex::new(r, c));
-        let squares = self.corners.keys().map(|&v| square(v));
-        let complete = squares.filter(|vs| vs.iter().all(|v| self.corners.contains_key(v)));
-        let corners = complete.flatten().map(|v| (v, self.corners[&v])).collect();
-        Self { image: self.image, corners }
+        let has = |vertex: Vertex| self.corners.contains_key(&vertex);
+        let is_in_one = |&(&v, _): &(&Vertex, &Point)| {
+            (0..CHECKER).any(|k| {
+                let [a, b] = [k, k + 1].map(step::<CHECKER>);
+                has(v + a) && has(v + b) && has(v + a + b)
+            })
+        };
+        let corners = self.corners.iter().filter(is_in_one).map(|(&v, &corner)| (v, corner));
+        Self { image: self.image, corners: corners.collect() }
     }
 
     /// Whether more than some part of what is beyond alternates; `is_others` tells whether a corner of
