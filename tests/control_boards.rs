@@ -51,9 +51,15 @@ fn board(family: &Family, first_id: u32, spacing: u32, cols: u32) -> Board {
 /// A family of as many bits whose codes are coin tosses.
 fn random_family(like: &Family, rng: &mut ChaCha8Rng) -> Family {
     let mask = like.dimension().mask();
-    let codes = (0..60).map(|_| rng.random::<u64>() & mask).collect();
-    let (rules, construction) = (like.rules().clone(), like.construction().clone());
-    Family::new("random", like.dimension(), 1, codes, rules, construction).unwrap()
+    // Of few bits some are now and then the same, perhaps turned: no family.
+    loop {
+        let codes = (0..60).map(|_| rng.random::<u64>() & mask).collect();
+        let (rules, construction) = (like.rules().clone(), like.construction().clone());
+        let family = Family::new("random", like.dimension(), 1, codes, rules, construction);
+        if let Ok(family) = family {
+            return family;
+        }
+    }
 }
 
 fn flopped(image: &Gray<f32>) -> Gray<f32> {

@@ -339,9 +339,8 @@ impl<const K: usize> Look<K> {
             product(tangents[0], normals[1]) / lengths - rho * by_turn[0],
             product(normals[0], tangents[1]) / lengths - rho * by_turn[1],
         ];
-        let parts = |a: [f64; 2], b: [f64; 2]| {
-            [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
-        };
+        let parts =
+            |a: [f64; 2], b: [f64; 2]| [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]];
         let by_astigmatism: [[f64; K]; 2] = [0, 1].map(|e| {
             std::array::from_fn(|k| parts(normals[k], normals[k])[e] / (2.0 * squares[k]))
         });
@@ -426,7 +425,8 @@ impl CornerFitter {
                 damping *= 10.0;
                 continue;
             };
-            let is_toned_anew = |tolerance| optics.is_toned() && !moved.is_lit_like(&toned, tolerance);
+            let is_toned_anew =
+                |tolerance| optics.is_toned() && !moved.is_lit_like(&toned, tolerance);
             let (is_last, tolerance) = match accuracy {
                 Accuracy::Full => {
                     let small = step.dot(&(matrix * step)) < CONVERGED * noise * noise;

@@ -37,6 +37,12 @@ const BLUR_STEP: f64 = 1.12;
 const LEAST_BLUR_PX: f64 = 0.35;
 const BLUR_STEPS: i32 = 26;
 
+/// Every so manieth of them is tried first, then those around the best.
+const COARSE_STEPS: i32 = 4;
+
+/// Edges of a direction that tell how much of white is clipped.
+const CLIPPED_EDGES: usize = 20;
+
 /// The part of the image's full scale from which a pixel may be saturated.
 const SATURATED: f64 = 0.985;
 
@@ -97,6 +103,8 @@ struct Profile {
     values: [f64; ACROSS],
     normal: [f64; 2],
     saturated: bool,
+    /// Variance of a sample by what differs along the edge.
+    variance: f64,
 }
 
 impl GridLight {
@@ -136,9 +144,11 @@ impl GridLight {
         }
         let (mut curvature, mut power) = (0.0, 0.0);
         let (mut squares, mut freedom) = (0.0, 0.0);
+        let mut variances = 0.0;
         let mut widths = Vec::new();
         for profiles in by_direction.iter().filter(|profiles| !profiles.is_empty()) {
-            let (sigma_px, _) = best_width(profiles, light.clipped_share);
+            let all: Vec<&Profile> = profiles.iter().collect();
+            let (sigma_px, _) = best_width(&all, light.clipped_share);
             let mut outer = [0.0; 3];
             for profile in profiles {
                 let [x, y] = profile.normal;
@@ -147,6 +157,7 @@ impl GridLight {
                 if let Some(fit) = profile.fit(sigma_px, light.clipped_share) {
                     curvature += fit.half_contrast * fit.curved;
                     power += fit.half_contrast.powi(2);
+                    variances += profile.variance;
                     squares += fit.squares;
                     freedom += (ACROSS - 3) as f64 * fit.half_contrast.powi(2);
                 }
@@ -160,8 +171,10 @@ impl GridLight {
         if light.clipped_share < 1.0 {
             light.tone = 0.0;
         }
-        // Samples are means of several, and contrasts twice the amplitude.
-        light.noise = (squares / freedom * ALONG.len() as f64).sqrt() / 2.0;
+        // Contrasts are twice the amplitude. What the fits leave shows shapes of the blur that are no Gaussian, but
+        // hardly noise, where samples lie closer than pixels.
+        let left = squares / freedom * ALONG.len() as f64;
+        light.noise = left.max(variances / power).sqrt() / 2.0;
         light.blur_px2 = covariance(&widths);
         Some(light)
     }
@@ -298,18 +311,25 @@ impl GridLight {
             reach[0] + (reach[1] - reach[0]) * j as f64 / (ACROSS - 1) as f64
         });
         let mut values = [0.0; ACROSS];
+        let mut variance = 0.0;
         for (j, value) in values.iter_mut().enumerate() {
-            for t in ALONG {
+            let mut samples = [0.0; ALONG.len()];
+            for (sample, t) in samples.iter_mut().zip(ALONG) {
                 let x = p[0] + t * along[0] + distances_px[j] * bright[0];
                 let y = p[1] + t * along[1] + distances_px[j] * bright[1];
                 if !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
                     return None;
                 }
-                *value += f64::from(image.bilinear(x, y)) / ALONG.len() as f64;
+                *sample = f64::from(image.bilinear(x, y));
             }
+            let [a, b, c] = samples;
+            *value = (a + b + c) / 3.0;
+            // What rises evenly cancels; 1 + 4 + 1 variances are left.
+            variance += (a - 2.0 * b + c).powi(2) / (6 * ACROSS) as f64;
             saturated += usize::from(*value >= full);
         }
-        Some(Profile { distances_px, values, normal: bright, saturated: saturated >= 2 })
+        let saturated = saturated >= 2;
+        Some(Profile { distances_px, values, normal: bright, saturated, variance })
     }
 }
 
@@ -350,7 +370,19 @@ impl Profile {
 }
 
 /// The width of the blur across edges of one direction that leaves least, px, and what it leaves.
-fn best_width(profiles: &[Profile], clipped_share: f64) -> (f64, f64) {
+fn best_width(profiles: &[&Profile], clipped_share: f64) -> (f64, f64) {
+    let coarse = best_step(profiles, clipped_share, (0..BLUR_STEPS).step_by(COARSE_STEPS as usize));
+    let around = (coarse.0 - COARSE_STEPS + 1).max(0)..(coarse.0 + COARSE_STEPS).min(BLUR_STEPS);
+    let (step, left) = best_step(profiles, clipped_share, around);
+    (LEAST_BLUR_PX * BLUR_STEP.powi(step), left)
+}
+
+/// Of some steps of the blur's deviation the one that leaves least, and what it leaves.
+fn best_step(
+    profiles: &[&Profile],
+    clipped_share: f64,
+    steps: impl Iterator<Item = i32>,
+) -> (i32, f64) {
     let left = |step: i32| {
         let sigma_px = LEAST_BLUR_PX * BLUR_STEP.powi(step);
         // Where nothing of the edge is left it cannot be fitted.
@@ -359,17 +391,21 @@ fn best_width(profiles: &[Profile], clipped_share: f64) -> (f64, f64) {
             .map(|p| p.fit(sigma_px, clipped_share).map_or(f64::INFINITY, |fit| fit.squares));
         squares.sum::<f64>()
     };
-    let all: Vec<f64> = (0..BLUR_STEPS).map(left).collect();
-    let best = (0..all.len()).min_by(|&a, &b| all[a].total_cmp(&all[b])).unwrap_or(0);
-    (LEAST_BLUR_PX * BLUR_STEP.powi(best as i32), all[best])
+    let all = steps.map(|step| (step, left(step)));
+    all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::INFINITY))
 }
 
-/// θ: the largest with which the edges of all directions leave nearly the least, or no more than samples of this
+/// θ: the largest with which some edges of all directions leave nearly the least, or no more than samples of this
 /// deviation do.
 fn clipped_share(by_direction: &[Vec<Profile>], deviation: f64) -> f64 {
-    let left =
-        |share: f64| by_direction.iter().map(|profiles| best_width(profiles, share).1).sum::<f64>();
-    let samples = ACROSS * by_direction.iter().map(Vec::len).sum::<usize>();
+    let some: Vec<Vec<&Profile>> = by_direction
+        .iter()
+        .map(|profiles| {
+            profiles.iter().step_by(profiles.len().div_ceil(CLIPPED_EDGES).max(1)).collect()
+        })
+        .collect();
+    let left = |share: f64| some.iter().map(|profiles| best_width(profiles, share).1).sum::<f64>();
+    let samples = ACROSS * some.iter().map(Vec::len).sum::<usize>();
     let tried = CLIPPED_SHARES.map(|share| (left(share), share));
     let least = tried.iter().map(|(left, _)| *left).fold(f64::INFINITY, f64::min);
     let limit = CLIPPING_GAIN * least.max(samples as f64 * deviation * deviation);

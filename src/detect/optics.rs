@@ -141,9 +141,7 @@ impl Optics {
     /// A parameter, for the corners' equations.
     fn common(&self, parameter: usize) -> Common {
         match parameter {
-            0..TONE_PARAMS => {
-                Common::Tone { parameter, moved: Box::new(self.moved(parameter)) }
-            }
+            0..TONE_PARAMS => Common::Tone { parameter, moved: Box::new(self.moved(parameter)) },
             HALO => Common::Halo,
             _ => Common::Astigmatism(parameter - TONE_PARAMS),
         }

@@ -37,6 +37,9 @@ const CORRELATION_STEP: f64 = 0.2;
 /// Deviation of a sample by what the model leaves out, over the contrast: places, the shape of the blur, dirt.
 const MODEL_ERROR: f64 = 0.05;
 
+/// Pixels whose noise a sample between them is the mean of: 1 / (2/3)².
+const SAMPLE_PX2: f64 = 2.25;
+
 /// Deviation of the levels, over the contrast, and of their slopes over a tile.
 const LEVEL_ERROR: f64 = 0.15;
 const SLOPE_ERROR: f64 = 0.2;
@@ -190,7 +193,8 @@ impl CellModel {
             self.points.iter().map(|&p| self.white_beyond(p, [uu, uv, vv])).collect();
         // Samples closer than pixels share their noise.
         let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
-        let variance = (noise * noise + MODEL_ERROR * MODEL_ERROR) * samples_px2.max(1.0);
+        let variance = noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
+            + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
         let mut normal = design.tr_mul(&design) / variance;
         for i in 0..bits + 3 {
             normal[(i, i)] += 1.0;

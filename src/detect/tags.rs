@@ -14,8 +14,10 @@ use crate::target::{Panel, TagsIn};
 /// The contrast at the edges of a tile must be this part of that at its corners.
 const MIN_CONTRAST: f64 = 0.4;
 
-/// Samples this much brighter than the white around are no paper, in contrasts.
+/// Samples this much brighter than the white around are no paper, in contrasts, and by so many deviations of the noise
+/// more: without these, noise would take away white cells alone.
 const GLARE: f64 = 0.35;
+const GLARE_NOISE: f64 = 3.0;
 
 /// The part of the image's full scale from which a pixel may be saturated.
 const SATURATED: f64 = 0.985;
@@ -182,6 +184,7 @@ impl TagReader {
         // Cells of the colour around the border are 1, on inverted boards dark ones.
         let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);
         let full = SATURATED * f64::from(T::FULL_SCALE);
+        let brightest = 1.0 + GLARE + GLARE_NOISE * light.noise;
         let mut samples = Vec::with_capacity(self.model.points().len());
         for &point in self.model.points() {
             let [x, y] = map.image_from_tile(point);
@@ -194,7 +197,7 @@ impl TagReader {
             let brightness = (value - dark) / contrast;
             let share = light.share(brightness).clamp(-0.5, 1.5) as f32;
             let saturated = value >= full;
-            samples.push(if contrast <= 0.0 || contrast.is_nan() || brightness > 1.0 + GLARE {
+            samples.push(if contrast <= 0.0 || contrast.is_nan() || brightness > brightest {
                 Sample::Erased
             } else if saturated && light.clipped_share < 1.0 {
                 Sample::AtLeast(light.clipped_share as f32)
