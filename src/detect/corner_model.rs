@@ -570,9 +570,10 @@ impl CornerFitter {
                     let there = toned(moved).terms;
                     let slopes = std::array::from_fn(|j| (there[j] - piece.terms[j]) / STEP as f32);
                     let slopes = Piece { terms: slopes, ratio: 0.0 };
-                    for i in 0..window.count {
-                        columns[TONE + parameter][i] =
-                            columns[RISE][i] * slopes.bulge(columns[SHADE][i]);
+                    let (filled, tones) = columns.split_at_mut(TONE);
+                    let shown = filled[RISE].iter().zip(&filled[SHADE]).take(window.count);
+                    for (by, (rise, &shade)) in tones[*parameter].iter_mut().zip(shown) {
+                        *by = rise * slopes.bulge(shade);
                     }
                     TONE + parameter
                 }
