@@ -56,6 +56,12 @@ const CLIPPING_GAIN: f64 = 1.5;
 /// Deviation of a sample that any picture has, of full scale: half a step of 8 bits.
 const LEAST_DEVIATION: f64 = 0.002;
 
+/// Variance of the levels that an edge tells, over that of a sample: a few samples on either side tell them.
+const EDGE_VARIANCE: f64 = 0.16;
+
+/// Deviation of the slopes of black and white over a tile, over the contrast: steeper ones are noise.
+const SLOPE: f64 = 0.2;
+
 /// Largest curvature of a tone curve: that of gamma 2.6 between white and a black of a twentieth is 0.4.
 const MOST_CURVATURE: f64 = 0.45;
 
@@ -221,7 +227,10 @@ impl GridLight {
                 [1.0, 1.0]
             }
         };
+        let [mu, mv] = self.kind.middle();
         let mut normal = Matrix3::<f64>::zeros();
+        let slopes = EDGE_VARIANCE * (self.noise / SLOPE).powi(2);
+        (1..3).for_each(|i| normal[(i, i)] = slopes);
         let mut right = [Vector3::zeros(); 2];
         for i in 0..vertices.len() {
             let (from, to) = (vertices[i], vertices[(i + 1) % vertices.len()]);
@@ -234,13 +243,16 @@ impl GridLight {
                 .or_insert_with(|| self.edge_levels(&self.profile(image, grid, edge.0, edge.1)?));
             let [dark, contrast] = levels?;
             let ([u0, v0], [u1, v1]) = (place(from), place(to));
-            let row = Vector3::new(1.0, 0.5 * (u0 + u1), 0.5 * (v0 + v1));
+            let row = Vector3::new(1.0, 0.5 * (u0 + u1) - mu, 0.5 * (v0 + v1) - mv);
             normal += row * row.transpose();
             right[0] += row * dark;
             right[1] += row * contrast;
         }
         let inverse = normal.try_inverse()?;
-        let [dark, contrast] = right.map(|right| (inverse * right).into());
+        let [dark, contrast] = right.map(|right| {
+            let [middle, a, b]: [f64; 3] = (inverse * right).into();
+            [middle - a * mu - b * mv, a, b]
+        });
         Some(Levels { dark, contrast })
     }
 

@@ -647,8 +647,8 @@ mod tests {
     use crate::family::{shipped_names, square_names};
     use crate::target::{BoardSpec, PaperSpec, TagSpec, TargetSpec};
 
-    /// Noise, of full scale, at which 10.8 % of the cells of four pixels a bit are taken for the other.
-    const NOISE_OF_A_TENTH: f64 = 0.35;
+    /// Noise, of full scale, at which more than a tenth of the cells of four pixels a bit are taken for the other.
+    const NOISE_OF_A_TENTH: f64 = 0.335;
 
     /// Half odds of a cell that is read without doubt.
     const SURE: f32 = 2.6;
@@ -794,6 +794,8 @@ mod tests {
         tags: usize,
         /// Cells that are more likely the other than the one printed.
         cell_errors: usize,
+        /// And as many as there should be by the odds.
+        expected_errors: f32,
         /// Tags with no more wrong cells than the family corrects.
         by_decisions: usize,
         /// Tags that label the corners around them.
@@ -802,6 +804,25 @@ mod tests {
         words: usize,
         false_decisions: usize,
         false_evidence: usize,
+        /// Λ of each tag where no other word has more, and the greatest of each of the other words.
+        of_tags: Vec<f32>,
+        of_words: Vec<f32>,
+    }
+
+    impl NoisyTags {
+        /// The part of the tags that have more evidence than other words have as seldom as they pass for a tag by
+        /// decisions.
+        fn read_at_the_rate_of_decisions(&self) -> f64 {
+            let mut of_words = self.of_words.clone();
+            of_words.sort_by(|a, b| b.total_cmp(a));
+            let least = of_words[self.false_decisions];
+            let read = self.of_tags.iter().filter(|&&evidence| evidence > least).count();
+            read as f64 / self.tags as f64
+        }
+    }
+
+    fn most(evidence: &[f32]) -> f32 {
+        evidence.iter().copied().fold(f32::NEG_INFINITY, f32::max)
     }
 
     fn noisy_tags(noise: f64, views: u64, words_a_view: usize) -> NoisyTags {
@@ -858,7 +879,14 @@ mod tests {
             let errors = (readings[at].word() ^ code).count_ones();
             seen.tags += 1;
             seen.cell_errors += errors as usize;
+            let wrong = |odds: &f32| 1.0 / (1.0 + (2.0 * odds.abs()).exp());
+            seen.expected_errors += readings[at].half_odds.iter().map(wrong).sum::<f32>();
             seen.by_decisions += usize::from(errors <= family.correctable());
+            let evidence = labeller.words.evidence(&readings[at].half_odds);
+            let of_tag = labeller.words.evidence_of(code, &readings[at].half_odds);
+            if of_tag > most(&evidence) - 1e-3 {
+                seen.of_tags.push(of_tag);
+            }
             let right = |found: Labelled| found.vertices.iter().all(|(from, to)| from == to);
             seen.by_evidence += usize::from(found(readings.clone()).is_some_and(right));
             for _ in 0..words_a_view {
@@ -867,6 +895,7 @@ mod tests {
                 for odds in &mut other[at].half_odds {
                     *odds *= if rng.random() { 1.0 } else { -1.0 };
                 }
+                seen.of_words.push(most(&labeller.words.evidence(&other[at].half_odds)));
                 let word = other[at].word();
                 let is_near = |index: usize| {
                     (labeller.words.word(index) ^ word).count_ones() <= family.correctable()
@@ -879,24 +908,27 @@ mod tests {
         seen
     }
 
-    /// With noise that misleads 10.8 % of cells, decisions cell by cell read some 82 % of the tags.
+    /// With noise that misleads some 10.5 % of cells, decisions cell by cell read 83 % of the tags.
     #[test]
     #[ignore = "a minute; prints the rates"]
     fn noisy_tags_are_read_by_evidence_no_more_often_wrong_than_by_decisions() {
         let seen = noisy_tags(NOISE_OF_A_TENTH, 4000, 50);
         let [tags, words] = [seen.tags, seen.words].map(|n| n as f64);
         let cell_errors = seen.cell_errors as f64 / (36.0 * tags);
+        let read = seen.read_at_the_rate_of_decisions();
         println!(
-            "{:.4} of cells wrong; read by decisions {:.4}, by evidence {:.4}; of other words by decisions {:.6}, by evidence {:.6}",
-            cell_errors,
+            "{cell_errors:.4} of cells wrong, {:.4} by the odds; by decisions {:.4} read and {:.6} of other words; by evidence {read:.4} \
+             at the same rate; labelled {:.4} and {:.6} of other words",
+            f64::from(seen.expected_errors) / (36.0 * tags),
             seen.by_decisions as f64 / tags,
-            seen.by_evidence as f64 / tags,
             seen.false_decisions as f64 / words,
+            seen.by_evidence as f64 / tags,
             seen.false_evidence as f64 / words,
         );
-        assert!((0.103..0.113).contains(&cell_errors), "{seen:?}");
-        assert!(seen.by_evidence as f64 > 0.95 * tags, "{seen:?}");
-        assert!(seen.false_evidence <= seen.false_decisions, "{seen:?}");
+        assert!((0.103..0.113).contains(&cell_errors));
+        assert!(read >= 0.95);
+        assert!(seen.false_evidence <= seen.false_decisions);
+        assert!(seen.by_evidence > seen.by_decisions);
     }
 
     /// Whatever is seen in a board's tiles is taken for tags of another board less often than allowed for.

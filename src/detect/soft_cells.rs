@@ -40,6 +40,10 @@ const MODEL_ERROR: f64 = 0.05;
 /// Pixels whose noise a sample between them is the mean of: 1 / (2/3)².
 const SAMPLE_PX2: f64 = 2.25;
 
+/// How much more the variance of noise counts than that of a sample alone: black, white and the width of the blur are
+/// measured through the same noise.
+const NOISE_WEIGHT: f64 = 1.5;
+
 /// Deviation of the levels, over the contrast, and of their slopes over a tile.
 const LEVEL_ERROR: f64 = 0.15;
 const SLOPE_ERROR: f64 = 0.2;
@@ -193,7 +197,7 @@ impl CellModel {
             self.points.iter().map(|&p| self.white_beyond(p, [uu, uv, vv])).collect();
         // Samples closer than pixels share their noise.
         let samples_px2 = n as f64 / (bits as f64 * self.cell_area() * area_px2);
-        let variance = noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
+        let variance = NOISE_WEIGHT * noise * noise * (SAMPLE_PX2 * samples_px2).max(1.0)
             + MODEL_ERROR * MODEL_ERROR * samples_px2.max(1.0);
         let mut normal = design.tr_mul(&design) / variance;
         for i in 0..bits + 3 {
