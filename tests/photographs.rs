@@ -5,7 +5,7 @@ mod common;
 use std::collections::BTreeMap;
 
 use common::data;
-use deltille::detect::{Detector, DetectorConfig, Grid};
+use deltille::detect::{Detector, DetectorConfig, Grid, InkEstimate};
 use deltille::export::dsc;
 use deltille::family::Family;
 use deltille::raster;
@@ -60,6 +60,23 @@ fn all_110_corners_of_the_robot_hand_photographs() {
     }
     println!("{complete} of {} photographs complete", images.len());
     assert_eq!(complete, images.len());
+}
+
+/// What looks like a tone curve in these pictures is the print's: every one of them says the same, from whatever side
+/// and distance.
+#[test]
+fn all_pictures_of_one_print_have_the_same_ink() {
+    let Some(images) = images("robot-hand") else { return };
+    let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
+    let ink = |path: &PathBuf| detector.detect_any(&raster::read(path).unwrap(), "photograph").ink;
+    let inks: Vec<InkEstimate> = images.iter().step_by(3).filter_map(ink).collect();
+    let all = InkEstimate::of_all(&inks).unwrap();
+    println!("{all}, from {} of {} pictures", all.pictures, images.len().div_ceil(3));
+    assert!(all.used && inks.len() == images.len().div_ceil(3));
+    assert!(
+        inks.iter().all(|ink| ink.used && (ink.edges / all.edges - 1.0).abs() < 0.1),
+        "{inks:?}"
+    );
 }
 
 #[test]

@@ -19,6 +19,7 @@
 //! once. Errors are below 3·10⁻⁶ (tests).
 
 use std::f32::consts::{FRAC_1_SQRT_2, FRAC_2_PI, LN_2, LOG2_E};
+use std::f64::consts::PI;
 
 /// √(2/π): the slope of erf(h/√2) at 0.
 const SLOPE: f32 = 0.797_884_6;
@@ -39,6 +40,8 @@ pub struct Shade<const K: usize> {
     pub correlation: f32,
     /// ∂f/∂α, of the strength of a halo; 0 without one.
     pub halo: f32,
+    /// Derivatives by the parameters of a triangle between the edges; 0 without one.
+    pub triangle: [f32; TRIANGLE_PARAMS],
 }
 
 /// The brightness around a corner of K edges.
@@ -90,7 +93,112 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Haloed<P> {
             slopes: std::array::from_fn(|k| both(sharp.slopes[k], wide.slopes[k] * self.narrower)),
             correlation: both(sharp.correlation, wide.correlation),
             halo: sharp.f - wide.f,
+            triangle: [0.0; TRIANGLE_PARAMS],
         }
+    }
+}
+
+/// The triangle between three edges that miss each other, since what is dark has grown or shrunk: the dark tiles
+/// overlap there, where the alternating sum has −3. Blurred, it is nearly a Gaussian with the triangle's area,
+/// centroid and variance.
+#[derive(Clone, Copy, Debug)]
+pub struct Overlap {
+    /// 1 where what is dark has grown, −1 where it has shrunk.
+    sign: f64,
+    /// Logarithm of what it adds to f in its middle.
+    ln_height: f64,
+    /// Its middle: distances from the first two edges in units of the blur.
+    middle: [f64; 2],
+    /// Inverse of its covariance: xx, xy, yy.
+    inverse: [f64; 3],
+}
+
+impl Overlap {
+    /// Between h₁ = 0, h₂ = 0 and h₃ = a·h₁ + b·h₂ + c = 0 under a blur of this correlation along the first two
+    /// normals.
+    pub fn between([a, b, c]: [f64; 3], rho: f64, sign: f64) -> Self {
+        let [x, y] = [-c / a, -c / b];
+        let [xx, xy, yy] = [1.0 + x * x / 18.0, rho - x * y / 36.0, 1.0 + y * y / 18.0];
+        let determinant = xx * yy - xy * xy;
+        let area = 0.5 * (x * y).abs();
+        // From −3 to −1.
+        let height = 2.0 * area / (2.0 * PI * determinant.sqrt());
+        Self {
+            sign,
+            ln_height: height.ln(),
+            middle: [x, y].map(|side| side / 3.0),
+            inverse: [yy, -xy, xx].map(|entry| entry / determinant),
+        }
+    }
+
+    /// Its relative derivative by what moves it to `other` in a step: coefficients of 1, x, y, x², xy and y², at
+    /// a distance (x, y) from the middle.
+    fn towards(&self, other: &Self, step: f64) -> [f32; 6] {
+        let by = |from: f64, to: f64| (to - from) / step;
+        let [x, y] = [0, 1].map(|i| by(self.middle[i], other.middle[i]));
+        let [xx, xy, yy] = self.inverse;
+        let [by_xx, by_xy, by_yy] = [0, 1, 2].map(|i| by(self.inverse[i], other.inverse[i]));
+        [
+            by(self.ln_height, other.ln_height),
+            xx * x + xy * y,
+            xy * x + yy * y,
+            -0.5 * by_xx,
+            -by_xy,
+            -0.5 * by_yy,
+        ]
+        .map(|coefficient| coefficient as f32)
+    }
+}
+
+/// Parameters that a triangle depends on, beside the distances from the edges.
+pub const TRIANGLE_PARAMS: usize = 5;
+
+/// An [`Overlap`] with its derivatives, for many pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct Triangle {
+    height: f32,
+    middle: [f32; 2],
+    inverse: [f32; 3],
+    by: [[f32; 6]; TRIANGLE_PARAMS],
+}
+
+impl Triangle {
+    /// With what becomes of it after a step in each parameter.
+    pub fn new(here: Overlap, there: [Overlap; TRIANGLE_PARAMS], step: f64) -> Self {
+        Self {
+            height: (here.sign * here.ln_height.exp()) as f32,
+            middle: here.middle.map(|c| c as f32),
+            inverse: here.inverse.map(|c| c as f32),
+            by: there.map(|there| here.towards(&there, step)),
+        }
+    }
+}
+
+/// Three edges that miss each other, with the triangle between them.
+#[derive(Clone, Copy, Debug)]
+pub struct Inked<P> {
+    /// The edges.
+    pub edges: P,
+    /// What lies between them.
+    pub triangle: Triangle,
+}
+
+impl<const K: usize, P: Pattern<K>> Pattern<K> for Inked<P> {
+    #[inline(always)]
+    fn at(&self, h: [f32; K]) -> Shade<K> {
+        let Triangle { height, middle, inverse: [xx, xy, yy], by } = self.triangle;
+        let mut shade = self.edges.at(h);
+        let (x, y) = (h[0] - middle[0], h[1] - middle[1]);
+        let (by_x, by_y) = (xx * x + xy * y, xy * x + yy * y);
+        let here = height * exp_negative(-0.5 * (x * by_x + y * by_y));
+        shade.f += here;
+        shade.slopes[0] -= here * by_x;
+        shade.slopes[1] -= here * by_y;
+        for p in 0..TRIANGLE_PARAMS {
+            let [c, cx, cy, cxx, cxy, cyy] = by[p];
+            shade.triangle[p] = here * (c + x * (cx + cxx * x + cxy * y) + y * (cy + cyy * y));
+        }
+        shade
     }
 }
 
@@ -101,6 +209,7 @@ fn deltille([h1, h2, h3]: [f32; 3]) -> Shade<3> {
         slopes: [SLOPE * bell(h1), -SLOPE * bell(h2), SLOPE * bell(h3)],
         correlation: 0.0,
         halo: 0.0,
+        triangle: [0.0; TRIANGLE_PARAMS],
     }
 }
 
@@ -148,6 +257,7 @@ impl Orthant {
             ],
             correlation: FRAC_2_PI / self.sine * exp_negative(exponent),
             halo: 0.0,
+            triangle: [0.0; TRIANGLE_PARAMS],
         }
     }
 }

@@ -90,6 +90,8 @@ pub struct Edge {
     pub angle_rad: f64,
     /// Curvature to the left of that direction (to greater v of u), 1/px.
     pub bend: f64,
+    /// How far from it something lies that is an edge of a tile away on the print, px.
+    pub across_px: f64,
 }
 
 impl Surroundings {
@@ -273,17 +275,26 @@ fn edges(
         let bend = mean(along.filter_map(|v| bend_at(v, step)))
             .or_else(|| mean(grid.kind.neighbours(vertex).filter_map(|v| bend_at(v, step))))
             .unwrap_or(0.0);
+        let along = chord.normalize_or_zero();
+        let off = steps.iter().map(|&other| along.perp_dot(place(other).into()).abs());
+        let across_px = off.sum::<f64>() / rows_apart(grid.kind, step);
         let angle_rad = chord.to_angle();
         // Turned by half, left is right.
         match angle_rad {
-            ..0.0 => Edge { angle_rad: angle_rad + PI, bend: -bend },
-            PI.. => Edge { angle_rad: angle_rad - PI, bend: -bend },
-            _ => Edge { angle_rad, bend },
+            ..0.0 => Edge { angle_rad: angle_rad + PI, bend: -bend, across_px },
+            PI.. => Edge { angle_rad: angle_rad - PI, bend: -bend, across_px },
+            _ => Edge { angle_rad, bend, across_px },
         }
     };
     let mut edges: Vec<Edge> = steps[..steps.len() / 2].iter().map(edge).collect();
     edges.sort_by(|a, b| a.angle_rad.total_cmp(&b.angle_rad));
     edges
+}
+
+/// The sum of the distances of all neighbours from the line along one of them, in edges.
+fn rows_apart(kind: GridKind, step: Vertex) -> f64 {
+    let place = |v: Vertex| DVec2::from(kind.position(v.row.into(), v.col.into()));
+    kind.steps().iter().map(|&other| place(step).perp_dot(place(other)).abs()).sum()
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {

@@ -7,6 +7,10 @@
 //!     s_k²   = s² · nᵀ M n,      n = (−sin θ_k, cos θ_k)
 //! ```
 //!
+//! Where ink has spread on the print, what is dark has grown: every line of a corner of three edges lies aside,
+//! both halves the same way, by ink times the image of an edge across it, and the three miss each other. The
+//! position is where they would meet on a print without. Of two edges the halves move against each other, and the corner stays.
+//!
 //! T is the camera's tone curve between the corner's black and white, r the sum of their light over
 //! its difference ([`super::curve`]); of a linear camera T(S) = S and I = (level + amplitude·f)·g.
 //! M, of trace 2, tells in which direction the picture is blurred more. Both, and halos in f, are the
@@ -25,10 +29,10 @@
 use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::blurred_corner::{Deltille, Haloed, Orthant, Pattern, Shade};
+use super::blurred_corner::{Deltille, Haloed, Inked, Orthant, Overlap, Pattern, Shade, Triangle};
 use super::correlation::Influence;
 use super::curve::{Piece, TONE_PARAMS};
-use super::optics::{Optics, STEP};
+use super::optics::{INK_UNIT, Optics, STEP};
 use crate::raster::{Gray, Intensity};
 
 /// Largest radius of a window, px.
@@ -129,6 +133,9 @@ pub struct Corner<const K: usize> {
     pub angles: [f64; K],
     /// Curvatures of the edges, to the left of their directions (to greater v of u), 1/px.
     pub bends: [f64; K],
+    /// How far from each edge something lies that is an edge of a tile away on the print, px; 0 where no grid
+    /// tells it.
+    pub across_px: [f64; K],
 }
 
 /// A fitted corner and what is known about its errors.
@@ -231,13 +238,14 @@ impl Window {
 }
 
 /// What all corners have in common is told by further rows: amplitude · (1 − S²), S, and derivatives by the two
-/// parameters of astigmatism and by the strength of the halo.
+/// parameters of astigmatism, by the strength of the halo and by the ink.
 const RISE: usize = PARAMS + 1;
 const SHADE: usize = PARAMS + 2;
 const ASTIGMATISM: usize = PARAMS + 3;
 const HALO: usize = PARAMS + 5;
+const INK: usize = PARAMS + 6;
 /// Derivatives by the parameters of the tone curve.
-const TONE: usize = PARAMS + 6;
+const TONE: usize = PARAMS + 7;
 /// All of them, in blocks of four.
 const ALL: usize = (TONE + TONE_PARAMS).next_multiple_of(4);
 
@@ -274,6 +282,8 @@ pub(super) enum Common {
     Astigmatism(usize),
     /// The strength of the halo.
     Halo,
+    /// How far what is dark has grown on the print.
+    Ink,
 }
 
 /// The normal equations of a corner and the optics.
@@ -319,8 +329,56 @@ struct Look<const K: usize> {
     piece: Piece,
     /// Strength of the halo, and its width over that of the blur.
     halo: [f32; 2],
+    /// How far ink displaces the edges, in units of the blur, its derivatives by the ink, and what is between.
+    displaced: [f64; K],
+    by_ink: [f64; K],
+    triangle: Option<Triangle>,
     /// The darkest and the brightest that is seen.
     limits: [f32; 2],
+}
+
+/// How far an ink of 1 displaces the edges, in units of the blur.
+///
+/// What is dark lies on the right of the first and the third edge where the contrast is positive, and on the
+/// left of the second. Of two edges each half moves its own way, and the corner stays.
+fn by_ink<const K: usize>(corner: &Corner<K>, sharpness: [f64; K]) -> [f64; K] {
+    std::array::from_fn(|k| match (K, k) {
+        (3, 1) => -INK_UNIT * corner.amplitude.signum() * corner.across_px[k] * sharpness[k],
+        (3, _) => INK_UNIT * corner.amplitude.signum() * corner.across_px[k] * sharpness[k],
+        _ => 0.0,
+    })
+}
+
+/// The triangle between three edges that ink displaces, with its derivatives by ln s, the angles and the ink.
+fn triangle<const K: usize>(corner: &Corner<K>, optics: &Optics) -> Triangle {
+    const STEP: f64 = 1e-4;
+    let [e1, e2] = optics.astigmatism;
+    let overlap = |corner: &Corner<K>, ink: f64| {
+        let normals = corner.angles.map(|angle| [-angle.sin(), angle.cos()]);
+        let product = |[ax, ay]: [f64; 2], [bx, by]: [f64; 2]| {
+            (1.0 + e1) * ax * bx + e2 * (ax * by + ay * bx) + (1.0 - e1) * ay * by
+        };
+        let lengths = normals.map(|n| product(n, n).sqrt());
+        let rho = product(normals[0], normals[1]) / (lengths[0] * lengths[1]);
+        let displaced =
+            by_ink(corner, lengths.map(|l| 1.0 / (corner.blur_px * l))).map(|by| by * ink);
+        // n₃ as a sum of n₁ and n₂.
+        let sine = |from: usize, to: usize| (corner.angles[to] - corner.angles[from]).sin();
+        let a = sine(2, 1) / sine(0, 1) * lengths[0] / lengths[2];
+        let b = sine(0, 2) / sine(0, 1) * lengths[1] / lengths[2];
+        let c = a * displaced[0] + b * displaced[1] - displaced[2];
+        Overlap::between([a, b, c], rho, displaced[0].signum())
+    };
+    let there = std::array::from_fn(|parameter| {
+        let (mut moved, mut ink) = (*corner, optics.ink);
+        match parameter {
+            0 => moved.blur_px *= STEP.exp(),
+            1..=3 => moved.angles[parameter - 1] += STEP,
+            _ => ink += STEP,
+        }
+        overlap(&moved, ink)
+    });
+    Triangle::new(overlap(corner, optics.ink), there, STEP)
 }
 
 impl<const K: usize> Look<K> {
@@ -348,10 +406,17 @@ impl<const K: usize> Look<K> {
             let [first, second] = [by_astigmatism[e][0], by_astigmatism[e][1]];
             parts(normals[0], normals[1])[e] / lengths - rho * (first + second)
         });
+        let sharpness = squares.map(|square| 1.0 / (corner.blur_px * square.sqrt()));
+        let by_ink = by_ink(corner, sharpness);
+        let displaced = by_ink.map(|by| by * optics.ink);
+        let triangle = displaced.iter().any(|d| *d != 0.0).then(|| triangle(corner, optics));
         Self {
             by_astigmatism,
             rho_by_astigmatism,
-            sharpness: squares.map(|square| 1.0 / (corner.blur_px * square.sqrt())),
+            sharpness,
+            displaced,
+            by_ink,
+            triangle,
             by_turn,
             rho,
             rho_by_angle,
@@ -579,6 +644,7 @@ impl CornerFitter {
                 }
                 Common::Astigmatism(i) => ASTIGMATISM + i,
                 Common::Halo => HALO,
+                Common::Ink => INK,
             });
         }
         let products = products::<ALL>(columns, window.count);
@@ -646,11 +712,20 @@ impl CornerFitter {
     ) {
         let look = Look::of(corner, optics, piece, self.limits);
         let (columns, pixels) = (&mut *self.columns, &*self.pixels);
-        match (K, JOINT, optics.has_halo()) {
-            (2, false, false) => fill_checker(columns, pixels, window, corner, &look),
+        match (K, JOINT, optics.has_halo(), look.triangle) {
+            (2, false, false, _) => fill_checker(columns, pixels, window, corner, &look),
             (2, ..) => fill_checker_with_halo::<K, JOINT>(columns, pixels, window, corner, &look),
-            (_, false, false) => fill_deltille(columns, pixels, window, corner, &look),
-            _ => fill_deltille_with_halo::<K, JOINT>(columns, pixels, window, corner, &look),
+            (_, false, false, None) => fill_deltille(columns, pixels, window, corner, &look),
+            (_, false, false, Some(triangle)) => {
+                fill_deltille_with_ink(columns, pixels, window, corner, &look, triangle);
+            }
+            (.., None) => {
+                fill_deltille_with_halo::<K, JOINT>(columns, pixels, window, corner, &look);
+            }
+            (.., Some(triangle)) => {
+                let look = (&look, triangle);
+                fill_deltille_with_all::<K, JOINT>(columns, pixels, window, corner, look);
+            }
         }
     }
 }
@@ -680,10 +755,10 @@ fn ends(values: &[f32]) -> (f32, f32) {
 impl<const K: usize> Corner<K> {
     /// The corner with its first J edges; further ones mean nothing.
     pub fn with_edges<const J: usize>(self) -> Corner<J> {
-        let Self { position, blur_px, amplitude, level, slope, .. } = self;
+        let Self { position, blur_px, amplitude, level, slope, angles, bends, across_px } = self;
         let first = |edges: [f64; K]| std::array::from_fn(|k| edges.get(k).copied().unwrap_or(0.0));
-        let (angles, bends) = (first(self.angles), first(self.bends));
-        Corner { position, blur_px, amplitude, level, slope, angles, bends }
+        let [angles, bends, across_px] = [first(angles), first(bends), first(across_px)];
+        Corner { position, blur_px, amplitude, level, slope, angles, bends, across_px }
     }
 
     /// The corner after a step of its own parameters in the joint equations.
@@ -774,6 +849,31 @@ fn fill_deltille_with_halo<const C: usize, const JOINT: bool>(
     fill::<3, C, JOINT>(columns, pixels, window, corner, look, look.haloed(Deltille));
 }
 
+#[multiversion(targets = "simd")]
+fn fill_deltille_with_ink<const C: usize>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+    triangle: Triangle,
+) {
+    let pattern = Inked { edges: Deltille, triangle };
+    fill::<3, C, false>(columns, pixels, window, corner, look, pattern);
+}
+
+#[multiversion(targets = "simd")]
+fn fill_deltille_with_all<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    (look, triangle): (&Look<C>, Triangle),
+) {
+    let pattern = Inked { edges: look.haloed(Deltille), triangle };
+    fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+}
+
 /// Fills the columns of derivatives and residuals.
 #[inline(always)]
 fn fill<const K: usize, const C: usize, const JOINT: bool>(
@@ -797,6 +897,8 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
     let by_astigmatism: [[f32; K]; 2] =
         [0, 1].map(|e| std::array::from_fn(|k| look.by_astigmatism[e][k] as f32));
     let rho_by_astigmatism = look.rho_by_astigmatism.map(|by| by as f32);
+    let displaced: [f32; K] = std::array::from_fn(|k| look.displaced[k] as f32);
+    let by_ink: [f32; K] = std::array::from_fn(|k| look.by_ink[k] as f32);
     let (amplitude, level) = (corner.amplitude as f32, corner.level as f32);
     let [gu, gv] = corner.slope.map(|g| g as f32);
     let (piece, [low, high]) = (look.piece, look.limits);
@@ -807,9 +909,9 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
         let (du, dv) = (u - x, v - y);
         let along: [f32; K] = std::array::from_fn(|k| cosines[k] * du + sines[k] * dv);
         let h: [f32; K] = std::array::from_fn(|k| {
-            cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k]
+            cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k] - displaced[k]
         });
-        let Shade { f, slopes, correlation, halo } = pattern.at(h);
+        let Shade { f, slopes, correlation, halo, triangle } = pattern.at(h);
         let change = gu * u + gv * v;
         let gain = 1.0 + change;
         let shade = f * gain + change * piece.ratio;
@@ -818,14 +920,15 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
         let seen = if model > low && model < high { 1.0 } else { 0.0 };
         let by_shade = amplitude * steepness * seen;
         let light = by_shade * gain;
-        let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, 0.0);
+        let (mut by_x, mut by_y, mut by_scale) = (0.0, 0.0, triangle[0]);
         for k in 0..K {
             let bent = bends[k] * along[k];
             by_x += slopes[k] * (sines[k] + bent * cosines[k]);
             by_y -= slopes[k] * (cosines[k] - bent * sines[k]);
             by_scale -= slopes[k] * h[k];
             let turned = along[k] + h[k] * by_turn[k];
-            columns[ANGLE + k][i] = light * (correlation * by_angle[k] - slopes[k] * turned);
+            let by = correlation * by_angle[k] - slopes[k] * turned + triangle[1 + k];
+            columns[ANGLE + k][i] = light * by;
         }
         let by_light = by_shade * (f + piece.ratio);
         columns[X][i] = light * by_x;
@@ -840,6 +943,11 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
             columns[RISE][i] = amplitude * seen * (1.0 - shade * shade);
             columns[SHADE][i] = shade;
             columns[HALO][i] = light * halo;
+            let mut by = triangle[4];
+            for k in 0..K {
+                by -= slopes[k] * by_ink[k];
+            }
+            columns[INK][i] = light * by;
             for e in 0..2 {
                 let mut by = correlation * rho_by_astigmatism[e];
                 for k in 0..K {

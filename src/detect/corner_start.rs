@@ -50,6 +50,7 @@ pub fn start_along<const K: usize>(
         slope: [0.0; 2],
         angles,
         bends: [0.0; K],
+        across_px: [0.0; K],
     })
 }
 
@@ -164,6 +165,7 @@ pub fn start<const K: usize, T: Intensity>(
         slope: [0.0; 2],
         angles,
         bends: [0.0; K],
+        across_px: [0.0; K],
     })
 }
 

@@ -1,11 +1,11 @@
 //! Tone curves: what a camera makes of light.
 //!
 //! A curve is kept as its inverse, the light q(y) of a grey value y, which is smooth where the curve itself
-//! is steep: near black. Where it is not known its logarithmic slope is a polynomial of the grey values
-//! of the board,
+//! is steep: near black. Where it is not known its slope follows powers of the distances from black and white,
+//! which hold gammas (p₁ = γ − 1), sRGB and s-curves (p₁ and p₃),
 //!
 //! ```text
-//!     ln q'(y) = p₁ t + p₂ t² + p₃ t³ + const,      t = (y − middle)/half
+//!     ln q'(y) = p₁ ln(y + δ) + p₂ t + p₃ ln(1 − y + δ) + const,      t = (y − middle)/half
 //! ```
 //!
 //! so that it rises whatever the p are; 0 is a linear camera. A corner sees the piece between its own

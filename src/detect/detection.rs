@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::curve::ToneEstimate;
+use super::ink::InkEstimate;
 use super::reason::Reason;
 use crate::raster::Pyramid;
 use crate::target::GridKind;
@@ -20,6 +21,8 @@ pub struct Detection {
     pub grids: Vec<Grid>,
     /// What was found of the camera's tone curve, where it was looked for.
     pub tone: Option<ToneEstimate>,
+    /// What was found of the spread of ink, where it was looked for.
+    pub ink: Option<InkEstimate>,
     /// Why there are no labels, where labels were looked for and no grid has any; and why there are no grids.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<Reason>,

@@ -6,11 +6,13 @@ use std::time::Instant;
 use super::beyond::go_on;
 use super::clearance::TagAreas;
 use super::corner_model::CornerFitter;
-use super::curve::{Tone, ToneEstimate};
+use super::curve::Tone;
 use super::detection::{Detection, Grid};
 use super::grow::grids;
+use super::ink::{Ink, InkEstimate};
 use super::label::Budget;
 use super::labels::{Labels, report_once};
+use super::optics::Optics;
 use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
 use super::refine_grid::sharp_level;
@@ -63,6 +65,8 @@ pub struct DetectorConfig {
     pub refinement: Refinement,
     /// The camera's tone curve.
     pub tone: Tone,
+    /// Growth of what is dark on the print.
+    pub ink: Ink,
 }
 
 /// Radius of the polynomial that refines, px: the reference detector's.
@@ -90,6 +94,10 @@ pub struct Detector {
     /// Where tiles show something else than their colour.
     tag_areas: TagAreas,
     labels: Labels,
+    /// Edge of the tiles, mm, where all panels have the same.
+    edge_mm: Option<f64>,
+    /// What is known of the ink from other pictures.
+    ink: Option<InkEstimate>,
 }
 
 /// Finds the corners of a tiling.
@@ -118,8 +126,9 @@ impl Detector {
     /// looks the same after half a turn; the lowest such corner in the image is then taken.
     pub fn for_grid(kind: GridKind, size: Option<(u32, u32)>, config: DetectorConfig) -> Self {
         let labels = Labels::of_size(kind, size, &config);
-        let refiner = refiner(kind, config);
-        Self { finder: Finder::of(kind), refiner, tag_areas: TagAreas::default(), labels }
+        let refiner = refiner(kind, config, None);
+        let tag_areas = TagAreas::default();
+        Self { finder: Finder::of(kind), refiner, tag_areas, labels, edge_mm: None, ink: None }
     }
 
     /// A detector of a target, whose panels are of one kind; `family` is the family that the target
@@ -131,7 +140,15 @@ impl Detector {
         let labels = Labels::of_target(target, family, &config);
         let tag_areas = family.map(|family| TagAreas::of(target, family)).unwrap_or_default();
         let kind = target.panels.first().map_or(GridKind::Deltille, |panel| panel.kind);
-        Self { finder: Finder::of(kind), refiner: refiner(kind, config), tag_areas, labels }
+        let edges = || target.panels.iter().map(|panel| panel.edge_mm);
+        let edge_mm = edges().next().filter(|first| edges().all(|edge| edge == *first));
+        let refiner = refiner(kind, config, edge_mm);
+        Self { finder: Finder::of(kind), refiner, tag_areas, labels, edge_mm, ink: None }
+    }
+
+    /// The same detector of a print of which this is known.
+    pub fn with_ink(self, ink: InkEstimate) -> Self {
+        Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), ..self }
     }
 
     /// Finds grids in one image; `name` is only noted in the result.
@@ -181,7 +198,7 @@ impl Detector {
         timing.lap("labels");
         let mut fitter = CornerFitter::default();
         let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
-        let (tone, are_waves) = self.refine(&mut fitter, (image, &pyramid), &mut refined);
+        let (optics, are_waves) = self.refine(&mut fitter, (image, &pyramid), &mut refined);
         let refined = refined.into_iter().zip(reasons).zip(are_waves);
         let grids: Vec<(Grid, Option<Reason>)> = refined
             .filter(|((grid, _), is_wave)| {
@@ -205,20 +222,24 @@ impl Detector {
             width: image.width() as u32,
             height: image.height() as u32,
             grids: grids.into_iter().map(|(grid, _)| grid).collect(),
-            tone,
+            tone: optics.tone,
+            ink: self.ink.or_else(|| {
+                let ink = optics.ink_found?;
+                Some(self.edge_mm.map_or(ink, |edge_mm| ink.on_print(edge_mm)))
+            }),
             reasons,
             timing_ms: timing.laps,
         }
     }
 
-    /// Refines all grids on the level of the pyramid that suits their blur; the tone curve that was found,
-    /// and for each grid whether the blur leaves of it but a wave.
+    /// Refines all grids on the level of the pyramid that suits their blur; what they have in common, and for
+    /// each grid whether the blur leaves of it but a wave.
     fn refine<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         (image, pyramid): (&Gray<T>, &Pyramid),
         grids: &mut [Grid],
-    ) -> (Option<ToneEstimate>, Vec<bool>) {
+    ) -> (Optics, Vec<bool>) {
         let blurs = self.refiner.blurs(fitter, (image, pyramid), grids, &self.tag_areas);
         match sharp_level(&blurs, pyramid.levels().len()) {
             0 => self.refine_blurred(fitter, image, grids, &blurs),
@@ -241,7 +262,7 @@ impl Detector {
         image: &Gray<T>,
         grids: &mut [Grid],
         blurs: &[Option<f64>],
-    ) -> (Option<ToneEstimate>, Vec<bool>) {
+    ) -> (Optics, Vec<bool>) {
         let optics = self.refiner.optics(fitter, image, (grids, blurs), &self.tag_areas);
         let refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
             let edge_px = grid.edge_px().unwrap_or(0.0);
@@ -249,7 +270,7 @@ impl Detector {
             blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
         };
         let are_waves = grids.iter_mut().zip(blurs).map(refine).collect();
-        (optics.tone, are_waves)
+        (optics, are_waves)
     }
 
     /// Why there are no grids in a picture with so many corners.
@@ -289,9 +310,14 @@ fn most_corners<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid) -> 
     grids(finder, pyramid, &saddles).iter().map(|grid| grid.len()).max().unwrap_or(0)
 }
 
-fn refiner(kind: GridKind, config: DetectorConfig) -> Refiner {
+fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refiner {
+    let ink = match config.ink {
+        Ink::Auto => None,
+        Ink::Um(um) => Some(edge_mm.map_or(0.0, |edge_mm| um / 1e3 / edge_mm)),
+    };
     Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
         .with_tone(config.tone)
+        .with_ink(ink)
 }
 
 /// Number of levels of an image's pyramid.

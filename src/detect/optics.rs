@@ -1,4 +1,4 @@
-//! What all corners of a picture have in common: tone curve, halo and astigmatism.
+//! What all corners of a picture have in common: tone curve, halo, astigmatism, and the ink of the print.
 //!
 //! Corners from all over the picture are fitted together, each with its own place, edges, blur and light, and
 //! with the common parameters: the normal equations have a block for each corner, which is eliminated
@@ -13,6 +13,7 @@ use super::corner_model::{Common, Corner, CornerFitter, Joint, Window};
 use super::correlation::{self, Influence};
 use super::curve::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
 use super::detection::median;
+use super::ink::InkEstimate;
 use crate::raster::{Gray, Intensity};
 
 /// Corners that are fitted together; more tell the curve better than single corners can use it.
@@ -27,16 +28,21 @@ pub const REACH_SIGMAS: f64 = 5.0;
 const HALO_WIDTH: f64 = 2.0;
 
 /// Prior deviations of the parameters: gamma 2.6 has (1.6, 0, 0), smooth steps have −0.5 at both ends,
-/// halos of 0.5 are strong, and a blur twice as wide in one direction has an astigmatism of 0.6.
-const PRIOR: [f64; PARAMS] = [2.0, 1.0, 1.0, 0.3, 0.3, 0.5];
+/// halos of 0.5 are strong, a blur twice as wide in one direction has an astigmatism of 0.6, and ink that spreads by
+/// 2 % of an edge takes a fifth of the bits of a tag.
+const PRIOR: [f64; PARAMS] = [2.0, 1.0, 1.0, 0.3, 0.3, 0.5, 2.0];
 
-/// The parameters: the curve's, the astigmatism's, the halo's.
-const PARAMS: usize = TONE_PARAMS + 3;
-const GROUPS: [&[usize]; 3] = [&[0, 1, 2], &[3, 4], &[HALO]];
-const HALO: usize = PARAMS - 1;
+/// The parameters: the curve's, the astigmatism's, the halo's, and the ink.
+const PARAMS: usize = TONE_PARAMS + 4;
+const GROUPS: [&[usize]; 4] = [&[0, 1, 2], &[3, 4], &[HALO], &[INK]];
+const HALO: usize = PARAMS - 2;
+const INK: usize = PARAMS - 1;
 
 /// A group is used when chance has it with less than 1 : 1000: χ² of three, two and one degrees of freedom.
-const CHI2: [f64; 3] = [16.3, 13.8, 10.8];
+const CHI2: [f64; 4] = [16.3, 13.8, 10.8, 10.8];
+
+/// The unit of the ink, in edges.
+pub const INK_UNIT: f64 = 0.01;
 
 /// A group is looked for where the first step, from a straight curve, promises this part of it.
 const WORTH_A_LOOK: f64 = 0.5;
@@ -62,6 +68,8 @@ const MAX_ASTIGMATISM: f64 = 0.95;
 pub struct Optics {
     /// Whether the curve is not known.
     is_open: bool,
+    /// Whether the ink is not known.
+    is_ink_open: bool,
     curve: Option<Curve>,
     params: [f64; TONE_PARAMS],
     /// Grey values that an estimated curve is made for.
@@ -70,26 +78,33 @@ pub struct Optics {
     pub astigmatism: [f64; 2],
     /// Strength of the halo, and its width over that of the blur.
     pub halo: [f64; 2],
+    /// Growth of what is dark on the print, in units of [`INK_UNIT`].
+    pub ink: f64,
     /// Factor of the covariances.
     pub inflation: f64,
     /// What single corners leave without them, of half the contrast: the median.
     pub plain_residual: f64,
     /// What was found of the curve.
     pub tone: Option<ToneEstimate>,
+    /// What was found of the ink.
+    pub ink_found: Option<InkEstimate>,
 }
 
 impl Default for Optics {
     fn default() -> Self {
         Self {
             is_open: false,
+            is_ink_open: false,
             curve: None,
             params: [0.0; TONE_PARAMS],
             range: [0.0, 1.0],
             astigmatism: [0.0; 2],
             halo: [0.0, HALO_WIDTH],
+            ink: 0.0,
             inflation: 1.0,
             plain_residual: 0.0,
             tone: None,
+            ink_found: None,
         }
     }
 }
@@ -111,6 +126,11 @@ impl Optics {
     /// What is known of a camera with this tone curve.
     pub fn of(tone: Tone) -> Self {
         Self { is_open: tone == Tone::Auto, curve: Curve::of(tone), ..Self::default() }
+    }
+
+    /// The same of a print whose ink has spread so far, in edges; `None` where it is not known.
+    pub fn with_ink(self, ink: Option<f64>) -> Self {
+        Self { is_ink_open: ink.is_none(), ink: ink.unwrap_or(0.0) / INK_UNIT, ..self }
     }
 
     /// Whether there is a halo.
@@ -143,16 +163,17 @@ impl Optics {
         match parameter {
             0..TONE_PARAMS => Common::Tone { parameter, moved: Box::new(self.moved(parameter)) },
             HALO => Common::Halo,
+            INK => Common::Ink,
             _ => Common::Astigmatism(parameter - TONE_PARAMS),
         }
     }
 
     fn vector(&self) -> [f64; PARAMS] {
         let ([p1, p2, p3], [e1, e2]) = (self.params, self.astigmatism);
-        [p1, p2, p3, e1, e2, self.halo[0]]
+        [p1, p2, p3, e1, e2, self.halo[0], self.ink]
     }
 
-    fn with(&self, &[p1, p2, p3, e1, e2, halo]: &[f64; PARAMS]) -> Self {
+    fn with(&self, &[p1, p2, p3, e1, e2, halo, ink]: &[f64; PARAMS]) -> Self {
         let params = [p1, p2, p3];
         let curve = if params == self.params {
             self.curve.clone()
@@ -165,6 +186,7 @@ impl Optics {
             params,
             astigmatism: [e1 / long, e2 / long],
             halo: [halo, self.halo[1]],
+            ink,
             ..self.clone()
         }
     }
@@ -189,7 +211,14 @@ impl Optics {
         let residuals = samples.iter().map(|sample| sample.residual).collect();
         let plain_residual = median(residuals).unwrap_or(0.0);
         let known = Self { range, plain_residual, ..known.clone() };
-        let active = (0..PARAMS).filter(|&p| known.is_open || p >= TONE_PARAMS).collect();
+        // Corners of two edges stay where they are under ink.
+        let has_ink = known.is_ink_open && K == 3;
+        let is_active = |p: usize| match p {
+            0..TONE_PARAMS => known.is_open,
+            INK => has_ink,
+            _ => true,
+        };
+        let active = (0..PARAMS).filter(|&p| is_active(p)).collect();
         let members = samples.into_iter().map(Member::from).collect();
         let mut problem = Problem::<K, T> { fitter, image, members, active };
         let middle = |v: Vec<f64>| median(v).unwrap_or(0.0);
@@ -201,28 +230,38 @@ impl Optics {
         };
         // A first step tells what is worth looking for. What the model lacks there scatters the gradients: that is
         // no reason to look away, but the deviation that is reported.
-        let (vector, under_noise, cov) = problem.first_step(&known);
-        let mut found = tone(&known.with(&vector), &cov, &problem.active, false);
-        let active = problem.supported(&vector, &under_noise, WORTH_A_LOOK);
+        let (first, scattered) = problem.first_step(&known);
+        let mut found = (
+            tone(&known.with(&first.vector()), &scattered, &problem.active, false),
+            problem.ink(&first.vector(), &scattered, false),
+        );
+        problem.active = first.supported(WORTH_A_LOOK).active;
         let mut optics = known.clone();
-        if !active.is_empty() {
-            problem.active = active;
+        if !problem.active.is_empty() {
             let mut cov;
             (optics, cov) = problem.adjusted(&known);
-            let vector = optics.vector();
-            let used = problem.supported(&vector, &cov, 1.0);
-            if used.len() < problem.active.len() {
-                let without = problem.without(&vector, &cov, &used);
-                problem.active = used;
-                optics = known.with(&without);
+            let active = problem.active.clone();
+            let whole = Estimate::of(&optics.vector(), active, &cov);
+            found = (
+                tone(&optics, &cov, &problem.active, false).or(found.0),
+                problem.ink(&optics.vector(), &cov, false).or(found.1),
+            );
+            let supported = whole.supported(1.0);
+            if supported.active.len() < problem.active.len() {
+                optics = known.with(&supported.vector());
+                problem.active = supported.active;
                 if !problem.active.is_empty() {
                     (optics, cov) = problem.adjusted(&optics);
                 }
             }
-            found = tone(&optics, &cov, &problem.active, true).or(found);
+            found = (
+                tone(&optics, &cov, &problem.active, true).or(found.0),
+                problem.ink(&optics.vector(), &cov, true).or(found.1),
+            );
         }
         let inflation = problem.inflation(&optics);
-        Self { tone: found, inflation, ..optics }
+        let (tone, ink_found) = found;
+        Self { tone, ink_found, inflation, ..optics }
     }
 
     /// κ₀ between black and white, its deviation, and κ₁; `None` where the curve was not looked for.
@@ -246,16 +285,71 @@ impl Optics {
     }
 }
 
-/// How much a group of parameters differs from nothing, in squared deviations.
-fn chi2(vector: &[f64; PARAMS], cov: &DMatrix<f64>, active: &[usize], group: &[usize]) -> f64 {
-    let places: Vec<usize> =
-        active.iter().enumerate().filter_map(|(i, p)| group.contains(p).then_some(i)).collect();
-    if places.is_empty() {
-        return 0.0;
+/// Values of the active parameters.
+struct Estimate {
+    active: Vec<usize>,
+    values: DVector<f64>,
+    /// The inverse of their covariance.
+    information: DMatrix<f64>,
+}
+
+impl Estimate {
+    fn of(vector: &[f64; PARAMS], active: Vec<usize>, cov: &DMatrix<f64>) -> Self {
+        let values = DVector::from_iterator(active.len(), active.iter().map(|&p| vector[p]));
+        let inverse = cov.clone().cholesky().map(|factor| factor.inverse());
+        let information = inverse.unwrap_or_else(|| DMatrix::zeros(active.len(), active.len()));
+        Self { active, values, information }
     }
-    let part = cov.select_rows(&places).select_columns(&places);
-    let value = DVector::from_iterator(places.len(), places.iter().map(|&i| vector[active[i]]));
-    part.cholesky().map_or(0.0, |part| value.dot(&part.solve(&value)))
+
+    fn vector(&self) -> [f64; PARAMS] {
+        let mut vector = [0.0; PARAMS];
+        self.active.iter().zip(&self.values).for_each(|(&p, value)| vector[p] = *value);
+        vector
+    }
+
+    /// Without the groups that differ from nothing by less than this part of what counts: the least of
+    /// them first, since what one explains another may explain too.
+    fn supported(mut self, part: f64) -> Self {
+        loop {
+            let ratios =
+                GROUPS.iter().zip(CHI2).map(|(group, limit)| (self.chi2(group) / limit, group));
+            let present = ratios.filter(|(_, group)| self.active.contains(&group[0]));
+            match present.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((ratio, group)) if ratio <= part => self = self.without(group),
+                _ => return self,
+            }
+        }
+    }
+
+    /// How much a group differs from nothing, in squared deviations.
+    fn chi2(&self, group: &[usize]) -> f64 {
+        let places = |inside: bool| -> Vec<usize> {
+            let all = 0..self.active.len();
+            all.filter(|&i| group.contains(&self.active[i]) == inside).collect()
+        };
+        let (own, others) = (places(true), places(false));
+        let between = |a: &[usize], b: &[usize]| self.information.select_rows(a).select_columns(b);
+        let value = self.values.select_rows(&own);
+        let shared = match between(&others, &others).cholesky() {
+            _ if others.is_empty() => DMatrix::zeros(own.len(), own.len()),
+            Some(factor) => between(&own, &others) * factor.solve(&between(&others, &own)),
+            None => return 0.0,
+        };
+        value.dot(&((between(&own, &own) - shared) * &value))
+    }
+
+    /// The most likely values where a group is nothing.
+    fn without(&self, group: &[usize]) -> Self {
+        let kept: Vec<usize> =
+            (0..self.active.len()).filter(|&i| !group.contains(&self.active[i])).collect();
+        let information = self.information.select_rows(&kept).select_columns(&kept);
+        let right = (&self.information * &self.values).select_rows(&kept);
+        let values = match information.clone().cholesky() {
+            Some(factor) => factor.solve(&right),
+            None => DVector::zeros(kept.len()),
+        };
+        Self { active: kept.iter().map(|&i| self.active[i]).collect(), values, information }
+    }
 }
 
 /// A corner of K edges in the joint fit.
@@ -291,45 +385,33 @@ struct Reduced {
 }
 
 impl<const K: usize, T: Intensity> Problem<'_, K, T> {
-    /// Where a first step leads, and the covariances there: under the noise alone, and by the scatter too.
-    fn first_step(&mut self, optics: &Optics) -> ([f64; PARAMS], DMatrix<f64>, DMatrix<f64>) {
+    /// Where a first step leads, under the noise alone, and the covariance by the scatter too.
+    fn first_step(&mut self, optics: &Optics) -> (Estimate, DMatrix<f64>) {
         let count = self.active.len();
-        let unknown = || DMatrix::identity(count, count);
+        let unknown = DMatrix::identity(count, count);
         let equations = self.equations(optics);
         let reduced = self.reduced(&equations, &weights(&equations), optics);
         let mut vector = optics.vector();
         let Some(factor) = reduced.matrix.clone().cholesky() else {
-            return (vector, unknown(), unknown());
+            return (Estimate::of(&vector, self.active.clone(), &unknown), unknown);
         };
         let step = factor.solve(&reduced.gradient);
         self.active.iter().zip(step.iter()).for_each(|(&p, s)| vector[p] += s);
-        (vector, factor.inverse(), covariance(&reduced).unwrap_or_else(unknown))
+        let estimate = Estimate::of(&vector, self.active.clone(), &factor.inverse());
+        (estimate, covariance(&reduced).unwrap_or(unknown))
     }
 
-    /// The active parameters of groups that differ from nothing by more than this part of what counts.
-    fn supported(&self, vector: &[f64; PARAMS], cov: &DMatrix<f64>, part: f64) -> Vec<usize> {
-        let differs = |group: &&[usize], limit: f64| chi2(vector, cov, &self.active, group) > limit;
-        let groups = GROUPS.iter().zip(CHI2);
-        groups
-            .filter(|(group, limit)| differs(group, part * limit))
-            .flat_map(|(group, _)| group.iter().copied())
-            .collect()
-    }
-
-    /// The most likely parameters where those that are not `used` are nothing.
-    fn without(&self, vector: &[f64; PARAMS], cov: &DMatrix<f64>, used: &[usize]) -> [f64; PARAMS] {
-        let (kept, dropped): (Vec<usize>, Vec<usize>) =
-            (0..self.active.len()).partition(|&i| used.contains(&self.active[i]));
-        let value =
-            DVector::from_iterator(dropped.len(), dropped.iter().map(|&i| vector[self.active[i]]));
-        let part = cov.select_rows(&dropped).select_columns(&dropped);
-        let mut changed = *vector;
-        dropped.iter().for_each(|&i| changed[self.active[i]] = 0.0);
-        if let Some(part) = part.cholesky() {
-            let shift = cov.select_rows(&kept).select_columns(&dropped) * part.solve(&value);
-            kept.iter().zip(shift.iter()).for_each(|(&i, s)| changed[self.active[i]] -= s);
-        }
-        changed
+    /// What was found of the ink; `None` where it was not looked for.
+    fn ink(&self, vector: &[f64; PARAMS], cov: &DMatrix<f64>, used: bool) -> Option<InkEstimate> {
+        let at = self.active.iter().position(|&p| p == INK)?;
+        Some(InkEstimate {
+            edges: INK_UNIT * vector[INK],
+            edges_deviation: INK_UNIT * cov[(at, at)].max(0.0).sqrt(),
+            um: None,
+            um_deviation: None,
+            used,
+            pictures: 1,
+        })
     }
 
     /// The optics that fit the corners best, from these, and the covariance of the active parameters.
@@ -484,4 +566,166 @@ fn covariance(reduced: &Reduced) -> Option<DMatrix<f64>> {
     let scale: Vec<f64> =
         (0..count).map(|i| (sandwich[(i, i)] / inverse[(i, i)]).max(1.0).sqrt()).collect();
     Some(DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, Normal};
+
+    use super::*;
+    use crate::detect::Tone;
+    use crate::detect::corner_model::{Accuracy, Fitted};
+
+    /// Square of each corner, px; points of each pixel's side; blur, px.
+    const SIDE: usize = 33;
+    const FINE: usize = 6;
+    const BLUR_PX: f64 = 0.8;
+    const EDGE_PX: f64 = 40.0;
+    const COUNT: usize = 5;
+
+    /// A picture of corners seen from 55°, all sides of which ink has moved, and the corners. Every point is dark
+    /// that lies in a dark sector or nearer to one than the ink, on the paper.
+    fn picture(ink: f64, grey: impl Fn(f64) -> f64) -> (Gray<f32>, Vec<Corner<3>>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let shrink = 55f64.to_radians().cos();
+        let mut fine = vec![0.0f64; (COUNT * SIDE * FINE).pow(2)];
+        let mut corners = Vec::new();
+        for tile in 0..COUNT * COUNT {
+            let first = [tile % COUNT, tile / COUNT].map(|c| (c * SIDE) as f64);
+            let position = first.map(|c| c + (SIDE / 2) as f64 + rng.random_range(-0.5..0.5));
+            let (turn, roll) = (rng.random_range(0.0..1.0), rng.random_range(0.0..1.0f64));
+            let on_paper = |[x, y]: [f64; 2]| {
+                let [u, v] = [x - position[0], y - position[1]];
+                [u * roll.cos() + v * roll.sin(), (v * roll.cos() - u * roll.sin()) / shrink]
+            };
+            let lines = [0, 1, 2].map(|k| turn + f64::from(k) * PI / 3.0);
+            let distances =
+                |paper: [f64; 2]| lines.map(|line| line.cos() * paper[1] - line.sin() * paper[0]);
+            for y in 0..SIDE * FINE {
+                for x in 0..SIDE * FINE {
+                    let place = [x, y].map(|c| (c as f64 + 0.5) / FINE as f64 - 0.5);
+                    let h = distances(on_paper([0, 1].map(|i| place[i] + first[i])));
+                    let grown = ink * EDGE_PX;
+                    let [right, left, far] = [h[0] < grown, h[1] > -grown, h[2] < grown];
+                    let is_dark = right && left || left && far || far && right;
+                    let [row, col] = [1, 0].map(|i| first[i] as usize * FINE + [x, y][i]);
+                    fine[row * COUNT * SIDE * FINE + col] = f64::from(!is_dark);
+                }
+            }
+            let edge = |line: &f64| {
+                let in_picture = |[x, y]: [f64; 2]| {
+                    let y = y * shrink;
+                    [x * roll.cos() - y * roll.sin(), x * roll.sin() + y * roll.cos()]
+                };
+                let along = in_picture([line.cos(), line.sin()]);
+                let across = in_picture([-line.sin(), line.cos()]);
+                let length = along[0].hypot(along[1]);
+                let off = (along[0] * across[1] - along[1] * across[0]).abs() / length;
+                (along[1].atan2(along[0]), EDGE_PX * off)
+            };
+            let mut edges: Vec<(f64, f64)> = lines.iter().map(edge).collect();
+            // What is before a line lies behind the same line the other way.
+            let turned = edges.iter().filter(|(angle, _)| *angle < 0.0).count();
+            edges.iter_mut().for_each(|(angle, _)| *angle = angle.rem_euclid(PI));
+            edges.sort_by(|a, b| a.0.total_cmp(&b.0));
+            corners.push(Corner {
+                position,
+                blur_px: BLUR_PX,
+                amplitude: if turned % 2 == 0 { 0.35 } else { -0.35 },
+                level: 0.45,
+                slope: [0.0; 2],
+                angles: [0, 1, 2].map(|k| edges[k].0),
+                bends: [0.0; 3],
+                across_px: [0, 1, 2].map(|k| edges[k].1),
+            });
+        }
+        let blurred = blurred_and_sampled(&fine);
+        let noise = Normal::new(0.0, 0.003).unwrap();
+        let picture = Gray::from_fn(COUNT * SIDE, COUNT * SIDE, |x, y| {
+            let light = 0.1 + 0.7 * blurred[y * COUNT * SIDE + x];
+            (grey(light) + noise.sample(&mut rng)) as f32
+        });
+        (picture, corners)
+    }
+
+    /// A fine square under a Gaussian blur and the mean over each pixel.
+    fn blurred_and_sampled(fine: &[f64]) -> Vec<f64> {
+        let side = COUNT * SIDE * FINE;
+        let reach = (4.0 * BLUR_PX * FINE as f64) as isize;
+        let kernel: Vec<f64> = (-reach..=reach)
+            .map(|k| (-0.5 * (k as f64 / (BLUR_PX * FINE as f64)).powi(2)).exp())
+            .collect();
+        let total: f64 = kernel.iter().sum();
+        // Along the rows, then transposed, and again.
+        let pass = |image: &[f64], rows: usize| -> Vec<f64> {
+            let mut result = vec![0.0; rows * COUNT * SIDE];
+            for row in 0..rows {
+                for (i, pixel) in (0..COUNT * SIDE).enumerate() {
+                    let points = (0..FINE).flat_map(|f| {
+                        let at = (pixel * FINE + f) as isize;
+                        (-reach..=reach).map(move |k| (at + k, (k + reach) as usize))
+                    });
+                    let sum: f64 = points
+                        .map(|(at, k)| {
+                            image[row * side + at.clamp(0, side as isize - 1) as usize] * kernel[k]
+                        })
+                        .sum();
+                    result[i * rows + row] = sum / (total * FINE as f64);
+                }
+            }
+            result
+        };
+        pass(&pass(fine, side), COUNT * SIDE)
+    }
+
+    fn fitted(
+        fitter: &mut CornerFitter,
+        image: &Gray<f32>,
+        corner: &Corner<3>,
+        optics: &Optics,
+    ) -> Fitted<3> {
+        let start = Corner { position: corner.position.map(f64::round), ..*corner };
+        fitter.fit(image, &Window::new(9), &start, (optics, Accuracy::Full)).unwrap()
+    }
+
+    #[test]
+    fn ink_is_told_from_tone_and_does_not_move_corners() {
+        let srgb = |light: f64| Tone::Srgb.grey(light);
+        let curves: [(&str, &dyn Fn(f64) -> f64); 2] = [("line", &|light| light), ("sRGB", &srgb)];
+        for (ink, (name, curve)) in
+            [0.0, 0.004, -0.006].into_iter().flat_map(|ink| curves.map(|curve| (ink, curve)))
+        {
+            let (image, corners) = picture(ink, curve);
+            let known = Optics::of(Tone::Auto).with_ink(None);
+            let mut fitter = CornerFitter::default();
+            let samples = corners.iter().take(SAMPLES).map(|corner| {
+                let Fitted { corner: found, noise, .. } =
+                    fitted(&mut fitter, &image, corner, &known);
+                Sample {
+                    window: Window::new(9),
+                    centre: corner.position.map(f64::round),
+                    corner: found,
+                    residual: noise / found.amplitude.abs(),
+                }
+            });
+            let samples = samples.collect();
+            let optics = Optics::estimate::<3, f32>(&mut fitter, &image, samples, &known);
+            let found = optics.ink_found.unwrap();
+            assert_eq!(found.used, ink != 0.0, "{ink} {name}: {found:?}");
+            assert!((found.edges - ink).abs() < 2e-4, "{ink} {name}: {found:?}");
+            let square: f64 = corners
+                .iter()
+                .map(|corner| {
+                    let found = fitted(&mut fitter, &image, corner, &optics).corner.position;
+                    (0..2).map(|i| (found[i] - corner.position[i]).powi(2)).sum::<f64>()
+                })
+                .sum();
+            let rms = (square / (2.0 * corners.len() as f64)).sqrt();
+            assert!(rms < 0.01, "{ink} {name}: {rms}");
+        }
+    }
 }

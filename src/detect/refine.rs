@@ -190,6 +190,11 @@ impl Refiner {
         Self { tone, known: Optics::of(tone), ..self }
     }
 
+    /// The same refiner for a print whose ink has spread so far, in edges of a tile; `None` where it is not known.
+    pub fn with_ink(self, ink: Option<f64>) -> Self {
+        Self { known: self.known.with_ink(ink), ..self }
+    }
+
     /// The corner near `start`, in the whole window.
     ///
     /// An unknown tone curve is estimated from this corner; [`Self::refine_all`] asks all of a picture.
@@ -336,7 +341,6 @@ impl Refiner {
         let window = self.window(image, position, room);
         let window = &*window;
         let edges: &[Edge; K] = room.around.edges.as_slice().try_into().ok()?;
-        let bends = edges.map(|edge| edge.bend);
         let angles = edges.map(|edge| edge.angle_rad);
         let (first, accuracy) = match before {
             _ if window.count() < MIN_PIXELS => return None,
@@ -346,7 +350,10 @@ impl Refiner {
                 (start_along(window, pixels, position, angles, room.blur_px)?, Accuracy::Rough)
             }
         };
-        let first = Corner { bends, ..first };
+        let edges = first.angles.map(|angle_rad| edge_along(edges, angle_rad));
+        let bends = edges.map(|edge| edge.bend);
+        let across_px = edges.map(|edge| edge.across_px);
+        let first = Corner { bends, across_px, ..first };
         // What a picture has in common may not be common to its rim.
         let fit = fitter
             .fit(image, window, &first, (room.optics, accuracy))
@@ -378,6 +385,16 @@ impl Refiner {
     pub(super) fn largest_radius(&self) -> f64 {
         self.windows.last().map_or(0.0, |window| window.radius() as f64)
     }
+}
+
+/// The edge nearest to a direction, turned by half where it points the other way: edges near a half-turn may have
+/// become the first since the fit.
+fn edge_along(edges: &[Edge], angle_rad: f64) -> Edge {
+    let off = |edge: &Edge| (edge.angle_rad - angle_rad).sin().abs();
+    let nearest = edges.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)));
+    let edge = nearest.unwrap_or(Edge { angle_rad, bend: 0.0, across_px: 0.0 });
+    let is_opposite = (edge.angle_rad - angle_rad).cos() < 0.0;
+    Edge { bend: if is_opposite { -edge.bend } else { edge.bend }, ..edge }
 }
 
 /// Pixels between a position and the nearest side of the image, where bilinear samples end.

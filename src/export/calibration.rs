@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::motion::Motion;
 use crate::calibrate::{Excluded, SHAPE_COEFFICIENTS as COUNT, Shape, Solution};
+use crate::detect::InkEstimate;
 
 /// What a calibration tells of the sheet that was photographed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -13,6 +14,15 @@ pub struct Sheet {
     pub print_scale: Option<[f64; 2]>,
     /// How the sheet differs from its plan then.
     pub shape: Option<Shape>,
+}
+
+/// What is known of the print that was photographed, beside its plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Print {
+    /// How it came out across and up its sheet, where that was measured.
+    pub scale: Option<[f64; 2]>,
+    /// How far ink has spread, as the detections tell.
+    pub ink: Option<InkEstimate>,
 }
 
 /// Why a file tells of no sheet.
@@ -75,6 +85,8 @@ struct CalibrationFile<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     print_scale: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    ink: Option<InkEstimate>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     board_shape: Option<ShapeOfBoard>,
     views: Vec<View>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -134,13 +146,12 @@ struct HeldOut<'a> {
 }
 
 /// The text of the file; `model` is the name of what was calibrated, `held_out` are the views that
-/// only had their poses found, `print_scale` is how the print came out across and up its sheet, where
-/// that was measured.
+/// only had their poses found.
 pub fn write(
     solution: &Solution,
     model: &str,
     held_out: Option<&Solution>,
-    print_scale: Option<[f64; 2]>,
+    print: Print,
 ) -> String {
     let found = solution.found().count();
     let correlations =
@@ -161,7 +172,8 @@ pub fn write(
         outliers: solution.outlier_count(),
         sigma: solution.sigma,
         common_px: solution.common_px,
-        print_scale,
+        print_scale: print.scale,
+        ink: print.ink,
         board_shape: solution.shape.map(|found| ShapeOfBoard {
             middle_mm: found.shape.middle_mm.to_array(),
             reach_mm: found.shape.reach_mm,

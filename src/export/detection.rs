@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::detect::{Detection, Grid, Reason, ToneEstimate};
+use crate::detect::{Detection, Grid, InkEstimate, Reason, ToneEstimate};
 use crate::json;
 
 /// Schema and version that this crate writes and reads.
@@ -59,6 +59,8 @@ struct DetectionFile {
     grids: Vec<Grid>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     tone: Option<ToneEstimate>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    ink: Option<InkEstimate>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     reasons: Vec<Reason>,
     timing_ms: std::collections::BTreeMap<String, f64>,
@@ -76,8 +78,19 @@ pub fn write_line(detection: &Detection) -> String {
 
 impl DetectionFile {
     fn of(detection: &Detection) -> Self {
-        let Detection { image, width, height, grids, tone, reasons, timing_ms } = detection.clone();
-        Self { schema: SCHEMA.to_owned(), image, width, height, grids, tone, reasons, timing_ms }
+        let Detection { image, width, height, grids, tone, ink, reasons, timing_ms } =
+            detection.clone();
+        Self {
+            schema: SCHEMA.to_owned(),
+            image,
+            width,
+            height,
+            grids,
+            tone,
+            ink,
+            reasons,
+            timing_ms,
+        }
     }
 }
 
@@ -101,7 +114,8 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
         return Err(DetectionFileError::Schema { found: schema });
     }
     let file: DetectionFile = serde_json::from_str(text)?;
-    let DetectionFile { schema: _, image, width, height, grids, tone, reasons, timing_ms } = file;
+    let DetectionFile { schema: _, image, width, height, grids, tone, ink, reasons, timing_ms } =
+        file;
     // Corners that are there twice would count twice. A panel may be seen in pieces.
     let mut places = BTreeSet::new();
     for (grid, of_grid) in grids.iter().enumerate() {
@@ -124,5 +138,5 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
             }
         }
     }
-    Ok(Detection { image, width, height, grids, tone, reasons, timing_ms })
+    Ok(Detection { image, width, height, grids, tone, ink, reasons, timing_ms })
 }

@@ -64,7 +64,7 @@ pub fn advice(report: &Report, survey: &Survey) -> Vec<Advice> {
     coverage(report, survey, &mut add);
     parameters(report, &mut add);
     residuals(report, survey, &mut add);
-    if report.print_scale.is_none() {
+    if report.print.scale.is_none() {
         let text =
             "Distances are as true as the print: measure both check bars of the sheet and give \
                     --print-scale. Focal lengths and distortion do not depend on it."
@@ -222,7 +222,7 @@ fn residuals(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, Stri
     let count = means.clone().count().max(1) as f64;
     let size = (means.map(|[x, y]| (x * x + y * y) / 2.0).sum::<f64>() / count).sqrt();
     let model = report.model.parse().ok();
-    let given = Given { model, print_scale: report.print_scale, remedy: report.remedy };
+    let given = Given { model, print_scale: report.print.scale, remedy: report.remedy };
     let causes = causes(solution, given);
     for cause in &causes {
         add(Weight::Warning, sentence(cause));
@@ -278,6 +278,7 @@ mod tests {
     use super::*;
     use crate::calibrate::Solution;
     use crate::camera::Camera;
+    use crate::export::calibration::Print;
 
     /// What is advised where no parameter of the lens is told from zero.
     fn advised(model: Model) -> String {
@@ -307,7 +308,7 @@ mod tests {
             model: &model.to_string(),
             solution: &solution,
             holdout: None,
-            print_scale: Some([1.0; 2]),
+            print: Print { scale: Some([1.0; 2]), ink: None },
             sufficient: None,
             remedy: None,
             thumbnails: BTreeMap::new(),

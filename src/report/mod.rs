@@ -20,6 +20,7 @@ mod thumbnail;
 use std::collections::BTreeMap;
 
 use crate::calibrate::{Model, Remedy, Solution};
+use crate::export::calibration::Print;
 
 pub use advice::{Advice, Weight, advice};
 pub use causes::{Given, cannot_tell_apart, causes, causes_of_rig};
@@ -37,8 +38,8 @@ pub struct Report<'a> {
     pub solution: &'a Solution,
     /// The same camera on views that took no part in it.
     pub holdout: Option<&'a Solution>,
-    /// How the print came out, where that was measured.
-    pub print_scale: Option<[f64; 2]>,
+    /// What is known of the print.
+    pub print: Print,
     /// A smaller model that holds the lens as well, where parameters cannot be told apart.
     pub sufficient: Option<Model>,
     /// What makes it fit where it does not.

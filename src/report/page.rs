@@ -71,6 +71,12 @@ fn figures(report: &Report) -> String {
         let name = "rms on views held out";
         cells.insert(1, (format!("{:.4} px", holdout.rms_px), name));
     }
+    if let Some((um, deviation)) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_deviation)) {
+        cells.push((
+            format!("{um:.1} ± {deviation:.1} µm").replace('-', "−"),
+            "growth of what is dark",
+        ));
+    }
     let cells = cells.iter().map(|(value, name)| format!("<div><b>{value}</b>{name}</div>"));
     format!("<div class=\"figures\">{}</div>", cells.collect::<String>())
 }

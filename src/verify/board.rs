@@ -7,7 +7,7 @@ use super::fit::AffineMap;
 use super::fold::Seen;
 use super::tiles::{MAX_INK_ERROR, PlacedPanel};
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
-use crate::detect::{Detection, Detector, DetectorConfig, GridCorner, Tone};
+use crate::detect::{Detection, Detector, DetectorConfig, GridCorner, Ink, Tone};
 use crate::target::{Corner, Panel, SheetLayout};
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
@@ -106,7 +106,7 @@ fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
     let any_grid = Detector::for_grid(
         kind,
         None,
-        DetectorConfig { tone: Tone::Linear, ..DetectorConfig::default() },
+        DetectorConfig { tone: Tone::Linear, ink: Ink::Um(0.0), ..DetectorConfig::default() },
     );
     let grids = any_grid.detect(&page.blurred(), "page").grids;
     let found: usize = grids.iter().map(|grid| grid.corners.len()).sum();

@@ -48,7 +48,7 @@ mod verdict;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::detect::{Detector, DetectorConfig, Tone};
+use crate::detect::{Detector, DetectorConfig, Ink, Tone};
 use crate::export::sheet_file_name;
 use crate::family::Family;
 use crate::target::{SheetLayout, SheetPage, Target};
@@ -148,7 +148,7 @@ impl<'a> Verifier<'a> {
         let detector = Detector::for_target(
             target,
             family,
-            DetectorConfig { tone: Tone::Linear, ..DetectorConfig::default() },
+            DetectorConfig { tone: Tone::Linear, ink: Ink::Um(0.0), ..DetectorConfig::default() },
         );
         Ok(Self { target, family, detector, cancel: None })
     }

@@ -17,6 +17,9 @@ import numpy as np
 
 from photograph import Page, Scene, photograph
 
+# Ink is found to a fiftieth of a pixel at the usual 3 px/mm.
+INK_UM = 6.0
+
 # Corners farther from their place than this part of an edge have a wrong label.
 WRONG = 0.3
 
@@ -40,6 +43,12 @@ CHECKS = [
     *(Check("board", Scene(tilt_deg=tilt, tone=tone), views=1) for tilt in TILTS for tone in TONES),
     *(Check("checker", Scene(tone=tone)) for tone in ("linear", "srgb")),
     Check("board", Scene(tone="srgb", mosaic=True, light_ratio=3.0), most_rms_px=0.02),
+    *(
+        Check("board", Scene(tilt_deg=tilt, tone=tone, ink_um=ink), views=1)
+        for tilt, tone, ink in ((0, "linear", 60), (45, "srgb", 60), (45, "linear", -60), (65, "srgb", 60))
+    ),
+    Check("board", Scene(tilt_deg=45, ink_um=200.0), views=1, most_rms_px=0.015),
+    Check("checker", Scene(tilt_deg=45, ink_um=60.0)),
     Check("board", Scene(blur_px=3.0), least_found=0.95, most_rms_px=0.1),
     Check("board", Scene(motion_px=10.0), least_found=0.95, most_rms_px=0.15),
     Check("board", Scene(edge_px=16.0), least_found=0.95, most_rms_px=0.04),
@@ -70,12 +79,15 @@ def run(*command):
 
 def judge(check, truths, folder):
     """Faults of the detections in a folder, and figures to print."""
-    found, due, wrong, errors, normalised = 0, 0, 0, [], []
+    found, due, wrong, errors, normalised, inks = 0, 0, 0, [], [], []
     for name, truth in truths.items():
         due += len(truth)
         places = list(truth.values())
         edge_px = np.sort([np.hypot(*(a - b)) for a in places for b in places])[len(places) + 1]
-        for grid in json.loads((folder / f"{name}.json").read_text())["grids"]:
+        detection = json.loads((folder / f"{name}.json").read_text())
+        if "ink" in detection and check.scene.ink_um:
+            inks.append(detection["ink"]["um"])
+        for grid in detection["grids"]:
             for corner in grid["corners"] if grid["panel"] is not None else []:
                 place = truth.get((grid["panel"], corner["row"], corner["col"]))
                 error = np.array([corner["x"], corner["y"]]) - (np.inf if place is None else place)
@@ -91,7 +103,9 @@ def judge(check, truths, folder):
     figures = f"{found} of {due} corners, {wrong} wrong, rms {rms:.4f} px"
     if normalised:
         figures += f", error squared over covariance {np.mean(normalised):.2f}"
-    faults = wrong > 0
+    if inks:
+        figures += f", ink {np.mean(inks):.1f} µm"
+    faults = wrong > 0 or any(abs(ink - check.scene.ink_um) > INK_UM for ink in inks)
     if check.labelled:
         faults |= found < check.least_found * due or not rms <= check.most_rms_px
     else:

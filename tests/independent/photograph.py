@@ -12,8 +12,10 @@ import hashlib
 import json
 import math
 import pathlib
+import re
 import subprocess
 import tempfile
+import zlib
 from dataclasses import dataclass
 
 import os
@@ -33,15 +35,9 @@ class Page:
     def __init__(self, target_json):
         path = pathlib.Path(target_json)
         target = json.loads(path.read_text())
-        pdf = path.with_suffix(".pdf")
-        digest = hashlib.sha1(pdf.read_bytes()).hexdigest()[:16]
-        png = pathlib.Path(tempfile.gettempdir(), f"page-{digest}-{DPI}")
-        if not png.with_suffix(".png").exists():
-            command = ["pdftocairo", "-r", str(DPI), "-gray", "-png", "-singlefile", pdf, png]
-            subprocess.run(command, check=True)
-        drawn = cv2.imread(str(png.with_suffix(".png")), cv2.IMREAD_GRAYSCALE)
+        self.pdf = path.with_suffix(".pdf").read_bytes()
         self.edge_mm = target["panels"][0]["edge_mm"]
-        self.reduced = {1: drawn.astype(np.float32) / 255}
+        self.reduced = {}
         sheet = target["sheets"][0]
         panels = {panel["id"]: panel for panel in target["panels"]}
         self.keys, places = [], []
@@ -55,14 +51,46 @@ class Page:
                 places.append((page_x, sheet["height_mm"] - page_y))
         self.corners_mm = np.array(places)
 
-    def reduced_by(self, n):
-        """The page with n × n pixels in one."""
-        if n not in self.reduced:
-            page = self.reduced[1]
+    def drawn(self, ink_um):
+        pdf = with_ink(self.pdf, ink_um) if ink_um else self.pdf
+        page = pathlib.Path(tempfile.gettempdir(), f"page-{hashlib.sha1(pdf).hexdigest()[:16]}-{DPI}")
+        png, source = page.with_suffix(".png"), page.with_suffix(".pdf")
+        if not png.exists():
+            source.write_bytes(pdf)
+            command = ["pdftocairo", "-q", "-r", str(DPI), "-gray", "-png", "-singlefile", source, page]
+            subprocess.run(command, check=True)
+        return cv2.imread(str(png), cv2.IMREAD_GRAYSCALE).astype(np.float32) / 255
+
+    def reduced_by(self, n, ink_um=0.0):
+        """The page with n × n pixels in one, what is dark grown by so much on every side."""
+        if (n, ink_um) not in self.reduced:
+            page = self.drawn(ink_um)
             height, width = (side // n for side in page.shape)
             blocks = page[: height * n, : width * n].reshape(height, n, width, n)
-            self.reduced[n] = blocks.mean((1, 3))
-        return self.reduced[n]
+            self.reduced[n, ink_um] = blocks.mean((1, 3))
+        return self.reduced[n, ink_um]
+
+
+def with_ink(pdf, ink_um):
+    """The bytes of a PDF with every dark path grown on all sides, by a stroke in its own colour; or shrunk by
+    a white one. Its table of objects is left as it was: readers make it anew."""
+    stroke = b"/Exact gs 0 0 0 %d K %.5f w 1 j\n" % (ink_um > 0, 2 * abs(ink_um) / 1000 * 72 / 25.4)
+    # Lines are moved to whole pixels otherwise.
+    resources = b"/Resources<</ExtGState<</Exact<</SA false>>>>>>"
+    pdf = re.sub(rb"/Resources \d+ 0 R", resources, pdf)
+
+    def inked(stream):
+        content = zlib.decompress(stream[3])
+        if b"f*" not in content:
+            return stream[0]
+        # Fills close what strokes leave open.
+        content = content.replace(b"0 0 0 1 K\n", b"")
+        content = re.sub(rb"( [lc]\n)([-\d. ]+ m\n)", rb"\1h\n\2", content)
+        content = zlib.compress(stroke + re.sub(rb"(?m)^f\*$", b"b*", content))
+        return stream[1] + b"%d" % len(content) + stream[2] + content + b"\nendstream"
+
+    pattern = rb"(/Length )\d+((?:(?!stream|endobj).)*FlateDecode.{0,20}?stream\r?\n)(.*?)\r?\nendstream"
+    return re.sub(pattern, inked, pdf, flags=re.DOTALL)
 
 
 @dataclass
@@ -83,6 +111,7 @@ class Scene:
     tone: str = "linear"  # or srgb, s-curve, or a gamma
     noise: float = 0.005
     mosaic: bool = False
+    ink_um: float = 0.0  # growth of what is dark
     mirrored: bool = False
 
 
@@ -158,7 +187,7 @@ def look(page, view, scene):
     """The reflectance seen by each pixel under the blur; around the page it is 0.25."""
     steps = 4 if scene.tilt_deg <= 20 else 6 if scene.tilt_deg <= 50 else 9
     n = int(np.clip(round(PX_PER_MM / (view.px_per_mm * steps)), 1, 24))
-    drawn = page.reduced_by(n)
+    drawn = page.reduced_by(n, scene.ink_um)
     fine = np.empty((scene.height * steps, scene.width * steps), np.float32)
     y, x = np.mgrid[0 : scene.height, 0 : scene.width].astype(float)
     for j in range(steps):

@@ -15,7 +15,7 @@ use crate::calibrate::{self, BoardShape, Loss, Model, Options, Remedy, Solution,
 use crate::camera::Pose;
 use crate::cli::output;
 use crate::cli::run::{FAILED, report};
-use crate::export::calibration;
+use crate::export::calibration::{self, Print};
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
 use crate::raster::{self, AnyGray};
 use crate::report::{Given, Report, cannot_tell_apart, causes, thumbnail};
@@ -133,7 +133,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // Poses of a known camera do not take the place of its calibration.
     let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
     let path = output::file(args.output.as_deref().unwrap_or(Path::new(".")), stem, "yaml")?;
-    let Sightings { views, panels, empty, left_out, print_scale } = args.sightings.read()?;
+    let Sightings { views, panels, empty, left_out, print } = args.sightings.read()?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     for picture in &empty {
         eprintln!("{}: no board, left out", picture.display());
@@ -166,7 +166,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(end) = solution.calibrated.lens_end() {
         eprintln!("warning: {end}");
     }
-    let given = Given { model: args.model, print_scale, remedy: solution.remedy };
+    let given = Given { model: args.model, print_scale: print.scale, remedy: solution.remedy };
     for cause in causes(&solution.calibrated, given) {
         eprintln!("warning: {cause}");
     }
@@ -174,19 +174,21 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let text = cannot_tell_apart(&solution.calibrated.loose, solution.sufficient);
         eprintln!("warning: {text}");
     }
-    let texts = args.format.iter().map(|&format| format.texts(&stem, &solution, print_scale));
+    let texts = args.format.iter().map(|&format| format.texts(&stem, &solution, print));
     let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
     let files = texts.into_iter().flatten().map(|(name, text)| text_file(name, text));
     let files: Vec<File> = files.collect();
     let mut written = write_all(output::folder_of(&path), &files)?;
     if let Some(page) = page {
-        output::write(&page, args.page(&stem, &solution, print_scale).as_bytes())
-            .context("--report")?;
+        output::write(&page, args.page(&stem, &solution, print).as_bytes()).context("--report")?;
         written.push(page);
     }
     let mut text = table(&solution.calibrated);
     if let Some(shape) = &solution.calibrated.shape {
         let _ = writeln!(text, "{}", told(shape));
+    }
+    if let Some(ink) = print.ink.filter(|ink| ink.used) {
+        let _ = writeln!(text, "ink: {ink}, which the corners allow for");
     }
     if let Some(test) = &solution.held_out {
         // Writing to a String cannot fail.
@@ -238,7 +240,7 @@ struct Solved {
 
 impl Args {
     /// The page of a calibration.
-    fn page(&self, stem: &str, solved: &Solved, print_scale: Option<[f64; 2]>) -> String {
+    fn page(&self, stem: &str, solved: &Solved, print: Print) -> String {
         let mut thumbnails = BTreeMap::new();
         for view in &solved.calibrated.views {
             let Some(path) = self.images.as_ref().map(|folder| folder.join(&view.image)) else {
@@ -256,7 +258,7 @@ impl Args {
             model: &solved.model,
             solution: &solved.calibrated,
             holdout: solved.held_out.as_ref(),
-            print_scale,
+            print,
             sufficient: solved.sufficient,
             remedy: solved.remedy,
             thumbnails,
@@ -328,7 +330,7 @@ impl Format {
         self,
         stem: &str,
         solved: &Solved,
-        print_scale: Option<[f64; 2]>,
+        print: Print,
     ) -> anyhow::Result<Vec<(String, String)>> {
         let solution = &solved.calibrated;
         let camera = &solution.camera;
@@ -338,12 +340,7 @@ impl Format {
                 (format!("{stem}.yaml"), camera.to_yaml()),
                 (
                     format!("{stem}.json"),
-                    calibration::write(
-                        solution,
-                        &solved.model,
-                        solved.held_out.as_ref(),
-                        print_scale,
-                    ),
+                    calibration::write(solution, &solved.model, solved.held_out.as_ref(), print),
                 ),
             ],
             Self::Opencv => one("-opencv.yaml", opencv(camera)?),

@@ -15,10 +15,11 @@ use super::finder::FinderArgs;
 use super::images::{Images, Stems};
 use crate::cli::run::{self, BAD_INPUT, FAILED, INTERRUPTED};
 use crate::cli::{interrupt, output, progress};
-use crate::detect::{Detection, Detector};
+use crate::detect::{Detection, Detector, InkEstimate};
 use crate::export::{atomic, csv, detection, orpc, overlay};
 use crate::raster;
 use crate::target::Target;
+use crate::words::counted;
 
 /// Arguments of `deltille detect`.
 #[derive(clap::Args)]
@@ -62,10 +63,13 @@ enum Format {
 
 /// What came of an image.
 enum Outcome {
-    /// The line to print of it.
-    Found(String),
+    /// The line to print of it, and what it says of the ink.
+    Found(String, Option<InkEstimate>),
     Skipped,
 }
+
+/// An image that was looked at, and the stem of its results.
+type Seen = (PathBuf, String, Option<InkEstimate>);
 
 /// Detects in all images; an image that cannot be read is reported, and the rest go on.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -87,20 +91,48 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
     let stems = Mutex::new(Stems::default());
     let report = Report::new(images.count() == Some(1));
-    threads.build()?.install(|| {
+    let seen: Mutex<Vec<Seen>> = Mutex::default();
+    let threads = threads.build()?;
+    threads.install(|| {
         images.iter().enumerate().par_bridge().for_each(|(index, image)| {
             if interrupted.load(Ordering::Relaxed) {
                 return;
             }
             let result = image.and_then(|image| {
                 let stem = stems.lock().expect("no thread panics here").claim(&image)?;
-                one_image(&args, target.as_ref(), &detector, &image, &stem)
+                let outcome = one_image(&args, target.as_ref(), &detector, &image, &stem)?;
+                if let Outcome::Found(_, ink) = &outcome {
+                    seen.lock().expect("no thread panics here").push((image, stem, *ink));
+                }
+                Ok(outcome)
             });
             bar.inc(1);
             bar.suspend(|| report.add(index, result));
         });
     });
     bar.finish_and_clear();
+    let seen = seen.into_inner().expect("no thread panics here");
+    let found: Vec<InkEstimate> = seen.iter().filter_map(|(_, _, ink)| *ink).collect();
+    let ink = (!args.stream && args.finder.ink_is_open()).then(|| InkEstimate::of_all(&found));
+    if let Some(ink) = ink.flatten().filter(|ink| ink.used && !interrupted.load(Ordering::Relaxed))
+    {
+        // One print has one ink: pictures that say little of it are seen with what all say.
+        if seen.len() > 1 {
+            let detector = detector.with_ink(ink);
+            let bar = progress::bar(seen.len() as u64, "images, with the ink of all");
+            threads.install(|| {
+                seen.par_iter().filter(|_| !interrupted.load(Ordering::Relaxed)).for_each(
+                    |(image, stem, _)| {
+                        let again = one_image(&args, target.as_ref(), &detector, image, stem);
+                        again.err().iter().for_each(|error| bar.suspend(|| run::report(error)));
+                        bar.inc(1);
+                    },
+                );
+            });
+            bar.finish_and_clear();
+        }
+        output::print(&format!("ink: {ink} ({})\n", counted(ink.pictures as usize, "picture")))?;
+    }
     if interrupted.load(Ordering::Relaxed) {
         let on = if args.stream { "" } else { "; --skip-existing goes on from here" };
         eprintln!("interrupted: {} images are done{on}", report.done());
@@ -139,7 +171,7 @@ impl Report {
             state.next += 1;
             match result {
                 Ok(Outcome::Skipped) => state.skipped += 1,
-                Ok(Outcome::Found(line)) => {
+                Ok(Outcome::Found(line, _)) => {
                     // What cannot be printed is lost, as it would be with `println`.
                     if let Err(error) = output::print(&line) {
                         state.error.get_or_insert(error);
@@ -250,7 +282,7 @@ fn one_image(
         }
     }
     let line = if args.stream { detection::write_line(&found) } else { summary(path, &found) };
-    Ok(Outcome::Found(line))
+    Ok(Outcome::Found(line, found.ink))
 }
 
 /// A line on what was found in an image.

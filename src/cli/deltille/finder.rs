@@ -7,7 +7,7 @@ use clap::ValueEnum;
 
 use super::refine::Method;
 use super::target_file;
-use crate::detect::{Detector, DetectorConfig, Tone};
+use crate::detect::{Detector, DetectorConfig, Ink, Tone};
 use crate::target::{GridKind, Target};
 
 /// Options that say what to look for.
@@ -42,6 +42,10 @@ pub struct FinderArgs {
     /// each picture
     #[arg(long, value_name = "CURVE", default_value = "auto")]
     tone: Tone,
+    /// How far ink has spread on the print, on every side of what is dark: µm, none, or auto: estimated from
+    /// the corners of each picture
+    #[arg(long, value_name = "UM", default_value = "auto", allow_negative_numbers = true)]
+    ink: Ink,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -58,6 +62,11 @@ fn side() -> clap::builder::RangedI64ValueParser<u32> {
 }
 
 impl FinderArgs {
+    /// Whether the ink of the print is not known.
+    pub fn ink_is_open(&self) -> bool {
+        self.ink == Ink::Auto
+    }
+
     /// The target, where one is named, and the detector.
     pub fn detector(&self) -> anyhow::Result<(Option<Target>, Detector)> {
         if self.target.is_none() && self.grid.is_none() {
@@ -71,8 +80,12 @@ impl FinderArgs {
             allow_mirrored: self.allow_mirrored,
             refinement: self.refine.into(),
             tone: self.tone,
+            ink: self.ink,
         };
         let Some(path) = &self.target else {
+            if matches!(self.ink, Ink::Um(um) if um != 0.0) {
+                bail!("--ink: µm need the size of the tiles: give --target FILE, or --ink none");
+            }
             let kind = match self.grid {
                 Some(Kind::Checker) => GridKind::Checker,
                 _ => GridKind::Deltille,

@@ -102,7 +102,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut left_out: Vec<Excluded> = Vec::new();
     for (name, folder) in &args.camera {
         let read = sightings::read(std::slice::from_ref(folder), &reference);
-        let (mut views, _, out) = read.with_context(|| format!("--camera {name}"))?;
+        let sightings::Read { mut views, left_out: out, .. } =
+            read.with_context(|| format!("--camera {name}"))?;
         sightings::put_on(&sheet, Some(&target), &mut views)?;
         let of_camera = |out| Excluded { camera: Some(name.clone()), ..out };
         left_out.extend(out.into_iter().map(of_camera));

@@ -8,8 +8,8 @@ use clap::ValueEnum;
 use super::target_file;
 use crate::calibrate::{Excluded, Reference, Shown, UntaggedGrid, View, views};
 use crate::camera::Pose;
-use crate::detect::Detection;
-use crate::export::calibration::{self, Sheet};
+use crate::detect::{Detection, InkEstimate};
+use crate::export::calibration::{self, Print, Sheet};
 use crate::export::detection;
 use crate::target::{GridKind, Target, TargetSpec, parse_length_mm};
 use crate::words::counted;
@@ -84,8 +84,8 @@ pub struct Sightings {
     pub empty: Vec<PathBuf>,
     /// What does not belong to the target.
     pub left_out: Vec<Excluded>,
-    /// How the print came out across and up its sheet, where that was measured.
-    pub print_scale: Option<[f64; 2]>,
+    /// What is known of the print.
+    pub print: Print,
 }
 
 impl SightingsArgs {
@@ -114,7 +114,7 @@ impl SightingsArgs {
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
-        let (mut views, empty, left_out) = read(&self.detections, &reference)?;
+        let Read { mut views, empty, left_out, ink } = read(&self.detections, &reference)?;
         let sheet = self.sheet.read()?;
         put_on(&sheet, target.as_ref(), &mut views)?;
         let mut panels = reference.panels();
@@ -122,8 +122,8 @@ impl SightingsArgs {
             let scale = solid_scale(&sheet, target)?;
             panels.iter_mut().for_each(|panel| panel.translation *= scale);
         }
-        let print_scale = sheet.print_scale;
-        Ok(Sightings { panels, views, empty, left_out, print_scale })
+        let print = Print { scale: sheet.print_scale, ink };
+        Ok(Sightings { panels, views, empty, left_out, print })
     }
 }
 
@@ -198,8 +198,16 @@ fn angle_on_sheet(target: &Target, panel: usize) -> f64 {
     placements.find(|placement| placement.panel == id).map_or(0.0, |placement| placement.angle_rad)
 }
 
-/// Views, files of detections that show none, and what does not belong to the target.
-type Read = (Vec<View>, Vec<PathBuf>, Vec<Excluded>);
+/// What detections show.
+pub struct Read {
+    pub views: Vec<View>,
+    /// Files of detections that show none.
+    pub empty: Vec<PathBuf>,
+    /// What does not belong to the target.
+    pub left_out: Vec<Excluded>,
+    /// What the pictures say together of the ink on the print.
+    pub ink: Option<InkEstimate>,
+}
 
 /// The views that detections show, files or folders of them. What does not belong to the target is
 /// told on standard error, too.
@@ -249,7 +257,28 @@ pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<Read> {
         eprintln!("warning: left out: {}: {}", files[*index].display(), out.reason);
     }
     let empty = empty.into_iter().map(|index| files[index].clone()).collect();
-    Ok((views, empty, left_out.into_iter().map(|(_, out)| out).collect()))
+    let left_out = left_out.into_iter().map(|(_, out)| out).collect();
+    Ok(Read { views, empty, left_out, ink: ink_of(&detections, reference) })
+}
+
+/// What detections say together of the ink; pictures that do not allow for it are told on standard error.
+fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<InkEstimate> {
+    let on_print = |ink: InkEstimate| match reference {
+        Reference::Grid(grid) => ink.on_print(grid.edge_mm),
+        Reference::Target(_) => ink,
+    };
+    let found: Vec<InkEstimate> =
+        detections.iter().filter_map(|(_, found)| Some(on_print(found.ink?))).collect();
+    let ink = InkEstimate::of_all(&found)?;
+    let without = found.iter().filter(|ink| !ink.used).count();
+    if ink.used && without > 0 {
+        eprintln!(
+            "warning: {ink}, but {} of {} do not allow for it: detect all in one run",
+            counted(without, "picture"),
+            found.len()
+        );
+    }
+    Some(ink)
 }
 
 /// Whether two detections are of one picture and found the same in it.

@@ -1,0 +1,158 @@
+//! Ink that has spread on a print: what is dark has grown.
+//!
+//! It belongs to the print, not to the picture, and displaces on the paper what tone curves displace in the
+//! picture: their shares are told apart by the places where lines cross, and by tilt.
+
+use serde::{Deserialize, Serialize};
+
+use super::detection::median;
+
+/// How far what is dark has grown, as the user tells it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Ink {
+    /// Estimated from the corners of each picture.
+    #[default]
+    Auto,
+    /// So much on every side, µm; less than 0 where it has shrunk.
+    Um(f64),
+}
+
+/// Most that ink is said to spread, µm: more fills the space between the bits of tags.
+const MOST_UM: f64 = 1000.0;
+
+impl std::str::FromStr for Ink {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.parse()) {
+            ("auto", _) => Ok(Self::Auto),
+            ("none", _) => Ok(Self::Um(0.0)),
+            (_, Ok(um)) if (-MOST_UM..=MOST_UM).contains(&um) => Ok(Self::Um(um)),
+            _ => Err(format!("not auto, none, or µm from -{MOST_UM} to {MOST_UM}")),
+        }
+    }
+}
+
+/// The growth of what is dark that was found in a picture, on every side.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InkEstimate {
+    /// In edges of a tile; less than 0 where it has shrunk.
+    pub edges: f64,
+    /// Its standard deviation.
+    pub edges_deviation: f64,
+    /// In µm of the print, where the target is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub um: Option<f64>,
+    /// Its standard deviation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub um_deviation: Option<f64>,
+    /// Whether it differs from nothing by more than its deviation explains, and was used.
+    pub used: bool,
+    /// How many pictures say so.
+    pub pictures: u32,
+}
+
+/// χ² of one degree of freedom that chance exceeds once in a thousand.
+const CHI2: f64 = 10.8;
+
+/// Standard deviation over median distance from the middle, and over that of the mean for the median, of a
+/// normal distribution.
+const OVER_MEDIAN_DISTANCE: f64 = 1.4826;
+const OVER_THAT_OF_THE_MEAN: f64 = 1.2533;
+
+impl InkEstimate {
+    /// What pictures of one print say together: the weighted median, so that a picture of something else does
+    /// not count; from none nothing. Its deviation is what theirs make, or what their scatter says if that is more.
+    pub fn of_all(pictures: &[Self]) -> Option<Self> {
+        // Pictures that were looked at with what all say have it already.
+        let mut pictures = pictures.to_vec();
+        pictures.sort_by(|a, b| a.edges.total_cmp(&b.edges));
+        pictures.dedup_by(|a, b| a.pictures > 1 && *a == *b);
+        let weight = |p: &Self| p.edges_deviation.max(f64::MIN_POSITIVE).powi(-2);
+        let total: f64 = pictures.iter().map(weight).sum();
+        let mut below = 0.0;
+        let middle = *pictures.iter().find(|picture| {
+            below += weight(picture);
+            below >= 0.5 * total
+        })?;
+        let count = pictures.iter().map(|picture| picture.pictures).sum();
+        if pictures.len() == 1 {
+            return Some(middle);
+        }
+        let off = |p: &Self| (p.edges - middle.edges).abs() * weight(p).sqrt();
+        let scatter = OVER_MEDIAN_DISTANCE * median(pictures.iter().map(off).collect())?;
+        let deviation = OVER_THAT_OF_THE_MEAN * scatter.max(1.0) / total.sqrt();
+        let um = |edges: f64| middle.um.map(|um| um / middle.edges * edges);
+        Some(Self {
+            edges_deviation: deviation,
+            um_deviation: um(deviation),
+            used: middle.edges.powi(2) > CHI2 * deviation.powi(2),
+            pictures: count,
+            ..middle
+        })
+    }
+
+    /// With µm of a print whose tiles have this edge.
+    pub fn on_print(self, edge_mm: f64) -> Self {
+        let um = |edges: f64| Some(1e3 * edge_mm * edges);
+        Self { um: um(self.edges), um_deviation: um(self.edges_deviation), ..self }
+    }
+}
+
+impl std::fmt::Display for InkEstimate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let grown = if self.edges < 0.0 { "shrunk" } else { "grown" };
+        match (self.um, self.um_deviation) {
+            (Some(um), Some(deviation)) => {
+                write!(f, "what is dark has {grown} by {:.1} ± {deviation:.1} µm", um.abs())?;
+            }
+            _ => {
+                let [edges, deviation] =
+                    [self.edges.abs(), self.edges_deviation].map(|e| 100.0 * e);
+                write!(f, "what is dark has {grown} by {edges:.3} ± {deviation:.3} % of an edge")?;
+            }
+        }
+        write!(f, " on every side")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(edges: f64, deviation: f64) -> InkEstimate {
+        let (um, um_deviation) = (None, None);
+        let ink = InkEstimate {
+            edges,
+            edges_deviation: deviation,
+            um,
+            um_deviation,
+            used: true,
+            pictures: 1,
+        };
+        ink.on_print(20.0)
+    }
+
+    #[test]
+    fn pictures_of_one_print_agree_whatever_one_of_them_shows() {
+        let pictures = [0.0031, 0.0029, 0.0030, 0.0032, 0.0028, 0.0300].map(|e| seen(e, 1e-4));
+        let all = InkEstimate::of_all(&pictures).unwrap();
+        assert!((all.edges - 0.0030).abs() < 1.5e-4 && all.pictures == 6 && all.used, "{all:?}");
+        assert!((0.3e-4..2e-4).contains(&all.edges_deviation), "{all:?}");
+        assert_eq!(InkEstimate::of_all(&[all, all, all]), Some(all));
+        assert_eq!(InkEstimate::of_all(&[]), None);
+        let chance = InkEstimate::of_all(&[seen(1e-4, 1e-4), seen(-2e-4, 1e-4)]).unwrap();
+        assert!(!chance.used);
+    }
+
+    #[test]
+    fn ink_is_told_in_words_that_a_printer_understands() {
+        let text = seen(-0.00305, 2e-5).to_string();
+        assert_eq!(text, "what is dark has shrunk by 61.0 ± 0.4 µm on every side");
+        assert!(
+            "none".parse::<Ink>() == Ok(Ink::Um(0.0)) && "-20".parse::<Ink>() == Ok(Ink::Um(-20.0))
+        );
+        assert!("nan".parse::<Ink>().is_err() && "5000".parse::<Ink>().is_err());
+    }
+}
