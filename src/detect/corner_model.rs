@@ -147,6 +147,8 @@ pub struct Fitted<const K: usize> {
     pub cov: [f64; 3],
     /// Standard deviation of the noise, of full scale.
     pub noise: f64,
+    /// Mean squared difference of neighbouring residuals over that of white noise: less where they have a shape.
+    pub whiteness: f64,
 }
 
 /// Pixels around a corner, by their distance from the pixel in the middle.
@@ -529,16 +531,17 @@ impl CornerFitter {
         let inverse = with_prior(&normal, &corner, noise).0.cholesky()?.inverse() * noise * noise;
         let way =
             (corner.position[0] - start.position[0]).hypot(corner.position[1] - start.position[1]);
+        let whiteness = self.whiteness(window);
         let trusted = converged
             && way <= MAX_WAY_PX
             && corner.edges_are_apart()
-            && (noise < MAX_RESIDUAL * corner.amplitude.abs()
-                || self.whiteness(window) > MIN_WHITENESS)
+            && (noise < MAX_RESIDUAL * corner.amplitude.abs() || whiteness > MIN_WHITENESS)
             && inverse[(X, X)] + inverse[(Y, Y)] < MAX_SIGMA_PX * MAX_SIGMA_PX;
         trusted.then_some(Fitted {
             corner,
             cov: [(X, X), (X, Y), (Y, Y)].map(|at| optics.inflation * inverse[at]),
             noise,
+            whiteness,
         })
     }
 

@@ -22,6 +22,7 @@
 mod beyond;
 mod blurred_corner;
 mod buckets;
+mod by_vertex;
 mod clearance;
 mod cone_fit;
 mod corner_model;
@@ -51,6 +52,7 @@ mod refine;
 mod refine_grid;
 mod ring;
 mod saddles;
+mod scatter;
 mod sectors;
 mod soft_cells;
 mod tag_words;

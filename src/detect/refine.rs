@@ -78,12 +78,19 @@ pub(super) struct ModelFit {
     pub cov: [f64; 3],
     /// Standard deviation of what is left, over half the contrast.
     pub residual: f64,
+    /// Mean squared difference of neighbouring residuals over that of white noise.
+    pub whiteness: f64,
 }
 
 impl ModelFit {
     /// Position, px.
     pub fn position(&self) -> [f64; 2] {
         self.corner.position
+    }
+
+    /// Standard deviation of what is left, of full scale.
+    pub fn noise(&self) -> f64 {
+        self.residual * self.corner.amplitude.abs()
     }
 
     /// Standard deviation of the blur with the pixel's box in it, px.
@@ -93,8 +100,9 @@ impl ModelFit {
 }
 
 impl<const K: usize> From<Fitted<K>> for ModelFit {
-    fn from(Fitted { corner, cov, noise }: Fitted<K>) -> Self {
-        Self { corner: corner.with_edges(), cov, residual: noise / corner.amplitude.abs() }
+    fn from(Fitted { corner, cov, noise, whiteness }: Fitted<K>) -> Self {
+        let residual = noise / corner.amplitude.abs();
+        Self { corner: corner.with_edges(), cov, residual, whiteness }
     }
 }
 

@@ -31,6 +31,12 @@ const MAX_RESIDUAL_RATIO: f64 = 3.0;
 /// median says nothing.
 const MIN_RESIDUAL: f64 = 0.05;
 
+/// Residuals above this many times the median show something beside noise, whose scatter in a window is a tenth.
+const UNUSUAL: f64 = 1.3;
+
+/// Correlations of neighbours above this are one shape all over the window.
+const MOST_CORRELATED: f64 = 0.9;
+
 /// Blur of which a picture loses nothing when it is sampled once a pixel, px: its spectrum falls to a
 /// ten-thousandth at the highest frequency.
 const SHARP_PX: f64 = 1.4;
@@ -134,9 +140,10 @@ impl Refiner {
                 (Some(refined), fit.filter(|_| clean))
             } else {
                 let smaller = self.clean_fit(fitter, image, corner, room, limit);
+                let is_inner = around[i].is_inner;
                 (
-                    smaller.map(Refined::from).or_else(|| around[i].is_inner.then_some(refined)),
-                    smaller,
+                    smaller.map(Refined::from).or_else(|| is_inner.then_some(refined)),
+                    smaller.or(fit.filter(|_| is_inner)),
                 )
             };
             if let Some(Refined { position: [x, y], cov, .. }) = refined {
@@ -160,14 +167,23 @@ impl Refiner {
         (tags, blur_px, optics): (&TagAreas, f64, &Optics),
     ) {
         let around = surroundings(grid, tags, 1.0);
-        for ((corner, around), fit) in grid.corners.iter_mut().zip(&around).zip(fits) {
+        let bent: Vec<Option<ModelFit>> = around
+            .iter()
+            .zip(fits)
+            .map(|(around, fit)| {
+                let fit = fit.as_ref()?;
+                let room = self.whole(around, blur_px, optics);
+                let bent = self.model(fitter, image, fit.position(), room, Some(fit));
+                bent.filter(|fit| fit.residual <= limit).or(Some(*fit))
+            })
+            .collect();
+        let noises = bent.iter().flatten().map(ModelFit::noise).collect();
+        let usual = median(noises).unwrap_or(0.0);
+        for (corner, fit) in grid.corners.iter_mut().zip(&bent) {
             let Some(fit) = fit else { continue };
-            let room = self.whole(around, blur_px, optics);
-            let bent = self.model(fitter, image, fit.position(), room, Some(fit));
-            if let Some(bent) = bent.filter(|fit| fit.residual <= limit) {
-                let [x, y] = bent.position();
-                *corner = GridCorner { x, y, cov: Some(bent.cov), ..*corner };
-            }
+            let [x, y] = fit.position();
+            let more = shape_of_residuals(fit, usual);
+            *corner = GridCorner { x, y, cov: Some(fit.cov.map(|c| more * c)), ..*corner };
         }
     }
 
@@ -287,6 +303,17 @@ impl Refiner {
 pub(super) fn sharp_level(blurs: &[Option<f64>], levels: usize) -> usize {
     let Some(blur_px) = blurs.iter().copied().flatten().reduce(f64::min) else { return 0 };
     (1..levels).rfind(|&n| blur_px >= SHARP_PX * f64::from(1u32 << n)).unwrap_or(0)
+}
+
+/// How much more a corner's covariance is than that of noise like elsewhere in the grid: what is left beyond that is
+/// something that the picture shows, as glare or the rim of a cover, and pixels beside each other say the same of it.
+/// Residuals whose neighbours have the correlation r, in rows and in columns, count as ((1 + r)/(1 − r))²
+/// times their variance.
+fn shape_of_residuals(fit: &ModelFit, usual_noise: f64) -> f64 {
+    let share = 1.0 - (UNUSUAL * usual_noise / fit.noise()).powi(2);
+    let correlation = (1.0 - fit.whiteness).clamp(0.0, MOST_CORRELATED);
+    let together = ((1.0 + correlation) / (1.0 - correlation)).powi(2);
+    1.0 + share.max(0.0) * (together - 1.0)
 }
 
 /// Whether the model finds most corners of a grid. Of edges as sharp as pixels it makes nothing; then it
