@@ -89,7 +89,7 @@ impl CheckerTiles<'_, i16> {
                 }
             }
         }
-        pairs >= LEAST_PAIRS && different as f64 > most * pairs as f64
+        pairs >= LEAST_PAIRS && different as f64 >= most * pairs as f64
     }
 
     /// Brightness of the squares beyond the ends in direction `k`, by their lowest, leftmost vertices.

@@ -23,8 +23,7 @@ use super::detection::Grid;
 use crate::lattice::{GridKind, Vertex};
 use crate::raster::{Gray, Intensity};
 
-/// The least board, of 3 × 3 corners, has so many whole squares. So has a part of any board; what lies apart from
-/// it may be there by chance.
+/// The least board, of 3 × 3 corners, has so many whole squares.
 const LEAST_SQUARES: usize = 4;
 
 /// Blur of a quarter of an edge, which the model reads in a wave, leaves an F_3 of 0.028 of F_1; a wave has none.
@@ -57,25 +56,9 @@ pub fn is_of_squares<T: Intensity>(image: &Gray<T>, grid: &Grid, may_have_tags: 
     }
     let tiles = CheckerTiles::of(image, grid);
     let count = tiles.whole_squares().count();
-    largest_area(&tiles) >= LEAST_SQUARES
+    count >= LEAST_SQUARES
         && has_few_wrong_squares(&tiles, count)
         && Waves::of(&tiles).is_none_or(|waves| waves.are_of_squares(count, may_have_tags))
-}
-
-/// Whole squares in the largest area of them, in which each touches another.
-fn largest_area(tiles: &CheckerTiles<impl Intensity>) -> usize {
-    let mut left: BTreeSet<Vertex> = tiles.whole_squares().map(|square| square.vertex).collect();
-    let mut largest = 0;
-    while let Some(first) = left.pop_first() {
-        let (mut area, mut open) = (0, vec![first]);
-        while let Some(vertex) = open.pop() {
-            area += 1;
-            let around = (-1..=1).flat_map(|row| (-1..=1).map(move |col| Vertex::new(row, col)));
-            open.extend(around.map(|step| vertex + step).filter(|next| left.remove(next)));
-        }
-        largest = largest.max(area);
-    }
-    largest
 }
 
 /// Parts of F_11 that other waves have.
