@@ -135,7 +135,7 @@ impl<const N: usize> SaddleFinder<N> {
                 return (found.level < coarse.level || is_stable).then_some(found);
             }
             let reach_px = f64::from(1u32 << found.level);
-            found = self.near(pyramid, finer, found.position, reach_px)?;
+            found = self.near(pyramid, finer, found.position, reach_px, Some)?;
         }
         Some(found)
     }
@@ -175,22 +175,31 @@ impl<const N: usize> SaddleFinder<N> {
     }
 
     /// [`Self::near_in`] a level of a pyramid; places and reach in px of level 0.
-    pub fn near(
+    pub fn near<S>(
         &self,
         pyramid: &Pyramid,
         level: usize,
         place: [f64; 2],
         reach_px: f64,
-    ) -> Option<Saddle<N>> {
+        accept: impl Fn(Saddle<N>) -> Option<S>,
+    ) -> Option<S> {
         let on_level = Pyramid::from_level_0(level, place);
         let reach_px = reach_px / f64::from(1u32 << level);
-        let found = self.near_in(&pyramid.levels()[level], on_level, reach_px)?;
-        Some(Saddle { position: Pyramid::to_level_0(level, found.position), level, ..found })
+        self.near_in(&pyramid.levels()[level], on_level, reach_px, |found| {
+            let position = Pyramid::to_level_0(level, found.position);
+            accept(Saddle { position, level, ..found })
+        })
     }
 
-    /// The first saddle that the fit reaches from starts further and further from `place`, if it lies
-    /// within `reach_px` of it.
-    pub fn near_in(&self, image: &Gray<i16>, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
+    /// What `accept` makes of the first saddle that it takes of those within `reach_px` of `place`, which the fit
+    /// reaches from starts further and further away.
+    pub fn near_in<S>(
+        &self,
+        image: &Gray<i16>,
+        place: [f64; 2],
+        reach_px: f64,
+        accept: impl Fn(Saddle<N>) -> Option<S>,
+    ) -> Option<S> {
         let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         // From the place itself, and from wherever a corner may be seen.
         let pixel = place.map(|c| c.max(0.0).round() as usize);
@@ -204,22 +213,21 @@ impl<const N: usize> SaddleFinder<N> {
         // Many starts lead to the same place, which is looked at once with each fit.
         let mut refused: Vec<([f64; 2], usize)> = Vec::new();
         starts.find_map(|start| {
-            let saddle = sizes.iter().find_map(|&size| {
+            sizes.iter().find_map(|&size| {
                 let corner = self.fits[size].find(image, start)?;
                 let position = corner.position;
                 let same = |&(other, with): &([f64; 2], usize)| {
                     with == size && distance(position, other) < STABLE_PX
                 };
-                if refused.iter().any(same) {
+                if distance(position, place) > reach_px || refused.iter().any(same) {
                     return None;
                 }
-                let saddle = self.describe(image, 0, &corner, size);
-                if saddle.is_none() {
+                let found = self.describe(image, 0, &corner, size).and_then(&accept);
+                if found.is_none() {
                     refused.push((position, size));
                 }
-                saddle
-            })?;
-            (distance(saddle.position, place) <= reach_px).then_some(saddle)
+                found
+            })
         })
     }
 }

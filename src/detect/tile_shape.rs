@@ -35,8 +35,8 @@ const PLAIN: f64 = 1.0 / 3.0;
 /// F_33 of squares is the product of F_3 along and across, and no less than this part of it.
 const LEAST_PRODUCT: f64 = 0.5;
 
-/// But for noise and what the places of corners in tiles of a few pixels leave: so much in a single square.
-const PRODUCT_NOISE: f64 = 0.1;
+/// But for so many deviations, as waves tell that tiles of boards and dots do not have.
+const DEVIATIONS: f64 = 3.0;
 
 /// Fewer single squares of the wrong colour than this, or than a part of the whole ones, are dirt.
 const LEAST_WRONG: usize = 3;
@@ -58,7 +58,7 @@ pub fn is_of_squares<T: Intensity>(image: &Gray<T>, grid: &Grid, may_have_tags: 
     let count = tiles.whole_squares().count();
     count >= LEAST_SQUARES
         && has_few_wrong_squares(&tiles, count)
-        && Waves::of(&tiles).is_none_or(|waves| waves.are_of_squares(count, may_have_tags))
+        && Waves::of(&tiles).is_none_or(|waves| waves.are_of_squares(may_have_tags))
 }
 
 /// Parts of F_11 that other waves have.
@@ -67,43 +67,50 @@ struct Waves {
     along: f64,
     across: f64,
     both: f64,
+    /// Deviation of each by noise and by the places of the corners: what waves have of which neither half is
+    /// like the other.
+    noise: f64,
 }
 
 impl Waves {
     /// Of the whole squares together.
     fn of(tiles: &CheckerTiles<impl Intensity>) -> Option<Self> {
         let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
-        let sines = |j: f64| {
-            std::array::from_fn::<f64, SAMPLES, _>(|i| (j * std::f64::consts::PI * part(i)).sin())
-        };
-        let (first, third) = (sines(1.0), sines(3.0));
-        let mut sums = [0.0; 4];
+        let mut mean = [[0.0; SAMPLES]; SAMPLES];
         for square in tiles.whole_squares() {
             let sign = [1.0, -1.0][parity(square.vertex)];
-            for (i, j) in (0..SAMPLES).flat_map(|i| (0..SAMPLES).map(move |j| (i, j))) {
-                // At the border of the picture a part of a square tells nothing.
-                let Some(value) = tiles.brightness(square.place(part(i), part(j))) else {
-                    continue;
-                };
-                let value = sign * value;
-                sums[0] += value * first[i] * first[j];
-                sums[1] += value * third[i] * first[j];
-                sums[2] += value * first[i] * third[j];
-                sums[3] += value * third[i] * third[j];
+            for (i, row) in mean.iter_mut().enumerate() {
+                for (j, sum) in row.iter_mut().enumerate() {
+                    // At the border of the picture a part of a square tells nothing.
+                    let value = tiles.brightness(square.place(part(j), part(i)));
+                    *sum += sign * value.unwrap_or(0.0);
+                }
             }
         }
-        let [whole, along, across, both] = sums;
-        let waves = Self { along: along / whole, across: across / whole, both: both / whole };
-        (whole != 0.0).then_some(waves)
+        let wave = |along: usize, across: usize| {
+            let sine = |k: usize, i: usize| (k as f64 * std::f64::consts::PI * part(i)).sin();
+            let row = |(i, row): (usize, &[f64; SAMPLES])| {
+                let along: f64 = row.iter().enumerate().map(|(j, v)| v * sine(along, j)).sum();
+                along * sine(across, i)
+            };
+            mean.iter().enumerate().map(row).sum::<f64>()
+        };
+        let whole = wave(1, 1);
+        let nothing = [(2, 2), (2, 4), (4, 2), (4, 4)].map(|(along, across)| wave(along, across));
+        let square: f64 = nothing.iter().map(|v| v * v).sum();
+        (whole != 0.0).then(|| Self {
+            along: wave(3, 1) / whole,
+            across: wave(1, 3) / whole,
+            both: wave(3, 3) / whole,
+            noise: (square / nothing.len() as f64).sqrt() / whole.abs(),
+        })
     }
 
-    /// Whether they may be those of so many squares.
-    fn are_of_squares(self, count: usize, may_have_tags: bool) -> bool {
+    fn are_of_squares(self, may_have_tags: bool) -> bool {
         let most = self.along.max(self.across);
         let is_plain = !may_have_tags && most <= PLAIN;
-        let noise = PRODUCT_NOISE / (count as f64).sqrt();
-        let is_round = self.both < LEAST_PRODUCT * self.along * self.across - noise;
-        most >= WAVE && !(is_plain && is_round)
+        let least = LEAST_PRODUCT * self.along * self.across - DEVIATIONS * self.noise;
+        most >= WAVE && !(is_plain && self.both < least)
     }
 }
 
