@@ -164,6 +164,95 @@ fn halftones_and_dithers_of_gradients() {
     }
 }
 
+/// What is asked for here is any checkerboard, which tells least.
+fn no_checkerboard_in(images: impl IntoIterator<Item = (String, Gray<u8>)>) {
+    let asked = |what: &str| what == "checker";
+    let lines: Vec<String> =
+        images.into_iter().flat_map(|(name, image)| found(&name, &image, asked)).collect();
+    assert!(lines.is_empty(), "{}", lines.join("\n"));
+}
+
+/// A sum of two waves at a slant is a slanted checkerboard, blurred. It has no waves of a third of the length.
+#[test]
+fn two_waves_at_a_slant() {
+    let waves = [(0.0, 8.0, 40.0, 14.0), (20.0, 9.0, 75.0, 31.0), (80.0, 24.0, 110.0, 17.0)];
+    no_checkerboard_in(waves.map(|(a, pitch_a, b, pitch_b)| {
+        let image = photograph(|x, y| {
+            let (u, v) = (turned(a, pitch_a, [x, y])[0], turned(b, pitch_b, [x, y])[0]);
+            0.5 + ((TAU * u).sin() + (TAU * v).sin()) / 4.0
+        });
+        (format!("waves of {pitch_a} px at {a}° and {pitch_b} px at {b}°"), image)
+    }));
+}
+
+/// Dots that do not meet, so small that blur joins them.
+#[test]
+fn fine_halftones() {
+    for threshold in [-0.4, 0.4] {
+        no_checkerboard_in([10.0, 10.6, 11.3].into_iter().flat_map(|pitch| {
+            [0.0, 15.0, 37.0].map(|angle| {
+                let image = photograph(|x, y| spots(turned(angle, pitch, [x, y]), threshold));
+                let image = gaussian(&image.map(f32::from), 0.8).map(|v| (v + 0.5) as u8);
+                (format!("spots {threshold}, {pitch} px at {angle}°"), image)
+            })
+        }));
+    }
+}
+
+/// Here and there a few of them alternate like squares of a board.
+#[test]
+fn fields_of_random_cells() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    for cell_px in [8.0, 10.0, 14.0, 20.0] {
+        for angle in [0.0, 15.0, 37.0, 60.0, 80.0] {
+            let cells = Gray::from_fn(100, 100, |_, _| u8::from(rng.random::<bool>()));
+            let image = photograph(|x, y| {
+                let [u, v] = turned(angle, cell_px, [x, y]);
+                let cell = |c: f64| (c.floor() + 50.0) as usize % 100;
+                f64::from(cells.at(cell(u), cell(v)))
+            });
+            no_checkerboard_in([(format!("cells of {cell_px} px at {angle}°"), image)]);
+        }
+    }
+}
+
+/// Where dots of one screen lie between those of another they seem to be squares.
+#[test]
+fn screens_slightly_turned() {
+    for (pitch, turn, ratio) in
+        [(12.0, 6.0, 0.93), (16.0, 9.0, 1.05), (22.0, 3.0, 1.08), (26.0, 14.0, 0.95)]
+    {
+        for (first, second) in [(0.4, -0.3), (-0.4, 0.7), (0.8, 0.3), (0.1, 0.2)] {
+            let image = photograph(|x, y| {
+                spots(turned(10.0, pitch, [x, y]), first)
+                    * spots(turned(10.0 + turn, ratio * pitch, [x, y]), second)
+            });
+            let name = format!("screens of {pitch} px, {turn}° apart, {first} and {second}");
+            no_checkerboard_in([(name, image)]);
+        }
+    }
+}
+
+/// Ordered dithers with a matrix of 8 × 8: from one tone to the next a few more cells change their colour.
+#[test]
+fn fine_dithers() {
+    let level = |x: usize, y: usize| {
+        let bits = |k: usize| 2 * ((x >> k ^ y >> k) & 1) + (y >> k & 1);
+        (16 * bits(0) + 4 * bits(1) + bits(2)) as f64 / 64.0
+    };
+    for cell_px in [8.0, 10.0, 12.0] {
+        for (across, down) in [(1.0, 0.4), (0.3, 1.0), (3.0, 1.0), (0.4, 0.0)] {
+            let image = photograph(|x, y| {
+                let cell = |c: f64| (c / cell_px).floor().max(0.0) as usize % 8;
+                let tone = 0.2 + (across * x + down * y) / (WIDTH as f64);
+                f64::from(tone % 1.0 > level(cell(x), cell(y)))
+            });
+            let name = format!("dither of {cell_px} px, {across} and {down}");
+            no_checkerboard_in([(name, image)]);
+        }
+    }
+}
+
 /// At 50 % cos u + cos v is a checkerboard, exactly, three waves are a deltille grid, and round dots
 /// are joined by blur where the gaps are small. Without a size there is nothing to tell them from a
 /// part of a board; with one there is: they do not end.

@@ -19,13 +19,17 @@
 use std::collections::BTreeMap;
 
 use super::buckets::Buckets;
-use super::detection::{Grid, median};
+use super::checker_tiles::{CheckerTiles, Point, Square, difference, moved};
+use super::detection::Grid;
 use super::tiling::{CHECKER, step};
 use crate::lattice::{GridKind, Vertex};
 use crate::raster::Gray;
 
 /// Largest part of the pairs of squares beyond a board that differ as black and white do.
 const MOST_DIFFERENT: f64 = 0.2;
+
+/// The same beyond rows of corners that are no area: in random cells they come about more easily.
+const MOST_DIFFERENT_ROWS: f64 = 0.08;
 
 /// The same beyond the complete squares of a grid. Single corners that stand apart are what a cover leaves of
 /// a board, with more of it beyond that is not covered; or gaps between dots, which all alternate.
@@ -37,14 +41,8 @@ const LEAST_PAIRS: usize = 6;
 /// Rows of squares that are looked at beyond an end.
 const ROWS: i32 = 2;
 
-/// Squares are sampled in the middle and at so many edges from it along rows and columns: on a dot that
-/// is much smaller than its square too.
-const AROUND: f64 = 0.12;
-
 /// A square this near to the corner of another grid, in edges, is one of that grid.
 const OTHER_GRID: f64 = 1.0;
-
-type Point = [f64; 2];
 
 /// Tells of each grid of a picture, of which `image` is the finest level, whether its pattern goes on where
 /// it ends. Six sectors that alternate do not come by chance, so of deltille grids it tells nothing.
@@ -60,11 +58,12 @@ pub fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
     }
     let goes_on = |(i, grid): (usize, &&Grid)| {
         let is_others = |place, reach| corners.within(place, reach).any(|(c, _)| owners[c] != i);
-        let goes_on = |lattice: &Lattice, most| lattice.goes_on(is_others, most);
+        let goes_on = |tiles: &CheckerTiles<i16>, most| tiles.goes_on(is_others, most);
         grid.kind == GridKind::Checker && {
-            let all = Lattice::of(image, grid);
-            goes_on(&all, MOST_DIFFERENT) || {
-                let squares = all.squares();
+            let all = CheckerTiles::of(image, grid);
+            let most = if all.is_compact() { MOST_DIFFERENT } else { MOST_DIFFERENT_ROWS };
+            goes_on(&all, most) || {
+                let squares = all.without_loose_corners();
                 let stand_apart = squares.corners.len() < all.corners.len();
                 stand_apart && goes_on(&squares, MOST_DIFFERENT_SQUARES)
             }
@@ -73,43 +72,12 @@ pub fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
     grids.iter().enumerate().map(goes_on).collect()
 }
 
-/// A square beyond the end of a grid, as one of the corners there predicts it.
-#[derive(Clone, Copy, Debug)]
-struct Square {
-    middle: Point,
-    /// An edge away from the grid, and one along its end.
-    edges: [Point; 2],
-}
-
-/// The corners of a grid in a picture.
-struct Lattice<'a> {
-    image: &'a Gray<i16>,
-    corners: BTreeMap<Vertex, Point>,
-}
-
-impl<'a> Lattice<'a> {
-    fn of(image: &'a Gray<i16>, grid: &Grid) -> Self {
-        let corner = |c: &super::GridCorner| (Vertex::new(c.row, c.col), [c.x, c.y]);
-        Self { image, corners: grid.corners.iter().map(corner).collect() }
-    }
-
-    /// The corners of complete squares.
-    fn squares(&self) -> Self {
-        let has = |vertex: Vertex| self.corners.contains_key(&vertex);
-        let is_in_one = |&(&v, _): &(&Vertex, &Point)| {
-            (0..CHECKER).any(|k| {
-                let [a, b] = [k, k + 1].map(step::<CHECKER>);
-                has(v + a) && has(v + b) && has(v + a + b)
-            })
-        };
-        let corners = self.corners.iter().filter(is_in_one).map(|(&v, &corner)| (v, corner));
-        Self { image: self.image, corners: corners.collect() }
-    }
-
+impl CheckerTiles<'_, i16> {
     /// Whether more than some part of what is beyond alternates; `is_others` tells whether a corner of
     /// another grid is within a distance of a place, px.
     fn goes_on(&self, is_others: impl Fn(Point, f64) -> bool, most: f64) -> bool {
-        let Some(contrast) = self.contrast() else { return false };
+        let Some([even, odd]) = self.levels() else { return false };
+        let contrast = (even - odd).abs();
         let (mut pairs, mut different) = (0, 0);
         for k in 0..CHECKER {
             let values = self.values_beyond(k, &is_others);
@@ -121,7 +89,7 @@ impl<'a> Lattice<'a> {
                 }
             }
         }
-        pairs >= LEAST_PAIRS && different as f64 > most * pairs as f64
+        pairs >= LEAST_PAIRS && different as f64 >= most * pairs as f64
     }
 
     /// Brightness of the squares beyond the ends in direction `k`, by their lowest, leftmost vertices.
@@ -181,39 +149,6 @@ impl<'a> Lattice<'a> {
         };
         Some([difference(corner, before), along])
     }
-
-    /// Difference between the bright squares of the grid and the dark ones.
-    fn contrast(&self) -> Option<f64> {
-        let mut values = [Vec::new(), Vec::new()];
-        for (&vertex, &corner) in &self.corners {
-            let at = |row, col| self.corners.get(&(vertex + Vertex::new(row, col))).copied();
-            let (Some(right), Some(above), Some(across)) = (at(0, 1), at(1, 0), at(1, 1)) else {
-                continue;
-            };
-            let edges = [difference(right, corner), difference(above, corner)];
-            let middle = [0, 1].map(|i| (corner[i] + right[i] + above[i] + across[i]) / 4.0);
-            let parity = (vertex.row + vertex.col).rem_euclid(2) as usize;
-            values[parity].extend(self.value(Square { middle, edges }));
-        }
-        let [even, odd] = values.map(median);
-        Some((even? - odd?).abs())
-    }
-
-    /// Brightness about the middle of a square; `None` where it lies outside the picture.
-    fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
-        const PLACES: [[f64; 2]; 5] =
-            [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
-        let (width, height) = (self.image.width() as f64, self.image.height() as f64);
-        let mut sum = 0.0;
-        for place in PLACES {
-            let [x, y] = moved(middle, edges, place);
-            if x < 0.0 || y < 0.0 || x + 1.0 >= width || y + 1.0 >= height {
-                return None;
-            }
-            sum += self.image.bilinear_inside(x, y);
-        }
-        Some(sum / PLACES.len() as f64)
-    }
 }
 
 /// The step along an end in direction `k`, up or to the right.
@@ -223,15 +158,6 @@ fn along_end(k: usize) -> Vertex {
 
 fn times(step: Vertex, count: i32) -> Vertex {
     Vertex::new(count * step.row, count * step.col)
-}
-
-fn difference(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
-/// A place moved by multiples of two edges.
-fn moved(place: Point, edges: [Point; 2], by: [f64; 2]) -> Point {
-    [0, 1].map(|i| place[i] + by[0] * edges[0][i] + by[1] * edges[1][i])
 }
 
 #[cfg(test)]

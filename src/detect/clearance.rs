@@ -58,6 +58,11 @@ impl TagAreas {
         }
     }
 
+    /// Whether no tile shows a tag.
+    pub fn is_empty(&self) -> bool {
+        self.tiles.is_empty()
+    }
+
     /// Whether a tile of a grid may show a tag: as its panel has them, or any that could where the
     /// panel is not known.
     fn has(&self, panel: Option<u32>, tile: Tile) -> bool {

@@ -114,12 +114,12 @@ impl CubicFit {
             }
             let [dx, dy] = surface.umbilic_point()?;
             position = [position[0] + dx, position[1] + dy];
-            let step = dx.hypot(dy);
-            let way = (position[0] - start[0]).hypot(position[1] - start[1]);
-            if step > radius || way > radius {
+            let way2 = (position[0] - start[0]).powi(2) + (position[1] - start[1]).powi(2);
+            let step2 = dx * dx + dy * dy;
+            if step2.max(way2) > radius * radius {
                 return None;
             }
-            if step < converged_px || iteration >= iterations {
+            if step2 < converged_px * converged_px || iteration >= iterations {
                 break;
             }
             surface = self.surface(image, position)?;

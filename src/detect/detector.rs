@@ -18,6 +18,7 @@ use super::refine::{Refinement, Refiner};
 use super::refine_grid::sharp_level;
 use super::saddles::SaddleFinder;
 use super::scatter;
+use super::tile_shape::is_of_squares;
 use super::tiling::{CHECKER, DELTILLE, kind};
 use super::why;
 use crate::family::Family;
@@ -188,11 +189,7 @@ impl Detector {
             }
             is_vouched_for(grid) || plausible && edge_px >= MIN_UNTAGGED_EDGE_PX
         });
-        let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
-        let mut goes_on = go_on(&pyramid.levels()[0], &all).into_iter();
-        grids.retain(|(grid, _)| {
-            goes_on.next() != Some(true) || is_vouched_for(grid) || grid.panel.is_some()
-        });
+        refuse_patterns(&pyramid, &mut grids);
         report_once(&mut grids);
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
         grids.sort_by_key(|(grid, _)| grid.panel.unwrap_or(u32::MAX));
@@ -201,12 +198,16 @@ impl Detector {
         let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
         let (optics, are_waves) = self.refine(&mut fitter, (image, &pyramid), &mut refined);
         let refined = refined.into_iter().zip(reasons).zip(are_waves);
-        let grids: Vec<(Grid, Option<Reason>)> = refined
+        let mut grids: Vec<(Grid, Option<Reason>)> = refined
             .filter(|((grid, _), is_wave)| {
                 is_vouched_for(grid) || grid.corners.len() >= least && !is_wave
             })
             .map(|(grid, _)| grid)
             .collect();
+        let may_have_tags = !self.tag_areas.is_empty();
+        grids.retain(|(grid, _)| is_labelled(grid) || is_of_squares(image, grid, may_have_tags));
+        // Of what was no corner, some is gone.
+        refuse_patterns(&pyramid, &mut grids);
         timing.lap("refine");
         let reasons = if grids.is_empty() {
             vec![too_small.unwrap_or_else(|| self.nothing_found::<N>(&pyramid, saddles.len()))]
@@ -307,6 +308,25 @@ impl Detector {
 /// Whether tags, or the outline of a mirrored board, tell that a grid is one.
 fn is_vouched_for(grid: &Grid) -> bool {
     !grid.tags.is_empty() || grid.mirrored
+}
+
+/// Whether a grid is known to be one, by tags or as a whole.
+fn is_labelled(grid: &Grid) -> bool {
+    is_vouched_for(grid) || grid.panel.is_some()
+}
+
+/// Leaves out grids that go on where they end, unless they are known.
+fn refuse_patterns(pyramid: &Pyramid, grids: &mut Vec<(Grid, Option<Reason>)>) {
+    loop {
+        let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
+        let mut goes_on = go_on(&pyramid.levels()[0], &all).into_iter();
+        let count = grids.len();
+        grids.retain(|(grid, _)| goes_on.next() != Some(true) || is_labelled(grid));
+        // What is refused is part of the pattern that others end at.
+        if grids.len() == count {
+            return;
+        }
+    }
 }
 
 /// Corners of the largest grid of a tiling.

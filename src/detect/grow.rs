@@ -380,13 +380,14 @@ fn corner_near<const N: usize>(
     let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
     let level = levels.max().unwrap_or(0);
     let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);
-    finder.near(pyramid, level, position, reach).and_then(at_place).or_else(|| {
+    finder.near(pyramid, level, position, reach, at_place).or_else(|| {
         let seen = |k: usize| grid.get(&(vertex + step::<N>(k))).map(|g| g.saddle.position);
         let edge = |k: usize| seen(k).map(|p| [p[0] - position[0], p[1] - position[1]]);
         (0..N).find_map(|k| {
-            Rectified::new::<N>(position, k, [edge(k)?, edge(k + 1)?])?
-                .find(finder, pyramid, level)
-                .and_then(at_place)
+            let edges = [edge(k)?, edge(k + 1)?];
+            Rectified::views::<N>(position, k, edges)
+                .into_iter()
+                .find_map(|view| view?.find(finder, pyramid, level, at_place))
         })
     })
 }

@@ -13,7 +13,8 @@
 //!    the map of a grid (`local_map`) goes on.
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns; `labels`
 //!    gives them to the grids.
-//!    `beyond` refuses checkerboards without tags whose pattern goes on where they end.
+//!    `beyond` refuses checkerboards without tags whose pattern goes on where they end, `tile_shape` those
+//!    whose tiles are no squares (`checker_tiles`).
 //! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`, in windows
 //!    that `refine_grid` chooses by blur (`clearance`) and by what else they show.
 //!
@@ -23,6 +24,7 @@ mod beyond;
 mod blurred_corner;
 mod buckets;
 mod by_vertex;
+mod checker_tiles;
 mod clearance;
 mod cone_fit;
 mod corner_model;
@@ -58,6 +60,7 @@ mod soft_cells;
 mod tag_words;
 mod tags;
 mod tile_map;
+mod tile_shape;
 mod tiling;
 mod why;
 

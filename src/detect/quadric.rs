@@ -62,12 +62,12 @@ impl QuadricFit {
             let coefficients = self.fit.coefficients(image, position)?;
             let [dx, dy] = stationary_point(coefficients)?;
             position = [position[0] + dx, position[1] + dy];
-            let way = (position[0] - start[0]).hypot(position[1] - start[1]);
-            let step = dx.hypot(dy);
-            if step > radius || way > radius {
+            let way2 = (position[0] - start[0]).powi(2) + (position[1] - start[1]).powi(2);
+            let step2 = dx * dx + dy * dy;
+            if step2.max(way2) > radius * radius {
                 return None;
             }
-            if step < converged_px || iteration >= iterations {
+            if step2 < converged_px * converged_px || iteration >= iterations {
                 let [c1, c2, c3, ..] = coefficients;
                 return Some(QuadricSaddle { position, form: [c1, c2, c3] });
             }

@@ -19,17 +19,17 @@ use super::saddles::{Saddle, SaddleFinder};
 use super::sectors::Sectors;
 use crate::raster::{Gray, Pyramid};
 
-/// Length of an edge in the patch, px: the widest fit of the finder reaches eight and stays within
-/// the tiles around the corner.
-const EDGE_PX: f64 = 16.0;
+/// Lengths of an edge in the patch, px, in the order of trial: the widest fit of the finder reaches eight and
+/// stays within the tiles around the corner, and the usual one within what tags leave clear of a longer edge.
+const EDGES_PX: [f64; 2] = [16.0, 28.0];
 
 /// Largest distance of a corner from where its neighbours predict it, as a part of an edge: where
 /// tiles shrink to a third from one to the next, rows continued evenly are off by so much, and still
 /// no other corner is as near.
 const MAX_WAY: f64 = 0.4;
 
-/// Half the side of the patch, px: that reach, and the way.
-const HALF_SIDE: usize = 16;
+/// Reach of the widest fit, px.
+const FIT_REACH_PX: f64 = 9.0;
 
 /// A view whose axes differ by less than this factor shows nothing that the picture does not show as well:
 /// sectors seen at 45° are still 40° wide.
@@ -38,24 +38,42 @@ const LEAST_STRETCH: f64 = 1.5;
 /// An affine view of the surroundings of a place.
 pub struct Rectified {
     place: Vector2<f64>,
+    edge_px: f64,
     image_from_patch: Matrix2<f64>,
 }
 
 impl Rectified {
-    /// The view around `place` in which edge `k` of the lattice, seen along `edges[0]`, and the next
-    /// one counter-clockwise, along `edges[1]`, lie as on the print. `None` when they are in line.
-    pub fn new<const N: usize>(place: [f64; 2], k: usize, edges: [[f64; 2]; 2]) -> Option<Self> {
+    /// The views around `place` in which edge `k` of the lattice, seen along `edges[0]`, and the next
+    /// one counter-clockwise, along `edges[1]`, lie as on the print, smaller and larger. `None` when they are in
+    /// line.
+    pub fn views<const N: usize>(
+        place: [f64; 2],
+        k: usize,
+        edges: [[f64; 2]; 2],
+    ) -> [Option<Self>; 2] {
+        EDGES_PX.map(|edge_px| Self::new::<N>(place, k, edges, edge_px))
+    }
+
+    fn new<const N: usize>(
+        place: [f64; 2],
+        k: usize,
+        edges: [[f64; 2]; 2],
+        edge_px: f64,
+    ) -> Option<Self> {
         // Image angles fall counter-clockwise on the print.
         let direction = |k: usize| {
             let angle = -TAU * k as f64 / N as f64;
-            EDGE_PX * Vector2::new(angle.cos(), angle.sin())
+            edge_px * Vector2::new(angle.cos(), angle.sin())
         };
         let patch = Matrix2::from_columns(&[direction(k), direction(k + 1)]);
         let image = Matrix2::from_columns(&edges.map(Vector2::from));
         let image_from_patch = image * patch.try_inverse()?;
         // A mirrored view is no view of this print.
-        (image_from_patch.determinant() > 0.0)
-            .then_some(Self { place: place.into(), image_from_patch })
+        (image_from_patch.determinant() > 0.0).then_some(Self {
+            place: place.into(),
+            edge_px,
+            image_from_patch,
+        })
     }
 
     /// Whether the patch shows more than a level of the pyramid by itself: tiles that are narrow there, or
@@ -65,22 +83,26 @@ impl Rectified {
         axes[1] < 1.0 || axes[0] > LEAST_STRETCH * axes[1]
     }
 
-    /// The corner that lies nearest to the place, as a level of the pyramid shows it, if the patch shows
-    /// more than that.
-    pub fn find<const N: usize>(
+    /// The nearest of the corners about the place that `accept` takes, as a level of the pyramid shows them, if
+    /// the patch shows more than that.
+    pub fn find<const N: usize, S>(
         &self,
         finder: &SaddleFinder<N>,
         pyramid: &Pyramid,
         level: usize,
-    ) -> Option<Saddle<N>> {
+        accept: impl Fn(Saddle<N>) -> Option<S>,
+    ) -> Option<S> {
         if !self.shows_more(level) {
             return None;
         }
         let image = &pyramid.levels()[level];
-        let centre = Vector2::repeat(HALF_SIDE as f64);
+        // That reach, and the way.
+        let way_px = MAX_WAY * self.edge_px;
+        let half_side = (FIT_REACH_PX + way_px) as usize + 1;
+        let centre = Vector2::repeat(half_side as f64);
         let in_level_0 = |at: Vector2<f64>| self.place + self.image_from_patch * (at - centre);
         let in_image = |at| Vector2::from(Pyramid::from_level_0(level, in_level_0(at).into()));
-        let side = 2 * HALF_SIDE + 1;
+        let side = 2 * half_side + 1;
         let inside = [[0, 0], [side, 0], [0, side], [side, side]].into_iter().all(|[x, y]| {
             let at = in_image(Vector2::new(x as f64, y as f64));
             at.x >= 0.0
@@ -99,12 +121,14 @@ impl Rectified {
             let at = [0, 1].map(|i| origin[i] + along * right[i] + down * below[i]);
             (image.bilinear_inside(at[0], at[1]) + 0.5) as i16
         });
-        let found = finder.near_in(&patch, centre.into(), MAX_WAY * EDGE_PX)?;
         let turned = |ray: f64| {
             let along = self.image_from_patch * Vector2::new(ray.cos(), ray.sin());
             along.y.atan2(along.x)
         };
-        let sectors = Sectors { rays: found.sectors.rays.map(turned), ..found.sectors };
-        Some(Saddle { position: in_level_0(found.position.into()).into(), sectors, level })
+        finder.near_in(&patch, centre.into(), way_px, |found| {
+            let sectors = Sectors { rays: found.sectors.rays.map(turned), ..found.sectors };
+            let position = in_level_0(found.position.into()).into();
+            accept(Saddle { position, sectors, level })
+        })
     }
 }

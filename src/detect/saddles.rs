@@ -70,13 +70,19 @@ impl<const N: usize> SaddleFinder<N> {
 
     /// All saddles of an image, in reading order.
     pub fn find(&self, pyramid: &Pyramid) -> Vec<Saddle<N>> {
-        let mut noise = 0.0f32;
+        let (mut noise, mut is_all_noise) = (0.0f32, true);
         let finest = &pyramid.levels()[0];
         let mut saddles = Merged::<N>::new(finest.width(), finest.height());
         for (n, level) in pyramid.levels().iter().enumerate() {
+            let sampled = sample_noise(level);
             // Grain that pixels share stays when they are averaged.
-            noise = noise.max(HARMONIC_NOISE * sample_noise(level));
-            let candidates = candidates_above_noise::<N>(level, NOISE_FACTOR * noise);
+            noise = noise.max(HARMONIC_NOISE * sampled.sigma);
+            is_all_noise &= sampled.is_all;
+            let candidates = if is_all_noise && NOISE_FACTOR * noise > MIN_AMPLITUDE {
+                candidates::<N>(level, NOISE_FACTOR * noise)
+            } else {
+                candidates_above_noise::<N>(level, NOISE_FACTOR * noise)
+            };
             for candidate in candidates {
                 let start = [candidate.x as f64, candidate.y as f64];
                 // What lies on a corner of a finer level is that corner.
@@ -91,11 +97,15 @@ impl<const N: usize> SaddleFinder<N> {
                 if !saddles.is_free(place, n) {
                     continue;
                 }
+                let is_stable = self.is_stable(level, on_level.position, USUAL);
+                if n == 0 && !is_stable && kind::<N>() == GridKind::Deltille {
+                    // No narrower fit is tried.
+                    continue;
+                }
                 let Some(sectors) = Sectors::read(level, on_level.position, &on_level.form) else {
                     continue;
                 };
                 let described = Saddle { position: place, sectors, level: n };
-                let is_stable = self.is_stable(level, on_level.position, USUAL);
                 let saddle = match n {
                     0 if is_stable => Some(described),
                     0 => self.narrow(pyramid, start),
@@ -125,7 +135,7 @@ impl<const N: usize> SaddleFinder<N> {
                 return (found.level < coarse.level || is_stable).then_some(found);
             }
             let reach_px = f64::from(1u32 << found.level);
-            found = self.near(pyramid, finer, found.position, reach_px)?;
+            found = self.near(pyramid, finer, found.position, reach_px, Some)?;
         }
         Some(found)
     }
@@ -165,22 +175,31 @@ impl<const N: usize> SaddleFinder<N> {
     }
 
     /// [`Self::near_in`] a level of a pyramid; places and reach in px of level 0.
-    pub fn near(
+    pub fn near<S>(
         &self,
         pyramid: &Pyramid,
         level: usize,
         place: [f64; 2],
         reach_px: f64,
-    ) -> Option<Saddle<N>> {
+        accept: impl Fn(Saddle<N>) -> Option<S>,
+    ) -> Option<S> {
         let on_level = Pyramid::from_level_0(level, place);
         let reach_px = reach_px / f64::from(1u32 << level);
-        let found = self.near_in(&pyramid.levels()[level], on_level, reach_px)?;
-        Some(Saddle { position: Pyramid::to_level_0(level, found.position), level, ..found })
+        self.near_in(&pyramid.levels()[level], on_level, reach_px, |found| {
+            let position = Pyramid::to_level_0(level, found.position);
+            accept(Saddle { position, level, ..found })
+        })
     }
 
-    /// The first saddle that the fit reaches from starts further and further from `place`, if it lies
-    /// within `reach_px` of it.
-    pub fn near_in(&self, image: &Gray<i16>, place: [f64; 2], reach_px: f64) -> Option<Saddle<N>> {
+    /// What `accept` makes of the first saddle that it takes of those within `reach_px` of `place`, which the fit
+    /// reaches from starts further and further away.
+    pub fn near_in<S>(
+        &self,
+        image: &Gray<i16>,
+        place: [f64; 2],
+        reach_px: f64,
+        accept: impl Fn(Saddle<N>) -> Option<S>,
+    ) -> Option<S> {
         let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         // From the place itself, and from wherever a corner may be seen.
         let pixel = place.map(|c| c.max(0.0).round() as usize);
@@ -194,29 +213,28 @@ impl<const N: usize> SaddleFinder<N> {
         // Many starts lead to the same place, which is looked at once with each fit.
         let mut refused: Vec<([f64; 2], usize)> = Vec::new();
         starts.find_map(|start| {
-            let saddle = sizes.iter().find_map(|&size| {
+            sizes.iter().find_map(|&size| {
                 let corner = self.fits[size].find(image, start)?;
                 let position = corner.position;
                 let same = |&(other, with): &([f64; 2], usize)| {
                     with == size && distance(position, other) < STABLE_PX
                 };
-                if refused.iter().any(same) {
+                if distance(position, place) > reach_px || refused.iter().any(same) {
                     return None;
                 }
-                let saddle = self.describe(image, 0, &corner, size);
-                if saddle.is_none() {
+                let found = self.describe(image, 0, &corner, size).and_then(&accept);
+                if found.is_none() {
                     refused.push((position, size));
                 }
-                saddle
-            })?;
-            (distance(saddle.position, place) <= reach_px).then_some(saddle)
+                found
+            })
         })
     }
 }
 
 /// Candidates on a level whose harmonic is no weaker than `noise`, or than a quarter of that of the
 /// ninth strongest where this is less: an image that is all board has no plain part to tell its noise
-/// from, but then it has at least as many corners as a grid.
+/// from, but then it has at least as many corners as a grid. (An image that is all noise tells it.)
 fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<Candidate> {
     const STRONGEST: usize = 9;
     const PART: f32 = 0.25;
@@ -320,13 +338,22 @@ impl<const N: usize> Merged<N> {
     }
 }
 
-/// Standard deviation of what a sample of the ring shows beside a corner, of 1023: noise, and grain
+/// What samples of a ring show beside corners.
+#[derive(Clone, Copy, Debug)]
+struct SampleNoise {
+    /// Standard deviation, of 1023.
+    sigma: f32,
+    /// Whether there is nothing else in the image: then it is known, however strong.
+    is_all: bool,
+}
+
+/// What a sample of the ring shows beside a corner: noise, and grain
 /// smoothed by a camera's demosaicing or by enlarging, which pixels next to each other share.
 ///
 /// From |Laplacian| over a sparse raster, with the mask of Immerkær, "Fast noise variance
 /// estimation" (1996), which vanishes on planes and weakly curved surfaces, drawn out so that its
 /// nine samples are as far apart as those of the ring.
-fn sample_noise(image: &Gray<i16>) -> f32 {
+fn sample_noise(image: &Gray<i16>) -> SampleNoise {
     /// One pixel in 64 is plenty for a quantile.
     const STRIDE: usize = 8;
     /// Distance of the mask's samples: the ring's radius.
@@ -335,6 +362,15 @@ fn sample_noise(image: &Gray<i16>) -> f32 {
     /// noise: boards and houses leave little without an edge.
     const QUIET: f64 = 0.1;
     const QUIET_TO_SIGMA: f32 = 1.0 / 0.1257;
+    /// Fewer samples tell quantiles no better than to a tenth.
+    const MANY: f64 = 4000.0;
+    /// The quantile that edges change first, and what it is of the median in Gaussian noise, and the median of
+    /// the quiet quantile; with their deviations over so many samples, times the root of that number.
+    const LOUD: f64 = 0.99;
+    const LOUD_TO_MIDDLE: f32 = 3.819;
+    const LOUD_DEVIATION: f64 = 1.7;
+    const MIDDLE_TO_QUIET: f32 = 5.367;
+    const QUIET_DEVIATION: f64 = 3.0;
     /// The mask's gain: √(1+4+1+4+16+4+1+4+1).
     const GAIN: f32 = 6.0;
     let (width, height) = (image.width(), image.height());
@@ -349,10 +385,21 @@ fn sample_noise(image: &Gray<i16>) -> f32 {
         }
     }
     if magnitudes.is_empty() {
-        return 0.0;
+        return SampleNoise { sigma: 0.0, is_all: false };
     }
-    let quiet = (QUIET * magnitudes.len() as f64) as usize;
-    let (_, &mut magnitude, _) = magnitudes.select_nth_unstable(quiet);
-    // Half a step of the quantisation more than nothing.
-    (magnitude as f32 + 0.5) * QUIET_TO_SIGMA / GAIN
+    let count = magnitudes.len() as f64;
+    let mut quantile = |part: f64| {
+        let (_, &mut magnitude, _) = magnitudes.select_nth_unstable((part * count) as usize);
+        // Half a step of the quantisation more than nothing.
+        magnitude as f32 + 0.5
+    };
+    let [quiet, middle, loud] = [QUIET, 0.5, LOUD].map(&mut quantile);
+    // Edges of a board on a twentieth of the image make the loud ones louder by a tenth.
+    let is_as = |ratio: f32, usual: f32, deviations: f64| {
+        f64::from(ratio / usual - 1.0).abs() <= deviations / count.sqrt()
+    };
+    let is_all = count >= MANY
+        && is_as(middle / quiet, MIDDLE_TO_QUIET, 3.0 * QUIET_DEVIATION)
+        && is_as(loud / middle, LOUD_TO_MIDDLE, 3.0 * LOUD_DEVIATION);
+    SampleNoise { sigma: quiet * QUIET_TO_SIGMA / GAIN, is_all }
 }

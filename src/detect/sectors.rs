@@ -121,7 +121,7 @@ impl<const N: usize> Circle<N> {
             return None;
         }
         let values = on_circle(image, [x, y], radius, &DIRECTIONS);
-        let mean = values.iter().sum::<f64>() / SAMPLES as f64;
+        let mean = sum(&values, |value| value) / SAMPLES as f64;
         let level = match kind::<N>() {
             // Opposite sectors have opposite colours, so the mean is the level of the edges.
             GridKind::Deltille => mean,
@@ -141,7 +141,7 @@ impl<const N: usize> Circle<N> {
 
     /// Mean deviation from the level.
     fn amplitude(&self) -> f64 {
-        self.deviations.iter().map(|d| d.abs()).sum::<f64>() / SAMPLES as f64
+        sum(&self.deviations, f64::abs) / SAMPLES as f64
     }
 
     fn sectors(&self, rays: [f64; N]) -> Sectors<N> {
@@ -171,8 +171,12 @@ impl<const N: usize> Circle<N> {
 
     /// The N sign changes; `None` unless there are exactly so many.
     fn crossings(&self) -> Option<[Crossing; N]> {
-        let largest = self.deviations.iter().fold(0.0f64, |m, d| m.max(d.abs()));
-        let dead = DEAD_BAND * largest;
+        let dead = DEAD_BAND * largest(&self.deviations);
+        let clear = bits(&self.deviations, |d| d.abs() > dead);
+        // Nearly everything that is no corner ends here.
+        if changes(clear, bits(&self.deviations, |d| d > 0.0)) != N as u32 {
+            return None;
+        }
         let is_clear = |k: &usize| self.deviations[*k].abs() > dead;
         let mut a = (0..SAMPLES).rfind(is_clear)?;
         let mut crossings = [Crossing { angle: 0.0, rising: false }; N];
@@ -262,6 +266,48 @@ fn on_circle(
     values
 }
 
+/// A bit for each sample.
+const EVERY: u64 = (1 << SAMPLES) - 1;
+
+/// The bits of the samples of which something is true.
+fn bits(values: &[f64; SAMPLES], is: impl Fn(f64) -> bool) -> u64 {
+    values.iter().enumerate().fold(0, |bits, (k, &value)| bits | u64::from(is(value)) << k)
+}
+
+/// How often, round the circle, a clear sample is on another side than the clear one before it.
+fn changes(clear: u64, above: u64) -> u32 {
+    let next = |bits: u64, by: usize| (bits << by | bits >> (SAMPLES - by)) & EVERY;
+    let (mut known, mut sides) = (clear, clear & above);
+    // What is not clear takes the side of the nearest clear sample before it: one, two, four … before.
+    for by in [1, 2, 4, 8, 16, 32] {
+        sides |= next(sides, by) & !known;
+        known |= next(known, by);
+    }
+    (sides ^ next(sides, 1)).count_ones()
+}
+
+/// The sum over the samples, in four parts that do not wait for each other.
+fn sum(values: &[f64; SAMPLES], of: impl Fn(f64) -> f64) -> f64 {
+    let mut parts = [0.0; 4];
+    for group in values.as_chunks::<4>().0 {
+        for i in 0..4 {
+            parts[i] += of(group[i]);
+        }
+    }
+    (parts[0] + parts[1]) + (parts[2] + parts[3])
+}
+
+/// The largest size of a sample.
+fn largest(values: &[f64; SAMPLES]) -> f64 {
+    let mut parts = [0.0f64; 4];
+    for group in values.as_chunks::<4>().0 {
+        for i in 0..4 {
+            parts[i] = parts[i].max(group[i].abs());
+        }
+    }
+    parts[0].max(parts[1]).max(parts[2].max(parts[3]))
+}
+
 /// An angle between 0 and 2π; most need no division for that.
 fn in_one_turn(angle: f64) -> f64 {
     if (0.0..TAU).contains(&angle) {
@@ -319,6 +365,9 @@ fn above_level(values: &[f64; SAMPLES], level: f64) -> [f64; 2] {
 fn roots<const N: usize>(form: &Form) -> Option<[Crossing; N]> {
     let Directions { cos, sin } = &*DIRECTIONS;
     let values: [f64; SAMPLES] = std::array::from_fn(|k| form.towards([cos[k], sin[k]]));
+    if changes(EVERY, bits(&values, |value| value > 0.0)) != N as u32 {
+        return None;
+    }
     let mut crossings = [Crossing { angle: 0.0, rising: false }; N];
     let mut count = 0;
     for k in 0..SAMPLES {
@@ -427,6 +476,18 @@ mod tests {
                 assert_eq!(value, image.bilinear_inside(x, y));
             }
         }
+    }
+
+    #[test]
+    fn changes_are_counted_round_the_circle() {
+        assert_eq!(changes(EVERY, 0), 0);
+        assert_eq!(changes(0, EVERY), 0);
+        assert_eq!(changes(EVERY, 0b1111), 2);
+        assert_eq!(changes(EVERY, 1 << 47 | 1), 2);
+        // A gap takes the side of what is before it, whatever it shows.
+        assert_eq!(changes(EVERY & !0b1110, 0b0101), 2);
+        assert_eq!(changes(1 | 1 << 20 | 1 << 40, 1 << 20), 2);
+        assert_eq!(changes(1 | 1 << 20 | 1 << 30 | 1 << 40, 1 << 20 | 1 << 40), 4);
     }
 
     #[test]
