@@ -67,6 +67,7 @@ fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8
         height: camera.height,
         grids: vec![grid],
         tone: None,
+        ink: None,
         reasons: Vec::new(),
         timing_ms: Default::default(),
     }
