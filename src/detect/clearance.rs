@@ -14,7 +14,6 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2};
 
-use super::by_vertex::ByVertex;
 use super::detection::{Grid, GridCorner};
 use super::local_map::{Bend, LocalMap};
 use super::tiling::{CHECKER, DELTILLE};
@@ -127,7 +126,7 @@ impl Surroundings {
 /// What lies around every corner of a grid, in their order, in pixels `scale` times as large as the
 /// grid's. Of a corner whose neighbours lie in one line nothing is known, and nothing is clear.
 pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
-    let places = places(grid, scale);
+    let places = Places::of(grid, scale);
     let bend = LazyCell::new(|| places.bend(grid));
     let around = |corner: &GridCorner| {
         let vertex = Vertex::new(corner.row, corner.col);
@@ -168,7 +167,7 @@ pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surrounding
 /// Where a corner should be that lies beside the lines of its neighbours: where they cross, px. `None`
 /// where it lies as near to them as any lens lets it, and of fewer than two lines.
 pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<[f64; 2]> {
-    let places = places(grid, 1.0);
+    let places = Places::of(grid, 1.0);
     let vertex = Vertex::new(corner.row, corner.col);
     let here = DVec2::new(corner.x, corner.y);
     let (mut normal, mut right, mut lines) = (DMat2::ZERO, DVec2::ZERO, 0);
@@ -190,14 +189,41 @@ pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<[f64; 2]> {
     (here.distance(crossing) > MOST_SAG * nearest_px).then_some(crossing.to_array())
 }
 
-/// Where the corners of a grid lie, px.
-type Places = ByVertex<[f64; 2]>;
-
-fn places(grid: &Grid, scale: f64) -> Places {
-    ByVertex::of(grid, |corner| [corner.x / scale, corner.y / scale])
+/// The places of corners in the rectangle of rows and columns that they span.
+struct Places {
+    first: Vertex,
+    cols: usize,
+    places: Vec<Option<[f64; 2]>>,
 }
 
 impl Places {
+    fn of(grid: &Grid, scale: f64) -> Self {
+        let range = |of: fn(&GridCorner) -> i32| {
+            let values = || grid.corners.iter().map(of);
+            let first = values().min().unwrap_or(0);
+            (first, values().max().map_or(0, |last| (last - first) as usize + 1))
+        };
+        let ((row, rows), (col, cols)) = (range(|c| c.row), range(|c| c.col));
+        let mut found =
+            Self { first: Vertex::new(row, col), cols, places: vec![None; rows * cols] };
+        for corner in &grid.corners {
+            if let Some(at) = found.index(Vertex::new(corner.row, corner.col)) {
+                found.places[at] = Some([corner.x / scale, corner.y / scale]);
+            }
+        }
+        found
+    }
+
+    fn index(&self, vertex: Vertex) -> Option<usize> {
+        let Vertex { row, col } = vertex - self.first;
+        let (row, col) = (usize::try_from(row).ok()?, usize::try_from(col).ok()?);
+        (col < self.cols).then_some(row * self.cols + col)
+    }
+
+    fn get(&self, vertex: Vertex) -> Option<[f64; 2]> {
+        *self.places.get(self.index(vertex)?)?
+    }
+
     fn bend(&self, grid: &Grid) -> Bend {
         let vertices = grid.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
         match grid.kind {

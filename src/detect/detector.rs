@@ -17,7 +17,6 @@ use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
 use super::refine_grid::sharp_level;
 use super::saddles::SaddleFinder;
-use super::scatter;
 use super::tile_shape::is_of_squares;
 use super::tiling::{CHECKER, DELTILLE, kind};
 use super::why;
@@ -272,10 +271,6 @@ impl Detector {
             blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
         };
         let are_waves = grids.iter_mut().zip(blurs).map(refine).collect();
-        let factor = scatter::factor(grids);
-        for corner in grids.iter_mut().flat_map(|grid| &mut grid.corners) {
-            corner.cov = corner.cov.map(|cov| cov.map(|entry| factor * entry));
-        }
         (optics, are_waves)
     }
 

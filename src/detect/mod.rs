@@ -23,7 +23,6 @@
 mod beyond;
 mod blurred_corner;
 mod buckets;
-mod by_vertex;
 mod checker_tiles;
 mod clearance;
 mod cone_fit;
@@ -54,7 +53,6 @@ mod refine;
 mod refine_grid;
 mod ring;
 mod saddles;
-mod scatter;
 mod sectors;
 mod soft_cells;
 mod tag_words;
