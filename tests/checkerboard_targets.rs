@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use command::{deltille, refused};
 use deltille::artwork;
-use deltille::camera::{Camera, Pose};
+use deltille::camera::{Camera, KannalaBrandt, Lens, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::dsc::{self, Dialect};
 use deltille::family::{Decoder, Family, TagWords, square_names};
@@ -117,6 +117,32 @@ fn errors(detection: &Detection, truth: &Truth) -> Vec<f64> {
             error
         })
         .collect()
+}
+
+/// The outermost corners are the narrowest, and nothing but the panel's margin lies beyond them.
+#[test]
+fn the_outermost_corners_are_found_through_a_fisheye_lens() {
+    let lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![0.01, -0.005, 0.0, 0.0] });
+    let camera = Camera::centred(1280, 960, 330.0, lens);
+    let board = board(&spec(8, 11, TagsIn::Black));
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let (mut found, mut all) = (0, 0);
+    for view in 0..24 {
+        let tilt = f64::from(view % 6) * 0.2;
+        let mm = rng.random_range(60.0..160.0);
+        let (detection, truth) = board.seen(&mut rng, &camera, mm, tilt);
+        let is_outermost = |row: i32, col: i32| row == 0 || row == 7 || col == 0 || col == 10;
+        // Windows end at the border of the picture.
+        let seen = truth.corners.iter().filter(|c| camera.sees([c.x, c.y], 8.0));
+        let ids: Vec<u32> = seen.filter(|c| is_outermost(c.row, c.col)).map(|c| c.id).collect();
+        errors(&detection, &truth);
+        let has = |id: &&u32| {
+            detection.grids.iter().flat_map(|grid| &grid.corners).any(|c| c.id == Some(**id))
+        };
+        found += ids.iter().filter(has).count();
+        all += ids.len();
+    }
+    assert!(100 * found >= 98 * all, "{found} of {all}");
 }
 
 fn rms(errors: &[f64]) -> f64 {

@@ -27,6 +27,9 @@ const SQUARE_SIDE: f64 = 0.04;
 /// The least distance of the samples from the edge, px of the level.
 const MIN_SIDE_PX: f64 = 1.2;
 
+/// Tiles whose next edges leave this one by less than this sine are not followed in their slant.
+const LEAST_ACROSS: f64 = 0.1;
+
 /// A sample must leave the level by this part of the corners' amplitude.
 const MIN_DEVIATION: f64 = 0.25;
 
@@ -45,6 +48,33 @@ pub fn is_clean<const N: usize>(
     b: &Saddle<N>,
     j: usize,
 ) -> bool {
+    is_clean_along(pyramid, (a, i), (b, j), |ends| ends)
+}
+
+/// [`is_clean`] of an edge that may also be the circular arc along one of the rays, or straight: of narrow
+/// sectors blur draws the rays apart.
+pub fn is_clean_somehow<const N: usize>(
+    pyramid: &Pyramid,
+    a: &Saddle<N>,
+    i: usize,
+    b: &Saddle<N>,
+    j: usize,
+) -> bool {
+    let shapes: [fn(Slopes) -> Slopes; 4] =
+        [|ends| ends, |[start, _]| [start, -start], |[_, end]| [-end, end], |_| [0.0; 2]];
+    shapes.into_iter().any(|shape| is_clean_along(pyramid, (a, i), (b, j), shape))
+}
+
+/// Slopes of an edge against its chord at either end.
+type Slopes = [f64; 2];
+
+/// [`is_clean`] of an edge whose slopes follow from those of the rays.
+fn is_clean_along<const N: usize>(
+    pyramid: &Pyramid,
+    (a, i): (&Saddle<N>, usize),
+    (b, j): (&Saddle<N>, usize),
+    shape: impl Fn(Slopes) -> Slopes,
+) -> bool {
     // The coarser of the levels that show the corners sharply shows the edge between them.
     let level = a.level.max(b.level);
     let image = &pyramid.levels()[level];
@@ -56,6 +86,7 @@ pub fn is_clean<const N: usize>(
     // Slopes of the curve against its chord at the two ends.
     let start = turn(chord, a.sectors.rays[i]).tan();
     let end = turn(chord + std::f64::consts::PI, b.sectors.rays[j]).tan();
+    let [start, end] = shape([start, end]);
     // Rays run to the left, counter-clockwise on the print, so the tile on the left lies between
     // ray i and i + 1 here, between j and j − 1 there.
     let side = |at_a: usize, at_b: usize| {
@@ -73,10 +104,23 @@ pub fn is_clean<const N: usize>(
         };
         side.max(MIN_SIDE_PX)
     };
-    let (left_side, right_side) =
-        (side((i + 1) % N, (j + N - 1) % N), side((i + N - 1) % N, (j + 1) % N));
+    let (lefts, rights) = (((i + 1) % N, (j + N - 1) % N), ((i + N - 1) % N, (j + 1) % N));
+    let (left_side, right_side) = (side(lefts.0, lefts.1), side(rights.0, rights.1));
     // Unit vectors along the chord and to its left on the print.
     let (along, left) = ([dx / length, dy / length], [dy / length, -dx / length]);
+    // How far along the edge the next edges of a tile lead for each step away from it. So the samples stay in
+    // a tile that is slanted.
+    let next_edges = |(at_a, at_b): (usize, usize)| {
+        [a.sectors.rays[at_a], b.sectors.rays[at_b]].map(|ray| {
+            let (sin, cos) = ray.sin_cos();
+            [cos * along[0] + sin * along[1], cos * left[0] + sin * left[1]]
+        })
+    };
+    let (next_left, next_right) = (next_edges(lefts), next_edges(rights));
+    let lean = |[at_a, at_b]: [[f64; 2]; 2], t: f64| {
+        let [ahead, across] = [0, 1].map(|k| (1.0 - t) * at_a[k] + t * at_b[k]);
+        if across.abs() > LEAST_ACROSS { ahead / across } else { 0.0 }
+    };
     let dark_left = i.is_multiple_of(2);
     let amplitude = a.sectors.amplitude.min(b.sectors.amplitude);
     let mut failures = 0;
@@ -84,13 +128,15 @@ pub fn is_clean<const N: usize>(
         let t = END + (1.0 - 2.0 * END) * (station as f64 + 0.5) / STATIONS as f64;
         // Hermite cubic in units of the length; image angles fall to the left, hence the signs.
         let offset = length * (-start * t * (1.0 - t) * (1.0 - t) + end * t * t * (1.0 - t));
-        let deviation = |lateral: f64| {
-            let x = ax + along[0] * t * length + left[0] * lateral;
-            let y = ay + along[1] * t * length + left[1] * lateral;
+        let deviation = |away: f64, next| {
+            let (ahead, lateral) = (t * length + lean(next, t) * away, offset + away);
+            let x = ax + along[0] * ahead + left[0] * lateral;
+            let y = ay + along[1] * ahead + left[1] * lateral;
             let level = a.sectors.level + t * (b.sectors.level - a.sectors.level);
             f64::from(image.bilinear(x, y)) - level
         };
-        let (on_left, on_right) = (deviation(offset + left_side), deviation(offset - right_side));
+        let (on_left, on_right) =
+            (deviation(left_side, next_left), deviation(-right_side, next_right));
         let (dark, bright) = if dark_left { (on_left, on_right) } else { (on_right, on_left) };
         let clean = dark < -MIN_DEVIATION * amplitude && bright > MIN_DEVIATION * amplitude;
         failures += usize::from(!clean);

@@ -8,7 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use super::buckets::Buckets;
-use super::edge::{MAX_CHORD_RAD, is_clean};
+use super::edge::{MAX_CHORD_RAD, is_clean_somehow};
 use super::links::{Link, Links, facing_ray, links};
 use super::local_map::{Bend, LocalMap};
 use super::parts::join;
@@ -405,7 +405,7 @@ fn placed_at<const N: usize>(
         let Some(other) = grid.get(&neighbour) else { continue };
         let back = other.ray(k + N / 2);
         if let Some(ray) = facing_ray(&other.saddle, back, &saddle)
-            && is_clean(pyramid, &other.saddle, back, &saddle, ray)
+            && is_clean_somehow(pyramid, &other.saddle, back, &saddle, ray)
         {
             votes[(k + N - ray) % N] += 1;
         }
