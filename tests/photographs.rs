@@ -3,6 +3,7 @@
 mod common;
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use common::data;
 use deltille::detect::{Detector, DetectorConfig, Grid, InkEstimate};
@@ -13,7 +14,7 @@ use deltille::target::GridKind;
 use deltille::verify::Document;
 
 /// Every image of a folder of the data.
-fn images(folder: &str) -> Option<Vec<std::path::PathBuf>> {
+fn images(folder: &str) -> Option<Vec<PathBuf>> {
     let mut images: Vec<_> =
         std::fs::read_dir(data(folder)?).ok()?.map(|entry| entry.unwrap().path()).collect();
     images.sort();

@@ -194,9 +194,8 @@ impl<const K: usize, P: Pattern<K>> Pattern<K> for Inked<P> {
         shade.f += here;
         shade.slopes[0] -= here * by_x;
         shade.slopes[1] -= here * by_y;
-        for p in 0..TRIANGLE_PARAMS {
-            let [c, cx, cy, cxx, cxy, cyy] = by[p];
-            shade.triangle[p] = here * (c + x * (cx + cxx * x + cxy * y) + y * (cy + cyy * y));
+        for (part, [c, cx, cy, cxx, cxy, cyy]) in shade.triangle.iter_mut().zip(by) {
+            *part = here * (c + x * (cx + cxx * x + cxy * y) + y * (cy + cyy * y));
         }
         shade
     }

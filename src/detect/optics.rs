@@ -610,8 +610,8 @@ mod tests {
                     let place = [x, y].map(|c| (c as f64 + 0.5) / FINE as f64 - 0.5);
                     let h = distances(on_paper([0, 1].map(|i| place[i] + first[i])));
                     let grown = ink * EDGE_PX;
-                    let [right, left, far] = [h[0] < grown, h[1] > -grown, h[2] < grown];
-                    let is_dark = right && left || left && far || far && right;
+                    let sides = [h[0] < grown, h[1] > -grown, h[2] < grown];
+                    let is_dark = sides.iter().filter(|&&side| side).count() > 1;
                     let [row, col] = [1, 0].map(|i| first[i] as usize * FINE + [x, y][i]);
                     fine[row * COUNT * SIDE * FINE + col] = f64::from(!is_dark);
                 }
