@@ -131,7 +131,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             });
             bar.finish_and_clear();
         }
-        output::print(&format!("ink: {ink} ({})\n", counted(ink.pictures as usize, "picture")))?;
+        eprintln!("ink: {ink} ({})", counted(ink.pictures as usize, "picture"));
     }
     if interrupted.load(Ordering::Relaxed) {
         let on = if args.stream { "" } else { "; --skip-existing goes on from here" };
