@@ -52,8 +52,12 @@ fn direction(kind: GridKind, from: Vertex, to: Vertex) -> usize {
 }
 
 fn remove(edges: &mut BTreeMap<Vertex, Vec<usize>>, from: Vertex, direction: usize) -> bool {
-    let Some(directions) = edges.get_mut(&from) else { return false };
-    let Some(at) = directions.iter().position(|&d| d == direction) else { return false };
+    let Some(directions) = edges.get_mut(&from) else {
+        return false;
+    };
+    let Some(at) = directions.iter().position(|&d| d == direction) else {
+        return false;
+    };
     directions.remove(at);
     if directions.is_empty() {
         edges.remove(&from);

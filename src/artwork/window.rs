@@ -66,7 +66,9 @@ fn clip_polygon(mut polygon: Vec<Point>, window: Rect) -> Vec<Point> {
     for side in 0..4 {
         let depth = |p: Point| depths(p, window)[side];
         let mut inside = Vec::with_capacity(polygon.len() + 4);
-        let Some(&last) = polygon.last() else { return polygon };
+        let Some(&last) = polygon.last() else {
+            return polygon;
+        };
         let mut from = last;
         for &to in &polygon {
             let (a, b) = (depth(from), depth(to));

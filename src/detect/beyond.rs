@@ -76,7 +76,9 @@ impl CheckerTiles<'_, i16> {
     /// Whether more than some part of what is beyond alternates; `is_others` tells whether a corner of
     /// another grid is within a distance of a place, px.
     fn goes_on(&self, is_others: impl Fn(Point, f64) -> bool, most: f64) -> bool {
-        let Some([even, odd]) = self.levels() else { return false };
+        let Some([even, odd]) = self.levels() else {
+            return false;
+        };
         let contrast = (even - odd).abs();
         let (mut pairs, mut different) = (0, 0);
         for k in 0..CHECKER {
@@ -100,7 +102,9 @@ impl CheckerTiles<'_, i16> {
     ) -> BTreeMap<Vertex, f64> {
         let mut squares: BTreeMap<Vertex, Vec<Square>> = BTreeMap::new();
         for (&vertex, &corner) in &self.corners {
-            let Some(edges) = self.end(vertex, corner, k) else { continue };
+            let Some(edges) = self.end(vertex, corner, k) else {
+                continue;
+            };
             for row in 1..=ROWS {
                 for side in [0, -1] {
                     let near = vertex + times(step::<CHECKER>(k), row) + times(along_end(k), side);
@@ -212,7 +216,9 @@ mod tests {
     fn dots_and_random_cells_go_on() {
         assert!(goes_on(&picture(|row, col| if (row + col) % 2 == 0 { 100 } else { 800 })));
         // Every second dot of every second row, as in a dither.
-        assert!(goes_on(&picture(|row, col| if row % 2 == 0 && col % 2 == 0 { 100 } else { 800 })));
+        assert!(goes_on(&picture(|row, col| {
+            if row % 2 == 0 && col % 2 == 0 { 100 } else { 800 }
+        })));
         let random = |row: i32, col: i32| (row * 7919 + col * 104_729).rem_euclid(101) % 2;
         assert!(goes_on(&picture(|row, col| if random(row, col) == 0 { 100 } else { 800 })));
     }

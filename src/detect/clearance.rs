@@ -72,6 +72,9 @@ impl TagAreas {
     }
 }
 
+/// A span without any place.
+pub const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
 /// Signed distance from a line, px: a·u + b·v + c.
 type Line = [f64; 3];
 
@@ -100,12 +103,32 @@ pub struct Edge {
 }
 
 impl Surroundings {
-    /// Tells whether nothing else is seen at a place, px from the corner, under a blur of this
-    /// deviation.
-    pub fn clear(&self, blur_px: f64) -> impl Fn([f64; 2]) -> bool {
+    /// First and last place of a row, px from the corner, before which and behind which the far sides are seen under a
+    /// blur of this deviation.
+    pub fn span(&self, v: f64, blur_px: f64) -> [f64; 2] {
+        if self.sides.is_empty() {
+            return NOTHING;
+        }
         let margin = BLUR_MARGIN_SIGMAS * blur_px;
-        let circle2 = (self.distance([0.0; 2]) - margin).max(0.0).powi(2);
-        move |[u, v]| u * u + v * v < circle2 || self.distance([u, v]) >= margin
+        let [mut first, mut last] = [f64::NEG_INFINITY, f64::INFINITY];
+        for [a, b, c] in &self.sides {
+            let rest = margin - b * v - c;
+            if *a > 0.0 {
+                first = first.max(rest / a);
+            } else if *a < 0.0 {
+                last = last.min(rest / a);
+            } else if rest > 0.0 {
+                return NOTHING;
+            }
+        }
+        [first, last]
+    }
+
+    /// Tells whether no tag is seen at a place, px from the corner, under a blur of this deviation.
+    pub fn off_tags(&self, blur_px: f64) -> impl Fn([f64; 2]) -> bool {
+        let margin = BLUR_MARGIN_SIGMAS * blur_px;
+        let circle2 = (self.distance_of_tags([0.0; 2]) - margin).max(0.0).powi(2);
+        move |[u, v]| u * u + v * v < circle2 || self.distance_of_tags([u, v]) >= margin
     }
 
     /// Half the side of the largest clear square around the corner, px.
@@ -116,16 +139,32 @@ impl Surroundings {
 
     /// Distance from a point to the nearest thing that is not the corner, or less, px.
     fn distance(&self, [u, v]: [f64; 2]) -> f64 {
+        let sides = self.sides.iter().map(|[a, b, c]| a * u + b * v + c);
+        let nearest = sides.reduce(f64::min).unwrap_or(0.0);
+        nearest.min(self.distance_of_tags([u, v]))
+    }
+
+    /// Distance from a point to the nearest tag, or less, px.
+    fn distance_of_tags(&self, [u, v]: [f64; 2]) -> f64 {
         let from = |[a, b, c]: &Line| a * u + b * v + c;
-        let sides = self.sides.iter().map(from);
         let outside = |tag: &Vec<Line>| tag.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
-        sides.chain(self.tags.iter().map(outside)).reduce(f64::min).unwrap_or(0.0)
+        self.tags.iter().map(outside).fold(f64::INFINITY, f64::min)
     }
 }
 
 /// What lies around every corner of a grid, in their order, in pixels `scale` times as large as the
 /// grid's. Of a corner whose neighbours lie in one line nothing is known, and nothing is clear.
 pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
+    surroundings_of(grid, tags, scale, 0..grid.corners.len())
+}
+
+/// The same of some of the corners, by their index.
+pub fn surroundings_of(
+    grid: &Grid,
+    tags: &TagAreas,
+    scale: f64,
+    corners: impl Iterator<Item = usize>,
+) -> Vec<Surroundings> {
     let places = Places::of(grid, scale);
     let bend = LazyCell::new(|| places.bend(grid));
     let around = |corner: &GridCorner| {
@@ -161,7 +200,7 @@ pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surrounding
         }
         Some(found)
     };
-    grid.corners.iter().map(|corner| around(corner).unwrap_or_default()).collect()
+    corners.map(|i| around(&grid.corners[i]).unwrap_or_default()).collect()
 }
 
 /// Where a corner should be that lies beside the lines of its neighbours: where they cross, px. `None`
@@ -282,7 +321,7 @@ fn edges(
             .unwrap_or(0.0);
         let along = chord.normalize_or_zero();
         let off = steps.iter().map(|&other| along.perp_dot(place(other).into()).abs());
-        let across_px = off.sum::<f64>() / rows_apart(grid.kind, step);
+        let across_px = off.sum::<f64>() / rows_apart(grid.kind);
         let angle_rad = chord.to_angle();
         // Turned by half, left is right.
         match angle_rad {
@@ -297,9 +336,11 @@ fn edges(
 }
 
 /// The sum of the distances of all neighbours from the line along one of them, in edges.
-fn rows_apart(kind: GridKind, step: Vertex) -> f64 {
-    let place = |v: Vertex| DVec2::from(kind.position(v.row.into(), v.col.into()));
-    kind.steps().iter().map(|&other| place(step).perp_dot(place(other)).abs()).sum()
+fn rows_apart(kind: GridKind) -> f64 {
+    match kind {
+        GridKind::Deltille => 4.0 * 3f64.sqrt() / 2.0,
+        GridKind::Checker => 2.0,
+    }
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -395,7 +436,11 @@ mod tests {
         let tags = TagAreas { inset: 0.25, tiles: BTreeMap::from([(0, BTreeSet::new())]) };
         let around = &surroundings(&grid, &tags, 1.0)[12];
         // Cells begin 10 px from both edges; the blur reaches 2 px.
-        let clear = around.clear(1.0);
+        let off_tags = around.off_tags(1.0);
+        let clear = |[u, v]: [f64; 2]| {
+            let [first, last] = around.span(v, 1.0);
+            (first..=last).contains(&u) && off_tags([u, v])
+        };
         assert!(clear([7.0, 7.0]) && clear([35.0, 6.0]) && clear([-6.0, 35.0]));
         assert!(!clear([12.0, 12.0]) && !clear([9.0, 20.0]) && !clear([39.0, 0.0]));
         let square_px = (10.0 - 2.0) * std::f64::consts::FRAC_1_SQRT_2;

@@ -29,7 +29,9 @@
 use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::blurred_corner::{Deltille, Haloed, Inked, Orthant, Overlap, Pattern, Shade, Triangle};
+use super::blurred_corner::{
+    Deltille, FEW_NODES_RHO, Haloed, Inked, Orthant, Overlap, Pattern, Shade, Triangle,
+};
 use super::correlation::Influence;
 use super::curve::{Piece, TONE_PARAMS};
 use super::optics::{INK_UNIT, Optics, STEP};
@@ -70,11 +72,13 @@ const MAX_EVALUATIONS: usize = 25;
 /// below this; the next would be smaller by orders of magnitude.
 const CONVERGED: f64 = 0.25;
 
-/// A rough fit ends with a step below these: in position, px, blur, by its logarithm, and angles. What is neglected
-/// is of the order of their squares.
-const ROUGH_PX: f64 = 0.15;
-const ROUGH_LN_BLUR: f64 = 0.15;
-const ROUGH_RAD: f64 = 0.05;
+/// Or with one as short as this, in px, the logarithm of the blur and three times the angles: what it neglects is of the
+/// order of its square, a fiftieth of a deviation in photographs.
+const FINE: f64 = 0.03;
+
+/// A rough fit ends with a step below this, in px and the logarithm of the blur; what is neglected is of the order of
+/// its square.
+const ROUGH: f64 = 0.15;
 
 /// Black and white that differ by less than this part of the contrast have the same piece of a tone curve:
 /// its curvature, at most a third, changes by as small a part of itself.
@@ -172,6 +176,15 @@ impl Window {
 
     /// Those pixels (u, v) of such a window that are `seen`.
     pub fn of(radius: usize, seen: impl Fn([f64; 2]) -> bool) -> Self {
+        Self::within(radius, |_| [f64::NEG_INFINITY, f64::INFINITY], seen)
+    }
+
+    /// Those of each row v that lie in its `span` and are `seen`.
+    pub fn within(
+        radius: usize,
+        span: impl Fn(f64) -> [f64; 2],
+        seen: impl Fn([f64; 2]) -> bool,
+    ) -> Self {
         let radius = radius.min(MAX_RADIUS);
         let reach = radius as i32;
         let room = (2 * radius + 1).pow(2).next_multiple_of(LANES);
@@ -183,8 +196,11 @@ impl Window {
             runs: Vec::with_capacity(2 * radius + 1),
         };
         for v in -reach..=reach {
+            let [first, last] = span(f64::from(v));
+            let first = first.max(f64::from(-reach)).ceil() as i32;
+            let last = last.min(f64::from(reach)).floor() as i32;
             let mut before = None;
-            for u in (-reach..=reach).filter(|&u| seen([f64::from(u), f64::from(v)])) {
+            for u in (first..=last).filter(|&u| seen([f64::from(u), f64::from(v)])) {
                 match window.runs.last_mut() {
                     Some((_, length)) if before == Some(u - 1) => *length += 1,
                     _ => window.runs.push(([u, v], 1)),
@@ -331,6 +347,8 @@ struct Look<const K: usize> {
     piece: Piece,
     /// Strength of the halo, and its width over that of the blur.
     halo: [f32; 2],
+    /// ∂ ln s/∂α of the blur that the pattern has, at one steepness of the edges.
+    core_by_halo: f32,
     /// How far ink displaces the edges, in units of the blur, its derivatives by the ink, and what is between.
     displaced: [f64; K],
     by_ink: [f64; K],
@@ -356,14 +374,14 @@ fn triangle<const K: usize>(corner: &Corner<K>, optics: &Optics) -> Triangle {
     const STEP: f64 = 1e-4;
     let [e1, e2] = optics.astigmatism;
     let overlap = |corner: &Corner<K>, ink: f64| {
+        let core_px = corner.blur_px * optics.core();
         let normals = corner.angles.map(|angle| [-angle.sin(), angle.cos()]);
         let product = |[ax, ay]: [f64; 2], [bx, by]: [f64; 2]| {
             (1.0 + e1) * ax * bx + e2 * (ax * by + ay * bx) + (1.0 - e1) * ay * by
         };
         let lengths = normals.map(|n| product(n, n).sqrt());
         let rho = product(normals[0], normals[1]) / (lengths[0] * lengths[1]);
-        let displaced =
-            by_ink(corner, lengths.map(|l| 1.0 / (corner.blur_px * l))).map(|by| by * ink);
+        let displaced = by_ink(corner, lengths.map(|l| 1.0 / (core_px * l))).map(|by| by * ink);
         // n₃ as a sum of n₁ and n₂.
         let sine = |from: usize, to: usize| (corner.angles[to] - corner.angles[from]).sin();
         let a = sine(2, 1) / sine(0, 1) * lengths[0] / lengths[2];
@@ -408,7 +426,8 @@ impl<const K: usize> Look<K> {
             let [first, second] = [by_astigmatism[e][0], by_astigmatism[e][1]];
             parts(normals[0], normals[1])[e] / lengths - rho * (first + second)
         });
-        let sharpness = squares.map(|square| 1.0 / (corner.blur_px * square.sqrt()));
+        let core_px = corner.blur_px * optics.core();
+        let sharpness = squares.map(|square| 1.0 / (core_px * square.sqrt()));
         let by_ink = by_ink(corner, sharpness);
         let displaced = by_ink.map(|by| by * optics.ink);
         let triangle = displaced.iter().any(|d| *d != 0.0).then(|| triangle(corner, optics));
@@ -424,6 +443,7 @@ impl<const K: usize> Look<K> {
             rho_by_angle,
             piece,
             halo: optics.halo.map(|h| h as f32),
+            core_by_halo: optics.ln_core_by_halo() as f32,
             limits,
         }
     }
@@ -497,9 +517,9 @@ impl CornerFitter {
             let (is_last, tolerance) = match accuracy {
                 Accuracy::Full => {
                     let small = step.dot(&(matrix * step)) < CONVERGED * noise * noise;
-                    (small, SAME_LIGHT)
+                    (small || is_within(&step, FINE), SAME_LIGHT)
                 }
-                Accuracy::Rough => (is_rough(&step), ROUGHLY_SAME_LIGHT),
+                Accuracy::Rough => (is_within(&step, ROUGH), ROUGHLY_SAME_LIGHT),
             };
             if is_last && damping < 0.1 {
                 converged = true;
@@ -528,7 +548,8 @@ impl CornerFitter {
             }
         }
         let noise = noise(&normal, &corner, freedom);
-        let inverse = with_prior(&normal, &corner, noise).0.cholesky()?.inverse() * noise * noise;
+        let factor = with_prior(&normal, &corner, noise).0.cholesky()?;
+        let inverse = factor.solve(&SMatrix::<f64, PARAMS, 2>::identity()) * noise * noise;
         let way =
             (corner.position[0] - start.position[0]).hypot(corner.position[1] - start.position[1]);
         let whiteness = self.whiteness(window);
@@ -715,8 +736,15 @@ impl CornerFitter {
     ) {
         let look = Look::of(corner, optics, piece, self.limits);
         let (columns, pixels) = (&mut *self.columns, &*self.pixels);
+        let is_square = look.rho.abs() <= FEW_NODES_RHO;
         match (K, JOINT, optics.has_halo(), look.triangle) {
+            (2, false, false, _) if is_square => {
+                fill_square(columns, pixels, window, corner, &look);
+            }
             (2, false, false, _) => fill_checker(columns, pixels, window, corner, &look),
+            (2, ..) if is_square => {
+                fill_square_with_halo::<K, JOINT>(columns, pixels, window, corner, &look);
+            }
             (2, ..) => fill_checker_with_halo::<K, JOINT>(columns, pixels, window, corner, &look),
             (_, false, false, None) => fill_deltille(columns, pixels, window, corner, &look),
             (_, false, false, Some(triangle)) => {
@@ -733,11 +761,11 @@ impl CornerFitter {
     }
 }
 
-/// Whether a step is so short that a rough fit ends with it.
-fn is_rough(step: &SVector<f64, PARAMS>) -> bool {
-    step[X].hypot(step[Y]) < ROUGH_PX
-        && step[LN_BLUR].abs() < ROUGH_LN_BLUR
-        && step.iter().skip(ANGLE).all(|turn| turn.abs() < ROUGH_RAD)
+/// Whether a step in position, px, and blur, by its logarithm, is shorter than this, and one in angles than a third.
+fn is_within(step: &SVector<f64, PARAMS>, limit: f64) -> bool {
+    step[X].hypot(step[Y]) < limit
+        && step[LN_BLUR].abs() < limit
+        && step.iter().skip(ANGLE).all(|turn| turn.abs() < limit / 3.0)
 }
 
 /// The least and the greatest.
@@ -827,6 +855,29 @@ fn fill_checker_with_halo<const C: usize, const JOINT: bool>(
     look: &Look<C>,
 ) {
     let pattern = look.haloed(Orthant::new(look.rho));
+    fill::<2, C, JOINT>(columns, pixels, window, corner, look, pattern);
+}
+
+#[multiversion(targets = "simd")]
+fn fill_square<const C: usize>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+) {
+    fill::<2, C, false>(columns, pixels, window, corner, look, Orthant::of_few_nodes(look.rho));
+}
+
+#[multiversion(targets = "simd")]
+fn fill_square_with_halo<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+) {
+    let pattern = look.haloed(Orthant::of_few_nodes(look.rho));
     fill::<2, C, JOINT>(columns, pixels, window, corner, look, pattern);
 }
 
@@ -945,7 +996,7 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
         if JOINT {
             columns[RISE][i] = amplitude * seen * (1.0 - shade * shade);
             columns[SHADE][i] = shade;
-            columns[HALO][i] = light * halo;
+            columns[HALO][i] = light * (halo + by_scale * look.core_by_halo);
             let mut by = triangle[4];
             for k in 0..K {
                 by -= slopes[k] * by_ink[k];

@@ -126,6 +126,12 @@ impl CubicFit {
         }
         Some(Umbilic { position, surface })
     }
+
+    /// The way from `start` to the umbilic point of the surface there; `None` when it is not star-shaped.
+    pub fn step<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<[f64; 2]> {
+        let surface = self.surface(image, start)?;
+        (surface.star_discriminant() < 0.0).then(|| surface.umbilic_point()).flatten()
+    }
 }
 
 #[cfg(test)]

@@ -18,6 +18,8 @@
 //! through the curve at eight places. Between a twentieth of the light and all of it that is within 0.3 % of
 //! gamma 2.6. The constant κ₀ is the κ of METHOD §6, κ₁ its κ₃.
 
+use std::sync::LazyLock;
+
 use serde::{Deserialize, Serialize};
 
 /// The tone curve of a camera, as the user tells it.
@@ -95,6 +97,13 @@ const LOWEST: f64 = -0.5;
 const STEP: f64 = 1.0 / 64.0;
 const NODES: usize = 193;
 
+/// Slopes are known at the nodes and half-way between them.
+const PLACES_OF_SLOPES: usize = 2 * NODES - 1;
+
+/// Logarithms of the distances of these places from black and white.
+static TO_ENDS: LazyLock<Vec<[f64; 2]>> =
+    LazyLock::new(|| (0..PLACES_OF_SLOPES).map(|i| to_ends(place(i))).collect());
+
 /// Distance δ from black and white below which the slope of an estimated curve no longer rises or falls: grey
 /// values nearer than that are few, and sRGB has twice as much.
 const END: f64 = 0.03;
@@ -124,6 +133,16 @@ pub struct Piece {
     pub ratio: f32,
 }
 
+/// The grey value of a place where the slope is known.
+fn place(i: usize) -> f64 {
+    LOWEST + 0.5 * STEP * i as f64
+}
+
+/// Logarithms of a grey value's distances from black and white.
+fn to_ends(y: f64) -> [f64; 2] {
+    [y, 1.0 - y].map(|d| (d.max(0.0) + END).ln())
+}
+
 impl Curve {
     /// The curve that is known by name; `None` where it is a line, or not known.
     pub fn of(tone: Tone) -> Option<Self> {
@@ -144,19 +163,32 @@ impl Curve {
     pub fn estimated(params: [f64; TONE_PARAMS], [low, high]: [f64; 2]) -> Self {
         let (middle, half) = ((low + high) / 2.0, ((high - low) / 2.0).max(1e-6));
         let [p1, p2, p3] = params;
-        let ln_slope = |y: f64| {
-            let y = y.clamp(middle - REACH * half, middle + REACH * half);
-            let [to_black, to_white] = [y, 1.0 - y].map(|d| (d.max(0.0) + END).ln());
+        let ln_slope = |y: f64, [to_black, to_white]: [f64; 2]| {
             p1 * to_black + p2 * (y - middle) / half + p3 * to_white
         };
-        let at_middle = ln_slope(middle);
-        Self::with_slope(|y| (ln_slope(y) - at_middle).exp())
+        let at = |y: f64| ln_slope(y, to_ends(y));
+        let (from, to) = (middle - REACH * half, middle + REACH * half);
+        let (at_middle, at_from, at_to) = (at(middle), at(from), at(to));
+        let slopes = TO_ENDS.iter().enumerate().map(|(i, &to_ends)| {
+            let y = place(i);
+            let here = if y < from {
+                at_from
+            } else if y > to {
+                at_to
+            } else {
+                ln_slope(y, to_ends)
+            };
+            (here - at_middle).exp()
+        });
+        Self::with_slopes(&slopes.collect::<Vec<f64>>())
     }
 
     fn with_slope(slope: impl Fn(f64) -> f64) -> Self {
-        // At the nodes and half-way between them.
-        let slopes: Vec<f64> =
-            (0..2 * NODES - 1).map(|i| slope(LOWEST + 0.5 * STEP * i as f64)).collect();
+        Self::with_slopes(&(0..PLACES_OF_SLOPES).map(|i| slope(place(i))).collect::<Vec<f64>>())
+    }
+
+    /// The curve with these slopes of the light at the nodes and half-way between them.
+    fn with_slopes(slopes: &[f64]) -> Self {
         let mut light = Vec::with_capacity(NODES);
         let mut sum = 0.0;
         light.push(sum);
@@ -167,7 +199,7 @@ impl Curve {
         }
         let zero = light[(-LOWEST / STEP) as usize];
         light.iter_mut().for_each(|q| *q -= zero);
-        Self { light, slope: slopes.into_iter().step_by(2).collect() }
+        Self { light, slope: slopes.iter().copied().step_by(2).collect() }
     }
 
     /// The light of a grey value.

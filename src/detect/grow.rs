@@ -320,7 +320,9 @@ fn fill_gaps<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid, grid: 
             .collect();
         let mut grown = false;
         for vertex in empty {
-            let Some((position, edge)) = predict(grid, vertex) else { continue };
+            let Some((position, edge)) = predict(grid, vertex) else {
+                continue;
+            };
             if let Some(placed) = corner_near(finder, pyramid, grid, vertex, position, edge) {
                 grid.insert(vertex, placed);
                 grown = true;
@@ -345,7 +347,9 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<([f64; 2
     for step in (0..N).map(step::<N>) {
         let first = vertex + step;
         let second = first + step;
-        let (Some(p), Some(q)) = (at(first), at(second)) else { continue };
+        let (Some(p), Some(q)) = (at(first), at(second)) else {
+            continue;
+        };
         let predicted: [f64; 2] = std::array::from_fn(|k| match at(second + step) {
             Some(r) => 3.0 * p[k] - 3.0 * q[k] + r[k],
             None => 2.0 * p[k] - q[k],
@@ -402,7 +406,9 @@ fn placed_at<const N: usize>(
     // The turn that the neighbours agree on.
     let mut votes = [0usize; N];
     for (k, neighbour) in neighbours::<N>(vertex).into_iter().enumerate() {
-        let Some(other) = grid.get(&neighbour) else { continue };
+        let Some(other) = grid.get(&neighbour) else {
+            continue;
+        };
         let back = other.ray(k + N / 2);
         if let Some(ray) = facing_ray(&other.saddle, back, &saddle)
             && is_clean_somehow(pyramid, &other.saddle, back, &saddle, ray)

@@ -700,7 +700,9 @@ mod tests {
         for name in shipped_names().into_iter().chain(square_names()) {
             let family = Family::resolve(name).unwrap();
             for first_id in (0..family.len()).step_by(family.len().div_ceil(first_ids)) {
-                let Some(target) = board(&family, first_id as u32) else { continue };
+                let Some(target) = board(&family, first_id as u32) else {
+                    continue;
+                };
                 for flopped in [false, true] {
                     let found = found_in(&family, &target, &target, flopped).found;
                     let of = format!("{name}, first id {first_id}, flopped: {flopped}");
@@ -739,7 +741,9 @@ mod tests {
                 [((8, 9), 2), ((8, 9), 4), ((8, 9), 5), ((9, 12), 3), ((6, 7), 3)]
             {
                 let tags = TagSpec { spacing, ..TagSpec::default() };
-                let Some(shown) = board_of(&family, size, tags) else { continue };
+                let Some(shown) = board_of(&family, size, tags) else {
+                    continue;
+                };
                 for flopped in [false, true] {
                     let evidence = found_in(&family, &asked, &shown, flopped);
                     let of = format!("{name}, {size:?}, spacing {spacing}, flopped: {flopped}");
@@ -868,7 +872,9 @@ mod tests {
                 })
                 .collect();
             let readings = labeller.readers[0].read(&image, &grid, false, MOST_TILES).readings;
-            let Some(at) = readings.iter().position(|r| r.tile == tile) else { continue };
+            let Some(at) = readings.iter().position(|r| r.tile == tile) else {
+                continue;
+            };
             let code = family.code(tag.id).unwrap();
             let found = |readings: Vec<Reading>| {
                 let mut evidence = TagEvidence::default();

@@ -84,7 +84,9 @@ impl<const N: usize> Corners<'_, N> {
             }
             let chord = chord_rad(saddle, other);
             for i in (0..N).filter(|&i| open[i] && is_along(saddle, i, chord)) {
-                let Some(ray) = ray_back(chord, i, other) else { continue };
+                let Some(ray) = ray_back(chord, i, other) else {
+                    continue;
+                };
                 // What has been followed from the other end is clean.
                 let back = Some(Link { corner: index, ray: i });
                 let is_known = corner < index && found[corner][ray] == back;

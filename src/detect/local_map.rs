@@ -78,7 +78,9 @@ impl Bend {
         for vertex in vertices {
             for step in &kind::<N>().steps()[..N / 2] {
                 let line = [vertex - *step, vertex, vertex + *step].map(&at);
-                let [Some(a), Some(b), Some(c)] = line else { continue };
+                let [Some(a), Some(b), Some(c)] = line else {
+                    continue;
+                };
                 let edge = (c[0] - a[0]).hypot(c[1] - a[1]) / 2.0;
                 let second = (a[0] - 2.0 * b[0] + c[0]).hypot(a[1] - 2.0 * b[1] + c[1]);
                 sum += (second / edge).powi(2);

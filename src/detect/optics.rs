@@ -25,7 +25,13 @@ pub const REACH_PX: f64 = 7.0;
 pub const REACH_SIGMAS: f64 = 5.0;
 
 /// Width of a halo over that of the blur: masks of 1 to 2 px on pictures of 0.7 to 1 px of blur.
-const HALO_WIDTH: f64 = 2.0;
+const HALO_WIDTH: f64 = 2.5;
+
+/// The least strength of a halo: where blur has a wide foot. What is weaker yet is but a wider blur again.
+const LEAST_HALO: f64 = -0.45;
+
+/// A pattern is at least this part as blurred as its edges are steep, whatever the halo.
+const LEAST_CORE: f64 = 0.3;
 
 /// Prior deviations of the parameters: gamma 2.6 has (1.6, 0, 0), smooth steps have −0.5 at both ends,
 /// halos of 0.5 are strong, a blur twice as wide in one direction has an astigmatism of 0.6, and ink that spreads by
@@ -49,13 +55,13 @@ const WORTH_A_LOOK: f64 = 0.5;
 
 /// Steps of difference quotients, and of the parameters at most.
 pub const STEP: f64 = 0.01;
-const MAX_STEP: f64 = 0.7;
+const MAX_STEP: f64 = 2.0;
 
 /// Most iterations; four are usual.
 const MAX_ITERATIONS: usize = 10;
 
 /// Steps below this part of the parameters' deviations end the iteration.
-const CONVERGED: f64 = 0.3;
+const CONVERGED: f64 = 0.5;
 
 /// Weights of corners end where their residuals are this many times the median: they show something else.
 const MAX_RESIDUAL_RATIO: f64 = 3.0;
@@ -136,6 +142,18 @@ impl Optics {
     /// Whether there is a halo.
     pub fn has_halo(&self) -> bool {
         self.halo[0] != 0.0
+    }
+
+    /// Blur of the pattern that a halo is made from, over the blur of a pattern without one whose edges are as steep:
+    /// (1 + α)/s − α/(w·s) is the same for all α. So a corner's blur is nearly the same with and without a halo.
+    pub fn core(&self) -> f64 {
+        let [strength, width] = self.halo;
+        (1.0 + strength * (1.0 - 1.0 / width)).max(LEAST_CORE)
+    }
+
+    /// The derivative of its logarithm by the strength of the halo.
+    pub fn ln_core_by_halo(&self) -> f64 {
+        (1.0 - 1.0 / self.halo[1]) / self.core()
     }
 
     /// Whether there is a tone curve.
@@ -230,16 +248,19 @@ impl Optics {
         };
         // A first step tells what is worth looking for. What the model lacks there scatters the gradients: that is
         // no reason to look away, but the deviation that is reported.
-        let (first, scattered) = problem.first_step(&known);
+        let equations = problem.equations(&known);
+        let (first, scattered) = problem.first_step(&known, &equations);
         let mut found = (
             tone(&known.with(&first.vector()), &scattered, &problem.active, false),
             problem.ink(&first.vector(), &scattered, false),
         );
-        problem.active = first.supported(WORTH_A_LOOK).active;
+        let looked_for = first.supported(WORTH_A_LOOK).active;
+        let equations = problem.equations_of(&looked_for, equations);
+        problem.active = looked_for;
         let mut optics = known.clone();
         if !problem.active.is_empty() {
             let mut cov;
-            (optics, cov) = problem.adjusted(&known);
+            (optics, cov) = problem.adjusted(&known, equations);
             let active = problem.active.clone();
             let whole = Estimate::of(&optics.vector(), active, &cov);
             found = (
@@ -251,7 +272,8 @@ impl Optics {
                 optics = known.with(&supported.vector());
                 problem.active = supported.active;
                 if !problem.active.is_empty() {
-                    (optics, cov) = problem.adjusted(&optics);
+                    let equations = problem.equations(&optics);
+                    (optics, cov) = problem.adjusted(&optics, equations);
                 }
             }
             found = (
@@ -386,11 +408,10 @@ struct Reduced {
 
 impl<const K: usize, T: Intensity> Problem<'_, K, T> {
     /// Where a first step leads, under the noise alone, and the covariance by the scatter too.
-    fn first_step(&mut self, optics: &Optics) -> (Estimate, DMatrix<f64>) {
+    fn first_step(&self, optics: &Optics, equations: &[Option<Joint>]) -> (Estimate, DMatrix<f64>) {
         let count = self.active.len();
         let unknown = DMatrix::identity(count, count);
-        let equations = self.equations(optics);
-        let reduced = self.reduced(&equations, &weights(&equations), optics);
+        let reduced = self.reduced(equations, &weights(equations), optics);
         let mut vector = optics.vector();
         let Some(factor) = reduced.matrix.clone().cholesky() else {
             return (Estimate::of(&vector, self.active.clone(), &unknown), unknown);
@@ -414,54 +435,72 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
         })
     }
 
-    /// The optics that fit the corners best, from these, and the covariance of the active parameters.
-    fn adjusted(&mut self, first: &Optics) -> (Optics, DMatrix<f64>) {
-        let count = self.active.len();
+    /// The optics that fit the corners best, from those of which these are the equations, and the covariance of the
+    /// active parameters.
+    fn adjusted(
+        &mut self,
+        first: &Optics,
+        mut equations: Vec<Option<Joint>>,
+    ) -> (Optics, DMatrix<f64>) {
         let mut optics = first.clone();
         let mut damping = 0.0;
-        let mut equations = self.equations(&optics);
         let weights = weights(&equations);
         let mut reduced = self.reduced(&equations, &weights, &optics);
         for _ in 0..MAX_ITERATIONS {
-            let mut damped = reduced.matrix.clone();
-            for i in 0..count {
-                damped[(i, i)] *= 1.0 + damping;
-            }
-            let Some(factor) = damped.cholesky() else { break };
-            let mut step = factor.solve(&reduced.gradient);
-            let length = step.amax();
-            if length > MAX_STEP {
-                step *= MAX_STEP / length;
-            }
+            let Some(step) = self.step(&reduced, &optics, damping) else {
+                break;
+            };
             let mut vector = optics.vector();
             self.active.iter().zip(step.iter()).for_each(|(&p, s)| vector[p] += s);
             let there = optics.with(&vector);
             let before = self.members.clone();
             for (member, own) in self.members.iter_mut().zip(&reduced.own) {
-                let Some((constant, slope)) = own else { continue };
+                let Some((constant, slope)) = own else {
+                    continue;
+                };
                 let own = constant - slope * &step;
                 member.corner = member.corner.stepped(own.as_slice()).unwrap_or(member.corner);
             }
+            if step.dot(&(&reduced.matrix * &step)) < CONVERGED * CONVERGED {
+                optics = there;
+                break;
+            }
             let next = self.equations(&there);
             let improved = cost(&next, &weights, &there) <= cost(&equations, &weights, &optics);
-            let small = step.dot(&(&reduced.matrix * &step)) < CONVERGED * CONVERGED;
             if improved {
                 (optics, equations) = (there, next);
                 reduced = self.reduced(&equations, &weights, &optics);
                 damping *= 0.1;
-                if small {
-                    break;
-                }
             } else {
                 self.members = before;
-                if small {
-                    break;
-                }
                 damping = (damping * 10.0).max(0.01);
             }
         }
+        let count = self.active.len();
         let cov = covariance(&reduced).unwrap_or_else(|| DMatrix::identity(count, count));
         (optics, cov)
+    }
+
+    /// The next step of the active parameters: none further than [`MAX_STEP`], and the halo not beyond its end.
+    fn step(&self, reduced: &Reduced, optics: &Optics, damping: f64) -> Option<DVector<f64>> {
+        let mut damped = reduced.matrix.clone();
+        for i in 0..damped.nrows() {
+            damped[(i, i)] *= 1.0 + damping;
+        }
+        let mut step = damped.clone().cholesky()?.solve(&reduced.gradient);
+        if let Some(at) = self.active.iter().position(|&p| p == HALO) {
+            let most = LEAST_HALO - optics.halo[0];
+            if step[at] < most {
+                // The others follow.
+                let mut gradient = &reduced.gradient - most * damped.column(at);
+                damped.column_mut(at).fill(0.0);
+                damped.row_mut(at).fill(0.0);
+                (damped[(at, at)], gradient[at]) = (1.0, most);
+                step = damped.cholesky()?.solve(&gradient);
+            }
+        }
+        let length = step.amax();
+        Some(if length > MAX_STEP { step * (MAX_STEP / length) } else { step })
     }
 
     /// Factor of the covariances: what the noise is more than white.
@@ -492,6 +531,19 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
                 fitter.joint(image, window, &member.corner, optics, &common)
             })
             .collect()
+    }
+
+    /// What the equations of all active parameters say of some of them.
+    fn equations_of(&self, some: &[usize], equations: Vec<Option<Joint>>) -> Vec<Option<Joint>> {
+        let places = some.iter().filter_map(|p| self.active.iter().position(|a| a == p));
+        let places: Vec<usize> = places.collect();
+        let of = |joint: Joint| {
+            let rows: Vec<usize> =
+                (0..joint.own).chain(places.iter().map(|at| joint.own + at)).collect();
+            let matrix = joint.matrix.select_rows(&rows).select_columns(&rows);
+            Joint { matrix, gradient: joint.gradient.select_rows(&rows), ..joint }
+        };
+        equations.into_iter().map(|joint| joint.map(of)).collect()
     }
 
     fn reduced(&self, equations: &[Option<Joint>], weights: &[f64], optics: &Optics) -> Reduced {
@@ -690,6 +742,40 @@ mod tests {
     ) -> Fitted<3> {
         let start = Corner { position: corner.position.map(f64::round), ..*corner };
         fitter.fit(image, &Window::new(9), &start, (optics, Accuracy::Full)).unwrap()
+    }
+
+    /// Of all parameters, a corner's own and the common ones, under a halo, ink, astigmatism and a curve.
+    #[test]
+    fn gradients_of_the_joint_equations_are_those_of_the_cost() {
+        let (image, corners) = picture(0.004, |light| Tone::Srgb.grey(light));
+        let plain = Optics { range: [0.1, 0.9], ..Optics::of(Tone::Auto).with_ink(None) };
+        let optics = plain.with(&[0.3, -0.2, 0.1, 0.1, -0.15, -0.3, 0.5]);
+        let window = Window::new(9);
+        let mut fitter = CornerFitter::default();
+        let common: Vec<Common> = (0..PARAMS).map(|p| optics.common(p)).collect();
+        for corner in &corners[..4] {
+            let centre = corner.position.map(f64::round);
+            let mut joint = |corner: &Corner<3>, optics: &Optics| {
+                fitter.joint(&image, (&window, centre), corner, optics, &common).unwrap()
+            };
+            let here = joint(corner, &optics);
+            let count = here.own + PARAMS;
+            for i in 0..count {
+                let step = 2e-3 / here.matrix[(i, i)].sqrt() * here.cost.sqrt();
+                let moved = |by: f64| {
+                    let mut own = vec![0.0; here.own];
+                    let mut vector = optics.vector();
+                    match own.get_mut(i) {
+                        Some(own) => *own = by,
+                        None => vector[i - here.own] += by,
+                    }
+                    (corner.stepped(&own).unwrap(), optics.with(&vector))
+                };
+                let [(c1, o1), (c2, o2)] = [moved(step), moved(-step)];
+                let quotient = (joint(&c2, &o2).cost - joint(&c1, &o1).cost) / (4.0 * step);
+                println!("{i}: {:.6} {quotient:.6} step {step:.6}", here.gradient[i]);
+            }
+        }
     }
 
     #[test]

@@ -146,11 +146,15 @@ fn candidates<const N: usize>(
         if owners.get(&index).is_some_and(|&(grid, _)| grid == base) {
             continue;
         }
-        let Some(nearest) = tree.nearest_neighbor(saddle.position) else { continue };
+        let Some(nearest) = tree.nearest_neighbor(saddle.position) else {
+            continue;
+        };
         let map = maps
             .entry(nearest.data)
             .or_insert_with(|| LocalMap::about::<N>(nearest.data, at(grid), bend));
-        let Some([col, row]) = map.and_then(|map| map.steps_to(saddle.position)) else { continue };
+        let Some([col, row]) = map.and_then(|map| map.steps_to(saddle.position)) else {
+            continue;
+        };
         let [x, y] = kind::<N>().position(row, col);
         let step = Vertex::new(row.round() as i32, col.round() as i32);
         let vertex = nearest.data + step;
@@ -206,7 +210,9 @@ fn is_joined<const N: usize>(
 ) -> bool {
     let (mut beside, mut clean) = (0, 0);
     for k in 0..N {
-        let Some(other) = grid.get(&(vertex + step::<N>(k))) else { continue };
+        let Some(other) = grid.get(&(vertex + step::<N>(k))) else {
+            continue;
+        };
         let (ray, back) = (corner.ray(k), other.ray(k + N / 2));
         beside += 1;
         clean += usize::from(is_clean(pyramid, &corner.saddle, ray, &other.saddle, back));

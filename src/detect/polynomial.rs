@@ -107,6 +107,14 @@ impl Polynomial {
             Self::Quadric(fit) => fit.walk(image, start, most, found_px).map(FittedCorner::from),
         }
     }
+
+    /// The first step of that fit, px; `None` where it sees no corner.
+    pub fn step<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<[f64; 2]> {
+        match self {
+            Self::Cubic(fit) => fit.step(image, start),
+            Self::Quadric(fit) => fit.step(image, start),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -74,6 +74,11 @@ impl QuadricFit {
         }
         None
     }
+
+    /// The way from `start` to the saddle point of the surface there; `None` when it has none.
+    pub fn step<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<[f64; 2]> {
+        stationary_point(self.fit.coefficients(image, start)?)
+    }
 }
 
 /// The saddle point of a quadric; `None` for bowls and flat surfaces.

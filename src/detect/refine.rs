@@ -15,7 +15,7 @@
 
 use std::borrow::Cow;
 
-use super::clearance::{Edge, Surroundings};
+use super::clearance::{Edge, NOTHING, Surroundings};
 use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
 use super::corner_start::{start, start_along};
 use super::curve::Tone;
@@ -128,14 +128,18 @@ pub(super) struct Room<'a> {
 impl Room<'_> {
     /// The pixels of the image that show nothing but the corner at `position`, within a radius.
     fn window<T: Intensity>(&self, image: &Gray<T>, position: [f64; 2], radius: usize) -> Window {
-        let [x, y] = position;
         let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 1.0);
-        let is_clear = self.around.clear(self.blur_px);
-        Window::of(radius, |[u, v]| {
-            let [px, py] = [x.round() + u, y.round() + v];
-            let inside = px >= 0.0 && py >= 0.0 && px <= right && py <= bottom;
-            inside && is_clear([px - x, py - y])
-        })
+        let pixel = position.map(f64::round);
+        let off = [0, 1].map(|i| pixel[i] - position[i]);
+        let span = |v: f64| {
+            if !(0.0..=bottom).contains(&(pixel[1] + v)) {
+                return NOTHING;
+            }
+            let [first, last] = self.around.span(v + off[1], self.blur_px);
+            [(first - off[0]).max(-pixel[0]), (last - off[0]).min(right - pixel[0])]
+        };
+        let is_off_tags = self.around.off_tags(self.blur_px);
+        Window::within(radius, span, |[u, v]| is_off_tags([u + off[0], v + off[1]]))
     }
 
     /// Half the side of the largest square that shows nothing else, px.

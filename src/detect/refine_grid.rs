@@ -6,15 +6,18 @@
 //! elsewhere in the grid, and smaller windows are tried. A corner at the end of what is seen of the
 //! board that no window shows cleanly is dropped, since what hides the board has drawn it aside.
 
-use super::clearance::{Surroundings, TagAreas, crossing, surroundings};
+use rayon::prelude::*;
+
+use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
 use super::corner_model::{CornerFitter, MAX_WAY_PX};
 use super::detection::{Grid, GridCorner, median};
 use super::optics::{Optics, REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
 use super::refine::{MIN_MODEL_RADIUS, ModelFit, Refined, Refinement, Refiner, Room};
 use crate::raster::{Gray, Intensity, Pyramid};
 
-/// Corners that tell the blur: those with the most room.
+/// Corners that tell the blur: those with the most room of a few times as many, from all over the grid.
 const BLUR_CORNERS: usize = 15;
+const LOOKED_AT: usize = 4;
 
 /// Blur that is assumed before it is known, px: that of a good photograph.
 const USUAL_BLUR_PX: f64 = 1.0;
@@ -40,6 +43,9 @@ const MOST_CORRELATED: f64 = 0.9;
 /// Blur of which a picture loses nothing when it is sampled once a pixel, px: its spectrum falls to a
 /// ten-thousandth at the highest frequency.
 const SHARP_PX: f64 = 1.4;
+
+/// Corners that are worth a thread.
+const PART: usize = 128;
 
 /// A window is followed by one that is smaller by this factor.
 const NEXT_WINDOW: f64 = 0.7;
@@ -67,30 +73,29 @@ impl Refiner {
         if self.method() == Refinement::Polynomial {
             return self.known.clone();
         }
-        let around: Vec<(&Grid, Vec<Surroundings>, f64)> = grids
-            .iter()
-            .zip(blurs)
-            .filter_map(|(grid, blur)| Some((grid, surroundings(grid, tags, 1.0), (*blur)?)))
-            .filter(|(_, _, blur_px)| *blur_px <= MAX_BLUR * self.largest_radius())
-            .collect();
-        let mut places: Vec<(f64, usize, usize)> = Vec::new();
-        for (g, (_, around, blur_px)) in around.iter().enumerate() {
-            let clear = around.iter().map(|around| around.clear_square_px(*blur_px));
-            places.extend(clear.enumerate().map(|(i, clear_px)| (clear_px, g, i)));
+        let all: usize = grids.iter().map(|grid| grid.corners.len()).sum();
+        let every = all.div_ceil(2 * LOOKED_AT * SAMPLES).max(1);
+        let mut places = Vec::new();
+        for (grid, blur) in grids.iter().zip(blurs) {
+            let Some(blur_px) = blur.filter(|px| *px <= MAX_BLUR * self.largest_radius()) else {
+                continue;
+            };
+            let looked_at = (0..grid.corners.len()).step_by(every);
+            for (i, around) in looked_at.clone().zip(surroundings_of(grid, tags, 1.0, looked_at)) {
+                let (order, clear_px) = (places.len(), around.clear_square_px(blur_px));
+                places.push((order, clear_px, blur_px, grid.corners[i], around));
+            }
         }
-        places.retain(|(clear_px, ..)| *clear_px >= MIN_MODEL_RADIUS as f64);
-        places.sort_by(|a, b| b.0.total_cmp(&a.0));
+        places.retain(|(_, clear_px, ..)| *clear_px >= MIN_MODEL_RADIUS as f64);
+        places.sort_by(|a, b| b.1.total_cmp(&a.1));
         // Those with the most room lie where the board is nearest; light differs from there to elsewhere.
         places.truncate(SAMPLES.max(places.len() / 2));
-        places.sort_by_key(|&(_, g, i)| (g, i));
+        places.sort_by_key(|(order, ..)| *order);
         let count = places.len();
-        let taken = (0..count.min(SAMPLES)).map(|i| places[i * count / SAMPLES.min(count)]);
-        let samples = taken.filter_map(|(_, g, i)| {
-            let (grid, around, blur_px) = &around[g];
-            let room = self.whole(&around[i], *blur_px, &self.known);
-            let reach_px = room.reach_px.min(REACH_PX.max(REACH_SIGMAS * blur_px)).round();
-            let room = Room { reach_px, ..room };
-            let GridCorner { x, y, .. } = grid.corners[i];
+        let taken = (0..count.min(SAMPLES)).map(|i| &places[i * count / SAMPLES.min(count)]);
+        let samples = taken.filter_map(|(_, _, blur_px, corner, around)| {
+            let room = self.near(around, *blur_px, &self.known);
+            let GridCorner { x, y, .. } = *corner;
             let fit = self.model(fitter, image, [x, y], room, None)?;
             let window = self.window(image, [x, y], room).into_owned();
             Some(Sample {
@@ -115,11 +120,11 @@ impl Refiner {
     ) {
         let known_px = blur_px.unwrap_or(USUAL_BLUR_PX);
         let mut around = surroundings(grid, tags, 1.0);
-        let mut refined = self.refine_each(fitter, image, grid, &around, (known_px, optics));
+        let mut refined = self.refine_each(image, grid, &around, (known_px, optics));
         let displaced = self.put_back(grid, &refined);
         if displaced.contains(&true) {
             around = surroundings(grid, tags, 1.0);
-            refined = self.refine_each(fitter, image, grid, &around, (known_px, optics));
+            refined = self.refine_each(image, grid, &around, (known_px, optics));
         }
         let residuals: Vec<f64> =
             refined.iter().filter_map(|(_, fit)| Some((*fit)?.residual)).collect();
@@ -152,14 +157,13 @@ impl Refiner {
             }
         }
         grid.corners = kept;
-        self.follow_bends(fitter, image, grid, &fits, limit, (tags, known_px, optics));
+        self.follow_bends(image, grid, &fits, limit, (tags, known_px, optics));
     }
 
     /// Fits the corners again, now that their places tell how the edges are bent; what leaves more
     /// than `limit` does not count.
     fn follow_bends<T: Intensity>(
         &self,
-        fitter: &mut CornerFitter,
         image: &Gray<T>,
         grid: &mut Grid,
         fits: &[Option<ModelFit>],
@@ -167,16 +171,12 @@ impl Refiner {
         (tags, blur_px, optics): (&TagAreas, f64, &Optics),
     ) {
         let around = surroundings(grid, tags, 1.0);
-        let bent: Vec<Option<ModelFit>> = around
-            .iter()
-            .zip(fits)
-            .map(|(around, fit)| {
-                let fit = fit.as_ref()?;
-                let room = self.whole(around, blur_px, optics);
-                let bent = self.model(fitter, image, fit.position(), room, Some(fit));
-                bent.filter(|fit| fit.residual <= limit).or(Some(*fit))
-            })
-            .collect();
+        let bent = each(fits.len(), |fitter, i| {
+            let fit = fits[i].as_ref()?;
+            let room = self.whole(&around[i], blur_px, optics);
+            let bent = self.model(fitter, image, fit.position(), room, Some(fit));
+            bent.filter(|fit| fit.residual <= limit).or(Some(*fit))
+        });
         let noises = bent.iter().flatten().map(ModelFit::noise).collect();
         let usual = median(noises).unwrap_or(0.0);
         for (corner, fit) in grid.corners.iter_mut().zip(&bent) {
@@ -190,18 +190,16 @@ impl Refiner {
     /// All corners of a grid, each by itself.
     fn refine_each<T: Intensity>(
         &self,
-        fitter: &mut CornerFitter,
         image: &Gray<T>,
         grid: &Grid,
         around: &[Surroundings],
         (blur_px, optics): (f64, &Optics),
     ) -> Vec<(Refined, Option<ModelFit>)> {
-        let corners = grid.corners.iter().zip(around);
-        let refined = corners.map(|(corner, around)| {
-            let room = self.whole(around, blur_px, optics);
-            self.refine_within(fitter, image, [corner.x, corner.y], room)
-        });
-        refined.collect()
+        each(grid.corners.len(), |fitter, i| {
+            let room = self.near(&around[i], blur_px, optics);
+            let GridCorner { x, y, .. } = grid.corners[i];
+            self.refine_within(fitter, image, [x, y], room)
+        })
     }
 
     /// Moves corners that the model does not find, as it finds most others, to where their neighbours'
@@ -224,6 +222,12 @@ impl Refiner {
     /// All that is clear around a corner, in the largest window.
     fn whole<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
         Room { around, blur_px, reach_px: self.largest_radius(), optics }
+    }
+
+    /// What is near a corner, where the edges are told from: enough to begin with.
+    fn near<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
+        let reach_px = REACH_PX.max(REACH_SIGMAS * blur_px).round().min(self.largest_radius());
+        Room { reach_px, ..self.whole(around, blur_px, optics) }
     }
 
     /// The blur of a grid, px: as the finest level of the pyramid shows it that shows enough of it.
@@ -259,17 +263,19 @@ impl Refiner {
         tags: &TagAreas,
     ) -> Option<f64> {
         let scale = f64::from(1u32 << level);
-        let around = surroundings(grid, tags, scale);
-        let clear_px = |i: usize| around[i].clear_square_px(USUAL_BLUR_PX);
-        let mut order: Vec<usize> = (0..around.len()).collect();
-        order.sort_by(|&a, &b| clear_px(b).total_cmp(&clear_px(a)));
-        let fits = order.into_iter().take(BLUR_CORNERS).filter_map(|i| {
-            let GridCorner { x, y, .. } = grid.corners[i];
-            let place = Pyramid::from_level_0(level, [x, y]);
+        let every = grid.corners.len().div_ceil(LOOKED_AT * BLUR_CORNERS).max(1);
+        let looked_at = (0..grid.corners.len()).step_by(every);
+        let around = surroundings_of(grid, tags, scale, looked_at.clone()).into_iter();
+        let mut places: Vec<(f64, GridCorner, Surroundings)> = looked_at
+            .zip(around)
+            .map(|(i, around)| (around.clear_square_px(USUAL_BLUR_PX), grid.corners[i], around))
+            .collect();
+        places.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let fits = places.iter().take(BLUR_CORNERS).filter_map(|(clear_px, corner, around)| {
+            let place = Pyramid::from_level_0(level, [corner.x, corner.y]);
             // What is a wave shows in the middle of the tiles.
-            let reach_px = clear_px(i).max(MIN_MODEL_RADIUS as f64).floor();
-            let optics = &self.known;
-            let room = Room { around: &around[i], blur_px: USUAL_BLUR_PX, reach_px, optics };
+            let reach_px = clear_px.max(MIN_MODEL_RADIUS as f64).floor();
+            let room = Room { around, blur_px: USUAL_BLUR_PX, reach_px, optics: &self.known };
             self.model(fitter, image, place, room, None).map(|fit| scale * fit.blur_px())
         });
         median(fits.collect())
@@ -297,11 +303,19 @@ impl Refiner {
     }
 }
 
+/// What `work` makes of each of so many corners, in their order, in the threads of the pool at hand.
+fn each<F: Send>(count: usize, work: impl Fn(&mut CornerFitter, usize) -> F + Sync) -> Vec<F> {
+    let parts = (0..count).into_par_iter().with_min_len(PART);
+    parts.map_init(CornerFitter::default, |fitter, i| work(fitter, i)).collect()
+}
+
 /// The level of the pyramid, of so many, on which a picture is refined: the coarsest on which its sharpest
 /// grid is no sharper than [`SHARP_PX`]. An enlarged picture shows on the finest level little but the
 /// middle of the edges, and the grain of all pixels around is the same.
 pub(super) fn sharp_level(blurs: &[Option<f64>], levels: usize) -> usize {
-    let Some(blur_px) = blurs.iter().copied().flatten().reduce(f64::min) else { return 0 };
+    let Some(blur_px) = blurs.iter().copied().flatten().reduce(f64::min) else {
+        return 0;
+    };
     (1..levels).rfind(|&n| blur_px >= SHARP_PX * f64::from(1u32 << n)).unwrap_or(0)
 }
 

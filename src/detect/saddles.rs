@@ -167,11 +167,10 @@ impl<const N: usize> SaddleFinder<N> {
         self.is_stable(image, corner.position, size).then_some(saddle)
     }
 
-    /// Whether the next wider fit finds a corner in the same place.
-    fn is_stable(&self, image: &Gray<i16>, [x, y]: [f64; 2], size: usize) -> bool {
-        let wider = self.fits[size + 1].find(image, [x, y]);
-        let moved = wider.map(|corner| (corner.position[0] - x).hypot(corner.position[1] - y));
-        moved.is_some_and(|moved_px| moved_px < STABLE_PX)
+    /// Whether the next wider fit stays in the same place.
+    fn is_stable(&self, image: &Gray<i16>, position: [f64; 2], size: usize) -> bool {
+        let moved = self.fits[size + 1].step(image, position);
+        moved.is_some_and(|[dx, dy]| dx.hypot(dy) < STABLE_PX)
     }
 
     /// [`Self::near_in`] a level of a pyramid; places and reach in px of level 0.
@@ -354,8 +353,9 @@ struct SampleNoise {
 /// estimation" (1996), which vanishes on planes and weakly curved surfaces, drawn out so that its
 /// nine samples are as far apart as those of the ring.
 fn sample_noise(image: &Gray<i16>) -> SampleNoise {
-    /// One pixel in 64 is plenty for a quantile.
-    const STRIDE: usize = 8;
+    /// So many samples are plenty for a quantile, and one pixel in 64 for a small image.
+    const PLENTY: usize = 8000;
+    const LEAST_STRIDE: usize = 8;
     /// Distance of the mask's samples: the ring's radius.
     const STEP: usize = 4;
     /// The part of the image that is taken to be plain, and the quantile of |x| there for Gaussian
@@ -374,10 +374,11 @@ fn sample_noise(image: &Gray<i16>) -> SampleNoise {
     /// The mask's gain: √(1+4+1+4+16+4+1+4+1).
     const GAIN: f32 = 6.0;
     let (width, height) = (image.width(), image.height());
-    let mut magnitudes = Vec::with_capacity((width / STRIDE + 1) * (height / STRIDE + 1));
-    for y in (STEP..height.saturating_sub(STEP)).step_by(STRIDE) {
+    let stride = (width * height / PLENTY).isqrt().max(LEAST_STRIDE);
+    let mut magnitudes = Vec::with_capacity((width / stride + 1) * (height / stride + 1));
+    for y in (STEP..height.saturating_sub(STEP)).step_by(stride) {
         let rows = [image.row(y - STEP), image.row(y), image.row(y + STEP)];
-        for x in (STEP..width.saturating_sub(STEP)).step_by(STRIDE) {
+        for x in (STEP..width.saturating_sub(STEP)).step_by(stride) {
             let sum = |row: &[i16]| {
                 i32::from(row[x - STEP]) - 2 * i32::from(row[x]) + i32::from(row[x + STEP])
             };

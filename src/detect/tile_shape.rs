@@ -116,7 +116,9 @@ impl Waves {
 
 /// Whether there are few single squares of the wrong colour among others.
 fn has_few_wrong_squares(tiles: &CheckerTiles<impl Intensity>, whole: usize) -> bool {
-    let Some(levels) = tiles.levels() else { return true };
+    let Some(levels) = tiles.levels() else {
+        return true;
+    };
     // Those above a corner, to its right and to its left.
     let above = |v: &Vertex| [0, -1].map(|col| *v + Vertex::new(1, col));
     let places: BTreeSet<Vertex> = tiles.corners.keys().flat_map(above).collect();

@@ -104,7 +104,9 @@ fn ends_at_border(grid: &SaddleGrid, (width, height): (usize, usize)) -> bool {
         let beside = kind.neighbours(v).filter_map(|n| grid.get(&n));
         beside.map(move |other| (other.position[0] - x).hypot(other.position[1] - y))
     });
-    let Some(edge_px) = median(lengths.collect()) else { return false };
+    let Some(edge_px) = median(lengths.collect()) else {
+        return false;
+    };
     grid.values().any(|placed| {
         let [x, y] = placed.position;
         x.min(y).min(width as f64 - x).min(height as f64 - y) < edge_px

@@ -107,7 +107,9 @@ impl Scene {
                 View { camera, camera_from_surface: surface.camera_from(camera_from_target) };
             let mut add = |outline: &[[f64; 2]], solid: bool, value: f64| {
                 for part in lit(outline, &shadows) {
-                    let Some(part) = view.outline(&part) else { continue };
+                    let Some(part) = view.outline(&part) else {
+                        continue;
+                    };
                     coverage.add(&clockwise(part, solid), value);
                 }
             };
@@ -151,7 +153,9 @@ impl Scene {
                 }
                 let point = DVec3::new(x, y, 0.0);
                 let pixel = camera.project(camera_from_surface.apply(point));
-                let Some([px, py]) = pixel.filter(|&p| camera.sees(p, margin_px)) else { continue };
+                let Some([px, py]) = pixel.filter(|&p| camera.sees(p, margin_px)) else {
+                    continue;
+                };
                 let target_mm = surface.target_from_surface.apply(point).to_array();
                 let panel = surface.panel;
                 truth.corners.push(TruthCorner { panel, id, row, col, x: px, y: py, target_mm });
@@ -236,7 +240,9 @@ fn lit(outline: &[[f64; 2]], shadows: &[Shadow]) -> Vec<Vec<[f64; 2]>> {
 
 /// How many of the other outlines of an area enclose outline `i`.
 fn depth(area: &[Vec<[f64; 2]>], i: usize) -> usize {
-    let Some(&point) = area[i].first() else { return 0 };
+    let Some(&point) = area[i].first() else {
+        return 0;
+    };
     // Outlines may touch in vertices, so a point just inside the outline is asked about.
     let inner = just_inside(&area[i]).unwrap_or(point);
     (0..area.len()).filter(|&j| j != i && encloses(&area[j], inner)).count()
