@@ -719,6 +719,7 @@ impl CornerFitter {
         let places = window.u.iter().zip(&window.v).take(window.count);
         Some(Influence {
             places: places.map(|(&u, &v)| [u as i32, v as i32]).collect(),
+            twice_middle: corner.position.map(|c| (2.0 * c).round() as i32),
             residuals: self.columns[PARAMS][..window.count].to_vec(),
             on_position: [X, Y].map(|i| column(row(&inverse, i))),
             hat: (0..ANGLE + K).map(|i| column(row(&root, i))).collect(),

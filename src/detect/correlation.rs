@@ -9,8 +9,13 @@
 //!     factor = Σ c² r²/(1 − H) / (σ² Σ c²) · (1 + Σ_lags ρ(lag) Σ c(p) c(p + lag) / Σ c²)
 //! ```
 //!
-//! pooled over corners of a picture. A fit takes out of its residuals what looks like its parameters:
+//! pooled over corners of a picture. What is even about a corner (the same at opposite pixels) and what is odd have
+//! factors of their own: where the blur is not quite that of the model, after motion say, the residuals of a
+//! corner of three edges are odd, and so do not move it, since its influence is nearly even; of two edges it is the other
+//! way round. A fit takes out of its residuals what looks like its parameters:
 //! E[r rᵀ] = σ² (1 − H) with the hat matrix H of white noise, which is added again.
+
+use std::collections::HashMap;
 
 use multiversion::multiversion;
 
@@ -19,6 +24,8 @@ use multiversion::multiversion;
 pub struct Influence {
     /// Pixels, counted from any.
     pub places: Vec<[i32; 2]>,
+    /// The place of the corner among them, twice.
+    pub twice_middle: [i32; 2],
     /// Pixels minus model.
     pub residuals: Vec<f32>,
     /// Influence on x and y.
@@ -35,11 +42,40 @@ const LAGS_PX: [i32; 2] = [2, 6];
 /// Mean correlation at the largest lag above which larger ones are looked at.
 const WIDE: f64 = 0.05;
 
-/// Factors that are believed: sharpened noise falls in half, enlarging by six gives 36.
-const FACTORS: [f64; 2] = [0.5, 40.0];
+/// Factors that are believed: where motion is ten times the blur the noise is a tenth of the residuals, and enlarging by
+/// six gives 36.
+const FACTORS: [f64; 2] = [0.02, 40.0];
 
 /// Corners from which correlations are told; the sums of ten vary by some per cent.
 pub const CORNERS: usize = 10;
+
+impl Influence {
+    /// What is the same at opposite pixels, or of opposite sign, of those that have both.
+    fn part(&self, sign: f32) -> Self {
+        let at: HashMap<[i32; 2], usize> =
+            self.places.iter().enumerate().map(|(i, &place)| (place, i)).collect();
+        let opposite =
+            |place: &[i32; 2]| at.get(&[0, 1].map(|k| self.twice_middle[k] - place[k])).copied();
+        let pairs: Vec<(usize, usize)> =
+            (0..self.places.len()).filter_map(|i| Some((i, opposite(&self.places[i])?))).collect();
+        let part = |values: &[f32]| -> Vec<f32> {
+            let sum = |&(i, j): &(usize, usize)| values[i] + sign * values[j];
+            pairs.iter().map(|pair| std::f32::consts::FRAC_1_SQRT_2 * sum(pair)).collect()
+        };
+        Self {
+            places: pairs.iter().map(|&(i, _)| self.places[i]).collect(),
+            residuals: part(&self.residuals),
+            on_position: [0, 1].map(|i| part(&self.on_position[i])),
+            hat: self.hat.iter().map(|q| part(q)).collect(),
+            ..*self
+        }
+    }
+
+    /// Sum of the squares of the influence.
+    fn strength(&self) -> f64 {
+        self.on_position.iter().map(|c| dot(c, c)).sum()
+    }
+}
 
 /// Factor of the covariances of positions against those under white noise.
 pub fn inflation(corners: &[Influence]) -> f64 {
@@ -47,10 +83,35 @@ pub fn inflation(corners: &[Influence]) -> f64 {
     if corners.is_empty() {
         return 1.0;
     }
-    let (narrow, rim) = lagged(corners, LAGS_PX[0]);
-    let lags = if rim > WIDE { lagged(corners, LAGS_PX[1]).0 } else { narrow };
-    let factor = uneven(corners) * lags;
+    let part = |sign| corners.iter().map(|corner| corner.part(sign)).collect::<Vec<Influence>>();
+    let (even, odd) = (part(1.0), part(-1.0));
+    let (mut factor, mut strength) = (both(&even, &odd), 0.0);
+    for parts in [even, odd] {
+        let weight: f64 = parts.iter().map(Influence::strength).sum();
+        factor += weight * factor_of(&parts);
+        strength += weight;
+    }
+    let factor = factor / strength;
     if factor.is_finite() { factor.clamp(FACTORS[0], FACTORS[1]) } else { 1.0 }
+}
+
+/// The factor of what is even, or odd.
+fn factor_of(parts: &[Influence]) -> f64 {
+    let (narrow, rim) = lagged(parts, LAGS_PX[0]);
+    let lags = if rim > WIDE { lagged(parts, LAGS_PX[1]).0 } else { narrow };
+    uneven(parts) * lags
+}
+
+/// What the even and the odd part have in common: noise of another strength in black than in white.
+fn both(even: &[Influence], odd: &[Influence]) -> f64 {
+    let common = |(even, odd): (&Influence, &Influence)| {
+        let at = |i: usize| {
+            let [x, y] = [0, 1].map(|k| even.on_position[k][i] * odd.on_position[k][i]);
+            f64::from((x + y) * even.residuals[i] * odd.residuals[i])
+        };
+        2.0 * (0..even.residuals.len()).map(at).sum::<f64>() / even.noise.powi(2)
+    };
+    even.iter().zip(odd).map(common).sum()
 }
 
 /// How much larger residuals are where positions come from.

@@ -22,7 +22,7 @@ use super::view::View;
 use crate::raster::Gray;
 
 /// Samples along a pixel.
-const SUBPIXELS: usize = 4;
+const SUBPIXELS: usize = 8;
 
 /// A Gaussian reaches so many standard deviations.
 const REACH_SIGMAS: f64 = 4.0;
