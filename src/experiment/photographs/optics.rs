@@ -1,6 +1,6 @@
 //! The light that falls on each pixel of the sensor.
 //!
-//! The scene is sampled `SUBPIXELS` times along both axes of a pixel, each sample an area of the page
+//! The scene is sampled four to eight times along both axes of a pixel, each sample an area of the page
 //! itself (`mips`), and blurred and gathered in one step: a pixel is the integral of the
 //! picture over its square, convolved with a Gaussian,
 //!
@@ -21,8 +21,11 @@ use super::scene::Scene;
 use super::view::View;
 use crate::raster::Gray;
 
-/// Samples along a pixel.
-const SUBPIXELS: usize = 8;
+/// Samples along a pixel: so many along a standard deviation of the blur, within these. Four along pixels of the usual
+/// blur displaced edges by 0.002 px.
+fn subpixels(blur_px: f64) -> usize {
+    ((5.6 / blur_px.max(f64::EPSILON)).round() as usize).clamp(4, 8)
+}
 
 /// A Gaussian reaches so many standard deviations.
 const REACH_SIGMAS: f64 = 4.0;
@@ -111,9 +114,10 @@ pub(super) fn expose(setting: &Setting, scene: &Scene) -> Gray<f32> {
 
 /// Weights of the samples for a pixel, from the sample `reach` pixels before its first one.
 fn kernel(sigma_px: f64, reach: usize) -> Vec<f32> {
-    let count = (2 * reach + 1) * SUBPIXELS;
+    let subpixels = subpixels(sigma_px);
+    let count = (2 * reach + 1) * subpixels;
     let weight = |k: usize| {
-        let delta = (k as f64 + 0.5) / SUBPIXELS as f64 - 0.5 - reach as f64;
+        let delta = (k as f64 + 0.5) / subpixels as f64 - 0.5 - reach as f64;
         if sigma_px == 0.0 {
             return f64::from(u8::from(delta.abs() < 0.5));
         }
@@ -127,24 +131,24 @@ fn kernel(sigma_px: f64, reach: usize) -> Vec<f32> {
 /// The blurred picture with a margin.
 fn gathered(setting: &Setting, scene: &Scene, margin: usize) -> Gray<f32> {
     let reach = (REACH_SIGMAS * scene.blur_px).ceil() as usize;
-    let kernel = kernel(scene.blur_px, reach);
+    let (subpixels, kernel) = (subpixels(scene.blur_px), kernel(scene.blur_px, reach));
     let [width, height] = setting.view.size_px.map(|size| size + 2 * margin);
-    let rows = (height + 2 * reach) * SUBPIXELS;
+    let rows = (height + 2 * reach) * subpixels;
     // Each row of samples, gathered along the row at once.
     let mut across: Gray<f32> = Gray::new(width, rows);
     across.pixels_mut().par_chunks_mut(width).enumerate().for_each(|(row, pixels)| {
-        let place = |k: usize| (k as f64 + 0.5) / SUBPIXELS as f64 - 0.5 - (reach + margin) as f64;
+        let place = |k: usize| (k as f64 + 0.5) / subpixels as f64 - 0.5 - (reach + margin) as f64;
         let samples =
-            sample_row(setting, scene, place(row), (width + 2 * reach) * SUBPIXELS, &place);
+            sample_row(setting, scene, place(row), (width + 2 * reach) * subpixels, &place);
         for (x, pixel) in pixels.iter_mut().enumerate() {
-            let from = &samples[x * SUBPIXELS..];
+            let from = &samples[x * subpixels..];
             *pixel = kernel.iter().zip(from).map(|(w, v)| w * v).sum();
         }
     });
     let mut out: Gray<f32> = Gray::new(width, height);
     out.pixels_mut().par_chunks_mut(width).enumerate().for_each(|(y, pixels)| {
         for (k, &w) in kernel.iter().enumerate() {
-            for (sum, value) in pixels.iter_mut().zip(across.row(y * SUBPIXELS + k)) {
+            for (sum, value) in pixels.iter_mut().zip(across.row(y * subpixels + k)) {
                 *sum += w * value;
             }
         }
@@ -162,7 +166,7 @@ fn sample_row(
 ) -> Vec<f32> {
     let &Setting { page, view, background, shift, skin, .. } = setting;
     let covers = setting.covers.in_row(y);
-    let step = 1.0 / SUBPIXELS as f64;
+    let step = 1.0 / subpixels(scene.blur_px) as f64;
     let (white, black) = (scene.white as f32, (scene.white / scene.contrast) as f32);
     let mut samples = Vec::with_capacity(count);
     let mut areas: Option<(Footprint, Footprint)> = None;
@@ -266,12 +270,12 @@ mod tests {
     fn kernels_have_the_width_that_they_say() {
         for sigma_px in [0.0, 0.5, 2.0] {
             let reach = (REACH_SIGMAS * sigma_px).ceil() as usize;
-            let kernel = kernel(sigma_px, reach);
-            let place = |k: usize| (k as f64 + 0.5) / SUBPIXELS as f64 - 0.5 - reach as f64;
+            let (subpixels, kernel) = (subpixels(sigma_px), kernel(sigma_px, reach));
+            let place = |k: usize| (k as f64 + 0.5) / subpixels as f64 - 0.5 - reach as f64;
             let variance: f64 =
                 kernel.iter().enumerate().map(|(k, &w)| f64::from(w) * place(k).powi(2)).sum();
             // The pixel's box has 1/12, in whole samples a little less.
-            let box_variance = (1.0 - 1.0 / (SUBPIXELS * SUBPIXELS) as f64) / 12.0;
+            let box_variance = (1.0 - 1.0 / (subpixels * subpixels) as f64) / 12.0;
             let expected = sigma_px * sigma_px + box_variance;
             assert!(
                 (variance - expected).abs() < 0.01 * (1.0 + expected),
