@@ -15,8 +15,6 @@
 //! way round. A fit takes out of its residuals what looks like its parameters:
 //! E[r rᵀ] = σ² (1 − H) with the hat matrix H of white noise, which is added again.
 
-use std::collections::HashMap;
-
 use multiversion::multiversion;
 
 /// Residuals of a corner, and how its parameters answer to its pixels.
@@ -52,12 +50,24 @@ pub const CORNERS: usize = 10;
 impl Influence {
     /// What is the same at opposite pixels, or of opposite sign, of those that have both.
     fn part(&self, sign: f32) -> Self {
-        let at: HashMap<[i32; 2], usize> =
-            self.places.iter().enumerate().map(|(i, &place)| (place, i)).collect();
+        // Where each pixel of the square around the corner is among them.
+        let reach =
+            self.places.iter().flatten().map(|c| c.unsigned_abs() as i32).max().unwrap_or(0);
+        let side = (2 * reach + 1) as usize;
+        let index = |[u, v]: [i32; 2]| {
+            let [u, v] = [u, v].map(|c| usize::try_from(c + reach).ok().filter(|&c| c < side));
+            Some(v? * side + u?)
+        };
+        let mut at = vec![None; side * side];
+        for (i, &place) in self.places.iter().enumerate() {
+            if let Some(index) = index(place) {
+                at[index] = Some(i);
+            }
+        }
         let opposite =
-            |place: &[i32; 2]| at.get(&[0, 1].map(|k| self.twice_middle[k] - place[k])).copied();
+            |[u, v]: [i32; 2]| at[index([self.twice_middle[0] - u, self.twice_middle[1] - v])?];
         let pairs: Vec<(usize, usize)> =
-            (0..self.places.len()).filter_map(|i| Some((i, opposite(&self.places[i])?))).collect();
+            (0..self.places.len()).filter_map(|i| Some((i, opposite(self.places[i])?))).collect();
         let part = |values: &[f32]| -> Vec<f32> {
             let sum = |&(i, j): &(usize, usize)| values[i] + sign * values[j];
             pairs.iter().map(|pair| std::f32::consts::FRAC_1_SQRT_2 * sum(pair)).collect()
