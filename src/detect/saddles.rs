@@ -169,7 +169,15 @@ impl<const N: usize> SaddleFinder<N> {
 
     /// Whether the next wider fit stays in the same place.
     fn is_stable(&self, image: &Gray<i16>, position: [f64; 2], size: usize) -> bool {
-        let moved = self.fits[size + 1].step(image, position);
+        let wider = &self.fits[size + 1];
+        let moved = match kind::<N>() {
+            // One step tells.
+            GridKind::Deltille => wider.step(image, position),
+            // That of a quadric overshoots where the squares are as narrow as its window.
+            GridKind::Checker => wider
+                .find(image, position)
+                .map(|corner| [0, 1].map(|i| corner.position[i] - position[i])),
+        };
         moved.is_some_and(|[dx, dy]| dx.hypot(dy) < STABLE_PX)
     }
 
