@@ -13,7 +13,7 @@
 //!
 //! T is the camera's tone curve between the corner's black and white, r the sum of their light over
 //! its difference ([`super::curve`]); of a linear camera T(S) = S and I = (level + amplitude·f)·g.
-//! M, of trace 2, tells in which direction the picture is blurred more. Both, and halos in f, are the
+//! M, of trace 2, tells in which direction the picture is blurred more; where it moved, by a box. Both, and halos in f, are the
 //! same all over a picture and given: [`super::optics`]. What is brighter than white or darker than black
 //! is seen as these; where pixels are, the model ends there too, so that they only count where it does not.
 //!
@@ -30,7 +30,8 @@ use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::blurred_corner::{
-    Deltille, FEW_NODES_RHO, Haloed, Inked, Orthant, Overlap, Pattern, Shade, Triangle,
+    Deltille, FEW_NODES_RHO, Haloed, Inked, Orthant, Overlap, Pattern, Shade, SweptChecker,
+    SweptDeltille, Triangle,
 };
 use super::correlation::Influence;
 use super::curve::{Piece, TONE_PARAMS};
@@ -349,6 +350,11 @@ struct Look<const K: usize> {
     halo: [f32; 2],
     /// ∂ ln s/∂α of the blur that the pattern has, at one steepness of the edges.
     core_by_halo: f32,
+    /// Half of the picture's way across the edges while it was taken, in units of the blur, where it moved, and its derivatives
+    /// by the angles and by both parameters of astigmatism.
+    way: Option<[f32; K]>,
+    way_by_turn: [f64; K],
+    way_by_astigmatism: [[f64; K]; 2],
     /// How far ink displaces the edges, in units of the blur, its derivatives by the ink, and what is between.
     displaced: [f64; K],
     by_ink: [f64; K],
@@ -372,13 +378,11 @@ fn by_ink<const K: usize>(corner: &Corner<K>, sharpness: [f64; K]) -> [f64; K] {
 /// The triangle between three edges that ink displaces, with its derivatives by ln s, the angles and the ink.
 fn triangle<const K: usize>(corner: &Corner<K>, optics: &Optics) -> Triangle {
     const STEP: f64 = 1e-4;
-    let [e1, e2] = optics.astigmatism;
+    let spread = optics.spread(K);
     let overlap = |corner: &Corner<K>, ink: f64| {
         let core_px = corner.blur_px * optics.core();
         let normals = corner.angles.map(|angle| [-angle.sin(), angle.cos()]);
-        let product = |[ax, ay]: [f64; 2], [bx, by]: [f64; 2]| {
-            (1.0 + e1) * ax * bx + e2 * (ax * by + ay * bx) + (1.0 - e1) * ay * by
-        };
+        let product = |a, b| spread.product(a, b);
         let lengths = normals.map(|n| product(n, n).sqrt());
         let rho = product(normals[0], normals[1]) / (lengths[0] * lengths[1]);
         let displaced = by_ink(corner, lengths.map(|l| 1.0 / (core_px * l))).map(|by| by * ink);
@@ -387,7 +391,10 @@ fn triangle<const K: usize>(corner: &Corner<K>, optics: &Optics) -> Triangle {
         let a = sine(2, 1) / sine(0, 1) * lengths[0] / lengths[2];
         let b = sine(0, 2) / sine(0, 1) * lengths[1] / lengths[2];
         let c = a * displaced[0] + b * displaced[1] - displaced[2];
-        Overlap::between([a, b, c], rho, displaced[0].signum())
+        let [x, y] = [0, 1]
+            .map(|k| (spread.way[0] * normals[k][0] + spread.way[1] * normals[k][1]) / lengths[k]);
+        let cov = [1.0 + x * x / 3.0, rho + x * y / 3.0, 1.0 + y * y / 3.0];
+        Overlap::between([a, b, c], cov, displaced[0].signum())
     };
     let there = std::array::from_fn(|parameter| {
         let (mut moved, mut ink) = (*corner, optics.ink);
@@ -403,24 +410,32 @@ fn triangle<const K: usize>(corner: &Corner<K>, optics: &Optics) -> Triangle {
 
 impl<const K: usize> Look<K> {
     fn of(corner: &Corner<K>, optics: &Optics, piece: Piece, limits: [f32; 2]) -> Self {
-        let [e1, e2] = optics.astigmatism;
+        let spread = optics.spread(K);
         let normals = corner.angles.map(|angle| [-angle.sin(), angle.cos()]);
         let tangents = corner.angles.map(|angle| [-angle.cos(), -angle.sin()]);
-        let product = |a: [f64; 2], b: [f64; 2]| {
-            (1.0 + e1) * a[0] * b[0] + e2 * (a[0] * b[1] + a[1] * b[0]) + (1.0 - e1) * a[1] * b[1]
-        };
+        let product = |a, b| spread.product(a, b);
         let squares = normals.map(|n| product(n, n));
-        let by_turn = std::array::from_fn(|k| product(tangents[k], normals[k]) / squares[k]);
+        let by_turn: [f64; K] =
+            std::array::from_fn(|k| product(tangents[k], normals[k]) / squares[k]);
         let lengths = (squares[0] * squares[1]).sqrt();
         let rho = product(normals[0], normals[1]) / lengths;
         let rho_by_angle = [
             product(tangents[0], normals[1]) / lengths - rho * by_turn[0],
             product(normals[0], tangents[1]) / lengths - rho * by_turn[1],
         ];
-        let parts =
-            |a: [f64; 2], b: [f64; 2]| [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]];
+        let parts = |a, b| spread.by_astigmatism(a, b);
         let by_astigmatism: [[f64; K]; 2] = [0, 1].map(|e| {
             std::array::from_fn(|k| parts(normals[k], normals[k])[e] / (2.0 * squares[k]))
+        });
+        let across = |way: [f64; 2], direction: [f64; 2], k: usize| {
+            (way[0] * direction[0] + way[1] * direction[1]) / f64::sqrt(squares[k])
+        };
+        let way: [f64; K] = std::array::from_fn(|k| across(spread.way, normals[k], k));
+        let way_by_turn =
+            std::array::from_fn(|k| across(spread.way, tangents[k], k) - way[k] * by_turn[k]);
+        let way_by_astigmatism = [0, 1].map(|e| {
+            let by = spread.way_by_astigmatism[e];
+            std::array::from_fn(|k| across(by, normals[k], k) - way[k] * by_astigmatism[e][k])
         });
         let rho_by_astigmatism = [0, 1].map(|e| {
             let [first, second] = [by_astigmatism[e][0], by_astigmatism[e][1]];
@@ -435,6 +450,9 @@ impl<const K: usize> Look<K> {
             by_astigmatism,
             rho_by_astigmatism,
             sharpness,
+            way: spread.is_swept.then(|| way.map(|way| way as f32)),
+            way_by_turn,
+            way_by_astigmatism,
             displaced,
             by_ink,
             triangle,
@@ -448,9 +466,23 @@ impl<const K: usize> Look<K> {
         }
     }
 
-    fn haloed<P>(&self, pattern: P) -> Haloed<P> {
+    fn has_halo(&self) -> bool {
+        self.halo[0] != 0.0
+    }
+
+    fn haloed<P: Copy>(&self, pattern: P) -> Haloed<P> {
+        self.haloed_of(|_| pattern)
+    }
+
+    /// The same of a pattern that has lengths of its own, which are to be multiplied by a number.
+    fn haloed_of<P>(&self, pattern: impl Fn(f32) -> P) -> Haloed<P> {
         let [strength, width] = self.halo;
-        Haloed { pattern, strength, narrower: 1.0 / width }
+        Haloed {
+            pattern: pattern(1.0),
+            wide: pattern(1.0 / width),
+            strength,
+            narrower: 1.0 / width,
+        }
     }
 }
 
@@ -738,6 +770,21 @@ impl CornerFitter {
         let look = Look::of(corner, optics, piece, self.limits);
         let (columns, pixels) = (&mut *self.columns, &*self.pixels);
         let is_square = look.rho.abs() <= FEW_NODES_RHO;
+        if let Some(way) = look.way {
+            let way: [f32; 3] = std::array::from_fn(|k| way.get(k).copied().unwrap_or(0.0));
+            let way_of_two = [way[0], way[1]];
+            return match K {
+                2 if is_square => {
+                    let with = (Orthant::of_few_nodes(look.rho), way_of_two);
+                    fill_swept_checker::<K, JOINT, 3>(columns, pixels, window, corner, &look, with);
+                }
+                2 => {
+                    let with = (Orthant::new(look.rho), way_of_two);
+                    fill_swept_checker::<K, JOINT, 6>(columns, pixels, window, corner, &look, with);
+                }
+                _ => fill_swept_deltille::<K, JOINT>(columns, pixels, window, corner, &look, way),
+            };
+        }
         match (K, JOINT, optics.has_halo(), look.triangle) {
             (2, false, false, _) if is_square => {
                 fill_square(columns, pixels, window, corner, &look);
@@ -929,6 +976,43 @@ fn fill_deltille_with_all<const C: usize, const JOINT: bool>(
     fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
 }
 
+#[multiversion(targets = "simd")]
+fn fill_swept_checker<const C: usize, const JOINT: bool, const NODES: usize>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+    (still, [across, along]): (Orthant<NODES>, [f32; 2]),
+) {
+    let swept = |by: f32| SweptChecker { pattern: still, way: [across * by, along * by] };
+    if JOINT || look.has_halo() {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, look.haloed_of(swept));
+    } else {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, swept(1.0));
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn fill_swept_deltille<const C: usize, const JOINT: bool>(
+    columns: &mut Columns,
+    pixels: &[f32; MAX_PIXELS],
+    window: &Window,
+    corner: &Corner<C>,
+    look: &Look<C>,
+    way: [f32; 3],
+) {
+    let swept = |by: f32| SweptDeltille::new(way.map(|way| way * by));
+    if let Some(triangle) = look.triangle {
+        let pattern = Inked { edges: look.haloed_of(swept), triangle };
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    } else if JOINT || look.has_halo() {
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, look.haloed_of(swept));
+    } else {
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, swept(1.0));
+    }
+}
+
 /// Fills the columns of derivatives and residuals.
 #[inline(always)]
 fn fill<const K: usize, const C: usize, const JOINT: bool>(
@@ -952,6 +1036,9 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
     let by_astigmatism: [[f32; K]; 2] =
         [0, 1].map(|e| std::array::from_fn(|k| look.by_astigmatism[e][k] as f32));
     let rho_by_astigmatism = look.rho_by_astigmatism.map(|by| by as f32);
+    let way_by_turn: [f32; K] = std::array::from_fn(|k| look.way_by_turn[k] as f32);
+    let way_by_astigmatism: [[f32; K]; 2] =
+        [0, 1].map(|e| std::array::from_fn(|k| look.way_by_astigmatism[e][k] as f32));
     let displaced: [f32; K] = std::array::from_fn(|k| look.displaced[k] as f32);
     let by_ink: [f32; K] = std::array::from_fn(|k| look.by_ink[k] as f32);
     let (amplitude, level) = (corner.amplitude as f32, corner.level as f32);
@@ -966,7 +1053,7 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
         let h: [f32; K] = std::array::from_fn(|k| {
             cosines[k] * dv - sines[k] * du - 0.5 * bends[k] * along[k] * along[k] - displaced[k]
         });
-        let Shade { f, slopes, correlation, halo, triangle } = pattern.at(h);
+        let Shade { f, slopes, correlation, halo, triangle, way } = pattern.at(h);
         let change = gu * u + gv * v;
         let gain = 1.0 + change;
         let shade = f * gain + change * piece.ratio;
@@ -983,6 +1070,7 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
             by_scale -= slopes[k] * h[k];
             let turned = along[k] + h[k] * by_turn[k];
             let by = correlation * by_angle[k] - slopes[k] * turned + triangle[1 + k];
+            let by = by + way[k] * way_by_turn[k];
             columns[ANGLE + k][i] = light * by;
         }
         let by_light = by_shade * (f + piece.ratio);
@@ -1007,6 +1095,7 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
                 let mut by = correlation * rho_by_astigmatism[e];
                 for k in 0..K {
                     by -= slopes[k] * h[k] * by_astigmatism[e][k];
+                    by += way[k] * way_by_astigmatism[e][k];
                 }
                 columns[ASTIGMATISM + e][i] = light * by;
             }

@@ -15,7 +15,7 @@ use super::labels::{Labels, report_once};
 use super::optics::Optics;
 use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
-use super::refine_grid::sharp_level;
+use super::refine_grid::{is_sampled, sharp_level};
 use super::saddles::SaddleFinder;
 use super::tile_shape::is_of_squares;
 use super::tiling::{CHECKER, DELTILLE, kind};
@@ -242,36 +242,39 @@ impl Detector {
         grids: &mut [Grid],
     ) -> (Optics, Vec<bool>) {
         let blurs = self.refiner.blurs(fitter, (image, pyramid), grids, &self.tag_areas);
-        match sharp_level(&blurs, pyramid.levels().len()) {
-            0 => self.refine_blurred(fitter, image, grids, &blurs),
-            level => {
-                let above = pyramid.above(level);
-                let image = above.in_full_scale();
-                grids.iter_mut().for_each(|grid| grid.moved_to_level(level));
-                let blurs = self.refiner.blurs(fitter, (&image, &above), grids, &self.tag_areas);
-                let found = self.refine_blurred(fitter, &image, grids, &blurs);
-                grids.iter_mut().for_each(|grid| grid.moved_from_level(level));
-                found
+        for level in (1..=sharp_level(&blurs, pyramid.levels().len())).rev() {
+            let above = pyramid.above(level);
+            let image = above.in_full_scale();
+            grids.iter_mut().for_each(|grid| grid.moved_to_level(level));
+            let blurs = self.refiner.blurs(fitter, (&image, &above), grids, &self.tag_areas);
+            let optics = self.refiner.optics(fitter, &image, (grids, &blurs), &self.tag_areas);
+            // A picture that moved is as sharp as ever across its way.
+            let found = is_sampled(&blurs, optics.narrowest())
+                .then(|| self.refine_under(fitter, &image, grids, (&optics, &blurs)));
+            grids.iter_mut().for_each(|grid| grid.moved_from_level(level));
+            if let Some(are_waves) = found {
+                return (optics, are_waves);
             }
         }
+        let optics = self.refiner.optics(fitter, image, (grids, &blurs), &self.tag_areas);
+        let are_waves = self.refine_under(fitter, image, grids, (&optics, &blurs));
+        (optics, are_waves)
     }
 
-    /// [`Self::refine`] in an image that shows the grids under these blurs, px.
-    fn refine_blurred<T: Intensity>(
+    /// [`Self::refine`] in an image that shows the grids under these optics and blurs, px.
+    fn refine_under<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         grids: &mut [Grid],
-        blurs: &[Option<f64>],
-    ) -> (Optics, Vec<bool>) {
-        let optics = self.refiner.optics(fitter, image, (grids, blurs), &self.tag_areas);
+        (optics, blurs): (&Optics, &[Option<f64>]),
+    ) -> Vec<bool> {
         let refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
             let edge_px = grid.edge_px().unwrap_or(0.0);
-            self.refiner.refine_grid(fitter, image, grid, &self.tag_areas, (&optics, blur_px));
+            self.refiner.refine_grid(fitter, image, grid, &self.tag_areas, (optics, blur_px));
             blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
         };
-        let are_waves = grids.iter_mut().zip(blurs).map(refine).collect();
-        (optics, are_waves)
+        grids.iter_mut().zip(blurs).map(refine).collect()
     }
 
     /// Why there are no grids in a picture with so many corners.

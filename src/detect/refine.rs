@@ -28,7 +28,7 @@ use crate::target::GridKind;
 pub const MIN_MODEL_RADIUS: usize = 3;
 
 /// Fewest pixels to which the model is fitted: three for each unknown, so that the noise shows.
-const MIN_PIXELS: usize = 30;
+pub(super) const MIN_PIXELS: usize = 30;
 
 /// Half the side of the square around a corner that must be clear for the polynomial, px: a third of
 /// what its usual window reads, where nearly all of its weight lies.

@@ -6,13 +6,16 @@
 //! elsewhere in the grid, and smaller windows are tried. A corner at the end of what is seen of the
 //! board that no window shows cleanly is dropped, since what hides the board has drawn it aside.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
 use super::corner_model::{CornerFitter, MAX_WAY_PX};
 use super::detection::{Grid, GridCorner, median};
 use super::optics::{Optics, REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
-use super::refine::{MIN_MODEL_RADIUS, ModelFit, Refined, Refinement, Refiner, Room};
+use super::refine::{MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room};
+use crate::lattice::Vertex;
 use crate::raster::{Gray, Intensity, Pyramid};
 
 /// Corners that tell the blur: those with the most room of a few times as many, from all over the grid.
@@ -46,6 +49,13 @@ const SHARP_PX: f64 = 1.4;
 
 /// Corners that are worth a thread.
 const PART: usize = 128;
+
+/// What is more blurred than its neighbours by more than this is not a corner but the rim of what covers it: at the rims of
+/// fisheye pictures blur doubles from one corner to the next.
+const MAX_BLUR_RATIO: f64 = 3.0;
+
+/// A position less certain than this, px, with what the shape of the residuals adds, is none: the grid tells as much.
+const WORST_SIGMA_PX: f64 = 3.0;
 
 /// A window is followed by one that is smaller by this factor.
 const NEXT_WINDOW: f64 = 0.7;
@@ -139,17 +149,15 @@ impl Refiner {
             }
             let room = self.whole(&around[i], known_px, optics);
             let clean = fit.is_some_and(|fit| fit.residual <= limit);
-            let modelled = self.method() == Refinement::Model
-                && room.clear_square_px() >= MIN_MODEL_RADIUS as f64;
-            let (refined, fit) = if clean || !modelled || !judged {
+            let modelled =
+                || self.method() == Refinement::Model && self.has_room(image, corner, room);
+            let (refined, fit) = if clean || !judged || !modelled() {
                 (Some(refined), fit.filter(|_| clean))
             } else {
+                // Where the model finds nothing, as at the rim of a cover, nothing is known of the position.
                 let smaller = self.clean_fit(fitter, image, corner, room, limit);
-                let is_inner = around[i].is_inner;
-                (
-                    smaller.map(Refined::from).or_else(|| is_inner.then_some(refined)),
-                    smaller.or(fit.filter(|_| is_inner)),
-                )
+                let found = smaller.or(fit.filter(|_| around[i].is_inner));
+                (found.map(Refined::from), found)
             };
             if let Some(Refined { position: [x, y], cov, .. }) = refined {
                 kept.push(GridCorner { x, y, cov, ..*corner });
@@ -171,20 +179,38 @@ impl Refiner {
         (tags, blur_px, optics): (&TagAreas, f64, &Optics),
     ) {
         let around = surroundings(grid, tags, 1.0);
-        let bent = each(fits.len(), |fitter, i| {
+        let fits = each(fits.len(), |fitter, i| {
             let fit = fits[i].as_ref()?;
             let room = self.whole(&around[i], blur_px, optics);
             let bent = self.model(fitter, image, fit.position(), room, Some(fit));
             bent.filter(|fit| fit.residual <= limit).or(Some(*fit))
         });
-        let noises = bent.iter().flatten().map(ModelFit::noise).collect();
+        let noises = fits.iter().flatten().map(ModelFit::noise).collect();
         let usual = median(noises).unwrap_or(0.0);
-        for (corner, fit) in grid.corners.iter_mut().zip(&bent) {
-            let Some(fit) = fit else { continue };
+        let blurs: BTreeMap<Vertex, f64> = grid
+            .corners
+            .iter()
+            .zip(&fits)
+            .filter_map(|(c, fit)| Some((Vertex::new(c.row, c.col), fit.as_ref()?.blur_px())))
+            .collect();
+        let kind = grid.kind;
+        let settled = |(corner, fit): (&GridCorner, &Option<ModelFit>)| {
+            let Some(fit) = fit else { return Some(*corner) };
+            let here = Vertex::new(corner.row, corner.col);
+            let around = kind.steps().iter().filter_map(|&step| blurs.get(&(here + step)).copied());
+            let usual_px = median(around.collect()).unwrap_or(fit.blur_px());
             let [x, y] = fit.position();
-            let more = shape_of_residuals(fit, usual);
-            *corner = GridCorner { x, y, cov: Some(fit.cov.map(|c| more * c)), ..*corner };
-        }
+            let cov = fit.cov.map(|c| c * shape_of_residuals(fit, usual));
+            let is_known = cov[0] + cov[2] < WORST_SIGMA_PX * WORST_SIGMA_PX;
+            let is_corner = is_known && fit.blur_px() <= MAX_BLUR_RATIO * usual_px;
+            is_corner.then_some(GridCorner { x, y, cov: Some(cov), ..*corner })
+        };
+        grid.corners = grid.corners.iter().zip(&fits).filter_map(settled).collect();
+    }
+
+    /// Whether the model can be fitted to what is clear around a corner.
+    fn has_room<T: Intensity>(&self, image: &Gray<T>, corner: &GridCorner, room: Room) -> bool {
+        self.window(image, [corner.x, corner.y], room).count() >= MIN_PIXELS
     }
 
     /// All corners of a grid, each by itself.
@@ -313,10 +339,14 @@ fn each<F: Send>(count: usize, work: impl Fn(&mut CornerFitter, usize) -> F + Sy
 /// grid is no sharper than [`SHARP_PX`]. An enlarged picture shows on the finest level little but the
 /// middle of the edges, and the grain of all pixels around is the same.
 pub(super) fn sharp_level(blurs: &[Option<f64>], levels: usize) -> usize {
-    let Some(blur_px) = blurs.iter().copied().flatten().reduce(f64::min) else {
-        return 0;
-    };
-    (1..levels).rfind(|&n| blur_px >= SHARP_PX * f64::from(1u32 << n)).unwrap_or(0)
+    let is_sampled_on = |&level: &usize| is_sampled(blurs, 1.0 / f64::from(1u32 << level));
+    (1..levels).rfind(is_sampled_on).unwrap_or(0)
+}
+
+/// Whether the sharpest grid is no sharper than [`SHARP_PX`] where its blur is `part` of the whole.
+pub(super) fn is_sampled(blurs: &[Option<f64>], part: f64) -> bool {
+    let sharpest = blurs.iter().copied().flatten().reduce(f64::min);
+    sharpest.is_some_and(|blur_px| part * blur_px >= SHARP_PX)
 }
 
 /// How much more a corner's covariance is than that of noise like elsewhere in the grid: what is left beyond that is

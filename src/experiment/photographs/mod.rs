@@ -286,6 +286,30 @@ mod tests {
         assert!(mean.iter().all(|m| m.abs() < 0.001) && rms < 0.01, "{mean:?} {rms}");
     }
 
+    /// A box along the way is no Gaussian; taken for one, it leaves covariances four times too large.
+    #[test]
+    fn corners_of_a_picture_that_moved_are_as_true_as_their_covariances_say() {
+        for kind in [Kind::ALL[0], Kind::ALL[2]] {
+            let subject = subject(kind);
+            let scene = scene::Scene { motion_px: 7.0, ..scene::Scene::default() };
+            let studio = Studio::new(2);
+            let scores: Vec<Score> = (0..2)
+                .map(|view| {
+                    let photograph = take(&subject.page, &studio, &scene, view);
+                    let found = subject.detector.detect(&photograph.image, "");
+                    score(&found, &photograph, 1.0, false)
+                })
+                .collect();
+            let squares = || scores.iter().flat_map(|score| score.errors_px.iter().flatten());
+            let count = squares().count() as f64;
+            let rms = (squares().map(|e| e * e).sum::<f64>() / count).sqrt();
+            let normalised: Vec<f64> = scores.iter().flat_map(|s| s.normalised.clone()).collect();
+            // A corner has two coordinates.
+            let mean = normalised.iter().sum::<f64>() / (2 * normalised.len()) as f64;
+            assert!(rms < 0.01 && (0.6..1.6).contains(&mean), "{}: {rms} {mean}", subject.name);
+        }
+    }
+
     #[test]
     fn the_same_seed_gives_the_same_bytes() {
         let subject = subject(Kind::ALL[3]);
