@@ -241,16 +241,17 @@ impl Detector {
         (image, pyramid): (&Gray<T>, &Pyramid),
         grids: &mut [Grid],
     ) -> (Optics, Vec<bool>) {
-        let blurs = self.refiner.blurs(fitter, (image, pyramid), grids, &self.tag_areas);
-        for level in (1..=sharp_level(&blurs, pyramid.levels().len())).rev() {
-            let above = pyramid.above(level);
-            let image = above.in_full_scale();
+        let levels = pyramid.levels();
+        let blurs = self.refiner.blurs(fitter, (image, levels), grids, &self.tag_areas);
+        for level in (1..=sharp_level(&blurs, levels.len())).rev() {
+            let image = &levels[level];
             grids.iter_mut().for_each(|grid| grid.moved_to_level(level));
-            let blurs = self.refiner.blurs(fitter, (&image, &above), grids, &self.tag_areas);
-            let optics = self.refiner.optics(fitter, &image, (grids, &blurs), &self.tag_areas);
+            let blurs =
+                self.refiner.blurs(fitter, (image, &levels[level..]), grids, &self.tag_areas);
+            let optics = self.refiner.optics(fitter, image, (grids, &blurs), &self.tag_areas);
             // A picture that moved is as sharp as ever across its way.
             let found = is_sampled(&blurs, optics.narrowest())
-                .then(|| self.refine_under(fitter, &image, grids, (&optics, &blurs)));
+                .then(|| self.refine_under(fitter, image, grids, (&optics, &blurs)));
             grids.iter_mut().for_each(|grid| grid.moved_from_level(level));
             if let Some(are_waves) = found {
                 return (optics, are_waves);

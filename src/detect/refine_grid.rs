@@ -65,7 +65,7 @@ impl Refiner {
     pub(super) fn blurs<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
-        images: (&Gray<T>, &Pyramid),
+        images: (&Gray<T>, &[Gray<i16>]),
         grids: &[Grid],
         tags: &TagAreas,
     ) -> Vec<Option<f64>> {
@@ -260,7 +260,7 @@ impl Refiner {
     fn blur_of_grid<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
-        (image, pyramid): (&Gray<T>, &Pyramid),
+        (image, levels): (&Gray<T>, &[Gray<i16>]),
         grid: &Grid,
         tags: &TagAreas,
     ) -> Option<f64> {
@@ -269,7 +269,7 @@ impl Refiner {
         let shown = if grid.tags.is_empty() { &plain } else { tags };
         let most_px = MAX_BLUR * self.largest_radius();
         let mut known = self.blur(fitter, image, 0, grid, shown);
-        for (n, level) in pyramid.levels().iter().enumerate().skip(1) {
+        for (n, level) in levels.iter().enumerate().skip(1) {
             if known.is_some_and(|blur_px| blur_px <= most_px * f64::from(1u32 << (n - 1))) {
                 break;
             }

@@ -1,6 +1,6 @@
 /// A pixel type: 8 or 16 bits, signed for intermediate results, or a float.
 pub trait Intensity: Copy + Default + Send + Sync + PartialOrd + 'static {
-    /// The value of white: 255, 65535, 32767, or 1.
+    /// The value of white: 255, 65535, of a pyramid's levels 1023, or 1.
     const FULL_SCALE: f32;
 
     /// The value as a float, in the type's own units.
@@ -34,8 +34,9 @@ impl Intensity for u16 {
     }
 }
 
+/// Levels of a pyramid.
 impl Intensity for i16 {
-    const FULL_SCALE: f32 = 32767.0;
+    const FULL_SCALE: f32 = super::PYRAMID_FULL_SCALE;
 
     #[inline(always)]
     fn to_f32(self) -> f32 {

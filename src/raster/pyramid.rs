@@ -33,17 +33,6 @@ impl Pyramid {
         &self.levels
     }
 
-    /// The pyramid of a level: that one and all coarser ones.
-    pub fn above(&self, level: usize) -> Self {
-        Self { levels: self.levels[level..].to_vec() }
-    }
-
-    /// The finest level as an image of 16 bits, so that parts of full scale are what they were.
-    pub fn in_full_scale(&self) -> Gray<u16> {
-        let gain = u16::FULL_SCALE / PYRAMID_FULL_SCALE;
-        self.levels[0].map(|value| (f32::from(value) * gain).round() as u16)
-    }
-
     /// Position in level 0 of a position in `level`, px.
     pub fn to_level_0(level: usize, [x, y]: [f64; 2]) -> [f64; 2] {
         let scale = f64::from(1u32 << level);
