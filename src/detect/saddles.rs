@@ -47,8 +47,10 @@ pub struct Saddle<const N: usize> {
 /// level then shows its edges better, and averages the grain that an enlarged picture has.
 const MAX_BLURRED_CONTRAST: f64 = 0.5;
 
-/// And its middle leaves the level between dark and bright by less than this part of that contrast.
+/// And its middle leaves the level between dark and bright by less than this part of the contrast that one of the next
+/// coarser levels, so many, shows. Ink that has spread darkens the middle, the more the larger it is seen.
 const MAX_BLURRED_SHIFT: f64 = 0.3;
+const LEVELS_OF_CONTRAST: usize = 3;
 
 /// A corner moves by less than this when the window grows by one, px: it looks the same at every
 /// size. What is made up of two things at different distances does not. The paper's choice; corners
@@ -284,8 +286,10 @@ fn is_blurred<const N: usize>(pyramid: &Pyramid, level: usize, position: [f64; 2
         contrast_around::<N>(pyramid.levels().get(n)?, Pyramid::from_level_0(n, position))
     };
     contrast(level).zip(contrast(level + 1)).is_some_and(|(fine, coarse)| {
+        let further = (level + 2..=level + LEVELS_OF_CONTRAST).map_while(contrast);
+        let whole = further.map(|(_, contrast)| contrast).fold(coarse.1, f64::max);
         fine.1 < MAX_BLURRED_CONTRAST * coarse.1
-            && (fine.0 - coarse.0).abs() < MAX_BLURRED_SHIFT * coarse.1
+            && (fine.0 - coarse.0).abs() < MAX_BLURRED_SHIFT * whole
     })
 }
 
