@@ -9,9 +9,10 @@ use common::data;
 use deltille::detect::{Detector, DetectorConfig, Grid, InkEstimate};
 use deltille::export::dsc;
 use deltille::family::Family;
-use deltille::raster;
+use deltille::raster::{self, Gray};
 use deltille::target::GridKind;
 use deltille::verify::Document;
+use image::imageops::{self, FilterType};
 
 /// Every image of a folder of the data.
 fn images(folder: &str) -> Option<Vec<PathBuf>> {
@@ -139,6 +140,40 @@ fn corners_of_the_fisheye_photographs() {
     let all = 88 * images.len();
     println!("{found} of {all} corners");
     assert!(found * 1000 >= all * 997, "{found} of {all} corners");
+}
+
+/// Enlarged to 48 megapixels a photograph shows its corners where it did before: among the grain, which is as large
+/// as they are and far more, and with ink that has spread over pixels.
+#[test]
+fn enlarged_photographs_show_the_same_corners() {
+    for (folder, kind, size) in
+        [("robot-hand", GridKind::Deltille, (10, 11)), ("fisheye", GridKind::Checker, (8, 11))]
+    {
+        let Some(images) = images(folder) else { return };
+        let detector = Detector::for_grid(kind, Some(size), DetectorConfig::default());
+        for (path, filter) in images.iter().zip([FilterType::Triangle, FilterType::CatmullRom]) {
+            let small = image::open(path).unwrap().into_luma8();
+            let (width, height) = (5 * small.width(), 5 * small.height());
+            let large = imageops::resize(&small, width, height, filter);
+            let large = Gray::from_fn(width as usize, height as usize, |x, y| {
+                large.get_pixel(x as u32, y as u32).0[0]
+            });
+            let before = detector.detect_any(&raster::read(path).unwrap(), "photograph");
+            let after = detector.detect(&large, "photograph");
+            let (before, after) = (&before.grids[0].corners, &after.grids[0].corners);
+            let mut errors: Vec<f64> = Vec::new();
+            for corner in after {
+                let [x, y] = [corner.x, corner.y].map(|c| (c + 0.5) / 5.0 - 0.5);
+                let distance = before.iter().map(|b| (b.x - x).hypot(b.y - y));
+                errors.push(distance.fold(f64::INFINITY, f64::min));
+            }
+            errors.sort_by(f64::total_cmp);
+            let (count, all) = (errors.len(), before.len());
+            assert!(count + 1 >= all && count <= all, "{count} of {all}: {}", path.display());
+            let median = errors[count / 2];
+            assert!(median < 0.02, "median {median} px: {}", path.display());
+        }
+    }
 }
 
 #[test]

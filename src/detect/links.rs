@@ -6,7 +6,7 @@ use super::saddles::Saddle;
 use super::sectors::turn;
 use crate::raster::Pyramid;
 
-/// Nearest corners looked at: up to six neighbours, the twelve behind them, and as many strangers.
+/// Nearest corners of like contrast looked at: up to six neighbours, the twelve behind them, and as many strangers.
 const NEAREST: usize = 36;
 
 /// Below the squared cosine of [`MAX_CHORD_RAD`].
@@ -40,10 +40,12 @@ pub fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Li
     let corners = Corners { pyramid, saddles, directions: &directions };
     let mut found: Vec<Links<N>> = vec![[None; N]; saddles.len()];
     for index in 0..saddles.len() {
-        let first = places.nearest(index, FIRST);
+        // Between the corners of an enlarged picture its grain has hundreds of its own.
+        let alike = |other: usize| are_alike(&saddles[index], &saddles[other]);
+        let first = places.nearest(index, FIRST, alike);
         corners.link_to(&mut found, index, &first);
         if found[index].contains(&None) {
-            let all = places.nearest(index, NEAREST);
+            let all = places.nearest(index, NEAREST, alike);
             corners.link_to(&mut found, index, &all[first.len()..]);
         }
     }
@@ -79,7 +81,7 @@ impl<const N: usize> Corners<'_, N> {
             let other = &self.saddles[corner];
             let open = |i: usize| links[i].is_none() && self.may_be_along(index, i, other.position);
             let open: [bool; N] = std::array::from_fn(open);
-            if !open.contains(&true) || !are_alike(saddle, other) {
+            if !open.contains(&true) {
                 continue;
             }
             let chord = chord_rad(saddle, other);

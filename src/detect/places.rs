@@ -60,8 +60,13 @@ impl<'a> Places<'a> {
         row * self.cols + col
     }
 
-    /// The `count` points nearest to one of them, nearest first, without itself.
-    pub fn nearest(&self, index: usize, count: usize) -> Vec<usize> {
+    /// The `count` points nearest to one of them, nearest first, without itself, of those that are `wanted`.
+    pub fn nearest(
+        &self,
+        index: usize,
+        count: usize,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Vec<usize> {
         let here = self.points[index];
         let [col, row] = self.cell(here).map(|c| c as isize);
         let mut near: Vec<(f64, usize)> = Vec::with_capacity(4 * count);
@@ -83,7 +88,7 @@ impl<'a> Places<'a> {
                     let places = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
                     near.extend(self.order[places].iter().map(|&i| i as usize).filter_map(|i| {
                         let [dx, dy] = [0, 1].map(|k| self.points[i][k] - here[k]);
-                        (i != index).then_some((dx * dx + dy * dy, i))
+                        (i != index && wanted(i)).then_some((dx * dx + dy * dy, i))
                     }));
                 }
             }
@@ -120,9 +125,11 @@ mod tests {
             for i in 0..points.len() {
                 let distance =
                     |j: usize| (points[i][0] - points[j][0]).hypot(points[i][1] - points[j][1]);
-                let mut all: Vec<usize> = (0..points.len()).filter(|&j| j != i).collect();
+                let wanted = |j: usize| j % 3 != i % 3;
+                let mut all: Vec<usize> =
+                    (0..points.len()).filter(|&j| j != i && wanted(j)).collect();
                 all.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
-                let found = places.nearest(i, 12);
+                let found = places.nearest(i, 12, wanted);
                 let expected: Vec<f64> = all.iter().take(12).map(|&j| distance(j)).collect();
                 assert_eq!(found.iter().map(|&j| distance(j)).collect::<Vec<_>>(), expected);
             }
