@@ -171,7 +171,7 @@ fn enlarged_photographs_show_the_same_corners() {
             let (count, all) = (errors.len(), before.len());
             assert!(count + 1 >= all && count <= all, "{count} of {all}: {}", path.display());
             let median = errors[count / 2];
-            assert!(median < 0.02, "median {median} px: {}", path.display());
+            assert!(median < 0.05, "median {median} px: {}", path.display());
         }
     }
 }
