@@ -8,7 +8,8 @@ use super::clearance::TagAreas;
 use super::corner_model::CornerFitter;
 use super::curve::Tone;
 use super::detection::{Detection, Grid};
-use super::grow::grids;
+use super::foreshortened::foreshortened_grids;
+use super::grow::{SaddleGrid, grids};
 use super::ink::{Ink, InkEstimate};
 use super::label::Budget;
 use super::labels::{Labels, report_once};
@@ -33,7 +34,7 @@ const PYRAMID_LEVELS: usize = 3;
 const MIN_FURTHER_SIDE: usize = 150;
 
 /// A level narrower than this shows no grid.
-const MIN_LEVEL_SIDE: usize = 24;
+pub(super) const MIN_LEVEL_SIDE: usize = 24;
 
 /// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
 /// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
@@ -173,26 +174,15 @@ impl Detector {
         timing.lap("saddles");
         let found = grids(finder, &pyramid, &saddles);
         timing.lap("grids");
-        let mut budget = Budget::default();
-        let mut grids: Vec<(Grid, Option<Reason>)> =
-            found.iter().flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
-        grids.iter_mut().for_each(|(grid, _)| grid.kind = kind::<N>());
         let least = least_untagged_corners(kind::<N>()) as usize;
         let mut too_small = None;
-        grids.retain(|(grid, _)| {
-            let plausible = grid.corners.len() >= least && !self.labels.exceeded_by(grid);
-            let edge_px = grid.edge_px().unwrap_or(0.0);
-            if plausible && edge_px < MIN_UNTAGGED_EDGE_PX {
-                let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
-                too_small.get_or_insert_with(|| Reason::new(ReasonKind::TooSmall, figures));
-            }
-            is_vouched_for(grid) || plausible && edge_px >= MIN_UNTAGGED_EDGE_PX
-        });
-        refuse_patterns(&pyramid, &mut grids);
-        report_once(&mut grids);
-        // Labelled grids by panel, then the others; a stable sort keeps the largest first.
-        grids.sort_by_key(|(grid, _)| grid.panel.unwrap_or(u32::MAX));
+        let mut grids = self.plausible::<N, T>(image, &pyramid, &found, &mut too_small);
         timing.lap("labels");
+        if grids.is_empty() && self.labels.are_wanted() {
+            let found = foreshortened_grids(finder, &pyramid);
+            grids = self.plausible::<N, T>(image, &pyramid, &found, &mut too_small);
+            timing.lap("foreshortened");
+        }
         let mut fitter = CornerFitter::default();
         let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
         let (optics, are_waves) = self.refine(&mut fitter, (image, &pyramid), &mut refined);
@@ -231,6 +221,35 @@ impl Detector {
             reasons,
             timing_ms: timing.laps,
         }
+    }
+
+    /// The grids with their labels that may be what is looked for, and whether tiles were too small for that.
+    fn plausible<const N: usize, T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        pyramid: &Pyramid,
+        found: &[SaddleGrid],
+        too_small: &mut Option<Reason>,
+    ) -> Vec<(Grid, Option<Reason>)> {
+        let mut budget = Budget::default();
+        let mut grids: Vec<(Grid, Option<Reason>)> =
+            found.iter().flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
+        grids.iter_mut().for_each(|(grid, _)| grid.kind = kind::<N>());
+        let least = least_untagged_corners(kind::<N>()) as usize;
+        grids.retain(|(grid, _)| {
+            let plausible = grid.corners.len() >= least && !self.labels.exceeded_by(grid);
+            let edge_px = grid.edge_px().unwrap_or(0.0);
+            if plausible && edge_px < MIN_UNTAGGED_EDGE_PX {
+                let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+                too_small.get_or_insert_with(|| Reason::new(ReasonKind::TooSmall, figures));
+            }
+            is_vouched_for(grid) || plausible && edge_px >= MIN_UNTAGGED_EDGE_PX
+        });
+        refuse_patterns(pyramid, &mut grids);
+        report_once(&mut grids);
+        // Labelled grids by panel, then the others; a stable sort keeps the largest first.
+        grids.sort_by_key(|(grid, _)| grid.panel.unwrap_or(u32::MAX));
+        grids
     }
 
     /// Refines all grids on the level of the pyramid that suits their blur; what they have in common, and for

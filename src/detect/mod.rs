@@ -34,6 +34,7 @@ mod curve;
 mod detection;
 mod detector;
 mod edge;
+mod foreshortened;
 mod grid_light;
 mod grow;
 mod ink;

@@ -349,6 +349,11 @@ impl<const N: usize> Merged<N> {
     }
 }
 
+/// Whether an image shows nothing but noise.
+pub fn is_all_noise(image: &Gray<i16>) -> bool {
+    sample_noise(image).is_all
+}
+
 /// What samples of a ring show beside corners.
 #[derive(Clone, Copy, Debug)]
 struct SampleNoise {
