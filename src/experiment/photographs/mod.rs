@@ -311,6 +311,23 @@ mod tests {
     }
 
     #[test]
+    fn boards_are_found_from_75_degrees() {
+        for kind in [Kind::ALL[0], Kind::ALL[2]] {
+            let subject = subject(kind);
+            let scene = scene::Scene { tilt_deg: Some(75.0), ..scene::Scene::default() };
+            let (mut visible, mut labelled) = (0, 0);
+            for view in 0..4 {
+                let photograph = take(&subject.page, &Studio::new(3), &scene, view);
+                let score =
+                    score(&subject.detector.detect(&photograph.image, ""), &photograph, 1.0, false);
+                assert_eq!(score.wrong, 0, "{} {view}", subject.name);
+                (visible, labelled) = (visible + score.visible, labelled + score.labelled);
+            }
+            assert!(labelled * 10 >= visible * 9, "{}: {labelled} of {visible}", subject.name);
+        }
+    }
+
+    #[test]
     fn the_same_seed_gives_the_same_bytes() {
         let subject = subject(Kind::ALL[3]);
         let scene = scene::Scene { covered: 0.2, glare: 2, ..scene::Scene::default() };
