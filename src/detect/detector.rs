@@ -181,6 +181,8 @@ impl Detector {
         if grids.is_empty() && self.labels.are_wanted() {
             let found = foreshortened_grids(finder, &pyramid);
             grids = self.plausible::<N, T>(image, &pyramid, &found, &mut too_small);
+            // Compressed patterns of all kinds have triangles and squares too.
+            grids.retain(|(grid, _)| is_labelled(grid));
             timing.lap("foreshortened");
         }
         let mut fitter = CornerFitter::default();
