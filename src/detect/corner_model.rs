@@ -592,7 +592,10 @@ impl CornerFitter {
             && inverse[(X, X)] + inverse[(Y, Y)] < MAX_SIGMA_PX * MAX_SIGMA_PX;
         trusted.then_some(Fitted {
             corner,
-            cov: [(X, X), (X, Y), (Y, Y)].map(|at| optics.inflation * inverse[at]),
+            cov: std::array::from_fn(|i| {
+                let at = [(X, X), (X, Y), (Y, Y)][i];
+                optics.inflation * inverse[at] + optics.shift[i]
+            }),
             noise,
             whiteness,
         })

@@ -91,6 +91,8 @@ pub struct Optics {
     pub ink: f64,
     /// Factor of the covariances.
     pub inflation: f64,
+    /// What is not known of the optics moves corners by so much: covariance xx, xy, yy, px².
+    pub shift: [f64; 3],
     /// What single corners leave without them, of half the contrast: the median.
     pub plain_residual: f64,
     /// What was found of the curve.
@@ -112,6 +114,7 @@ impl Default for Optics {
             halo: [0.0, HALO_WIDTH],
             ink: 0.0,
             inflation: 1.0,
+            shift: [0.0; 3],
             plain_residual: 0.0,
             tone: None,
             ink_found: None,
@@ -493,6 +496,20 @@ struct Reduced {
     own: Vec<Option<(DVector<f64>, DMatrix<f64>)>>,
 }
 
+impl Reduced {
+    /// What the common parameters, known to this covariance, move corners by: the mean of the covariances of their
+    /// positions.
+    fn shift(&self, cov: &DMatrix<f64>) -> [f64; 3] {
+        let mut sum = DMatrix::zeros(2, 2);
+        for (_, slope) in self.own.iter().flatten() {
+            let position = slope.rows(0, 2);
+            sum += position * cov * position.transpose();
+        }
+        let count = self.own.iter().flatten().count().max(1) as f64;
+        [(0, 0), (0, 1), (1, 1)].map(|at| sum[at] / count)
+    }
+}
+
 impl<const K: usize, T: Intensity> Problem<'_, K, T> {
     /// Where a first step leads, under the noise alone, and the covariance by the scatter too.
     fn first_step(&self, optics: &Optics, equations: &[Option<Joint>]) -> (Estimate, DMatrix<f64>) {
@@ -565,7 +582,7 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
         }
         let count = self.active.len();
         let cov = covariance(&reduced).unwrap_or_else(|| DMatrix::identity(count, count));
-        (optics, cov)
+        (Optics { shift: reduced.shift(&cov), ..optics }, cov)
     }
 
     /// The optics and the covariance of their active parameters if the picture moved along a line, where that fits the
