@@ -53,7 +53,7 @@ pub struct Shade<const K: usize> {
     pub halo: f32,
     /// Derivatives by the parameters of a triangle between the edges; 0 without one.
     pub triangle: [f32; TRIANGLE_PARAMS],
-    /// Derivatives by the way of half a motion; 0 without one.
+    /// Derivatives by half of the way of a motion across each edge; 0 without one.
     pub way: [f32; K],
 }
 

@@ -13,9 +13,10 @@
 //!
 //! T is the camera's tone curve between the corner's black and white, r the sum of their light over
 //! its difference ([`super::curve`]); of a linear camera T(S) = S and I = (level + amplitude·f)·g.
-//! M, of trace 2, tells in which direction the picture is blurred more; where it moved, by a box. Both, and halos in f, are the
-//! same all over a picture and given: [`super::optics`]. What is brighter than white or darker than black
-//! is seen as these; where pixels are, the model ends there too, so that they only count where it does not.
+//! M, of trace 2, tells in which direction the picture is blurred more; where it moved, by a box. Both, and
+//! halos in f, are the same all over a picture and given: [`super::optics`]. What is brighter than white or
+//! darker than black is seen as these; where pixels are, the model ends there too, so that they only count
+//! where it does not.
 //!
 //! Edges have curvatures κ where a lens bends them, which are given: a window is too small to tell
 //! them from the position. (u, v) are pixels from the window's centre, f is the blurred corner of
@@ -350,8 +351,8 @@ struct Look<const K: usize> {
     halo: [f32; 2],
     /// ∂ ln s/∂α of the blur that the pattern has, at one steepness of the edges.
     core_by_halo: f32,
-    /// Half of the picture's way across the edges while it was taken, in units of the blur, where it moved, and its derivatives
-    /// by the angles and by both parameters of astigmatism.
+    /// Half of the picture's way across the edges while it was taken, in units of the blur, where it moved, and
+    /// its derivatives by the angles and by both parameters of astigmatism.
     way: Option<[f32; K]>,
     way_by_turn: [f64; K],
     way_by_astigmatism: [[f64; K]; 2],
@@ -466,6 +467,7 @@ impl<const K: usize> Look<K> {
         }
     }
 
+    /// Whether there is a halo.
     fn has_halo(&self) -> bool {
         self.halo[0] != 0.0
     }
@@ -788,7 +790,7 @@ impl CornerFitter {
                 _ => fill_swept_deltille::<K, JOINT>(columns, pixels, window, corner, &look, way),
             };
         }
-        match (K, JOINT, optics.has_halo(), look.triangle) {
+        match (K, JOINT, look.has_halo(), look.triangle) {
             (2, false, false, _) if is_square => {
                 fill_square(columns, pixels, window, corner, &look);
             }

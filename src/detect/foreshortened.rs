@@ -1,8 +1,8 @@
 //! Boards seen at a grazing angle, looked for in pictures that are compressed along their tiles.
 //!
-//! From 75° a tile is four times as wide as it is high, and its sectors are 15° wide: a circle around a corner that shows
-//! them leaves the tile. Compressed to half their width, along the direction nearest to theirs of a few, tiles look as from
-//! 60° or 65°.
+//! From 75° a tile is four times as wide as it is high, and its sectors are 15° wide: a circle around a
+//! corner that shows them leaves the tile. Compressed to half their width, along the direction nearest to
+//! theirs of a few, tiles look as from 60° or 65°.
 //!
 //! ```text
 //!     ╲▁▁▁▁▁▁╱▔▔▔▔▔▔╲▁▁▁▁▁▁╱        ╲▁▁╱▔▔╲▁▁╱

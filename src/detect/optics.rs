@@ -188,15 +188,9 @@ impl Optics {
         Self { is_ink_open: ink.is_none(), ink: ink.unwrap_or(0.0) / INK_UNIT, ..self }
     }
 
-    /// Whether there is a halo.
-    pub fn has_halo(&self) -> bool {
-        self.halo[0] != 0.0
-    }
-
     /// The directions of the blur, for corners of so many edges.
     pub fn spread(&self, edges: usize) -> Spread {
-        let [e1, e2] = self.astigmatism;
-        let length = e1.hypot(e2);
+        let ([e1, e2], length) = (self.astigmatism, self.stretch());
         let is_swept = self.is_motion && length > 0.0;
         let still = Spread {
             astigmatism: [e1, e2],
@@ -220,9 +214,15 @@ impl Optics {
         Spread { part, way, way_by_astigmatism, ..still }
     }
 
+    /// How much further the square of the blur goes one way than the other, over the sum of both.
+    fn stretch(&self) -> f64 {
+        let [e1, e2] = self.astigmatism;
+        e1.hypot(e2)
+    }
+
     /// Blur in the direction in which there is the least of it, over that of the whole.
     pub fn narrowest(&self) -> f64 {
-        (1.0 - self.astigmatism[0].hypot(self.astigmatism[1])).sqrt()
+        (1.0 - self.stretch()).sqrt()
     }
 
     /// Blur of the pattern that a halo is made from, over the blur of a pattern without one whose edges are as steep:
@@ -357,15 +357,11 @@ impl Optics {
                     (optics, cov) = problem.adjusted(&optics, equations);
                 }
             }
-            found = (
-                tone(&optics, &cov, &problem.active, true).or(found.0),
-                problem.ink(&optics.vector(), &cov, true).or(found.1),
-            );
-        }
-        if optics.astigmatism[0].hypot(optics.astigmatism[1]) > LEAST_MOTION
-            && let Some((moved, cov)) = problem.moved(&optics)
-        {
-            optics = moved;
+            if optics.stretch() > LEAST_MOTION
+                && let Some(moved) = problem.moved(&optics)
+            {
+                (optics, cov) = moved;
+            }
             found = (
                 tone(&optics, &cov, &problem.active, true).or(found.0),
                 problem.ink(&optics.vector(), &cov, true).or(found.1),
@@ -585,8 +581,8 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
         (Optics { shift: reduced.shift(&cov), ..optics }, cov)
     }
 
-    /// The optics and the covariance of their active parameters if the picture moved along a line, where that fits the
-    /// corners better than a Gaussian does.
+    /// The optics and the covariance of their active parameters if the picture moved along a line, where that
+    /// fits the corners better than a Gaussian does.
     fn moved(&mut self, still: &Optics) -> Option<(Optics, DMatrix<f64>)> {
         let before = self.members.clone();
         let equations = self.equations(still);

@@ -50,8 +50,8 @@ const SHARP_PX: f64 = 1.4;
 /// Corners that are worth a thread.
 const PART: usize = 128;
 
-/// What is more blurred than its neighbours by more than this is not a corner but the rim of what covers it: at the rims of
-/// fisheye pictures blur doubles from one corner to the next.
+/// What is more blurred than its neighbours by more than this is not a corner but the rim of what covers it: at
+/// the rims of fisheye pictures blur doubles from one corner to the next.
 const MAX_BLUR_RATIO: f64 = 3.0;
 
 /// A position less certain than this, px, with what the shape of the residuals adds, is none: the grid tells as much.
