@@ -8,6 +8,7 @@ use assert_cmd::assert::Assert;
 use command::{deltille, refused};
 use deltille::export::detection;
 use deltille::target::Target;
+use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 
 /// A folder with a board as `board.json`, `board.dsc` and `sheet/board.png`.
@@ -111,7 +112,8 @@ fn mirrored_boards_are_told_and_labelled_where_that_is_allowed() {
     ] {
         let detected = |options: &str| {
             let args = format!("detect {what} {image}.png -o out {options}");
-            let said = deltille(folder.path(), &args).success();
+            let is_labelled = !what.contains("target") || !options.is_empty();
+            let said = deltille(folder.path(), &args).code(i32::from(!is_labelled));
             let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
             let json = std::fs::read_to_string(folder.path().join(format!("out/{image}.json")));
             (said, detection::read(&json.unwrap()).unwrap())
@@ -134,6 +136,36 @@ fn mirrored_boards_are_told_and_labelled_where_that_is_allowed() {
             assert!((corner.x - x).hypot(corner.y - y) < 0.2, "{what}: {corner:?} at {x}, {y}");
         }
     }
+}
+
+#[test]
+fn what_is_left_out_is_told_and_finding_nothing_is_no_success() {
+    let folder = board();
+    deltille(
+        folder.path(),
+        "board --rows 9 --cols 10 --edge 10 --untagged --png --dpi 200 -o more",
+    )
+    .success();
+    let page = image::open(folder.path().join("sheet/board.png")).unwrap().into_luma8();
+    let (width, height) = page.dimensions();
+    let mut two = image::GrayImage::new(2 * width, height);
+    for x in [0, width] {
+        image::imageops::replace(&mut two, &page, x.into(), 0);
+    }
+    two.save(folder.path().join("two.png")).unwrap();
+    let detected = |image: &str| {
+        deltille(folder.path(), &format!("detect --target board.json {image} -o out"))
+    };
+    detected("two.png")
+        .success()
+        .stdout(contains("1 grid, 42 corners").and(contains("42 corners left out")));
+    detected("more/board.png")
+        .code(1)
+        .stdout(contains("a grid of 90 corners is not the whole board of 42"));
+    let grey = image::GrayImage::from_pixel(300, 200, image::Luma([128]));
+    grey.save(folder.path().join("grey.png")).unwrap();
+    detected("grey.png").code(1).stdout(contains("nothing in the picture looks like a corner"));
+    detected("grey.png two.png").success();
 }
 
 #[test]

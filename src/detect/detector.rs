@@ -175,12 +175,12 @@ impl Detector {
         let found = grids(finder, &pyramid, &saddles);
         timing.lap("grids");
         let least = least_untagged_corners(kind::<N>()) as usize;
-        let mut too_small = None;
-        let mut grids = self.plausible::<N, T>(image, &pyramid, &found, &mut too_small);
+        let mut left_out = Vec::new();
+        let mut grids = self.plausible::<N, T>(image, &pyramid, &found, &mut left_out);
         timing.lap("labels");
         if grids.is_empty() && self.labels.are_wanted() {
             let found = foreshortened_grids(finder, &pyramid);
-            grids = self.plausible::<N, T>(image, &pyramid, &found, &mut too_small);
+            grids = self.plausible::<N, T>(image, &pyramid, &found, &mut left_out);
             // Compressed patterns of all kinds have triangles and squares too.
             grids.retain(|(grid, _)| is_labelled(grid));
             timing.lap("foreshortened");
@@ -200,8 +200,9 @@ impl Detector {
         // Of what was no corner, some is gone.
         refuse_patterns(&pyramid, &mut grids);
         timing.lap("refine");
-        let reasons = if grids.is_empty() {
-            vec![too_small.unwrap_or_else(|| self.nothing_found::<N>(&pyramid, saddles.len()))]
+        let mut reasons = if grids.is_empty() {
+            let nothing = || self.nothing_found::<N>(&pyramid, saddles.len());
+            vec![left_out.first().cloned().unwrap_or_else(nothing)]
         } else if self.labels.are_wanted() && grids.iter().all(|(_, reason)| reason.is_some()) {
             let of_grid = |(i, (_, reason)): (usize, &(Grid, Option<Reason>))| {
                 Some(Reason { grid: Some(i), ..reason.clone()? })
@@ -210,6 +211,10 @@ impl Detector {
         } else {
             Vec::new()
         };
+        let is_of_others = |reason: &Reason| reason.kind == ReasonKind::SeenTwice;
+        reasons.extend(
+            left_out.into_iter().filter(|reason| !grids.is_empty() && is_of_others(reason)),
+        );
         Detection {
             image: name.to_owned(),
             width: image.width() as u32,
@@ -225,30 +230,40 @@ impl Detector {
         }
     }
 
-    /// The grids with their labels that may be what is looked for, and whether tiles were too small for that.
+    /// The grids with their labels that may be what is looked for, and why others are left out.
     fn plausible<const N: usize, T: Intensity>(
         &self,
         image: &Gray<T>,
         pyramid: &Pyramid,
         found: &[SaddleGrid],
-        too_small: &mut Option<Reason>,
+        left_out: &mut Vec<Reason>,
     ) -> Vec<(Grid, Option<Reason>)> {
         let mut budget = Budget::default();
         let mut grids: Vec<(Grid, Option<Reason>)> =
             found.iter().flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
         grids.iter_mut().for_each(|(grid, _)| grid.kind = kind::<N>());
         let least = least_untagged_corners(kind::<N>()) as usize;
+        let most = self.labels.most_corners();
+        let mut refused = None;
         grids.retain(|(grid, _)| {
-            let plausible = grid.corners.len() >= least && !self.labels.exceeded_by(grid);
-            let edge_px = grid.edge_px().unwrap_or(0.0);
-            if plausible && edge_px < MIN_UNTAGGED_EDGE_PX {
+            let (corners, edge_px) = (grid.corners.len(), grid.edge_px().unwrap_or(0.0));
+            let is_large = corners >= least;
+            let why = if edge_px < MIN_UNTAGGED_EDGE_PX {
                 let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
-                too_small.get_or_insert_with(|| Reason::new(ReasonKind::TooSmall, figures));
-            }
-            is_vouched_for(grid) || plausible && edge_px >= MIN_UNTAGGED_EDGE_PX
+                Some(Reason::new(ReasonKind::TooSmall, figures))
+            } else if corners > most {
+                let figures = [("corners", corners as f64), ("expected", most as f64)];
+                Some(Reason::new(ReasonKind::NotWhole, figures))
+            } else {
+                None
+            };
+            let is_plausible = is_large && why.is_none();
+            refused = refused.take().or(why.filter(|_| is_large && !is_vouched_for(grid)));
+            is_vouched_for(grid) || is_plausible
         });
+        left_out.extend(refused);
         refuse_patterns(pyramid, &mut grids);
-        report_once(&mut grids);
+        left_out.extend(report_once(&mut grids));
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
         grids.sort_by_key(|(grid, _)| grid.panel.unwrap_or(u32::MAX));
         grids
@@ -269,7 +284,8 @@ impl Detector {
             grids.iter_mut().for_each(|grid| grid.moved_to_level(level));
             let blurs =
                 self.refiner.blurs(fitter, (image, &levels[level..]), grids, &self.tag_areas);
-            let optics = self.refiner.optics(fitter, image, (grids, &blurs), &self.tag_areas);
+            let optics =
+                self.refiner.optics(fitter, (image, level), (grids, &blurs), &self.tag_areas);
             // A picture that moved is as sharp as ever across its way.
             let found = is_sampled(&blurs, optics.narrowest())
                 .then(|| self.refine_under(fitter, image, grids, (&optics, &blurs)));
@@ -278,7 +294,7 @@ impl Detector {
                 return (optics, are_waves);
             }
         }
-        let optics = self.refiner.optics(fitter, image, (grids, &blurs), &self.tag_areas);
+        let optics = self.refiner.optics(fitter, (image, 0), (grids, &blurs), &self.tag_areas);
         let are_waves = self.refine_under(fitter, image, grids, (&optics, &blurs));
         (optics, are_waves)
     }

@@ -4,6 +4,7 @@
 //! is a right-handed lattice like any other, but lies on the panel with rows and columns exchanged. Labels
 //! of such a grid belong to no view of the print, so they are given only where they are asked for.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::detection::{DecodedTag, Grid, GridCorner};
@@ -129,14 +130,9 @@ impl Labels {
         !matches!(self.source, Source::None)
     }
 
-    /// Whether a grid that no tag vouches for has more corners than anything that is looked for: a
-    /// halftone, a fabric or a tiled floor is as regular as a board, but seldom as small.
-    pub fn exceeded_by(&self, grid: &Grid) -> bool {
-        grid.corners.len() > self.most_corners()
-    }
-
-    /// Corners of the largest thing that is looked for.
-    fn most_corners(&self) -> usize {
+    /// Corners of the largest thing that is looked for. What has more, and no tag that vouches for it, is another
+    /// thing: a halftone, a fabric or a tiled floor is as regular as a board, but seldom as small.
+    pub fn most_corners(&self) -> usize {
         match &self.source {
             Source::None => usize::MAX,
             Source::Outline(outline) => outline.len(),
@@ -188,16 +184,29 @@ pub(super) fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
 }
 
 /// Leaves out of grids of one panel what a larger one, which comes before, has already: beside a tag of
-/// few pixels corners may be found twice, a pixel apart.
-pub(super) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) {
-    let (mut corners, mut tags) = (BTreeSet::new(), BTreeSet::new());
+/// few pixels corners may be found twice, a pixel apart. What is a whole edge apart is told.
+pub(super) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) -> Option<Reason> {
+    let (mut corners, mut tags) = (BTreeMap::new(), BTreeSet::new());
+    let mut elsewhere = 0;
     grids.retain_mut(|(grid, _)| {
         if let Some(panel) = grid.panel {
-            grid.corners.retain(|corner| corners.insert((panel, corner.row, corner.col)));
+            let edge_px = grid.edge_px().unwrap_or(f64::INFINITY);
+            grid.corners.retain(|&GridCorner { row, col, x, y, .. }| {
+                let [x0, y0] = match corners.entry((panel, row, col)) {
+                    Entry::Vacant(entry) => {
+                        entry.insert([x, y]);
+                        return true;
+                    }
+                    Entry::Occupied(entry) => *entry.get(),
+                };
+                elsewhere += usize::from((x - x0).hypot(y - y0) > edge_px);
+                false
+            });
             grid.tags.retain(|tag| tags.insert((panel, tag.row, tag.col)));
         }
         !grid.corners.is_empty()
     });
+    (elsewhere > 0).then(|| Reason::new(ReasonKind::SeenTwice, [("corners", elsewhere as f64)]))
 }
 
 fn unlabelled(grid: &SaddleGrid) -> Grid {

@@ -5,6 +5,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::words::counted;
+
 /// Why something has no labels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -57,6 +59,8 @@ pub enum ReasonKind {
     NotWhole,
     /// The same, and it ends at the border of the picture: `corners`, and `expected` where there are no tags.
     CutByBorder,
+    /// Corners of a panel that is seen elsewhere in the picture too, and are left out: `corners`.
+    SeenTwice,
     /// The picture holds more grids than are worth the time.
     TooManyGrids,
 }
@@ -95,7 +99,7 @@ impl fmt::Display for Reason {
                 figure("blur_px")
             ),
             ReasonKind::NoGrid => {
-                write!(f, "{} corners, but no grid of them", figure("corners"))
+                write!(f, "{}, but no grid of them", counted(figure("corners") as usize, "corner"))
             }
             ReasonKind::TooSmall => write!(
                 f,
@@ -160,6 +164,11 @@ impl fmt::Display for Reason {
                 f,
                 "a grid of {} corners is cut by the border of the picture",
                 figure("corners")
+            ),
+            ReasonKind::SeenTwice => write!(
+                f,
+                "{} left out: they show what is seen elsewhere in the picture too; is there a second copy of the target?",
+                counted(figure("corners") as usize, "corner")
             ),
             ReasonKind::TooManyGrids => {
                 write!(f, "the picture holds more grids than are worth the time")

@@ -233,7 +233,7 @@ impl Refiner {
                 residual: fit.residual,
             })
             .collect();
-        let optics = self.joint_optics(&mut fitter, image, samples);
+        let optics = self.joint_optics(&mut fitter, image, samples, &self.known);
         let again = |(i, (refined, fit)): (usize, (Refined, Option<_>))| match fit {
             Some(_) => self.refine_with(&mut fitter, image, starts[i], &optics).0,
             None => refined,
@@ -241,16 +241,17 @@ impl Refiner {
         first.into_iter().enumerate().map(again).collect()
     }
 
-    /// The optics of a picture that these corners show.
+    /// The optics of a picture that these corners show, of which so much is known.
     pub(super) fn joint_optics<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
         image: &Gray<T>,
         samples: Vec<Sample>,
+        known: &Optics,
     ) -> Optics {
         match self.polynomial {
-            Polynomial::Cubic(_) => Optics::estimate::<3, T>(fitter, image, samples, &self.known),
-            Polynomial::Quadric(_) => Optics::estimate::<2, T>(fitter, image, samples, &self.known),
+            Polynomial::Cubic(_) => Optics::estimate::<3, T>(fitter, image, samples, known),
+            Polynomial::Quadric(_) => Optics::estimate::<2, T>(fitter, image, samples, known),
         }
     }
 

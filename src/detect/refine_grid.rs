@@ -72,16 +72,21 @@ impl Refiner {
         grids.iter().map(|grid| self.blur_of_grid(fitter, images, grid, tags)).collect()
     }
 
-    /// What the grids of a picture, with these blurs, have in common.
+    /// What the grids of a picture, with these blurs, have in common, as a level of its pyramid shows them.
     pub(super) fn optics<T: Intensity>(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        (image, level): (&Gray<T>, usize),
         (grids, blurs): (&[Grid], &[Option<f64>]),
         tags: &TagAreas,
     ) -> Optics {
+        let mut known = self.known.clone();
         if self.method() == Refinement::Polynomial {
-            return self.known.clone();
+            return known;
+        }
+        if level > 0 {
+            // The blur of an enlarged picture is no Gaussian, which ink would explain.
+            known = known.with_ink_as_known();
         }
         let all: usize = grids.iter().map(|grid| grid.corners.len()).sum();
         let every = all.div_ceil(2 * LOOKED_AT * SAMPLES).max(1);
@@ -116,7 +121,7 @@ impl Refiner {
             })
         });
         let samples = samples.collect();
-        self.joint_optics(fitter, image, samples)
+        self.joint_optics(fitter, image, samples, &known)
     }
 
     /// Refines the corners of a grid in place, under its blur in px, and drops those that are spoilt.

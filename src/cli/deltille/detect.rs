@@ -63,9 +63,18 @@ enum Format {
 
 /// What came of an image.
 enum Outcome {
-    /// The line to print of it, and what it says of the ink.
-    Found(String, Option<InkEstimate>),
+    Seen(Found),
     Skipped,
+}
+
+/// What was found in an image.
+struct Found {
+    /// The line to print of it.
+    line: String,
+    /// What it says of the ink.
+    ink: Option<InkEstimate>,
+    /// Whether what was asked for is there: labels of the target, or some grid.
+    is_there: bool,
 }
 
 /// An image that was looked at, and the stem of its results.
@@ -101,8 +110,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             let result = image.and_then(|image| {
                 let stem = stems.lock().expect("no thread panics here").claim(&image)?;
                 let outcome = one_image(&args, target.as_ref(), &detector, &image, &stem)?;
-                if let Outcome::Found(_, ink) = &outcome {
-                    seen.lock().expect("no thread panics here").push((image, stem, *ink));
+                if let Outcome::Seen(found) = &outcome {
+                    seen.lock().expect("no thread panics here").push((image, stem, found.ink));
                 }
                 Ok(outcome)
             });
@@ -154,6 +163,7 @@ struct State {
     waiting: BTreeMap<usize, anyhow::Result<Outcome>>,
     failed: usize,
     skipped: usize,
+    found: usize,
     error: Option<anyhow::Error>,
 }
 
@@ -171,7 +181,8 @@ impl Report {
             state.next += 1;
             match result {
                 Ok(Outcome::Skipped) => state.skipped += 1,
-                Ok(Outcome::Found(line, _)) => {
+                Ok(Outcome::Seen(Found { line, is_there, .. })) => {
+                    state.found += usize::from(is_there);
                     // What cannot be printed is lost, as it would be with `println`.
                     if let Err(error) = output::print(&line) {
                         state.error.get_or_insert(error);
@@ -195,7 +206,7 @@ impl Report {
     }
 
     fn end(self) -> anyhow::Result<ExitCode> {
-        let State { next: all, failed, skipped, error, .. } =
+        let State { next: all, failed, skipped, found, error, .. } =
             self.state.into_inner().expect("no thread panics here");
         if let Some(error) = error {
             return Err(error);
@@ -204,7 +215,8 @@ impl Report {
             eprintln!("{skipped} of {all} images skipped: their results are there");
         }
         if failed == 0 {
-            return Ok(ExitCode::SUCCESS);
+            let nothing = found == 0 && skipped == 0;
+            return Ok(if nothing { ExitCode::from(FAILED) } else { ExitCode::SUCCESS });
         }
         eprintln!("error: {failed} of {all} images failed");
         Ok(ExitCode::from(if failed == all { BAD_INPUT } else { FAILED }))
@@ -282,22 +294,25 @@ fn one_image(
         }
     }
     let line = if args.stream { detection::write_line(&found) } else { summary(path, &found) };
-    Ok(Outcome::Found(line, found.ink))
+    let is_there = match target {
+        Some(_) => found.grids.iter().any(|grid| grid.panel.is_some()),
+        None => !found.grids.is_empty(),
+    };
+    Ok(Outcome::Seen(Found { line, ink: found.ink, is_there }))
 }
 
 /// A line on what was found in an image.
 fn summary(path: &Path, found: &Detection) -> String {
-    let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
     let corners: usize = found.grids.iter().map(|grid| grid.corners.len()).sum();
     let tags: usize = found.grids.iter().map(|grid| grid.tags.len()).sum();
     let mut line = format!(
         "{}: {}, {}",
         path.display(),
-        count(found.grids.len(), "grid"),
-        count(corners, "corner")
+        counted(found.grids.len(), "grid"),
+        counted(corners, "corner")
     );
     if tags > 0 {
-        line += &format!(", {}", count(tags, "tag"));
+        line += &format!(", {}", counted(tags, "tag"));
     }
     line += "\n";
     for reason in &found.reasons {
