@@ -50,6 +50,12 @@ const INK: usize = PARAMS - 1;
 /// 1 : 10.
 const CHI2: [f64; 4] = [16.3, 4.6, 10.8, 10.8];
 
+/// The same of one degree of freedom.
+const CHI2_OF_ONE: f64 = 10.8;
+
+/// A curve that displaces nothing is used where it explains this part of the noise.
+const NOTICED: f64 = 0.05;
+
 /// The unit of the ink, in edges.
 pub const INK_UNIT: f64 = 0.01;
 
@@ -326,12 +332,11 @@ impl Optics {
         };
         let active = (0..PARAMS).filter(|&p| is_active(p)).collect();
         let members = samples.into_iter().map(Member::from).collect();
-        let mut problem = Problem::<K, T> { fitter, image, members, active };
-        let middle = |v: Vec<f64>| median(v).unwrap_or(0.0);
-        let (black, white) = (middle(blacks), middle(whites));
+        let greys = [blacks, whites].map(|greys| median(greys).unwrap_or(0.0));
+        let mut problem = Problem::<K, T> { fitter, image, members, greys, active };
         let reported =
             |problem: &Problem<K, T>, optics: &Self, cov: &DMatrix<f64>, used| Reported {
-                tone: optics.tone_between([black, white], (cov, &problem.active), used),
+                tone: optics.tone_between(greys, (cov, &problem.active), used),
                 ink: problem.ink(optics, cov, used),
             };
         let all = problem.active.clone();
@@ -347,7 +352,7 @@ impl Optics {
             let unused = reported(&problem, &optics.with(&step.vector), &scattered, false);
             let worth = match is_first {
                 true => step.supported(WORTH_A_LOOK),
-                false => Estimate::of(step.vector, all.clone(), &scattered).supported(1.0),
+                false => problem.estimate(&optics, step.vector, &scattered).supported(1.0),
             };
             if worth.active == used {
                 found = found.or(unused);
@@ -374,22 +379,29 @@ impl Optics {
     /// looked for.
     fn tone_between(
         &self,
-        [black, white]: [f64; 2],
+        greys: [f64; 2],
         (cov, active): (&DMatrix<f64>, &[usize]),
         used: bool,
     ) -> Option<ToneEstimate> {
         active.contains(&0).then(|| {
-            let terms = |optics: &Self| {
-                optics.piece((white + black) / 2.0, (white - black) / 2.0).terms.map(f64::from)
-            };
-            let [kappa, kappa_odd, ..] = terms(self);
-            let slopes = DVector::from_iterator(
-                active.len(),
-                active.iter().map(|&p| (terms(&self.moved(p))[0] - kappa) / STEP),
-            );
+            let [kappa, kappa_odd] = self.kappas(greys);
+            let slopes = active.iter().map(|&p| self.kappa_slope(greys, p));
+            let slopes = DVector::from_iterator(active.len(), slopes);
             let kappa_deviation = slopes.dot(&(cov * &slopes)).max(0.0).sqrt();
+            let [black, white] = greys;
             ToneEstimate { black, white, kappa, kappa_deviation, kappa_odd, used }
         })
+    }
+
+    /// κ₀ and κ₁ between black and white.
+    fn kappas(&self, [black, white]: [f64; 2]) -> [f64; 2] {
+        let piece = self.piece((white + black) / 2.0, (white - black) / 2.0);
+        [0, 1].map(|i| f64::from(piece.terms[i]))
+    }
+
+    /// The derivative of κ₀ by a parameter.
+    fn kappa_slope(&self, greys: [f64; 2], parameter: usize) -> f64 {
+        (self.moved(parameter).kappas(greys)[0] - self.kappas(greys)[0]) / STEP
     }
 }
 
@@ -416,15 +428,13 @@ struct Estimate {
     active: Vec<usize>,
     /// The inverse of their covariance.
     information: DMatrix<f64>,
+    /// Derivatives of κ₀ by the parameters of the curve.
+    kappa_slopes: [f64; TONE_PARAMS],
+    /// How many they come from.
+    pixels: usize,
 }
 
 impl Estimate {
-    fn of(vector: [f64; PARAMS], active: Vec<usize>, cov: &DMatrix<f64>) -> Self {
-        let inverse = cov.clone().cholesky().map(|factor| factor.inverse());
-        let information = inverse.unwrap_or_else(|| DMatrix::zeros(active.len(), active.len()));
-        Self { vector, active, information }
-    }
-
     fn values(&self) -> DVector<f64> {
         DVector::from_iterator(self.active.len(), self.active.iter().map(|&p| self.vector[p]))
     }
@@ -433,9 +443,9 @@ impl Estimate {
     /// them first, since what one explains another may explain too.
     fn supported(mut self, part: f64) -> Self {
         loop {
-            let ratios =
-                GROUPS.iter().zip(CHI2).map(|(group, limit)| (self.chi2(group) / limit, group));
-            let present = ratios.filter(|(_, group)| self.active.contains(&group[0]));
+            let present =
+                GROUPS.iter().zip(CHI2).filter(|(group, _)| self.active.contains(&group[0]));
+            let present = present.map(|(group, limit)| (self.evidence(group) / limit, group));
             match present.min_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((ratio, group)) if ratio <= part => self = self.without(group),
                 _ => return self,
@@ -444,7 +454,10 @@ impl Estimate {
     }
 
     /// How much a group differs from nothing, in squared deviations.
-    fn chi2(&self, group: &[usize]) -> f64 {
+    ///
+    /// What a curve is beside κ₀ displaces no corner, and is in every picture whose blur is not quite that of the
+    /// model. It counts where it is more than a twentieth of the noise.
+    fn evidence(&self, group: &[usize]) -> f64 {
         let places = |inside: bool| -> Vec<usize> {
             let all = 0..self.active.len();
             all.filter(|&i| group.contains(&self.active[i]) == inside).collect()
@@ -457,7 +470,16 @@ impl Estimate {
             Some(factor) => between(&own, &others) * factor.solve(&between(&others, &own)),
             None => return 0.0,
         };
-        value.dot(&((between(&own, &own) - shared) * &value))
+        let information = between(&own, &own) - shared;
+        let chi2 = value.dot(&(&information * &value));
+        if group[0] != 0 {
+            return chi2;
+        }
+        let slopes = DVector::from_column_slice(&self.kappa_slopes);
+        let Some(factor) = information.cholesky() else { return 0.0 };
+        let of_kappa = slopes.dot(&value).powi(2) / slopes.dot(&factor.solve(&slopes));
+        let of_noise = chi2 / (NOTICED * self.pixels as f64);
+        CHI2[0] * (of_kappa / CHI2_OF_ONE).max(of_noise)
     }
 
     /// The most likely values where a group is nothing.
@@ -474,7 +496,7 @@ impl Estimate {
         let mut vector = self.vector;
         group.iter().for_each(|&p| vector[p] = 0.0);
         active.iter().zip(&values).for_each(|(&p, value)| vector[p] = *value);
-        Self { vector, active, information }
+        Self { vector, active, information, ..*self }
     }
 }
 
@@ -497,6 +519,8 @@ struct Problem<'a, const K: usize, T> {
     fitter: &'a mut CornerFitter,
     image: &'a Gray<T>,
     members: Vec<Member<K>>,
+    /// Median black and white of the corners.
+    greys: [f64; 2],
     active: Vec<usize>,
 }
 
@@ -534,12 +558,22 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
         let reduced = self.reduced(equations, &weights_of(equations), optics);
         let mut vector = optics.vector();
         let Some(factor) = reduced.matrix.clone().cholesky() else {
-            return (Estimate::of(vector, self.active.clone(), &unknown), unknown);
+            return (self.estimate(optics, vector, &unknown), unknown);
         };
         let step = factor.solve(&reduced.gradient);
         self.active.iter().zip(step.iter()).for_each(|(&p, s)| vector[p] += s);
-        let estimate = Estimate::of(vector, self.active.clone(), &factor.inverse());
+        let estimate = self.estimate(optics, vector, &factor.inverse());
         (estimate, covariance(&reduced).unwrap_or(unknown))
+    }
+
+    /// What these values of the parameters say, near these optics, if the active ones have this covariance.
+    fn estimate(&self, optics: &Optics, vector: [f64; PARAMS], cov: &DMatrix<f64>) -> Estimate {
+        let active = self.active.clone();
+        let inverse = cov.clone().cholesky().map(|factor| factor.inverse());
+        let information = inverse.unwrap_or_else(|| DMatrix::zeros(active.len(), active.len()));
+        let kappa_slopes = [0, 1, 2].map(|p| optics.kappa_slope(self.greys, p));
+        let pixels = self.members.iter().map(|member| member.window.count()).sum();
+        Estimate { vector, active, information, kappa_slopes, pixels }
     }
 
     /// What was found of the ink; `None` where it was not looked for.
@@ -607,8 +641,7 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
     /// then differ from nothing by no more than chance, and the covariance of the active parameters.
     fn settled(&mut self, start: &Optics, equations: Vec<Option<Joint>>) -> (Optics, DMatrix<f64>) {
         let (mut optics, mut cov) = self.adjusted(start, equations);
-        let whole = Estimate::of(optics.vector(), self.active.clone(), &cov);
-        let supported = whole.supported(1.0);
+        let supported = self.estimate(&optics, optics.vector(), &cov).supported(1.0);
         if supported.active.len() < self.active.len() {
             optics = start.with(&supported.vector);
             self.active = supported.active;
@@ -682,7 +715,7 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
     }
 
     fn equations(&mut self, optics: &Optics) -> Vec<Option<Joint>> {
-        let Self { fitter, image, members, active } = self;
+        let Self { fitter, image, members, active, .. } = self;
         let common: Vec<Common> = active.iter().map(|&p| optics.common(p)).collect();
         members
             .iter()
