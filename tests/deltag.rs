@@ -31,6 +31,55 @@ fn a_search_ends_after_the_round_in_which_its_time_is_over() {
     assert!(family.contains("\"rounds\": 1"), "{family}");
 }
 
+/// What ships is where a search starts, and is said, with the true distance, before the search begins.
+#[test]
+fn a_search_starts_from_what_ships() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = |family: &str, more: &[&str]| {
+        let mut command = deltag();
+        command.args(["gen-family", family, "--time", "0.1", "-o"]).arg(folder.path()).args(more);
+        command.assert().success()
+    };
+    made("d25h7", &[])
+        .stderr(contains(
+            "starts from 1208 codes of d25h7: any two, in any turn, differ in at least 7",
+        ))
+        .stdout(contains("1208 codes of 25 bits"));
+    let file = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("families/d25h7.json");
+    assert_eq!(file("d25h7.json"), std::fs::read_to_string(shipped).unwrap());
+    // Codes that are farther apart than asked for, and fewer of them under stricter rules.
+    made("d36h10", &[])
+        .stderr(contains("of d36h11").and(contains("at least 12 cells, more than the 10")));
+    made("d16h5", &["--min-complexity", "0.7"]).stderr(contains("starts from "));
+    let silent = made("d16h5", &["--from-nothing", "--force"]);
+    assert!(silent.get_output().stderr.is_empty());
+}
+
+/// Work is counted alike on every machine, whatever its number of threads.
+#[test]
+fn a_search_by_work_depends_on_its_seed_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = |name: &str, more: &[&str]| {
+        let mut command = deltag();
+        command.args([
+            "gen-family",
+            "d16h6",
+            "--from-nothing",
+            "--work",
+            "1",
+            "--name",
+            "codes",
+            "-o",
+        ]);
+        command.arg(folder.path().join(name)).args(more).assert().success();
+        std::fs::read_to_string(folder.path().join(name)).unwrap()
+    };
+    let one = made("one.json", &["-j", "1"]);
+    assert_eq!(one, made("two.json", &["-j", "2"]));
+    assert_ne!(one, made("other.json", &["--seed", "2"]));
+}
+
 #[test]
 fn the_published_lexicode_is_written_as_shipped() {
     let folder = tempfile::tempdir().unwrap();
@@ -155,6 +204,10 @@ fn bad_arguments_are_one_line_and_exit_code_2() {
     gen_family(&["--method", "lexicode", "--seed", "3"], "--seed");
     gen_family(&["--method", "lexicode", "--time", "3"], "--time");
     gen_family(&["--method", "lexicode", "--limit", "3"], "--limit");
+    gen_family(&["--method", "search", "--work", "3"], "--work: does nothing with --method search");
+    gen_family(&["--method", "lexicode", "--from-nothing"], "--from-nothing");
+    gen_family(&["--work", "3", "--time", "3"], "--time");
+    gen_family(&["--work", "0"], "--work");
     refused(&["verify-family", "no-such-family"], "no-such-family");
     refused(&["verify-family", "/no/such/file.json"], "/no/such/file.json");
     refused(&["verify-family"], "FAMILIES");

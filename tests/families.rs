@@ -123,12 +123,13 @@ fn best_families_hold_whatever_the_rules() {
             dimension: Dimension::from_bits(bits).unwrap(),
             distance,
             rules,
-            time: std::time::Duration::from_millis(500),
+            budget: best::Budget::Time(std::time::Duration::from_millis(500)),
+            from_nothing: false,
             seed: 3,
             limit: None,
             exchange: true,
         };
-        let family = search.family("test", Control::default()).unwrap();
+        let family = search.family("test", search.start(), Control::default()).unwrap();
         assert_eq!(certify(&family).failures, [""; 0]);
         assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
     }

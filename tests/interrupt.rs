@@ -123,17 +123,23 @@ fn without_a_checkpoint_an_interrupted_lexicode_leaves_nothing() {
     assert_eq!(names(folder.path()), [""; 0]);
 }
 
-/// The best family so far is kept, or, where the signal came before the first, nothing.
+/// The best family so far is kept, at least what ships, or, where a search from nothing had found none, nothing.
 #[test]
 fn an_interrupted_best_search_keeps_the_best_so_far() {
-    for (pause_ms, must_find) in [(0, false), (4000, true)] {
+    for (from, pause_ms, must_find) in
+        [(None, 0, true), (Some("--from-nothing"), 0, false), (Some("--from-nothing"), 4000, true)]
+    {
         let folder = tempfile::tempdir().unwrap();
-        let mut child = start(&["d16h5", "--time", "100000"], folder.path());
+        let arguments: Vec<&str> = ["d16h5", "--time", "100000"].into_iter().chain(from).collect();
+        let mut child = start(&arguments, folder.path());
         wait_for("the signal handler", || handles_interrupts(&mut child));
         std::thread::sleep(Duration::from_millis(pause_ms));
         let output = interrupt(child);
         let (code, stderr) = (output.status.code(), text(&output.stderr));
-        assert!(stderr.starts_with("interrupted: ") && stderr.lines().count() == 1, "{stderr}");
+        let said: Vec<&str> =
+            stderr.lines().filter(|line| !line.starts_with("starts from")).collect();
+        assert!(said.len() == 1 && said[0].starts_with("interrupted: "), "{stderr}");
+        assert_eq!(stderr.lines().count(), 1 + usize::from(from.is_none()), "{stderr}");
         if code == Some(0) {
             assert!(stderr.contains("kept the best family so far"));
             assert_eq!(names(folder.path()), ["d16h5.json"]);

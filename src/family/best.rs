@@ -1,9 +1,12 @@
-//! The best of all methods within a time limit: sources of invariant codes, arranged on the tag so
-//! that as many words as possible satisfy the rules, then repaired and extended by local search.
+//! The best of all methods within a time limit: the best construction on record, and sources of invariant
+//! codes, arranged on the tag so that as many words as possible satisfy the rules, then repaired and
+//! extended by local search.
 //!
 //! How far it gets depends on the time, so what it found is recorded in full
-//! ([`AlgebraicConstruction`]) and gives the same codes again without any search.
+//! ([`AlgebraicConstruction`]) and gives the same codes again without any search. With an amount of work
+//! instead of a time the same seed gives the same codes on every machine.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use rand::seq::{IndexedRandom, SliceRandom};
@@ -17,9 +20,11 @@ use super::algebra::quasicyclic::{Symmetry, random_code};
 use super::algebra::record::has_free_centre;
 use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, residue};
 use super::bounds::bounds;
+use super::file::parse_word;
 use super::polish::{Effort, polish};
 use super::search::Search;
-use super::{Construction, Control, Family, FamilyError, Rules, Screen, TagWords};
+use super::shipped::shipped_names;
+use super::{Construction, Control, Family, FamilyError, Progress, Rules, Screen, TagWords};
 use crate::lattice::Dimension;
 
 /// What to search and for how long.
@@ -31,14 +36,97 @@ pub struct Best {
     pub distance: u32,
     /// Rules for single codes.
     pub rules: Rules,
-    /// Time for all of it.
-    pub time: Duration,
+    /// How much of it.
+    pub budget: Budget,
+    /// Whether to leave alone what is on record, and search from nothing.
+    pub from_nothing: bool,
     /// Seed of all random choices.
     pub seed: u64,
     /// Number of codes at most.
     pub limit: Option<u64>,
     /// Whether local search may exchange codes at the end; without it the family is algebraic.
     pub exchange: bool,
+}
+
+/// How long a search goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Budget {
+    /// So long; how much is found depends on the machine.
+    Time(Duration),
+    /// So many steps: in each [`DRAWS`] batches of codes are drawn, the best are arranged once more, and codes are
+    /// exchanged in one round of local search. What is found depends on the seed alone.
+    Work(u32),
+}
+
+/// Batches of codes that are drawn in a step of work.
+pub const DRAWS: u64 = 4;
+
+/// What a search starts from.
+#[derive(Clone, Debug)]
+pub struct Start {
+    /// The family on record.
+    pub family: String,
+    /// Its codes, as far as they satisfy the rules.
+    pub codes: Vec<u64>,
+    construction: AlgebraicConstruction,
+}
+
+/// How far a search has come.
+struct Clock {
+    start: Instant,
+    budget: Budget,
+    /// Share of the budget that is spent before the first share is asked for.
+    first: f64,
+    /// Steps done of a search by work, and in all.
+    done: AtomicU64,
+    total: u64,
+}
+
+impl Clock {
+    fn new(budget: Budget, first: f64) -> Self {
+        // Drawing, arranging and exchanging, and exchanging what is on record.
+        let parts = if first > 0.0 { 4 } else { 3 };
+        let total = match budget {
+            Budget::Time(_) => 1,
+            Budget::Work(steps) => parts * u64::from(steps.max(1)),
+        };
+        Self { start: Instant::now(), budget, first, done: AtomicU64::new(0), total }
+    }
+
+    /// When a share of what follows the first share is spent; `None` where work is counted.
+    fn until(&self, share: f64) -> Option<Instant> {
+        match self.budget {
+            Budget::Time(time) => {
+                Some(self.start + time.mul_f64(self.first + (1.0 - self.first) * share))
+            }
+            Budget::Work(_) => None,
+        }
+    }
+
+    /// Rounds of a kind: as many as are worked, or as the time gives.
+    fn rounds(&self, most: u64) -> u64 {
+        match self.budget {
+            Budget::Time(_) => most,
+            Budget::Work(steps) => u64::from(steps.max(1)),
+        }
+    }
+
+    fn step(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn thousandths(&self) -> u64 {
+        let share = match self.budget {
+            Budget::Time(time) => self.start.elapsed().as_secs_f64() / time.as_secs_f64().max(1e-3),
+            Budget::Work(_) => self.done.load(Ordering::Relaxed) as f64 / self.total as f64,
+        };
+        (1000.0 * share.min(1.0)) as u64
+    }
+}
+
+/// Whether an end has come; without one it never does.
+fn is_past(end: Option<Instant>) -> bool {
+    end.is_some_and(|end| Instant::now() >= end)
 }
 
 /// A union, how it is arranged, and how many words pass.
@@ -66,39 +154,102 @@ struct Draw {
 }
 
 impl Best {
-    /// Searches and makes a family of what was found. Progress is reported in thousandths of the
-    /// time. When it is cancelled, the time is over: the family is the best so far, and only where
-    /// nothing was found yet there is none.
-    pub fn family(&self, name: &str, control: Control) -> Result<Family, FamilyError> {
+    /// The best construction on record for such tags: of a shipped family with these bits and this distance or a
+    /// greater one, as far as its codes satisfy the rules. `None` where there is none, or it is not wanted.
+    pub fn start(&self) -> Option<Start> {
+        if self.from_nothing {
+            return None;
+        }
+        let screen = self.screen();
+        let on_record = |name: &str| {
+            let family = Family::resolve(name).ok()?;
+            let Construction::Algebraic(construction) = family.construction() else { return None };
+            let fits = family.dimension() == self.dimension && family.distance() >= self.distance;
+            let construction = AlgebraicConstruction { limit: self.limit, ..construction.clone() };
+            // Exchanged words are listed whatever the rules.
+            let admitted = |word: &String| parse_word(word).is_some_and(|w| screen.admits(w));
+            let all_admitted = construction.exchanged.iter().all(admitted);
+            let construction = match all_admitted && self.exchange {
+                true => construction,
+                false => AlgebraicConstruction { exchanged: Vec::new(), ..construction },
+            };
+            let codes = fits.then(|| construction.codes(&screen).ok()).flatten()?;
+            Some(Start { family: name.to_owned(), codes, construction })
+        };
+        let all = shipped_names().into_iter().filter_map(on_record);
+        all.filter(|start| !start.codes.is_empty()).max_by_key(|start| start.codes.len())
+    }
+
+    /// The family that a search starts from.
+    pub fn family_of(&self, name: &str, start: &Start) -> Result<Family, FamilyError> {
+        let construction = Construction::Algebraic(start.construction.clone());
+        let (codes, rules) = (start.codes.clone(), self.rules.clone());
+        Family::new(name, self.dimension, self.distance, codes, rules, construction)
+    }
+
+    fn screen(&self) -> Screen {
+        Screen::new(TagWords::new(self.dimension), self.distance, &self.rules)
+    }
+
+    /// Searches and makes a family of what was found, at least as large as what it starts from. Progress is
+    /// reported in thousandths. When it is cancelled, the search is over: the family is the best so far,
+    /// and only where nothing was found yet there is none.
+    pub fn family(
+        &self,
+        name: &str,
+        start: Option<Start>,
+        control: Control,
+    ) -> Result<Family, FamilyError> {
+        /// Share of the time in which codes on record are exchanged.
+        const FOR_RECORD: f64 = 0.4;
         self.rules.check(self.dimension.bits())?;
-        let screen = Screen::new(TagWords::new(self.dimension), self.distance, &self.rules);
-        let start = Instant::now();
+        let screen = self.screen();
         // Most of the gain comes from good sources and arrangements, at 25 bits and fewer also
         // from exchanging codes, where there is time for it.
         let small = self.exchange && self.dimension.bits() <= super::polish::MAX_BITS;
-        let until = |share: f64| start + self.time.mul_f64(share);
         let [sources, arrangements] = match (small, self.exchange_pays()) {
             (false, _) => [0.6, 1.0],
             (true, false) => [0.6, 0.9],
             (true, true) => [0.3, 0.5],
         };
+        let clock =
+            Clock::new(self.budget, if small && start.is_some() { FOR_RECORD } else { 0.0 });
         let most = self.most();
-        let mut candidates = self.sources(until(sources), start, control);
-        self.rearrange(&mut candidates, until(arrangements), start, control);
-
         let mut best: Option<(Vec<u64>, Construction)> = None;
+        if let Some(Start { codes, construction, .. }) = start {
+            control.report(0, 1000, codes.len());
+            let found =
+                self.exchanged(&screen, construction, codes, clock.until(0.0), &clock, control)?;
+            best = Some(found);
+        }
+        let found =
+            |best: &Option<(Vec<u64>, Construction)>| best.as_ref().map_or(0, |b| b.0.len());
+        let mut candidates = self.sources(&clock, sources, found(&best), control);
+        self.rearrange(&mut candidates, &clock, arrangements, found(&best), control);
+
+        let mut is_first = true;
         for candidate in candidates {
-            let left = until(1.0).saturating_duration_since(Instant::now());
-            let over = left.is_zero() || !small || control.is_cancelled();
-            if best.as_ref().is_some_and(|(codes, _)| over || codes.len() >= most) {
+            let end = clock.until(1.0);
+            let over = match self.budget {
+                Budget::Time(_) => is_past(end),
+                Budget::Work(_) => !is_first,
+            };
+            let over = over || !small || control.is_cancelled();
+            if best.as_ref().is_some_and(|(codes, _)| (over && !is_first) || codes.len() >= most) {
                 break;
             }
-            let end = Instant::now() + left.mul_f64(0.7);
-            let found = self.finish(&screen, &candidate, end, control)?;
+            is_first = false;
+            let end = end.map(|end| {
+                let left = end.saturating_duration_since(Instant::now());
+                Instant::now() + left.mul_f64(0.7)
+            });
+            let construction = self.construction(&screen, candidate);
+            let codes = construction.codes(&screen)?;
+            let found = self.exchanged(&screen, construction, codes, end, &clock, control)?;
             if best.as_ref().is_none_or(|(codes, _)| found.0.len() > codes.len()) {
                 best = Some(found);
             }
-            control.report(self.thousandths(start), 1000, best.as_ref().map_or(0, |b| b.0.len()));
+            control.report(clock.thousandths(), 1000, best.as_ref().map_or(0, |b| b.0.len()));
         }
         let (codes, construction) = match best {
             Some(found) if !found.0.is_empty() => found,
@@ -112,7 +263,11 @@ impl Best {
     /// seconds not even the conflicts are counted.
     fn exchange_pays(&self) -> bool {
         const LEAST: Duration = Duration::from_secs(20);
-        self.exchange && self.time >= LEAST
+        let is_long = match self.budget {
+            Budget::Time(time) => time >= LEAST,
+            Budget::Work(_) => true,
+        };
+        self.exchange && is_long
     }
 
     /// No family is larger; once there are so many codes, the search is over.
@@ -121,13 +276,9 @@ impl Best {
         bounds.linear_programming.min(bounds.sphere_packing) as usize
     }
 
-    fn thousandths(&self, start: Instant) -> u64 {
-        let share = start.elapsed().as_secs_f64() / self.time.as_secs_f64().max(1e-3);
-        (1000.0 * share.min(1.0)) as u64
-    }
-
-    /// Draws unions of cosets until the time is over; the most promising first.
-    fn sources(&self, until: Instant, start: Instant, control: Control) -> Vec<Candidate> {
+    /// Draws unions of cosets until a share of the time is over; the most promising first. So many codes are
+    /// `known` already.
+    fn sources(&self, clock: &Clock, share: f64, known: usize, control: Control) -> Vec<Candidate> {
         /// Draws between two looks at the clock.
         const BATCH: u64 = 16;
         /// Candidates kept for a thorough arrangement.
@@ -138,7 +289,9 @@ impl Best {
         let mut promising: Vec<(usize, Shape)> = Vec::new();
         let mut most_orbits = 0;
         let enough = self.most();
-        let halt = || Instant::now() >= until || control.is_cancelled();
+        let until = clock.until(share);
+        let halt = || is_past(until) || control.is_cancelled();
+        let steps = clock.rounds(u64::MAX / BATCH / DRAWS);
         let mut draw = 0;
         loop {
             let most = most_orbits;
@@ -169,9 +322,12 @@ impl Best {
             kept.truncate(KEPT);
             promising.sort_by_key(|&(best, shape)| (std::cmp::Reverse(best), shape));
             promising.truncate(PROMISING);
+            if draw.is_multiple_of(BATCH * DRAWS) {
+                clock.step();
+            }
             let best = kept.first().map_or(0, |c| c.worth as usize);
-            control.report(self.thousandths(start), 1000, best);
-            if halt() || best >= enough {
+            control.report(clock.thousandths(), 1000, best.max(known));
+            if halt() || best >= enough || draw >= steps * BATCH * DRAWS {
                 return kept;
             }
         }
@@ -320,16 +476,18 @@ impl Best {
     fn rearrange(
         &self,
         candidates: &mut [Candidate],
-        until: Instant,
-        start: Instant,
+        clock: &Clock,
+        share: f64,
+        known: usize,
         control: Control,
     ) {
-        let over = || Instant::now() >= until || control.is_cancelled();
+        let until = clock.until(share);
+        let over = || is_past(until) || control.is_cancelled();
         let arrangers: Vec<Arranger> =
             candidates.iter().map(|c| self.arranger(&c.union, c.union.orbits())).collect();
         let enough = self.most();
         let mut steps = 4_000;
-        for round in 0.. {
+        for round in 0..clock.rounds(u64::MAX) {
             candidates.par_iter_mut().zip(&arrangers).for_each(|(candidate, arranger)| {
                 if !over() {
                     let seed = self.seed.wrapping_add(1_000_003 * (round + 1));
@@ -340,7 +498,8 @@ impl Best {
                 }
             });
             let best = candidates.iter().map(|c| c.worth as usize).max().unwrap_or(0);
-            control.report(self.thousandths(start), 1000, best);
+            clock.step();
+            control.report(clock.thousandths(), 1000, best.max(known));
             if over() || candidates.is_empty() || best >= enough {
                 break;
             }
@@ -349,35 +508,51 @@ impl Best {
         candidates.sort_by(|a, b| b.worth.total_cmp(&a.worth));
     }
 
-    /// The codes of a candidate, exchanged where that gains some.
-    fn finish(
-        &self,
-        screen: &Screen,
-        candidate: &Candidate,
-        end: Instant,
-        control: Control,
-    ) -> Result<(Vec<u64>, Construction), FamilyError> {
+    /// The record of a candidate.
+    fn construction(&self, screen: &Screen, candidate: Candidate) -> AlgebraicConstruction {
         let words = screen.words();
         let hex = |list: &[u64]| list.iter().map(|&w| words.hex(w)).collect();
-        let mut construction = AlgebraicConstruction {
-            source: candidate.source.clone(),
+        AlgebraicConstruction {
+            source: candidate.source,
             basis: hex(candidate.union.code.rows()),
             cosets: hex(&candidate.union.cosets),
-            arrangement: candidate.arrangement.clone(),
+            arrangement: candidate.arrangement,
             exchanged: Vec::new(),
             limit: self.limit,
             seed: self.seed,
-        };
-        let codes = construction.codes(screen)?;
+        }
+    }
+
+    /// The codes of a construction, some of them exchanged where that gains more.
+    fn exchanged(
+        &self,
+        screen: &Screen,
+        construction: AlgebraicConstruction,
+        codes: Vec<u64>,
+        end: Option<Instant>,
+        clock: &Clock,
+        control: Control,
+    ) -> Result<(Vec<u64>, Construction), FamilyError> {
         if !self.exchange || self.dimension.bits() > super::polish::MAX_BITS {
             return Ok((codes, Construction::Algebraic(construction)));
         }
-        let effort = Effort { seed: self.seed, rounds: 50, steps: 400_000, most: self.most() };
-        let quiet = Control { report: None, ..control };
-        let polished = polish(screen, codes.clone(), effort, quiet, || Instant::now() >= end);
-        let exchanged: Vec<u64> =
-            polished.into_iter().filter(|code| !codes.contains(code)).collect();
-        construction.exchanged = hex(&exchanged);
+        let rounds = clock.rounds(50) as u32;
+        let effort = Effort { seed: self.seed, rounds, steps: 400_000, most: self.most() };
+        let known = codes.len();
+        let report = |progress: Progress| {
+            clock.step();
+            control.report(clock.thousandths(), 1000, progress.codes.max(known));
+        };
+        let within = Control { report: Some(&report), ..control };
+        let polished = polish(screen, codes.clone(), effort, within, || is_past(end));
+        if polished.len() <= codes.len() {
+            return Ok((codes, Construction::Algebraic(construction)));
+        }
+        let plain = AlgebraicConstruction { exchanged: Vec::new(), ..construction };
+        let own = plain.codes(screen)?;
+        let exchanged = polished.into_iter().filter(|code| !own.contains(code));
+        let exchanged = exchanged.map(|word| screen.words().hex(word)).collect();
+        let construction = AlgebraicConstruction { exchanged, seed: self.seed, ..plain };
         Ok((construction.codes(screen)?, Construction::Algebraic(construction)))
     }
 

@@ -12,15 +12,19 @@ use super::checkpoint::CheckpointFile;
 use super::parameters::Parameters;
 use super::rules::RuleArgs;
 use super::values::{name, number, whole};
+use super::verify_family::proof_of;
+use crate::cli::progress::SearchProgress;
 use crate::cli::run::{FAILED, INTERRUPTED};
-use crate::cli::{interrupt, output, output::say, progress};
-use crate::family::best::Best;
+use crate::cli::{interrupt, output, output::say};
+use crate::family::best::{Best, Budget};
 use crate::family::lexicode::{self, Lexicode};
 use crate::family::search::{self, Search};
 use crate::family::{
-    self, Control, Family, FamilyError, Progress, Rules, Screen, TagWords, check_name,
+    self, Control, Family, FamilyError, Progress, Rules, Screen, TagWords, certify_codes,
+    check_name,
 };
 use crate::lattice::Dimension;
+use crate::words::counted;
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Ctrl-C ends a search early. The methods best and algebraic write \
@@ -41,6 +45,15 @@ pub(super) struct Args {
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true,
           value_parser = number(0.001..=1e6))]
     time: Option<f64>,
+    /// Steps of work for the methods best and algebraic instead of a time: the same seed gives the
+    /// same codes on every machine
+    #[arg(long, value_name = "STEPS", conflicts_with = "time", allow_negative_numbers = true,
+          value_parser = whole(1..=1_000_000u32))]
+    work: Option<u32>,
+    /// For the methods best and algebraic: do not start from the family that ships, but search from
+    /// nothing
+    #[arg(long)]
+    from_nothing: bool,
     /// Seed of the random choices of best, algebraic and search [default: 1]
     #[arg(long, allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     seed: Option<u64>,
@@ -75,7 +88,7 @@ pub(super) struct Args {
 
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Method {
-    /// Algebraic codes, arranged and improved by local search, within --time
+    /// The best codes on record and others, arranged and improved by local search, within --time
     Best,
     /// Algebraic codes arranged within --time, without local search
     Algebraic,
@@ -139,13 +152,10 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (total, unit) = match args.method {
         Method::Lexicode => (dimension.mask() + 1, "candidates"),
         Method::Search => (u64::from(args.rounds()), "rounds"),
-        Method::Best | Method::Algebraic => (1000, "‰ of the time"),
+        Method::Best | Method::Algebraic => (1000, ""),
     };
-    let bar = progress::bar(total, unit);
-    let report = |p: Progress| {
-        bar.set_position(p.done);
-        bar.set_message(format!("{} codes", p.codes));
-    };
+    let shown = SearchProgress::new(total, unit);
+    let report = |progress: Progress| shown.show(progress);
     let control = Control { cancel: Some(interrupt::flag()), report: Some(&report) };
     let file = CheckpointFile::new(args.resume.as_deref(), args.identity(&rules));
     let outcome = match args.method {
@@ -153,7 +163,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         Method::Search => args.search(&name, rules, &file, control),
         Method::Best | Method::Algebraic => args.best(&name, rules, control),
     };
-    bar.finish_and_clear();
+    shown.end();
     let Outcome { family, interrupted, mut exit } = outcome?;
 
     let mut path = path;
@@ -179,12 +189,14 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         None => file.finish()?,
     }
     if let Some(family) = family {
+        let certificate = certify_codes(&family);
+        ensure!(certificate.holds(), "{}: {}", path.display(), certificate.failures.join("; "));
         say!(
-            "{}: {} codes of {} bits, distance {}, fingerprint {}",
+            "{}: {} of {} bits; {}; fingerprint {}",
             path.display(),
-            family.len(),
+            counted(family.len(), "code"),
             dimension.bits(),
-            family.distance(),
+            proof_of(&certificate, distance),
             family.fingerprint()
         );
     }
@@ -261,6 +273,8 @@ impl Args {
             )
         };
         refuse("--time", self.time.is_some(), &[Algebraic, Best, Search])?;
+        refuse("--work", self.work.is_some(), &[Algebraic, Best])?;
+        refuse("--from-nothing", self.from_nothing, &[Algebraic, Best])?;
         refuse("--limit", self.limit.is_some(), &[Algebraic, Best])?;
         refuse("--rounds", self.rounds.is_some(), &[Search])?;
         ensure!(
@@ -374,13 +388,23 @@ impl Args {
             dimension,
             distance,
             rules,
-            time: Duration::from_secs_f64(self.time.unwrap_or(60.0)),
+            budget: match self.work {
+                Some(steps) => Budget::Work(steps),
+                None => Budget::Time(Duration::from_secs_f64(self.time.unwrap_or(60.0))),
+            },
+            from_nothing: self.from_nothing,
             seed: self.seed(),
             limit,
             exchange: self.method == Method::Best,
         };
         let stopped = || interrupt::flag().load(Ordering::Relaxed);
-        match best.family(name, control) {
+        let start = best.start();
+        if let Some(start) = &start {
+            let codes = best.family_of(name, start)?;
+            let proof = proof_of(&certify_codes(&codes), distance);
+            eprintln!("starts from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
+        }
+        match best.family(name, start, control) {
             Ok(family) if stopped() => Ok(Outcome {
                 family: Some(family),
                 interrupted: Some("kept the best family so far".to_owned()),

@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 use crate::cli::output::say;
 use crate::cli::run::{BAD_INPUT, FAILED, report};
-use crate::family::{Family, FamilyError, certify};
+use crate::family::{Certificate, Family, FamilyError, certify};
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Checked are the codes (distance, rules, fingerprint, statistics) and the \
@@ -36,18 +36,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         };
         let certificate = certify(&family);
         if certificate.holds() {
-            let (found, claimed) = (certificate.min_distance, family.distance());
-            let how = if certificate.all_compared && found > claimed {
-                format!("the file claims distance {claimed}, the true distance is {found}")
-            } else if certificate.all_compared {
-                format!("any two, in any turn, differ in at least {found} cells")
-            } else {
-                format!(
-                    "all are in a linear code of distance {} that turning leaves as it is, checked \
-                     word by word; a sample of pairs, too, differs in at least {found} cells",
-                    claimed,
-                )
-            };
+            let how = proof_of(&certificate, family.distance());
             let unchecked = match certificate.unchecked.as_str() {
                 "" => String::new(),
                 what => format!("; not checked: {what}"),
@@ -69,6 +58,22 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         (true, false) => ExitCode::from(FAILED),
         (true, true) => ExitCode::SUCCESS,
     })
+}
+
+/// How far apart the codes of a family that claims a distance are, and how that is known.
+pub(super) fn proof_of(certificate: &Certificate, claimed: u32) -> String {
+    let found = certificate.min_distance;
+    if !certificate.all_compared {
+        return format!(
+            "all are in a linear code of distance {claimed} that turning leaves as it is, checked word \
+             by word; a sample of pairs, too, differs in at least {found} cells"
+        );
+    }
+    let known = format!("any two, in any turn, differ in at least {found} cells");
+    match found > claimed {
+        true => format!("{known}, more than the {claimed} asked for"),
+        false => known,
+    }
 }
 
 /// What is wrong in a file that is named already.
