@@ -38,6 +38,7 @@ pub mod export;
 pub mod family;
 mod json;
 pub mod lattice;
+mod name;
 pub mod raster;
 pub mod report;
 pub mod synth;

@@ -84,7 +84,7 @@ pub enum CuttingError {
 /// Panels are whole faces; with a skeleton in the spec they are what its seats take.
 pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     let TargetSpec::Solid(spec) = &target.spec else {
-        return Err(CuttingError::NotSolid(target.name.clone()));
+        return Err(CuttingError::NotSolid(target.name.to_string()));
     };
     let panels = spec.panel_faces()?;
     let solid = spec.polyhedron();
@@ -112,7 +112,7 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
 /// printed on: the outline of each piece with its tabs, the lines to fold, and the numbers of faces
 /// and edges to engrave. Pieces lie side by side.
 pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
-    let no_net = || CuttingError::NotNet(target.name.clone());
+    let no_net = || CuttingError::NotNet(target.name.to_string());
     let mut drawing = CutDrawing::default();
     let mut right_mm = 0.0;
     for sheet in &target.sheets {

@@ -163,7 +163,7 @@ pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, Artwork
             sheets.push(board::page(&sheet, layout, page)?);
         }
     }
-    Ok(Artwork { title: target.name.clone(), subject: subject(target), sheets })
+    Ok(Artwork { title: target.name.to_string(), subject: subject(target), sheets })
 }
 
 /// The tiles of one panel in its own frame.

@@ -56,13 +56,24 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Prints a line as [`print`] does, and returns from the function where that fails.
+/// Prints a line, [`shown`], and returns from the function where that fails.
 macro_rules! say {
     ($($argument:tt)*) => {
-        $crate::cli::output::print(&format!("{}\n", format_args!($($argument)*)))?
+        $crate::cli::output::print(&format!(
+            "{}\n",
+            $crate::words::shown(&format!($($argument)*))
+        ))?
     };
 }
 pub(crate) use say;
+
+/// Prints a line on standard error, [`shown`].
+macro_rules! tell {
+    ($($argument:tt)*) => {
+        eprintln!("{}", $crate::words::shown(&format!($($argument)*)))
+    };
+}
+pub(crate) use tell;
 
 /// Refuses to write a JSON of some schema, or anything else, over a JSON of another kind: it only
 /// has the same name, and may be all that its owner has of a target or a calibration.

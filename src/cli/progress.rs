@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::cli::output::tell;
 use crate::family::Progress;
 use crate::words::counted;
 
@@ -50,7 +51,7 @@ impl SearchProgress {
         let mut last = last.lock().expect("no thread panics here");
         if last.elapsed() >= Self::EVERY {
             *last = Instant::now();
-            eprintln!("{} %, {codes}", 100 * done / total.max(1));
+            tell!("{} %, {codes}", 100 * done / total.max(1));
         }
     }
 

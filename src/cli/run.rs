@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use crate::cli::output::tell;
 use clap::Parser;
 
 /// Exit code for bad input of every kind.
@@ -29,7 +30,7 @@ pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> Ex
     };
     result.unwrap_or_else(|error| {
         if let Some(interrupted) = error.downcast_ref::<Interrupted>() {
-            eprintln!("{interrupted}");
+            tell!("{interrupted}");
             return ExitCode::from(INTERRUPTED);
         }
         report(&error);
@@ -39,7 +40,7 @@ pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> Ex
 
 /// Prints an error and its causes on one line.
 pub fn report(error: &anyhow::Error) {
-    eprintln!("error: {}", message(error));
+    tell!("error: {}", message(error));
 }
 
 /// An error and its causes on one line; a cause that the message above it tells already is left

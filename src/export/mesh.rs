@@ -91,7 +91,7 @@ impl TexturedMesh {
         dpi: Option<f64>,
     ) -> Result<Self, MeshError> {
         let TargetSpec::Solid(spec) = &target.spec else {
-            return Err(MeshError::NotSolid(target.name.clone()));
+            return Err(MeshError::NotSolid(target.name.to_string()));
         };
         let faces = spec.faces()?;
         let rows = family.map_or(0, |family| family.dimension().rows());
@@ -129,7 +129,7 @@ impl TexturedMesh {
             }
         };
         Ok(Self {
-            name: target.name.clone(),
+            name: target.name.to_string(),
             faces: (0..faces.len()).map(mesh_face).collect(),
             texture_png: png::to_bytes(&atlas.sheet, &target.name, f64::from(px_per_m) * 0.0254)?,
             texture_px: atlas.size_px,

@@ -1,13 +1,10 @@
 use super::layout::{arrange, label};
 use super::paper::{PaperSpec, SolidSheets};
 use super::{
-    BoardSpec, FamilyRef, Panel, SheetLayout, Target, TargetError, TargetSpec, board, face_sheet,
-    net, solid, tag_sheet,
+    BoardSpec, FamilyRef, Name, Panel, SheetLayout, Target, TargetError, TargetSpec, board,
+    face_sheet, net, solid, tag_sheet,
 };
 use crate::family::Family;
-
-/// Longest name, characters: it is part of the label and of file names.
-const LONGEST_NAME: usize = 64;
 
 impl Target {
     /// Makes what `spec` asks for, laid out on `layout`; without a layout there are no sheets.
@@ -19,15 +16,15 @@ impl Target {
         family: Option<&Family>,
         layout: Option<&PaperSpec>,
     ) -> Result<Target, TargetError> {
-        check_name(name)?;
+        let name = Name::new(name).map_err(|problem| TargetError::invalid("--name", problem))?;
         let (panels, family, sheets) = match spec {
-            TargetSpec::Board(board) => board_parts(name, board, family, layout)?,
+            TargetSpec::Board(board) => board_parts(&name, board, family, layout)?,
             TargetSpec::Solid(spec) => {
                 let (panels, family) = solid::panels(spec, family)?;
                 let sheets = layout.map(|paper| match paper.solids {
-                    SolidSheets::Net => net::sheets(name, spec, &panels, family.as_ref(), paper),
+                    SolidSheets::Net => net::sheets(&name, spec, &panels, family.as_ref(), paper),
                     SolidSheets::PerFace => {
-                        face_sheet::sheets(name, spec, &panels, family.as_ref(), paper)
+                        face_sheet::sheets(&name, spec, &panels, family.as_ref(), paper)
                     }
                 });
                 (panels, family, sheets.transpose()?.unwrap_or_default())
@@ -37,7 +34,7 @@ impl Target {
                     let (wanted, given) = (spec.family.clone(), "none is given".to_owned());
                     return Err(TargetError::Family { wanted, given });
                 };
-                let (panels, family, sheets) = tag_sheet::parts(name, spec, family, layout)?;
+                let (panels, family, sheets) = tag_sheet::parts(&name, spec, family, layout)?;
                 (panels, Some(family), sheets)
             }
             TargetSpec::Listed(_) => {
@@ -45,8 +42,7 @@ impl Target {
                 return Err(TargetError::invalid("kind", problem));
             }
         };
-        let (name, spec) = (name.to_owned(), spec.clone());
-        Ok(Target { name, spec, family, panels, sheets })
+        Ok(Target { name, spec: spec.clone(), family, panels, sheets })
     }
 
     /// Checks that this target can be used together with another one: no tag of the same family
@@ -59,7 +55,7 @@ impl Target {
             if !own.iter().any(|id| others.contains(id)) {
                 return Ok(());
             }
-            let (other, free) = (other.name.clone(), u64::from(high) + 1);
+            let (other, free) = (other.name.to_string(), u64::from(high) + 1);
             Err(TargetError::Overlap { option, what, first, last, other, free })
         };
         let tags = |target: &Target| -> Vec<u32> {
@@ -108,19 +104,4 @@ pub fn largest_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> Option<f64> {
         Err(TargetError::DoesNotFit { fitting_edge_mm, .. }) => fitting_edge_mm.map(f64::from),
         Err(_) => None,
     }
-}
-
-/// A name is part of the label, which is set in a font of few characters, and the stem of files.
-fn check_name(name: &str) -> Result<(), TargetError> {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    let problem = if name.is_empty() || name.len() > LONGEST_NAME {
-        format!("`{name}` must have 1 to {LONGEST_NAME} characters")
-    } else if !name.chars().all(plain) || name.starts_with('.') {
-        format!(
-            "`{name}` may hold only ASCII letters (A-Z, a-z), digits, -, _ and ., and not start with ."
-        )
-    } else {
-        return Ok(());
-    };
-    Err(TargetError::invalid("--name", problem))
 }

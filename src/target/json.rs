@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Corner, FamilyRef, GridKind, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board,
+    Corner, FamilyRef, GridKind, Name, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board,
     solid, tag_sheet,
 };
 use crate::lattice::Vertex;
@@ -62,7 +62,7 @@ pub enum TargetFileError {
 #[serde(deny_unknown_fields)]
 struct TargetFile {
     schema: String,
-    name: String,
+    name: Name,
     spec: TargetSpec,
     family: Option<FamilyRef>,
     panels: Vec<Panel>,
@@ -126,6 +126,9 @@ pub(crate) fn check(target: &Target) -> Result<(), Problem> {
     if target.panels.is_empty() {
         return problem("panels", "there is none");
     }
+    // A family is looked for by its name, which must not lead to a file.
+    let family = target.family.as_ref().map_or(Ok(()), |f| Name::new(&f.name).map(|_| ()));
+    family.or_else(|wrong| problem("family.name", wrong))?;
     let (mut panels, mut corners, mut tags) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
     for (p, panel) in target.panels.iter().enumerate() {
         let field = format!("panels[{p}]");

@@ -29,6 +29,7 @@ mod tag_sheet;
 use serde::{Deserialize, Serialize};
 
 pub use crate::lattice::GridKind;
+pub use crate::name::Name;
 pub use board::zigzag_vertices;
 pub use build::largest_edge_mm;
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
@@ -51,7 +52,7 @@ pub use spec::{
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// Name; the stem of the files made from it.
-    pub name: String,
+    pub name: Name,
     /// What was asked for.
     pub spec: TargetSpec,
     /// The family of its tags; `None` on an untagged target.

@@ -186,7 +186,7 @@ impl<'a> Verifier<'a> {
             return Err(VerifyError::OtherKind { path: path.to_owned() });
         }
         if self.target.sheets.is_empty() {
-            let (path, target) = (path.to_owned(), self.target.name.clone());
+            let (path, target) = (path.to_owned(), self.target.name.to_string());
             return Err(VerifyError::NoSheets { path, target });
         }
         let mut findings = Vec::new();

@@ -11,7 +11,7 @@ use crate::calibrate::settle::{residuals, variance};
 use crate::calibrate::solution::{Parameter, rms_px};
 use crate::calibrate::weights::Whitening;
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
-use crate::target::{PanelPose, Target};
+use crate::target::{Name, PanelPose, Target};
 
 /// Cameras fixed to each other, as their views have them.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +81,7 @@ impl RigSolution {
         let poses = self.panels.iter();
         let poses =
             poses.map(|panel| PanelPose::from_pose(&panel.target_from_panel, panel.covariance));
-        let name = format!("{}-refined", target.name.trim_end_matches("-refined"));
+        let name = Name::like(&format!("{}-refined", target.name.trim_end_matches("-refined")));
         Target { name, ..target.with_poses(&poses.collect::<Vec<_>>()) }
     }
 

@@ -13,9 +13,10 @@ use super::parameters::Parameters;
 use super::rules::RuleArgs;
 use super::values::{name, number, whole};
 use super::verify_family::proof_of;
+use crate::cli::interrupt;
+use crate::cli::output::{self, say, tell};
 use crate::cli::progress::SearchProgress;
 use crate::cli::run::{FAILED, INTERRUPTED};
-use crate::cli::{interrupt, output, output::say};
 use crate::family::best::{Best, Budget};
 use crate::family::lexicode::{self, Lexicode};
 use crate::family::search::{self, Search};
@@ -171,7 +172,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         // What took hours is not lost, and neither is what was there.
         if let Some(there) = there(&path).filter(|f| !args.force && f.len() > family.len()) {
             let beside = free_name(&path);
-            eprintln!(
+            tell!(
                 "error: {} keeps its {} codes, more than these {}, which go to {}; --force replaces \
                  it, -o names another place",
                 path.display(),
@@ -185,7 +186,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::write(&path, family.to_json().as_bytes())?;
     }
     match interrupted {
-        Some(message) => eprintln!("interrupted: {message}"),
+        Some(message) => tell!("interrupted: {message}"),
         None => file.finish()?,
     }
     if let Some(family) = family {
@@ -402,7 +403,7 @@ impl Args {
         if let Some(start) = &start {
             let codes = best.family_of(name, start)?;
             let proof = proof_of(&certify_codes(&codes), distance);
-            eprintln!("starts from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
+            tell!("starts from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
         }
         match best.family(name, start, control) {
             Ok(family) if stopped() => Ok(Outcome {

@@ -21,6 +21,7 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::{Parser, Subcommand};
 
+use crate::cli::output::tell;
 use crate::family::{Family, PAIRS_COUNTED, certify_codes, shipped_names};
 use crate::lattice::GridKind;
 
@@ -95,7 +96,7 @@ fn resolve(name_or_path: &str) -> anyhow::Result<Family> {
         && let Some(failure) = certify_codes(&family).failures.first()
     {
         let file = Path::new(name_or_path).display();
-        eprintln!("warning: {file} is not what it claims: {failure}");
+        tell!("warning: {file} is not what it claims: {failure}");
     }
     Ok(family)
 }

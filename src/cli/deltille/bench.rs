@@ -9,7 +9,7 @@ use clap::Subcommand;
 use super::finder::FinderArgs;
 use super::images::Images;
 use crate::cli::interrupt;
-use crate::cli::output::say;
+use crate::cli::output::{say, tell};
 use crate::cli::run::INTERRUPTED;
 use crate::raster;
 
@@ -53,7 +53,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let mut best: Option<BTreeMap<String, f64>> = None;
         for _ in 0..args.repeat {
             if interrupt::flag().load(std::sync::atomic::Ordering::Relaxed) {
-                eprintln!("interrupted");
+                tell!("interrupted");
                 return Ok(ExitCode::from(INTERRUPTED));
             }
             let found = detector.detect_any(&image, "");

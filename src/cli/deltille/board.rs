@@ -9,7 +9,7 @@ use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
 use super::settings::{Plan, Settings};
 use crate::artwork::{self, Artwork};
-use crate::cli::output;
+use crate::cli::output::{self, tell};
 use crate::export::dsc;
 use crate::family::{Family, FamilyError, square_names};
 use crate::target::{GridKind, Target, TargetSpec, id_range};
@@ -54,7 +54,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         && tags.spacing > 1
         && !tags.spacing.is_multiple_of(2)
     {
-        eprintln!(
+        tell!(
             "warning: --tag-spacing {}: with an odd number only every second of these squares has the \
              colour of the tags, with an even one all have it",
             tags.spacing
@@ -88,7 +88,7 @@ fn files(plan: &Plan, target: &Target, artwork: Artwork) -> anyhow::Result<Vec<F
 /// One line on what was made.
 fn summary(target: &Target) -> String {
     let panels = &target.panels;
-    let TargetSpec::Board(spec) = &target.spec else { return target.name.clone() };
+    let TargetSpec::Board(spec) = &target.spec else { return target.name.to_string() };
     let (edge, sheet) = (spec.edge_mm, &target.sheets[0]);
     let boards = if panels.len() == 1 { String::new() } else { format!("{} × ", panels.len()) };
     let mut text =

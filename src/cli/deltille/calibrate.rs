@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail, ensure};
@@ -13,7 +13,7 @@ use super::files::{File, text_file, write_all};
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{self, BoardShape, Loss, Model, Options, Remedy, Solution, View, Weights};
 use crate::camera::Pose;
-use crate::cli::output;
+use crate::cli::output::{self, tell};
 use crate::cli::run::{FAILED, report};
 use crate::export::calibration::{self, Print};
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
@@ -136,7 +136,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Sightings { views, panels, empty, left_out, print } = args.sightings.read()?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     for picture in &empty {
-        eprintln!("{}: no board, left out", picture.display());
+        tell!("{}: no board, left out", picture.display());
     }
     if let Some(folder) = &args.images {
         ensure!(folder.is_dir(), "--images: {} is no folder", folder.display());
@@ -154,7 +154,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut solution = args.solve(&views, &panels)?;
     let of_test = solution.held_out.iter().flat_map(|test| &test.excluded);
     for out in solution.calibrated.excluded.iter().chain(of_test) {
-        eprintln!("{}: left out: {}", out.view, out.reason);
+        tell!("{}: left out: {}", out.view, out.reason);
     }
     solution.calibrated.excluded.splice(0..0, left_out);
     if let (Some(camera), Some(cause)) =
@@ -164,15 +164,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::from(FAILED));
     }
     if let Some(end) = solution.calibrated.lens_end() {
-        eprintln!("warning: {end}");
+        tell!("warning: {end}");
     }
     let given = Given { model: args.model, print_scale: print.scale, remedy: solution.remedy };
     for cause in causes(&solution.calibrated, given) {
-        eprintln!("warning: {cause}");
+        tell!("warning: {cause}");
     }
     if !solution.calibrated.loose.is_empty() {
         let text = cannot_tell_apart(&solution.calibrated.loose, solution.sufficient);
-        eprintln!("warning: {text}");
+        tell!("warning: {text}");
     }
     let texts = args.format.iter().map(|&format| format.texts(&stem, &solution, print));
     let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
@@ -213,12 +213,19 @@ fn wrong_camera(solution: &Solution) -> Option<String> {
     })
 }
 
+/// The picture of a view in a folder, or in one within it. What a file calls the picture leads nowhere else.
+fn picture_of(image: &str, folder: &Path) -> Option<PathBuf> {
+    let name = Path::new(image);
+    let is_within = name.components().all(|part| matches!(part, Component::Normal(_)));
+    Some(folder.join(name)).filter(|path| is_within && path.is_file())
+}
+
 /// Tells which pictures of the views are not in a folder.
 fn warn_of_missing(folder: &Path, views: &[View]) {
-    let missing = views.iter().filter(|view| !folder.join(&view.image).is_file());
+    let missing = views.iter().filter(|view| picture_of(&view.image, folder).is_none());
     let missing: Vec<&str> = missing.map(|view| view.image.as_str()).collect();
     if let Some(first) = missing.first() {
-        eprintln!(
+        tell!(
             "warning: --images: {} of {} are not in {}, such as {first}",
             missing.len(),
             counted(views.len(), "picture"),
@@ -243,11 +250,11 @@ impl Args {
     fn page(&self, stem: &str, solved: &Solved, print: Print) -> String {
         let mut thumbnails = BTreeMap::new();
         for view in &solved.calibrated.views {
-            let Some(path) = self.images.as_ref().map(|folder| folder.join(&view.image)) else {
-                break;
-            };
+            let Some(folder) = &self.images else { break };
             // A picture that is not there leaves its place to the corners.
-            let picture = raster::io::read(&path).ok().and_then(|image| match image {
+            let picture =
+                picture_of(&view.image, folder).and_then(|path| raster::io::read(&path).ok());
+            let picture = picture.and_then(|image| match image {
                 AnyGray::U8(image) => thumbnail(&image),
                 AnyGray::U16(image) => thumbnail(&image.map(|v| (v >> 8) as u8)),
             });

@@ -13,13 +13,14 @@ use rayon::prelude::*;
 
 use super::finder::FinderArgs;
 use super::images::{Images, Stems};
+use crate::cli::output::{self, tell};
 use crate::cli::run::{self, BAD_INPUT, FAILED, INTERRUPTED};
-use crate::cli::{interrupt, output, progress};
+use crate::cli::{interrupt, progress};
 use crate::detect::{Detection, Detector, InkEstimate};
 use crate::export::{atomic, csv, detection, orpc, overlay};
 use crate::raster;
 use crate::target::Target;
-use crate::words::counted;
+use crate::words::{counted, shown};
 
 /// Arguments of `deltille detect`.
 #[derive(clap::Args)]
@@ -140,11 +141,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             });
             bar.finish_and_clear();
         }
-        eprintln!("ink: {ink} ({})", counted(ink.pictures as usize, "picture"));
+        tell!("ink: {ink} ({})", counted(ink.pictures as usize, "picture"));
     }
     if interrupted.load(Ordering::Relaxed) {
         let on = if args.stream { "" } else { "; --skip-existing goes on from here" };
-        eprintln!("interrupted: {} images are done{on}", report.done());
+        tell!("interrupted: {} images are done{on}", report.done());
         return Ok(ExitCode::from(INTERRUPTED));
     }
     report.end()
@@ -212,13 +213,13 @@ impl Report {
             return Err(error);
         }
         if skipped > 0 {
-            eprintln!("{skipped} of {all} images skipped: their results are there");
+            tell!("{skipped} of {all} images skipped: their results are there");
         }
         if failed == 0 {
             let nothing = found == 0 && skipped == 0;
             return Ok(if nothing { ExitCode::from(FAILED) } else { ExitCode::SUCCESS });
         }
-        eprintln!("error: {failed} of {all} images failed");
+        tell!("error: {failed} of {all} images failed");
         Ok(ExitCode::from(if failed == all { BAD_INPUT } else { FAILED }))
     }
 }
@@ -318,5 +319,5 @@ fn summary(path: &Path, found: &Detection) -> String {
     for reason in &found.reasons {
         line += &format!("  {reason}\n");
     }
-    line
+    shown(&line).into_owned()
 }

@@ -9,7 +9,7 @@ use super::images::Images;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{self, Loss, Reference, Weights, views};
-use crate::cli::output::{self, say};
+use crate::cli::output::{self, say, tell};
 use crate::cli::run::FAILED;
 use crate::detect::{Detector, DetectorConfig};
 use crate::export::pose;
@@ -64,13 +64,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         if solution.views.is_empty() {
             without += 1;
             let why = solution.excluded.first().map_or("no target in it", |out| &out.reason);
-            eprintln!("{}: {why}", image.display());
+            tell!("{}: {why}", image.display());
         }
         for view in &solution.views {
             let line = pose::write_line(view, &target.name);
             match path {
                 Some(_) => lines += &(line + "\n"),
-                None => say!("{line}"),
+                None => output::print(&(line + "\n"))?,
             }
         }
     }

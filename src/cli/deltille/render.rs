@@ -10,7 +10,7 @@ use image::{DynamicImage, ImageBuffer, Luma};
 use super::files::{bytes_file, text_file, write_all};
 use super::{camera_file, target_file};
 use crate::camera::{Camera, Pose};
-use crate::cli::output::{self, say};
+use crate::cli::output::{self, say, tell};
 use crate::export::truth;
 use crate::synth::{Light, scene_of_target};
 use crate::target::TargetSpec;
@@ -108,7 +108,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     write_all(output::folder_of(&path), &files)?;
     say!("{}: {} corners in view", path.display(), seen.len());
     if seen.is_empty() {
-        eprintln!(
+        tell!(
             "warning: the camera looks past the target, or at its back: with --eye it looks at the \
              middle of the target, whose front is on the side of z > 0 where it is a board"
         );

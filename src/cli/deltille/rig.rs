@@ -15,10 +15,11 @@ use crate::calibrate::{
     wrong_cameras,
 };
 use crate::camera::{Camera, Pose};
-use crate::cli::output::{check_folder, fixed, say};
+use crate::cli::output::{check_folder, fixed, say, tell};
 use crate::export::camera::{colmap, colmap_rig, kalibr};
 use crate::export::rig;
 use crate::report::{cannot_tell_apart, causes_of_rig};
+use crate::target::Name;
 use crate::words::counted;
 
 /// Arguments of `deltille rig`.
@@ -66,8 +67,8 @@ enum Format {
 
 fn named(text: &str) -> Result<(String, PathBuf), String> {
     match text.split_once('=') {
-        Some((name, path)) if !name.is_empty() && !path.is_empty() => {
-            Ok((name.to_owned(), path.into()))
+        Some((name, path)) if !path.is_empty() => {
+            Name::new(name).map(|name| (name.to_string(), path.into()))
         }
         _ => Err("give a name and a path, such as left=corners/left".to_owned()),
     }
@@ -134,15 +135,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         })?;
     for camera in &solution.cameras {
         if let Some(end) = &camera.lens_end {
-            eprintln!("warning: camera {}: {end}", camera.name);
+            tell!("warning: camera {}: {end}", camera.name);
         }
     }
     let is_given = |name: &str| args.known.iter().any(|(known, _)| known == name);
     for cause in causes_of_rig(&solution, args.model, is_given, &wrong, args.refine_target) {
-        eprintln!("warning: {cause}");
+        tell!("warning: {cause}");
     }
     if !solution.loose.is_empty() {
-        eprintln!("warning: {}", cannot_tell_apart(&solution.loose, None));
+        tell!("warning: {}", cannot_tell_apart(&solution.loose, None));
     }
     let text = summary(&solution);
     solution.excluded.splice(0..0, left_out);

@@ -8,6 +8,7 @@ use clap::ValueEnum;
 use super::target_file;
 use crate::calibrate::{Excluded, Reference, Shown, UntaggedGrid, View, views};
 use crate::camera::Pose;
+use crate::cli::output::tell;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::{self, Print, Sheet};
 use crate::export::detection;
@@ -229,7 +230,7 @@ pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<Read> {
         let found: Detection = detection::read(&text).with_context(show)?;
         if let Some(first) = detections.iter().position(|(_, other)| is_same(&found, other)) {
             let first: &PathBuf = &files[first];
-            eprintln!(
+            tell!(
                 "warning: {}: the same picture and corners as in {}, counted once",
                 show(),
                 first.display()
@@ -247,14 +248,14 @@ pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<Read> {
             "{}: no detection among the .json files: make some with `deltille detect`",
             first.parent().unwrap_or(first).display()
         );
-        eprintln!(
+        tell!(
             "left out: {count} in the folder that hold no detection, such as {}",
             first.display()
         );
     }
     let Shown { views, empty, left_out } = views(&detections, reference)?;
     for (index, out) in &left_out {
-        eprintln!("warning: left out: {}: {}", files[*index].display(), out.reason);
+        tell!("warning: left out: {}: {}", files[*index].display(), out.reason);
     }
     let empty = empty.into_iter().map(|index| files[index].clone()).collect();
     let left_out = left_out.into_iter().map(|(_, out)| out).collect();
@@ -272,7 +273,7 @@ fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<I
     let ink = InkEstimate::of_all(&found)?;
     let without = found.iter().filter(|ink| !ink.used).count();
     if ink.used && without > 0 {
-        eprintln!(
+        tell!(
             "warning: {ink}, but {} of {} do not allow for it: detect all in one run",
             counted(without, "picture"),
             found.len()

@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use serde::Serialize;
 
 use super::target_file;
-use crate::cli::output::{self, say};
+use crate::cli::output::{self, say, tell};
 use crate::cli::run::FAILED;
 use crate::export::{atomic, sheet_file_name, stl};
 use crate::family::Family;
@@ -105,7 +105,7 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
     let meshes = meshes.into_iter().chain([stl::skeleton_name(name)]).filter_map(present);
     if target.sheets.is_empty() {
         for path in printed {
-            eprintln!(
+            tell!(
                 "{}: not compared, {name} as described was not laid out on paper: print it anew, \
                  or remove the file",
                 path.display()

@@ -4,8 +4,8 @@ use super::{Dialect, DscError, FAMILIES};
 use crate::family::Family;
 use crate::lattice::Vertex;
 use crate::target::{
-    Corner, FamilyRef, GridKind, ListFormat, ListedSpec, Outline, Panel, PanelPose, TagPlacement,
-    TagsIn, Target, TargetSpec,
+    Corner, FamilyRef, GridKind, ListFormat, ListedSpec, Name, Outline, Panel, PanelPose,
+    TagPlacement, TagsIn, Target, TargetSpec,
 };
 
 /// Most boards in a file, and most columns or rows of one: beyond this a number is a typing error.
@@ -51,7 +51,7 @@ pub fn read(text: &str, name: &str) -> Result<Target, DscError> {
     let mut next_id = 0;
     let panels = blocks.iter().map(|block| block.panel(&mut next_id));
     let target = Target {
-        name: name.to_owned(),
+        name: Name::like(name),
         spec: TargetSpec::Listed(ListedSpec { format }),
         panels: panels.collect::<Result<_, _>>()?,
         family: Some(family_ref(&family, &blocks)?),

@@ -8,7 +8,7 @@ use crate::target::{GridKind, Panel, TagsIn, Target};
 pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
     let refused = |reason: &str| DscError::Refused {
         dialect,
-        name: target.name.clone(),
+        name: target.name.to_string(),
         reason: reason.to_owned(),
     };
     let name = target.family.as_ref().map(|family| family.name.as_str());

@@ -1,0 +1,95 @@
+//! Names of targets and cameras.
+
+use std::fmt;
+use std::ops::Deref;
+
+use serde::{Deserialize, Serialize};
+
+/// Longest name, characters: it is part of the label and of file names.
+const LONGEST: usize = 64;
+
+/// The name of a target or a camera, which is the stem of its files and part of labels: ASCII letters, digits, `-`, `_` and
+/// `.`, not at the beginning. So it never names another folder, and the label's font has all of it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Name(String);
+
+impl Name {
+    /// This name; what is wrong with it where it is none.
+    pub fn new(name: &str) -> Result<Self, String> {
+        if name.is_empty() || name.len() > LONGEST {
+            return Err(format!("{name:?} must have 1 to {LONGEST} characters"));
+        }
+        if !name.chars().all(is_plain) || name.starts_with('.') {
+            return Err(format!(
+                "{name:?} may hold only ASCII letters (A-Z, a-z), digits, -, _ and ., and not start with ."
+            ));
+        }
+        Ok(Self(name.to_owned()))
+    }
+
+    /// The name most like a text: with `-` for what a name cannot hold.
+    pub fn like(text: &str) -> Self {
+        let plain = text.trim_start_matches('.').chars().take(LONGEST);
+        let name: String = plain.map(|c| if is_plain(c) { c } else { '-' }).collect();
+        Self(if name.is_empty() { "target".to_owned() } else { name })
+    }
+}
+
+fn is_plain(c: char) -> bool {
+    c.is_ascii_alphanumeric() || "-_.".contains(c)
+}
+
+impl Deref for Name {
+    type Target = str;
+
+    fn deref(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl TryFrom<String> for Name {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        Self::new(&name)
+    }
+}
+
+impl From<Name> for String {
+    fn from(name: Name) -> Self {
+        name.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_stems_of_files() {
+        for name in ["board", "2026-11-22_desk.v2", "A"] {
+            assert_eq!(&*Name::new(name).unwrap(), name);
+            assert_eq!(&*Name::like(name), name);
+        }
+        let long = "x".repeat(LONGEST + 1);
+        for (text, like) in [
+            ("", "target"),
+            ("../../x", "-..-x"),
+            ("/etc/passwd", "-etc-passwd"),
+            ("a\u{1b}[31mb", "a--31mb"),
+            (".hidden", "hidden"),
+            (long.as_str(), &long[1..]),
+        ] {
+            assert!(Name::new(text).is_err(), "{text:?}");
+            assert_eq!(&*Name::like(text), like, "{text:?}");
+            assert!(Name::new(&Name::like(text)).is_ok());
+        }
+    }
+}
