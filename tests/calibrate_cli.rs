@@ -593,3 +593,47 @@ fn motion(value: &Value) -> Pose {
     let translation = DVec3::from_slice(&numbers("translation_mm"));
     Pose { rotation: DQuat::from_mat3(&rotation), translation }
 }
+
+/// What a file calls a target, a camera or a picture leads to no other folder, and does nothing to a terminal.
+#[test]
+fn names_in_files_lead_nowhere() {
+    let target = board(8, 9);
+    let found = detections(&target, 6, 0.7);
+    let folder = folder(&target, &found);
+    let path = |name: &str| folder.path().join(name);
+    for (i, image) in ["../secret.png", "a\u{1b}[31m.png"].into_iter().enumerate() {
+        let detection = Detection { image: image.to_owned(), ..found[i].clone() };
+        std::fs::write(path(&format!("corners/{i:02}.json")), detection::write(&detection))
+            .unwrap();
+    }
+    std::fs::write(path("camera.yaml"), camera().to_yaml()).unwrap();
+    let text = std::fs::read_to_string(path("board.json")).unwrap();
+    for name in ["../../x", "/tmp/x", "..", "a\u{1b}[31mb", ""] {
+        let named = format!("\"name\": {}", serde_json::to_string(name).unwrap());
+        std::fs::write(path("bad.json"), text.replacen("\"name\": \"board\"", &named, 1)).unwrap();
+        for args in [
+            "render bad.json --camera camera.yaml -o out",
+            "detect --target bad.json photo.png -o out",
+            "verify bad.json",
+            "calibrate corners --target bad.json -o out/camera.yaml",
+        ] {
+            let said = refused(folder.path(), args);
+            assert!(said.contains("bad.json") && said.contains("`name`"), "{args}: {said}");
+            assert!(!said.contains('\u{1b}'), "{args}: {said}");
+        }
+    }
+    let rig = "rig --camera ../left=corners --camera right=corners --target board.json -o out";
+    assert!(refused(folder.path(), rig).contains("--camera"));
+    assert!(!path("out").exists());
+
+    // A picture beside the folder of pictures is not shown.
+    std::fs::create_dir(path("photos")).unwrap();
+    image::GrayImage::from_pixel(64, 48, image::Luma([99])).save(path("secret.png")).unwrap();
+    let args =
+        "calibrate corners --target board.json --images photos --report page.html -o camera2.yaml";
+    let result = deltille(folder.path(), args).success();
+    let said = String::from_utf8(result.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("6 of 6 pictures are not in photos"), "{said}");
+    assert!(!said.contains('\u{1b}'), "{said}");
+    assert!(!std::fs::read_to_string(path("page.html")).unwrap().contains("data:image"));
+}
