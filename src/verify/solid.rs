@@ -69,9 +69,9 @@ pub(super) fn verify(
         let panels = verifier.target.panels.par_iter();
         faces = panels.map(|panel| check_face(verifier, &model, panel)).collect();
     }
-    let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let passed = findings.is_empty() && faces.iter().all(|face| face.findings.is_empty());
-    Ok(Verdict { artifact, format, passed, findings, sheets: Vec::new(), faces, body: None })
+    let mut verdict = Verdict::new(path, format, findings);
+    verdict.passed &= faces.iter().all(|face| face.findings.is_empty());
+    Ok(Verdict { faces, ..verdict })
 }
 
 /// Largest distance from the origin on the mesh over that on the target's solid, and the latter,
