@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::edit::{append, find, swap};
+use super::edit::{append, swap};
 use super::png;
 use super::{Case, Damage, cases};
 
@@ -37,6 +37,14 @@ fn json(edit: impl Fn(&mut Value) + 'static) -> Damage {
         edit(&mut root);
         parts.json = root.to_string().into_bytes();
         parts.join()
+    })
+}
+
+/// Changes the text of the JSON.
+fn words(damage: Damage) -> Damage {
+    Box::new(move |bytes| {
+        let Parts { json, binary } = Parts::of(bytes);
+        Parts { json: damage(&json), binary }.join()
     })
 }
 
@@ -217,7 +225,7 @@ pub fn all() -> Vec<Case> {
             (
                 "two default scenes",
                 "duplicate field `scene`",
-                swap("\"scene\":0", "\"scene\":0,\"scene\":0"),
+                words(swap("\"scene\":0", "\"scene\":0,\"scene\":0")),
             ),
             (
                 "extensions in use",
@@ -309,16 +317,8 @@ pub fn all() -> Vec<Case> {
                 "cut off",
                 Box::new(|bytes| bytes[..bytes.len() / 2].to_vec()),
             ),
-            (
-                "JSON that is none",
-                "not glTF",
-                Box::new(|bytes| {
-                    let mut bytes = bytes.to_vec();
-                    let at = find(&bytes, b"{");
-                    bytes[at] = b'[';
-                    bytes
-                }),
-            ),
+            ("lists for objects", "a list for", words(swap("[{\"nodes\":[0]}]", "[[[0]]]"))),
+            ("JSON that is none", "not glTF", words(swap("{", "x"))),
             ("a position that is none", "POSITION other than", float(0, 0, f32::NAN)),
             ("a position that is moved", "min and max", float(0, 0, 1.0)),
             ("a normal that is turned", "wrong normals", float(1, 0, -1.0)),
@@ -335,7 +335,7 @@ pub fn all() -> Vec<Case> {
                 "chunk gAMA",
                 texture(png::with_chunk("gAMA", &[0, 0, 0, 1])),
             ),
-            ("a spot on the texture", "at row", texture(png::square(300, 300, 30, 255))),
+            ("a spot on the texture", "at row", texture(png::square([0.33, 0.83], 30))),
         ],
     )
 }

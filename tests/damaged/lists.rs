@@ -28,13 +28,17 @@ pub fn dsc() -> Vec<Case> {
         "b.dsc",
         vec![
             ("a corner that is moved", "off by 0.010000 mm", swap("-1,1,0,20,", "-1,1,0,20.01,")),
-            ("a corner that is missing", "is not listed", line("-1,4,3", |_| String::new())),
+            (
+                "a corner that is missing",
+                "the corner at row 3 col 1 is not listed",
+                swap("-1,1,3,50,51.96152422706632,0\n", ""),
+            ),
             (
                 "the last corner cut off",
                 "corner at row 3 col 4 is not listed",
                 text(|text| text.lines().take(21).map(|line| format!("{line}\n")).collect()),
             ),
-            ("a corner that is listed twice", "is listed twice", append("-1,0,0,0,0,0\n")),
+            ("a corner that is listed twice", "is listed twice", append("-1,1,0,20,0,0\n")),
             (
                 "a tag of another id",
                 "is listed as tag 2",
@@ -77,16 +81,16 @@ pub fn dsc() -> Vec<Case> {
             ("a family of squares", "another kind of grid", swap("delTag25h7", "aprilTag25h9")),
             ("a family that nobody knows", "is none of", swap("delTag25h7", "delTag99")),
             ("another border", "a border of 2 bits instead of 1.5", swap(",1.5\n", ",2\n")),
-            ("another board", "board 0 is not listed", swap("0,5,4,20\n", "1,5,4,20\n")),
+            ("another board", "board 0 is not listed", swap("0,6,4,20\n", "1,6,4,20\n")),
             (
                 "a board too many",
                 "board 9 is listed",
                 append("9,2,2,20\ndelTag25h7,1.5\n-1,0,0,0,0,0\n-1,1,0,20,0,0\n-1,0,1,10,17,0\n"),
             ),
-            ("more columns", "6 columns and 4 rows instead of 5 and 4", swap("0,5,4,", "0,6,4,")),
-            ("fewer columns", "is outside the board's", swap("0,5,4,", "0,4,4,")),
+            ("more columns", "7 columns and 4 rows instead of 6 and 4", swap("0,6,4,", "0,7,4,")),
+            ("fewer columns", "is outside the board's", swap("0,6,4,", "0,5,4,")),
             ("a blank line", "a blank", before("-1,1,0,", "\n")),
-            ("spaces", "line 3: a blank", swap("\n0,0,0,", "\n0, 0,0,")),
+            ("spaces", "line 8: a blank", swap("\n0,1,1,", "\n0, 1,1,")),
             ("ends of lines of another system", "a blank", swap("\n", "\r\n")),
             ("a comment", "a blank or a character", append("# words\n")),
             ("a coordinate that is none", "is not finite", swap("-1,1,0,20,", "-1,1,0,nan,")),
@@ -143,7 +147,7 @@ pub fn net() -> Vec<Case> {
             ("a fold to be cut", "the path on FOLD", swap("LINE\n  8\nFOLD", "LINE\n  8\nCUT")),
             (
                 "a fold the other way",
-                "the path on VALLEY",
+                "a path on VALLEY",
                 swap("LINE\n  8\nFOLD", "LINE\n  8\nVALLEY"),
             ),
             (

@@ -141,7 +141,7 @@ pub fn texture() -> Vec<Case> {
                 png::pixels(|p| image::DynamicImage::from(p).to_luma_alpha8().into()),
             ),
             ("a gamma", "t-texture.png, byte ", png::with_chunk("gAMA", &[0, 0, 0, 1])),
-            ("a spot", "at row", png::square(300, 300, 30, 255)),
+            ("a spot", "at row", png::square([0.33, 0.83], 30)),
             (
                 "a file that is cut off",
                 "cut off",

@@ -2,7 +2,7 @@
 
 use lopdf::{Dictionary, Document, Object, ObjectId, Stream, dictionary};
 
-use super::edit::{append, swap};
+use super::edit::{append, before, swap};
 use super::{Case, Damage, cases};
 
 /// Changes the objects of a document.
@@ -205,7 +205,7 @@ pub fn board() -> Vec<Case> {
             ("dashes", "operator [3]", operators("[3] 0 d")),
             ("a shading", "operator /S", operators("/S sh")),
             ("a rectangle", "operator re", operators("0 0 9 9 re f*")),
-            ("a nonzero filling", "operator f ", content(|text| text.replacen("f*", "f ", 1))),
+            ("a nonzero filling", "operator f:", content(|text| text.replacen("f*", "f ", 1))),
             ("white marks", "operator k with [0.0, 0.0, 0.0, 0.0]", operators("0 0 0 0 k")),
             ("coloured marks", "operator rg", operators("1 0 0 rg")),
             ("grey marks", "operator g", operators("0.5 g")),
@@ -222,6 +222,12 @@ pub fn board() -> Vec<Case> {
                 "a page that ends early",
                 "ends within a path",
                 content(|text| format!("{text} 0 0 m")),
+            ),
+            ("a key twice", "there twice", swap("/PageMode/UseNone", "/Pages 5 0 R     ")),
+            (
+                "an object after the table",
+                "key Page",
+                before("startxref", "6 0 obj\n<</Page 0>>\nendobj\n"),
             ),
             ("encryption", "key Encrypt", swap("trailer\n<<", "trailer\n<</Encrypt 1 0 R")),
             ("an earlier revision", "key Prev", swap("trailer\n<<", "trailer\n<</Prev 9")),

@@ -47,11 +47,13 @@ pub fn pixels(draw: impl Fn(GrayImage) -> DynamicImage + 'static) -> Damage {
     })
 }
 
-/// A square of one grey.
-pub fn square(x: u32, y: u32, side: u32, grey: u8) -> Damage {
+/// Exchanges black and white in a square; its corner in parts of the picture, its side in pixels.
+pub fn square([across, down]: [f64; 2], side: u32) -> Damage {
     pixels(move |mut picture| {
+        let [x, y] = [across * f64::from(picture.width()), down * f64::from(picture.height())];
         for (dx, dy) in (0..side).flat_map(|dx| (0..side).map(move |dy| (dx, dy))) {
-            picture.put_pixel(x + dx, y + dy, Luma([grey]));
+            let Luma([grey]) = picture.get_pixel_mut(x as u32 + dx, y as u32 + dy);
+            *grey = 255 - *grey;
         }
         picture.into()
     })
@@ -103,8 +105,8 @@ pub fn board() -> Vec<Case> {
             ("a larger page", "page of", resolution(11_000, 11_000, 1)),
             ("pixels that are not square", "no resolution", resolution(11_811, 11_000, 1)),
             ("a resolution without a unit", "no resolution", resolution(11_811, 11_811, 0)),
-            ("a spot", "spot of", square(60, 60, 12, 0)),
-            ("a hole in the board", "at row", square(1700, 1240, 40, 255)),
+            ("a spot", "spot of", square([0.02, 0.02], 12)),
+            ("a hole in the board", "at row", square([0.5, 0.5], 40)),
             (
                 "black and white exchanged",
                 "is inverted",

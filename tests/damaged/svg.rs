@@ -67,8 +67,13 @@ pub fn board() -> Vec<Case> {
                 over("<path xmlns=\"http://example.org\" d=\"M0 0Z\"/>"),
             ),
             (
+                "no paper",
+                "no paper below the marks",
+                swap("<rect fill=\"#fff\" height=\"100%\" width=\"100%\"/>", ""),
+            ),
+            (
                 "a white page over all",
-                "board 0 not recognised",
+                "paper above the marks",
                 over("<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>"),
             ),
             ("style of the marks", "attribute style of <g>", on("g", "style=\"display: none\"")),

@@ -3,6 +3,8 @@
 
 use glam::{DMat4, DQuat, DVec3};
 
+use serde_json::Value;
+
 use super::glb_json::{Accessor, Material, Node, Primitive, Root, Sampler, Surface};
 use super::{Findings, png};
 use crate::export::gltf::{
@@ -35,6 +37,12 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
             return Ok(found);
         }
     };
+    let value: Value =
+        serde_json::from_slice(json).map_err(|error| format!("not glTF: {error}"))?;
+    if value.is_array() || !has_objects(&value) {
+        found.add("the JSON", "a list for an object or within a list");
+        return Ok(found);
+    }
     let mut walk = Walk { root: &root, binary, found };
     walk.counts();
     // What refers to something that is not there is not followed.
@@ -45,6 +53,19 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
         walk.texture(&root.samplers[0]);
     }
     Ok(walk.found)
+}
+
+/// Whether objects are written as such: as types are read, a list of their values would do.
+fn has_objects(value: &Value) -> bool {
+    const OBJECTS: [&str; 4] = ["asset", "attributes", "pbrMetallicRoughness", "baseColorTexture"];
+    match value {
+        Value::Array(list) => list.iter().all(|entry| !entry.is_array() && has_objects(entry)),
+        Value::Object(object) => object.iter().all(|(key, value)| {
+            let listed = value.is_array() && OBJECTS.contains(&key.as_str());
+            key == "extras" || (!listed && has_objects(value))
+        }),
+        _ => true,
+    }
 }
 
 /// The JSON and the binary chunk, when there are no others.
@@ -119,6 +140,8 @@ impl Walk<'_> {
                     .is_some_and(|end| end <= self.binary.len());
             let place = format!("bufferViews[{i}]");
             self.found.unless(inside, &place, "bytes outside the binary part");
+            let whole = view.byte_offset.is_multiple_of(4);
+            self.found.unless(whole, &place, "values that are not at whole words");
             let target =
                 view.target.is_none_or(|t| [ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER].contains(&t));
             self.found.unless(target, &place, "a target that is none");

@@ -30,7 +30,7 @@ struct Findings(Vec<Finding>);
 impl Findings {
     /// Adds a construct, such as "element <image>", and where it is, such as "line 12".
     fn add(&mut self, place: impl Into<String>, construct: impl Into<String>) {
-        if self.0.len() < MOST_LISTED {
+        if !self.is_full() {
             let (place, construct) = (place.into(), construct.into());
             self.0.push(Finding::Construct { place, construct });
         }
@@ -40,6 +40,20 @@ impl Findings {
     fn unless(&mut self, holds: bool, place: impl Into<String>, construct: impl Into<String>) {
         if !holds {
             self.add(place, construct);
+        }
+    }
+
+    /// Whether no more is listed.
+    fn is_full(&self) -> bool {
+        self.0.len() >= MOST_LISTED
+    }
+
+    /// Adds what was found in one place.
+    fn add_at(&mut self, at: &str, other: Findings) {
+        for finding in other.0 {
+            if let Finding::Construct { construct, .. } = finding {
+                self.add(at, construct);
+            }
         }
     }
 

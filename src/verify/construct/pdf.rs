@@ -33,6 +33,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
     let classic = !positions(bytes, b"trailer").is_empty();
     found.unless(classic, "the end", "a cross-reference stream");
     let mut walk = Walk { document: &document, found };
+    walk.names(bytes);
     walk.catalog();
     walk.info();
     walk.pages();
@@ -62,6 +63,35 @@ fn positions(bytes: &[u8], word: &[u8]) -> Vec<usize> {
     windows.filter(|(_, window)| *window == word).map(|(at, _)| at).collect()
 }
 
+/// How many slashes, which begin names, an object is written with.
+fn slashes(object: &Object) -> usize {
+    let of_dictionary = |dictionary: &Dictionary| -> usize {
+        dictionary.iter().map(|(_, value)| 1 + slashes(value)).sum()
+    };
+    match object {
+        Object::Name(_) => 1,
+        Object::String(text, _) => text.iter().filter(|&&byte| byte == b'/').count(),
+        Object::Array(list) => list.iter().map(slashes).sum(),
+        Object::Dictionary(dictionary) => of_dictionary(dictionary),
+        Object::Stream(stream) => of_dictionary(&stream.dict),
+        _ => 0,
+    }
+}
+
+/// How many slashes stand in a file but for the content of its streams.
+fn slashes_outside_streams(bytes: &[u8]) -> usize {
+    let ends = positions(bytes, b"endstream");
+    let begins = positions(bytes, b">>stream");
+    let (mut count, mut from) = (0, 0);
+    for begin in begins {
+        let plain = bytes.get(from..begin).unwrap_or_default();
+        count += plain.iter().filter(|&&byte| byte == b'/').count();
+        let end = ends.iter().find(|&&end| end > begin);
+        from = from.max(end.copied().unwrap_or(bytes.len()));
+    }
+    count + bytes[from..].iter().filter(|&&byte| byte == b'/').count()
+}
+
 /// The way through a document.
 struct Walk<'a> {
     document: &'a Document,
@@ -72,6 +102,20 @@ impl<'a> Walk<'a> {
     /// What an object is, references followed.
     fn resolve(&self, object: &'a Object) -> Option<&'a Object> {
         self.document.dereference(object).ok().map(|(_, object)| object)
+    }
+
+    /// As many names are read as stand in the file: of a key or an object that is there twice one
+    /// reader takes the first, another the last.
+    fn names(&mut self, bytes: &[u8]) {
+        let objects = self.document.objects.values().map(slashes);
+        let trailer: usize =
+            self.document.trailer.iter().map(|(_, value)| 1 + slashes(value)).sum();
+        let read = objects.sum::<usize>() + trailer;
+        self.found.unless(
+            read == slashes_outside_streams(bytes),
+            "the file",
+            "a key or an object that is there twice",
+        );
     }
 
     /// A value of a dictionary, references followed.

@@ -43,46 +43,61 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
         || DECLARATIONS.iter().any(|declaration| text.starts_with(declaration));
     found.unless(declared, "line 1", "an XML declaration other than of UTF-8");
     for node in document.root().descendants() {
-        let place = format!("line {}", document.text_pos_at(node.range().start).row);
+        let mut here = Findings::default();
         match node.node_type() {
-            NodeType::Element => element(&node, &place, &mut found),
-            NodeType::Text => words(&node, &place, &mut found),
+            NodeType::Element => element(&node, &mut here),
+            NodeType::Text => words(&node, &mut here),
             NodeType::PI => {
                 let target = node.pi().map_or("", |pi| pi.target);
-                found.add(place, format!("processing instruction <?{target}?>"));
+                here.add("", format!("processing instruction <?{target}?>"));
             }
             NodeType::Root | NodeType::Comment => {}
         }
+        // Lines are counted from the first on, so only where they are asked for.
+        if !here.0.is_empty() && !found.is_full() {
+            let line = document.text_pos_at(node.range().start).row;
+            found.add_at(&format!("line {line}"), here);
+        }
     }
+    paper(&document, &mut found);
     Ok(found)
 }
 
-fn element(node: &Node, place: &str, found: &mut Findings) {
+/// Black marks are seen on white paper, and on nothing where a viewer has a dark background.
+fn paper(document: &Document, found: &mut Findings) {
+    let children = document.root_element().children().filter(Node::is_element);
+    let drawn: Vec<&str> = children.map(|node| node.tag_name().name()).collect();
+    let mut drawn = drawn.into_iter().filter(|name| !["title", "desc"].contains(name));
+    found.unless(drawn.next() == Some("rect"), "the page", "no paper below the marks");
+    found.unless(!drawn.any(|name| name == "rect"), "the page", "paper above the marks");
+}
+
+fn element(node: &Node, found: &mut Findings) {
     let name = node.tag_name().name();
     let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());
     let listed = ELEMENTS.iter().find(|(listed, ..)| *listed == name);
     let Some((_, within, attributes)) =
         listed.filter(|_| node.tag_name().namespace() == Some(NAMESPACE))
     else {
-        return found.add(place, format!("element <{name}>"));
+        return found.add("", format!("element <{name}>"));
     };
-    found.unless(*within == parent, place, format!("element <{name}> within <{parent}>"));
+    found.unless(*within == parent, "", format!("element <{name}> within <{parent}>"));
     for attribute in node.attributes() {
         let (key, value) = (attribute.name(), attribute.value());
         if attribute.namespace().is_some() || !attributes.contains(&key) {
-            found.add(place, format!("attribute {key} of <{name}>"));
+            found.add("", format!("attribute {key} of <{name}>"));
         } else if !holds(name, key, value) {
             let start: String = value.chars().take(40).collect();
-            found.add(place, format!("{key}=\"{start}\" of <{name}>"));
+            found.add("", format!("{key}=\"{start}\" of <{name}>"));
         }
     }
 }
 
 /// Only titles and descriptions have words.
-fn words(node: &Node, place: &str, found: &mut Findings) {
+fn words(node: &Node, found: &mut Findings) {
     let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());
     let blank = node.text().unwrap_or_default().trim().is_empty();
-    found.unless(blank || ["title", "desc"].contains(&parent), place, "text between elements");
+    found.unless(blank || ["title", "desc"].contains(&parent), "", "text between elements");
 }
 
 /// Whether the value of a listed attribute is one that all viewers understand alike.
