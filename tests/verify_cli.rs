@@ -82,3 +82,21 @@ fn bad_input_is_one_line_and_exit_code_2() {
         assert!(stderr.starts_with("error: "), "{stderr}");
     }
 }
+
+#[test]
+fn what_not_every_viewer_shows_alike_is_named_with_its_place() {
+    let folder = board();
+    let svg = folder.path().join("b.svg");
+    let text = fs::read_to_string(&svg).unwrap();
+    let hidden = "<style>@media print { * { display: none } }</style>";
+    fs::write(&svg, text.replace("<title>", &format!("{hidden}<title>"))).unwrap();
+    let dsc = folder.path().join("b.dsc");
+    let text = fs::read_to_string(&dsc).unwrap();
+    fs::write(&dsc, text.replacen("\n0,", "\n7,", 1)).unwrap();
+    deltille(folder.path(), &["verify", "b.json"])
+        .code(1)
+        .stdout(contains("b.svg: FAILED, line 3: element <style>: not every viewer shows"))
+        .stdout(contains("b.dsc: FAILED").and(contains("is listed as tag 7")))
+        .stdout(contains("b.pdf: verified"))
+        .stdout(contains("FAILED: 2 of 4 files differ from target b"));
+}

@@ -115,9 +115,9 @@ fn check_name(name: &str) -> Result<(), TargetError> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     let problem = if name.is_empty() || name.len() > LONGEST_NAME {
         format!("`{name}` must have 1 to {LONGEST_NAME} characters")
-    } else if !name.chars().all(plain) || name.starts_with('.') {
+    } else if !name.chars().all(plain) || name.starts_with(['.', '-']) {
         format!(
-            "`{name}` may hold only ASCII letters (A-Z, a-z), digits, -, _ and ., and not start with ."
+            "`{name}` may hold only ASCII letters (A-Z, a-z), digits, -, _ and ., and not start with . or -"
         )
     } else {
         return Ok(());

@@ -57,6 +57,14 @@ pub(super) fn verify(
     {
         findings.push(Finding::Scale { panel: verifier.target.panels[0].id, scale });
     }
+    if let TargetSpec::Solid(spec) = &verifier.target.spec {
+        // As many as there are faces, all of which are looked at: there is nothing else.
+        let [found, stated] = [model.triangles.len(), spec.polyhedron().faces.len()];
+        if found != stated {
+            findings
+                .push(Finding::Body { problem: format!("{found} triangles instead of {stated}") });
+        }
+    }
     let wrong = model.triangles.iter().filter(|triangle| {
         let normal = triangle.winding().normalize_or_zero();
         triangle.normals.iter().any(|n| n.distance(normal) > NORMAL_SLACK)

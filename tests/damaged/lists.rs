@@ -66,7 +66,7 @@ pub fn dsc() -> Vec<Case> {
                 corners(|words| words[3..].iter_mut().for_each(|v| *v /= 1e3)),
             ),
             ("another edge", "no units of length", swap(",20\n", ",25\n")),
-            ("an edge that is a bit larger", "an edge of 20.1 mm", swap(",20\n", ",20.1\n")),
+            ("an edge that is a bit larger", "an edge of 20.01 mm", swap(",20\n", ",20.01\n")),
             ("all larger", "an edge of 40 mm", {
                 let larger = corners(|words| words[3..].iter_mut().for_each(|v| *v *= 2.0));
                 Box::new(move |bytes| swap(",20\n", ",40\n")(&larger(bytes)))
@@ -78,14 +78,20 @@ pub fn dsc() -> Vec<Case> {
                 "family delTag36h9 instead of delTag25h7",
                 swap("delTag25h7", "delTag36h9"),
             ),
-            ("a family of squares", "another kind of grid", swap("delTag25h7", "aprilTag25h9")),
+            (
+                "a family of squares",
+                "more than 1 % of an edge away",
+                swap("delTag25h7", "aprilTag25h9"),
+            ),
             ("a family that nobody knows", "is none of", swap("delTag25h7", "delTag99")),
             ("another border", "a border of 2 bits instead of 1.5", swap(",1.5\n", ",2\n")),
             ("another board", "board 0 is not listed", swap("0,6,4,20\n", "1,6,4,20\n")),
             (
                 "a board too many",
                 "board 9 is listed",
-                append("9,2,2,20\ndelTag25h7,1.5\n-1,0,0,0,0,0\n-1,1,0,20,0,0\n-1,0,1,10,17,0\n"),
+                append(
+                    "9,2,2,20\ndelTag25h7,1.5\n-1,0,0,0,0,0\n-1,1,0,20,0,0\n-1,0,1,10,17.320508,0\n",
+                ),
             ),
             ("more columns", "7 columns and 4 rows instead of 6 and 4", swap("0,6,4,", "0,7,4,")),
             ("fewer columns", "is outside the board's", swap("0,6,4,", "0,5,4,")),
@@ -114,6 +120,16 @@ fn without(start: &'static str, next: &'static str) -> Damage {
     })
 }
 
+/// Moves a point by 0.01 mm: the number on the line after `start`.
+fn moved(start: &'static str) -> Damage {
+    text(move |text| {
+        let (at, end) = entity(text, start, "\n");
+        let number = at + start.len();
+        let x: f64 = text[number..end].parse().unwrap();
+        format!("{}{:.6}{}", &text[..number], x + 0.01, &text[end..])
+    })
+}
+
 /// The net of a solid, to cut, fold and engrave.
 pub fn net() -> Vec<Case> {
     let add = |entity: &str| before("  0\nENDSEC\n  0\nEOF", entity);
@@ -135,15 +151,7 @@ pub fn net() -> Vec<Case> {
                 "the path on ENGRAVE",
                 without("  0\nPOLYLINE\n  8\nENGRAVE", "  0\nPOLYLINE"),
             ),
-            (
-                "a fold that is moved",
-                "the path on FOLD",
-                text(|text| {
-                    let (at, end) = entity(text, "LINE\n  8\nFOLD\n 10\n", "\n");
-                    let x: f64 = text[at + 18..end].parse().unwrap();
-                    format!("{}{:.6}{}", &text[..at + 18], x + 0.1, &text[end..])
-                }),
-            ),
+            ("a fold that is moved", "the path on FOLD", moved("LINE\n  8\nFOLD\n 10\n")),
             ("a fold to be cut", "the path on FOLD", swap("LINE\n  8\nFOLD", "LINE\n  8\nCUT")),
             (
                 "a fold the other way",
@@ -211,7 +219,7 @@ pub fn panels() -> Vec<Case> {
             (
                 "another extent",
                 "an extent",
-                swap("$EXTMIN\n 10\n0.000000", "$EXTMIN\n 10\n5.000000"),
+                swap("$EXTMIN\n 10\n4.000000", "$EXTMIN\n 10\n5.000000"),
             ),
             (
                 "a layer that is frozen",
@@ -223,7 +231,7 @@ pub fn panels() -> Vec<Case> {
             ("a dashed style", "group 3 of LTYPE", swap("Solid line", "Dashed")),
             (
                 "an outline to engrave",
-                "the path on CUT",
+                "VERTEX in a POLYLINE",
                 swap("POLYLINE\n  8\nCUT", "POLYLINE\n  8\nENGRAVE"),
             ),
             (
@@ -239,15 +247,11 @@ pub fn panels() -> Vec<Case> {
                 "the path on ENGRAVE",
                 without("  0\nPOLYLINE\n  8\nENGRAVE", "  0\nPOLYLINE"),
             ),
-            (
-                "a point that is moved",
-                "the path on CUT",
-                swap("VERTEX\n  8\nCUT\n 10\n0.000000", "VERTEX\n  8\nCUT\n 10\n0.010000"),
-            ),
+            ("a point that is moved", "the path on ENGRAVE", moved("VERTEX\n  8\nENGRAVE\n 10\n")),
             (
                 "a point that is missing",
-                "the path on CUT",
-                without("  0\nVERTEX\n  8\nCUT", "  0\nVERTEX"),
+                "the path on ENGRAVE",
+                without("  0\nVERTEX\n  8\nENGRAVE", "  0\nVERTEX"),
             ),
             ("a file that is cut off", "the end of the file", swap("  0\nENDSEC\n  0\nEOF\n", "")),
             ("data after the end", "data after the end", append("  0\nEOF\n")),

@@ -64,6 +64,12 @@ pub fn mesh() -> Vec<Case> {
             ),
             ("a face that is missing", "board 0 not recognised", line("f ", |_| String::new())),
             (
+                "a face that is there twice",
+                "5 triangles instead of 4",
+                append("f 1/1/1 2/2/1 3/3/1\n"),
+            ),
+            ("a face too many", "5 triangles instead of 4", append("f 1/1/1 2/2/1 6/6/2\n")),
+            (
                 "a face inside out",
                 "wrong normals",
                 line("f ", |line| {

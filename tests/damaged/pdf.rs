@@ -2,7 +2,7 @@
 
 use lopdf::{Dictionary, Document, Object, ObjectId, Stream, dictionary};
 
-use super::edit::{append, before, swap};
+use super::edit::{append, before, find, swap};
 use super::{Case, Damage, cases};
 
 /// Changes the objects of a document.
@@ -228,6 +228,15 @@ pub fn board() -> Vec<Case> {
                 "an object after the table",
                 "key Page",
                 before("startxref", "6 0 obj\n<</Page 0>>\nendobj\n"),
+            ),
+            (
+                "content of another length",
+                "content",
+                Box::new(|bytes| {
+                    let at = find(bytes, b"/Length ") + 8;
+                    let digit = if bytes[at] == b'1' { b'2' } else { b'1' };
+                    [&bytes[..at], &[digit], &bytes[at + 1..]].concat()
+                }),
             ),
             ("encryption", "key Encrypt", swap("trailer\n<<", "trailer\n<</Encrypt 1 0 R")),
             ("an earlier revision", "key Prev", swap("trailer\n<<", "trailer\n<</Prev 9")),

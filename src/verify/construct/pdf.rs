@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use lopdf::{Dictionary, Document, Object, ObjectId};
+use lopdf::{Dictionary, Document, Object, ObjectId, StringFormat};
 
 use super::{Findings, pdf_content};
 
@@ -16,6 +16,8 @@ const PAGE: [&str; 8] =
     ["Type", "Parent", "MediaBox", "TrimBox", "CropBox", "Resources", "Contents", "Annots"];
 /// Kinds of resources that may be listed, as long as there are none.
 const RESOURCES: [&str; 4] = ["Font", "XObject", "ExtGState", "Shading"];
+/// Where the content of a stream begins.
+const STREAM_BEGINS: &[u8] = b">>stream";
 const STREAM: [&str; 2] = ["Length", "Filter"];
 
 /// Most bytes of a page, unpacked: a hundred times the largest that is written.
@@ -23,6 +25,9 @@ const MOST_CONTENT: usize = 1 << 29;
 
 /// Goes through a PDF.
 pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
+    if positions(bytes, b"%PDF-").is_empty() {
+        return Err("not a readable PDF (its head)".to_owned());
+    }
     let mut found = Findings::default();
     trailer(bytes, &mut found);
     if !found.0.is_empty() {
@@ -32,8 +37,9 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
         Document::load_mem(bytes).map_err(|error| format!("not a readable PDF ({error})"))?;
     let classic = !positions(bytes, b"trailer").is_empty();
     found.unless(classic, "the end", "a cross-reference stream");
-    let mut walk = Walk { document: &document, found };
-    walk.names(bytes);
+    let (between, streams) = split_streams(bytes);
+    let mut walk = Walk { document: &document, between, streams, found };
+    walk.names();
     walk.catalog();
     walk.info();
     walk.pages();
@@ -70,7 +76,9 @@ fn slashes(object: &Object) -> usize {
     };
     match object {
         Object::Name(_) => 1,
-        Object::String(text, _) => text.iter().filter(|&&byte| byte == b'/').count(),
+        Object::String(text, StringFormat::Literal) => {
+            text.iter().filter(|&&byte| byte == b'/').count()
+        }
         Object::Array(list) => list.iter().map(slashes).sum(),
         Object::Dictionary(dictionary) => of_dictionary(dictionary),
         Object::Stream(stream) => of_dictionary(&stream.dict),
@@ -78,23 +86,29 @@ fn slashes(object: &Object) -> usize {
     }
 }
 
-/// How many slashes stand in a file but for the content of its streams.
-fn slashes_outside_streams(bytes: &[u8]) -> usize {
-    let ends = positions(bytes, b"endstream");
-    let begins = positions(bytes, b">>stream");
-    let (mut count, mut from) = (0, 0);
-    for begin in begins {
-        let plain = bytes.get(from..begin).unwrap_or_default();
-        count += plain.iter().filter(|&&byte| byte == b'/').count();
-        let end = ends.iter().find(|&&end| end > begin);
-        from = from.max(end.copied().unwrap_or(bytes.len()));
+/// What stands between the streams of a file, and what is in them, without the ends of lines
+/// around it.
+fn split_streams(bytes: &[u8]) -> (Vec<&[u8]>, Vec<&[u8]>) {
+    let (begins, ends) = (positions(bytes, STREAM_BEGINS), positions(bytes, b"endstream"));
+    let (mut between, mut streams) = (Vec::new(), Vec::new());
+    let mut from = 0;
+    for begin in begins.into_iter().map(|at| at + STREAM_BEGINS.len()) {
+        let Some(&end) = ends.iter().find(|&&end| end >= begin && begin >= from) else { continue };
+        between.push(&bytes[from..begin]);
+        streams.push(bytes[begin..end].trim_ascii());
+        from = end;
     }
-    count + bytes[from..].iter().filter(|&&byte| byte == b'/').count()
+    between.push(&bytes[from..]);
+    (between, streams)
 }
 
 /// The way through a document.
 struct Walk<'a> {
     document: &'a Document,
+    /// What stands between streams in the file.
+    between: Vec<&'a [u8]>,
+    /// What is in streams in the file.
+    streams: Vec<&'a [u8]>,
     found: Findings,
 }
 
@@ -106,16 +120,14 @@ impl<'a> Walk<'a> {
 
     /// As many names are read as stand in the file: of a key or an object that is there twice one
     /// reader takes the first, another the last.
-    fn names(&mut self, bytes: &[u8]) {
+    fn names(&mut self) {
         let objects = self.document.objects.values().map(slashes);
         let trailer: usize =
             self.document.trailer.iter().map(|(_, value)| 1 + slashes(value)).sum();
         let read = objects.sum::<usize>() + trailer;
-        self.found.unless(
-            read == slashes_outside_streams(bytes),
-            "the file",
-            "a key or an object that is there twice",
-        );
+        let slashes = |part: &&[u8]| part.iter().filter(|&&byte| byte == b'/').count();
+        let written: usize = self.between.iter().map(slashes).sum();
+        self.found.unless(read == written, "the file", "a key or an object that is there twice");
     }
 
     /// A value of a dictionary, references followed.
@@ -241,6 +253,9 @@ impl<'a> Walk<'a> {
             return self.found.add(place, "content other than one stream");
         };
         self.keys(&stream.dict, &format!("{place}, its content"), &STREAM);
+        // A reader that mends a wrong length takes what stands up to the end.
+        let whole = self.streams.contains(&stream.content.trim_ascii());
+        self.found.unless(whole, place, "content of another length than stated");
         let content = match stream.dict.has(b"Filter") {
             false => Some(stream.content.clone()),
             true if self.name(&stream.dict, "Filter") == Some(b"FlateDecode") => {
