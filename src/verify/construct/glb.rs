@@ -21,7 +21,7 @@ const SLACK: f64 = 1e-5;
 /// Goes through a `.glb`.
 pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
     let mut found = Findings::default();
-    let Some((json, binary)) = chunks(bytes, &mut found)? else { return Ok(found) };
+    let Some(Chunks { json, binary }) = Chunks::read(bytes, &mut found)? else { return Ok(found) };
     let mut deserializer = serde_json::Deserializer::from_slice(json);
     let root: Root = match serde_path_to_error::deserialize(&mut deserializer) {
         Ok(root) => root,
@@ -68,39 +68,44 @@ fn has_objects(value: &Value) -> bool {
     }
 }
 
-/// The JSON and the binary chunk, when there are no others.
-fn chunks<'a>(
-    bytes: &'a [u8],
-    found: &mut Findings,
-) -> Result<Option<(&'a [u8], &'a [u8])>, String> {
-    let word = |at: usize| -> Option<u32> {
-        bytes.get(at..at + 4)?.first_chunk::<4>().copied().map(u32::from_le_bytes)
-    };
-    if !bytes.starts_with(b"glTF") {
-        return Err("not glTF: it does not begin as a .glb does".to_owned());
+/// The two parts of a file.
+struct Chunks<'a> {
+    json: &'a [u8],
+    binary: &'a [u8],
+}
+
+impl<'a> Chunks<'a> {
+    /// The parts, unless the container is of another version.
+    fn read(bytes: &'a [u8], found: &mut Findings) -> Result<Option<Self>, String> {
+        let word = |at: usize| -> Option<u32> {
+            bytes.get(at..at + 4)?.first_chunk::<4>().copied().map(u32::from_le_bytes)
+        };
+        if !bytes.starts_with(b"glTF") {
+            return Err("not glTF: it does not begin as a .glb does".to_owned());
+        }
+        if word(4) != Some(2) {
+            found.add("the head", "a version other than 2");
+            return Ok(None);
+        }
+        let cut_off = || "not glTF: it is cut off".to_owned();
+        let length = word(8).ok_or_else(cut_off)? as usize;
+        found.unless(bytes.len() <= length, "the end", "data after the stated length");
+        if bytes.len() < length {
+            return Err(cut_off());
+        }
+        let mut at = 12;
+        let mut chunk = |name: &[u8; 4]| -> Option<&'a [u8]> {
+            let length = word(at)? as usize;
+            let kind = bytes.get(at + 4..at + 8)?;
+            let data = bytes.get(at + 8..)?.get(..length)?;
+            at += 8 + length;
+            (kind == name).then_some(data)
+        };
+        let json = chunk(b"JSON").ok_or_else(cut_off)?;
+        let binary = chunk(b"BIN\0").ok_or("it has no binary part")?;
+        found.unless(at >= length, "the end", "a third chunk");
+        Ok(Some(Self { json, binary }))
     }
-    if word(4) != Some(2) {
-        found.add("the head", "a version other than 2");
-        return Ok(None);
-    }
-    let cut_off = || "not glTF: it is cut off".to_owned();
-    let length = word(8).ok_or_else(cut_off)? as usize;
-    found.unless(bytes.len() <= length, "the end", "data after the stated length");
-    if bytes.len() < length {
-        return Err(cut_off());
-    }
-    let mut at = 12;
-    let mut chunk = |name: &[u8; 4]| -> Option<&'a [u8]> {
-        let length = word(at)? as usize;
-        let kind = bytes.get(at + 4..at + 8)?;
-        let data = bytes.get(at + 8..)?.get(..length)?;
-        at += 8 + length;
-        (kind == name).then_some(data)
-    };
-    let json = chunk(b"JSON").ok_or_else(cut_off)?;
-    let binary = chunk(b"BIN\0").ok_or("it has no binary part")?;
-    found.unless(at >= length, "the end", "a third chunk");
-    Ok(Some((json, binary)))
 }
 
 /// The way through a file.

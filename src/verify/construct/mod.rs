@@ -48,15 +48,6 @@ impl Findings {
         self.0.len() >= MOST_LISTED
     }
 
-    /// Adds what was found in one place.
-    fn add_at(&mut self, at: &str, other: Findings) {
-        for finding in other.0 {
-            if let Finding::Construct { construct, .. } = finding {
-                self.add(at, construct);
-            }
-        }
-    }
-
     /// Adds what a file that belongs to this one has, with its name.
     fn add_of(&mut self, file: &str, other: Findings) {
         for finding in other.0 {

@@ -43,20 +43,19 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
         || DECLARATIONS.iter().any(|declaration| text.starts_with(declaration));
     found.unless(declared, "line 1", "an XML declaration other than of UTF-8");
     for node in document.root().descendants() {
-        let mut here = Findings::default();
-        match node.node_type() {
-            NodeType::Element => element(&node, &mut here),
-            NodeType::Text => words(&node, &mut here),
+        let constructs = match node.node_type() {
+            NodeType::Element => element(&node),
+            NodeType::Text => words(&node),
             NodeType::PI => {
                 let target = node.pi().map_or("", |pi| pi.target);
-                here.add("", format!("processing instruction <?{target}?>"));
+                vec![format!("processing instruction <?{target}?>")]
             }
-            NodeType::Root | NodeType::Comment => {}
-        }
+            NodeType::Root | NodeType::Comment => continue,
+        };
         // Lines are counted from the first on, so only where they are asked for.
-        if !here.0.is_empty() && !found.is_full() {
-            let line = document.text_pos_at(node.range().start).row;
-            found.add_at(&format!("line {line}"), here);
+        if !constructs.is_empty() && !found.is_full() {
+            let place = format!("line {}", document.text_pos_at(node.range().start).row);
+            constructs.into_iter().for_each(|construct| found.add(&place, construct));
         }
     }
     paper(&document, &mut found);
@@ -72,32 +71,40 @@ fn paper(document: &Document, found: &mut Findings) {
     found.unless(!drawn.any(|name| name == "rect"), "the page", "paper above the marks");
 }
 
-fn element(node: &Node, found: &mut Findings) {
+/// What of an element is not on the list.
+fn element(node: &Node) -> Vec<String> {
     let name = node.tag_name().name();
     let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());
     let listed = ELEMENTS.iter().find(|(listed, ..)| *listed == name);
     let Some((_, within, attributes)) =
         listed.filter(|_| node.tag_name().namespace() == Some(NAMESPACE))
     else {
-        return found.add("", format!("element <{name}>"));
+        return vec![format!("element <{name}>")];
     };
-    found.unless(*within == parent, "", format!("element <{name}> within <{parent}>"));
+    let mut constructs = Vec::new();
+    if *within != parent {
+        constructs.push(format!("element <{name}> within <{parent}>"));
+    }
     for attribute in node.attributes() {
         let (key, value) = (attribute.name(), attribute.value());
         if attribute.namespace().is_some() || !attributes.contains(&key) {
-            found.add("", format!("attribute {key} of <{name}>"));
+            constructs.push(format!("attribute {key} of <{name}>"));
         } else if !holds(name, key, value) {
             let start: String = value.chars().take(40).collect();
-            found.add("", format!("{key}=\"{start}\" of <{name}>"));
+            constructs.push(format!("{key}=\"{start}\" of <{name}>"));
         }
     }
+    constructs
 }
 
 /// Only titles and descriptions have words.
-fn words(node: &Node, found: &mut Findings) {
+fn words(node: &Node) -> Vec<String> {
     let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());
     let blank = node.text().unwrap_or_default().trim().is_empty();
-    found.unless(blank || ["title", "desc"].contains(&parent), "", "text between elements");
+    if blank || ["title", "desc"].contains(&parent) {
+        return Vec::new();
+    }
+    vec!["text between elements".to_owned()]
 }
 
 /// Whether the value of a listed attribute is one that all viewers understand alike.
