@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 const LONGEST: usize = 64;
 
 /// The name of a target or a camera, which is the stem of its files and part of labels: ASCII letters, digits, `-`, `_` and
-/// `.`, not at the beginning. So it never names another folder, and the label's font has all of it.
+/// `.`, the first of them a letter, a digit or `_`. So it never names another folder, and the label's font has all of it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Name(String);
@@ -20,9 +20,9 @@ impl Name {
         if name.is_empty() || name.len() > LONGEST {
             return Err(format!("{name:?} must have 1 to {LONGEST} characters"));
         }
-        if !name.chars().all(is_plain) || name.starts_with('.') {
+        if !name.chars().all(is_plain) || name.starts_with(['.', '-']) {
             return Err(format!(
-                "{name:?} may hold only ASCII letters (A-Z, a-z), digits, -, _ and ., and not start with ."
+                "{name:?} may hold only ASCII letters (A-Z, a-z), digits, -, _ and ., and not start with . or -"
             ));
         }
         Ok(Self(name.to_owned()))
@@ -30,7 +30,7 @@ impl Name {
 
     /// The name most like a text: with `-` for what a name cannot hold.
     pub fn like(text: &str) -> Self {
-        let plain = text.trim_start_matches('.').chars().take(LONGEST);
+        let plain = text.trim_start_matches(['.', '-', '/', '\\']).chars().take(LONGEST);
         let name: String = plain.map(|c| if is_plain(c) { c } else { '-' }).collect();
         Self(if name.is_empty() { "target".to_owned() } else { name })
     }
@@ -74,15 +74,16 @@ mod tests {
 
     #[test]
     fn names_are_stems_of_files() {
-        for name in ["board", "2026-11-22_desk.v2", "A"] {
+        for name in ["board", "2026-11-22_desk.v2", "_A"] {
             assert_eq!(&*Name::new(name).unwrap(), name);
             assert_eq!(&*Name::like(name), name);
         }
         let long = "x".repeat(LONGEST + 1);
         for (text, like) in [
             ("", "target"),
-            ("../../x", "-..-x"),
-            ("/etc/passwd", "-etc-passwd"),
+            ("../../x", "x"),
+            ("/etc/passwd", "etc-passwd"),
+            ("-rf", "rf"),
             ("a\u{1b}[31mb", "a--31mb"),
             (".hidden", "hidden"),
             (long.as_str(), &long[1..]),

@@ -76,11 +76,11 @@ fn a_wrong_sheet_is_refused_with_the_reason() {
         .any(|finding| matches!(finding, Finding::TagReads { id: 6, reads: 7, .. }));
     assert!(reads, "{exchanged}");
 
-    let cut = |svg: &str| svg.replace("id=\"tile-8-r0-c0\"", "visibility=\"hidden\"");
+    let cut = |svg: &str| svg.replace("id=\"tile-8-r0-c0\"", "fill=\"none\"");
     let missing = verdict(&[5, 6, 7, 8], cut);
     assert_eq!(missing.sheets[0].findings, [Finding::TagMissing { id: 8 }], "{missing}");
 
-    let text = |svg: &str| svg.replace("id=\"label-4\"", "visibility=\"hidden\"");
+    let text = |svg: &str| svg.replace("id=\"label-4\"", "fill=\"none\"");
     let nameless = verdict(&[5, 6, 7, 8], text);
     assert!(matches!(nameless.sheets[0].findings[..], [Finding::TextDiffers { .. }]), "{nameless}");
 }

@@ -16,7 +16,7 @@ fn deltille(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
 fn board() -> TempDir {
     let folder = TempDir::new().unwrap();
     let arguments = ["board", "--rows", "3", "--cols", "4", "--edge", "20mm", "--name", "b"];
-    let formats = ["--pdf", "--svg", "--png"];
+    let formats = ["--pdf", "--svg", "--png", "--dsc"];
     deltille(folder.path(), &[&arguments[..], &formats].concat()).success();
     folder
 }
@@ -29,7 +29,8 @@ fn the_files_beside_the_description_are_verified() {
         .stdout(contains("b.pdf: verified, 12 corners within"))
         .stdout(contains("b.svg: verified"))
         .stdout(contains("b.png: verified"))
-        .stdout(contains("verified: 3 files of target b"));
+        .stdout(contains("b.dsc: verified, 1 board, 12 corners listed"))
+        .stdout(contains("verified: 4 files of target b"));
     let report = fs::read_to_string(folder.path().join("r.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     assert_eq!(report["passed"], true);
@@ -69,7 +70,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
         (&["b.json", "absent.png"], "absent.png"),
         (&["b.json", "b.json"], "only .pdf, .svg, .png"),
         (&["broken.json"], "broken.json"),
-        (&["alone/b.json"], "no b.pdf, .svg, .png, .glb, .obj or .stl beside"),
+        (&["alone/b.json"], "no b.pdf, .svg, .png, .glb, .obj, .stl, .dsc or .dxf beside"),
         (&["b.json", "--report", "nowhere/r.json"], "nowhere"),
         (&["b.json", "--report", "b.json"], "--report: b.json holds deltille/target/1"),
     ];
@@ -80,4 +81,22 @@ fn bad_input_is_one_line_and_exit_code_2() {
         assert_eq!(stderr.lines().count(), 1, "{stderr}");
         assert!(stderr.starts_with("error: "), "{stderr}");
     }
+}
+
+#[test]
+fn what_not_every_viewer_shows_alike_is_named_with_its_place() {
+    let folder = board();
+    let svg = folder.path().join("b.svg");
+    let text = fs::read_to_string(&svg).unwrap();
+    let hidden = "<style>@media print { * { display: none } }</style>";
+    fs::write(&svg, text.replace("<title>", &format!("{hidden}<title>"))).unwrap();
+    let dsc = folder.path().join("b.dsc");
+    let text = fs::read_to_string(&dsc).unwrap();
+    fs::write(&dsc, text.replacen("\n0,", "\n7,", 1)).unwrap();
+    deltille(folder.path(), &["verify", "b.json"])
+        .code(1)
+        .stdout(contains("b.svg: FAILED, line 3: element <style>: not every viewer shows"))
+        .stdout(contains("b.dsc: FAILED").and(contains("is listed as tag 7")))
+        .stdout(contains("b.pdf: verified"))
+        .stdout(contains("FAILED: 2 of 4 files differ from target b"));
 }

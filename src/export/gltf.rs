@@ -9,13 +9,13 @@ use super::atomic;
 use super::mesh::TexturedMesh;
 
 /// Numbers of the glTF 2.0 specification.
-const FLOAT: u32 = 5126;
-const UNSIGNED_SHORT: u32 = 5123;
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
-const LINEAR: u32 = 9729;
-const LINEAR_MIPMAP_LINEAR: u32 = 9987;
-const CLAMP_TO_EDGE: u32 = 33071;
+pub(crate) const FLOAT: u32 = 5126;
+pub(crate) const UNSIGNED_SHORT: u32 = 5123;
+pub(crate) const ARRAY_BUFFER: u32 = 34962;
+pub(crate) const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+pub(crate) const LINEAR: u32 = 9729;
+pub(crate) const LINEAR_MIPMAP_LINEAR: u32 = 9987;
+pub(crate) const CLAMP_TO_EDGE: u32 = 33071;
 
 /// Writes the mesh as `.glb`.
 pub fn write(mesh: &TexturedMesh, path: &Path) -> Result<(), atomic::WriteError> {

@@ -4,8 +4,7 @@ use glam::DVec3;
 
 /// The content of an `.stl` file; triangles counter-clockwise from outside.
 pub fn to_bytes(name: &str, triangles_mm: &[[DVec3; 3]]) -> Vec<u8> {
-    let mut bytes = format!("deltille {name}, millimetres").into_bytes();
-    bytes.resize(80, b' ');
+    let mut bytes = header(name).to_vec();
     bytes.extend((triangles_mm.len() as u32).to_le_bytes());
     for &[a, b, c] in triangles_mm {
         let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -15,6 +14,16 @@ pub fn to_bytes(name: &str, triangles_mm: &[[DVec3; 3]]) -> Vec<u8> {
         bytes.extend([0, 0]);
     }
     bytes
+}
+
+/// The words before the triangles, which readers pass over.
+pub fn header(name: &str) -> [u8; 80] {
+    let mut header = [b' '; 80];
+    let words = format!("deltille {name}, millimetres");
+    for (byte, word) in header.iter_mut().zip(words.bytes()) {
+        *byte = word;
+    }
+    header
 }
 
 /// The file name of a skeleton.

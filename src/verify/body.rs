@@ -54,15 +54,7 @@ pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, Docume
         None if is_skeleton => return Err(unreadable("the target has no skeleton")),
         None => check_faces(&facets, &solid, &mut body, &mut findings),
     }
-    Ok(Verdict {
-        artifact,
-        format: Format::Stl,
-        passed: findings.is_empty(),
-        findings,
-        sheets: Vec::new(),
-        faces: Vec::new(),
-        body: Some(body),
-    })
+    Ok(Verdict { body: Some(body), ..Verdict::new(path, Format::Stl, findings) })
 }
 
 /// Closed, one piece, outside out, normals those of the triangles.

@@ -10,6 +10,42 @@ use crate::target::LineKind;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Finding {
+    /// The file has something that not every viewer shows alike, so that what is seen here need
+    /// not be what is seen elsewhere.
+    Construct {
+        /// Where it is, in the words of the format.
+        place: String,
+        /// What it is.
+        construct: String,
+    },
+    /// A list for other detectors is not that of the target.
+    Listed {
+        /// What differs.
+        problem: String,
+    },
+    /// A path to cut, fold or engrave lies elsewhere.
+    PathOff {
+        /// Its layer.
+        layer: &'static str,
+        /// Where it should begin.
+        at_mm: [f64; 2],
+        /// Largest distance of a point.
+        by_mm: f64,
+    },
+    /// A path to cut, fold or engrave is not there.
+    PathMissing {
+        /// Its layer.
+        layer: &'static str,
+        /// Where it should begin.
+        at_mm: [f64; 2],
+    },
+    /// A path that the target does not have.
+    PathExtra {
+        /// Its layer.
+        layer: &'static str,
+        /// Where it begins.
+        at_mm: [f64; 2],
+    },
     /// The file has too many or too few pages.
     Pages {
         /// Pages of the file.
@@ -357,6 +393,19 @@ fn micrometres(mm: f64) -> f64 {
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Construct { place, construct } => {
+                write!(f, "{place}: {construct}: not every viewer shows that alike")
+            }
+            Self::Listed { problem } => write!(f, "{problem}"),
+            Self::PathOff { layer, at_mm: [x, y], by_mm } => {
+                write!(f, "the path on {layer} from ({x:.2}, {y:.2}) mm is off by {by_mm:.3} mm")
+            }
+            Self::PathMissing { layer, at_mm: [x, y] } => {
+                write!(f, "the path on {layer} from ({x:.2}, {y:.2}) mm is missing")
+            }
+            Self::PathExtra { layer, at_mm: [x, y] } => {
+                write!(f, "a path on {layer} from ({x:.2}, {y:.2}) mm that should not be there")
+            }
             Self::Pages { found, stated } => write!(f, "{found} pages instead of {stated}"),
             Self::PageSize { found_mm: [fw, fh], stated_mm: [sw, sh] } => {
                 write!(f, "page of {fw:.3} x {fh:.3} mm instead of {sw:.3} x {sh:.3} mm")

@@ -26,6 +26,13 @@
 //! flat and compared like a sheet: every tile, every cell of every tag, and no other mark. A body
 //! to print (`.stl`) must be closed, outside out, and of the stated shape.
 //!
+//! What is drawn here must be what is seen elsewhere. So before a file is drawn it is gone through,
+//! and anything in it that not every viewer shows alike is a finding: files are accepted by a list
+//! of what may be in them, not refused by a list of what may not.
+//!
+//! Lists for other detectors (`.dsc`) and drawings for a cutter (`.dxf`) are read and compared with
+//! the target number by number.
+//!
 //! Limits: words and stray ink are compared only where the boards lie as stated and are recognised;
 //! dirt within a few pixels of a word or a bar counts to it.
 
@@ -33,11 +40,14 @@ mod assemble;
 mod bars;
 mod board;
 mod body;
+mod construct;
+mod cutting;
 mod document;
 mod face_page;
 mod finding;
 mod fit;
 mod fold;
+mod listing;
 mod marks;
 mod model;
 mod solid;
@@ -48,6 +58,7 @@ mod verdict;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::artwork::CuttingError;
 use crate::detect::{Detector, DetectorConfig, Ink, Tone};
 use crate::export::sheet_file_name;
 use crate::family::Family;
@@ -60,7 +71,9 @@ pub use document::{Document, DocumentError, Format, Page};
 pub use finding::Finding;
 pub use fold::FOLD_TOLERANCE_MM;
 pub use solid::MESH_TOLERANCE_MM;
-pub use verdict::{BodyVerdict, FaceVerdict, FoldVerdict, SheetVerdict, Verdict};
+pub use verdict::{
+    BodyVerdict, CutVerdict, FaceVerdict, FoldVerdict, ListVerdict, SheetVerdict, Verdict,
+};
 
 /// Largest deviation of a position or a length, mm: a fifth of what a good printer adds.
 pub const TOLERANCE_MM: f64 = 0.02;
@@ -90,7 +103,8 @@ pub enum VerifyError {
     },
     /// A file of another kind.
     #[error(
-        "{}: only .pdf, .svg, .png, .glb, .obj and .stl files are compared with their target",
+        "{}: only .pdf, .svg, .png, .glb, .obj, .stl, .dsc and .dxf files are compared with their \
+         target",
         path.display()
     )]
     OtherKind {
@@ -106,6 +120,25 @@ pub enum VerifyError {
         sheets: usize,
         /// A name that tells.
         example: String,
+    },
+    /// The file name does not tell what is cut.
+    #[error(
+        "{}: name the file {target}-panels.dxf or {target}-net.dxf, for what it shows",
+        path.display()
+    )]
+    WhichDrawing {
+        /// The file.
+        path: PathBuf,
+        /// Name of the target.
+        target: String,
+    },
+    /// The target says nothing about what the file shows.
+    #[error("{}: {source}", path.display())]
+    NothingToCut {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: CuttingError,
     },
     /// The family needed is not the one given.
     #[error("the target needs family {needed}: {given}")]
@@ -162,7 +195,7 @@ impl<'a> Verifier<'a> {
     /// The files that are verified together with one: the pages of a net, each in a file of its
     /// own, belong together. Any other file is verified by itself.
     pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
-        let single = Format::of_document(path).is_some_and(|format| format != Format::Pdf);
+        let single = matches!(Format::of(path), Some(Format::Svg | Format::Png));
         let count = self.target.page_count();
         if !single || count == 1 || !fold::is_net(self.target) || self.sheet_of(path).is_err() {
             return vec![path.to_owned()];
@@ -177,23 +210,37 @@ impl<'a> Verifier<'a> {
     /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
     /// that its name tells; for a page of a net all files of [`set_of`](Self::set_of) are read.
     pub fn verify(&self, path: &Path) -> Result<Verdict, VerifyError> {
-        match Format::of_mesh(path) {
-            Some(Format::Stl) => return Ok(body::verify(self, path)?),
-            Some(format) => return Ok(solid::verify(self, path, format)?),
-            None => {}
-        }
-        if Format::of_document(path).is_none() {
+        let Some(format) = Format::of(path) else {
             return Err(VerifyError::OtherKind { path: path.to_owned() });
+        };
+        match format {
+            Format::Dsc => return Ok(listing::verify(self, path)?),
+            Format::Dxf => return cutting::verify(self, path),
+            Format::Pdf | Format::Svg | Format::Png => return self.verify_sheets(path, format),
+            Format::Glb | Format::Obj | Format::Stl => {}
         }
+        let refused = construct::check(path, format, &self.target.name)?;
+        Ok(match format {
+            _ if !refused.is_empty() => Verdict::new(path, format, refused),
+            Format::Stl => body::verify(self, path)?,
+            _ => solid::verify(self, path, format)?,
+        })
+    }
+
+    /// Compares printed pages.
+    fn verify_sheets(&self, path: &Path, format: Format) -> Result<Verdict, VerifyError> {
         if self.target.sheets.is_empty() {
             let (path, target) = (path.to_owned(), self.target.name.to_string());
             return Err(VerifyError::NoSheets { path, target });
         }
         let mut findings = Vec::new();
         let files = self.set_of(path);
+        let refused = self.refused(&files, format)?;
+        if !refused.is_empty() {
+            return Ok(Verdict::new(path, format, refused));
+        }
         let documents: Vec<Document> =
             files.iter().map(|file| Document::open(file)).collect::<Result<_, _>>()?;
-        let format = documents[0].format();
         let stated = self.target.page_count();
         // Where each page of the target is to be seen.
         let sources: Vec<Option<Source>> = match format {
@@ -236,21 +283,25 @@ impl<'a> Verifier<'a> {
         if fold::is_net(self.target) && verdicts.len() == self.target.sheets.len() {
             fold::check(self.target, &seen, &mut verdicts);
         }
-        let name =
-            |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let artifact = match files.as_slice() {
-            [first, .., last] => format!("{} to {}", name(first), name(last)),
-            _ => name(path),
-        };
-        Ok(Verdict {
-            artifact,
-            format,
-            passed: findings.is_empty() && verdicts.iter().all(|s| s.findings.is_empty()),
-            findings,
-            sheets: verdicts,
-            faces: Vec::new(),
-            body: None,
-        })
+        let mut verdict = Verdict::new(path, format, findings);
+        if let [first, .., last] = files.as_slice() {
+            verdict.artifact = format!("{} to {}", file_name(first), file_name(last));
+        }
+        verdict.passed &= verdicts.iter().all(|sheet| sheet.findings.is_empty());
+        Ok(Verdict { sheets: verdicts, ..verdict })
+    }
+
+    /// What is not on the list of a format in files that belong together.
+    fn refused(&self, files: &[PathBuf], format: Format) -> Result<Vec<Finding>, DocumentError> {
+        let mut refused = Vec::new();
+        for file in files {
+            let found = construct::check(file, format, &self.target.name)?;
+            refused.extend(found.into_iter().map(|finding| match files.len() {
+                1 => finding,
+                _ => Finding::OnPage { page: file_name(file), finding: Box::new(finding) },
+            }));
+        }
+        Ok(refused)
     }
 
     /// The page that a file of a single page shows, by its name.
@@ -354,6 +405,10 @@ impl<'a> Verifier<'a> {
         }
         seen
     }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// A page of a document.

@@ -57,6 +57,14 @@ pub(super) fn verify(
     {
         findings.push(Finding::Scale { panel: verifier.target.panels[0].id, scale });
     }
+    if let TargetSpec::Solid(spec) = &verifier.target.spec {
+        // As many as there are faces, all of which are looked at: there is nothing else.
+        let [found, stated] = [model.triangles.len(), spec.polyhedron().faces.len()];
+        if found != stated {
+            findings
+                .push(Finding::Body { problem: format!("{found} triangles instead of {stated}") });
+        }
+    }
     let wrong = model.triangles.iter().filter(|triangle| {
         let normal = triangle.winding().normalize_or_zero();
         triangle.normals.iter().any(|n| n.distance(normal) > NORMAL_SLACK)
@@ -69,9 +77,9 @@ pub(super) fn verify(
         let panels = verifier.target.panels.par_iter();
         faces = panels.map(|panel| check_face(verifier, &model, panel)).collect();
     }
-    let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let passed = findings.is_empty() && faces.iter().all(|face| face.findings.is_empty());
-    Ok(Verdict { artifact, format, passed, findings, sheets: Vec::new(), faces, body: None })
+    let mut verdict = Verdict::new(path, format, findings);
+    verdict.passed &= faces.iter().all(|face| face.findings.is_empty());
+    Ok(Verdict { faces, ..verdict })
 }
 
 /// Largest distance from the origin on the mesh over that on the target's solid, and the latter,

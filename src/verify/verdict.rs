@@ -1,6 +1,7 @@
 //! What was found of an artifact: as a whole, on its sheets, on its faces; and in words.
 
 use std::fmt;
+use std::path::Path;
 
 use serde::Serialize;
 
@@ -27,6 +28,38 @@ pub struct Verdict {
     /// A body to print.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body: Option<BodyVerdict>,
+    /// A list for other detectors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub list: Option<ListVerdict>,
+    /// A drawing for a cutter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cut: Option<CutVerdict>,
+}
+
+/// What was found in a list of boards.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ListVerdict {
+    /// Boards of the target that are listed.
+    pub boards: usize,
+    /// Their corners that are.
+    pub corners: usize,
+    /// Their tags that are listed in their places.
+    pub tags: usize,
+    /// Largest distance of a listed corner from its stated position, mm.
+    pub max_deviation_mm: f64,
+}
+
+/// What was found in a drawing for a cutter.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct CutVerdict {
+    /// Outlines that were found in their places.
+    pub outlines: usize,
+    /// Lines to fold that were.
+    pub folds: usize,
+    /// Engraved outlines that were.
+    pub engraved: usize,
+    /// Largest distance of a point of these from its stated position, mm.
+    pub max_deviation_mm: f64,
 }
 
 /// What was found of a body to print.
@@ -106,10 +139,50 @@ pub struct FoldVerdict {
 /// Findings named on the line for people; the report has all.
 const NAMED: usize = 4;
 
+impl Verdict {
+    /// The verdict on a file as a whole; what was found of its parts is added.
+    pub(super) fn new(path: &Path, format: Format, findings: Vec<Finding>) -> Self {
+        Self {
+            artifact: super::file_name(path),
+            format,
+            passed: findings.is_empty(),
+            findings,
+            sheets: Vec::new(),
+            faces: Vec::new(),
+            body: None,
+            list: None,
+            cut: None,
+        }
+    }
+}
+
+impl fmt::Display for ListVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { boards, corners, tags, max_deviation_mm } = self;
+        let s = |n: &usize| if *n == 1 { "" } else { "s" };
+        write!(f, "verified, {boards} board{}, {corners} corners listed within ", s(boards))?;
+        write!(f, "{max_deviation_mm:.4} mm, {tags} tag{}", s(tags))
+    }
+}
+
+impl fmt::Display for CutVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { outlines, folds, engraved, max_deviation_mm } = self;
+        write!(f, "verified, {outlines} outlines to cut, {folds} lines to fold, {engraved} ")?;
+        write!(f, "engraved, within {max_deviation_mm:.4} mm")
+    }
+}
+
 impl fmt::Display for Verdict {
     /// One line: what was proved, or what is wrong.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.artifact)?;
+        if let Some(list) = self.list.as_ref().filter(|_| self.passed) {
+            return write!(f, "{list}");
+        }
+        if let Some(cut) = self.cut.as_ref().filter(|_| self.passed) {
+            return write!(f, "{cut}");
+        }
         if let Some(body) = self.body.as_ref().filter(|_| self.passed) {
             let BodyVerdict { triangles, volume_mm3, seats, max_deviation_mm } = body;
             write!(f, "verified, closed body of {triangles} triangles, ")?;

@@ -11,6 +11,7 @@ use crate::cli::output::say;
 use crate::export::obj;
 use crate::family::Family;
 use crate::target::Target;
+use crate::verify::Format;
 
 /// Where the files of a target go, and what is checked before and after.
 #[derive(clap::Args)]
@@ -67,7 +68,5 @@ impl Delivery {
 
 /// Whether a file is compared by itself; a texture is with its mesh.
 fn is_proved(path: &Path, texture: &str) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let proved = ["pdf", "svg", "png", "glb", "obj", "stl"].contains(&extension);
-    proved && path.file_name().is_none_or(|name| name != texture)
+    Format::of(path).is_some() && path.file_name().is_none_or(|name| name != texture)
 }

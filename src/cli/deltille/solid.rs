@@ -174,18 +174,13 @@ pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
     let paper = args.paper()?;
     let family = Family::resolve(&spec.tags.family).context("--family")?;
     let name = args.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
-    let printed = args.printed();
-    let layout = printed.then_some(&paper);
+    // What is cut is the net that is printed, or would be: the description has it in either case.
+    let net = args.dxf && !args.per_face;
+    let layout = (args.printed() || net).then_some(&paper);
     let solid = TargetSpec::Solid(spec.clone());
     let target = Target::build(&name, &solid, Some(&family), layout)?;
     args.delivery.check_beside(&target)?;
-    // What is cut is the net that is printed, or would be.
-    let net = match args.dxf && !args.per_face {
-        true if printed => Some(target.clone()),
-        true => Some(Target::build(&name, &solid, Some(&family), Some(&paper))?),
-        false => None,
-    };
-    let files = args.files(&target, net.as_ref(), &spec, &family)?;
+    let files = args.files(&target, net, &spec, &family)?;
     args.delivery.deliver(&target, Some(&family), &files, &summary(&target, &spec)?)
 }
 
@@ -277,7 +272,7 @@ impl Args {
     fn files(
         &self,
         target: &Target,
-        net: Option<&Target>,
+        net: bool,
         spec: &SolidSpec,
         family: &Family,
     ) -> anyhow::Result<Vec<File>> {
@@ -309,8 +304,8 @@ impl Args {
             let text = dxf::text(&artwork::panels_to_cut(target)?);
             files.push(text_file(format!("{name}-panels.dxf"), text));
         }
-        if let Some(net) = net {
-            let text = dxf::text(&artwork::net_to_cut(net)?);
+        if net {
+            let text = dxf::text(&artwork::net_to_cut(target)?);
             files.push(text_file(format!("{name}-net.dxf"), text));
         }
         if with_gltf || self.obj {

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 use serde::Serialize;
 
+use super::files::same_file;
 use super::target_file;
 use crate::cli::output::{self, say, tell};
 use crate::cli::run::FAILED;
@@ -36,13 +37,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let family = target_file::family(&target, args.family.as_deref())?;
     let folder = args.target.parent().unwrap_or(Path::new("."));
     let artifacts = match args.artifacts.as_slice() {
-        [] => artifacts_beside(folder, &target),
+        [] => {
+            let mut beside = artifacts_beside(folder, &target);
+            // A description is not proved by itself.
+            beside.retain(|path| !same_file(path, &args.target));
+            beside
+        }
         given => given.to_vec(),
     };
     if artifacts.is_empty() {
         let name = &target.name;
         bail!(
-            "no {name}.pdf, .svg, .png, .glb, .obj or .stl beside {}: name the files",
+            "no {name}.pdf, .svg, .png, .glb, .obj, .stl, .dsc or .dxf beside {}: name the files",
             args.target.display()
         );
     }
@@ -101,8 +107,9 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
     });
     let printed = [format!("{name}.pdf")].into_iter().chain(drawn).filter_map(present);
     let printed: Vec<PathBuf> = printed.collect();
-    let meshes = ["glb", "obj", "stl"].map(|extension| format!("{name}.{extension}"));
-    let meshes = meshes.into_iter().chain([stl::skeleton_name(name)]).filter_map(present);
+    let meshes = ["glb", "obj", "stl", "dsc"].map(|extension| format!("{name}.{extension}"));
+    let more = [stl::skeleton_name(name), format!("{name}-panels.dxf"), format!("{name}-net.dxf")];
+    let meshes = meshes.into_iter().chain(more).filter_map(present);
     if target.sheets.is_empty() {
         for path in printed {
             tell!(

@@ -42,7 +42,7 @@ mod write;
 use std::fmt;
 use std::str::FromStr;
 
-pub use read::read;
+pub use read::{read, read_in_mm};
 pub use write::write;
 
 use crate::lattice::Vertex;

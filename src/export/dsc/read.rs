@@ -14,9 +14,25 @@ const MOST: u32 = 10_000;
 /// How far the unit that the corner distances suggest may be off, relative.
 const UNIT_SLACK: f64 = 0.02;
 
+/// Units of a file: how many units of the coordinates the edge's unit makes, and the mm of either.
+type Units = (f64, [f64; 2]);
+
+/// Edge and coordinates: mm and mm, mm and cm, cm and m, mm and m.
+const KNOWN: [Units; 4] =
+    [(1.0, [1.0, 1.0]), (10.0, [1.0, 10.0]), (100.0, [10.0, 1e3]), (1e3, [1.0, 1e3])];
+
 /// Reads the text of a `.dsc` in either dialect; corner ids count through the file by board, row
 /// and column.
 pub fn read(text: &str, name: &str) -> Result<Target, DscError> {
+    read_in(text, name, &KNOWN)
+}
+
+/// Reads the text of a `.dsc` whose lengths must all be in millimetres, as they are written here.
+pub fn read_in_mm(text: &str, name: &str) -> Result<Target, DscError> {
+    read_in(text, name, &KNOWN[..1])
+}
+
+fn read_in(text: &str, name: &str, units: &[Units]) -> Result<Target, DscError> {
     let lines: Vec<Line> = text
         .lines()
         .enumerate()
@@ -49,7 +65,7 @@ pub fn read(text: &str, name: &str) -> Result<Target, DscError> {
         Dialect::Fork => ListFormat::DscFork,
     };
     let mut next_id = 0;
-    let panels = blocks.iter().map(|block| block.panel(&mut next_id));
+    let panels = blocks.iter().map(|block| block.panel(&mut next_id, units));
     let target = Target {
         name: Name::like(name),
         spec: TargetSpec::Listed(ListedSpec { format }),
@@ -183,7 +199,7 @@ impl<'a> Block<'a> {
     }
 
     /// The board as a panel, its corners numbered from `next_id`.
-    fn panel(&self, next_id: &mut u32) -> Result<Panel, DscError> {
+    fn panel(&self, next_id: &mut u32, units: &[Units]) -> Result<Panel, DscError> {
         let mut by_vertex = BTreeMap::new();
         for corner in &self.corners {
             if by_vertex.insert(corner.vertex, corner).is_some() {
@@ -192,7 +208,7 @@ impl<'a> Block<'a> {
                 return Err(corner.line.fault(problem));
             }
         }
-        let [edge_mm, unit_mm] = self.units(&by_vertex)?;
+        let [edge_mm, unit_mm] = self.units(&by_vertex, units)?;
         let mut panel = Panel {
             id: self.id,
             kind: self.kind,
@@ -227,7 +243,11 @@ impl<'a> Block<'a> {
     }
 
     /// The edge in mm, and how many mm the unit of the coordinates has.
-    fn units(&self, corners: &BTreeMap<Vertex, &ListedCorner>) -> Result<[f64; 2], DscError> {
+    fn units(
+        &self,
+        corners: &BTreeMap<Vertex, &ListedCorner>,
+        known: &[Units],
+    ) -> Result<[f64; 2], DscError> {
         // The next corner along the row is one edge away on both kinds of board.
         let mut steps: Vec<f64> = corners
             .iter()
@@ -241,9 +261,6 @@ impl<'a> Block<'a> {
         let Some(&step) = steps.get(steps.len() / 2) else {
             return Err(self.head.fault("no two corners of a row are neighbours"));
         };
-        // Edge and coordinates: mm and mm, mm and cm, cm and m, mm and m.
-        let known =
-            [(1.0, [1.0, 1.0]), (10.0, [1.0, 10.0]), (100.0, [10.0, 1e3]), (1e3, [1.0, 1e3])];
         let ratio = self.size / step;
         let unit = known.iter().find(|(r, _)| (ratio / r - 1.0).abs() < UNIT_SLACK);
         let (_, [edge, unit]) = unit.ok_or_else(|| {

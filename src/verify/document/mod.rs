@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 use crate::raster::Gray;
 
+pub(super) use svg::length_mm;
+
 /// Largest picture that is drawn for a check, px.
 pub(super) const MAX_PIXELS: f64 = 60.0e6;
 
@@ -28,27 +30,34 @@ pub enum Format {
     Obj,
     /// Binary STL.
     Stl,
+    /// List of boards, corners and tags for other detectors.
+    Dsc,
+    /// Drawing for a cutter.
+    Dxf,
 }
 
 impl Format {
-    /// The kind of printed document that a file name tells.
-    pub fn of_document(path: &Path) -> Option<Self> {
-        match path.extension()?.to_string_lossy().to_lowercase().as_str() {
-            "pdf" => Some(Self::Pdf),
-            "svg" => Some(Self::Svg),
-            "png" => Some(Self::Png),
-            _ => None,
-        }
+    /// All kinds with the extensions of their files.
+    pub const ALL: [(Self, &str); 8] = [
+        (Self::Pdf, "pdf"),
+        (Self::Svg, "svg"),
+        (Self::Png, "png"),
+        (Self::Glb, "glb"),
+        (Self::Obj, "obj"),
+        (Self::Stl, "stl"),
+        (Self::Dsc, "dsc"),
+        (Self::Dxf, "dxf"),
+    ];
+
+    /// The kind that a file name tells.
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_string_lossy().to_lowercase();
+        Self::ALL.iter().find(|(_, known)| *known == extension).map(|(format, _)| *format)
     }
 
-    /// The kind of mesh or body that a file name tells.
-    pub fn of_mesh(path: &Path) -> Option<Self> {
-        match path.extension()?.to_string_lossy().to_lowercase().as_str() {
-            "glb" => Some(Self::Glb),
-            "obj" => Some(Self::Obj),
-            "stl" => Some(Self::Stl),
-            _ => None,
-        }
+    /// Whether files of this kind are printed pages.
+    pub fn is_document(self) -> bool {
+        matches!(self, Self::Pdf | Self::Svg | Self::Png)
     }
 }
 
@@ -103,7 +112,7 @@ impl Document {
     pub fn open(path: &Path) -> Result<Self, DocumentError> {
         let unreadable =
             |problem: String| DocumentError::Unreadable { path: path.to_owned(), problem };
-        let Some(format) = Format::of_document(path) else {
+        let Some(format) = Format::of(path).filter(|format| format.is_document()) else {
             return Err(unreadable("not a .pdf, .svg or .png file".to_owned()));
         };
         let bytes = std::fs::read(path)

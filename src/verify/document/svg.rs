@@ -65,7 +65,7 @@ impl Svg {
 }
 
 /// A length with an absolute unit, mm; px are CSS pixels of 1/96 inch, and so are bare numbers.
-fn length_mm(text: &str) -> Option<f64> {
+pub(in crate::verify) fn length_mm(text: &str) -> Option<f64> {
     let number = text.trim().trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let mm = match text.trim()[number.len()..].to_ascii_lowercase().as_str() {
         "mm" => 1.0,

@@ -23,23 +23,25 @@ fn glb(path: &Path) -> Result<Model, String> {
     let blob = file.blob.as_deref().ok_or("it has no binary part")?;
     let mut triangles = Vec::new();
     let mut texture = None;
-    for scene in file.scenes() {
-        for node in scene.nodes() {
-            visit(&node, DMat4::IDENTITY, blob, &mut triangles, &mut texture)?;
-        }
+    let roots = file.default_scene().into_iter().flat_map(|scene| scene.nodes());
+    // Every node is reached once, as was seen to before; chains of them may be long.
+    let mut open: Vec<(gltf::Node, DMat4)> = roots.map(|node| (node, DMat4::IDENTITY)).collect();
+    while let Some((node, parent)) = open.pop() {
+        let here = visit(&node, parent, blob, &mut triangles, &mut texture)?;
+        open.extend(node.children().map(|child| (child, here)));
     }
     let texture = texture.ok_or("it has no texture")?;
     Ok(Model { triangles, texture: image(texture)? })
 }
 
-/// Adds the triangles of a node and of those below it; glTF is in metres.
+/// Adds the triangles of a node, and tells its motion; glTF is in metres.
 fn visit<'a>(
     node: &gltf::Node<'a>,
     parent: DMat4,
     blob: &'a [u8],
     triangles: &mut Vec<Triangle>,
     texture: &mut Option<&'a [u8]>,
-) -> Result<(), String> {
+) -> Result<DMat4, String> {
     let columns = node.transform().matrix().map(|column| column.map(f64::from));
     let here = parent * DMat4::from_cols_array_2d(&columns);
     for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
@@ -64,7 +66,7 @@ fn visit<'a>(
             *texture = blob.get(view.offset()..view.offset() + view.length());
         }
     }
-    node.children().try_for_each(|child| visit(&child, here, blob, triangles, texture))
+    Ok(here)
 }
 
 fn obj(path: &Path) -> Result<Model, String> {
@@ -88,15 +90,6 @@ fn obj(path: &Path) -> Result<Model, String> {
             (&mesh.texcoord_indices, &uvs),
         )?;
         let material = mesh.material_id.and_then(|id| materials.get(id));
-        if let Some(material) = material
-            && (material.diffuse.is_some_and(|kd| kd != [1.0; 3])
-                || material.dissolve.is_some_and(|d| d != 1.0))
-        {
-            return Err(
-                "its material tints or hides the texture: Kd 1 1 1 and d 1 show it as it is"
-                    .to_owned(),
-            );
-        }
         let name = material.and_then(|material| material.diffuse_texture.as_ref());
         texture = name.map(|name| path.with_file_name(name)).or(texture);
     }

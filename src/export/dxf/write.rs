@@ -1,19 +1,7 @@
-//! DXF of AutoCAD release 12, as text, in millimetres: the dialect that every cutter reads.
-//!
-//! Closed paths are closed `POLYLINE`s, others are `LINE`s; layers `CUT`, `FOLD`, `VALLEY`
-//! and `ENGRAVE` have colours of their own, by which cutters tell what to do.
-
 use std::fmt::Write;
 
-use crate::artwork::{CutDrawing, CutLayer, CutPath};
-
-/// Layers with their colours: red, green, magenta, blue.
-const LAYERS: [(CutLayer, &str, u8); 4] = [
-    (CutLayer::Cut, "CUT", 1),
-    (CutLayer::Fold, "FOLD", 3),
-    (CutLayer::Valley, "VALLEY", 6),
-    (CutLayer::Engrave, "ENGRAVE", 5),
-];
+use super::{LAYERS, layer_name};
+use crate::artwork::{CutDrawing, CutPath};
 
 /// The text of a `.dxf` file.
 pub fn text(drawing: &CutDrawing) -> String {
@@ -41,10 +29,6 @@ pub fn text(drawing: &CutDrawing) -> String {
     file.section("ENTITIES", |file| drawing.paths.iter().for_each(|path| file.path(path)));
     file.tag(0, "EOF");
     file.text
-}
-
-fn layer_name(layer: CutLayer) -> &'static str {
-    LAYERS.iter().find(|(l, ..)| *l == layer).map_or("0", |(_, name, _)| name)
 }
 
 #[derive(Default)]

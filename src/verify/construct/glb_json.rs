@@ -1,0 +1,157 @@
+//! The JSON of a `.glb` that every viewer shows alike, as types: what has no field here is refused.
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Root {
+    pub asset: Asset,
+    pub scene: usize,
+    pub scenes: Vec<Scene>,
+    pub nodes: Vec<Node>,
+    pub meshes: Vec<Mesh>,
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    pub samplers: Vec<Sampler>,
+    pub images: Vec<Image>,
+    pub accessors: Vec<Accessor>,
+    pub buffer_views: Vec<BufferView>,
+    pub buffers: Vec<Buffer>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Asset {
+    pub version: String,
+    #[serde(rename = "generator")]
+    _generator: Option<String>,
+    #[serde(rename = "extras")]
+    _extras: Option<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Scene {
+    pub nodes: Vec<usize>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Node {
+    #[serde(rename = "name")]
+    _name: Option<String>,
+    pub mesh: Option<usize>,
+    #[serde(default)]
+    pub children: Vec<usize>,
+    pub matrix: Option<[f64; 16]>,
+    pub translation: Option<[f64; 3]>,
+    pub rotation: Option<[f64; 4]>,
+    pub scale: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Mesh {
+    #[serde(rename = "name")]
+    _name: Option<String>,
+    pub primitives: Vec<Primitive>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Primitive {
+    pub attributes: Attributes,
+    pub indices: usize,
+    pub material: usize,
+    pub mode: Option<u32>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "SCREAMING_SNAKE_CASE")]
+pub(super) struct Attributes {
+    pub position: usize,
+    pub normal: usize,
+    #[serde(rename = "TEXCOORD_0")]
+    pub texcoord_0: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Material {
+    #[serde(rename = "name")]
+    _name: Option<String>,
+    pub pbr_metallic_roughness: Surface,
+    pub alpha_mode: Option<String>,
+    pub emissive_factor: Option<[f64; 3]>,
+    pub double_sided: Option<bool>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Surface {
+    pub base_color_texture: TextureInfo,
+    pub base_color_factor: Option<[f64; 4]>,
+    pub metallic_factor: f64,
+    pub roughness_factor: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct TextureInfo {
+    pub index: usize,
+    pub tex_coord: Option<u32>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Texture {
+    pub sampler: usize,
+    pub source: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Sampler {
+    pub mag_filter: u32,
+    pub min_filter: u32,
+    pub wrap_s: u32,
+    pub wrap_t: u32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Image {
+    #[serde(rename = "name")]
+    _name: Option<String>,
+    pub mime_type: String,
+    pub buffer_view: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Accessor {
+    pub buffer_view: usize,
+    pub component_type: u32,
+    pub count: usize,
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub min: Option<Vec<f32>>,
+    pub max: Option<Vec<f32>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct BufferView {
+    pub buffer: usize,
+    #[serde(default)]
+    pub byte_offset: usize,
+    pub byte_length: usize,
+    pub target: Option<u32>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+pub(super) struct Buffer {
+    pub byte_length: usize,
+}

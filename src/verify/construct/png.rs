@@ -1,0 +1,51 @@
+//! The PNG chunks and pixels that every viewer shows alike: grey of 8 bits without transparency,
+//! without a colour space to interpret and without a second picture.
+
+use super::Findings;
+
+const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+
+/// Pixels, their size on paper, and words.
+const CHUNKS: [&[u8]; 6] = [b"IHDR", b"pHYs", b"iTXt", b"tEXt", b"IDAT", b"IEND"];
+
+/// Depth, colour type, compression, filter and interlace of 8-bit grey.
+const GREY: [u8; 5] = [8, 0, 0, 0, 0];
+
+/// Goes through the chunks of a PNG.
+pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
+    let mut rest = bytes.strip_prefix(&SIGNATURE).ok_or("not a readable PNG (its signature)")?;
+    let mut found = Findings::default();
+    let mut seen: Vec<&[u8]> = Vec::new();
+    while seen.last() != Some(&b"IEND".as_slice()) {
+        let (kind, data, after) = chunk(rest).ok_or("not a readable PNG (it is cut off)")?;
+        let name = String::from_utf8_lossy(kind).into_owned();
+        let place = format!("byte {}", bytes.len() - rest.len());
+        if !CHUNKS.contains(&kind) {
+            found.add(&place, format!("chunk {name}"));
+        }
+        let twice = [b"IHDR".as_slice(), b"pHYs"].contains(&kind) && seen.contains(&kind);
+        found.unless(!twice, &place, format!("a second chunk {name}"));
+        let head = kind == b"IHDR";
+        found.unless(head == seen.is_empty(), &place, format!("chunk {name} in this place"));
+        if head && data.get(8..) != Some(&GREY) {
+            found.add(&place, "pixels other than grey of 8 bits, line by line");
+        }
+        if kind == b"pHYs" && seen.contains(&b"IDAT".as_slice()) {
+            found.add(&place, "the resolution after the pixels");
+        }
+        seen.push(kind);
+        rest = after;
+    }
+    let place = format!("byte {}", bytes.len() - rest.len());
+    found.unless(rest.is_empty(), place, "data after the end");
+    Ok(found)
+}
+
+/// Name and content of the next chunk, and what follows it: length, name, content, check sum.
+fn chunk(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
+    let (length, rest) = bytes.split_first_chunk::<4>()?;
+    let (kind, rest) = rest.split_at_checked(4)?;
+    let (data, rest) = rest.split_at_checked(u32::from_be_bytes(*length) as usize)?;
+    let (_, rest) = rest.split_at_checked(4)?;
+    Some((kind, data, rest))
+}

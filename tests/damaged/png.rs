@@ -1,0 +1,121 @@
+//! Damaged PNG.
+
+use image::{DynamicImage, GrayImage, ImageFormat, Luma};
+
+use super::edit::{append, find};
+use super::{Case, Damage, cases};
+
+/// A chunk with its check sum.
+pub fn chunk(name: &str, data: &[u8]) -> Vec<u8> {
+    let body = [name.as_bytes(), data].concat();
+    let mut crc = u32::MAX;
+    for &byte in &body {
+        crc ^= u32::from(byte);
+        for _ in 0..8 {
+            crc = if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 };
+        }
+    }
+    [&(data.len() as u32).to_be_bytes(), &body[..], &(!crc).to_be_bytes()].concat()
+}
+
+/// Puts a chunk before the pixels.
+pub fn with_chunk(name: &'static str, data: &'static [u8]) -> Damage {
+    Box::new(move |bytes| {
+        // The length stands before the name.
+        let at = find(bytes, b"IDAT") - 4;
+        [&bytes[..at], &chunk(name, data), &bytes[at..]].concat()
+    })
+}
+
+/// Changes a byte of the head: 8 depth, 9 colour type, 12 interlace.
+fn head(at: usize, value: u8) -> Damage {
+    Box::new(move |bytes| {
+        let mut head = bytes[16..29].to_vec();
+        head[at] = value;
+        [&bytes[..8], &chunk("IHDR", &head), &bytes[33..]].concat()
+    })
+}
+
+/// Draws the pixels anew, the resolution kept.
+pub fn pixels(draw: impl Fn(GrayImage) -> DynamicImage + 'static) -> Damage {
+    Box::new(move |bytes| {
+        let picture = image::load_from_memory(bytes).unwrap().into_luma8();
+        let mut drawn = std::io::Cursor::new(Vec::new());
+        draw(picture).write_to(&mut drawn, ImageFormat::Png).unwrap();
+        let (drawn, at) = (drawn.into_inner(), find(bytes, b"pHYs") - 4);
+        [&drawn[..33], &bytes[at..at + 21], &drawn[33..]].concat()
+    })
+}
+
+/// Exchanges black and white in a square; its corner in parts of the picture, its side in pixels.
+pub fn square([across, down]: [f64; 2], side: u32) -> Damage {
+    pixels(move |mut picture| {
+        let [x, y] = [across * f64::from(picture.width()), down * f64::from(picture.height())];
+        for (dx, dy) in (0..side).flat_map(|dx| (0..side).map(move |dy| (dx, dy))) {
+            let Luma([grey]) = picture.get_pixel_mut(x as u32 + dx, y as u32 + dy);
+            *grey = 255 - *grey;
+        }
+        picture.into()
+    })
+}
+
+/// The resolution, in pixels along each side.
+fn resolution(along: u32, up: u32, unit: u8) -> Damage {
+    Box::new(move |bytes| {
+        let at = find(bytes, b"pHYs") - 4;
+        let data = [&along.to_be_bytes()[..], &up.to_be_bytes(), &[unit]].concat();
+        [&bytes[..at], &chunk("pHYs", &data), &bytes[at + 21..]].concat()
+    })
+}
+
+/// Of a board.
+pub fn board() -> Vec<Case> {
+    cases(
+        "b.png",
+        vec![
+            ("a gamma", "chunk gAMA", with_chunk("gAMA", &[0, 0, 0, 1])),
+            ("a colour space", "chunk sRGB", with_chunk("sRGB", &[0])),
+            ("a profile", "chunk iCCP", with_chunk("iCCP", b"a\0\0")),
+            ("primary colours", "chunk cHRM", with_chunk("cHRM", &[0; 32])),
+            ("transparent black", "chunk tRNS", with_chunk("tRNS", &[0, 0])),
+            ("a background", "chunk bKGD", with_chunk("bKGD", &[0, 0])),
+            ("an animation", "chunk acTL", with_chunk("acTL", &[0, 0, 0, 2, 0, 0, 0, 0])),
+            ("a turn", "chunk eXIf", with_chunk("eXIf", b"MM")),
+            ("a palette", "chunk PLTE", with_chunk("PLTE", &[0; 3])),
+            ("significant bits", "chunk sBIT", with_chunk("sBIT", &[1])),
+            ("a second resolution", "a second chunk pHYs", with_chunk("pHYs", &[0; 9])),
+            ("interlacing", "pixels other than grey", head(12, 1)),
+            ("one bit", "pixels other than grey", head(8, 1)),
+            (
+                "colours",
+                "pixels other than grey",
+                pixels(|p| DynamicImage::from(p).to_rgb8().into()),
+            ),
+            (
+                "transparency",
+                "pixels other than grey",
+                pixels(|p| DynamicImage::from(p).to_luma_alpha8().into()),
+            ),
+            (
+                "sixteen bits",
+                "pixels other than grey",
+                pixels(|p| DynamicImage::from(p).to_luma16().into()),
+            ),
+            ("data after the end", "data after the end", append("PK")),
+            ("a larger page", "page of", resolution(11_000, 11_000, 1)),
+            ("pixels that are not square", "no resolution", resolution(11_811, 11_000, 1)),
+            ("a resolution without a unit", "no resolution", resolution(11_811, 11_811, 0)),
+            ("a spot", "spot of", square([0.02, 0.02], 12)),
+            ("a hole in the board", "at row", square([0.5, 0.5], 40)),
+            (
+                "black and white exchanged",
+                "is inverted",
+                pixels(|mut p| {
+                    image::imageops::invert(&mut p);
+                    p.into()
+                }),
+            ),
+            ("a mirror", "is mirrored", pixels(|p| image::imageops::flip_horizontal(&p).into())),
+        ],
+    )
+}

@@ -1,0 +1,70 @@
+//! Damaged STL.
+
+use super::{Case, Damage, cases};
+
+/// Changes bytes in place.
+fn bytes(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
+    Box::new(move |good| {
+        let mut bad = good.to_vec();
+        edit(&mut bad);
+        bad
+    })
+}
+
+/// Where triangle `index` begins: a normal and three vertices of three floats, two bytes.
+fn triangle(index: usize) -> usize {
+    84 + 50 * index
+}
+
+/// Changes all coordinates of vertices.
+fn vertices(edit: impl Fn(usize, f32) -> f32 + 'static) -> Damage {
+    bytes(move |bytes| {
+        for index in 0..(bytes.len() - 84) / 50 {
+            for number in 3..12 {
+                let at = triangle(index) + 4 * number;
+                let value = f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+                bytes[at..at + 4].copy_from_slice(&edit(number % 3, value).to_le_bytes());
+            }
+        }
+    })
+}
+
+/// Of a solid.
+pub fn all() -> Vec<Case> {
+    cases(
+        "t.stl",
+        vec![
+            (
+                "the word that begins a text",
+                "the head",
+                bytes(|b| b[..5].copy_from_slice(b"solid")),
+            ),
+            ("a colour", "the head", bytes(|b| b[40..50].copy_from_slice(b"COLOR=\xff\0\0\xff"))),
+            (
+                "a coloured triangle",
+                "triangle 2: attribute bytes",
+                bytes(|b| b[triangle(2) + 49] = 0x80),
+            ),
+            (
+                "a triangle that is missing",
+                "it is open",
+                bytes(|b| {
+                    b.truncate(triangle(3));
+                    b[80] = 3;
+                }),
+            ),
+            (
+                "a file that is cut off",
+                "its length is not that",
+                bytes(|b| b.truncate(triangle(3))),
+            ),
+            ("data after the end", "its length is not that", bytes(|b| b.extend(b"more"))),
+            ("a normal of another side", "wrong normals", bytes(|b| b[triangle(0) + 3] ^= 0x80)),
+            ("a vertex that is moved", "open", bytes(|b| b[triangle(0) + 14] ^= 0x10)),
+            ("a coordinate that is none", "coordinates", vertices(|_, _| f32::NAN)),
+            ("inches for millimetres", "as of scale", vertices(|_, v| v / 25.4)),
+            ("a mirror", "inside out", vertices(|axis, v| if axis == 0 { -v } else { v })),
+            ("stretched", "volume", vertices(|axis, v| if axis == 2 { 1.01 * v } else { v })),
+        ],
+    )
+}

@@ -1,0 +1,198 @@
+//! Damaged SVG.
+
+use super::edit::{append, before, line, swap, text};
+use super::{Case, cases};
+
+/// Of a board.
+pub fn board() -> Vec<Case> {
+    let over = |element: &str| before("</svg>", element);
+    let on = |element: &str, attribute: &str| {
+        swap(&format!("<{element} "), &format!("<{element} {attribute} "))
+    };
+    cases(
+        "b.svg",
+        vec![
+            (
+                "a web page over the board",
+                "element <foreignObject>",
+                over("<foreignObject width=\"297\" height=\"210\"/>"),
+            ),
+            (
+                "hidden in print",
+                "element <style>",
+                over("<style>@media print { * { display: none } }</style>"),
+            ),
+            (
+                "hidden on dark screens",
+                "element <style>",
+                over("<style>@media (prefers-color-scheme: dark) { path { fill: #fff } }</style>"),
+            ),
+            (
+                "a script",
+                "element <script>",
+                over("<script>document.rootElement.remove()</script>"),
+            ),
+            (
+                "an animation",
+                "element <animate>",
+                before("</g>", "<animate attributeName=\"fill\" to=\"#fff\" dur=\"1s\"/>"),
+            ),
+            (
+                "an animated value",
+                "element <set>",
+                before("</g>", "<set attributeName=\"fill\" to=\"#fff\" begin=\"1s\"/>"),
+            ),
+            (
+                "a moving board",
+                "element <animateTransform>",
+                before("</g>", "<animateTransform attributeName=\"transform\"/>"),
+            ),
+            (
+                "an external picture",
+                "element <image>",
+                over("<image href=\"http://example.org/a.png\" width=\"9\" height=\"9\"/>"),
+            ),
+            ("an external part", "element <use>", over("<use href=\"other.svg#a\"/>")),
+            ("text in a font", "element <text>", over("<text x=\"9\" y=\"9\">5</text>")),
+            ("a choice by language", "element <switch>", over("<switch/>")),
+            ("a link", "element <a>", over("<a href=\"http://example.org\"/>")),
+            ("a filter", "element <filter>", over("<filter id=\"f\"/>")),
+            ("a mask", "element <mask>", over("<mask id=\"m\"/>")),
+            ("a pattern", "element <pattern>", over("<pattern id=\"p\"/>")),
+            ("a view of a part", "element <view>", over("<view id=\"v\" viewBox=\"0 0 9 9\"/>")),
+            ("a drawing within", "element <svg> within <svg>", over("<svg/>")),
+            (
+                "a path of another language",
+                "element <path>",
+                over("<path xmlns=\"http://example.org\" d=\"M0 0Z\"/>"),
+            ),
+            (
+                "no paper",
+                "no paper below the marks",
+                swap("<rect fill=\"#fff\" height=\"100%\" width=\"100%\"/>", ""),
+            ),
+            (
+                "a white page over all",
+                "paper above the marks",
+                over("<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>"),
+            ),
+            ("style of the marks", "attribute style of <g>", on("g", "style=\"display: none\"")),
+            ("a class", "attribute class of <g>", on("g", "class=\"a\"")),
+            ("opacity of the marks", "attribute opacity of <g>", on("g", "opacity=\"0\"")),
+            ("a transform", "attribute transform of <g>", on("g", "transform=\"rotate(1)\"")),
+            (
+                "a blend mode",
+                "attribute mix-blend-mode of <g>",
+                on("g", "mix-blend-mode=\"screen\""),
+            ),
+            ("a hidden tile", "attribute display of <path>", on("path", "display=\"none\"")),
+            (
+                "an invisible tile",
+                "attribute visibility of <path>",
+                on("path", "visibility=\"hidden\""),
+            ),
+            (
+                "a clipped tile",
+                "attribute clip-path of <path>",
+                on("path", "clip-path=\"url(#c)\""),
+            ),
+            (
+                "a dashed tile",
+                "attribute stroke-dasharray of <path>",
+                on("path", "stroke-dasharray=\"1 1\""),
+            ),
+            (
+                "code that is run when shown",
+                "attribute onload of <svg>",
+                on("svg", "onload=\"alert()\""),
+            ),
+            (
+                "another aspect",
+                "attribute preserveAspectRatio of <svg>",
+                on("svg", "preserveAspectRatio=\"none\""),
+            ),
+            ("white marks", "fill=\"#fff\" of <g>", swap("fill=\"#000\"", "fill=\"#fff\"")),
+            (
+                "marks of the reader's colour",
+                "fill=\"currentColor\" of <g>",
+                swap("fill=\"#000\"", "fill=\"currentColor\""),
+            ),
+            (
+                "marks of a pattern",
+                "fill=\"url(#p)\" of <g>",
+                swap("fill=\"#000\"", "fill=\"url(#p)\""),
+            ),
+            ("another rule of filling", "fill-rule=\"nonzero\" of <g>", swap("evenodd", "nonzero")),
+            ("black paper", "fill=\"#000\" of <rect>", swap("fill=\"#fff\"", "fill=\"#000\"")),
+            (
+                "a tile that ends early",
+                "d=\"M",
+                line("<path", |line| line.replacen("Z\"", "L1\"", 1)),
+            ),
+            (
+                "a tile with an arc",
+                "d=\"M",
+                line("<path", |line| line.replacen("Z\"", "A1 1 0 0 0 2 2Z\"", 1)),
+            ),
+            (
+                "a style sheet",
+                "processing instruction <?xml-stylesheet?>",
+                before("<svg", "<?xml-stylesheet href=\"a.css\"?>"),
+            ),
+            (
+                "entities",
+                "a document type declaration",
+                before("<svg", "<!DOCTYPE svg [<!ENTITY a \"b\">]>"),
+            ),
+            ("another encoding", "an XML declaration", swap("UTF-8", "UTF-16")),
+            ("words on the page", "text between elements", over("words")),
+            (
+                "a tile that is missing",
+                "tile missing at row 1 col 1",
+                text(|text| {
+                    let tile = text.lines().find(|line| line.contains("tile-0-r1-c1\"")).unwrap();
+                    text.replacen(tile, "", 1)
+                }),
+            ),
+            ("another page", "page of 298.000", swap("297mm", "298mm")),
+            (
+                "another scale",
+                "scale 0.99",
+                swap("viewBox=\"0 0 297 210\"", "viewBox=\"0 0 300 212.1212\""),
+            ),
+            ("a second document", "not a readable SVG", append("<svg/>")),
+        ],
+    )
+}
+
+/// Of a net, which has lines.
+pub fn net() -> Vec<Case> {
+    cases(
+        "t.svg",
+        vec![
+            (
+                "lines of no width",
+                "stroke-width=\"0\" of <path>",
+                swap("stroke-width=\"0.15\"", "stroke-width=\"0\""),
+            ),
+            (
+                "white lines",
+                "stroke=\"#fff\" of <path>",
+                swap("stroke=\"#000\"", "stroke=\"#fff\""),
+            ),
+            (
+                "lines as wide as the screen says",
+                "attribute vector-effect",
+                swap("stroke=\"#000\"", "vector-effect=\"non-scaling-stroke\" stroke=\"#000\""),
+            ),
+            (
+                "a line that is missing",
+                "line ",
+                text(|text| {
+                    let cut = text.lines().find(|line| line.contains("id=\"cut-")).unwrap();
+                    text.replacen(cut, "", 1)
+                }),
+            ),
+        ],
+    )
+}
