@@ -615,7 +615,7 @@ fn names_in_files_lead_nowhere() {
             "render bad.json --camera camera.yaml -o out",
             "detect --target bad.json photo.png -o out",
             "verify bad.json",
-            "calibrate corners --target bad.json -o out/camera.yaml",
+            "calibrate corners --target bad.json --model radtan -o out/camera.yaml",
         ] {
             let said = refused(folder.path(), args);
             assert!(said.contains("bad.json") && said.contains("`name`"), "{args}: {said}");
@@ -629,8 +629,7 @@ fn names_in_files_lead_nowhere() {
     // A picture beside the folder of pictures is not shown.
     std::fs::create_dir(path("photos")).unwrap();
     image::GrayImage::from_pixel(64, 48, image::Luma([99])).save(path("secret.png")).unwrap();
-    let args =
-        "calibrate corners --target board.json --images photos --report page.html -o camera2.yaml";
+    let args = "calibrate corners --target board.json --model radtan --images photos --report page.html -o camera2.yaml";
     let result = deltille(folder.path(), args).success();
     let said = String::from_utf8(result.get_output().stderr.clone()).unwrap();
     assert!(said.contains("6 of 6 pictures are not in photos"), "{said}");
