@@ -14,7 +14,8 @@ pub struct WriteError {
 }
 
 /// Writes a file through `fill`: to a temporary name in the same folder, renamed to `path` once
-/// everything is written. On an error nothing is left behind, and an earlier file stays as it was.
+/// everything is written. On an error nothing is left behind, and an earlier file stays as it was. Where
+/// `path` is a symbolic link, what it points to is written; a device or a pipe is refused.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -26,6 +27,7 @@ fn fill_and_rename(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
+    let path = &place(path)?;
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -53,9 +55,43 @@ fn fill_and_rename(
     Ok(())
 }
 
+/// The file that a path stands for, which a renamed one may take the place of.
+pub fn place(path: &Path) -> io::Result<PathBuf> {
+    match path.symlink_metadata() {
+        Err(_) => Ok(path.to_owned()),
+        Ok(link) if link.is_symlink() => {
+            let to = path.canonicalize().map_err(|error| {
+                io::Error::new(error.kind(), "it is a symbolic link to nothing")
+            })?;
+            place(&to)
+        }
+        Ok(there) if there.is_file() || there.is_dir() => Ok(path.to_owned()),
+        Ok(_) => {
+            Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a device or a pipe, no file"))
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_links_and_pipes_pipes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("real"), "old").unwrap();
+        std::os::unix::fs::symlink("real", path("link")).unwrap();
+        std::os::unix::fs::symlink("nowhere", path("dangling")).unwrap();
+        std::os::unix::net::UnixListener::bind(path("socket")).unwrap();
+        let new = |name: &str| write(&path(name), |out| out.write_all(b"new"));
+        new("link").unwrap();
+        assert_eq!(std::fs::read(path("real")).unwrap(), b"new");
+        assert!(path("link").is_symlink());
+        assert!(new("dangling").unwrap_err().to_string().contains("link to nothing"));
+        assert!(new("socket").unwrap_err().to_string().contains("no file"));
+    }
 
     #[test]
     fn a_failed_write_leaves_the_earlier_file_and_nothing_else() {

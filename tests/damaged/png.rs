@@ -68,6 +68,33 @@ fn resolution(along: u32, up: u32, unit: u8) -> Damage {
     })
 }
 
+/// Changes the check sum of the packed pixels, in the last of their chunks.
+fn packed_sum() -> Damage {
+    Box::new(|bytes| {
+        let end = bytes.len() - 12;
+        let at = bytes[..end].windows(4).rposition(|name| name == b"IDAT").unwrap();
+        let mut data = bytes[at + 4..end - 4].to_vec();
+        *data.last_mut().unwrap() ^= 1;
+        [&bytes[..at - 4], &chunk("IDAT", &data), &bytes[end..]].concat()
+    })
+}
+
+/// Adds data to the last chunk of packed pixels.
+fn more_packed() -> Damage {
+    Box::new(|bytes| {
+        let end = bytes.len() - 12;
+        [&bytes[..end], &chunk("IDAT", b"more"), &bytes[end..]].concat()
+    })
+}
+
+/// Changes the check sum of the last chunk.
+fn last_byte() -> Damage {
+    Box::new(|bytes| {
+        let (last, rest) = bytes.split_last().unwrap();
+        [rest, &[last ^ 1]].concat()
+    })
+}
+
 /// Of a board.
 pub fn board() -> Vec<Case> {
     cases(
@@ -102,6 +129,9 @@ pub fn board() -> Vec<Case> {
                 pixels(|p| DynamicImage::from(p).to_luma16().into()),
             ),
             ("data after the end", "data after the end", append("PK")),
+            ("a check sum of the packed pixels", "a check sum", packed_sum()),
+            ("data behind the packed pixels", "a check sum", more_packed()),
+            ("a check sum of the end", "a check sum", last_byte()),
             ("a larger page", "page of", resolution(11_000, 11_000, 1)),
             ("pixels that are not square", "no resolution", resolution(11_811, 11_000, 1)),
             ("a resolution without a unit", "no resolution", resolution(11_811, 11_811, 0)),

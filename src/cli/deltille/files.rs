@@ -103,7 +103,11 @@ fn write_here(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
     let context = || format!("-o: cannot write to {}", folder.display());
     output::check_folder(folder).context("-o")?;
     fs::create_dir_all(folder).with_context(context)?;
-    let paths: Vec<PathBuf> = files.iter().map(|file| folder.join(&file.name)).collect();
+    let place = |file: &File| {
+        let path = folder.join(&file.name);
+        atomic::place(&path).with_context(|| format!("cannot write {}", path.display()))
+    };
+    let paths = files.iter().map(place).collect::<anyhow::Result<Vec<PathBuf>>>()?;
     if let Some(path) = paths.iter().find(|path| path.is_dir()) {
         bail!("cannot write {}: there is a folder of that name", path.display());
     }

@@ -1,6 +1,8 @@
 //! The PNG chunks and pixels that every viewer shows alike: grey of 8 bits without transparency,
 //! without a colour space to interpret and without a second picture.
 
+use std::io::{self, Cursor, Read};
+
 use super::Findings;
 
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
@@ -16,6 +18,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
     let mut rest = bytes.strip_prefix(&SIGNATURE).ok_or("not a readable PNG (its signature)")?;
     let mut found = Findings::default();
     let mut seen: Vec<&[u8]> = Vec::new();
+    let (mut packed, mut first) = (Vec::new(), [].as_slice());
     while seen.last() != Some(&b"IEND".as_slice()) {
         let (kind, data, after) = chunk(rest).ok_or("not a readable PNG (it is cut off)")?;
         let name = String::from_utf8_lossy(kind).into_owned();
@@ -27,6 +30,12 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
         found.unless(!twice, &place, format!("a second chunk {name}"));
         let head = kind == b"IHDR";
         found.unless(head == seen.is_empty(), &place, format!("chunk {name} in this place"));
+        if head {
+            first = data;
+        }
+        if kind == b"IDAT" {
+            packed.extend_from_slice(data);
+        }
         if head && data.get(8..) != Some(&GREY) {
             found.add(&place, "pixels other than grey of 8 bits, line by line");
         }
@@ -38,7 +47,40 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
     }
     let place = format!("byte {}", bytes.len() - rest.len());
     found.unless(rest.is_empty(), place, "data after the end");
+    // What is not grey of 8 bits is told already.
+    let is_whole = !found.0.is_empty() || is_whole(&packed, first);
+    found.unless(
+        is_whole && is_intact(bytes),
+        "the pixels",
+        "a check sum that is wrong, or data that is cut off",
+    );
     Ok(found)
+}
+
+/// Whether all check sums hold: some readers refuse what others show.
+fn is_intact(bytes: &[u8]) -> bool {
+    let mut options = png::DecodeOptions::default();
+    options.set_skip_ancillary_crc_failures(false);
+    let read = || -> Result<(), png::DecodingError> {
+        let decoder = png::Decoder::new_with_options(Cursor::new(bytes), options);
+        let mut reader = decoder.read_info()?;
+        while reader.next_row()?.is_some() {}
+        reader.finish()
+    };
+    read().is_ok()
+}
+
+/// Whether the packed pixels are whole, with their check sum and nothing behind it, and fill the picture: a byte and
+/// the pixels of each row.
+fn is_whole(packed: &[u8], head: &[u8]) -> bool {
+    let word = |at: usize| {
+        head.get(at..)?.first_chunk::<4>().map(|bytes| u64::from(u32::from_be_bytes(*bytes)))
+    };
+    let (Some(width), Some(height)) = (word(0), word(4)) else { return false };
+    let mut pixels = flate2::bufread::ZlibDecoder::new(packed);
+    let most = (width + 1) * height;
+    let unpacked = io::copy(&mut (&mut pixels).take(most + 1), &mut io::sink());
+    unpacked.is_ok_and(|length| length == most) && pixels.total_in() == packed.len() as u64
 }
 
 /// Name and content of the next chunk, and what follows it: length, name, content, check sum.
