@@ -124,7 +124,6 @@ fn best_families_hold_whatever_the_rules() {
             distance,
             rules,
             budget: best::Budget::Time(std::time::Duration::from_millis(500)),
-            from_nothing: false,
             seed: 3,
             limit: None,
             exchange: true,

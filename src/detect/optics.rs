@@ -401,7 +401,12 @@ impl Optics {
 
     /// The derivative of κ₀ by a parameter.
     fn kappa_slope(&self, greys: [f64; 2], parameter: usize) -> f64 {
-        (self.moved(parameter).kappas(greys)[0] - self.kappas(greys)[0]) / STEP
+        match parameter {
+            0..TONE_PARAMS => {
+                (self.moved(parameter).kappas(greys)[0] - self.kappas(greys)[0]) / STEP
+            }
+            _ => 0.0,
+        }
     }
 }
 

@@ -38,8 +38,6 @@ pub struct Best {
     pub rules: Rules,
     /// How much of it.
     pub budget: Budget,
-    /// Whether to leave alone what is on record, and search from nothing.
-    pub from_nothing: bool,
     /// Seed of all random choices.
     pub seed: u64,
     /// Number of codes at most.
@@ -155,11 +153,8 @@ struct Draw {
 
 impl Best {
     /// The best construction on record for such tags: of a shipped family with these bits and this distance or a
-    /// greater one, as far as its codes satisfy the rules. `None` where there is none, or it is not wanted.
+    /// greater one, as far as its codes satisfy the rules.
     pub fn start(&self) -> Option<Start> {
-        if self.from_nothing {
-            return None;
-        }
         let screen = self.screen();
         let on_record = |name: &str| {
             let family = Family::resolve(name).ok()?;

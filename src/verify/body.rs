@@ -30,10 +30,7 @@ const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
 
 /// Reads an STL from disk and compares it with the target.
 pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
-    let unreadable = |problem: &str| DocumentError::Unreadable {
-        path: path.to_owned(),
-        problem: problem.to_owned(),
-    };
+    let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
     let target = verifier.target;
     let TargetSpec::Solid(spec) = &target.spec else {
         return Err(unreadable("the target is no solid"));

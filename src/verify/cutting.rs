@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use super::document::read_text;
 use super::{CutVerdict, DocumentError, Finding, Format, Verdict, Verifier, VerifyError};
 use crate::artwork::{self, CutDrawing, CutLayer, CutPath};
 use crate::export::dxf::{self, DxfError};
@@ -17,17 +18,16 @@ const MOVED_MM: f64 = 20.0;
 /// the file tells.
 pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, VerifyError> {
     let stated = stated(verifier, path)?;
-    let unreadable = |problem: String| DocumentError::Unreadable { path: path.to_owned(), problem };
-    let bytes = std::fs::read(path)
-        .map_err(|source| DocumentError::Io { path: path.to_owned(), source })?;
-    let text = String::from_utf8(bytes).map_err(|_| unreadable("not a text file".to_owned()))?;
+    let text = read_text(path)?;
     let mut cut = CutVerdict::default();
     let findings = match dxf::read(&text) {
         Ok(found) => compare(found, stated, &mut cut),
         Err(DxfError::Construct { line, construct }) => {
             vec![Finding::Construct { place: format!("line {line}"), construct }]
         }
-        Err(error @ DxfError::NotDxf) => return Err(unreadable(error.to_string()).into()),
+        Err(error @ DxfError::NotDxf) => {
+            return Err(DocumentError::unreadable(path, error.to_string()).into());
+        }
     };
     Ok(Verdict { cut: Some(cut), ..Verdict::new(path, Format::Dxf, findings) })
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::document::read_text;
 use super::{DocumentError, Finding, Format, ListVerdict, Verdict, Verifier};
 use crate::export::dsc::{self, Dialect};
 use crate::target::{Panel, Target};
@@ -14,15 +15,10 @@ const LIST_TOLERANCE_MM: f64 = 1e-6;
 
 /// Reads a `.dsc` from disk and compares it with the target.
 pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
-    let unreadable = |problem: &str| DocumentError::Unreadable {
-        path: path.to_owned(),
-        problem: problem.to_owned(),
-    };
-    let bytes = std::fs::read(path)
-        .map_err(|source| DocumentError::Io { path: path.to_owned(), source })?;
-    let text = std::str::from_utf8(&bytes).map_err(|_| unreadable("not a text file"))?;
+    let text = &read_text(path)?;
     if text.lines().next().is_none_or(|head| head.split(',').count() != 4) {
-        return Err(unreadable("not a .dsc: it does not start with a line `id,A,B,size`"));
+        let problem = "not a .dsc: it does not start with a line `id,A,B,size`";
+        return Err(DocumentError::unreadable(path, problem));
     }
     let mut list = ListVerdict::default();
     let mut findings = unlisted(text);

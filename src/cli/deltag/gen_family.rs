@@ -393,13 +393,12 @@ impl Args {
                 Some(steps) => Budget::Work(steps),
                 None => Budget::Time(Duration::from_secs_f64(self.time.unwrap_or(60.0))),
             },
-            from_nothing: self.from_nothing,
             seed: self.seed(),
             limit,
             exchange: self.method == Method::Best,
         };
         let stopped = || interrupt::flag().load(Ordering::Relaxed);
-        let start = best.start();
+        let start = if self.from_nothing { None } else { best.start() };
         if let Some(start) = &start {
             let codes = best.family_of(name, start)?;
             let proof = proof_of(&certify_codes(&codes), distance);

@@ -19,7 +19,7 @@ use crate::export::calibration::{self, Print};
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
 use crate::raster::{self, AnyGray};
 use crate::report::{Given, Report, cannot_tell_apart, causes, thumbnail};
-use crate::words::counted;
+use crate::words::{counted, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
 const STRONG_CORRELATION: f64 = 0.98;
@@ -197,7 +197,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for path in written {
         let _ = writeln!(text, "wrote {}", path.display());
     }
-    output::print(&text)?;
+    output::print(&shown(&text))?;
     Ok(ExitCode::SUCCESS)
 }
 

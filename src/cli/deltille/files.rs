@@ -127,8 +127,12 @@ fn write_here(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
         output::check_replaced_by(path, &staged.with_context(context)?)?;
     }
     for (file, path) in files.iter().zip(&paths) {
-        fs::rename(staging.path().join(&file.name), path)
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        let staged = staging.path().join(&file.name);
+        if fs::rename(&staged, path).is_err() {
+            // A link may lead to another file system.
+            let content = fs::read(&staged).with_context(context)?;
+            atomic::write(path, |out| out.write_all(&content))?;
+        }
     }
     Ok(paths)
 }

@@ -15,9 +15,9 @@ mod png;
 mod stl;
 mod svg;
 
-use std::fs;
 use std::path::Path;
 
+use super::document::read;
 use super::{DocumentError, Finding, Format};
 
 /// More than this of a file is not listed.
@@ -65,7 +65,7 @@ pub(super) fn check(
     format: Format,
     name: &str,
 ) -> Result<Vec<Finding>, DocumentError> {
-    let unreadable = |problem: String| DocumentError::Unreadable { path: path.to_owned(), problem };
+    let unreadable = |problem: String| DocumentError::unreadable(path, problem);
     let bytes = read(path)?;
     let found = match format {
         Format::Svg => svg::check(&bytes),
@@ -80,13 +80,14 @@ pub(super) fn check(
     Ok(found.map_err(unreadable)?.0)
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, DocumentError> {
-    fs::read(path).map_err(|source| DocumentError::Io { path: path.to_owned(), source })
-}
-
 /// The text of a file.
 fn text(bytes: &[u8]) -> Result<&str, String> {
     std::str::from_utf8(bytes).map_err(|_| "not a text file".to_owned())
+}
+
+/// The first characters of what is named in a finding.
+fn start(text: &str, characters: usize) -> String {
+    text.chars().take(characters).collect()
 }
 
 /// A decimal number without an exponent, as all readers take it.

@@ -1,7 +1,7 @@
 //! The lines of a material library that every viewer takes alike: one material that shows its
 //! texture as it is.
 
-use super::{Findings, decimal, is_plain_file_name};
+use super::{Findings, decimal, is_plain_file_name, start};
 
 /// Statements with the numbers that they must have: no light of its own, white, no gloss, opaque.
 const NUMBERS: [(&str, &[f64]); 5] = [
@@ -44,14 +44,12 @@ pub(super) fn check(text: &str) -> (Material, Findings) {
                     numbers.as_deref() == Some(*stated)
                 }
                 None => {
-                    let start: String = word.chars().take(20).collect();
-                    found.add(place, format!("statement {start}"));
+                    found.add(place, format!("statement {}", start(word, 20)));
                     continue;
                 }
             },
         };
-        let start: String = line.chars().take(60).collect();
-        found.unless(holds, place, format!("`{start}`"));
+        found.unless(holds, place, format!("`{}`", start(line, 60)));
     }
     let white = text.lines().any(|line| line.starts_with("Kd "));
     found.unless(white, "the file", "no colour Kd 1 1 1");

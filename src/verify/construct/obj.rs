@@ -3,17 +3,15 @@
 
 use std::path::Path;
 
-use super::{Findings, decimal, is_plain_file_name, mtl, png, read, text};
+use super::{Findings, decimal, is_plain_file_name, mtl, png, start, text};
 use crate::verify::DocumentError;
+use crate::verify::document::{read, read_text};
 
 /// Goes through an OBJ, its material library and its texture.
 pub(super) fn check(path: &Path, bytes: &[u8]) -> Result<Findings, DocumentError> {
-    let unreadable =
-        |path: &Path, problem: String| DocumentError::Unreadable { path: path.to_owned(), problem };
+    let text = text(bytes).map_err(|problem| DocumentError::unreadable(path, problem))?;
     let mut reader = Reader::default();
-    for (index, line) in
-        text(bytes).map_err(|problem| unreadable(path, problem))?.lines().enumerate()
-    {
+    for (index, line) in text.lines().enumerate() {
         reader.line(line, &format!("line {}", index + 1));
     }
     let mut found = reader.found;
@@ -22,15 +20,14 @@ pub(super) fn check(path: &Path, bytes: &[u8]) -> Result<Findings, DocumentError
         return Ok(found);
     };
     let file = path.with_file_name(&library);
-    let bytes = read(&file)?;
-    let text = text(&bytes).map_err(|problem| unreadable(&file, problem))?;
-    let (material, of_library) = mtl::check(text);
+    let (material, of_library) = mtl::check(&read_text(&file)?);
     found.add_of(&library, of_library);
     let known = material.name.is_some() && material.name == reader.material;
     found.unless(known, "the file", "a material other than that of its library");
     if let Some(texture) = material.texture.filter(|_| found.0.is_empty()) {
         let file = path.with_file_name(&texture);
-        let picture = png::check(&read(&file)?).map_err(|problem| unreadable(&file, problem))?;
+        let picture = png::check(&read(&file)?)
+            .map_err(|problem| DocumentError::unreadable(&file, problem))?;
         found.add_of(&texture, picture);
     }
     Ok(found)
@@ -67,12 +64,10 @@ impl Reader {
                 self.is_triangle(rest)
             }
             _ => {
-                let start: String = word.chars().take(20).collect();
-                return self.found.add(place, format!("statement {start}"));
+                return self.found.add(place, format!("statement {}", start(word, 20)));
             }
         };
-        let start: String = line.chars().take(60).collect();
-        self.found.unless(holds, place, format!("`{start}`"));
+        self.found.unless(holds, place, format!("`{}`", start(line, 60)));
     }
 
     /// Whether a line holds so many numbers; they are counted.

@@ -1,7 +1,7 @@
 //! The operators of a PDF page that every viewer draws alike: black paths, filled by the even-odd
 //! rule or stroked.
 
-use super::Findings;
+use super::{Findings, start};
 
 /// What an operator does to the path that is being built.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -51,8 +51,7 @@ pub(super) fn check(content: &[u8], page: &str, found: &mut Findings) {
             }
             let listed = OPERATORS.iter().find(|(name, ..)| *name == word);
             let Some(&(_, count, role)) = listed else {
-                let start: String = word.chars().take(20).collect();
-                found.add(place(), format!("operator {start}"));
+                found.add(place(), format!("operator {}", start(word, 20)));
                 operands.clear();
                 continue;
             };

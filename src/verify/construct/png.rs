@@ -1,7 +1,7 @@
 //! The PNG chunks and pixels that every viewer shows alike: grey of 8 bits without transparency,
 //! without a colour space to interpret and without a second picture.
 
-use std::io::{self, Cursor, Read};
+use std::io::{self, Read};
 
 use super::Findings;
 
@@ -20,9 +20,12 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
     let mut seen: Vec<&[u8]> = Vec::new();
     let (mut packed, mut first) = (Vec::new(), [].as_slice());
     while seen.last() != Some(&b"IEND".as_slice()) {
-        let (kind, data, after) = chunk(rest).ok_or("not a readable PNG (it is cut off)")?;
+        let Chunk { kind, data, is_intact, after } =
+            Chunk::first_of(rest).ok_or("not a readable PNG (it is cut off)")?;
         let name = String::from_utf8_lossy(kind).into_owned();
         let place = format!("byte {}", bytes.len() - rest.len());
+        // Some readers refuse what others show.
+        found.unless(is_intact, &place, format!("a check sum of {name} that is wrong"));
         if !CHUNKS.contains(&kind) {
             found.add(&place, format!("chunk {name}"));
         }
@@ -50,24 +53,11 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
     // What is not grey of 8 bits is told already.
     let is_whole = !found.0.is_empty() || is_whole(&packed, first);
     found.unless(
-        is_whole && is_intact(bytes),
+        is_whole,
         "the pixels",
-        "a check sum that is wrong, or data that is cut off",
+        "a check sum that is wrong, or more or less data than of the picture",
     );
     Ok(found)
-}
-
-/// Whether all check sums hold: some readers refuse what others show.
-fn is_intact(bytes: &[u8]) -> bool {
-    let mut options = png::DecodeOptions::default();
-    options.set_skip_ancillary_crc_failures(false);
-    let read = || -> Result<(), png::DecodingError> {
-        let decoder = png::Decoder::new_with_options(Cursor::new(bytes), options);
-        let mut reader = decoder.read_info()?;
-        while reader.next_row()?.is_some() {}
-        reader.finish()
-    };
-    read().is_ok()
 }
 
 /// Whether the packed pixels are whole, with their check sum and nothing behind it, and fill the picture: a byte and
@@ -83,11 +73,27 @@ fn is_whole(packed: &[u8], head: &[u8]) -> bool {
     unpacked.is_ok_and(|length| length == most) && pixels.total_in() == packed.len() as u64
 }
 
-/// Name and content of the next chunk, and what follows it: length, name, content, check sum.
-fn chunk(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
-    let (length, rest) = bytes.split_first_chunk::<4>()?;
-    let (kind, rest) = rest.split_at_checked(4)?;
-    let (data, rest) = rest.split_at_checked(u32::from_be_bytes(*length) as usize)?;
-    let (_, rest) = rest.split_at_checked(4)?;
-    Some((kind, data, rest))
+/// A chunk, which begins with the length of its content and ends with a check sum.
+struct Chunk<'a> {
+    /// Its name.
+    kind: &'a [u8],
+    data: &'a [u8],
+    /// Whether the check sum is that of name and content.
+    is_intact: bool,
+    /// What follows the chunk.
+    after: &'a [u8],
+}
+
+impl<'a> Chunk<'a> {
+    /// The chunk that these bytes begin with.
+    fn first_of(bytes: &'a [u8]) -> Option<Self> {
+        let (length, rest) = bytes.split_first_chunk::<4>()?;
+        let (kind, rest) = rest.split_at_checked(4)?;
+        let (data, rest) = rest.split_at_checked(u32::from_be_bytes(*length) as usize)?;
+        let (stated, after) = rest.split_first_chunk::<4>()?;
+        let mut sum = flate2::Crc::new();
+        sum.update(kind);
+        sum.update(data);
+        Some(Self { kind, data, is_intact: sum.sum() == u32::from_be_bytes(*stated), after })
+    }
 }

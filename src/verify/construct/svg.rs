@@ -3,7 +3,7 @@
 use kurbo::{BezPath, Shape as _};
 use resvg::usvg::roxmltree::{Document, Error, Node, NodeType, ParsingOptions};
 
-use super::{Findings, decimal, text};
+use super::{Findings, decimal, start, text};
 use crate::verify::document::length_mm;
 
 const NAMESPACE: &str = "http://www.w3.org/2000/svg";
@@ -90,8 +90,7 @@ fn element(node: &Node) -> Vec<String> {
         if attribute.namespace().is_some() || !attributes.contains(&key) {
             constructs.push(format!("attribute {key} of <{name}>"));
         } else if !holds(name, key, value) {
-            let start: String = value.chars().take(40).collect();
-            constructs.push(format!("{key}=\"{start}\" of <{name}>"));
+            constructs.push(format!("{key}=\"{}\" of <{name}>", start(value, 40)));
         }
     }
     constructs

@@ -82,6 +82,23 @@ pub enum DocumentError {
     },
 }
 
+impl DocumentError {
+    /// What is wrong with a file that was read.
+    pub(super) fn unreadable(path: &Path, problem: impl Into<String>) -> Self {
+        Self::Unreadable { path: path.to_owned(), problem: problem.into() }
+    }
+}
+
+/// The bytes of an artifact.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, DocumentError> {
+    std::fs::read(path).map_err(|source| DocumentError::Io { path: path.to_owned(), source })
+}
+
+/// The text of an artifact.
+pub(super) fn read_text(path: &Path) -> Result<String, DocumentError> {
+    String::from_utf8(read(path)?).map_err(|_| DocumentError::unreadable(path, "not a text file"))
+}
+
 /// An opened artifact.
 pub struct Document {
     content: Content,
@@ -110,13 +127,11 @@ pub struct Page {
 impl Document {
     /// Opens a `.pdf`, `.svg` or `.png` file.
     pub fn open(path: &Path) -> Result<Self, DocumentError> {
-        let unreadable =
-            |problem: String| DocumentError::Unreadable { path: path.to_owned(), problem };
+        let unreadable = |problem: String| DocumentError::unreadable(path, problem);
         let Some(format) = Format::of(path).filter(|format| format.is_document()) else {
             return Err(unreadable("not a .pdf, .svg or .png file".to_owned()));
         };
-        let bytes = std::fs::read(path)
-            .map_err(|source| DocumentError::Io { path: path.to_owned(), source })?;
+        let bytes = read(path)?;
         let content = match format {
             Format::Pdf => Content::Pdf(pdf::Pdf::parse(bytes).map_err(unreadable)?),
             Format::Svg => Content::Svg(Box::new(svg::Svg::parse(&bytes).map_err(unreadable)?)),

@@ -8,7 +8,7 @@ use crate::verify::DocumentError;
 
 /// Loads a `.glb` or an `.obj` with its material and texture.
 pub(in crate::verify) fn load(path: &Path) -> Result<Model, DocumentError> {
-    let unreadable = |problem: String| DocumentError::Unreadable { path: path.to_owned(), problem };
+    let unreadable = |problem: String| DocumentError::unreadable(path, problem);
     let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
     let model = if is_obj { obj(path) } else { glb(path) }.map_err(unreadable)?;
     if model.triangles.is_empty() {
