@@ -25,7 +25,9 @@
 //! against the better of the two, and that with its best codes, the evidence only becomes less.
 //!
 //! Limits: codes are taken as drawn from their family; placements of parts of the same board by
-//! other lattices are not thought of. Faces of a solid may lie in one grid, so there nothing counts beyond a panel.
+//! other lattices are not thought of. Faces of a solid may lie in one grid, so there nothing counts beyond a panel; but
+//! all that is placed in a grid must explain its codes better together than a board does that has the same codes
+//! elsewhere.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -416,7 +418,7 @@ impl TagLabeller {
                 {
                     placed.contradicted = Some(self.agreement(&sights[first.sight], first));
                 }
-                return placed;
+                break;
             };
             let vertices = self.on_panel(sights, grid, best);
             let rivals =
@@ -432,9 +434,17 @@ impl TagLabeller {
                 placed.placements.push(*best);
             }
             if taken.len() == before {
-                return placed;
+                break;
             }
         }
+        if self.panels_abut && !placed.placements.is_empty() {
+            let (surplus, counts) = self.together(sights, &placed.placements);
+            if surplus < 0.0 {
+                placed.contradicted = Some(counts);
+                placed.placements.clear();
+            }
+        }
+        placed
     }
 
     /// The placements that tiles speak for, with the sum of their evidence, which grows with what is for
@@ -499,36 +509,60 @@ impl TagLabeller {
         placement: &Placement,
         taken: &BTreeSet<Vertex>,
     ) -> impl Iterator<Item = Judged> {
-        let panel = &self.panels[placement.panel];
-        let turns = sight.readings.first().map_or(0, |r| turns_of(placement.map, r.tile));
         let free = |tile: Tile| {
             let side = |v: Vertex| if sight.mirrored { mirrored(v) } else { v };
             taken.is_empty() || tile.vertices().all(|v| !taken.contains(&side(v)))
         };
-        let tiles = sight.readings.iter().zip(&sight.evidence).zip(&sight.shown);
-        tiles.filter(move |((reading, _), _)| free(reading.tile)).filter_map(
-            move |((reading, evidence), shown)| {
-                let tile = placement.map.apply_tile(reading.tile);
-                if let Some(code) = panel.tags.get(&tile) {
-                    let word = self.words.turns() * code + turns;
-                    // Other codes than that.
-                    let but = usize::from(shown.word == word);
-                    let predicted = [or_spoilt(evidence[word].into(), SPOILT); DIRTY.len()];
-                    let other_code = [shown.code[but]; DIRTY.len()];
-                    let of_board = Some(shown.of_board[but]);
-                    Some(Judged { predicted, other_code, of_board })
-                } else if panel.tiles.contains(&tile) {
-                    let predicted = shown.if_plain;
-                    let of_board = Some(shown.of_board[0]);
-                    Some(Judged { predicted, other_code: predicted, of_board })
-                } else if self.panels_abut {
-                    None
-                } else {
-                    let predicted = [SPOILT.ln(); DIRTY.len()];
-                    Some(Judged { predicted, other_code: predicted, of_board: None })
-                }
-            },
-        )
+        let tiles = (0..sight.readings.len()).filter(move |&i| free(sight.readings[i].tile));
+        tiles.filter_map(move |index| self.judge(sight, placement, index))
+    }
+
+    /// What all tiles of a grid that show codes say of all that is placed in it together, each panel but once: how much
+    /// better it explains them than a board that has the same codes wherever it likes, nats, and how many agree and
+    /// disagree.
+    fn together(&self, sights: &[Sight], placements: &[Placement]) -> (f64, [usize; 2]) {
+        let mut panels = BTreeSet::new();
+        let once: Vec<&Placement> = placements.iter().filter(|p| panels.insert(p.panel)).collect();
+        let mut surplus = 0.0;
+        let mut counts = [0; 2];
+        for at in once.iter().map(|placement| placement.sight).collect::<BTreeSet<usize>>() {
+            let sight = &sights[at];
+            let codes = sight.shown.iter().map(|shown| shown.code[0]).enumerate();
+            for (index, code) in codes.filter(|&(_, code)| code > PROPOSING) {
+                let mut here = once.iter().filter(|placement| placement.sight == at);
+                let judged = here.find_map(|placement| self.judge(sight, placement, index));
+                let predicted = judged.map_or(SPOILT.ln(), |tile| greatest(tile.predicted));
+                surplus += predicted - code;
+                counts[usize::from(predicted < code)] += 1;
+            }
+        }
+        (surplus, counts)
+    }
+
+    /// A tile under a placement that says something of it.
+    fn judge(&self, sight: &Sight, placement: &Placement, index: usize) -> Option<Judged> {
+        let panel = &self.panels[placement.panel];
+        let (tile, shown) = (sight.readings[index].tile, &sight.shown[index]);
+        let on_panel = placement.map.apply_tile(tile);
+        if let Some(code) = panel.tags.get(&on_panel) {
+            let word = self.words.turns() * code + turns_of(placement.map, tile);
+            // Other codes than that.
+            let but = usize::from(shown.word == word);
+            let evidence = sight.evidence[index][word].into();
+            let predicted = [or_spoilt(evidence, SPOILT); DIRTY.len()];
+            let other_code = [shown.code[but]; DIRTY.len()];
+            let of_board = Some(shown.of_board[but]);
+            Some(Judged { predicted, other_code, of_board })
+        } else if panel.tiles.contains(&on_panel) {
+            let predicted = shown.if_plain;
+            let of_board = Some(shown.of_board[0]);
+            Some(Judged { predicted, other_code: predicted, of_board })
+        } else if self.panels_abut {
+            None
+        } else {
+            let predicted = [SPOILT.ln(); DIRTY.len()];
+            Some(Judged { predicted, other_code: predicted, of_board: None })
+        }
     }
 
     /// Grid tile, in the mirror if need be, code and turns of every tag of a panel under a placement.
@@ -645,7 +679,7 @@ mod tests {
     use super::super::grow::PlacedSaddle;
     use super::*;
     use crate::family::{shipped_names, square_names};
-    use crate::target::{BoardSpec, PaperSpec, TagSpec, TargetSpec};
+    use crate::target::{BoardSpec, PaperSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
 
     /// Noise, of full scale, at which more than a tenth of the cells of four pixels a bit are taken for the other.
     const NOISE_OF_A_TENTH: f64 = 0.335;
@@ -753,6 +787,34 @@ mod tests {
             }
         }
         assert!(told > 20, "{told} times only it is said that other tiles contradict");
+    }
+
+    /// A board has the tags of some faces, but not as they lie on a solid: around each face that fits, and between
+    /// them, are others.
+    #[test]
+    fn boards_are_no_faces_of_solids_with_the_same_ids() {
+        for name in shipped_names() {
+            let family = Family::resolve(name).unwrap();
+            let tags = TagSpec { family: name.to_owned(), ..TagSpec::default() };
+            for tiles in [7, 10] {
+                let tags = tags.clone();
+                let spec = SolidSpec { tiles, tags, ..SolidSpec::new(SolidShape::Octahedron) };
+                let Ok(solid) = Target::build("o", &TargetSpec::Solid(spec), Some(&family), None)
+                else {
+                    continue;
+                };
+                // Smaller boards have just the tags of a face, or one more.
+                for size in [(10, 11), (12, 16)] {
+                    let Some(shown) = board_of(&family, size, TagSpec::default()) else {
+                        continue;
+                    };
+                    let evidence = found_in(&family, &solid, &shown, false);
+                    let of = format!("{name}, {tiles} tiles a side, {size:?}");
+                    assert!(evidence.found.is_empty(), "{of}: {:?}", evidence.found);
+                    assert!(evidence.contradicted.is_some(), "{of}");
+                }
+            }
+        }
     }
 
     /// A part of the board with one tag, as a photograph of nothing else shows it, is labelled; not so if just one other
