@@ -5,8 +5,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use deltille::calibrate::{
-    Loss, Model, Observation, Options, PanelPlace, RigOptions, RigViews, Sighting, View, Weights,
-    calibrate, calibrate_rig,
+    Loss, Model, Observation, Options, PanelPlace, PanelRef, RigOptions, RigViews, Sighting, View,
+    Weights, calibrate, calibrate_rig,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use glam::{DQuat, DVec3};
@@ -31,7 +31,7 @@ fn sighting(
         let cov = Some([0.003, 0.0, 0.003]);
         observations.push(Observation { row, col, panel_mm, pixel, cov });
     }
-    Some(Sighting { panel, observations })
+    Some(Sighting { panel: PanelRef::new(panel, panel as u32), observations })
 }
 
 fn view(name: usize, camera: &Camera, sightings: Vec<Sighting>) -> View {

@@ -15,6 +15,30 @@ pub(crate) fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
     String::from_utf8(text).expect("JSON is UTF-8")
 }
 
+/// Why a JSON text is not what it should be.
+pub(crate) enum ReadError {
+    /// Not JSON, or not an object of this kind at all.
+    Json(serde_json::Error),
+    /// A field is missing, unknown, or holds what it must not.
+    Field { field: String, problem: String },
+}
+
+/// Parses JSON; an error that is not one of JSON's grammar names the field.
+pub(crate) fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> {
+    let mut deserializer = serde_json::Deserializer::from_str(json);
+    let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+        let field = error.path().to_string();
+        let inner = error.into_inner();
+        if inner.is_data() && field != "." {
+            ReadError::Field { field, problem: inner.to_string() }
+        } else {
+            ReadError::Json(inner)
+        }
+    })?;
+    deserializer.end().map_err(ReadError::Json)?;
+    Ok(value)
+}
+
 /// The schema that a JSON text names, such as `deltille/target/1`; `None` where it names none, an
 /// error where it is no JSON object.
 pub(crate) fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {

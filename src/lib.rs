@@ -9,6 +9,7 @@
 //!
 //! | floor | module | its one job |
 //! |---|---|---|
+//! | 0 | [`limits`] | how much of a file is read, and panics of other code |
 //! | 1 | [`lattice`] | the triangular lattice: vertices, tiles, symmetries, the cells of a tag |
 //! | 1 | [`raster`] | grey images: storage, sampling, blur, files |
 //! | 1 | [`camera`] | camera models and poses |
@@ -38,7 +39,9 @@ pub mod export;
 pub mod family;
 mod json;
 pub mod lattice;
+pub mod limits;
 mod name;
+mod quantity;
 pub mod raster;
 pub mod report;
 pub mod synth;

@@ -36,6 +36,21 @@ impl Name {
     }
 }
 
+/// Whether a path that a file names leads into the folder that it is looked for in, on any system.
+pub(crate) fn is_within(path: &str) -> bool {
+    let is_drive = |part: &str| part.as_bytes().get(1) == Some(&b':');
+    path.split(SEPARATORS).all(|part| !matches!(part, "" | "." | "..") && !is_drive(part))
+}
+
+/// A path that leads into its folder: this one, or what it ends with.
+pub(crate) fn within(path: &str) -> &str {
+    let end = path.rsplit(SEPARATORS).find(|part| is_within(part));
+    if is_within(path) { path } else { end.unwrap_or("picture") }
+}
+
+/// What separates folders, here or elsewhere.
+const SEPARATORS: [char; 2] = ['/', '\\'];
+
 fn is_plain(c: char) -> bool {
     c.is_ascii_alphanumeric() || "-_.".contains(c)
 }
@@ -71,6 +86,26 @@ impl From<Name> for String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn paths_lead_into_their_folder() {
+        for path in ["a.png", "left/a.png", "12:30.png", "..a/b..c"] {
+            assert_eq!(within(path), path);
+        }
+        for (path, end) in [
+            ("../../etc/passwd", "passwd"),
+            ("/a.png", "a.png"),
+            ("a/../b.png", "b.png"),
+            ("..\\..\\a.png", "a.png"),
+            ("C:\\a.png", "a.png"),
+            ("C:a.png", "picture"),
+            ("a/..", "a"),
+            ("..", "picture"),
+            ("", "picture"),
+        ] {
+            assert!(!is_within(path) && within(path) == end, "{path}: {}", within(path));
+        }
+    }
 
     #[test]
     fn names_are_stems_of_files() {

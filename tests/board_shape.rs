@@ -1,8 +1,8 @@
 //! The shape of a board's sheet: found where it is bent, and called chance where it is not.
 
 use deltille::calibrate::{
-    BoardShape, Instead, Loss, Misfit, Model, Observation, Options, Sighting, View, Weights,
-    calibrate, calibrate_with_shape, remedy,
+    BoardShape, Instead, Loss, Misfit, Model, Observation, Options, PanelRef, Sighting, View,
+    Weights, calibrate, calibrate_with_shape, remedy,
 };
 use deltille::camera::{Camera, Pose};
 use glam::{DQuat, DVec3};
@@ -39,7 +39,7 @@ fn views(offset: impl Fn(f64, f64) -> DVec3, seed: u64) -> Vec<View> {
             let cov = Some([NOISE_PX * NOISE_PX, 0.0, NOISE_PX * NOISE_PX]);
             Observation { row, col, panel_mm, pixel, cov }
         });
-        let sightings = vec![Sighting { panel: 0, observations: corners.collect() }];
+        let sightings = vec![Sighting { panel: PanelRef::ONLY, observations: corners.collect() }];
         let name = index.to_string();
         View { image: name.clone(), name, size_px: [1600, 1200], sightings }
     };
@@ -57,7 +57,7 @@ fn a_bent_and_stretched_sheet_is_found() {
     let views = views(offset, 1);
     let flat = calibrate(&views, &[Pose::IDENTITY], OPTIONS).unwrap();
     let found = calibrate_with_shape(&views, &[Pose::IDENTITY], OPTIONS).unwrap();
-    let [Misfit::Target { panel: 0, rms_mm, .. }] = flat.misfits[..] else {
+    let [Misfit::Target { panel: PanelRef::ONLY, rms_mm, .. }] = flat.misfits[..] else {
         panic!("{:?}", flat.misfits)
     };
     assert!((0.05..0.5).contains(&rms_mm), "{rms_mm}");

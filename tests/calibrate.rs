@@ -1,8 +1,8 @@
 //! Calibration of simulated cameras, whose truth is known, and of views that make none.
 
 use deltille::calibrate::{
-    CalibrationError, Instead, Loss, Misfit, Model, Observation, Options, Sighting, View, Weights,
-    calibrate, poses, remedy, sufficient,
+    CalibrationError, Instead, Loss, Misfit, Model, Observation, Options, PanelRef, Sighting, View,
+    Weights, calibrate, poses, remedy, sufficient,
 };
 use deltille::camera::{Camera, Pose};
 use glam::{DQuat, DVec3};
@@ -49,7 +49,7 @@ fn view(camera: &Camera, pose: &Pose, name: &str, noise: &mut impl FnMut() -> f6
             observations.push(Observation { row, col, panel_mm, pixel, cov });
         }
     }
-    let sightings = vec![Sighting { panel: 0, observations }];
+    let sightings = vec![Sighting { panel: PanelRef::ONLY, observations }];
     let size_px = [camera.width, camera.height];
     Some(View { name: name.to_owned(), image: format!("{name}.png"), size_px, sightings })
 }

@@ -65,6 +65,7 @@ fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8
         image: String::new(),
         width: camera.width,
         height: camera.height,
+        file: Default::default(),
         grids: vec![grid],
         tone: None,
         ink: None,
@@ -304,7 +305,7 @@ fn options_that_contradict_each_other_or_the_disk_are_refused() {
         ),
         (
             "calibrate corners --grid deltille --edge -20mm --model radtan".to_owned(),
-            "--edge: -20 mm is not more than 0 mm",
+            "--edge: -20 is not between 0.001 and 100000 mm",
         ),
         ("experiment table2 blank".to_owned(), "blank: 0 of 1 images show the board whole"),
     ];
@@ -635,4 +636,73 @@ fn names_in_files_lead_nowhere() {
     assert!(said.contains("6 of 6 pictures are not in photos"), "{said}");
     assert!(!said.contains('\u{1b}'), "{said}");
     assert!(!std::fs::read_to_string(path("page.html")).unwrap().contains("data:image"));
+}
+
+/// Detections of an icosahedron of which panel 7 is displaced, in so many pictures.
+fn of_displaced_panel(target: &Target, count: usize, by_mm: DVec3) -> Vec<Detection> {
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let lens = Lens::BrownConrady(BrownConrady::default());
+    let camera = Camera::centred(1600, 1200, 1300.0, lens);
+    let pictures = (0..count).map(|_| {
+        let mut any = |reach: f64| random.random_range(-reach..reach);
+        let rotation = DQuat::from_scaled_axis(DVec3::new(any(3.0), any(3.0), any(3.0)));
+        let translation = DVec3::new(any(20.0), any(20.0), 420.0 + any(80.0));
+        let pose = Pose { rotation, translation };
+        let grids = target.panels.iter().enumerate().filter_map(|(index, panel)| {
+            let mut place = panel.pose.to_pose();
+            if index == 7 {
+                place.translation += by_mm;
+            }
+            let pose = pose.after(&place);
+            let faces = (pose.rotation * DVec3::Z).dot(-pose.translation.normalize()) > 0.4;
+            let corners = panel.corners.iter().map(|corner| {
+                let [x, y] = corner.panel_mm;
+                let [x, y] = camera.project(pose.apply(DVec3::new(x, y, 0.0)))?;
+                let mut off = || random.random_range(-0.1..0.1);
+                let (row, col, id) = (corner.row, corner.col, Some(corner.id));
+                Some(GridCorner { row, col, id, x: x + off(), y: y + off(), cov: None })
+            });
+            let corners: Vec<GridCorner> = corners.collect::<Option<_>>()?;
+            let (kind, panel) = (panel.kind, Some(panel.id));
+            faces.then(|| Grid { kind, panel, mirrored: false, corners, tags: Vec::new() })
+        });
+        Detection {
+            image: String::new(),
+            width: 1600,
+            height: 1200,
+            file: Default::default(),
+            grids: grids.collect(),
+            tone: None,
+            ink: None,
+            reasons: Vec::new(),
+            timing_ms: Default::default(),
+        }
+    });
+    pictures.collect()
+}
+
+#[test]
+fn a_displaced_panel_is_named_on_the_terminal_in_the_file_and_on_the_page() {
+    let family = Family::resolve("delTag25h7").unwrap();
+    let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
+    let target = Target::build("board", &spec, Some(&family), None).unwrap();
+    let mut detections = of_displaced_panel(&target, 20, DVec3::new(0.0, 0.36, 0.48));
+    detections[2].grids[0].corners[3].y = 1e5;
+    let folder = folder(&target, &detections);
+    let output = output(folder.path(), &format!("{CALIBRATE} --report page.html"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let id = target.panels[7].id;
+    assert!(said.contains(&format!("warning: panel {id}: ")), "{said}");
+    assert!(said.contains("it seems displaced by 0.6"), "{said}");
+    assert!(said.contains("view 02: 1 corner of "), "{said}");
+    let camera = json(&folder.path().join("camera.json"));
+    let findings = camera["findings"].as_array().unwrap();
+    let of_panel = findings.iter().find(|finding| finding["kind"] == "panel").unwrap();
+    assert_eq!((&of_panel["panel"], &of_panel["left_out"]), (&id.into(), &true.into()));
+    assert!((of_panel["moved_mm"].as_f64().unwrap() - 0.6).abs() < 0.05, "{of_panel}");
+    let outliers = camera["outliers"].as_u64().unwrap();
+    assert!(outliers <= of_panel["corners"].as_u64().unwrap() + 2, "{outliers} {of_panel}");
+    let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+    assert!(page.contains(&format!("Panel {id}: ")), "the page names it");
 }

@@ -101,7 +101,7 @@ fn all_formats_show_the_same() {
         png::write(&artwork.sheets[0], "t", &file("t.png"), 254.0).unwrap();
 
         let [pdf, svg, png] = ["t.pdf", "t.svg", "t.png"]
-            .map(|name| Document::open(&file(name)).unwrap().render(0, 10.0).image);
+            .map(|name| Document::open(&file(name)).unwrap().render(0, 10.0).unwrap().image);
         assert_same("hayro's PDF and the PNG", &pdf, &png);
         assert_same("resvg's SVG and the PNG", &svg, &png);
         if let Some(poppler) = poppler(&file("t.pdf")) {

@@ -233,8 +233,8 @@ fn a_net_larger_than_the_paper_takes_several_pages() {
     deltille(folder.path(), "verify octahedron.json octahedron-3.svg").success();
     std::fs::remove_file(folder.path().join("octahedron-2.svg")).unwrap();
     deltille(folder.path(), "verify octahedron.json octahedron-3.svg")
-        .code(2)
-        .stderr(contains("octahedron-2.svg"));
+        .code(1)
+        .stdout(contains("octahedron-2.svg is missing"));
 }
 
 #[test]

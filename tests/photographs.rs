@@ -197,7 +197,7 @@ fn published_targets_decode_completely() {
         let document = Document::open(&folder.join(format!("{name}.pdf"))).unwrap();
         assert_eq!(document.pages(), target.panels.len());
         for page in 0..document.pages() {
-            let image = document.render(page, 300.0 / 25.4).image;
+            let image = document.render(page, 300.0 / 25.4).unwrap().image;
             let detection = detector.detect(&image, name);
             assert_eq!(detection.grids.len(), 1, "{name}, page {page}");
             let grid = &detection.grids[0];

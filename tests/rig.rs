@@ -1,8 +1,8 @@
 //! Rigs of simulated cameras: what is found is what was put in, and the stated deviations are true.
 
 use deltille::calibrate::{
-    CalibrationError, Loss, Misfit, Model, Observation, PanelPlace, RigOptions, RigSolution,
-    RigViews, Sighting, View, Weights, calibrate_rig, wrong_cameras,
+    CalibrationError, Loss, Misfit, Model, Observation, PanelPlace, PanelRef, RigOptions,
+    RigSolution, RigViews, Sighting, View, Weights, calibrate_rig, wrong_cameras,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::family::Family;
@@ -119,7 +119,10 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
                     })
                 });
                 let observations: Option<Vec<_>> = observations.collect();
-                observations.map(|observations| Sighting { panel: p, observations })
+                observations.map(|observations| Sighting {
+                    panel: PanelRef::new(p, panel.id),
+                    observations,
+                })
             });
             let sightings: Vec<Sighting> = sightings.collect();
             let name = format!("{frame:03}");

@@ -55,6 +55,41 @@ fn a_changed_file_fails_with_exit_code_1() {
 }
 
 #[test]
+fn a_page_that_is_missing_fails_unless_one_is_verified_alone() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path();
+    let arguments = ["board", "--rows", "3", "--cols", "4", "--edge", "20mm", "--boards", "3"];
+    deltille(path, &[&arguments[..], &["--name", "b", "--svg", "--no-verify"]].concat()).success();
+    deltille(path, &["verify", "b.json"]).success().stdout(contains("verified: 3 files"));
+    deltille(path, &["verify", "b.json", "b-2.svg"]).success();
+    let left_out = || contains("b-1.svg to b-3.svg: FAILED").and(contains("b-2.svg is missing"));
+    deltille(path, &["verify", "b.json", "b-1.svg", "b-3.svg"]).code(1).stdout(left_out());
+    fs::remove_file(path.join("b-2.svg")).unwrap();
+    deltille(path, &["verify", "b.json"]).code(1).stdout(left_out());
+    fs::remove_file(path.join("b-3.svg")).unwrap();
+    deltille(path, &["verify", "b.json"]).code(1).stdout(contains("b-3.svg is missing"));
+}
+
+#[test]
+fn a_net_without_a_page_and_a_file_that_is_none_do_not_end_the_run() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path();
+    let arguments = ["tetrahedron", "--edge", "90mm", "--paper", "A5", "--name", "t"];
+    deltille(path, &[&arguments[..], &["--svg", "--stl", "--no-verify"]].concat()).success();
+    fs::remove_file(path.join("t-2.svg")).unwrap();
+    deltille(path, &["verify", "t.json"])
+        .code(1)
+        .stdout(contains("t-2.svg is missing").and(contains("t.stl: verified")));
+    fs::write(path.join("t-1.svg"), "").unwrap();
+    deltille(path, &["verify", "t.json", "no.pdf", "t.stl", "--report", "r.json"])
+        .code(2)
+        .stdout(contains("t.stl: verified"))
+        .stderr(contains("no.pdf"));
+    let report = fs::read_to_string(path.join("r.json")).unwrap();
+    assert!(report.contains("\"passed\": false") && report.contains("no.pdf"), "{report}");
+}
+
+#[test]
 fn bad_input_is_one_line_and_exit_code_2() {
     let folder = board();
     let path = folder.path();
@@ -71,7 +106,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
         (&["b.json", "b.json"], "only .pdf, .svg, .png"),
         (&["broken.json"], "broken.json"),
         (&["alone/b.json"], "no b.pdf, .svg, .png, .glb, .obj, .stl, .dsc or .dxf beside"),
-        (&["b.json", "--report", "nowhere/r.json"], "nowhere"),
+        (&["b.json", "--report", "b.pdf/r.json"], "b.pdf"),
         (&["b.json", "--report", "b.json"], "--report: b.json holds deltille/target/1"),
     ];
     for (arguments, reason) in cases {
@@ -95,7 +130,7 @@ fn what_not_every_viewer_shows_alike_is_named_with_its_place() {
     fs::write(&dsc, text.replacen("\n0,", "\n7,", 1)).unwrap();
     deltille(folder.path(), &["verify", "b.json"])
         .code(1)
-        .stdout(contains("b.svg: FAILED, line 3: element <style>: not every viewer shows"))
+        .stdout(contains("b.svg: FAILED, line 4: element <style>: not every viewer shows"))
         .stdout(contains("b.dsc: FAILED").and(contains("is listed as tag 7")))
         .stdout(contains("b.pdf: verified"))
         .stdout(contains("FAILED: 2 of 4 files differ from target b"));

@@ -181,7 +181,8 @@ pub fn text_outline(text: &SheetText) -> Result<BezPath, text::MissingGlyph> {
     board::draw_text(text)
 }
 
-fn subject(target: &Target) -> String {
+/// One line on what a target is.
+pub fn subject(target: &Target) -> String {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
     let plural = if tags == 1 { "" } else { "s" };

@@ -92,10 +92,13 @@ pub enum CalibrationError {
     },
     /// Cameras that moved against each other.
     #[error(
-        "in {wrong} of {all} frames the cameras do not agree where the target is: they moved against \
-         each other, or pictures of the same name were not taken at the same moment"
+        "in {wrong} of {all} frames the cameras do not agree where the target is, most of all camera \
+         {camera}: they moved against each other, or pictures of the same name were not taken at the \
+         same moment"
     )]
     NotRigid {
+        /// The camera that is off in most of them.
+        camera: String,
         /// Frames that do not fit.
         wrong: usize,
         /// All frames.

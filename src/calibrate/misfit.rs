@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
+use super::panel::PanelRef;
 use super::problem::Problem;
 use super::weights::Whitening;
 
@@ -49,8 +50,8 @@ pub enum Misfit {
     },
     /// Residuals depend on the place on the target: its corners are not where they are said to be.
     Target {
-        /// Index of the panel that shows it most.
-        panel: usize,
+        /// The panel that shows it most.
+        panel: PanelRef,
         /// Root mean square of the pattern, px a coordinate.
         rms_px: f64,
         /// The same of what moves the corners in space, mm. What poses and camera take up is not in it.
@@ -62,7 +63,7 @@ pub enum Misfit {
 struct Seen {
     block: usize,
     camera: usize,
-    panel: usize,
+    panel: PanelRef,
     cell: [i32; 2],
     label: [i32; 2],
     residual: [f64; 2],
@@ -89,7 +90,7 @@ struct Explained {
     left: f64,
     freedom: f64,
     /// By panel: what is explained; and Σ|move|², Σ of its variances by that of the residuals, corners.
-    by_panel: BTreeMap<usize, f64>,
+    by_panel: BTreeMap<PanelRef, f64>,
     moves: [f64; 3],
 }
 
@@ -117,7 +118,7 @@ pub(super) fn misfits(problem: &Problem, whitening: &Whitening) -> Vec<Misfit> {
             Source::Target => {
                 let most = explained.by_panel.iter().max_by(|a, b| a.1.total_cmp(b.1));
                 Misfit::Target {
-                    panel: most.map_or(0, |(&panel, _)| panel),
+                    panel: most.map_or(PanelRef::ONLY, |(&panel, _)| panel),
                     rms_px,
                     rms_mm: explained.rms_mm(),
                 }
@@ -140,7 +141,7 @@ fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
         let cell_px = f64::from(camera.width.max(camera.height)) / CELLS;
         let camera_from_panel = unknowns.camera_from_rig.rotation
             * problem.frames[block.frame].rotation
-            * problem.panels[block.panel].target_from_panel.rotation;
+            * problem.panels[block.panel.index()].target_from_panel.rotation;
         let panel_from_camera = DMat3::from_quat(camera_from_panel.conjugate());
         for (corner, &w) in block.observations.iter().zip(weights) {
             let at = camera.project_with_derivatives(problem.camera_point(block, corner));
@@ -204,7 +205,7 @@ fn over_image(seen: &[Seen], camera: usize) -> Explained {
 
 /// Moves of corners in space.
 fn over_target(seen: &[Seen]) -> Explained {
-    let mut corners: BTreeMap<(usize, [i32; 2]), Vec<usize>> = BTreeMap::new();
+    let mut corners: BTreeMap<(PanelRef, [i32; 2]), Vec<usize>> = BTreeMap::new();
     for (index, corner) in seen.iter().enumerate() {
         corners.entry((corner.panel, corner.label)).or_default().push(index);
     }

@@ -19,9 +19,12 @@
 //! pose leads to, and the translation grows by τ. Standard deviations of poses are those of ω (rad)
 //! and τ (mm).
 
+mod consensus;
 mod error;
 mod excluded;
+mod finding;
 mod grid;
+mod gross;
 mod image_circle;
 mod lens_end;
 mod loss;
@@ -29,6 +32,7 @@ mod minimise;
 mod misfit;
 mod model;
 mod normal;
+mod panel;
 mod pose;
 mod problem;
 mod remedy;
@@ -45,12 +49,14 @@ mod wrong;
 
 pub use error::CalibrationError;
 pub use excluded::Excluded;
+pub use finding::{Finding, Moved, Shared};
 pub use grid::UntaggedGrid;
 pub use image_circle::ImageCircle;
 pub use lens_end::LensEnd;
 pub use loss::Loss;
 pub use misfit::Misfit;
 pub use model::{Model, ModelError};
+pub use panel::PanelRef;
 pub use pose::estimate_pose;
 pub use problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Prior, Problem};
 pub use remedy::{Instead, Remedy, remedy, remedy_of_given};

@@ -299,11 +299,12 @@ impl Local {
         sigma: f64,
     ) -> Option<Self> {
         let camera = &problem.cameras[block.camera];
-        let (rig, target) = (&problem.frames[block.frame], &problem.panels[block.panel]);
+        let (rig, target) = (&problem.frames[block.frame], &problem.panels[block.panel.index()]);
         let rig_from_camera = DMat3::from_quat(camera.camera_from_rig.rotation.conjugate());
         let target_from_rig = DMat3::from_quat(rig.rotation.conjugate());
         let free = &layout.parameters[block.camera];
-        let (of_camera, of_panel) = (layout.cameras[block.camera], layout.panels[block.panel]);
+        let (of_camera, of_panel) =
+            (layout.cameras[block.camera], layout.panels[block.panel.index()]);
         let poses = of_camera.into_iter().chain(of_panel).flat_map(|first| first..first + 6);
         let of_shape = layout.shape.into_iter().flat_map(|first| first..first + shape::COUNT);
         let poses = poses.chain(of_shape);

@@ -6,23 +6,69 @@ use nalgebra::{Matrix3, SMatrix};
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
 use super::problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem};
+use super::settle::residuals;
 use super::view::Sighting;
-use super::weights::{Weights, Whitening};
+use super::weights::{Weights, Whitening, median};
 use crate::camera::{Camera, Pose};
 
 /// Corners that determine a homography.
 const LEAST_RAYS: usize = 4;
 
-/// camera_from_target, with the least squared error of all corners; `panels` are the poses of the
-/// target's panels on it. `None` where the corners lie on a line or out of the camera's reach.
+/// Panels from which a pose is started, the largest first: one of them may be wrong, and one more.
+const STARTS: usize = 3;
+
+/// Panels that are off by more than so many times what the best is do not fit its pose.
+const DISAGREE: f64 = 5.0;
+
+/// camera_from_target; `panels` are the poses of the target's panels on it. Of one panel it has the least
+/// squared error of all corners; of several it is the one on which most corners agree. `None` where the
+/// corners lie on a line or out of the camera's reach.
 pub fn estimate_pose(camera: &Camera, panels: &[Pose], sightings: &[Sighting]) -> Option<Pose> {
-    let largest = sightings.iter().max_by_key(|sighting| sighting.observations.len())?;
+    let mut by_size: Vec<&Sighting> = sightings.iter().collect();
+    by_size.sort_by_key(|sighting| std::cmp::Reverse(sighting.observations.len()));
+    let mut best: Option<(f64, Pose)> = None;
+    for largest in by_size.into_iter().take(STARTS) {
+        let Some(pose) = pose_from(camera, panels, sightings, largest) else { continue };
+        let medians: Vec<f64> =
+            sightings.iter().map(|s| median_off_px(camera, panels, s, &pose)).collect();
+        let (least, most) = medians
+            .iter()
+            .fold((f64::INFINITY, 0.0), |(least, most), &off| (off.min(least), off.max(most)));
+        let error = median(medians);
+        if best.as_ref().is_none_or(|(least, _)| error < *least) {
+            best = Some((error, pose));
+        }
+        if most <= DISAGREE * least {
+            break;
+        }
+    }
+    best.map(|(_, pose)| pose)
+}
+
+/// The median error of a panel's corners, px.
+fn median_off_px(camera: &Camera, panels: &[Pose], sighting: &Sighting, pose: &Pose) -> f64 {
+    let camera_from_panel = pose.after(&panels[sighting.panel.index()]);
+    let off = sighting.observations.iter().map(|seen| {
+        let at = camera.project(camera_from_panel.apply(seen.panel_mm));
+        at.map_or(f64::INFINITY, |[x, y]| (seen.pixel[0] - x).hypot(seen.pixel[1] - y))
+    });
+    median(off.collect())
+}
+
+/// The pose that is found from that of one panel.
+fn pose_from(
+    camera: &Camera,
+    panels: &[Pose],
+    sightings: &[Sighting],
+    largest: &Sighting,
+) -> Option<Pose> {
     let camera_from_panel = planar_pose(camera, &largest.observations)?;
-    let start = camera_from_panel.after(&panels[largest.panel].inverse());
+    let start = camera_from_panel.after(&panels[largest.panel.index()].inverse());
     // Seen from afar a panel looks nearly the same when its tilt is mirrored at the line of sight.
     let centre = largest.observations.iter().map(|o| o.panel_mm).sum::<DVec3>()
         / largest.observations.len() as f64;
-    let mirrored = mirrored(&camera_from_panel, centre).after(&panels[largest.panel].inverse());
+    let mirrored =
+        mirrored(&camera_from_panel, centre).after(&panels[largest.panel.index()].inverse());
     let refined = [start, mirrored].map(|pose| refine(camera, panels, sightings, pose));
     let best = refined.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
     best.map(|(pose, _)| pose)
@@ -106,11 +152,20 @@ fn refine(
         blocks: blocks(sightings, 0).collect(),
         shape: None,
     };
-    let residuals: Option<Vec<_>> =
+    let first: Option<Vec<_>> =
         problem.blocks.iter().map(|block| problem.residuals(block)).collect();
-    let whitening = Whitening::fit(&problem, Weights::Equal, &residuals?);
-    let minimum = minimise(problem, &whitening, Loss::Squared, Until::Rough)?;
-    Some((minimum.problem.frames[0], minimum.normal.cost))
+    let whitening = Whitening::fit(&problem, Weights::Equal, &first?);
+    // One of several panels may be wrong.
+    let loss = if sightings.len() > 1 { Loss::Cauchy } else { Loss::Squared };
+    let minimum = minimise(problem, &whitening, loss, Until::Rough)?;
+    let cost = match loss {
+        Loss::Squared => minimum.normal.cost,
+        // Scales differ, so that costs do not compare.
+        Loss::Huber | Loss::Cauchy => {
+            Whitening::fit(&minimum.problem, Weights::Equal, &residuals(&minimum.problem)).sigma
+        }
+    };
+    Some((minimum.problem.frames[0], cost))
 }
 
 /// Panels that stay where they are.

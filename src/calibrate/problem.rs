@@ -1,7 +1,9 @@
 use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
+use super::panel::PanelRef;
 use super::shape::Shape;
+use super::view::LEAST_CORNERS;
 use crate::camera::{Camera, Pose, Projection};
 
 /// A corner that a camera saw.
@@ -78,8 +80,8 @@ pub struct Block {
     pub camera: usize,
     /// Index of the frame.
     pub frame: usize,
-    /// Index of the panel.
-    pub panel: usize,
+    /// The panel.
+    pub panel: PanelRef,
     /// The corners.
     pub observations: Vec<Observation>,
 }
@@ -111,7 +113,7 @@ impl Problem {
     pub fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
         let shape = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(observation.panel_mm));
         let at = observation.panel_mm + shape;
-        let target = self.panels[block.panel].target_from_panel.apply(at);
+        let target = self.panels[block.panel.index()].target_from_panel.apply(at);
         let rig = self.frames[block.frame].apply(target);
         self.cameras[block.camera].camera_from_rig.apply(rig)
     }
@@ -119,13 +121,15 @@ impl Problem {
     /// Seen less predicted positions of a block's corners, px; `None` where one is out of the
     /// model's reach.
     pub fn residuals(&self, block: &Block) -> Option<Vec<[f64; 2]>> {
+        block.observations.iter().map(|seen| self.residual(block, seen)).collect()
+    }
+
+    /// Seen less predicted position of a corner, px; `None` where it is out of the model's reach.
+    pub(super) fn residual(&self, block: &Block, seen: &Observation) -> Option<[f64; 2]> {
         let camera = &self.cameras[block.camera].camera;
-        let residual = |seen: &Observation| {
-            let Projection { pixel: [x, y], .. } =
-                camera.project_with_derivatives(self.camera_point(block, seen))?;
-            Some([seen.pixel[0] - x, seen.pixel[1] - y])
-        };
-        block.observations.iter().map(residual).collect()
+        let Projection { pixel: [x, y], .. } =
+            camera.project_with_derivatives(self.camera_point(block, seen))?;
+        Some([seen.pixel[0] - x, seen.pixel[1] - y])
     }
 
     /// How many corners there are in all.
@@ -148,6 +152,58 @@ impl Problem {
         let blocks = blocks.collect();
         let (cameras, panels) = (self.cameras.clone(), self.panels.clone());
         Problem { cameras, frames, panels, blocks, shape: self.shape }
+    }
+}
+
+/// Some of a problem's observations, and the frames that have enough of them to be adjusted.
+pub(super) struct Part {
+    pub problem: Problem,
+    /// Indices of its frames in the whole.
+    frames: Vec<usize>,
+}
+
+impl Problem {
+    /// The same with only the corners for which `kept` holds.
+    pub(super) fn with_corners(&self, kept: &[Vec<bool>]) -> Problem {
+        let of_block = |(block, kept): (&Block, &Vec<bool>)| {
+            let kept = block.observations.iter().zip(kept).filter(|(_, kept)| **kept);
+            Block { observations: kept.map(|(seen, _)| *seen).collect(), ..*block }
+        };
+        let blocks = self.blocks.iter().zip(kept).map(of_block).collect();
+        let Problem { cameras, frames, panels, shape, .. } = self;
+        let (cameras, frames, panels) = (cameras.clone(), frames.clone(), panels.clone());
+        Problem { cameras, frames, panels, blocks, shape: *shape }
+    }
+
+    /// The blocks for which `kept` holds, and the frames that still have as many corners as a panel needs.
+    pub(super) fn part(&self, kept: impl Fn(usize, &Block) -> bool) -> Part {
+        let kept: Vec<bool> =
+            self.blocks.iter().enumerate().map(|(index, block)| kept(index, block)).collect();
+        let mut corners = vec![0; self.frames.len()];
+        for (block, _) in self.blocks.iter().zip(&kept).filter(|(_, kept)| **kept) {
+            corners[block.frame] += block.observations.len();
+        }
+        let all = |block: &Block, kept: bool| vec![kept; block.observations.len()];
+        let kept: Vec<Vec<bool>> =
+            self.blocks.iter().zip(kept).map(|(block, kept)| all(block, kept)).collect();
+        let has_enough = |frame: usize| corners[frame] >= LEAST_CORNERS;
+        let mut problem = self.with_corners(&kept).with_frames(has_enough);
+        problem.blocks.retain(|block| !block.observations.is_empty());
+        Part { problem, frames: (0..self.frames.len()).filter(|&f| has_enough(f)).collect() }
+    }
+
+    /// Takes over what was found in a part.
+    pub(super) fn take(&mut self, part: Part) {
+        let Part { problem, frames } = part;
+        for (frame, pose) in frames.into_iter().zip(problem.frames) {
+            self.frames[frame] = pose;
+        }
+        (self.cameras, self.panels, self.shape) = (problem.cameras, problem.panels, problem.shape);
+    }
+
+    /// Its observations with what was found in a problem of the same unknowns.
+    pub(super) fn at(&self, found: &Problem) -> Problem {
+        Problem { blocks: self.blocks.clone(), ..found.clone() }
     }
 }
 

@@ -1,12 +1,33 @@
+use std::collections::BTreeMap;
+
 use super::error::CalibrationError;
 use super::loss::Loss;
 use super::minimise::{Minimum, Until, minimise};
-use super::problem::Problem;
-use super::weights::{Weights, Whitening};
+use super::problem::{Block, Observation, Problem};
+use super::view::LEAST_CORNERS;
+use super::weights::{OUTLIER_SIGMA, Weights, Whitening};
 
 /// Rounds in which weights and solution are fitted to one another; the third changes no digit that
 /// matters.
 const WEIGHT_ROUNDS: usize = 3;
+
+/// Rounds until no corner changes sides between those that count and those that do not; a corner
+/// that lies on the border may change for ever.
+const MOST_ROUNDS: usize = 12;
+
+/// Gross errors are at least so many deviations. From [`OUTLIER_SIGMA`] on a corner is called an outlier.
+const GROSS_SIGMA: f64 = 2.0 * OUTLIER_SIGMA;
+
+/// Between the corners that belong and those with gross errors there is a gap: half as far off are at most this
+/// part as many. A lens that the model does not quite hold leaves a tail at its rim, where nearer corners
+/// are more than farther ones; without its rim the model would hold it less and less.
+const IN_THE_GAP: f64 = 0.25;
+
+/// What a lens leaves is smooth: of the neighbours of corners that are far off more than this part are off
+/// towards the same side, by more than this part as much. Wrong places are smooth nowhere, and of labels
+/// or corners that are off alike so many have such neighbours as there are such corners.
+const SMOOTH: f64 = 0.5;
+const FALLS_OFF: f64 = 0.05;
 
 /// Seen less predicted positions; empty blocks where a corner is out of reach, which problems that
 /// were started do not have.
@@ -14,26 +35,160 @@ pub(super) fn residuals(problem: &Problem) -> Vec<Vec<[f64; 2]>> {
     problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
 }
 
-/// The minimum of a problem whose weights fit its own residuals.
+/// Where weights, corners that count, and unknowns fit each other.
+pub(super) struct Settled {
+    /// Of the corners that count.
+    pub minimum: Minimum,
+    /// Of the same.
+    pub whitening: Whitening,
+    /// The same unknowns with all corners.
+    pub problem: Problem,
+    /// Which of all corners are farther off than corners are by chance.
+    pub outliers: Vec<Vec<bool>>,
+}
+
+/// The minimum of a problem whose weights fit its own residuals. Corners with gross errors take no part, nor
+/// do blocks that are `left_out`, so that deviations are those of what does; with [`Loss::Squared`] every
+/// corner takes part.
 pub(super) fn settle(
     problem: Problem,
+    left_out: &[bool],
     weights: Weights,
     loss: Loss,
-) -> Result<(Minimum, Whitening), CalibrationError> {
-    let mut problem = problem;
-    let mut whitening = Whitening::fit(&problem, weights, &residuals(&problem));
-    // Where corners are alike and losses square, weights change nothing.
-    if whitening.common_px.is_some() || loss != Loss::Squared {
-        for _ in 1..WEIGHT_ROUNDS {
-            problem = minimise(problem, &whitening, loss, Until::Rough)
-                .ok_or(CalibrationError::NoStart)?
-                .problem;
-            whitening = Whitening::fit(&problem, weights, &residuals(&problem));
+) -> Result<Settled, CalibrationError> {
+    let start = || CalibrationError::NoStart;
+    let all_of = |keep: bool| move |block: &Block| vec![keep; block.observations.len()];
+    let none: Vec<Vec<bool>> = problem.blocks.iter().map(all_of(false)).collect();
+    let counting = |problem: &Problem, gross: &[Vec<bool>]| {
+        let kept = gross.iter().zip(left_out);
+        let kept = kept.map(|(of_block, out)| of_block.iter().map(|far| !far && !out).collect());
+        problem.with_corners(&kept.collect::<Vec<_>>())
+    };
+    let mut all = problem;
+    let mut gross = none.clone();
+    let mut part = counting(&all, &gross);
+    let mut whitening = Whitening::fit(&part, weights, &residuals(&part));
+    // In the first round all corners pull, so that a lens is judged as its rim bends it. Where corners are alike and losses square, weights change nothing.
+    let rounds = match whitening.common_px.is_some() || loss != Loss::Squared {
+        true => MOST_ROUNDS,
+        false => 0,
+    };
+    for round in 1..rounds {
+        part = minimise(part, &whitening, loss, Until::Rough).ok_or_else(start)?.problem;
+        all = all.at(&part);
+        whitening = Whitening::fit(&part, weights, &residuals(&part));
+        let now = match loss {
+            Loss::Squared => none.clone(),
+            Loss::Huber | Loss::Cauchy => with_gross_errors(&all, left_out, &whitening),
+        };
+        let is_same = now == gross;
+        if !is_same {
+            gross = now;
+            part = counting(&all, &gross);
+            whitening = Whitening::fit(&part, weights, &residuals(&part));
+        }
+        if is_same && round + 1 >= WEIGHT_ROUNDS {
+            break;
         }
     }
-    let minimum =
-        minimise(problem, &whitening, loss, Until::Fine).ok_or(CalibrationError::NoStart)?;
-    Ok((minimum, whitening))
+    let minimum = minimise(part, &whitening, loss, Until::Fine).ok_or_else(start)?;
+    let problem = all.at(&minimum.problem);
+    let limit = whitening.outlier_limit();
+    let of_block = |off: Vec<f64>| off.into_iter().map(|off| off > limit).collect();
+    let outliers = deviations(&problem, &whitening).into_iter().map(of_block).collect();
+    Ok(Settled { minimum, whitening, problem, outliers })
+}
+
+/// Which corners have gross errors. A frame keeps as many of its corners as a pose needs, the nearest.
+fn with_gross_errors(
+    problem: &Problem,
+    left_out: &[bool],
+    whitening: &Whitening,
+) -> Vec<Vec<bool>> {
+    let off = deviations(problem, whitening);
+    let mut of_frames = vec![Vec::new(); problem.frames.len()];
+    let of_blocks = problem.blocks.iter().zip(&off).zip(left_out);
+    for ((block, off), _) in of_blocks.filter(|(_, left_out)| !**left_out) {
+        of_frames[block.frame].extend_from_slice(off);
+    }
+    let limit = gross_limit(&of_frames.concat(), whitening.sigma);
+    let limits = of_frames.into_iter().map(|mut off| {
+        off.sort_by(f64::total_cmp);
+        let needed = off.get(LEAST_CORNERS.min(off.len()).saturating_sub(1)).copied();
+        needed.filter(|off| off.is_finite()).unwrap_or_default().max(limit)
+    });
+    let limits: Vec<f64> = limits.collect();
+    let of_blocks = problem.blocks.iter().zip(off);
+    let mut gross: Vec<Vec<bool>> = of_blocks
+        .map(|(block, off)| off.into_iter().map(|off| off > limits[block.frame]).collect())
+        .collect();
+    let smooth: Vec<Vec<[usize; 2]>> = problem
+        .blocks
+        .iter()
+        .zip(&gross)
+        .zip(left_out)
+        .map(|((block, gross), out)| match *out || !gross.contains(&true) {
+            true => Vec::new(),
+            false => smooth_neighbours(problem, block, gross),
+        })
+        .collect();
+    let all = smooth.iter().flatten();
+    let [alike, count] = all.fold([0, 0], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+    if alike as f64 > SMOOTH * count as f64 {
+        gross.iter_mut().for_each(|gross| gross.fill(false));
+    }
+    gross
+}
+
+/// Of every corner with a gross error how many of its neighbours are off towards the same side, and not by much
+/// less, and how many it has.
+fn smooth_neighbours(problem: &Problem, block: &Block, gross: &[bool]) -> Vec<[usize; 2]> {
+    let off: Vec<Option<[f64; 2]>> =
+        block.observations.iter().map(|seen| problem.residual(block, seen)).collect();
+    let places: BTreeMap<(i32, i32), usize> =
+        block.observations.iter().enumerate().map(|(i, seen)| ((seen.row, seen.col), i)).collect();
+    let of_corner = |(index, seen): (usize, &Observation)| {
+        let (true, Some([x, y])) = (gross[index], off[index]) else { return [0, 0] };
+        let steps = [(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)];
+        let neighbours = steps
+            .iter()
+            .filter_map(|(rows, cols)| off[*places.get(&(seen.row + rows, seen.col + cols))?]);
+        neighbours.fold([0, 0], |[alike, count], [u, v]| {
+            let along = (x * u + y * v) / (x * x + y * y);
+            [alike + usize::from(along > FALLS_OFF), count + 1]
+        })
+    };
+    block.observations.iter().enumerate().map(of_corner).collect()
+}
+
+/// Where gross errors begin: at the first gap.
+fn gross_limit(off: &[f64], sigma: f64) -> f64 {
+    let beyond = |limit: f64| off.iter().filter(|&&off| off > limit).count() as f64;
+    let mut limit = GROSS_SIGMA * sigma;
+    while beyond(limit) > 0.0 {
+        if beyond(limit / 2.0) - beyond(limit) <= IN_THE_GAP * beyond(limit) {
+            return limit;
+        }
+        limit *= 2.0;
+        // What is out of its camera's reach is off by more than any number.
+        if limit.is_infinite() {
+            break;
+        }
+    }
+    f64::MAX
+}
+
+/// How far each corner is off, whitened; infinitely where it is out of its camera's reach.
+pub(super) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f64>> {
+    let weights = whitening.of(problem).blocks;
+    let of_block = |(block, weights): (&Block, &Vec<[f64; 3]>)| {
+        let off = block.observations.iter().zip(weights).map(|(seen, &w)| {
+            let [x, y] = Whitening::apply(w, problem.residual(block, seen)?);
+            Some(x.hypot(y))
+        });
+        off.map(|off| off.unwrap_or(f64::INFINITY)).collect()
+    };
+    problem.blocks.iter().zip(&weights).map(of_block).collect()
 }
 
 /// The a-posteriori variance: what the residuals cost for each of their degrees of freedom.

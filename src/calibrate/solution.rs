@@ -1,8 +1,10 @@
 use nalgebra::DMatrix;
 
 use super::excluded::Excluded;
+use super::finding::Finding;
 use super::lens_end::LensEnd;
 use super::misfit::Misfit;
+use super::panel::PanelRef;
 use super::shape::BoardShape;
 use crate::camera::{Camera, Pose};
 
@@ -35,6 +37,8 @@ pub struct Solution {
     pub shape: Option<BoardShape>,
     /// Patterns in the residuals that noise does not make, the strongest first.
     pub misfits: Vec<Misfit>,
+    /// What outliers share, and corners that were left out together.
+    pub findings: Vec<Finding>,
     /// Steps of the last bundle adjustment.
     pub steps: usize,
 }
@@ -70,8 +74,8 @@ pub struct ViewSolution {
 /// A corner as the camera explains it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner {
-    /// Index of the panel.
-    pub panel: usize,
+    /// The panel.
+    pub panel: PanelRef,
     /// Lattice row.
     pub row: i32,
     /// Lattice column.

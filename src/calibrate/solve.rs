@@ -1,7 +1,10 @@
 use glam::DVec3;
 
+use super::consensus::agreeing;
 use super::error::CalibrationError;
 use super::excluded::Excluded;
+use super::finding::Finding;
+use super::gross::{Gross, WrongFrame, within_pictures};
 use super::loss::Loss;
 use super::minimise::{Minimum, Until, minimise};
 use super::misfit::misfits;
@@ -9,13 +12,12 @@ use super::model::Model;
 use super::normal::Covariances;
 use super::pose::{blocks, estimate_pose, fixed};
 use super::problem::{CameraUnknowns, Problem};
-use super::settle::{residuals, settle, variance};
+use super::settle::{Settled, residuals, settle, variance};
 use super::shape::{self, BoardShape, Shape};
 use super::solution::{Corner, Parameter, Solution, ViewSolution, rms_px};
 use super::start::first_camera;
-use super::view::View;
+use super::view::{MIRRORED, View};
 use super::weights::{Weights, Whitening, median};
-use super::wrong::{limit_px, median_px};
 use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Pose};
 
 /// Two views of a plane determine focal lengths and principal point if nothing is off; a third
@@ -30,6 +32,10 @@ const PARALLEL_RAD: f64 = 0.05;
 /// of the focal length: equations that are linear near the solution, as deviations are computed from,
 /// are then off by as much as they say, and the deviation means nothing.
 const LOOSE_FOCAL: f64 = 0.1;
+
+/// Why a view is left out that shows nothing but panels that are.
+pub(super) const ONLY_WRONG_PANELS: &str =
+    "it shows only panels that are not where the target's file has them";
 
 /// How a camera is calibrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,14 +76,18 @@ pub(super) fn calibrated(
     options: Options,
     with_shape: bool,
 ) -> Result<Solution, CalibrationError> {
+    let (views, beyond) = within_pictures(views, 0);
+    let views = views.as_slice();
     enough(views.len(), views.len())?;
-    let ideal = first_camera(views, options.model).ok_or(CalibrationError::NoStart)?;
+    let agreeing: Vec<View> = views.iter().map(agreeing).collect();
+    let ideal = first_camera(&agreeing, options.model).ok_or(CalibrationError::NoStart)?;
     let [width, height] = views[0].size_px;
     let poses: Vec<Option<Pose>> =
-        views.iter().map(|view| estimate_pose(&ideal, panels, &view.sightings)).collect();
+        agreeing.iter().map(|view| estimate_pose(&ideal, panels, &view.sightings)).collect();
     let from = |(lens, scale): (Lens, f64)| {
         let camera = Camera::centred(width, height, scale * ideal.focal_px[0], lens);
-        let mut search = Search { views, panels, camera, poses: poses.clone() };
+        let agreeing = agreeing.clone();
+        let mut search = Search { views, agreeing, panels, camera, poses: poses.clone() };
         search.adjust(options.model.coarse())?;
         search.adjust(options.model.free())?;
         search.look_again();
@@ -95,7 +105,13 @@ pub(super) fn calibrated(
     let solution =
         search.finish(options.model.free(), options.loss, options.weights, with_shape)?;
     check_focal(&solution)?;
-    Ok(solution)
+    Ok(with_findings(solution, beyond))
+}
+
+/// The same with findings that were made before.
+fn with_findings(mut solution: Solution, before: Vec<Finding>) -> Solution {
+    solution.findings.splice(0..0, before);
+    solution
 }
 
 /// Finds only the poses of the views of a known camera.
@@ -128,9 +144,12 @@ pub(super) fn given(
             other_px: view.size_px,
         });
     }
-    let poses = views.iter().map(|view| estimate_pose(camera, panels, &view.sightings)).collect();
-    let search = Search { views, panels, camera: camera.clone(), poses };
-    search.finish(free, loss, weights, with_shape)
+    let (views, beyond) = within_pictures(views, 0);
+    let agreeing: Vec<View> = views.iter().map(agreeing).collect();
+    let pose = |view: &View| estimate_pose(camera, panels, &view.sightings);
+    let poses = agreeing.iter().map(pose).collect();
+    let search = Search { views: &views, agreeing, panels, camera: camera.clone(), poses };
+    Ok(with_findings(search.finish(free, loss, weights, with_shape)?, beyond))
 }
 
 fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
@@ -143,6 +162,8 @@ fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
 /// The camera and the poses on the way.
 struct Search<'a> {
     views: &'a [View],
+    /// The same with only those corners that agree with each other, from which poses start.
+    agreeing: Vec<View>,
     panels: &'a [Pose],
     camera: Camera,
     /// `None` where a view has no pose that the camera can have seen, or does not belong.
@@ -150,15 +171,16 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The views that have a pose and are within the camera's reach, and their problem.
-    fn problem(&self, free: Vec<bool>) -> (Vec<usize>, Problem) {
+    /// The views that have a pose and are within the camera's reach, and the problem of what is seen in
+    /// them.
+    fn problem(&self, views: &[View], free: Vec<bool>) -> (Vec<usize>, Problem) {
         let mut problem = Problem {
             cameras: vec![CameraUnknowns::alone(self.camera.clone(), free)],
             panels: fixed(self.panels),
             ..Problem::default()
         };
         let mut used = Vec::new();
-        for (index, (view, pose)) in self.views.iter().zip(&self.poses).enumerate() {
+        for (index, (view, pose)) in views.iter().zip(&self.poses).enumerate() {
             let Some(pose) = pose else { continue };
             problem.frames.push(*pose);
             let first = problem.blocks.len();
@@ -175,7 +197,7 @@ impl Search<'_> {
 
     /// Bundle adjustment in which wrong corners and wrong views hardly count.
     fn adjust(&mut self, free: Vec<bool>) -> Result<(), CalibrationError> {
-        let (used, problem) = self.problem(free);
+        let (used, problem) = self.problem(&self.agreeing, free);
         enough(used.len(), self.views.len())?;
         let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
         let minimum = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
@@ -190,7 +212,7 @@ impl Search<'_> {
     /// Estimates the pose of every view anew, now that the camera is nearly known, and keeps the
     /// better one.
     fn look_again(&mut self) {
-        for (view, pose) in self.views.iter().zip(&mut self.poses) {
+        for (view, pose) in self.agreeing.iter().zip(&mut self.poses) {
             let again = estimate_pose(&self.camera, self.panels, &view.sightings);
             let error = |pose: &Option<Pose>| {
                 pose.map_or(f64::INFINITY, |pose| {
@@ -205,7 +227,7 @@ impl Search<'_> {
 
     /// Median over all views of the median error of their corners, px.
     fn error_px(&self) -> f64 {
-        let views = self.views.iter().zip(&self.poses);
+        let views = self.agreeing.iter().zip(&self.poses);
         let error = |(view, pose): (&View, &Option<Pose>)| {
             pose.map_or(f64::INFINITY, |pose| view_error_px(&self.camera, self.panels, view, pose))
         };
@@ -221,31 +243,24 @@ impl Search<'_> {
         with_shape: bool,
     ) -> Result<Solution, CalibrationError> {
         let calibrating = free.contains(&true);
-        let (used, all) = self.problem(free);
-        let residuals_of_all = residuals(&all);
-        let medians: Vec<f64> = (0..used.len())
-            .map(|frame| {
-                let of_frame = all.blocks.iter().zip(&residuals_of_all);
-                let of_frame = of_frame.filter(|(block, _)| block.frame == frame);
-                median_px(of_frame.flat_map(|(_, residuals)| residuals))
-            })
-            .collect();
-        let limit = limit_px(&medians);
-        let belongs = |frame: usize| medians[frame] <= limit;
-        let problem = all.with_frames(belongs);
-        let kept: Vec<usize> = (0..used.len()).filter(|&f| belongs(f)).map(|f| used[f]).collect();
+        let (used, all) = self.problem(self.views, free);
+        let gross = Gross::of(all).ok_or(CalibrationError::NoStart)?;
+        let kept = (0..used.len()).filter(|frame| !gross.frames.contains_key(frame));
+        let kept: Vec<usize> = kept.map(|frame| used[frame]).collect();
         if calibrating {
             enough(kept.len(), self.views.len())?;
         }
         let excluded = self.views.iter().enumerate().filter(|(index, _)| !kept.contains(index));
         let excluded = excluded.map(|(index, view)| {
-            let why = match used.iter().position(|used| *used == index) {
-                Some(frame) => format!(
-                    "its corners are off by {:.1} px where those of other views are by {:.2} px: \
+            let frame = used.iter().position(|used| *used == index);
+            let why = match frame.and_then(|frame| gross.frames.get(&frame)) {
+                Some(WrongFrame::Off { off_px, .. }) => format!(
+                    "its corners are off by {off_px:.1} px where those of other views are by {:.2} px: \
                      wrong labels, or another target",
-                    medians[frame],
-                    median(medians.clone())
+                    gross.usual_px
                 ),
+                Some(WrongFrame::Mirrored) => MIRRORED.to_owned(),
+                Some(WrongFrame::OnlyWrongPanels) => ONLY_WRONG_PANELS.to_owned(),
                 None => "no pose explains its corners: wrong labels, another target, or corners \
                          where the lens model has ended"
                     .to_owned(),
@@ -254,30 +269,33 @@ impl Search<'_> {
         });
         let excluded = excluded.collect();
 
-        let (mut minimum, mut whitening) = settle(problem, weights, loss)?;
+        let (problem, left_out) = gross.kept();
+        let mut settled = settle(problem, &left_out, weights, loss)?;
         let mut f_ratio = 0.0;
         if with_shape {
-            let flat = minimum.normal.cost;
-            let mut problem = minimum.problem;
+            let flat = settled.minimum.normal.cost;
+            let mut problem = settled.minimum.problem;
             let observations = problem.blocks.iter().flat_map(|block| &block.observations);
             problem.shape = Some(Shape::flat(observations.map(|seen| seen.panel_mm)));
             // Compared under the same weights.
-            let bent = minimise(problem, &whitening, loss, Until::Fine)
+            let bent = minimise(problem, &settled.whitening, loss, Until::Fine)
                 .ok_or(CalibrationError::NoStart)?;
             f_ratio = (flat - bent.normal.cost) / shape::COUNT as f64 / variance(&bent);
-            (minimum, whitening) = settle(bent.problem, weights, loss)?;
+            settled = settle(settled.problem.at(&bent.problem), &left_out, weights, loss)?;
         }
-        self.solution(&kept, excluded, &minimum, &whitening, f_ratio)
+        let findings = gross.findings(&settled, |frame| self.views[used[frame]].name.clone());
+        let solution = self.solution(&kept, excluded, &settled, f_ratio)?;
+        Ok(Solution { findings, ..solution })
     }
 
     fn solution(
         &self,
         kept: &[usize],
         excluded: Vec<Excluded>,
-        minimum: &Minimum,
-        whitening: &Whitening,
+        settled: &Settled,
         f_ratio: f64,
     ) -> Result<Solution, CalibrationError> {
+        let Settled { minimum, whitening, problem: all, outliers } = settled;
         let Minimum { problem, normal, layout, steps } = minimum;
         let CameraUnknowns { camera, free, .. } = &problem.cameras[0];
         let names = camera.parameter_names();
@@ -313,7 +331,6 @@ impl Search<'_> {
         });
         let parameters = parameters.collect();
 
-        let residuals = residuals(problem);
         let mut views: Vec<ViewSolution> = kept
             .iter()
             .zip(&problem.frames)
@@ -327,24 +344,24 @@ impl Search<'_> {
                 corners: Vec::new(),
             })
             .collect();
-        for ((block, residuals), weights) in
-            problem.blocks.iter().zip(&residuals).zip(&whitening.blocks)
-        {
-            let corners = block.observations.iter().zip(residuals).zip(weights);
-            views[block.frame].corners.extend(corners.map(|((seen, &residual), &w)| {
-                let outlier = whitening.is_outlier(w, residual);
+        for (block, outliers) in all.blocks.iter().zip(outliers) {
+            let corners = block.observations.iter().zip(outliers);
+            views[block.frame].corners.extend(corners.filter_map(|(seen, &outlier)| {
                 let (row, col, pixel) = (seen.row, seen.col, seen.pixel);
-                Corner { panel: block.panel, row, col, pixel, residual, outlier }
+                let residual = all.residual(block, seen)?;
+                Some(Corner { panel: block.panel, row, col, pixel, residual, outlier })
             }));
         }
         for view in &mut views {
             view.rms_px = rms_px(view.corners.iter().map(|corner| &corner.residual));
         }
+        let seen = views.iter().flat_map(|view| &view.corners);
+        let rms_px = rms_px(seen.map(|corner| &corner.residual));
         Ok(Solution {
             camera: camera.clone(),
             parameters,
             covariance,
-            rms_px: rms_px(residuals.iter().flatten()),
+            rms_px,
             views,
             excluded,
             common_px: whitening.common_px,
@@ -352,6 +369,7 @@ impl Search<'_> {
             loose,
             shape,
             misfits: misfits(problem, whitening),
+            findings: Vec::new(),
             steps: *steps,
         })
     }
@@ -360,7 +378,7 @@ impl Search<'_> {
 /// Median error of a view's corners at a pose, px.
 fn view_error_px(camera: &Camera, panels: &[Pose], view: &View, pose: Pose) -> f64 {
     let errors = view.sightings.iter().flat_map(|sighting| {
-        let camera_from_panel = pose.after(&panels[sighting.panel]);
+        let camera_from_panel = pose.after(&panels[sighting.panel.index()]);
         sighting.observations.iter().map(move |seen| {
             match camera.project(camera_from_panel.apply(seen.panel_mm)) {
                 Some([x, y]) => (seen.pixel[0] - x).hypot(seen.pixel[1] - y),

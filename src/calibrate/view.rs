@@ -5,6 +5,7 @@ use glam::{DQuat, DVec3};
 use super::error::CalibrationError;
 use super::excluded::Excluded;
 use super::grid::UntaggedGrid;
+use super::panel::PanelRef;
 use super::problem::Observation;
 use super::shape::Shape;
 use crate::camera::Pose;
@@ -12,10 +13,10 @@ use crate::detect::{Detection, Grid};
 use crate::target::{Panel, Target, TargetSpec};
 
 /// Corners that a panel needs in a view, so that a few wrong ones show.
-const LEAST_CORNERS: usize = 6;
+pub(super) const LEAST_CORNERS: usize = 6;
 
 /// What is wrong with labels that run the wrong way round.
-const MIRRORED: &str =
+pub(super) const MIRRORED: &str =
     "the labels are mirrored: rows and columns are exchanged, or the image was flipped";
 
 /// What is wrong with a board of the other tiling.
@@ -53,8 +54,8 @@ pub struct View {
 /// A panel in a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sighting {
-    /// Index of the panel.
-    pub panel: usize,
+    /// Which panel.
+    pub panel: PanelRef,
     /// Its corners.
     pub observations: Vec<Observation>,
 }
@@ -118,10 +119,10 @@ impl Reference<'_> {
     }
 
     /// Id of a panel; `None` on an untagged board.
-    fn panel_id(&self, index: usize) -> Option<u32> {
+    fn panel_id(&self, panel: PanelRef) -> Option<u32> {
         match self {
             Self::Grid(_) => None,
-            Self::Target(target) => Some(target.panels[index].id),
+            Self::Target(_) => Some(panel.id()),
         }
     }
 
@@ -138,7 +139,7 @@ impl Reference<'_> {
                 };
                 board.check(grid).map_err(|problem| (None, problem))?;
                 let at = |row, col| board.place(row, col);
-                Ok(vec![Sighting { panel: 0, observations: observations(grid, at) }])
+                Ok(vec![Sighting { panel: PanelRef::ONLY, observations: observations(grid, at) }])
             }
             Self::Target(target) => {
                 let grids = detection.grids.iter();
@@ -273,7 +274,8 @@ fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
         }
     }
     let at = |row, col| places[&(row, col)];
-    Ok(Some(Sighting { panel: index, observations: observations(grid, at) }))
+    let panel = PanelRef::new(index, panel.id);
+    Ok(Some(Sighting { panel, observations: observations(grid, at) }))
 }
 
 /// Compares what a detection says of a panel with the target.

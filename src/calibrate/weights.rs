@@ -47,14 +47,17 @@ impl Whitening {
     /// Whether a corner is farther off than corners are by chance.
     pub(super) fn is_outlier(&self, weight: [f64; 3], residual: [f64; 2]) -> bool {
         let [x, y] = Self::apply(weight, residual);
-        x.hypot(y) > OUTLIER_SIGMA * self.sigma
+        x.hypot(y) > self.outlier_limit()
+    }
+
+    /// The whitened distance beyond which a corner is an outlier.
+    pub(super) fn outlier_limit(&self) -> f64 {
+        OUTLIER_SIGMA * self.sigma
     }
 
     /// Every corner alike.
     fn equal(problem: &Problem, residuals: &[Vec<[f64; 2]>]) -> Self {
-        let alike = |n: usize| vec![[1.0, 0.0, 1.0]; n];
-        let blocks = problem.blocks.iter().map(|block| alike(block.observations.len())).collect();
-        let mut whitening = Self { blocks, common_px: None, sigma: 1.0 };
+        let mut whitening = Self { blocks: alike(problem), common_px: None, sigma: 1.0 };
         whitening.sigma = whitening.median_sigma(residuals);
         whitening
     }
@@ -67,10 +70,8 @@ impl Whitening {
         };
         let Some(covariances) = covariances else { return Self::equal(problem, residuals) };
         let with = |common: f64| {
-            let whiten = |cov: &[f64; 3]| triangle(*cov, common * common);
-            let blocks = covariances.iter().map(|block| block.iter().map(whiten).collect());
-            let mut whitening =
-                Self { blocks: blocks.collect(), common_px: Some(common), sigma: 1.0 };
+            let blocks = triangles(&covariances, common);
+            let mut whitening = Self { blocks, common_px: Some(common), sigma: 1.0 };
             whitening.sigma = whitening.median_sigma(residuals);
             whitening
         };
@@ -85,6 +86,16 @@ impl Whitening {
             *(if with(middle).sigma > 1.0 { &mut low } else { &mut high }) = middle;
         }
         with(high)
+    }
+
+    /// The same weights for other corners.
+    pub(super) fn of(&self, problem: &Problem) -> Self {
+        let covariances = self.common_px.and_then(|common| Some((common, covariances(problem)?)));
+        let blocks = match covariances {
+            Some((common, covariances)) => triangles(&covariances, common),
+            None => alike(problem),
+        };
+        Self { blocks, ..*self }
     }
 
     fn median_sigma(&self, residuals: &[Vec<[f64; 2]>]) -> f64 {
@@ -106,6 +117,17 @@ fn covariances(problem: &Problem) -> Option<Vec<Vec<[f64; 3]>>> {
         block.observations.iter().map(|o| o.cov.unwrap_or([largest, 0.0, largest])).collect()
     };
     (largest > 0.0).then(|| problem.blocks.iter().map(of).collect())
+}
+
+/// W of corners that are all as precise.
+fn alike(problem: &Problem) -> Vec<Vec<[f64; 3]>> {
+    problem.blocks.iter().map(|block| vec![[1.0, 0.0, 1.0]; block.observations.len()]).collect()
+}
+
+/// W of covariances with a deviation beside them.
+fn triangles(covariances: &[Vec<[f64; 3]>], common: f64) -> Vec<Vec<[f64; 3]>> {
+    let whiten = |cov: &[f64; 3]| triangle(*cov, common * common);
+    covariances.iter().map(|block| block.iter().map(whiten).collect()).collect()
 }
 
 /// W of a covariance with `common` added to both variances.

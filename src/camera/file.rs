@@ -32,13 +32,16 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::quantity;
+
 use super::{
     BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
     Pupil,
 };
+use crate::limits::MAX_SETTINGS_BYTES;
 
-/// Largest side of an image, px.
-const MAX_SIDE: u32 = 50_000;
+/// Most lists and maps within each other; a camera has two.
+const MAX_DEPTH: usize = 16;
 
 /// Terms of a fisheye's polynomial that are there even when a file has fewer.
 const LEAST_TERMS: usize = 4;
@@ -124,6 +127,15 @@ impl Model {
         }
     }
 
+    /// The ranges of the parameters of its lens, from the first; those without one have that of coefficients.
+    fn ranges(self) -> &'static [quantity::Range] {
+        match self {
+            Self::Eucm => &[quantity::alpha::RANGE, quantity::beta::RANGE],
+            Self::DoubleSphere => &[quantity::xi::RANGE, quantity::alpha::RANGE],
+            Self::Pinhole | Self::Fisheye | Self::Pupil => &[],
+        }
+    }
+
     /// Whether coefficients that are left out at the end of the list are zero.
     fn ends_early(self) -> bool {
         matches!(self, Self::Pinhole | Self::Fisheye)
@@ -133,22 +145,22 @@ impl Model {
 impl Camera {
     /// Reads the text of a camera file.
     pub fn from_yaml(text: &str) -> Result<Camera, CameraFileError> {
+        check_size(text).map_err(CameraFileError::Yaml)?;
         // OpenCV writes a version directive and a tag that no other reader of YAML knows.
         let foreign = text.contains("camera_matrix");
         let own = if foreign { from_foreign(text)? } else { parse(text)? };
         let Own { width, height, focal_px, centre_px, model, mut distortion } = own;
         let key = |key, problem: String| CameraFileError::Key { key, problem };
-        for (name, side) in [("width", width), ("height", height)] {
-            if !(1..=MAX_SIDE).contains(&side) {
-                return Err(key(name, format!("{side} is not between 1 and {MAX_SIDE}")));
-            }
-        }
-        if focal_px.iter().any(|&f| !(f > 0.0 && f.is_finite())) {
-            return Err(key("focal_px", "it must be positive".to_owned()));
-        }
-        for (name, values) in [("centre_px", centre_px.as_slice()), ("distortion", &distortion)] {
-            if values.iter().any(|v| !v.is_finite()) {
-                return Err(key(name, "it must be finite".to_owned()));
+        let numbers = [
+            ("width", vec![f64::from(width)], quantity::side_px::RANGE),
+            ("height", vec![f64::from(height)], quantity::side_px::RANGE),
+            ("focal_px", focal_px.to_vec(), quantity::focal_px::RANGE),
+            ("centre_px", centre_px.to_vec(), quantity::place_px::RANGE),
+            ("distortion", distortion.clone(), quantity::coefficient::RANGE),
+        ];
+        for (name, numbers, range) in numbers {
+            for number in numbers {
+                range.check(number).map_err(|problem| key(name, problem.to_string()))?;
             }
         }
         let lens = model.lens(distortion.len());
@@ -162,6 +174,10 @@ impl Camera {
             return Err(key("distortion", problem));
         }
         distortion.resize(count, 0.0);
+        for ((name, &number), range) in lens.names().iter().zip(&distortion).zip(model.ranges()) {
+            let in_range = range.check(number);
+            in_range.map_err(|what| key("distortion", format!("{name}: {what}")))?;
+        }
         let lens = lens.with_parameters(&distortion);
         Ok(Camera { width, height, focal_px, centre_px, lens })
     }
@@ -176,8 +192,28 @@ impl Camera {
         }
         let Camera { width, height, focal_px, centre_px, .. } = *self;
         let own = Own { width, height, focal_px, centre_px, model, distortion };
-        serde_yaml_ng::to_string(&own).expect("plain data has a YAML form")
+        let yaml = serde_yaml_ng::to_string(&own).expect("plain data has a YAML form");
+        format!("# deltille {}, camera\n{yaml}", env!("CARGO_PKG_VERSION"))
     }
+}
+
+/// Refuses what no camera file has, and what takes a reader of YAML time with its square.
+fn check_size(text: &str) -> Result<(), String> {
+    if text.len() > MAX_SETTINGS_BYTES {
+        return Err(format!("more than {MAX_SETTINGS_BYTES} bytes, which no camera has"));
+    }
+    let mut depth = 0usize;
+    for byte in text.bytes() {
+        match byte {
+            b'[' | b'{' => depth += 1,
+            b']' | b'}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        if depth > MAX_DEPTH {
+            return Err(format!("lists more than {MAX_DEPTH} deep, which no camera has"));
+        }
+    }
+    Ok(())
 }
 
 fn parse<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, CameraFileError> {

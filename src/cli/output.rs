@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 
-use crate::export::atomic;
-use crate::json;
+use crate::export::kind::Kind;
+use crate::export::{atomic, staging};
+use crate::limits::{Limits, ReadError};
 
 /// The file that `-o` means: itself when it ends in the extension, else `<stem>.<extension>` in
 /// that folder. A path that ends in another extension is no folder, unless it is there as one.
@@ -46,13 +47,19 @@ pub fn check_writable(option: &str, path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints a result; a reader that has gone away (`| head`) is not an error.
+/// Exit code when the reader of the standard output has gone away, as of a program that SIGPIPE ends.
+const UNREAD: i32 = 141;
+
+/// Prints a result. Where its reader has gone away, as `head` does when it has seen enough, the
+/// process ends without a word, and what it is writing is removed.
 pub fn print(text: &str) -> anyhow::Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(error).context("cannot write to the standard output")
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {
+            let _nothing_more = atomic::abandon();
+            std::process::exit(UNREAD)
         }
-        _ => Ok(()),
+        result => result.context("cannot write to the standard output"),
     }
 }
 
@@ -69,36 +76,72 @@ pub(crate) use say;
 
 /// Prints a line on standard error, [`shown`].
 macro_rules! tell {
-    ($($argument:tt)*) => {
-        eprintln!("{}", $crate::words::shown(&format!($($argument)*)))
-    };
+    ($($argument:tt)*) => {{
+        // Nobody may be left to read it.
+        let _ = ::std::io::Write::write_fmt(
+            &mut ::std::io::stderr(),
+            format_args!("{}\n", $crate::words::shown(&format!($($argument)*))),
+        );
+    }};
 }
 pub(crate) use tell;
 
-/// Refuses to write a JSON of some schema, or anything else, over a JSON of another kind: it only
-/// has the same name, and may be all that its owner has of a target or a calibration.
-pub fn check_replaced(path: &Path, schema: Option<&str>) -> anyhow::Result<()> {
-    if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json")) {
+/// What becomes of files that are there already. One of the same kind is replaced.
+#[derive(clap::Args, Clone, Copy, Default)]
+pub struct Overwrite {
+    /// Replace files of the same name also where they are of another kind, or something else wrote them
+    #[arg(long)]
+    force: bool,
+}
+
+impl Overwrite {
+    /// Whether anything is replaced.
+    pub fn is_forced(self) -> bool {
+        self.force
+    }
+
+    /// Refuses to write a file of some kind over one of another kind: it only has the same name, and
+    /// may be all that its owner has of a mesh, a target or a calibration.
+    pub fn check(self, path: &Path, kind: &Kind) -> anyhow::Result<()> {
+        if self.force || !path.is_file() {
+            return Ok(());
+        }
+        let content = match Limits::default().read(path) {
+            Err(ReadError::Exceeded { .. }) => bail!(
+                "{} is too large to be looked at, and would be lost: choose another place to write \
+                 to; --force replaces it",
+                path.display()
+            ),
+            content => content.with_context(|| cannot_read(path))?,
+        };
+        let there = Kind::of(&content);
+        ensure!(
+            content.is_empty() || there == *kind,
+            "{} holds {there}, which would be lost: choose another place to write to; --force \
+             replaces it",
+            path.display()
+        );
+        Ok(())
+    }
+}
+
+fn cannot_read(path: &Path) -> String {
+    format!("cannot read {}, which would be replaced", path.display())
+}
+
+/// Finishes or removes what killed runs have left of files that were on their way to a folder.
+pub fn settle(folder: &Path) -> anyhow::Result<()> {
+    Ok(staging::settle(folder)?)
+}
+
+/// Writes a file whole or not at all, making its folder where there is none. Where the same content
+/// is there already, it stays.
+pub fn write(path: &Path, content: &[u8], overwrite: Overwrite) -> anyhow::Result<()> {
+    overwrite.check(path, &Kind::of(content))?;
+    settle(folder_of(path))?;
+    if path.is_file() && std::fs::read(path).is_ok_and(|there| there == content) {
         return Ok(());
     }
-    let there = std::fs::read(path).ok().and_then(|text| json::schema(&text).ok().flatten());
-    match there {
-        Some(there) if schema.map(json::kind) != Some(json::kind(&there)) => bail!(
-            "{} holds {there}, which would be lost: choose another place to write to",
-            path.display()
-        ),
-        _ => Ok(()),
-    }
-}
-
-/// The same for a content that is there already.
-pub fn check_replaced_by(path: &Path, content: &[u8]) -> anyhow::Result<()> {
-    check_replaced(path, json::schema(content).ok().flatten().as_deref())
-}
-
-/// Writes a file whole or not at all, making its folder where there is none.
-pub fn write(path: &Path, content: &[u8]) -> anyhow::Result<()> {
-    check_replaced_by(path, content)?;
     make_folder_of(path)?;
     Ok(atomic::write(path, |file| file.write_all(content))?)
 }

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use crate::cli::interrupt;
 use crate::cli::output::tell;
 use clap::Parser;
 
@@ -9,16 +10,18 @@ use clap::Parser;
 pub const BAD_INPUT: u8 = 2;
 /// Exit code when what was checked does not hold, or some of many inputs failed.
 pub const FAILED: u8 = 1;
-/// Exit code when Ctrl-C came before the work was done, as a shell has it.
-pub const INTERRUPTED: u8 = 130;
 
-/// Ctrl-C came, and this is how things stand. Ends a program with the exit code [`INTERRUPTED`].
+/// Characters kept of either end of a long message.
+const MOST_CHARACTERS: usize = 1000;
+
+/// Ctrl-C or another signal came, and this is how things stand; see [`interrupt::leave`].
 #[derive(Debug, thiserror::Error)]
-#[error("interrupted: {0}")]
-pub struct Interrupted(pub &'static str);
+#[error("{0}")]
+pub struct Interrupted(pub String);
 
 /// Parses the arguments and runs a program; errors become one line on standard error.
 pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> ExitCode {
+    interrupt::listen();
     let result = match A::try_parse() {
         Ok(arguments) => program(arguments),
         Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error))),
@@ -29,9 +32,9 @@ pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> Ex
         }
     };
     result.unwrap_or_else(|error| {
-        if let Some(interrupted) = error.downcast_ref::<Interrupted>() {
-            tell!("{interrupted}");
-            return ExitCode::from(INTERRUPTED);
+        if interrupt::is_raised() {
+            // Any other error has come of what is being torn down.
+            interrupt::leave(error.downcast_ref().map(|Interrupted(how)| how.as_str()));
         }
         report(&error);
         ExitCode::from(BAD_INPUT)
@@ -54,7 +57,19 @@ pub fn message(error: &anyhow::Error) -> String {
             text = format!("{text}: {cause}");
         }
     }
-    text.replace('\n', " ")
+    shortened(&text.replace('\n', " "))
+}
+
+/// A line without its middle where that is longer than anybody reads: messages name what they found
+/// in a file, whatever it is.
+fn shortened(line: &str) -> String {
+    let count = line.chars().count();
+    if count <= 2 * MOST_CHARACTERS {
+        return line.to_owned();
+    }
+    let start: String = line.chars().take(MOST_CHARACTERS).collect();
+    let end: String = line.chars().skip(count - MOST_CHARACTERS).collect();
+    format!("{start} … {end}")
 }
 
 /// The first paragraph of a message of clap, and its tip, on one line.

@@ -22,6 +22,8 @@ use std::sync::LazyLock;
 
 use serde::{Deserialize, Serialize};
 
+use crate::quantity;
+
 /// The tone curve of a camera, as the user tells it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Tone {
@@ -72,15 +74,20 @@ impl std::str::FromStr for Tone {
 #[serde(deny_unknown_fields)]
 pub struct ToneEstimate {
     /// Median black of the corners, of full scale.
+    #[serde(deserialize_with = "quantity::figure::de")]
     pub black: f64,
     /// Median white.
+    #[serde(deserialize_with = "quantity::figure::de")]
     pub white: f64,
     /// Curvature κ₀ between them: grey = middle + half·(S + (1 − S²)(κ₀ + κ₁ S + …)); 0 is linear,
     /// positive brightens.
+    #[serde(deserialize_with = "quantity::figure::de")]
     pub kappa: f64,
     /// Its standard deviation.
+    #[serde(deserialize_with = "quantity::deviation::de")]
     pub kappa_deviation: f64,
     /// The next term, κ₁.
+    #[serde(deserialize_with = "quantity::figure::de")]
     pub kappa_odd: f64,
     /// Whether it differs from a line by more than its deviation explains, and was used.
     pub used: bool,

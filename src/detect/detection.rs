@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::curve::ToneEstimate;
 use super::ink::InkEstimate;
 use super::reason::Reason;
-use crate::raster::Pyramid;
+use crate::quantity;
+use crate::raster::{FileNotes, Pyramid};
 use crate::target::GridKind;
 
 /// What was found in one image.
@@ -17,6 +18,9 @@ pub struct Detection {
     pub width: u32,
     /// Height, px.
     pub height: u32,
+    /// What the image's file says beside its pixels.
+    #[serde(default, skip_serializing_if = "FileNotes::is_empty")]
+    pub file: FileNotes,
     /// Grids: labelled ones by panel id, then the others, largest first.
     pub grids: Vec<Grid>,
     /// What was found of the camera's tone curve, where it was looked for.
@@ -26,7 +30,8 @@ pub struct Detection {
     /// Why there are no labels, where labels were looked for and no grid has any; and why there are no grids.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<Reason>,
-    /// Milliseconds per stage.
+    /// Milliseconds per stage; written only where it is asked for, as no two runs take the same.
+    #[serde(default)]
     pub timing_ms: BTreeMap<String, f64>,
 }
 
@@ -93,14 +98,18 @@ pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridCorner {
     /// Lattice row.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub row: i32,
     /// Lattice column.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub col: i32,
     /// Corner id in the target, once known.
     pub id: Option<u32>,
     /// Position, px; pixel centres at integers.
+    #[serde(deserialize_with = "quantity::place_px::de")]
     pub x: f64,
     /// Position, px, downwards.
+    #[serde(deserialize_with = "quantity::place_px::de")]
     pub y: f64,
     /// Covariance xx, xy, yy, px²; `None` where the method gives none.
     pub cov: Option<[f64; 3]>,
@@ -114,8 +123,10 @@ pub struct DecodedTag {
     /// Name of the family.
     pub family: String,
     /// Row of the tile's lower-left vertex, in the grid's rows.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub row: i32,
     /// Column of the tile's lower-left vertex.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub col: i32,
     /// Corrected bits.
     pub errors: u32,

@@ -23,7 +23,7 @@ use super::tiling::{CHECKER, DELTILLE, kind};
 use super::why;
 use crate::family::Family;
 use crate::lattice::GridKind;
-use crate::raster::{AnyGray, Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
+use crate::raster::{AnyGray, FileNotes, Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
 use crate::target::{Target, least_untagged_corners};
 
 /// Most levels of the pyramid that every image has: the coarsest sees four times the blur that the finest can.
@@ -219,6 +219,7 @@ impl Detector {
             image: name.to_owned(),
             width: image.width() as u32,
             height: image.height() as u32,
+            file: FileNotes::default(),
             grids: grids.into_iter().map(|(grid, _)| grid).collect(),
             tone: optics.tone,
             ink: self.ink.or_else(|| {
@@ -245,7 +246,7 @@ impl Detector {
         let least = least_untagged_corners(kind::<N>()) as usize;
         let most = self.labels.most_corners();
         let mut refused = None;
-        grids.retain(|(grid, _)| {
+        grids.retain(|(grid, no_labels)| {
             let (corners, edge_px) = (grid.corners.len(), grid.edge_px().unwrap_or(0.0));
             let is_large = corners >= least;
             let why = if edge_px < MIN_UNTAGGED_EDGE_PX {
@@ -253,7 +254,8 @@ impl Detector {
                 Some(Reason::new(ReasonKind::TooSmall, figures))
             } else if corners > most {
                 let figures = [("corners", corners as f64), ("expected", most as f64)];
-                Some(Reason::new(ReasonKind::NotWhole, figures))
+                // Where there are tags, they tell more.
+                no_labels.clone().or_else(|| Some(Reason::new(ReasonKind::NotWhole, figures)))
             } else {
                 None
             };

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::detection::median;
+use crate::quantity;
 
 /// How far what is dark has grown, as the user tells it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -38,14 +39,24 @@ impl std::str::FromStr for Ink {
 #[serde(deny_unknown_fields)]
 pub struct InkEstimate {
     /// In edges of a tile; less than 0 where it has shrunk.
+    #[serde(deserialize_with = "quantity::figure::de")]
     pub edges: f64,
     /// Its standard deviation.
+    #[serde(deserialize_with = "quantity::deviation::de")]
     pub edges_deviation: f64,
     /// In µm of the print, where the target is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::figure::de"
+    )]
     pub um: Option<f64>,
     /// Its standard deviation.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::deviation::de"
+    )]
     pub um_deviation: Option<f64>,
     /// Whether it differs from nothing by more than its deviation explains, and was used.
     pub used: bool,
@@ -61,6 +72,9 @@ const CHI2: f64 = 10.8;
 const OVER_MEDIAN_DISTANCE: f64 = 1.4826;
 const OVER_THAT_OF_THE_MEAN: f64 = 1.2533;
 
+/// No picture tells more precisely than this, in edges.
+const LEAST_DEVIATION: f64 = 1e-9;
+
 impl InkEstimate {
     /// What pictures of one print say together: the weighted median, so that a picture of something else does
     /// not count; from none nothing. Its deviation is what theirs make, or what their scatter says if that is more.
@@ -69,21 +83,24 @@ impl InkEstimate {
         let mut pictures = pictures.to_vec();
         pictures.sort_by(|a, b| a.edges.total_cmp(&b.edges));
         pictures.dedup_by(|a, b| a.pictures > 1 && *a == *b);
-        let weight = |p: &Self| p.edges_deviation.max(f64::MIN_POSITIVE).powi(-2);
+        let weight = |p: &Self| p.edges_deviation.max(LEAST_DEVIATION).powi(-2);
         let total: f64 = pictures.iter().map(weight).sum();
         let mut below = 0.0;
         let middle = *pictures.iter().find(|picture| {
             below += weight(picture);
             below >= 0.5 * total
         })?;
-        let count = pictures.iter().map(|picture| picture.pictures).sum();
+        let count = pictures.iter().map(|picture| picture.pictures).fold(0, u32::saturating_add);
         if pictures.len() == 1 {
             return Some(middle);
         }
         let off = |p: &Self| (p.edges - middle.edges).abs() * weight(p).sqrt();
         let scatter = OVER_MEDIAN_DISTANCE * median(pictures.iter().map(off).collect())?;
         let deviation = OVER_THAT_OF_THE_MEAN * scatter.max(1.0) / total.sqrt();
-        let um = |edges: f64| middle.um.map(|um| um / middle.edges * edges);
+        let um = |edges: f64| {
+            let um = middle.um.map(|um| um / middle.edges * edges);
+            um.filter(|um| um.is_finite())
+        };
         Some(Self {
             edges_deviation: deviation,
             um_deviation: um(deviation),

@@ -5,6 +5,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::quantity;
 use crate::words::counted;
 
 /// Why something has no labels.
@@ -17,7 +18,11 @@ pub struct Reason {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<usize>,
     /// What was measured, by names with units, such as `bit_px`.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(
+        default,
+        skip_serializing_if = "BTreeMap::is_empty",
+        deserialize_with = "quantity::figure::de"
+    )]
     pub figures: BTreeMap<String, f64>,
 }
 

@@ -7,6 +7,8 @@ use kurbo::Affine;
 
 use super::corners::{METHODS, Method, Row, Sweep, name};
 use crate::artwork::text;
+use crate::export::GENERATOR;
+use crate::export::kind::signed_png;
 use crate::target::GridKind;
 
 /// Size of a panel's axes and the room around it, in user units.
@@ -58,8 +60,9 @@ pub fn svg(rows: &[Row]) -> String {
 pub(super) fn page([width, height]: [f64; 2], body: &str) -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
-         viewBox=\"0 0 {width} {height}\">\n<rect width=\"100%\" height=\"100%\" \
-         fill=\"#fff\"/>\n{body}</svg>\n"
+         viewBox=\"0 0 {width} {height}\">\n<!-- {} -->\n<rect width=\"100%\" height=\"100%\" \
+         fill=\"#fff\"/>\n{body}</svg>\n",
+        GENERATOR
     )
 }
 
@@ -71,7 +74,7 @@ pub fn png(svg: &str) -> Option<Vec<u8>> {
     let mut pixmap = resvg::tiny_skia::Pixmap::new(size.width(), size.height())?;
     let scale = resvg::tiny_skia::Transform::from_scale(SCALE, SCALE);
     resvg::render(&tree, scale, &mut pixmap.as_mut());
-    pixmap.encode_png().ok()
+    pixmap.encode_png().ok().map(signed_png)
 }
 
 fn legend(body: &mut String) {

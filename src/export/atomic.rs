@@ -1,7 +1,23 @@
 //! Files that appear whole or not at all.
+//!
+//! A file is written under another name, brought to the disk, and renamed. What is being written is
+//! locked by its writer, so that what a killed one leaves can be told from it and goes when the next
+//! one comes, see [`settle`](super::staging::settle).
 
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// What the names of files that are being written begin with, and how many characters follow.
+const PREFIX: &str = ".deltille-writing-";
+const RANDOM: usize = 6;
+
+/// What this process is writing at the moment.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Held while a set of files is moved to its places.
+static MOVING: Mutex<()> = Mutex::new(());
 
 /// A file that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -14,8 +30,8 @@ pub struct WriteError {
 }
 
 /// Writes a file through `fill`: to a temporary name in the same folder, renamed to `path` once
-/// everything is written. On an error nothing is left behind, and an earlier file stays as it was. Where
-/// `path` is a symbolic link, what it points to is written; a device or a pipe is refused.
+/// everything is on the disk. On an error nothing is left behind, and an earlier file stays as it was.
+/// Where `path` is a symbolic link, what it points to is written; a device or a pipe is refused.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -37,22 +53,115 @@ fn fill_and_rename(
         return Err(io::Error::new(io::ErrorKind::NotFound, message));
     }
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".deltille-");
+    builder.prefix(PREFIX).rand_bytes(RANDOM);
     #[cfg(unix)]
     {
         // The umask decides, as for any file that a program creates.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let file = builder.tempfile_in(folder).map_err(|error| {
-        // The temporary name means nothing to the user.
-        io::Error::new(error.kind(), std::io::Error::from(error.kind()).to_string())
-    })?;
+    let made = Unfinished::begin(|| {
+        let file = builder.tempfile_in(folder).map_err(|error| {
+            // The temporary name means nothing to the user.
+            io::Error::new(error.kind(), std::io::Error::from(error.kind()).to_string())
+        })?;
+        // Where files cannot be locked, nothing that is left over is ever removed.
+        let _ = file.as_file().lock();
+        let path = file.path().to_owned();
+        Ok((file, path))
+    });
+    let (file, _unfinished) = made?;
     let mut writer = BufWriter::new(file);
     fill(&mut writer)?;
     let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
+    file.as_file().sync_all()?;
     file.persist(path).map_err(|error| error.error)?;
+    sync_folder(folder);
     Ok(())
+}
+
+/// Something that is being written, and goes when the process is left.
+pub(super) struct Unfinished(PathBuf);
+
+impl Unfinished {
+    /// Makes something that is there while it is written. Another process that tidies up may take it
+    /// for left over in the moment before it is locked; then it is made again.
+    pub(super) fn begin<T>(
+        mut make: impl FnMut() -> io::Result<(T, PathBuf)>,
+    ) -> io::Result<(T, Self)> {
+        let mut unfinished = unfinished();
+        loop {
+            let (made, path) = make()?;
+            if path.exists() {
+                unfinished.push(path.clone());
+                return Ok((made, Self(path)));
+            }
+        }
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        unfinished().retain(|path| *path != self.0);
+    }
+}
+
+/// What is being written; while this is held, nothing is begun.
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Keeps [`abandon`] waiting while the result lives.
+pub(super) fn moving() -> MutexGuard<'static, ()> {
+    MOVING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes what this process is writing, and lets nothing else be begun while the result lives: for
+/// a program that is about to end. A set of files that is just being moved to its places gets there.
+#[must_use]
+pub fn abandon() -> impl Sized {
+    let (moving, unfinished) = (moving(), unfinished());
+    for path in unfinished.iter() {
+        remove(path);
+    }
+    (moving, unfinished)
+}
+
+/// Removes a file or folder. Where that fails, the next run does it.
+pub(super) fn remove(path: &Path) {
+    let _ = match path.is_dir() {
+        true => std::fs::remove_dir_all(path),
+        false => std::fs::remove_file(path),
+    };
+}
+
+/// A temporary folder with a name of its own, locked.
+pub(super) fn temporary_folder(folder: &Path) -> io::Result<(tempfile::TempDir, Option<File>)> {
+    let made = tempfile::Builder::new().prefix(PREFIX).rand_bytes(RANDOM).tempdir_in(folder)?;
+    let lock = lock(made.path());
+    Ok((made, lock))
+}
+
+/// Whether a name is one of those that files have while they are written.
+pub(super) fn is_temporary(name: &str) -> bool {
+    let random = name.strip_prefix(PREFIX);
+    random.is_some_and(|r| r.len() == RANDOM && r.bytes().all(|b| b.is_ascii_alphanumeric()))
+}
+
+/// Waits for the lock of a file or folder, held until the result is dropped; `None` where the system
+/// has none for it.
+pub(super) fn lock(path: &Path) -> Option<File> {
+    File::open(path).ok().filter(|file| file.lock().is_ok())
+}
+
+/// The lock of a file or folder that no living process holds.
+pub(super) fn lock_of_left(path: &Path) -> Option<File> {
+    File::open(path).ok().filter(|file| file.try_lock().is_ok())
+}
+
+/// Brings the names in a folder to the disk; where a system cannot, it does so in its own time.
+pub(super) fn sync_folder(folder: &Path) {
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
 /// The file that a path stands for, which a renamed one may take the place of.

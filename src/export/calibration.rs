@@ -3,9 +3,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::finding::{FindingRecord, records};
 use super::motion::Motion;
-use crate::calibrate::{Excluded, SHAPE_COEFFICIENTS as COUNT, Shape, Solution};
+use crate::calibrate::{Excluded, PanelRef, SHAPE_COEFFICIENTS as COUNT, Shape, Solution};
 use crate::detect::InkEstimate;
+use crate::json::{self, ReadError};
+use crate::quantity;
 
 /// What a calibration tells of the sheet that was photographed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -31,6 +34,14 @@ pub enum SheetError {
     /// Not the file of a calibration.
     #[error("not the .json that `calibrate` writes")]
     Foreign,
+    /// A field is missing, or holds what it must not.
+    #[error("field `{field}`: {problem}; make it anew with `calibrate --board-shape`")]
+    Field {
+        /// The field, such as `board_shape.reach_mm`.
+        field: String,
+        /// What is wrong.
+        problem: String,
+    },
     /// A calibration without shape.
     #[error("no `board_shape` in it: make it with `calibrate --board-shape`")]
     Flat,
@@ -38,29 +49,32 @@ pub enum SheetError {
 
 #[derive(Deserialize)]
 struct SheetOfFile {
-    schema: String,
+    #[serde(default, deserialize_with = "quantity::print_scale::de")]
     print_scale: Option<[f64; 2]>,
     board_shape: Option<StoredShape>,
 }
 
 #[derive(Deserialize)]
 struct StoredShape {
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     middle_mm: [f64; 3],
+    #[serde(deserialize_with = "quantity::edge_mm::de")]
     reach_mm: f64,
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     coefficients_mm: [f64; COUNT],
 }
 
 /// Reads the sheet of a calibration that found its shape.
 pub fn read_sheet(text: &str) -> Result<Sheet, SheetError> {
-    let file: SheetOfFile = serde_json::from_str(text).map_err(|_| SheetError::Foreign)?;
-    if file.schema != SCHEMA {
+    if json::schema(text.as_bytes()).ok().flatten().as_deref() != Some(SCHEMA) {
         return Err(SheetError::Foreign);
     }
+    let file: SheetOfFile = json::read(text).map_err(|error| match error {
+        ReadError::Json(_) => SheetError::Foreign,
+        ReadError::Field { field, problem } => SheetError::Field { field, problem },
+    })?;
     let StoredShape { middle_mm, reach_mm, coefficients_mm } =
         file.board_shape.ok_or(SheetError::Flat)?;
-    if reach_mm.is_nan() || reach_mm <= 0.0 {
-        return Err(SheetError::Foreign);
-    }
     let shape = Shape { middle_mm: middle_mm.into(), reach_mm, coefficients_mm };
     Ok(Sheet { print_scale: file.print_scale, shape: Some(shape) })
 }
@@ -92,6 +106,8 @@ struct CalibrationFile<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     held_out: Option<HeldOut<'a>>,
     excluded: &'a [Excluded],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    findings: Vec<FindingRecord>,
 }
 
 #[derive(Serialize)]
@@ -127,7 +143,7 @@ struct View {
 
 #[derive(Serialize)]
 struct Corner {
-    panel: usize,
+    panel: PanelRef,
     row: i32,
     col: i32,
     x: f64,
@@ -191,8 +207,9 @@ pub fn write(
         }),
         views: solution.views.iter().map(view).collect(),
         excluded: &solution.excluded,
+        findings: records(&solution.findings, &[]),
     };
-    crate::json::to_text(&file, 4)
+    json::to_text(&file, 4)
 }
 
 fn view(view: &crate::calibrate::ViewSolution) -> View {

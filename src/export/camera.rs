@@ -8,7 +8,9 @@ use std::fmt::Write as _;
 use glam::{DMat3, DMat4};
 use serde_json::json;
 
+use super::GENERATOR;
 use crate::camera::{Camera, Lens, Pose};
+use crate::name;
 
 /// A format that cannot say what a camera is.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -77,7 +79,7 @@ pub fn opencv(camera: &Camera) -> Result<String, FormatError> {
     };
     let model = if model == "fisheye" { "distortion_model: fisheye\n" } else { "" };
     Ok(format!(
-        "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\ncamera_matrix: {}{model}\
+        "%YAML:1.0\n---\n# {GENERATOR}\nimage_width: {}\nimage_height: {}\ncamera_matrix: {}{model}\
          distortion_coefficients: {}",
         camera.width,
         camera.height,
@@ -109,7 +111,7 @@ pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
     let one = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     let projection = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
     Ok(format!(
-        "image_width: {}\nimage_height: {}\ncamera_name: {}\ncamera_matrix:{}distortion_model: \
+        "# {GENERATOR}\nimage_width: {}\nimage_height: {}\ncamera_name: {}\ncamera_matrix:{}distortion_model: \
          {model}\ndistortion_coefficients:{}rectification_matrix:{}projection_matrix:{}",
         camera.width,
         camera.height,
@@ -123,7 +125,7 @@ pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
 
 /// Kalibr's camera chain: cameras, each with its camera_from_rig.
 pub fn kalibr(cameras: &[(&Camera, Pose)]) -> Result<String, FormatError> {
-    let mut text = String::new();
+    let mut text = format!("# {GENERATOR}\n");
     for (n, (camera, camera_from_rig)) in cameras.iter().enumerate() {
         // Writing to a String cannot fail.
         let _ = write!(text, "cam{n}:\n{}", kalibr_camera(camera)?);
@@ -169,7 +171,7 @@ fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
 
 /// COLMAP's cameras.txt, of cameras numbered from 1.
 pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
-    let mut text = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n".to_owned();
+    let mut text = format!("# {GENERATOR}\n# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n");
     for (n, camera) in (1..).zip(cameras) {
         let (model, parameters) = colmap_camera(camera)?;
         let _ = write!(text, "{n} {model} {} {}", camera.width, camera.height);
@@ -218,7 +220,7 @@ fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatErro
 }
 
 /// nerfstudio's transforms.json: the camera, and for each image its camera_from_target, with lengths
-/// in mm and axes as OpenGL has them.
+/// in mm and axes as OpenGL has them. An image whose name leads out of its folder is called by the end of it.
 pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
     let (model, names, coefficients) = match Shared::of(camera, &parameters) {
@@ -235,7 +237,7 @@ pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, For
         let mut matrix = DMat4::from_mat3(rotation);
         matrix.w_axis = back.translation.extend(1.0);
         let rows = matrix.transpose().to_cols_array_2d();
-        json!({ "file_path": image, "transform_matrix": rows })
+        json!({ "file_path": name::within(image), "transform_matrix": rows })
     });
     let mut file = json!({
         "camera_model": model,
@@ -341,7 +343,7 @@ mod tests {
         assert_eq!(right["image_prefix"], json!("r/"));
         assert_eq!(right["cam_from_rig_translation"], json!([-120.0, 0.0, 0.0]));
         assert_eq!(right["cam_from_rig_rotation"][0], json!(turn.w));
-        assert_eq!(colmap(&[&radtan, &radtan]).unwrap().lines().count(), 3);
+        assert_eq!(colmap(&[&radtan, &radtan]).unwrap().lines().count(), 4);
     }
 
     #[test]
@@ -349,7 +351,8 @@ mod tests {
         let radtan = camera(Model::Radtan, 4);
         assert_eq!(
             kalibr(&[(&radtan, Pose::IDENTITY)]).unwrap(),
-            "cam0:\n  camera_model: pinhole\n  intrinsics: [500.0, 500.0, 319.5, 239.5]\n  \
+            format!("# {GENERATOR}\n")
+                + "cam0:\n  camera_model: pinhole\n  intrinsics: [500.0, 500.0, 319.5, 239.5]\n  \
              distortion_model: radtan\n  distortion_coeffs: [0.25, 1.0e-5, -1.0e-7, 0.125]\n  \
              resolution: [640, 480]\n"
         );

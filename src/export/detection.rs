@@ -1,11 +1,13 @@
 //! Detections as JSON (FORMATS §9, schema `deltille/detection/1`), and back.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
 use crate::detect::{Detection, Grid, InkEstimate, Reason, ToneEstimate};
-use crate::json;
+use crate::json::{self, ReadError};
+use crate::quantity;
+use crate::raster::FileNotes;
 
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/detection/1";
@@ -14,9 +16,9 @@ pub const SCHEMA: &str = "deltille/detection/1";
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DetectionFileError {
-    /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
+    /// Not JSON, or cut off.
     #[error("not a detection file: {0}; make it anew with `deltille detect`")]
-    Json(#[from] serde_json::Error),
+    Json(serde_json::Error),
     /// Another schema, or another version of it.
     #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
     Schema {
@@ -28,6 +30,14 @@ pub enum DetectionFileError {
     Kind {
         /// The schema that the file names.
         found: String,
+    },
+    /// A field is missing, unknown, or holds what it must not.
+    #[error("field `{field}`: {problem}; make the file anew with `deltille detect`")]
+    Field {
+        /// The field, such as `grids[0].corners[3].x`.
+        field: String,
+        /// What is wrong.
+        problem: String,
     },
     /// A grid that is there already.
     #[error("grids[{grid}] is grids[{first}] again")]
@@ -45,8 +55,17 @@ pub enum DetectionFileError {
         /// Index of the corner.
         corner: usize,
         /// What is wrong.
-        problem: &'static str,
+        problem: String,
     },
+}
+
+impl From<ReadError> for DetectionFileError {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Json(error) => Self::Json(error),
+            ReadError::Field { field, problem } => Self::Field { field, problem },
+        }
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -54,8 +73,12 @@ pub enum DetectionFileError {
 struct DetectionFile {
     schema: String,
     image: String,
+    #[serde(deserialize_with = "quantity::side_px::de")]
     width: u32,
+    #[serde(deserialize_with = "quantity::side_px::de")]
     height: u32,
+    #[serde(default, skip_serializing_if = "FileNotes::is_empty")]
+    file: FileNotes,
     grids: Vec<Grid>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     tone: Option<ToneEstimate>,
@@ -63,7 +86,12 @@ struct DetectionFile {
     ink: Option<InkEstimate>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     reasons: Vec<Reason>,
-    timing_ms: std::collections::BTreeMap<String, f64>,
+    #[serde(
+        default,
+        skip_serializing_if = "BTreeMap::is_empty",
+        deserialize_with = "quantity::figure::de"
+    )]
+    timing_ms: BTreeMap<String, f64>,
 }
 
 /// The text of the JSON file of one image, a corner a line.
@@ -78,13 +106,14 @@ pub fn write_line(detection: &Detection) -> String {
 
 impl DetectionFile {
     fn of(detection: &Detection) -> Self {
-        let Detection { image, width, height, grids, tone, ink, reasons, timing_ms } =
+        let Detection { image, width, height, file, grids, tone, ink, reasons, timing_ms } =
             detection.clone();
         Self {
             schema: SCHEMA.to_owned(),
             image,
             width,
             height,
+            file,
             grids,
             tone,
             ink,
@@ -106,37 +135,45 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     struct Head {
         schema: String,
     }
-    let Head { schema } = serde_json::from_str(text)?;
+    let Head { schema } = json::read(text)?;
     if json::kind(&schema) != json::kind(SCHEMA) {
         return Err(DetectionFileError::Kind { found: schema });
     }
     if schema != SCHEMA {
         return Err(DetectionFileError::Schema { found: schema });
     }
-    let file: DetectionFile = serde_json::from_str(text)?;
-    let DetectionFile { schema: _, image, width, height, grids, tone, ink, reasons, timing_ms } =
-        file;
+    let DetectionFile { image, width, height, file, grids, tone, ink, reasons, timing_ms, .. } =
+        json::read(text)?;
     // Corners that are there twice would count twice. A panel may be seen in pieces.
-    let mut places = BTreeSet::new();
+    let (mut places, mut firsts) = (BTreeSet::new(), BTreeMap::new());
     for (grid, of_grid) in grids.iter().enumerate() {
-        let again = |other: &Grid| !other.corners.is_empty() && other.corners == of_grid.corners;
-        if let Some(first) = grids[..grid].iter().position(again) {
+        let corners = serde_json::to_string(&of_grid.corners).map_err(DetectionFileError::Json)?;
+        let first = *firsts.entry(corners).or_insert(grid);
+        if first != grid && !of_grid.corners.is_empty() {
             return Err(DetectionFileError::Again { grid, first });
         }
         // Labels without a panel are those of their grid alone.
         let labels = of_grid.panel.map_or((None, grid), |panel| (Some(panel), 0));
         for (corner, found) in of_grid.corners.iter().enumerate() {
-            // Negations, so that what is no number is refused too.
-            let usable = |[xx, xy, yy]: [f64; 3]| xx > 0.0 && yy > 0.0 && xx * yy > xy * xy;
-            if !found.cov.is_none_or(usable) {
-                let problem = "`cov` is no covariance xx, xy, yy";
+            if let Some(problem) = found.cov.and_then(|cov| check_covariance(cov).err()) {
                 return Err(DetectionFileError::Corner { grid, corner, problem });
             }
             if !places.insert((labels, found.row, found.col)) {
-                let problem = "another corner has this row and column already";
+                let problem = "another corner has this row and column already".to_owned();
                 return Err(DetectionFileError::Corner { grid, corner, problem });
             }
         }
     }
-    Ok(Detection { image, width, height, grids, tone, ink, reasons, timing_ms })
+    Ok(Detection { image, width, height, file, grids, tone, ink, reasons, timing_ms })
+}
+
+/// Checks the covariance of a corner.
+fn check_covariance([xx, xy, yy]: [f64; 3]) -> Result<(), String> {
+    for variance in [xx, yy] {
+        let in_range = quantity::variance_px2::RANGE.check(variance);
+        in_range.map_err(|what| format!("`cov`: a variance, {what}"))?;
+    }
+    // So that what is no number is refused too.
+    let usable = xx * yy > xy * xy;
+    usable.then_some(()).ok_or_else(|| "`cov` is no covariance xx, xy, yy".to_owned())
 }

@@ -17,6 +17,9 @@ pub(crate) const LINEAR: u32 = 9729;
 pub(crate) const LINEAR_MIPMAP_LINEAR: u32 = 9987;
 pub(crate) const CLAMP_TO_EDGE: u32 = 33071;
 
+/// Name of the one material.
+pub(crate) const MATERIAL: &str = "print";
+
 /// Writes the mesh as `.glb`.
 pub fn write(mesh: &TexturedMesh, path: &Path) -> Result<(), atomic::WriteError> {
     let bytes = to_bytes(mesh);
@@ -65,7 +68,7 @@ pub fn to_bytes(mesh: &TexturedMesh) -> Vec<u8> {
             "indices": 3,
             "material": 0,
         }]}],
-        "materials": [{"name": "print", "pbrMetallicRoughness": {
+        "materials": [{"name": MATERIAL, "pbrMetallicRoughness": {
             "baseColorTexture": {"index": 0}, "metallicFactor": 0.0, "roughnessFactor": 1.0,
         }}],
         "textures": [{"sampler": 0, "source": 0}],

@@ -4,7 +4,7 @@ use std::io;
 
 use glam::DVec3;
 
-use super::png;
+use super::{GENERATOR, png};
 use crate::artwork::{ArtworkError, Atlas};
 use crate::family::Family;
 use crate::target::{Target, TargetError, TargetSpec};
@@ -55,6 +55,16 @@ pub enum MeshError {
     /// The texture cannot be encoded.
     #[error("cannot encode the texture: {0}")]
     Encode(#[from] io::Error),
+}
+
+/// Spec and family of a target, for readers of its mesh.
+pub fn extras(target: &Target) -> serde_json::Value {
+    serde_json::json!({
+        "generator": GENERATOR,
+        "name": target.name,
+        "spec": target.spec,
+        "family": target.family,
+    })
 }
 
 /// Triangles with a texture, in the target frame.
@@ -133,12 +143,7 @@ impl TexturedMesh {
             faces: (0..faces.len()).map(mesh_face).collect(),
             texture_png: png::to_bytes(&atlas.sheet, &target.name, f64::from(px_per_m) * 0.0254)?,
             texture_px: atlas.size_px,
-            extras: serde_json::json!({
-                "generator": concat!("deltille ", env!("CARGO_PKG_VERSION")),
-                "name": target.name,
-                "spec": target.spec,
-                "family": target.family,
-            }),
+            extras: extras(target),
         })
     }
 }

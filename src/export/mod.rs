@@ -1,7 +1,8 @@
 //! Artwork, targets and detections to files and back, one module per format.
 //!
 //! Writers of artwork take shapes in millimetres and only change units and syntax; those of
-//! targets and detections make text. Files appear whole or not at all, see [`atomic`].
+//! targets and detections make text. Files appear whole or not at all, see [`atomic`],
+//! and several as one, see [`staging`]; what a file is that is there already tells [`kind`].
 
 pub mod atomic;
 pub mod calibration;
@@ -10,7 +11,9 @@ pub mod csv;
 pub mod detection;
 pub mod dsc;
 pub mod dxf;
+mod finding;
 pub mod gltf;
+pub mod kind;
 pub mod mesh;
 mod motion;
 pub mod obj;
@@ -20,6 +23,7 @@ pub mod pdf;
 pub mod png;
 pub mod pose;
 pub mod rig;
+pub mod staging;
 pub mod stl;
 mod supersample;
 pub mod svg;
@@ -48,6 +52,9 @@ pub enum ExportError {
         limit: String,
     },
 }
+
+/// What made a file, as it stands in all files that have a place for it.
+pub(crate) const GENERATOR: &str = concat!("deltille ", env!("CARGO_PKG_VERSION"));
 
 /// The file name of sheet `index` (from 0) of `count`: `name.svg`, or `name-2.svg` when there are
 /// several.

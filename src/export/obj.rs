@@ -4,8 +4,9 @@ use std::fmt::Write;
 
 use glam::DVec3;
 
+use super::GENERATOR;
 use super::mesh::TexturedMesh;
-use crate::target::{ClosedMesh, ClosedMeshError};
+use crate::target::{ClosedMesh, ClosedMeshError, is_coordinate};
 
 /// Why an OBJ is not taken for a solid.
 #[derive(Debug, thiserror::Error)]
@@ -54,10 +55,10 @@ pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
     })
 }
 
-/// Number of the first `v` line with a number that is not finite.
+/// Number of the first `v` line with a number that is no coordinate.
 fn first_not_finite(text: &[u8]) -> Option<usize> {
     let text = String::from_utf8_lossy(text);
-    let finite = |word: &str| word.parse::<f64>().is_ok_and(f64::is_finite);
+    let finite = |word: &str| word.parse().is_ok_and(is_coordinate);
     let mut lines = text.lines().filter_map(|line| line.trim_start().strip_prefix("v "));
     lines.position(|line| !line.split_whitespace().all(finite)).map(|index| index + 1)
 }
@@ -90,7 +91,9 @@ pub fn text(mesh: &TexturedMesh) -> String {
 /// The text of `<name>.mtl`; it names the texture `<name>-texture.png`.
 pub fn material(mesh: &TexturedMesh) -> String {
     let texture = texture_name(&mesh.name);
-    format!("newmtl print\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {texture}\n")
+    format!(
+        "# {GENERATOR}, material\nnewmtl print\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {texture}\n"
+    )
 }
 
 /// File name of the texture.

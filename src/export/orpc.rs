@@ -20,13 +20,16 @@ use crate::detect::{Detection, Grid};
 use crate::lattice::Vertex;
 use crate::target::Target;
 
+/// What a file begins with.
+pub const HEAD: &str = "filename:";
+
 /// The text of the `.orpc` of one image; `target` is what was looked for, if it was known.
 pub fn write(detection: &Detection, target: Option<&Target>) -> String {
     let lines: Vec<String> =
         detection.grids.iter().flat_map(|grid| corner_lines(grid, target)).collect();
     let mut text = String::new();
     // Writing to a String cannot fail.
-    let _ = writeln!(text, "filename: {}", detection.image);
+    let _ = writeln!(text, "{HEAD} {}", detection.image);
     let _ = writeln!(text, "width: {}\nheight: {}", detection.width, detection.height);
     let _ = writeln!(text, "num_corners: {}\nencoding: ascii", lines.len());
     lines.iter().for_each(|line| {

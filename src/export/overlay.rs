@@ -10,6 +10,7 @@ use tiny_skia::{
     Transform,
 };
 
+use super::kind::signed_png;
 use crate::artwork::text;
 use crate::detect::{Detection, Grid};
 use crate::lattice::Vertex;
@@ -54,7 +55,8 @@ pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayErr
         let [r, g, b] = COLOURS[index % COLOURS.len()];
         draw_grid(&mut canvas, grid, Color::from_rgba8(r, g, b, 255), f64::from(scale));
     }
-    canvas.encode_png().map_err(|error| OverlayError::Encode(error.to_string()))
+    let png = canvas.encode_png().map_err(|error| OverlayError::Encode(error.to_string()))?;
+    Ok(signed_png(png))
 }
 
 /// How many times the photograph is enlarged.

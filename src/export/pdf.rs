@@ -14,8 +14,11 @@ use printpdf::{
 };
 use sha2::{Digest, Sha256};
 
-use super::{ExportError, atomic};
+use super::{ExportError, GENERATOR, atomic};
 use crate::artwork::{Artwork, Paint, Shape, Sheet};
+
+/// Version of the format.
+pub(crate) const VERSION: &str = "1.6";
 
 /// Points per millimetre.
 const PT_PER_MM: f64 = 72.0 / 25.4;
@@ -43,7 +46,7 @@ pub fn to_bytes(artwork: &Artwork) -> Vec<u8> {
     let mut document = PdfDocument::new(&artwork.title);
     document.with_pages(artwork.sheets.iter().map(page).collect());
     let mut document = document.to_lopdf_document(&PdfSaveOptions::default(), &mut Vec::new());
-    document.version = "1.6".to_owned();
+    document.version = VERSION.to_owned();
     document.compress();
     finish(&mut document, artwork);
     let mut bytes = Vec::new();
@@ -62,7 +65,7 @@ fn finish(document: &mut lopdf::Document, artwork: &Artwork) {
     let info = Dictionary::from_iter([
         ("Title", lopdf::text_string(&artwork.title)),
         ("Subject", lopdf::text_string(&artwork.subject)),
-        ("Creator", lopdf::text_string(concat!("deltille ", env!("CARGO_PKG_VERSION")))),
+        ("Creator", lopdf::text_string(GENERATOR)),
     ]);
     if let Ok(id) = document.trailer.get(b"Info").and_then(Object::as_reference) {
         document.set_object(id, info);

@@ -6,7 +6,7 @@ use std::path::Path;
 use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape as _, Stroke, StrokeOpts};
 use tiny_skia::{FillRule, Mask, PathBuilder, Transform};
 
-use super::{Block, ExportError, SUBPIXELS, atomic, supersample};
+use super::{Block, ExportError, GENERATOR, SUBPIXELS, atomic, kind, supersample};
 use crate::artwork::{Paint, Shape, Sheet};
 
 /// Most pixels of an image: 2 gigapixels, an A0 sheet at 1200 dpi.
@@ -81,6 +81,7 @@ impl Raster {
             yppu: self.pixels_per_metre,
             unit: png::Unit::Meter,
         }));
+        encoder.add_text_chunk(kind::SOFTWARE.to_owned(), GENERATOR.to_owned())?;
         encoder.add_itxt_chunk("Title".to_owned(), title.to_owned())?;
         let mut writer = encoder.write_header()?;
         let mut stream = writer.stream_writer()?;

@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::finding::{FindingRecord, records};
 use super::motion::Motion;
 use crate::calibrate::{Excluded, Parameter, RigSolution};
 
@@ -21,6 +22,8 @@ struct RigFile<'a> {
     cameras: Vec<Camera<'a>>,
     frames: Vec<Frame<'a>>,
     excluded: &'a [Excluded],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    findings: Vec<FindingRecord>,
 }
 
 #[derive(Serialize)]
@@ -52,6 +55,7 @@ struct Frame<'a> {
 
 /// The text of a rig's file.
 pub fn write(solution: &RigSolution, model: &str) -> String {
+    let names: Vec<&str> = solution.cameras.iter().map(|camera| camera.name.as_str()).collect();
     let cameras = solution.cameras.iter().map(|camera| Camera {
         name: &camera.name,
         width: camera.camera.width,
@@ -79,6 +83,7 @@ pub fn write(solution: &RigSolution, model: &str) -> String {
         cameras: cameras.collect(),
         frames: frames.collect(),
         excluded: &solution.excluded,
+        findings: records(&solution.findings, &names),
     };
     crate::json::to_text(&file, 4)
 }

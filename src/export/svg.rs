@@ -13,6 +13,13 @@ use crate::artwork::{Artwork, Paint, Part, Shape};
 /// Decimals of a coordinate: a tenth of a micrometre.
 const DECIMALS: usize = 4;
 
+/// What a file begins with.
+pub const HEAD: &str = concat!(
+    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- deltille ",
+    env!("CARGO_PKG_VERSION"),
+    " -->\n"
+);
+
 /// Writes one sheet (counted from 0) as SVG.
 pub fn write(artwork: &Artwork, sheet: usize, path: &Path) -> Result<(), ExportError> {
     let text = to_string(artwork, sheet);
@@ -40,7 +47,7 @@ pub fn to_string(artwork: &Artwork, sheet: usize) -> String {
         .add(Description::new().add(::svg::node::Text::new(&artwork.subject)))
         .add(paper)
         .add(marks);
-    format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{document}\n")
+    format!("{HEAD}{document}\n")
 }
 
 fn element(shape: &Shape, svg_from_page: Affine) -> PathElement {

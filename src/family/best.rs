@@ -230,7 +230,9 @@ impl Best {
                 Budget::Work(_) => !is_first,
             };
             let over = over || !small || control.is_cancelled();
-            if best.as_ref().is_some_and(|(codes, _)| (over && !is_first) || codes.len() >= most) {
+            // What may be large is not written down only to be compared when time is short.
+            let over = over && (!is_first || control.is_cancelled());
+            if best.as_ref().is_some_and(|(codes, _)| over || codes.len() >= most) {
                 break;
             }
             is_first = false;

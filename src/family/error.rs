@@ -13,13 +13,8 @@ pub enum FamilyError {
         name: String,
     },
     /// The file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why not.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] crate::limits::ReadError),
     /// Something is wrong inside a file.
     #[error("{}: {error}", path.display())]
     In {

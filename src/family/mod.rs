@@ -57,6 +57,7 @@ pub use statistics::{ball, distance_histogram, false_positive_rates};
 pub use tagwords::TagWords;
 
 use crate::lattice::{Dimension, GridKind, TagCells};
+use crate::limits::{self, MAX_FAMILY_BYTES, ReadError};
 
 /// The pairs of larger families are too many to count one by one.
 pub(crate) const PAIRS_COUNTED: usize = 100_000;
@@ -125,9 +126,10 @@ impl Family {
 
     /// Reads a family file.
     pub fn read(path: &Path) -> Result<Self, FamilyError> {
-        let bytes = std::fs::read(path)
-            .map_err(|source| FamilyError::Read { path: path.to_owned(), source })?;
-        let json = String::from_utf8(bytes).map_err(|_| FamilyError::NotText);
+        let json = match limits::read_short_text(path, MAX_FAMILY_BYTES) {
+            Err(ReadError::NotText { .. }) => Err(FamilyError::NotText),
+            json => Ok(json?),
+        };
         json.and_then(|json| Self::from_json(&json))
             .map_err(|error| FamilyError::In { path: path.to_owned(), error: Box::new(error) })
     }

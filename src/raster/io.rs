@@ -1,14 +1,69 @@
 //! Reading photographs of any common format as grey images.
+//!
+//! What a file says beside its pixels does not change them:
+//!
+//! - pixels stay where the sensor had them, whatever orientation EXIF asks a viewer for, as they do for COLMAP and for
+//!   OpenCV with `IMREAD_IGNORE_ORIENTATION`; the orientation is noted;
+//! - colour profiles and gamma chunks are not applied: corners come with an estimate of the tone curve of their own;
+//! - of a TIFF there must be one page, thumbnails (reduced images) aside, and of an animation the first picture is taken;
+//! - a JPEG whose pixels do not all come from the file is damaged, and not read unless that is asked for; all other
+//!   formats are read whole or not at all.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
-use image::{DynamicImage, ImageReader, Limits};
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
+use serde::{Deserialize, Serialize};
+use tiff::tags::Tag;
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::Gray;
+use crate::limits::{self, Exceeded, Limits};
 
-/// Largest allocation that a decoder may ask for: a 100-megapixel colour image of 16 bits takes
-/// 600 MB, so 2 GiB leaves room and still stops a forged header.
-const MAX_DECODER_BYTES: u64 = 2 << 30;
+/// What a PNG may hold beside its pixels, unpacked: profiles and words.
+const MAX_BESIDE_BYTES: u64 = 32 << 20;
+
+/// Pages of a TIFF that are counted.
+const MAX_PAGES: usize = 1000;
+
+/// Bytes from which a format is told.
+const HEAD_BYTES: u64 = 64;
+
+/// What strict readers of JPEG refuse although no pixel depends on it.
+const PADDING: &str = "Extra bytes between headers";
+
+/// A photograph, and what its file says beside its pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Photograph {
+    /// The pixels, where the sensor had them.
+    pub image: AnyGray,
+    /// What else there is to say.
+    pub notes: FileNotes,
+}
+
+/// What the file of a photograph says beside its pixels.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileNotes {
+    /// How EXIF says that the pixels are to be turned for a viewer, from 2 to 8; `None` if not at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exif_orientation: Option<u8>,
+    /// Why some pixels do not come from the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damage: Option<String>,
+}
+
+impl FileNotes {
+    /// Whether there is nothing to say.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
 
 /// A grey image in the depth of its file.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,6 +114,49 @@ pub enum ImageError {
         /// Why.
         source: image::ImageError,
     },
+    /// The image is larger than what is read.
+    #[error("{}: {exceeded}", path.display())]
+    Exceeded {
+        /// The file.
+        path: PathBuf,
+        /// The limit.
+        exceeded: Exceeded,
+    },
+    /// Not all pixels are in the file.
+    #[error("{}: a damaged JPEG ({problem}): take it anew, or give --accept-damaged", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The file holds several pictures.
+    #[error("{}: {pages} pages in one TIFF: save each as a file of its own", path.display())]
+    Pages {
+        /// The file.
+        path: PathBuf,
+        /// How many there are.
+        pages: usize,
+    },
+    /// Its pixels are deep, so that they take more memory than those of a larger image may.
+    #[error(
+        "{}: takes more than {bytes} bytes of memory; --max-pixels sets how many, 4 for each",
+        path.display()
+    )]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// How many it may take.
+        bytes: u64,
+    },
+    /// The decoder fails within.
+    #[error("{}: {source}", path.display())]
+    Broken {
+        /// The file.
+        path: PathBuf,
+        /// How.
+        source: limits::Broken,
+    },
 }
 
 /// Reads a PNG, JPEG, TIFF, BMP, PGM/PPM or WebP file; colour becomes luma (Rec. 709 weights),
@@ -66,13 +164,181 @@ pub enum ImageError {
 ///
 /// The format is told from the content, not from the name.
 pub fn read(path: &Path) -> Result<AnyGray, ImageError> {
-    let io = |source| ImageError::Io { path: path.to_owned(), source };
-    let decode = |source| ImageError::Decode { path: path.to_owned(), source };
-    let mut reader = ImageReader::open(path).map_err(io)?.with_guessed_format().map_err(io)?;
-    let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(MAX_DECODER_BYTES);
-    reader.limits(limits);
-    Ok(from_dynamic(reader.decode().map_err(decode)?))
+    read_within(path, &Limits::default())
+}
+
+/// The same within other limits than the default.
+pub fn read_within(path: &Path, limits: &Limits) -> Result<AnyGray, ImageError> {
+    Ok(photograph(path, limits, false)?.image)
+}
+
+/// Reads a photograph with what its file says of it. A damaged JPEG is refused unless it is accepted; the pixels that
+/// it does not have are grey then.
+pub fn photograph(
+    path: &Path,
+    limits: &Limits,
+    accept_damaged: bool,
+) -> Result<Photograph, ImageError> {
+    let broken = |source| ImageError::Broken { path: path.to_owned(), source };
+    limits::caught(|| {
+        let decode = |source| ImageError::Decode { path: path.to_owned(), source };
+        let file = ImageFile::open(path, limits)?;
+        file.check_pages()?;
+        let mut decoder = file.decoder(limits)?;
+        let orientation = decoder.orientation().map_or(1, Orientation::to_exif);
+        let (image, damage) = match file.jpeg() {
+            Ok(Some(image)) => (image, None),
+            Ok(None) => (DynamicImage::from_decoder(decoder).map_err(decode)?, None),
+            Err(problem) if !accept_damaged => {
+                return Err(ImageError::Damaged { path: path.to_owned(), problem });
+            }
+            Err(problem) => (DynamicImage::from_decoder(decoder).map_err(decode)?, Some(problem)),
+        };
+        let exif_orientation = (orientation != 1).then_some(orientation);
+        let notes = FileNotes { exif_orientation, damage };
+        Ok(Photograph { image: from_dynamic(image), notes })
+    })
+    .map_err(broken)?
+}
+
+/// How many pixels an image has by its head, as far as that can be told without using up a pipe.
+pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
+    limits::check_file(path).ok()?;
+    let dimensions =
+        || Some(ImageFile::open(path, limits).ok()?.decoder(limits).ok()?.dimensions());
+    let (width, height) = limits::caught(dimensions).ok()??;
+    Some(u64::from(width) * u64::from(height))
+}
+
+/// Where decoders read.
+trait Source: BufRead + Seek {}
+
+impl<T: BufRead + Seek> Source for T {}
+
+/// An image file, opened.
+struct ImageFile<'a> {
+    path: &'a Path,
+    /// What is read as a whole: a JPEG, as its decoders take it so, and what comes through a pipe.
+    bytes: Option<Vec<u8>>,
+    format: Option<ImageFormat>,
+}
+
+impl<'a> ImageFile<'a> {
+    fn open(path: &'a Path, limits: &Limits) -> Result<Self, ImageError> {
+        let most = limits.picture_bytes();
+        let too_many = || ImageError::Memory { path: path.to_owned(), bytes: most };
+        let io = |source| ImageError::Io { path: path.to_owned(), source };
+        let mut file = File::open(path).map_err(io)?;
+        let metadata = file.metadata().map_err(io)?;
+        if metadata.is_file() && metadata.len() > most {
+            return Err(too_many());
+        }
+        let mut bytes = Vec::new();
+        (&mut file).take(HEAD_BYTES).read_to_end(&mut bytes).map_err(io)?;
+        let format = image::guess_format(&bytes).ok();
+        let is_whole = format == Some(ImageFormat::Jpeg) || !metadata.is_file();
+        // What is no image is not read on: it may never end.
+        if is_whole && format.is_some() {
+            file.take(most).read_to_end(&mut bytes).map_err(io)?;
+            if bytes.len() as u64 > most {
+                return Err(too_many());
+            }
+        }
+        Ok(Self { path, bytes: is_whole.then_some(bytes), format })
+    }
+
+    fn source(&self) -> Result<Box<dyn Source + '_>, ImageError> {
+        let io = |source| ImageError::Io { path: self.path.to_owned(), source };
+        Ok(match &self.bytes {
+            Some(bytes) => Box::new(Cursor::new(bytes)),
+            None => Box::new(BufReader::new(File::open(self.path).map_err(io)?)),
+        })
+    }
+
+    /// A decoder that has read the head of the file, whose picture is within the limits.
+    fn decoder(&self, limits: &Limits) -> Result<impl ImageDecoder, ImageError> {
+        let path = || self.path.to_owned();
+        let decode = |source| ImageError::Decode { path: path(), source };
+        let exceeded = |exceeded| ImageError::Exceeded { path: path(), exceeded };
+        let mut reader = ImageReader::new(self.source()?);
+        if let Some(format) = self.format {
+            reader.set_format(format);
+        }
+        let mut most = image::Limits::no_limits();
+        most.max_alloc = Some(match self.format {
+            Some(ImageFormat::Png) => MAX_BESIDE_BYTES,
+            _ => limits.picture_bytes(),
+        });
+        reader.limits(most);
+        let decoder = reader.into_decoder().map_err(decode)?;
+        let (width, height) = decoder.dimensions();
+        limits.check_pixels(width, height).map_err(exceeded)?;
+        let bytes = limits.picture_bytes();
+        if decoder.total_bytes() > bytes {
+            return Err(ImageError::Memory { path: path(), bytes });
+        }
+        Ok(decoder)
+    }
+
+    /// Refuses a TIFF of which nobody knows which page is meant.
+    fn check_pages(&self) -> Result<(), ImageError> {
+        if self.format != Some(ImageFormat::Tiff) {
+            return Ok(());
+        }
+        match pages(self.source()?) {
+            // What is wrong with it the decoder tells.
+            Ok(0 | 1) | Err(_) => Ok(()),
+            Ok(pages) => Err(ImageError::Pages { path: self.path.to_owned(), pages }),
+        }
+    }
+
+    /// The pixels of a whole JPEG, or what is missing; `None` for other files, and for colours that need their
+    /// profile.
+    fn jpeg(&self) -> Result<Option<DynamicImage>, String> {
+        let (Some(ImageFormat::Jpeg), Some(bytes)) = (self.format, &self.bytes) else {
+            return Ok(None);
+        };
+        let strict = DecoderOptions::default()
+            .set_strict_mode(true)
+            .set_max_width(usize::MAX)
+            .set_max_height(usize::MAX);
+        let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes.as_slice()), strict);
+        let pixels = match decoder.decode() {
+            Ok(pixels) => pixels,
+            Err(error) => {
+                let problem = error.to_string();
+                return if problem.contains(PADDING) { Ok(None) } else { Err(told(&problem)) };
+            }
+        };
+        let (width, height) = decoder.dimensions().unwrap_or_default();
+        let as_seen = matches!(
+            decoder.input_colorspace(),
+            Some(ColorSpace::Luma | ColorSpace::RGB | ColorSpace::YCbCr)
+        );
+        let image = RgbImage::from_raw(width as u32, height as u32, pixels);
+        Ok(image.filter(|_| as_seen).map(DynamicImage::ImageRgb8))
+    }
+}
+
+/// The decoder's words without their quotation marks, in one line.
+fn told(problem: &str) -> String {
+    let words: Vec<&str> = problem.trim_matches('"').split_whitespace().collect();
+    words.join(" ")
+}
+
+/// Pages of a TIFF, smaller copies of another one aside.
+fn pages(source: impl BufRead + Seek) -> tiff::TiffResult<usize> {
+    let mut file = tiff::decoder::Decoder::new(source)?;
+    let mut pages = 0;
+    for _ in 0..MAX_PAGES {
+        let kind: u32 = file.find_tag_unsigned(Tag::NewSubfileType)?.unwrap_or(0);
+        pages += usize::from(kind & 1 == 0);
+        if !file.more_images() {
+            break;
+        }
+        file.next_image()?;
+    }
+    Ok(pages)
 }
 
 fn from_dynamic(image: DynamicImage) -> AnyGray {

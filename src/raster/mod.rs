@@ -13,5 +13,5 @@ pub use bands::{bands, fill_bands};
 pub use blur::gaussian;
 pub use coverage::Coverage;
 pub use gray::{Gray, Intensity};
-pub use io::{AnyGray, ImageError, read};
+pub use io::{AnyGray, FileNotes, ImageError, Photograph, photograph, pixels, read, read_within};
 pub use pyramid::{PYRAMID_FULL_SCALE, Pyramid};

@@ -1,6 +1,6 @@
 //! Plain words on what a calibration lacks. Every rule has its reason; none depends on a camera.
 
-use super::{Given, Report, Survey, cannot_tell_apart, causes};
+use super::{Given, Named, Report, Survey, cannot_tell_apart, causes};
 use crate::calibrate::{Model, Parameter};
 use crate::words::counted;
 
@@ -224,6 +224,10 @@ fn residuals(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, Stri
     let model = report.model.parse().ok();
     let given = Given { model, print_scale: report.print.scale, remedy: report.remedy };
     let causes = causes(solution, given);
+    let named = Named { cameras: &[] };
+    for finding in &solution.findings {
+        add(Weight::Warning, sentence(&named.sentence(finding)));
+    }
     for cause in &causes {
         add(Weight::Warning, sentence(cause));
     }
@@ -301,6 +305,7 @@ mod tests {
             loose: Vec::new(),
             shape: None,
             misfits: Vec::new(),
+            findings: Vec::new(),
             steps: 1,
         };
         let report = Report {

@@ -12,6 +12,7 @@
 mod advice;
 mod axes;
 mod causes;
+mod findings;
 mod page;
 mod plots;
 mod survey;
@@ -24,6 +25,7 @@ use crate::export::calibration::Print;
 
 pub use advice::{Advice, Weight, advice};
 pub use causes::{Given, cannot_tell_apart, causes, causes_of_rig};
+pub use findings::Named;
 pub use survey::{Survey, SurveyedView};
 pub use thumbnail::thumbnail;
 

@@ -20,10 +20,11 @@ pub(super) fn html(report: &Report) -> String {
     let survey = Survey::new(solution);
     let title = escaped(report.title);
     let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+        "<!DOCTYPE html>\n<!-- deltille {} -->\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{title} – camera calibration</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <header><h1>{title}</h1>{}</header>\n",
+        env!("CARGO_PKG_VERSION"),
         figures(report)
     );
     page += "<section><h2>What to make of it</h2><ul class=\"advice\">";

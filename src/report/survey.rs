@@ -68,7 +68,7 @@ impl Survey {
             }
         }
         let corners = || solution.views.iter().flat_map(|view| &view.corners);
-        let planar = corners().all(|corner| corner.panel == 0);
+        let planar = corners().all(|corner| corner.panel.index() == 0);
         let views =
             solution.views.iter().map(|view| surveyed(&solution.camera, view, planar)).collect();
         let means_px = inside.iter().map(|residuals| cell_mean(residuals)).collect();

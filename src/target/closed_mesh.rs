@@ -19,6 +19,14 @@ const LEAST_HEIGHT: f64 = 1e-4;
 /// A mesh that encloses less than this part of the cube of its extent is flat.
 const LEAST_VOLUME: f64 = 1e-6;
 
+/// Largest coordinate, in the unit of the list.
+const FARTHEST: f64 = 1e9;
+
+/// Whether a number can be a coordinate of a mesh.
+pub(crate) fn is_coordinate(value: f64) -> bool {
+    value.abs() <= FARTHEST
+}
+
 /// Why a list of triangles is not a closed solid. Triangles and vertices are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -26,8 +34,8 @@ pub enum ClosedMeshError {
     /// Nothing there.
     #[error("it has no triangles")]
     Empty,
-    /// A coordinate is not finite.
-    #[error("vertex {0}: its coordinates must be finite numbers")]
+    /// A coordinate is not finite, or too large to be squared in single precision.
+    #[error("vertex {0}: its coordinates must be finite numbers of at most {FARTHEST:e}")]
     NotFinite(usize),
     /// An index beyond the vertices.
     #[error("triangle {0} names a vertex that is not there")]
@@ -104,7 +112,9 @@ impl ClosedMesh {
         if faces.is_empty() {
             return Err(Empty);
         }
-        if let Some(bad) = vertices.iter().position(|v| !v.is_finite()) {
+        if let Some(bad) =
+            vertices.iter().position(|v| !v.to_array().into_iter().all(is_coordinate))
+        {
             return Err(NotFinite(bad + 1));
         }
         if let Some(bad) = faces.iter().position(|f| f.iter().any(|&v| v >= vertices.len())) {

@@ -8,7 +8,9 @@ use super::{
     Corner, FamilyRef, GridKind, Name, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board,
     solid, tag_sheet,
 };
+use crate::json::{self, ReadError};
 use crate::lattice::Vertex;
+use crate::quantity;
 
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/target/1";
@@ -26,6 +28,10 @@ const LONGEST_SHEET_MM: f64 = 20_000.0;
 
 /// How far the rotation of a pose may be from orthonormal: what six written digits leave.
 const ROTATION_SLACK: f64 = 1e-5;
+
+/// How far the correlations of a covariance may be from symmetric, and from positive semidefinite: what
+/// rounding leaves.
+const COVARIANCE_SLACK: f64 = 1e-6;
 
 /// What is wrong with a target file.
 #[derive(Debug, thiserror::Error)]
@@ -72,20 +78,20 @@ struct TargetFile {
 
 impl Target {
     /// Reads the text of a target file.
-    pub fn from_json(json: &str) -> Result<Target, TargetFileError> {
+    pub fn from_json(text: &str) -> Result<Target, TargetFileError> {
         // The schema is looked at first, so that a file of another version is called just that.
         #[derive(Deserialize)]
         struct Head {
             schema: String,
         }
-        let head: Head = parse(json)?;
-        if crate::json::kind(&head.schema) != crate::json::kind(SCHEMA) {
+        let head: Head = json::read(text)?;
+        if json::kind(&head.schema) != json::kind(SCHEMA) {
             return Err(TargetFileError::Kind { found: head.schema });
         }
         if head.schema != SCHEMA {
             return Err(TargetFileError::Schema { found: head.schema });
         }
-        let TargetFile { schema: _, name, spec, family, panels, sheets } = parse(json)?;
+        let TargetFile { schema: _, name, spec, family, panels, sheets } = json::read(text)?;
         let target = Target { name, spec, family, panels, sheets };
         check(&target).map_err(|(field, problem)| TargetFileError::Field { field, problem })?;
         Ok(target)
@@ -95,24 +101,17 @@ impl Target {
     pub fn to_json(&self) -> String {
         let Target { name, spec, family, panels, sheets } = self.clone();
         let file = TargetFile { schema: SCHEMA.to_owned(), name, spec, family, panels, sheets };
-        crate::json::to_text(&file, 4)
+        json::to_text(&file, 4)
     }
 }
 
-/// Parses JSON; an error that is not one of JSON's grammar names the field.
-fn parse<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, TargetFileError> {
-    let mut deserializer = serde_json::Deserializer::from_str(json);
-    let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
-        let field = error.path().to_string();
-        let inner = error.into_inner();
-        if inner.is_data() && field != "." {
-            TargetFileError::Field { field, problem: inner.to_string() }
-        } else {
-            TargetFileError::Json(inner)
+impl From<ReadError> for TargetFileError {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Json(error) => Self::Json(error),
+            ReadError::Field { field, problem } => Self::Field { field, problem },
         }
-    })?;
-    deserializer.end().map_err(TargetFileError::Json)?;
-    Ok(value)
+    }
 }
 
 pub(crate) type Problem = (String, String);
@@ -265,12 +264,6 @@ fn check_against_spec(target: &Target) -> Result<(), Problem> {
 }
 
 fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
-    if panel.edge_mm <= 0.0 {
-        return problem(format!("{field}.edge_mm"), "it must be positive");
-    }
-    if panel.border_bits.is_some_and(|bits| bits < 0.0) {
-        return problem(format!("{field}.border_bits"), "it must not be negative");
-    }
     if panel.border_bits.is_none() && !panel.tags.is_empty() {
         return problem(format!("{field}.border_bits"), "there are tags, so there must be one");
     }
@@ -278,6 +271,10 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
         return problem(format!("{field}.corners"), "there is none");
     }
     check_rotation(&panel.pose.rotation, field)?;
+    if let Some(covariance) = &panel.pose.covariance {
+        check_covariance(covariance)
+            .or_else(|what| problem(format!("{field}.pose.covariance"), what))?;
+    }
     let slack = SLACK_EDGES * panel.edge_mm;
     let mut previous = None;
     for (i, corner) in panel.corners.iter().enumerate() {
@@ -331,6 +328,27 @@ fn check_rotation(rotation: &[f64; 9], field: &str) -> Result<(), Problem> {
     let off = (r * r.transpose() - nalgebra::Matrix3::identity()).amax();
     if off > ROTATION_SLACK || r.determinant() < 0.0 {
         return problem(format!("{field}.pose.rotation"), "it is not a rotation");
+    }
+    Ok(())
+}
+
+/// Checks that it is the covariance of something.
+fn check_covariance(covariance: &[[f64; 6]; 6]) -> Result<(), String> {
+    let c = nalgebra::Matrix6::from_fn(|i, j| covariance[i][j]);
+    for i in 0..6 {
+        let in_range = quantity::pose_variance::RANGE.check(c[(i, i)]);
+        in_range.map_err(|what| format!("a variance, {what}"))?;
+    }
+    // Turns and moves have different units.
+    let correlations =
+        nalgebra::Matrix6::from_fn(|i, j| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt());
+    let uneven = (correlations - correlations.transpose()).amax();
+    if uneven > COVARIANCE_SLACK {
+        return Err("it is not symmetric".to_owned());
+    }
+    let least = correlations.symmetric_eigenvalues().min();
+    if least < -COVARIANCE_SLACK {
+        return Err("it is no covariance: some variance in it is negative".to_owned());
     }
     Ok(())
 }

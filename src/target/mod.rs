@@ -30,8 +30,10 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::lattice::GridKind;
 pub use crate::name::Name;
+use crate::quantity;
 pub use board::zigzag_vertices;
 pub use build::largest_edge_mm;
+pub(crate) use closed_mesh::is_coordinate;
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
 pub use error::TargetError;
 pub(crate) use face_sheet::{edge_numbers, edge_text, upright_number};
@@ -116,8 +118,10 @@ pub struct Panel {
     /// The tiling.
     pub kind: GridKind,
     /// Length of a tile's edge, mm.
+    #[serde(deserialize_with = "quantity::edge_mm::de")]
     pub edge_mm: f64,
     /// Border of its tags in bit-widths along the edge; `None` without tags.
+    #[serde(default, deserialize_with = "quantity::border_bits::de")]
     pub border_bits: Option<f64>,
     /// Which squares of a checkerboard carry its tags.
     #[serde(default, skip_serializing_if = "TagsIn::is_black")]
@@ -129,6 +133,7 @@ pub struct Panel {
     pub outline: Outline,
     /// Columns and rows of the matrix in which `.dsc` and `.orpc` files number the corners
     /// (FORMATS §5); it holds every corner.
+    #[serde(deserialize_with = "quantity::side_of_matrix::de")]
     pub matrix: [u32; 2],
     /// Pose of the panel frame in the target frame.
     pub pose: PanelPose,
@@ -143,12 +148,18 @@ pub struct Panel {
 #[serde(deny_unknown_fields)]
 pub struct PanelPose {
     /// Rotation matrix, row-major.
+    #[serde(deserialize_with = "quantity::cosine::de")]
     pub rotation: [f64; 9],
     /// Translation, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub translation_mm: [f64; 3],
     /// Covariance of a small turn (rad) and move (mm) along the target's axes, where the pose was
     /// measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::pose_covariance::de"
+    )]
     pub covariance: Option<[[f64; 6]; 6]>,
 }
 
@@ -159,12 +170,16 @@ pub struct Corner {
     /// Unique within the target.
     pub id: u32,
     /// Lattice row.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub row: i32,
     /// Lattice column.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub col: i32,
     /// Position in the panel frame, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub panel_mm: [f64; 2],
     /// Position in the target frame, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub target_mm: [f64; 3],
 }
 
@@ -175,8 +190,10 @@ pub struct TagPlacement {
     /// Index of the code in the family.
     pub id: u32,
     /// Row of the tile's lower-left vertex.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub row: i32,
     /// Column of the tile's lower-left vertex.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub col: i32,
 }
 
@@ -187,8 +204,10 @@ pub struct TagPlacement {
 #[serde(deny_unknown_fields)]
 pub struct SheetLayout {
     /// Page width, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
     pub width_mm: f64,
     /// Page height, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
     pub height_mm: f64,
     /// Panels on the page.
     pub placements: Vec<Placement>,
@@ -222,8 +241,10 @@ pub struct SheetPage {
     /// Its place among the pages: rows are letters from the top, columns numbers from the left.
     pub label: String,
     /// Left, lower, right and upper end of the window on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub window_mm: [f64; 4],
     /// Position of the sheet's lower-left corner on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub sheet_at_mm: [f64; 2],
     /// Size of the page, and what is printed around the window.
     pub marks: SheetLayout,
@@ -263,8 +284,10 @@ pub struct Placement {
     /// Which panel.
     pub panel: u32,
     /// Counter-clockwise turn of the panel on the page, radians.
+    #[serde(deserialize_with = "quantity::angle_rad::de")]
     pub angle_rad: f64,
     /// Page position of the panel's origin, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub origin_mm: [f64; 2],
 }
 
@@ -284,10 +307,13 @@ pub struct SheetLine {
     /// What it is for.
     pub kind: LineKind,
     /// One end on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub from_mm: [f64; 2],
     /// The other end on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub to_mm: [f64; 2],
     /// Its width, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
     pub width_mm: f64,
 }
 
@@ -331,8 +357,10 @@ impl LineKind {
 #[serde(deny_unknown_fields)]
 pub struct CheckBar {
     /// One end on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub from_mm: [f64; 2],
     /// The other end on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub to_mm: [f64; 2],
 }
 
@@ -350,11 +378,15 @@ pub struct SheetText {
     /// The words: ASCII and `° ± · × – −`.
     pub text: String,
     /// Left end of the base line on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
     pub at_mm: [f64; 2],
     /// Counter-clockwise turn of the base line, radians.
+    #[serde(deserialize_with = "quantity::angle_rad::de")]
     pub angle_rad: f64,
     /// Height of a capital letter, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
     pub cap_height_mm: f64,
     /// The line is set smaller where it would be longer than this, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
     pub max_width_mm: f64,
 }

@@ -36,7 +36,7 @@ pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, Docume
         return Err(unreadable("the target is no solid"));
     };
     let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let facets = load_stl(path)?;
+    let facets = load_stl(path, &verifier.limits)?;
     let solid = spec.polyhedron();
     let mut body = BodyVerdict {
         triangles: facets.len(),
@@ -66,9 +66,11 @@ fn check_surface(facets: &[Facet]) -> Vec<Finding> {
         Err(error) => Some(error.to_string()),
     };
     findings.extend(problem.map(|problem| Finding::Body { problem }));
+    // A normal that is no number is wrong too.
     let wrong = facets.iter().filter(|facet| {
         let [a, b, c] = facet.vertices_mm;
-        facet.normal.distance((b - a).cross(c - a).normalize_or_zero()) > NORMAL_SLACK
+        let off = facet.normal.distance((b - a).cross(c - a).normalize_or_zero());
+        off.is_nan() || off > NORMAL_SLACK
     });
     let triangles = wrong.count();
     if triangles > 0 {

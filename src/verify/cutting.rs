@@ -3,7 +3,6 @@
 
 use std::path::Path;
 
-use super::document::read_text;
 use super::{CutVerdict, DocumentError, Finding, Format, Verdict, Verifier, VerifyError};
 use crate::artwork::{self, CutDrawing, CutLayer, CutPath};
 use crate::export::dxf::{self, DxfError};
@@ -18,7 +17,7 @@ const MOVED_MM: f64 = 20.0;
 /// the file tells.
 pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, VerifyError> {
     let stated = stated(verifier, path)?;
-    let text = read_text(path)?;
+    let text = verifier.limits.read_text(path).map_err(DocumentError::from)?;
     let mut cut = CutVerdict::default();
     let findings = match dxf::read(&text) {
         Ok(found) => compare(found, stated, &mut cut),

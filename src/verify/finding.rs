@@ -53,6 +53,18 @@ pub enum Finding {
         /// Sheets of the target.
         stated: usize,
     },
+    /// What no picture of the page shows: words that are not those of the target, or marks beside the page.
+    Unseen {
+        /// Where it is, in the words of the format.
+        place: String,
+        /// What it is.
+        problem: String,
+    },
+    /// A page in a file of its own is not there, or was not named with the others.
+    PageMissing {
+        /// File name of the page.
+        page: String,
+    },
     /// The page has another size.
     PageSize {
         /// Width and height in the file.
@@ -396,6 +408,7 @@ impl fmt::Display for Finding {
             Self::Construct { place, construct } => {
                 write!(f, "{place}: {construct}: not every viewer shows that alike")
             }
+            Self::Unseen { place, problem } => write!(f, "{place}: {problem}"),
             Self::Listed { problem } => write!(f, "{problem}"),
             Self::PathOff { layer, at_mm: [x, y], by_mm } => {
                 write!(f, "the path on {layer} from ({x:.2}, {y:.2}) mm is off by {by_mm:.3} mm")
@@ -405,6 +418,9 @@ impl fmt::Display for Finding {
             }
             Self::PathExtra { layer, at_mm: [x, y] } => {
                 write!(f, "a path on {layer} from ({x:.2}, {y:.2}) mm that should not be there")
+            }
+            Self::PageMissing { page } => {
+                write!(f, "{page} is missing, or not named with the others")
             }
             Self::Pages { found, stated } => write!(f, "{found} pages instead of {stated}"),
             Self::PageSize { found_mm: [fw, fh], stated_mm: [sw, sh] } => {

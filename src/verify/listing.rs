@@ -5,7 +5,6 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::document::read_text;
 use super::{DocumentError, Finding, Format, ListVerdict, Verdict, Verifier};
 use crate::export::dsc::{self, Dialect};
 use crate::target::{Panel, Target};
@@ -15,7 +14,7 @@ const LIST_TOLERANCE_MM: f64 = 1e-6;
 
 /// Reads a `.dsc` from disk and compares it with the target.
 pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
-    let text = &read_text(path)?;
+    let text = &verifier.limits.read_text(path).map_err(DocumentError::from)?;
     if text.lines().next().is_none_or(|head| head.split(',').count() != 4) {
         let problem = "not a .dsc: it does not start with a line `id,A,B,size`";
         return Err(DocumentError::unreadable(path, problem));
@@ -24,7 +23,10 @@ pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, Docume
     let mut findings = unlisted(text);
     if findings.is_empty() {
         match dsc::read_in_mm(text, &verifier.target.name) {
-            Ok(listed) => findings = compare(&listed, verifier.target, &mut list),
+            Ok(listed) => {
+                findings = compare(&listed, verifier.target, &mut list);
+                findings.extend(written_otherwise(text, &listed).filter(|_| findings.is_empty()));
+            }
             Err(error) => findings.push(Finding::Listed { problem: error.to_string() }),
         }
     }
@@ -41,6 +43,19 @@ fn unlisted(text: &str) -> Vec<Finding> {
         construct: "a blank or a character other than of words and numbers".to_owned(),
     })
     .collect()
+}
+
+/// The first line that is not written as what is read of it is: readers take numbers, and the order of
+/// lines, each in their way.
+fn written_otherwise(text: &str, listed: &Target) -> Option<Finding> {
+    let dialect = Dialect::of(listed);
+    let anew = dsc::write(listed, dialect).unwrap_or_default();
+    if text == anew {
+        return None;
+    }
+    let same = text.lines().zip(anew.lines()).take_while(|(found, anew)| found == anew).count();
+    let construct = "a number or an order that is written otherwise".to_owned();
+    Some(Finding::Construct { place: format!("line {}", same + 1), construct })
 }
 
 fn compare(listed: &Target, target: &Target, list: &mut ListVerdict) -> Vec<Finding> {

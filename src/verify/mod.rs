@@ -28,7 +28,8 @@
 //!
 //! What is drawn here must be what is seen elsewhere. So before a file is drawn it is gone through,
 //! and anything in it that not every viewer shows alike is a finding: files are accepted by a list
-//! of what may be in them, not refused by a list of what may not.
+//! of what may be in them, not refused by a list of what may not. Titles and descriptions must be those of
+//! the target, and there is nothing that is of no use.
 //!
 //! Lists for other detectors (`.dsc`) and drawings for a cutter (`.dxf`) are read and compared with
 //! the target number by number.
@@ -55,6 +56,7 @@ mod tags;
 mod tiles;
 mod verdict;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -62,6 +64,7 @@ use crate::artwork::CuttingError;
 use crate::detect::{Detector, DetectorConfig, Ink, Tone};
 use crate::export::sheet_file_name;
 use crate::family::Family;
+use crate::limits::Limits;
 use crate::target::{SheetLayout, SheetPage, Target};
 use fit::AffineMap;
 use fold::Seen;
@@ -83,6 +86,10 @@ const PRINT_PX_PER_MM: f64 = 300.0 / 25.4;
 
 /// Least edge of a tag's cell in the picture, px: its inside is then more than a few pixels.
 const CELL_PX: f64 = 8.0;
+
+/// A page with a side so many times as long as stated is not looked at: at the resolution that is
+/// left for it nothing would be seen of its boards.
+const MOST_ENLARGED: f64 = 10.0;
 
 /// Why an artifact cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -155,6 +162,7 @@ pub struct Verifier<'a> {
     target: &'a Target,
     family: Option<&'a Family>,
     detector: Detector,
+    limits: Limits,
     cancel: Option<&'a AtomicBool>,
 }
 
@@ -183,7 +191,12 @@ impl<'a> Verifier<'a> {
             family,
             DetectorConfig { tone: Tone::Linear, ink: Ink::Um(0.0), ..DetectorConfig::default() },
         );
-        Ok(Self { target, family, detector, cancel: None })
+        Ok(Self { target, family, detector, limits: Limits::default(), cancel: None })
+    }
+
+    /// The same, and reading artifacts within other limits than the default.
+    pub fn within(self, limits: Limits) -> Self {
+        Self { limits, ..self }
     }
 
     /// The same, and looking at `flag` before each page: once it is set, [`verify`](Self::verify)
@@ -195,9 +208,17 @@ impl<'a> Verifier<'a> {
     /// The files that are verified together with one: the pages of a net, each in a file of its
     /// own, belong together. Any other file is verified by itself.
     pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
+        match fold::is_net(self.target) {
+            true => self.pages_with(path),
+            false => vec![path.to_owned()],
+        }
+    }
+
+    /// The files of all pages of which one is in this file; the file alone where it holds all.
+    pub fn pages_with(&self, path: &Path) -> Vec<PathBuf> {
         let single = matches!(Format::of(path), Some(Format::Svg | Format::Png));
         let count = self.target.page_count();
-        if !single || count == 1 || !fold::is_net(self.target) || self.sheet_of(path).is_err() {
+        if !single || count == 1 || self.sheet_of(path).is_err() {
             return vec![path.to_owned()];
         }
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -205,6 +226,35 @@ impl<'a> Verifier<'a> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         let file = |index| path.with_file_name(sheet_file_name(name, index, count, &extension));
         (0..count).map(file).collect()
+    }
+
+    /// What is wrong with files that are named together: pages are left out that belong to others.
+    /// One page may be named alone where it can be verified so and `alone` says that it is meant to.
+    pub fn left_out(&self, named: &[PathBuf], alone: bool) -> Vec<Verdict> {
+        // A folder may be named in several ways.
+        let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
+        let named: Vec<PathBuf> = named.iter().map(absolute).collect();
+        let sets: BTreeSet<Vec<PathBuf>> = named.iter().map(|path| self.pages_with(path)).collect();
+        let mut verdicts = Vec::new();
+        for pages in sets {
+            let verified_together = self.set_of(&pages[0]).len() > 1;
+            let missing: Vec<&PathBuf> =
+                pages.iter().filter(|page| !named.contains(page)).collect();
+            let single = alone && missing.len() + 1 == pages.len();
+            if let Some(format) = Format::of(&pages[0])
+                && !(verified_together || single || missing.is_empty())
+            {
+                verdicts.push(Self::without(&pages, format, &missing));
+            }
+        }
+        verdicts
+    }
+
+    /// Pages of which some are missing.
+    fn without(pages: &[PathBuf], format: Format, missing: &[&PathBuf]) -> Verdict {
+        let findings = missing.iter().map(|page| Finding::PageMissing { page: file_name(page) });
+        let verdict = Verdict::new(&pages[0], format, findings.collect());
+        Verdict { artifact: of_all(pages), ..verdict }
     }
 
     /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
@@ -219,12 +269,17 @@ impl<'a> Verifier<'a> {
             Format::Pdf | Format::Svg | Format::Png => return self.verify_sheets(path, format),
             Format::Glb | Format::Obj | Format::Stl => {}
         }
-        let refused = construct::check(path, format, &self.target.name)?;
-        Ok(match format {
-            _ if !refused.is_empty() => Verdict::new(path, format, refused),
+        let refused = construct::check(path, format, self.target, &self.limits)?;
+        if construct::refuse(&refused) {
+            return Ok(Verdict::new(path, format, refused));
+        }
+        let mut verdict = match format {
             Format::Stl => body::verify(self, path)?,
             _ => solid::verify(self, path, format)?,
-        })
+        };
+        verdict.passed &= refused.is_empty();
+        verdict.findings.extend(refused);
+        Ok(verdict)
     }
 
     /// Compares printed pages.
@@ -235,12 +290,19 @@ impl<'a> Verifier<'a> {
         }
         let mut findings = Vec::new();
         let files = self.set_of(path);
+        let missing: Vec<&PathBuf> = files.iter().filter(|file| !file.exists()).collect();
+        if path.exists() && !missing.is_empty() {
+            return Ok(Self::without(&files, format, &missing));
+        }
         let refused = self.refused(&files, format)?;
-        if !refused.is_empty() {
+        if construct::refuse(&refused) {
             return Ok(Verdict::new(path, format, refused));
         }
-        let documents: Vec<Document> =
-            files.iter().map(|file| Document::open(file)).collect::<Result<_, _>>()?;
+        findings.extend(refused);
+        let documents: Vec<Document> = files
+            .iter()
+            .map(|file| Document::open_within(file, &self.limits))
+            .collect::<Result<_, _>>()?;
         let stated = self.target.page_count();
         // Where each page of the target is to be seen.
         let sources: Vec<Option<Source>> = match format {
@@ -274,8 +336,8 @@ impl<'a> Verifier<'a> {
                 continue;
             };
             let (verdict, found) = match layout.pages.is_empty() {
-                true => self.verify_page(pages[0], index),
-                false => self.verify_pages(&pages, index),
+                true => self.verify_page(pages[0], index)?,
+                false => self.verify_pages(&pages, index)?,
             };
             verdicts.push(verdict);
             seen.push(found);
@@ -283,10 +345,8 @@ impl<'a> Verifier<'a> {
         if fold::is_net(self.target) && verdicts.len() == self.target.sheets.len() {
             fold::check(self.target, &seen, &mut verdicts);
         }
-        let mut verdict = Verdict::new(path, format, findings);
-        if let [first, .., last] = files.as_slice() {
-            verdict.artifact = format!("{} to {}", file_name(first), file_name(last));
-        }
+        let mut verdict =
+            Verdict { artifact: of_all(&files), ..Verdict::new(path, format, findings) };
         verdict.passed &= verdicts.iter().all(|sheet| sheet.findings.is_empty());
         Ok(Verdict { sheets: verdicts, ..verdict })
     }
@@ -295,7 +355,7 @@ impl<'a> Verifier<'a> {
     fn refused(&self, files: &[PathBuf], format: Format) -> Result<Vec<Finding>, DocumentError> {
         let mut refused = Vec::new();
         for file in files {
-            let found = construct::check(file, format, &self.target.name)?;
+            let found = construct::check(file, format, self.target, &self.limits)?;
             refused.extend(found.into_iter().map(|finding| match files.len() {
                 1 => finding,
                 _ => Finding::OnPage { page: file_name(file), finding: Box::new(finding) },
@@ -341,17 +401,25 @@ impl<'a> Verifier<'a> {
         cells_mm.map(|cell_mm| CELL_PX / cell_mm).fold(PRINT_PX_PER_MM, f64::max)
     }
 
-    fn verify_page(&self, source: Source, index: usize) -> (SheetVerdict, Seen) {
+    fn verify_page(
+        &self,
+        source: Source,
+        index: usize,
+    ) -> Result<(SheetVerdict, Seen), DocumentError> {
         let layout = &self.target.sheets[index];
-        let (page, findings) = source.render(layout, self.wish_px_per_mm(layout));
+        let (page, findings) = source.render(layout, self.wish_px_per_mm(layout))?;
         let mut verdict = SheetVerdict::new(index, &page, findings);
         let seen = self.verify_sheet(&page, layout, &mut verdict);
-        (verdict, seen)
+        Ok((verdict, seen))
     }
 
     /// Compares a sheet that is printed on several pages: what is around the window of each, then
     /// all that the windows show, laid together.
-    fn verify_pages(&self, sources: &[Source], index: usize) -> (SheetVerdict, Seen) {
+    fn verify_pages(
+        &self,
+        sources: &[Source],
+        index: usize,
+    ) -> Result<(SheetVerdict, Seen), DocumentError> {
         let layout = &self.target.sheets[index];
         let wish = self.wish_px_per_mm(layout);
         let most = (document::MAX_PIXELS / (layout.width_mm * layout.height_mm)).sqrt();
@@ -360,7 +428,7 @@ impl<'a> Verifier<'a> {
         let mut check_bars_mm = Vec::new();
         for (source, SheetPage { label, window_mm, marks, .. }) in sources.iter().zip(&layout.pages)
         {
-            let (page, wrong) = source.render(marks, wish);
+            let (page, wrong) = source.render(marks, wish)?;
             let mut verdict = SheetVerdict::new(index, &page, wrong);
             check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
             marks::check(&page, marks, &[], Some(*window_mm), &mut verdict);
@@ -370,7 +438,7 @@ impl<'a> Verifier<'a> {
             }));
             check_bars_mm.extend(verdict.check_bars_mm);
             // Kept no finer than the sheet is looked at.
-            pages.push(if wish > most { source.render(marks, most).0 } else { page });
+            pages.push(if wish > most { source.render(marks, most)?.0 } else { page });
         }
         let (sheet, different) = assemble::assemble(&pages, layout, wish.min(most));
         let mut verdict = SheetVerdict::new(index, &sheet, different);
@@ -378,7 +446,7 @@ impl<'a> Verifier<'a> {
         let seen = self.verify_sheet(&sheet, layout, &mut verdict);
         verdict.findings.extend(findings);
         verdict.check_bars_mm = check_bars_mm;
-        (verdict, seen)
+        Ok((verdict, seen))
     }
 
     /// Compares the panels and marks of a whole sheet.
@@ -407,6 +475,14 @@ impl<'a> Verifier<'a> {
     }
 }
 
+/// The name of a file, or of the first and the last of several.
+fn of_all(files: &[PathBuf]) -> String {
+    match files {
+        [first, .., last] => format!("{} to {}", file_name(first), file_name(last)),
+        _ => files.iter().map(|file| file_name(file)).collect(),
+    }
+}
+
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
@@ -420,18 +496,25 @@ struct Source<'a> {
 
 impl Source<'_> {
     /// The page as a picture, and whether it has the stated size.
-    fn render(&self, layout: &SheetLayout, px_per_mm: f64) -> (Page, Vec<Finding>) {
+    fn render(
+        &self,
+        layout: &SheetLayout,
+        px_per_mm: f64,
+    ) -> Result<(Page, Vec<Finding>), DocumentError> {
         let tolerance_mm = self.document.size_tolerance_mm();
-        let mut page = self.document.render(self.page, px_per_mm);
         let stated_mm = [layout.width_mm, layout.height_mm];
-        let found_mm = [page.width_mm, page.height_mm];
+        let found_mm = self.document.size_mm(self.page);
+        if (0..2).any(|i| found_mm[i] > MOST_ENLARGED * stated_mm[i]) {
+            return Err(self.document.too_large(found_mm, stated_mm));
+        }
+        let mut page = self.document.render(self.page, px_per_mm)?;
         if (0..2).any(|i| (found_mm[i] - stated_mm[i]).abs() > tolerance_mm) {
-            return (page, vec![Finding::PageSize { found_mm, stated_mm }]);
+            return Ok((page, vec![Finding::PageSize { found_mm, stated_mm }]));
         }
         // Pictures begin at the upper edge and end with a whole pixel: heights are counted from
         // the true lower edge, not from the end of the last pixel.
         page.height_mm = layout.height_mm;
-        (page, Vec::new())
+        Ok((page, Vec::new()))
     }
 }
 

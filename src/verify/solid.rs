@@ -48,7 +48,7 @@ pub(super) fn verify(
     path: &Path,
     format: Format,
 ) -> Result<Verdict, DocumentError> {
-    let model = model::load(path)?;
+    let model = model::load(path, &verifier.limits)?;
     let mut findings = Vec::new();
     let mut faces = Vec::new();
     let scale = scale(verifier, &model);

@@ -128,6 +128,18 @@ fn texture(damage: Damage) -> Damage {
     })
 }
 
+/// Changes the binary part.
+fn binary(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
+    Box::new(move |bytes| {
+        let mut parts = Parts::of(bytes);
+        let mut root: Value = serde_json::from_slice(&parts.json).unwrap();
+        edit(&mut parts.binary);
+        root["buffers"][0]["byteLength"] = json!(parts.binary.len());
+        parts.json = root.to_string().into_bytes();
+        parts.join()
+    })
+}
+
 /// Changes bytes in place.
 fn byte(at: usize, value: u8) -> Damage {
     Box::new(move |bytes| {
@@ -305,8 +317,79 @@ pub fn all() -> Vec<Case> {
                 set("/bufferViews/0/byteLength", json!(1u64 << 62)),
             ),
             ("fewer normals", "another number of vertices", set("/accessors/1/count", json!(9))),
-            ("fewer triangles", "not recognised", set("/accessors/3/count", json!(9))),
+            ("fewer triangles", "do not fill", set("/accessors/3/count", json!(9))),
             ("part of a triangle", "a part of a triangle", set("/accessors/3/count", json!(10))),
+            ("values of no use", "accessors[4]: values of no use", {
+                add(
+                    "accessors",
+                    json!({"bufferView": 1, "componentType": 5126, "count": 12, "type": "VEC3"}),
+                )
+            }),
+            ("bytes of no use", "bytes of no", {
+                add("bufferViews", json!({"buffer": 0, "byteOffset": 0, "byteLength": 0}))
+            }),
+            (
+                "bytes before a view",
+                "bytes that do not follow",
+                set("/bufferViews/1/byteOffset", json!(4)),
+            ),
+            ("bytes after the views", "bytes of no view", binary(|binary| binary.extend([1; 8]))),
+            (
+                "bounds of normals",
+                "min and max of no use",
+                set("/accessors/1/max", json!([0, 0, 0])),
+            ),
+            (
+                "indices for positions",
+                "a view for values of another kind",
+                set("/bufferViews/0/target", json!(34963)),
+            ),
+            (
+                "values for a picture",
+                "a view for values",
+                set("/bufferViews/4/target", json!(34962)),
+            ),
+            ("another generator", "a generator other", set("/asset/generator", json!("a program"))),
+            (
+                "another target's description",
+                "extras that do not describe",
+                set("/asset/extras/spec/tiles", json!(8)),
+            ),
+            ("more in the extras", "extras that", set("/asset/extras/more", json!(1))),
+            (
+                "no extras",
+                "missing field `extras`",
+                json(|root| {
+                    root["asset"].as_object_mut().unwrap().remove("extras");
+                }),
+            ),
+            (
+                "another name of the mesh",
+                "\"u\" for the target's",
+                set("/meshes/0/name", json!("u")),
+            ),
+            (
+                "another name of the material",
+                "a name other than print",
+                material("name", json!("u")),
+            ),
+            ("extras of the node", "extras", node("extras", json!({"a": 1}))),
+            ("blanks in the JSON", "blanks, a spelling", words(swap("{", "{  "))),
+            (
+                "an escaped name",
+                "a spelling",
+                words(swap("\"name\":\"t\"", "\"name\":\"\\u0074\"")),
+            ),
+            (
+                "a key of extras twice",
+                "there twice",
+                words(swap("\"tiles\":7", "\"tiles\":8,\"tiles\":7")),
+            ),
+            (
+                "a texture of another title",
+                "images[0], byte 89: words",
+                texture(swap("\0t", "\0u")),
+            ),
             ("a later version", "version 3.0", set("/asset/version", json!("3.0"))),
             ("a least version", "minVersion", set("/asset/minVersion", json!("2.1"))),
             ("a container of another version", "a version other than 2", byte(4, 3)),

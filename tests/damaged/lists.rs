@@ -95,11 +95,33 @@ pub fn dsc() -> Vec<Case> {
             ),
             ("more columns", "7 columns and 4 rows instead of 6 and 4", swap("0,6,4,", "0,7,4,")),
             ("fewer columns", "is outside the board's", swap("0,6,4,", "0,5,4,")),
+            (
+                "a number that is spelled otherwise",
+                "line 3: a number",
+                swap("-1,1,0,20,", "-1,1,0,20.0,"),
+            ),
+            ("an exponent", "line 3: a number", swap("-1,1,0,20,", "-1,1,0,2e1,")),
+            ("lines in another order", "an order that", {
+                text(|text| {
+                    let mut lines: Vec<&str> = text.lines().collect();
+                    lines.swap(4, 5);
+                    lines.iter().map(|line| format!("{line}\n")).collect()
+                })
+            }),
+            (
+                "no end of the last line",
+                "a number or an order",
+                text(|text| text.trim_end().to_owned()),
+            ),
             ("a blank line", "a blank", before("-1,1,0,", "\n")),
             ("spaces", "line 8: a blank", swap("\n0,1,1,", "\n0, 1,1,")),
             ("ends of lines of another system", "a blank", swap("\n", "\r\n")),
             ("a comment", "a blank or a character", append("# words\n")),
-            ("a coordinate that is none", "is not finite", swap("-1,1,0,20,", "-1,1,0,nan,")),
+            (
+                "a coordinate that is none",
+                "x NaN is not between",
+                swap("-1,1,0,20,", "-1,1,0,nan,"),
+            ),
             ("nothing of a list", "not a .dsc", text(|_| "hello\n".to_owned())),
         ],
     )
@@ -161,7 +183,46 @@ pub fn net() -> Vec<Case> {
             (
                 "a line too many",
                 "that should not be there",
-                add("  0\nLINE\n  8\nCUT\n 10\n0\n 20\n0\n 30\n0\n 11\n9\n 21\n9\n 31\n0\n"),
+                add(
+                    "  0\nLINE\n  8\nCUT\n 10\n0.000000\n 20\n0.000000\n 30\n0.000000\n 11\n9.000000\n 21\n\
+                     9.000000\n 31\n0.000000\n",
+                ),
+            ),
+            (
+                "a line of no length",
+                "that should not be there",
+                add(
+                    "  0\nLINE\n  8\nCUT\n 10\n1.000000\n 20\n1.000000\n 30\n0.000000\n 11\n1.000000\n 21\n\
+                     1.000000\n 31\n0.000000\n",
+                ),
+            ),
+            (
+                "an outline twice",
+                "that should not be there",
+                text(|text| {
+                    let (at, end) =
+                        entity(text, "  0\nPOLYLINE\n  8\nCUT", "  0\nSEQEND\n  8\nCUT\n");
+                    let end = end + "  0\nSEQEND\n  8\nCUT\n".len();
+                    [&text[..end], &text[at..end], &text[end..]].concat()
+                }),
+            ),
+            (
+                "a number that is spelled otherwise",
+                "written otherwise",
+                swap(" 30\n0.000000", " 30\n0.0"),
+            ),
+            ("another comment", "written otherwise", swap("deltille 0", "desk 0")),
+            ("a comment too many", "written otherwise", before("  0\nEOF", "999\ndesk\n")),
+            ("a code without blanks", "written otherwise", swap("  0\nSECTION", "0\nSECTION")),
+            (
+                "ends of lines of another system",
+                "written otherwise",
+                swap("SECTION\n", "SECTION\r\n"),
+            ),
+            (
+                "a name of a layer in small letters",
+                "on layer `cut`",
+                swap("POLYLINE\n  8\nCUT", "POLYLINE\n  8\ncut"),
             ),
             (
                 "a line twice",

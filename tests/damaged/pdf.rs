@@ -57,6 +57,26 @@ fn content(edit: impl Fn(&str) -> String + 'static) -> Damage {
     })
 }
 
+/// Sets words of the information.
+fn info(key: &'static str, words: &'static str) -> Damage {
+    document(move |document| {
+        let id = document.trailer.get(b"Info").and_then(Object::as_reference).unwrap();
+        let info = document.get_object_mut(id).and_then(Object::as_dict_mut).unwrap();
+        info.set(key, Object::string_literal(words));
+    })
+}
+
+/// Changes the packed content of the page.
+fn packed(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
+    document(move |document| {
+        let id = document.get_page_contents(page_id(document))[0];
+        let stream = document.get_object_mut(id).and_then(Object::as_stream_mut).unwrap();
+        let mut packed = stream.content.clone();
+        edit(&mut packed);
+        stream.set_content(packed);
+    })
+}
+
 fn name(name: &str) -> Object {
     Object::Name(name.as_bytes().to_vec())
 }
@@ -97,7 +117,7 @@ pub fn board() -> Vec<Case> {
                 "key OutputIntents",
                 catalog("OutputIntents", |_| Vec::<Object>::new().into()),
             ),
-            ("full screen", "a page mode", catalog("PageMode", |_| name("FullScreen"))),
+            ("full screen", "a PageMode other", catalog("PageMode", |_| name("FullScreen"))),
             (
                 "scaled prints",
                 "print scaling",
@@ -223,6 +243,96 @@ pub fn board() -> Vec<Case> {
                 "ends within a path",
                 content(|text| format!("{text} 0 0 m")),
             ),
+            ("marks of the default colour", "a mark before any operator k", {
+                content(|text| text.replacen("0 0 0 1 k\n", "", 1))
+            }),
+            ("a line of the default colour", "a mark before any operator K", {
+                content(|text| format!("1 w 9 9 m 99 9 l S\n{text}"))
+            }),
+            (
+                "a line of the default width",
+                "a mark before any operator w",
+                operators("0 0 0 1 K 9 9 m 99 9 l S"),
+            ),
+            (
+                "marks off the page",
+                "over the edge of the page",
+                operators("0 0 0 1 k 900 9 m 910 9 l 910 19 l h f*"),
+            ),
+            (
+                "a line over the edge",
+                "over the edge of the page",
+                operators("0 0 0 1 K 20 w 9 9 m 99 9 l S"),
+            ),
+            ("an object of no use", "an object of no use", {
+                document(|document| {
+                    document.add_object(Object::string_literal("hidden"));
+                })
+            }),
+            ("an attached file of no use", "an object of no use", {
+                document(|document| {
+                    let file = dictionary! { "Type" => "EmbeddedFile" };
+                    document.add_object(Stream::new(file, b"<html></html>".to_vec()));
+                })
+            }),
+            ("another title", "a Title other", info("Title", "desk")),
+            ("another description", "a Subject that", info("Subject", "a checkerboard")),
+            ("another creator", "a Creator other", info("Creator", "a program")),
+            (
+                "an identifier of a change",
+                "an ID that",
+                document(|document| {
+                    let id =
+                        document.trailer.get_mut(b"ID").and_then(Object::as_array_mut).unwrap();
+                    id[1] = Object::string_literal("changed");
+                }),
+            ),
+            ("key words", "key Keywords", info("Keywords", "desk")),
+            (
+                "no words",
+                "no dictionary",
+                document(|document| {
+                    document.trailer.remove(b"Info");
+                }),
+            ),
+            (
+                "pages side by side",
+                "a PageLayout other",
+                catalog("PageLayout", |_| name("TwoPageLeft")),
+            ),
+            ("a language", "key Lang", catalog("Lang", |_| Object::string_literal("en"))),
+            ("a page of two units", "key UserUnit", page("UserUnit", |_| 1.into())),
+            (
+                "pages of another version",
+                "version 2.0 instead of 1.6",
+                swap("%PDF-1.6", "%PDF-2.0"),
+            ),
+            ("an older version", "version 1.0 instead of 1.6", swap("%PDF-1.6", "%PDF-1.0")),
+            (
+                "content that is not packed",
+                "not of FlateDecode",
+                document(|document| document.decompress()),
+            ),
+            (
+                "content without its check sum",
+                "cut off",
+                packed(|data| data.truncate(data.len() - 4)),
+            ),
+            (
+                "content of another check sum",
+                "check sum is wrong",
+                packed(|data| *data.last_mut().unwrap() ^= 1),
+            ),
+            ("content that ends early", "cut off", packed(|data| data.truncate(data.len() / 2))),
+            ("content that goes on", "goes on behind", packed(|data| data.extend(b"more"))),
+            ("a comment at the end", "spelling, order", before("startxref", "% desk\n")),
+            (
+                "a table that points elsewhere",
+                "object 2 elsewhere",
+                swap("0000000066", "0000000067"),
+            ),
+            ("a table of another place", "PDF", swap("startxref\n4", "startxref\n5")),
+            ("a number on the next line", "spelling, order", swap("/Count 1", "/Count\n1")),
             ("a key twice", "there twice", swap("/PageMode/UseNone", "/Pages 5 0 R     ")),
             (
                 "an object after the table",
@@ -255,7 +365,10 @@ pub fn board() -> Vec<Case> {
             (
                 "a page that is missing",
                 "without pages",
-                document(|document| document.delete_pages(&[1])),
+                document(|document| {
+                    document.delete_pages(&[1]);
+                    document.prune_objects();
+                }),
             ),
         ],
     )

@@ -2,7 +2,7 @@
 
 use image::{DynamicImage, GrayImage, ImageFormat, Luma};
 
-use super::edit::{append, find};
+use super::edit::{append, find, swap};
 use super::{Case, Damage, cases};
 
 /// A chunk with its check sum.
@@ -36,14 +36,14 @@ fn head(at: usize, value: u8) -> Damage {
     })
 }
 
-/// Draws the pixels anew, the resolution kept.
+/// Draws the pixels anew, resolution and title kept.
 pub fn pixels(draw: impl Fn(GrayImage) -> DynamicImage + 'static) -> Damage {
     Box::new(move |bytes| {
         let picture = image::load_from_memory(bytes).unwrap().into_luma8();
         let mut drawn = std::io::Cursor::new(Vec::new());
         draw(picture).write_to(&mut drawn, ImageFormat::Png).unwrap();
-        let (drawn, at) = (drawn.into_inner(), find(bytes, b"pHYs") - 4);
-        [&drawn[..33], &bytes[at..at + 21], &drawn[33..]].concat()
+        let (drawn, pixels) = (drawn.into_inner(), find(bytes, b"IDAT") - 4);
+        [&drawn[..33], &bytes[33..pixels], &drawn[33..]].concat()
     })
 }
 
@@ -84,6 +84,31 @@ fn more_packed() -> Damage {
     Box::new(|bytes| {
         let end = bytes.len() - 12;
         [&bytes[..end], &chunk("IDAT", b"more"), &bytes[end..]].concat()
+    })
+}
+
+/// Packs the pixels anew in one chunk.
+fn packed(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
+    Box::new(move |bytes| {
+        let first = find(bytes, b"IDAT") - 4;
+        let (mut at, mut data) = (first, Vec::new());
+        while &bytes[at + 4..at + 8] == b"IDAT" {
+            let length = u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+            data.extend_from_slice(&bytes[at + 8..at + 8 + length]);
+            at += 12 + length;
+        }
+        edit(&mut data);
+        [&bytes[..first], &chunk("IDAT", &data), &bytes[at..]].concat()
+    })
+}
+
+/// Changes the last byte of the check sum of a chunk with so many bytes of content.
+fn sum_of(name: &'static str, length: usize) -> Damage {
+    Box::new(move |bytes| {
+        let mut bytes = bytes.to_vec();
+        let at = find(&bytes, name.as_bytes());
+        bytes[at + 4 + length + 3] ^= 1;
+        bytes
     })
 }
 
@@ -131,7 +156,29 @@ pub fn board() -> Vec<Case> {
             ("data after the end", "data after the end", append("PK")),
             ("a check sum of the packed pixels", "a check sum", packed_sum()),
             ("data behind the packed pixels", "a check sum", more_packed()),
+            (
+                "packed pixels without their check sum",
+                "a check sum",
+                packed(|data| data.truncate(data.len() - 4)),
+            ),
+            (
+                "packed pixels that end early",
+                "a check sum",
+                packed(|data| data.truncate(data.len() - 9)),
+            ),
+            ("a check sum of the resolution", "a check sum of pHYs", sum_of("pHYs", 9)),
+            ("a check sum of the title", "a check sum of iTXt", sum_of("iTXt", 11)),
             ("a check sum of the end", "a check sum", last_byte()),
+            ("another title", "words other than", swap("Title\0\0\0\0\0b", "Title\0\0\0\0\0c")),
+            ("a second title", "a second chunk iTXt", with_chunk("iTXt", b"Title\0\0\0\0\0b")),
+            ("no title", "no title", {
+                Box::new(|bytes| [&bytes[..54], &bytes[find(bytes, b"IDAT") - 4..]].concat())
+            }),
+            ("words on the side", "chunk tEXt", with_chunk("tEXt", b"Comment\0desk")),
+            ("a time", "chunk tIME", with_chunk("tIME", &[7, 234, 1, 1, 0, 0, 0])),
+            ("data at the end", "data in the chunk IEND", {
+                Box::new(|bytes| [&bytes[..bytes.len() - 12], &chunk("IEND", b"a")].concat())
+            }),
             ("a larger page", "page of", resolution(11_000, 11_000, 1)),
             ("pixels that are not square", "no resolution", resolution(11_811, 11_000, 1)),
             ("a resolution without a unit", "no resolution", resolution(11_811, 11_811, 0)),

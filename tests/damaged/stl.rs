@@ -60,6 +60,22 @@ pub fn all() -> Vec<Case> {
             ),
             ("data after the end", "its length is not that", bytes(|b| b.extend(b"more"))),
             ("a normal of another side", "wrong normals", bytes(|b| b[triangle(0) + 3] ^= 0x80)),
+            (
+                "a normal that is none",
+                "wrong normals",
+                bytes(|b| b[triangle(0)..triangle(0) + 4].copy_from_slice(&f32::NAN.to_le_bytes())),
+            ),
+            ("another target's head", "the head", bytes(|b| b[9] = b'u')),
+            ("more triangles stated", "its length is not that", bytes(|b| b[80] = 5)),
+            (
+                "a triangle twice",
+                "an edge of triangle",
+                bytes(|b| {
+                    let first = b[triangle(0)..triangle(1)].to_vec();
+                    b.extend(first);
+                    b[80] += 1;
+                }),
+            ),
             ("a vertex that is moved", "open", bytes(|b| b[triangle(0) + 14] ^= 0x10)),
             ("a coordinate that is none", "coordinates", vertices(|_, _| f32::NAN)),
             ("inches for millimetres", "as of scale", vertices(|_, v| v / 25.4)),

@@ -144,7 +144,7 @@ pub fn board() -> Vec<Case> {
                 "a document type declaration",
                 before("<svg", "<!DOCTYPE svg [<!ENTITY a \"b\">]>"),
             ),
-            ("another encoding", "an XML declaration", swap("UTF-8", "UTF-16")),
+            ("another encoding", "instead of <?xml", swap("UTF-8", "UTF-16")),
             ("words on the page", "text between elements", over("words")),
             (
                 "a tile that is missing",
@@ -154,7 +154,53 @@ pub fn board() -> Vec<Case> {
                     text.replacen(tile, "", 1)
                 }),
             ),
-            ("another page", "page of 298.000", swap("297mm", "298mm")),
+            ("another page", "page of 298.000", {
+                text(|text| text.replacen("297mm", "298mm", 1).replacen("0 0 297", "0 0 298", 1))
+            }),
+            ("a drawing of another shape", "no page in mm", swap("297mm", "298mm")),
+            ("a page of another unit", "no page in mm", swap("297mm", "29.7cm")),
+            ("a unit in capitals", "no page in mm", swap("297mm", "297MM")),
+            ("no width", "no width of <svg>", swap(" width=\"297mm\"", "")),
+            ("no part of the drawing", "no viewBox of <svg>", swap(" viewBox=\"0 0 297 210\"", "")),
+            ("a byte order mark", "a byte order mark", before("<?xml", "\u{feff}")),
+            ("another version of XML", "instead of <?xml version=\"1.0\"", swap("1.0", "1.1")),
+            (
+                "no declaration",
+                "instead of <?xml",
+                swap("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", ""),
+            ),
+            ("another alphabet", "instead of <?xml", {
+                Box::new(|bytes| bytes.iter().flat_map(|&byte| [byte, 0]).collect())
+            }),
+            ("a comment", "a comment", over("<!-- desk -->")),
+            (
+                "a section of characters",
+                "a CDATA section",
+                swap("<title>b<", "<title><![CDATA[b]]><"),
+            ),
+            ("another title", "a title other", swap("<title>b<", "<title>c<")),
+            ("no title", "a title other", swap("<title>b</title>", "")),
+            ("two titles", "a title other", before("<title>", "<title>b</title>")),
+            ("another description", "a desc that", swap("20 corners", "21 corners")),
+            (
+                "a value with references",
+                "that is spelled otherwise",
+                swap("\"#000\"", "\"&#35;000\""),
+            ),
+            ("kept blanks", "attribute space of", on("svg", "xml:space=\"preserve\"")),
+            (
+                "marks without a rule of filling",
+                "no fill-rule of <g>",
+                swap(" fill-rule=\"evenodd\"", ""),
+            ),
+            ("marks without a colour", "no fill of <g>", swap("<g fill=\"#000\"", "<g")),
+            ("a mark of no paint", "not painted", swap("<path ", "<path fill=\"none\" ")),
+            (
+                "marks off the page",
+                "over the edge of the page",
+                before("</g>", "<path d=\"M300 9L310 9L310 19Z\" id=\"a\"/>"),
+            ),
+            ("numbers without blanks", "d=\"M", line("<path", |line| line.replacen("L", " L", 1))),
             (
                 "another scale",
                 "scale 0.99",

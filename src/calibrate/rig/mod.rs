@@ -14,23 +14,24 @@
 mod solution;
 mod start;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::error::CalibrationError;
 use super::excluded::Excluded;
+use super::gross::{Gross, WrongFrame, within_pictures};
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
 use super::model::Model;
-use super::problem::{Block, CameraUnknowns, PanelUnknowns, Prior, Problem};
+use super::problem::{Block, CameraUnknowns, PanelUnknowns, Prior};
 use super::remedy::{Instead, remedy_of_given};
 use super::settle::{residuals, settle};
 use super::solve::{self, Options};
-use super::view::View;
+use super::view::{MIRRORED, View};
 use super::weights::{Weights, Whitening};
-use super::wrong::{limit_px, median_px};
 use crate::camera::{Camera, Pose};
 use crate::target::PanelPose;
 use start::Start;
+pub(super) use start::middle;
 
 pub use solution::{RigCamera, RigFrame, RigSolution};
 
@@ -81,6 +82,14 @@ pub fn calibrate_rig(
     panels: &[PanelPlace],
     options: RigOptions,
 ) -> Result<RigSolution, CalibrationError> {
+    let mut findings = Vec::new();
+    let within = cameras.iter().enumerate().map(|(index, camera)| {
+        let (views, beyond) = within_pictures(&camera.views, index);
+        findings.extend(beyond);
+        RigViews { views, ..camera.clone() }
+    });
+    let cameras: Vec<RigViews> = within.collect();
+    let cameras = cameras.as_slice();
     let start = Start::new(cameras, panels, options)?;
     let mut excluded = start.excluded.clone();
     let problem = start.problem(cameras, panels, options);
@@ -88,14 +97,18 @@ pub fn calibrate_rig(
     let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
     let first = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
         .ok_or(CalibrationError::NoStart)?;
-    let wrong = wrong_frames(&first.problem);
-    for (&frame, (camera, off_px)) in &wrong {
-        let reason = format!(
-            "the corners of camera {} are off by {off_px:.1} px: not taken at the same moment, or \
-             wrong labels",
-            cameras[*camera].name
-        );
-        let of_frame = first.problem.blocks.iter().filter(|block| block.frame == frame);
+    let gross = Gross::of(first.problem).ok_or(CalibrationError::NoStart)?;
+    for (&frame, why) in &gross.frames {
+        let reason = match why {
+            WrongFrame::Off { camera, off_px } => format!(
+                "the corners of camera {} are off by {off_px:.1} px: not taken at the same moment, or \
+                 wrong labels",
+                cameras[*camera].name
+            ),
+            WrongFrame::Mirrored => MIRRORED.to_owned(),
+            WrongFrame::OnlyWrongPanels => solve::ONLY_WRONG_PANELS.to_owned(),
+        };
+        let of_frame = gross.problem.blocks.iter().filter(|block| block.frame == frame);
         excluded.push(Excluded {
             camera: None,
             view: start.frames[frame].clone(),
@@ -105,37 +118,37 @@ pub fn calibrate_rig(
             reason,
         });
     }
-    let all = start.frames.len();
-    if 2 * wrong.len() > all {
-        return Err(CalibrationError::NotRigid { wrong: wrong.len(), all });
+    let (wrong, all) = (gross.frames.len(), start.frames.len());
+    if 2 * wrong > all {
+        let of_camera = |camera: usize| {
+            let off = |why: &&WrongFrame| matches!(why, WrongFrame::Off { camera: c, .. } if *c == camera);
+            gross.frames.values().filter(off).count()
+        };
+        let most = (0..cameras.len()).max_by_key(|&camera| of_camera(camera)).unwrap_or_default();
+        let camera = cameras[most].name.clone();
+        return Err(CalibrationError::NotRigid { camera, wrong, all });
     }
-    let kept: Vec<usize> = (0..all).filter(|frame| !wrong.contains_key(frame)).collect();
-    let mut problem = first.problem.with_frames(|frame| !wrong.contains_key(&frame));
-    let unknowns = panel_unknowns(&problem.blocks, panels, options.refine_target);
+    let kept: Vec<usize> = (0..all).filter(|frame| !gross.frames.contains_key(frame)).collect();
+    let (mut problem, left_out) = gross.kept();
+    let taking_part: Vec<Block> = problem
+        .blocks
+        .iter()
+        .zip(&left_out)
+        .filter(|(_, out)| !**out)
+        .map(|(block, _)| block.clone())
+        .collect();
+    let unknowns = panel_unknowns(&taking_part, panels, options.refine_target);
     for (panel, unknown) in problem.panels.iter_mut().zip(unknowns) {
         // Where frames went, a panel may hang together with no other, or another be held.
         if panel.pose_free != unknown.pose_free {
             *panel = unknown;
         }
     }
-    let (minimum, whitening) = settle(problem, options.weights, options.loss)?;
+    let settled = settle(problem, &left_out, options.weights, options.loss)?;
+    findings.extend(gross.findings(&settled, |frame| start.frames[frame].clone()));
     let names = |index: usize| start.frames[kept[index]].clone();
-    let solution = RigSolution::new(cameras, names, &minimum, &whitening)?;
-    Ok(RigSolution { excluded, ..solution })
-}
-
-/// Frames that do not belong, each with the camera that shows it and by how much.
-fn wrong_frames(problem: &Problem) -> BTreeMap<usize, (usize, f64)> {
-    let medians: Vec<f64> = residuals(problem).iter().map(median_px).collect();
-    let limit = limit_px(&medians);
-    let mut wrong = BTreeMap::new();
-    for (block, off_px) in problem.blocks.iter().zip(medians).filter(|(_, off)| *off > limit) {
-        let worst = wrong.entry(block.frame).or_insert((block.camera, off_px));
-        if off_px > worst.1 {
-            *worst = (block.camera, off_px);
-        }
-    }
-    wrong
+    let solution = RigSolution::new(cameras, names, &settled)?;
+    Ok(RigSolution { excluded, findings, ..solution })
 }
 
 /// The panel to be held: the one seen most of those that no measurement moves, which an earlier
@@ -145,8 +158,8 @@ fn connected_panels(blocks: &[Block], panels: &[PanelPlace]) -> (usize, BTreeSet
     let mut corners = vec![0; count];
     let mut frames = vec![BTreeSet::new(); count];
     for block in blocks {
-        corners[block.panel] += block.observations.len();
-        frames[block.panel].insert(block.frame);
+        corners[block.panel.index()] += block.observations.len();
+        frames[block.panel.index()].insert(block.frame);
     }
     let stated = |panel: usize| corners[panel] > 0 && panels[panel].covariance.is_none();
     let rank = |&panel: &usize| (stated(panel), corners[panel], std::cmp::Reverse(panel));

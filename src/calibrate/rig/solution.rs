@@ -1,15 +1,18 @@
+use std::collections::BTreeSet;
+
 use nalgebra::DMatrix;
 
 use super::{PanelPlace, RigViews};
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::excluded::Excluded;
+use crate::calibrate::finding::Finding;
 use crate::calibrate::lens_end::LensEnd;
 use crate::calibrate::minimise::Minimum;
 use crate::calibrate::misfit::{Misfit, misfits};
 use crate::calibrate::normal::Covariances;
-use crate::calibrate::settle::{residuals, variance};
+use crate::calibrate::panel::PanelRef;
+use crate::calibrate::settle::{Settled, variance};
 use crate::calibrate::solution::{Parameter, rms_px};
-use crate::calibrate::weights::Whitening;
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 use crate::target::{Name, PanelPose, Target};
 
@@ -26,6 +29,8 @@ pub struct RigSolution {
     pub loose: Vec<String>,
     /// Views and frames that took no part, and why.
     pub excluded: Vec<Excluded>,
+    /// What outliers share, and corners that were left out together.
+    pub findings: Vec<Finding>,
     /// Root mean square error of a coordinate over all corners, px.
     pub rms_px: f64,
     /// The deviation that was added to every corner's covariance, px; see [`super::Weights`].
@@ -101,9 +106,9 @@ impl RigSolution {
     pub(super) fn new(
         views: &[RigViews],
         frame_name: impl Fn(usize) -> String,
-        minimum: &Minimum,
-        whitening: &Whitening,
+        settled: &Settled,
     ) -> Result<Self, CalibrationError> {
+        let Settled { minimum, whitening, problem: all, outliers } = settled;
         let Minimum { problem, normal, layout, .. } = minimum;
         let open = |parameters: &[String]| CalibrationError::Undetermined {
             parameters: parameters.join(", "),
@@ -126,7 +131,9 @@ impl RigSolution {
         for (views, _) in views.iter().zip(&layout.cameras).filter(|(_, first)| is_loose(first)) {
             poses.push(format!("the pose of {}", views.name));
         }
-        for (panel, _) in layout.panels.iter().enumerate().filter(|(_, first)| is_loose(first)) {
+        let seen = problem.blocks.iter().map(|block| block.panel);
+        let seen: BTreeSet<PanelRef> = seen.collect();
+        for panel in seen.into_iter().filter(|panel| is_loose(&layout.panels[panel.index()])) {
             poses.push(format!("the pose of panel {panel}"));
         }
         if !poses.is_empty() {
@@ -134,11 +141,17 @@ impl RigSolution {
         }
         let variance = variance(minimum);
         let covariance = shared * variance;
-        let residuals = residuals(problem);
+        // Residual, and whether it is an outlier, of every corner within reach.
+        let residuals_of = |belongs: &dyn Fn(&super::Block) -> bool| -> Vec<([f64; 2], bool)> {
+            let of_blocks = all.blocks.iter().zip(outliers).filter(|(block, _)| belongs(block));
+            let corners = of_blocks.flat_map(|(block, outliers)| {
+                let corners = block.observations.iter().zip(outliers);
+                corners.filter_map(|(seen, &far)| Some((all.residual(block, seen)?, far)))
+            });
+            corners.collect()
+        };
         let rms_of = |belongs: &dyn Fn(&super::Block) -> bool| {
-            let of_blocks =
-                problem.blocks.iter().zip(&residuals).filter(|(block, _)| belongs(block));
-            rms_px(of_blocks.flat_map(|(_, residuals)| residuals))
+            rms_px(residuals_of(belongs).iter().map(|(residual, _)| residual))
         };
         let cameras =
             views.iter().zip(&problem.cameras).enumerate().map(|(index, (views, found))| {
@@ -150,15 +163,11 @@ impl RigSolution {
                     Parameter { name, value, sd: column.map(|c| covariance[(c, c)].sqrt()) }
                 });
                 let of_camera = |block: &&super::Block| block.camera == index;
-                let blocks = || problem.blocks.iter().filter(of_camera);
+                let blocks = || all.blocks.iter().filter(of_camera);
                 let seen = blocks().flat_map(|block| &block.observations).map(|seen| seen.pixel);
                 let seen: Vec<[f64; 2]> = seen.collect();
-                let of_blocks = problem.blocks.iter().zip(&residuals).zip(&whitening.blocks);
-                let of_blocks = of_blocks.filter(|((block, _), _)| block.camera == index);
-                let corners =
-                    of_blocks.flat_map(|((_, residuals), weights)| residuals.iter().zip(weights));
-                let (off, inliers): (Vec<_>, Vec<_>) =
-                    corners.partition(|(residual, w)| whitening.is_outlier(**w, **residual));
+                let corners = residuals_of(&|block| block.camera == index);
+                let inliers = corners.iter().filter(|(_, far)| !far);
                 RigCamera {
                     name: views.name.clone(),
                     camera: found.camera.clone(),
@@ -166,9 +175,9 @@ impl RigSolution {
                     camera_from_rig: found.camera_from_rig,
                     pose_sd: layout.cameras[index].map(|first| deviations(&covariance, first)),
                     rms_px: rms_of(&|block| block.camera == index),
-                    inlier_rms_px: rms_px(inliers.into_iter().map(|(residual, _)| residual)),
-                    corners: blocks().map(|block| block.observations.len()).sum(),
-                    outliers: off.len(),
+                    inlier_rms_px: rms_px(inliers.map(|(residual, _)| residual)),
+                    corners: corners.len(),
+                    outliers: corners.iter().filter(|(_, far)| *far).count(),
                     lens_end: LensEnd::of(&found.camera, &seen),
                 }
             });
@@ -192,7 +201,8 @@ impl RigSolution {
             panels: panels.collect(),
             loose: loose_parameters,
             excluded: Vec::new(),
-            rms_px: rms_px(residuals.iter().flatten()),
+            findings: Vec::new(),
+            rms_px: rms_of(&|_| true),
             common_px: whitening.common_px,
             sigma: variance.sqrt(),
             misfits: misfits(problem, whitening),

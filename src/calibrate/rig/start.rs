@@ -135,7 +135,7 @@ fn lay_together(
 
 /// The pose that lies in the middle of others: its median distance from them is the least. A turn
 /// counts by how far it moves a point as far away as the translations reach.
-fn middle(poses: &[Pose]) -> Pose {
+pub(in crate::calibrate) fn middle(poses: &[Pose]) -> Pose {
     let arm = median(poses.iter().map(|pose| pose.translation.length()).collect()).max(1.0);
     let apart = |a: &Pose, b: &Pose| {
         let turn = a.rotation.angle_between(b.rotation);

@@ -7,7 +7,8 @@ use anyhow::{Context, ensure};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::cli::output;
+use crate::cli::output::{self, Overwrite};
+use crate::limits;
 
 /// The checkpoint file of one search, if it has one.
 pub(super) struct CheckpointFile<'a> {
@@ -40,8 +41,7 @@ impl<'a> CheckpointFile<'a> {
             self.write(path, &C::default()).context("--resume")?;
             return Ok(C::default());
         }
-        let text = std::fs::read_to_string(path)
-            .with_context(|| format!("--resume: cannot read {file}"))?;
+        let text = limits::read_short_text(path, limits::MAX_FAMILY_BYTES).context("--resume")?;
         let saved: Saved<C> = serde_json::from_str(&text).ok().with_context(|| {
             format!("--resume: {file} is no checkpoint of this method; remove it to start anew")
         })?;
@@ -63,7 +63,7 @@ impl<'a> CheckpointFile<'a> {
 
     fn write<C: Serialize>(&self, path: &Path, checkpoint: &C) -> anyhow::Result<()> {
         let saved = Saved { search: self.search.clone(), checkpoint };
-        output::write(path, &serde_json::to_vec(&saved)?)
+        output::write(path, &serde_json::to_vec(&saved)?, Overwrite::default())
     }
 
     /// How to go on after an interruption.

@@ -5,7 +5,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 
 use super::values::name;
-use crate::cli::output::{self, say};
+use crate::cli::output::{self, Overwrite, say};
 use crate::family::{ExportFormat, export};
 
 #[derive(clap::Args)]
@@ -21,6 +21,8 @@ pub(super) struct Args {
     /// Stem of the file in the folder of -o [default: the family's name]
     #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -60,7 +62,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some(place) => {
             let stem = args.name.as_deref().unwrap_or(family.name());
             let path = output::file(&place, stem, format.extension())?;
-            output::write(&path, text.as_bytes()).context("-o")?;
+            output::write(&path, text.as_bytes(), args.overwrite).context("-o")?;
             say!("{}", path.display());
         }
     }

@@ -14,15 +14,16 @@ use super::rules::RuleArgs;
 use super::values::{name, number, whole};
 use super::verify_family::proof_of;
 use crate::cli::interrupt;
-use crate::cli::output::{self, say, tell};
+use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::progress::SearchProgress;
-use crate::cli::run::{FAILED, INTERRUPTED};
+use crate::cli::run::FAILED;
+use crate::export::kind::Kind;
 use crate::family::best::{Best, Budget};
 use crate::family::lexicode::{self, Lexicode};
 use crate::family::search::{self, Search};
 use crate::family::{
-    self, Control, Family, FamilyError, Progress, Rules, Screen, TagWords, certify_codes,
-    check_name,
+    self, Control, Family, FamilyError, PAIRS_COUNTED, Progress, Rules, Screen, TagWords,
+    certify_codes, check_name,
 };
 use crate::lattice::Dimension;
 use crate::words::counted;
@@ -33,6 +34,10 @@ pub(super) const HELP: &str = "Ctrl-C ends a search early. The methods best and 
     and lexicode nothing (exit code 130); with --resume the same command goes on later and finds \
     exactly what it would have found without a break. Where nothing was found yet, nothing is \
     written (130). A second Ctrl-C ends the program at once.";
+
+/// Told of `--force`.
+pub(super) const FORCE: &str = "Replace a family file also by one with fewer codes, other bits or \
+    another distance, and a file of another kind";
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -78,9 +83,8 @@ pub(super) struct Args {
     /// Folder for the file, or the file itself
     #[arg(short, long, default_value = "families")]
     output: PathBuf,
-    /// Replace a family file also by one with fewer codes, other bits or another distance
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
     /// Threads [default: one per processor]
     #[arg(short = 'j', long, value_name = "N", allow_negative_numbers = true,
           value_parser = whole(1..=1024u16))]
@@ -121,7 +125,7 @@ impl Outcome {
     }
 
     fn interrupted(family: Option<Family>, message: String) -> Self {
-        Self { family, interrupted: Some(message), exit: ExitCode::from(INTERRUPTED) }
+        Self { family, interrupted: Some(message), exit: ExitCode::from(interrupt::exit_code()) }
     }
 
     /// What became of a search with checkpoints that ended before it found anything.
@@ -141,6 +145,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
     let name = args.name.clone().unwrap_or_else(|| format!("d{}h{distance}", dimension.bits()));
     let path = output::file(&args.output, &name, "json")?;
+    interrupt::stands("nothing was found yet, and nothing was written");
     if let Err(FamilyError::Claim { problem, .. }) = check_name(&name, dimension, distance) {
         bail!("--name: {problem}");
     }
@@ -170,7 +175,9 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut path = path;
     if let Some(family) = &family {
         // What took hours is not lost, and neither is what was there.
-        if let Some(there) = there(&path).filter(|f| !args.force && f.len() > family.len()) {
+        if let Some(there) =
+            there(&path).filter(|f| !args.overwrite.is_forced() && f.len() > family.len())
+        {
             let beside = free_name(&path);
             tell!(
                 "error: {} keeps its {} codes, more than these {}, which go to {}; --force replaces \
@@ -183,13 +190,22 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
             path = beside;
             exit = ExitCode::from(FAILED);
         }
-        output::write(&path, family.to_json().as_bytes())?;
+        output::write(&path, family.to_json().as_bytes(), args.overwrite)?;
     }
+    let is_whole = interrupted.is_none();
     match interrupted {
         Some(message) => tell!("interrupted: {message}"),
         None => file.finish()?,
     }
-    if let Some(family) = family {
+    if let Some(family) = family.as_ref().filter(|f| !is_whole && f.len() > PAIRS_COUNTED) {
+        say!(
+            "{}: {} of {} bits, which `deltag verify-family` proves; fingerprint {}",
+            path.display(),
+            counted(family.len(), "code"),
+            dimension.bits(),
+            family.fingerprint()
+        );
+    } else if let Some(family) = family {
         let certificate = certify_codes(&family);
         ensure!(certificate.holds(), "{}: {}", path.display(), certificate.failures.join("; "));
         say!(
@@ -235,9 +251,9 @@ impl Args {
 
     /// Refuses to lose a file of other tags, or one that is no family file at all.
     fn check_replaced(&self, path: &Path) -> anyhow::Result<()> {
-        // Not even with --force, and before the hours that a search takes.
-        output::check_replaced(path, Some(family::SCHEMA))?;
-        if self.force || !path.exists() {
+        // Before the hours that a search takes.
+        self.overwrite.check(path, &Kind::of_schema(family::SCHEMA))?;
+        if self.overwrite.is_forced() || !path.exists() {
             return Ok(());
         }
         let Parameters { dimension, distance } = self.family;
@@ -328,6 +344,7 @@ impl Args {
         let Parameters { dimension, distance } = self.family;
         let lexicode = Lexicode { rules, ..Lexicode::published(dimension, distance) };
         let mut checkpoint: lexicode::Checkpoint = file.load()?;
+        interrupt::keeps_results();
         match lexicode.resume(&mut checkpoint, &|c| file.save(c), control) {
             Ok(codes) => {
                 self.check_found(codes.len())?;
@@ -358,6 +375,7 @@ impl Args {
             file.save(c);
             self.time.is_none_or(|time| start.elapsed().as_secs_f64() < time)
         };
+        interrupt::keeps_results();
         let ended = search.resume(&screen, &mut checkpoint, &save, control);
         let rounds = checkpoint.rounds_done;
         let family = || {
@@ -404,6 +422,7 @@ impl Args {
             let proof = proof_of(&certify_codes(&codes), distance);
             tell!("starts from {} of {}: {proof}", counted(codes.len(), "code"), start.family);
         }
+        interrupt::keeps_results();
         match best.family(name, start, control) {
             Ok(family) if stopped() => Ok(Outcome {
                 family: Some(family),

@@ -36,7 +36,7 @@ pub struct Deltag {
 #[derive(Subcommand)]
 enum Command {
     /// Search a family such as d25h7 and write its file
-    #[command(after_help = gen_family::HELP)]
+    #[command(after_help = gen_family::HELP, mut_arg("force", |arg| arg.help(gen_family::FORCE)))]
     GenFamily(gen_family::Args),
     /// Check what a family file claims from nothing but its codes
     #[command(after_help = verify_family::HELP)]

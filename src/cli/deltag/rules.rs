@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 
 use super::parameters::Parameters;
 use crate::family::{FamilyError, Rules};
+use crate::limits;
 
 #[derive(clap::Args)]
 pub(super) struct RuleArgs {
@@ -55,8 +56,7 @@ fn check(rules: &Rules, bits: u32, place: impl Fn(&str) -> String) -> anyhow::Re
 /// Takes the fields of a rules file.
 fn read(path: &Path, rules: &mut Rules) -> anyhow::Result<()> {
     let file = path.display();
-    let text =
-        std::fs::read_to_string(path).with_context(|| format!("--rules: cannot read {file}"))?;
+    let text = limits::read_short_text(path, limits::MAX_SETTINGS_BYTES).context("--rules")?;
     let table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
         let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
         let line = 1 + before.matches('\n').count();

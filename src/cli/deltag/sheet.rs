@@ -9,8 +9,9 @@ use super::values::{Ids, name, whole};
 use crate::artwork;
 use crate::cli::deltille::files::{Formats, drawn, write_all};
 use crate::cli::interrupt;
-use crate::cli::output::say;
+use crate::cli::output::{Overwrite, say};
 use crate::cli::run::{FAILED, Interrupted};
+use crate::limits::Limits;
 use crate::target::{
     DEFAULT_MARGIN_MM, PaperSpec, TagSheetSpec, Target, TargetSpec, parse_length_mm,
 };
@@ -60,6 +61,8 @@ pub(super) struct Args {
     /// Stem of the files' names [default: the family's name and -sheet]
     #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
+    #[command(flatten)]
+    overwrite: Overwrite,
     /// Do not read the written files back to compare every cell
     #[arg(long)]
     no_verify: bool,
@@ -112,19 +115,23 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         Formats { pdf: args.pdf || !(args.svg || args.png), svg: args.svg, png: args.png };
     let artwork = artwork::draw(&target, Some(&family))?;
     let files = drawn(&name, artwork, formats, args.dpi.unwrap_or(300));
-    let written = write_all(&args.output, &files)?;
+    let written = write_all(&args.output, &files, args.overwrite)?;
     for path in &written {
         say!("wrote {}", path.display());
     }
     if args.no_verify {
         return Ok(ExitCode::SUCCESS);
     }
-    let verifier = Verifier::new(&target, Some(&family))?.stopped_by(interrupt::flag());
+    let verifier = Verifier::new(&target, Some(&family))?;
+    let verifier = verifier.within(Limits::NONE).stopped_by(interrupt::flag());
     let mut passed = true;
     for path in &written {
         let verdict = match verifier.verify(path) {
             Err(VerifyError::Cancelled) => {
-                return Err(Interrupted("the files are whole, but were not all compared").into());
+                return Err(Interrupted(
+                    "the files are whole, but were not all compared".to_owned(),
+                )
+                .into());
             }
             verdict => verdict?,
         };

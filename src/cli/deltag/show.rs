@@ -5,7 +5,8 @@ use anyhow::Context;
 
 use super::values::{Ids, name, whole};
 use crate::artwork::{Artwork, GalleryTile, tag_gallery};
-use crate::cli::output::{self, say};
+use crate::cli::output::{self, Overwrite, say};
+use crate::export::kind::Kind;
 use crate::export::{png, svg};
 
 /// Most tags on one picture: a sheet of A0 size at the default edge.
@@ -37,6 +38,8 @@ pub(super) struct Args {
     /// Stem of the files' names [default: the family's name]
     #[arg(long, value_parser = name, allow_hyphen_values = true)]
     name: Option<String>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -54,17 +57,22 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let place = |extension| output::file(&args.output, stem, extension);
     let png_path = args.png.then(|| place("png")).transpose()?;
     let svg_path = svg.then(|| place("svg")).transpose()?;
+    let kinds = [(&png_path, Kind::own_png()), (&svg_path, Kind::of(svg::HEAD.as_bytes()))];
+    for (path, kind) in kinds {
+        let Some(path) = path else { continue };
+        args.overwrite.check(path, &kind)?;
+        output::settle(output::folder_of(path))?;
+        output::make_folder_of(path).context("-o")?;
+    }
     let style = GalleryTile { columns: usize::from(args.columns), ..GalleryTile::default() };
     let sheet = tag_gallery(&family, &ids, style)?;
     let title = format!("DelTags of family {}", family.name());
     let mut written = Vec::new();
     if let Some(path) = png_path {
-        output::make_folder_of(&path).context("-o")?;
         png::write(&sheet, &title, &path, f64::from(args.dpi.unwrap_or(200))).context("-o")?;
         written.push(path);
     }
     if let Some(path) = svg_path {
-        output::make_folder_of(&path).context("-o")?;
         let subject = format!("fingerprint {}", family.fingerprint());
         svg::write(&Artwork { title, subject, sheets: vec![sheet] }, 0, &path).context("-o")?;
         written.push(path);

@@ -3,6 +3,7 @@ use std::process::ExitCode;
 use crate::cli::output::say;
 use crate::cli::run::{BAD_INPUT, FAILED, report};
 use crate::family::{Certificate, Family, FamilyError, certify};
+use crate::words::counted;
 
 /// Told at the end of `--help`.
 pub(super) const HELP: &str = "Checked are the codes (distance, rules, fingerprint, statistics) and the \
@@ -63,13 +64,14 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// How far apart the codes of a family that claims a distance are, and how that is known.
 pub(super) fn proof_of(certificate: &Certificate, claimed: u32) -> String {
     let found = certificate.min_distance;
+    let cells = counted(found as usize, "cell");
     if !certificate.all_compared {
         return format!(
             "all are in a linear code of distance {claimed} that turning leaves as it is, checked word \
-             by word; a sample of pairs, too, differs in at least {found} cells"
+             by word; a sample of pairs, too, differs in at least {cells}"
         );
     }
-    let known = format!("any two, in any turn, differ in at least {found} cells");
+    let known = format!("any two, in any turn, differ in at least {cells}");
     match found > claimed {
         true => format!("{known}, more than the {claimed} asked for"),
         false => known,

@@ -9,8 +9,8 @@ use clap::Subcommand;
 use super::finder::FinderArgs;
 use super::images::Images;
 use crate::cli::interrupt;
-use crate::cli::output::{say, tell};
-use crate::cli::run::INTERRUPTED;
+use crate::cli::output::say;
+use crate::cli::run::Interrupted;
 use crate::raster;
 
 /// Arguments of `deltille bench`.
@@ -49,12 +49,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut pixels, mut corners) = (0, 0);
     for path in Images::of(&args.images)?.iter() {
         let path = path?;
-        let image = raster::read(&path)?;
+        let image = raster::read_within(&path, &args.finder.limits())?;
         let mut best: Option<BTreeMap<String, f64>> = None;
         for _ in 0..args.repeat {
-            if interrupt::flag().load(std::sync::atomic::Ordering::Relaxed) {
-                tell!("interrupted");
-                return Ok(ExitCode::from(INTERRUPTED));
+            if interrupt::is_raised() {
+                return Err(Interrupted("nothing was timed to the end".to_owned()).into());
             }
             let found = detector.detect_any(&image, "");
             corners += found.grids.iter().map(|grid| grid.corners.len()).sum::<usize>();

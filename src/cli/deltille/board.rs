@@ -11,6 +11,7 @@ use super::settings::{Plan, Settings};
 use crate::artwork::{self, Artwork};
 use crate::cli::output::{self, tell};
 use crate::export::dsc;
+use crate::export::kind::Kind;
 use crate::family::{Family, FamilyError, square_names};
 use crate::target::{GridKind, Target, TargetSpec, id_range};
 
@@ -63,11 +64,17 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
     let spec = TargetSpec::Board(plan.spec.clone());
     let target = Target::build(&plan.name, &spec, family.as_ref(), Some(&plan.paper))?;
     args.delivery.check_beside(&target)?;
+    let overwrite = args.delivery.overwrite;
+    let template = args.save_template.as_ref().map(|path| {
+        let toml = settings.with_edge(plan.spec.edge_mm).to_toml(grid);
+        overwrite.check(path, &Kind::of(toml.as_bytes())).context("--save-template")?;
+        Ok::<_, anyhow::Error>((path, toml))
+    });
+    let template = template.transpose()?;
     let files = files(&plan, &target, artwork::draw(&target, family.as_ref())?)?;
     let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &summary(&target))?;
-    if let Some(path) = &args.save_template {
-        let template = settings.with_edge(plan.spec.edge_mm).to_toml(grid);
-        output::write(path, template.as_bytes()).context("--save-template")?;
+    if let Some((path, toml)) = template {
+        output::write(path, toml.as_bytes(), overwrite).context("--save-template")?;
     }
     Ok(delivered)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail, ensure};
@@ -13,12 +13,13 @@ use super::files::{File, text_file, write_all};
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{self, BoardShape, Loss, Model, Options, Remedy, Solution, View, Weights};
 use crate::camera::Pose;
-use crate::cli::output::{self, tell};
+use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
 use crate::export::calibration::{self, Print};
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
+use crate::name::is_within;
 use crate::raster::{self, AnyGray};
-use crate::report::{Given, Report, cannot_tell_apart, causes, thumbnail};
+use crate::report::{Given, Named, Report, cannot_tell_apart, causes, thumbnail};
 use crate::words::{counted, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
@@ -70,6 +71,8 @@ pub struct Args {
     /// named after it [default: camera.yaml, or poses.yaml with --fixed-intrinsics]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// How corners far off count.
@@ -166,6 +169,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(end) = solution.calibrated.lens_end() {
         tell!("warning: {end}");
     }
+    let named = Named { cameras: &[] };
+    for finding in &solution.calibrated.findings {
+        tell!("warning: {}", named.sentence(finding));
+    }
     let given = Given { model: args.model, print_scale: print.scale, remedy: solution.remedy };
     for cause in causes(&solution.calibrated, given) {
         tell!("warning: {cause}");
@@ -178,9 +185,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
     let files = texts.into_iter().flatten().map(|(name, text)| text_file(name, text));
     let files: Vec<File> = files.collect();
-    let mut written = write_all(output::folder_of(&path), &files)?;
+    let mut written = write_all(output::folder_of(&path), &files, args.overwrite)?;
     if let Some(page) = page {
-        output::write(&page, args.page(&stem, &solution, print).as_bytes()).context("--report")?;
+        let html = args.page(&stem, &solution, print);
+        output::write(&page, html.as_bytes(), args.overwrite).context("--report")?;
         written.push(page);
     }
     let mut text = table(&solution.calibrated);
@@ -215,9 +223,7 @@ fn wrong_camera(solution: &Solution) -> Option<String> {
 
 /// The picture of a view in a folder, or in one within it. What a file calls the picture leads nowhere else.
 fn picture_of(image: &str, folder: &Path) -> Option<PathBuf> {
-    let name = Path::new(image);
-    let is_within = name.components().all(|part| matches!(part, Component::Normal(_)));
-    Some(folder.join(name)).filter(|path| is_within && path.is_file())
+    is_within(image).then(|| folder.join(image)).filter(|path| path.is_file())
 }
 
 /// Tells which pictures of the views are not in a folder.

@@ -6,10 +6,12 @@ use std::process::ExitCode;
 use anyhow::Context;
 
 use super::files::{File, same_file, write_all};
+use super::limits::FileLimits;
 use super::{target_file, verify};
-use crate::cli::output::say;
+use crate::cli::output::{Overwrite, say};
 use crate::export::obj;
 use crate::family::Family;
+use crate::limits::Limits;
 use crate::target::Target;
 use crate::verify::Format;
 
@@ -23,16 +25,20 @@ pub struct Delivery {
     /// Folder to write to
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
+    #[command(flatten)]
+    pub(super) overwrite: Overwrite,
     /// Do not read the written files back to compare them with the description
     #[arg(long)]
     no_verify: bool,
+    #[command(flatten)]
+    limits: FileLimits,
 }
 
 impl Delivery {
     /// Refuses a target that cannot be used together with those named.
     pub fn check_beside(&self, target: &Target) -> anyhow::Result<()> {
         for path in &self.with {
-            let other = target_file::read(path).context("--with")?;
+            let other = target_file::read(path, &self.limits.limits()).context("--with")?;
             target.check_beside(&other)?;
         }
         Ok(())
@@ -43,6 +49,11 @@ impl Delivery {
         same_file(&self.output.join(name), other)
     }
 
+    /// What is read of a file.
+    pub fn limits(&self) -> Limits {
+        self.limits.limits()
+    }
+
     /// Writes all files or none, says so after `summary`, and compares them with the target.
     pub fn deliver(
         &self,
@@ -51,7 +62,7 @@ impl Delivery {
         files: &[File],
         summary: &str,
     ) -> anyhow::Result<ExitCode> {
-        let written = write_all(&self.output, files)?;
+        let written = write_all(&self.output, files, self.overwrite)?;
         say!("{summary}");
         for path in &written {
             say!("wrote {}", path.display());
@@ -62,7 +73,8 @@ impl Delivery {
         if self.no_verify || artifacts.is_empty() {
             return Ok(ExitCode::SUCCESS);
         }
-        verify::verify(target, family, &artifacts, None)
+        // They were just made, however large.
+        verify::verify(target, family, &artifacts, false, None, Limits::NONE)
     }
 }
 

@@ -5,20 +5,20 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
-use std::sync::atomic::Ordering;
 
 use anyhow::Context;
 use clap::ValueEnum;
-use rayon::prelude::*;
 
 use super::finder::FinderArgs;
-use super::images::{Images, Stems};
-use crate::cli::output::{self, tell};
-use crate::cli::run::{self, BAD_INPUT, FAILED, INTERRUPTED};
+use super::images::{self, Images, Stems};
+use super::in_flight;
+use crate::cli::output::{self, Overwrite, tell};
+use crate::cli::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::cli::{interrupt, progress};
 use crate::detect::{Detection, Detector, InkEstimate};
+use crate::export::kind::Kind;
 use crate::export::{atomic, csv, detection, orpc, overlay};
-use crate::raster;
+use crate::raster::{self, Photograph};
 use crate::target::Target;
 use crate::words::{counted, shown};
 
@@ -40,13 +40,21 @@ pub struct Args {
     /// Write <image>.overlay.png too: corners, grid and ids drawn over the photograph
     #[arg(long)]
     overlay: bool,
+    /// Write into the JSON how long each stage took, ms; without, two runs write the same
+    #[arg(long)]
+    timing: bool,
     /// Print each result on standard output as a line of JSON as soon as it is there; files are
     /// written only where -o names a folder
     #[arg(long)]
     stream: bool,
+    /// Read JPEG files of which a part is missing too, and note it in the result; without this they are errors
+    #[arg(long)]
+    accept_damaged: bool,
     /// Leave out images whose results are there already, as after a stopped run
     #[arg(long, conflicts_with = "stream")]
     skip_existing: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
     /// Images at a time [default: one per processor]
     #[arg(short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
@@ -78,8 +86,8 @@ struct Found {
     is_there: bool,
 }
 
-/// An image that was looked at, and the stem of its results.
-type Seen = (PathBuf, String, Option<InkEstimate>);
+/// An image that was looked at: its place among all, its file, and the stem of its results.
+type Seen = (usize, PathBuf, String, Option<InkEstimate>);
 
 /// Detects in all images; an image that cannot be read is reported, and the rest go on.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -94,59 +102,66 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::check_folder(folder).context("-o")?;
         fs::create_dir_all(folder)
             .with_context(|| format!("-o: cannot write to {}", folder.display()))?;
+        output::settle(folder).context("-o")?;
     }
 
-    let interrupted = interrupt::flag();
     let bar = progress::bar(images.count().unwrap_or(0) as u64, "images");
     let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
-    let stems = Mutex::new(Stems::default());
-    let report = Report::new(images.count() == Some(1));
+    // One after the other, so that it is always the later one of two with one stem that is refused.
+    let mut stems = Stems::default();
+    let claimed = images.iter().map(|image| {
+        let image = image?;
+        stems.claim(&image)?;
+        Ok(image)
+    });
+    let go_on = if args.stream { "" } else { "; --skip-existing goes on from here" };
+    let report = Report::new(images.count() == Some(1), go_on);
     let seen: Mutex<Vec<Seen>> = Mutex::default();
     let threads = threads.build()?;
-    threads.install(|| {
-        images.iter().enumerate().par_bridge().for_each(|(index, image)| {
-            if interrupted.load(Ordering::Relaxed) {
-                return;
+    let limits = args.finder.limits();
+    in_flight::for_each(&threads, &limits, claimed, |index, image| {
+        if interrupt::is_raised() {
+            return;
+        }
+        let result = image.and_then(|image| {
+            let stem = images::stem(&image)?;
+            let outcome = one_image(&args, target.as_ref(), &detector, &image, &stem)?;
+            if let Outcome::Seen(found) = &outcome {
+                let ink = found.ink;
+                seen.lock().expect("no thread panics here").push((index, image, stem, ink));
             }
-            let result = image.and_then(|image| {
-                let stem = stems.lock().expect("no thread panics here").claim(&image)?;
-                let outcome = one_image(&args, target.as_ref(), &detector, &image, &stem)?;
-                if let Outcome::Seen(found) = &outcome {
-                    seen.lock().expect("no thread panics here").push((image, stem, found.ink));
-                }
-                Ok(outcome)
-            });
-            bar.inc(1);
-            bar.suspend(|| report.add(index, result));
+            Ok(outcome)
         });
+        bar.inc(1);
+        bar.suspend(|| report.add(index, result));
     });
     bar.finish_and_clear();
-    let seen = seen.into_inner().expect("no thread panics here");
-    let found: Vec<InkEstimate> = seen.iter().filter_map(|(_, _, ink)| *ink).collect();
+    let mut seen = seen.into_inner().expect("no thread panics here");
+    // In the order of the images, whichever was done first.
+    seen.sort_unstable_by_key(|(index, ..)| *index);
+    let found: Vec<InkEstimate> = seen.iter().filter_map(|(.., ink)| *ink).collect();
     let ink = (!args.stream && args.finder.ink_is_open()).then(|| InkEstimate::of_all(&found));
-    if let Some(ink) = ink.flatten().filter(|ink| ink.used && !interrupted.load(Ordering::Relaxed))
-    {
+    if let Some(ink) = ink.flatten().filter(|ink| ink.used && !interrupt::is_raised()) {
         // One print has one ink: pictures that say little of it are seen with what all say.
         if seen.len() > 1 {
             let detector = detector.with_ink(ink);
             let bar = progress::bar(seen.len() as u64, "images, with the ink of all");
-            threads.install(|| {
-                seen.par_iter().filter(|_| !interrupted.load(Ordering::Relaxed)).for_each(
-                    |(image, stem, _)| {
-                        let again = one_image(&args, target.as_ref(), &detector, image, stem);
-                        again.err().iter().for_each(|error| bar.suspend(|| run::report(error)));
-                        bar.inc(1);
-                    },
-                );
+            let images = seen.iter().map(|(_, image, ..)| Ok(image.clone()));
+            in_flight::for_each(&threads, &limits, images, |index, _| {
+                if interrupt::is_raised() {
+                    return;
+                }
+                let (_, image, stem, _) = &seen[index];
+                let again = one_image(&args, target.as_ref(), &detector, image, stem);
+                again.err().iter().for_each(|error| bar.suspend(|| run::report(error)));
+                bar.inc(1);
             });
             bar.finish_and_clear();
         }
         tell!("ink: {ink} ({})", counted(ink.pictures as usize, "picture"));
     }
-    if interrupted.load(Ordering::Relaxed) {
-        let on = if args.stream { "" } else { "; --skip-existing goes on from here" };
-        tell!("interrupted: {} images are done{on}", report.done());
-        return Ok(ExitCode::from(INTERRUPTED));
+    if interrupt::is_raised() {
+        return Err(Interrupted(report.standing()).into());
     }
     report.end()
 }
@@ -155,6 +170,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 struct Report {
     /// A single image's error is the command's.
     single: bool,
+    /// What to say of going on after an interruption.
+    go_on: &'static str,
     state: Mutex<State>,
 }
 
@@ -169,11 +186,23 @@ struct State {
 }
 
 impl Report {
-    fn new(single: bool) -> Self {
-        Self { single, state: Mutex::default() }
+    fn new(single: bool, go_on: &'static str) -> Self {
+        let report = Self { single, go_on, state: Mutex::default() };
+        interrupt::stands(report.standing());
+        report
+    }
+
+    /// How things stand.
+    fn standing(&self) -> String {
+        format!("{} images are done{}", self.done(), self.go_on)
     }
 
     fn add(&self, index: usize, result: anyhow::Result<Outcome>) {
+        self.tell(index, result);
+        interrupt::stands(self.standing());
+    }
+
+    fn tell(&self, index: usize, result: anyhow::Result<Outcome>) {
         let mut state = self.state.lock().expect("no thread panics here");
         state.waiting.insert(index, result);
         loop {
@@ -235,17 +264,19 @@ impl Args {
     }
 
     /// The files of an image's results.
-    fn results(&self, stem: &str) -> Vec<PathBuf> {
+    fn results(&self, stem: &str) -> Vec<(PathBuf, Kind)> {
         let Some(folder) = self.folder() else { return Vec::new() };
-        let extensions = self.format.iter().map(|format| format.extension());
-        let overlay = self.overlay.then_some("overlay.png");
-        extensions.chain(overlay).map(|e| folder.join(format!("{stem}.{e}"))).collect()
+        let formats = self.format.iter().map(|format| (format.extension(), format.kind()));
+        let overlay = self.overlay.then(|| ("overlay.png", Kind::own_png()));
+        let all = formats.chain(overlay);
+        all.map(|(end, kind)| (folder.join(format!("{stem}.{end}")), kind)).collect()
     }
 
-    /// A result may not take the place of a target, or of the truth of a synthetic picture.
+    /// A result may not take the place of a target, of the truth of a synthetic picture, or of
+    /// anything else.
     fn check_results(&self, stem: &str) -> anyhow::Result<()> {
         let mut results = self.results(stem).into_iter();
-        results.try_for_each(|result| output::check_replaced(&result, Some(detection::SCHEMA)))
+        results.try_for_each(|(path, kind)| self.overwrite.check(&path, &kind))
     }
 }
 
@@ -255,6 +286,14 @@ impl Format {
             Self::Json => "json",
             Self::Orpc => "orpc",
             Self::Csv => "csv",
+        }
+    }
+
+    fn kind(self) -> Kind {
+        match self {
+            Self::Json => Kind::of_schema(detection::SCHEMA),
+            Self::Orpc => Kind::of(orpc::HEAD.as_bytes()),
+            Self::Csv => Kind::of(csv::HEADER.as_bytes()),
         }
     }
 
@@ -276,12 +315,16 @@ fn one_image(
     stem: &str,
 ) -> anyhow::Result<Outcome> {
     args.check_results(stem)?;
-    if args.skip_existing && args.results(stem).iter().all(|result| result.exists()) {
+    if args.skip_existing && args.results(stem).iter().all(|(path, _)| path.exists()) {
         return Ok(Outcome::Skipped);
     }
-    let image = raster::read(path)?;
+    let limits = args.finder.limits();
+    let Photograph { image, notes } = raster::photograph(path, &limits, args.accept_damaged)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let found = detector.detect_any(&image, &name);
+    let mut found = Detection { file: notes, ..detector.detect_any(&image, &name) };
+    if !args.timing {
+        found.timing_ms.clear();
+    }
     if let Some(folder) = args.folder() {
         let save = |extension: &str, content: &[u8]| {
             let path = folder.join(format!("{stem}.{extension}"));
@@ -316,6 +359,10 @@ fn summary(path: &Path, found: &Detection) -> String {
         line += &format!(", {}", counted(tags, "tag"));
     }
     line += "\n";
+    if let Some(damage) = &found.file.damage {
+        line +=
+            &format!("  the file is damaged ({damage}): pixels that it does not have are grey\n");
+    }
     for reason in &found.reasons {
         line += &format!("  {reason}\n");
     }

@@ -7,15 +7,18 @@ use std::sync::atomic::Ordering;
 use anyhow::{Context, bail};
 use clap::Subcommand;
 
+use super::files::{bytes_file, text_file, write_all};
 use super::images::Images;
 use super::target_file;
-use crate::cli::output::say;
+use crate::cli::output::{Overwrite, say};
+use crate::cli::run::Interrupted;
 use crate::cli::{interrupt, output, progress};
 use crate::detect::Tone;
 use crate::experiment::photographs::axes::Axis;
 use crate::experiment::photographs::{self, Kind, Subject, table};
 use crate::experiment::{corners, plot, rig, table2};
 use crate::family::Family;
+use crate::limits::Limits;
 
 /// Arguments of `deltille experiment`.
 #[derive(clap::Args)]
@@ -112,10 +115,13 @@ struct SimulationArgs {
     /// Folder for the results
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// Runs an experiment; nothing is written when it is interrupted.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    interrupt::stands("no result was written");
     match args.experiment {
         Experiment::Corners(args) => run_corners(args),
         Experiment::Photographs(args) => run_photographs(args),
@@ -153,9 +159,11 @@ fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {
     let pictures = rig::Object::ALL.len() * rig::CAMERAS * setup.frames;
     let outcomes =
         simulation.run(pictures, "pictures", |tick| rig::run(setup, interrupt::flag(), tick))?;
-    let Some(outcomes) = outcomes? else { bail!("interrupted; nothing was written") };
+    let Some(outcomes) = outcomes? else {
+        return Err(Interrupted("nothing was written".to_owned()).into());
+    };
     let path = simulation.output.join("rig.csv");
-    output::write(&path, rig::csv(&outcomes).as_bytes())?;
+    output::write(&path, rig::csv(&outcomes).as_bytes(), simulation.overwrite)?;
     output::print(&format!("{}wrote {}\n", rig::text(&outcomes), path.display()))?;
     Ok(ExitCode::SUCCESS)
 }
@@ -171,18 +179,17 @@ fn run_corners(args: CornersArgs) -> anyhow::Result<ExitCode> {
         corners::run(images as usize, *seed, tone, interrupted, tick)
     })?;
     let Some(rows) = rows.filter(|_| !interrupted.load(Ordering::Relaxed)) else {
-        bail!("interrupted; nothing was written");
+        return Err(Interrupted("nothing was written".to_owned()).into());
     };
     let svg = plot::svg(&rows);
     let png = plot::png(&svg).context("the plot cannot be drawn")?;
     say!("{} fits a point, seed {seed}", 4 * images);
-    for (name, content) in [
-        ("corners.csv", corners::csv(&rows).into_bytes()),
-        ("corners.svg", svg.into_bytes()),
-        ("corners.png", png),
-    ] {
-        let path = folder.join(name);
-        output::write(&path, &content)?;
+    let files = [
+        text_file("corners.csv".to_owned(), corners::csv(&rows)),
+        text_file("corners.svg".to_owned(), svg),
+        bytes_file("corners.png".to_owned(), png),
+    ];
+    for path in write_all(folder, &files, simulation.overwrite)? {
         say!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
@@ -213,18 +220,19 @@ fn run_photographs(args: PhotographsArgs) -> anyhow::Result<ExitCode> {
             }))
         })
     })?;
-    let Some(rows) = rows? else { bail!("interrupted; no result was written") };
+    let Some(rows) = rows? else {
+        return Err(Interrupted("no result was written".to_owned()).into());
+    };
     output::print(&table::text(&rows))?;
     let svg = photographs::plot::svg(&rows);
+    let png = plot::png(&svg).context("the plot cannot be drawn")?;
     let files = [
-        ("photographs.csv", table::csv(&rows).into_bytes()),
-        ("photographs.json", table::json(&rows, simulation.seed).into_bytes()),
-        ("photographs.png", plot::png(&svg).context("the plot cannot be drawn")?),
-        ("photographs.svg", svg.into_bytes()),
+        text_file("photographs.csv".to_owned(), table::csv(&rows)),
+        text_file("photographs.json".to_owned(), table::json(&rows, simulation.seed)),
+        bytes_file("photographs.png".to_owned(), png),
+        text_file("photographs.svg".to_owned(), svg),
     ];
-    for (name, content) in files {
-        let path = simulation.output.join(name);
-        output::write(&path, &content)?;
+    for path in write_all(&simulation.output, &files, simulation.overwrite)? {
         say!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
@@ -234,7 +242,7 @@ impl PhotographsArgs {
     /// What is photographed.
     fn subjects(&self) -> anyhow::Result<Vec<Subject>> {
         if let Some(path) = &self.target {
-            let target = target_file::read(path)?;
+            let target = target_file::read(path, &Limits::default())?;
             let family = target_file::family(&target, self.family.as_deref())?;
             let subject = Subject::new(&target.name, &target, family.as_ref());
             return Ok(vec![subject.with_context(|| path.display().to_string())?]);

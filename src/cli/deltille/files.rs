@@ -3,15 +3,17 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use std::sync::atomic::Ordering;
 
 use anyhow::{Context, anyhow, bail};
 
 use crate::artwork::Artwork;
 use crate::cli::interrupt;
-use crate::cli::output;
+use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{Interrupted, message};
+use crate::export::kind::Kind;
+use crate::export::staging::{Staging, same_content};
 use crate::export::{atomic, pdf, png, sheet_file_name, svg};
+use crate::target;
 
 /// Writes one file to a path.
 type Writer = dyn Fn(&Path) -> anyhow::Result<()>;
@@ -19,13 +21,18 @@ type Writer = dyn Fn(&Path) -> anyhow::Result<()>;
 /// A file to be written: its name, and what writes it.
 pub struct File {
     name: String,
+    kind: Kind,
     write: Box<Writer>,
 }
 
 impl File {
-    /// A file of that name, written by `write`.
-    pub fn new(name: String, write: impl Fn(&Path) -> anyhow::Result<()> + 'static) -> Self {
-        Self { name, write: Box::new(write) }
+    /// A file of that name and kind, written by `write`.
+    pub fn new(
+        name: String,
+        kind: Kind,
+        write: impl Fn(&Path) -> anyhow::Result<()> + 'static,
+    ) -> Self {
+        Self { name, kind, write: Box::new(write) }
     }
 }
 
@@ -44,7 +51,8 @@ pub fn text_file(name: String, text: String) -> File {
 
 /// A file of bytes.
 pub fn bytes_file(name: String, bytes: Vec<u8>) -> File {
-    File::new(name, move |path| Ok(atomic::write(path, |out| out.write_all(&bytes))?))
+    let kind = Kind::of(&bytes);
+    File::new(name, kind, move |path| Ok(atomic::write(path, |out| out.write_all(&bytes))?))
 }
 
 /// The sheets of an artwork in some formats.
@@ -54,21 +62,23 @@ pub fn drawn(name: &str, artwork: Artwork, formats: Formats, dpi: u32) -> Vec<Fi
     if formats.pdf {
         let artwork = artwork.clone();
         let write = move |path: &Path| Ok(pdf::write(&artwork, path)?);
-        files.push(File::new(format!("{name}.pdf"), write));
+        files.push(File::new(format!("{name}.pdf"), Kind::own_pdf(), write));
     }
     let count = artwork.sheets.len();
     for index in 0..count {
         if formats.svg {
             let artwork = artwork.clone();
             let write = move |path: &Path| Ok(svg::write(&artwork, index, path)?);
-            files.push(File::new(sheet_file_name(name, index, count, "svg"), write));
+            let kind = Kind::of(svg::HEAD.as_bytes());
+            files.push(File::new(sheet_file_name(name, index, count, "svg"), kind, write));
         }
         if formats.png {
             let (artwork, dpi) = (artwork.clone(), f64::from(dpi));
             let write = move |path: &Path| {
                 Ok(png::write(&artwork.sheets[index], &artwork.title, path, dpi)?)
             };
-            files.push(File::new(sheet_file_name(name, index, count, "png"), write));
+            let name = sheet_file_name(name, index, count, "png");
+            files.push(File::new(name, Kind::own_png(), write));
         }
     }
     files
@@ -80,29 +90,14 @@ pub fn same_file(written: &Path, other: &Path) -> bool {
     written.is_some() && written == other
 }
 
-/// Writes all files into a folder beside their places, then moves them there: all or none.
-pub fn write_all(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
-    let missing: Vec<&Path> =
-        folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).collect();
-    let written = write_here(folder, files);
-    if written.is_err() {
-        for folder in missing {
-            // Only a folder that is still empty goes.
-            let _ = fs::remove_dir(folder);
-        }
-    }
-    written
-}
-
-fn write_here(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
-    let interrupted = interrupt::flag();
-    let check = || match interrupted.load(Ordering::Relaxed) {
-        true => Err(Interrupted("nothing was written")),
-        false => Ok(()),
-    };
+/// Writes all files, all or none: see [`staging`](crate::export::staging).
+pub fn write_all(
+    folder: &Path,
+    files: &[File],
+    overwrite: Overwrite,
+) -> anyhow::Result<Vec<PathBuf>> {
     let context = || format!("-o: cannot write to {}", folder.display());
     output::check_folder(folder).context("-o")?;
-    fs::create_dir_all(folder).with_context(context)?;
     let place = |file: &File| {
         let path = folder.join(&file.name);
         atomic::place(&path).with_context(|| format!("cannot write {}", path.display()))
@@ -111,28 +106,93 @@ fn write_here(folder: &Path, files: &[File]) -> anyhow::Result<Vec<PathBuf>> {
     if let Some(path) = paths.iter().find(|path| path.is_dir()) {
         bail!("cannot write {}: there is a folder of that name", path.display());
     }
-    let staging = tempfile::Builder::new().prefix(".deltille-").tempdir_in(folder);
-    let staging = staging.with_context(context)?;
+    let check_kinds = || {
+        let mut places = files.iter().zip(&paths);
+        places.try_for_each(|(file, path)| overwrite.check(path, &file.kind))
+    };
+    check_kinds()?;
+    interrupt::stands("nothing was written");
+    let staging = Staging::new(folder).with_context(context)?;
+    let staged = staging.files();
     for file in files {
-        check()?;
-        (file.write)(&staging.path().join(&file.name)).map_err(|error| {
+        check_interrupt()?;
+        (file.write)(&staged.join(&file.name)).map_err(|error| {
             // The name of the temporary folder means nothing to the user.
-            let staged = staging.path().display().to_string();
+            let staged = staged.display().to_string();
             anyhow!(message(&error).replace(&staged, &folder.display().to_string()))
         })?;
     }
-    check()?;
-    for (file, path) in files.iter().zip(&paths).filter(|(_, path)| path.exists()) {
-        let staged = fs::read(staging.path().join(&file.name));
-        output::check_replaced_by(path, &staged.with_context(context)?)?;
+    check_interrupt()?;
+    // Drawing takes a while, and what is there may have changed.
+    check_kinds()?;
+    let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+    let replaced = files.iter().filter_map(|file| file.replaced(folder, &staged, &names));
+    let replaced: Vec<String> = replaced.collect();
+    staging.commit().with_context(context)?;
+    interrupt::stands("the files are whole, but were not all compared");
+    replaced.iter().for_each(|line| tell!("{line}"));
+    Ok(paths)
+}
+
+fn check_interrupt() -> anyhow::Result<()> {
+    match interrupt::is_raised() {
+        true => Err(Interrupted("nothing was written".to_owned()).into()),
+        false => Ok(()),
     }
-    for (file, path) in files.iter().zip(&paths) {
-        let staged = staging.path().join(&file.name);
-        if fs::rename(&staged, path).is_err() {
-            // A link may lead to another file system.
-            let content = fs::read(&staged).with_context(context)?;
-            atomic::write(path, |out| out.write_all(&content))?;
+}
+
+impl File {
+    /// What is to be said where this is a description that takes the place of another target's: files
+    /// of that one may be left beside it.
+    fn replaced(&self, folder: &Path, staged: &Path, written: &[&str]) -> Option<String> {
+        let path = folder.join(&self.name);
+        let is_other = self.kind == Kind::of_schema(target::SCHEMA)
+            && path.is_file()
+            && !same_content(&path, &staged.join(&self.name));
+        let stem = self.name.strip_suffix(".json").filter(|_| is_other)?;
+        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+        let mut left: Vec<String> = entries
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .filter(|name| !written.contains(&name.as_str()) && is_of_target(name, stem))
+            .filter(|name| fs::read(folder.join(name)).is_ok_and(|text| Kind::of(&text).is_own()))
+            .collect();
+        left.sort();
+        let line = format!("{}: takes the place of a target that differs", path.display());
+        Some(match left.len() {
+            0 => line,
+            _ => format!(
+                "{line}; still of that one beside it: {}: remove them, or write them anew",
+                left.join(", ")
+            ),
+        })
+    }
+}
+
+/// Whether a name is that of a file that is written for the target of that stem.
+fn is_of_target(name: &str, stem: &str) -> bool {
+    let Some((part, extension)) = name.strip_prefix(stem).and_then(|rest| rest.rsplit_once('.'))
+    else {
+        return false;
+    };
+    let is_page = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+    let is_part = match part.strip_prefix('-') {
+        None => part.is_empty(),
+        Some(part) => is_page(part) || ["texture", "skeleton", "panels", "net"].contains(&part),
+    };
+    is_part && ["pdf", "svg", "png", "dsc", "glb", "obj", "mtl", "stl", "dxf"].contains(&extension)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_of_target;
+
+    #[test]
+    fn files_of_a_target_are_known_by_their_names() {
+        for name in ["a.pdf", "a-12.svg", "a-texture.png", "a-net.dxf", "a.dsc"] {
+            assert!(is_of_target(name, "a"), "{name}");
+        }
+        for name in ["a.json", "b.pdf", "ab.pdf", "a-b.pdf", "a-.pdf", "a-view.png", "a"] {
+            assert!(!is_of_target(name, "a"), "{name}");
         }
     }
-    Ok(paths)
 }

@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 
+use super::limits::ImageLimits;
 use super::refine::Method;
 use super::target_file;
 use crate::detect::{Detector, DetectorConfig, Ink, Tone};
+use crate::limits::Limits;
 use crate::target::{GridKind, Target};
 
 /// Options that say what to look for.
@@ -46,6 +48,8 @@ pub struct FinderArgs {
     /// the corners of each picture
     #[arg(long, value_name = "UM", default_value = "auto", allow_negative_numbers = true)]
     ink: Ink,
+    #[command(flatten)]
+    limits: ImageLimits,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -65,6 +69,11 @@ impl FinderArgs {
     /// Whether the ink of the print is not known.
     pub fn ink_is_open(&self) -> bool {
         self.ink == Ink::Auto
+    }
+
+    /// What is read of a file.
+    pub fn limits(&self) -> Limits {
+        self.limits.limits()
     }
 
     /// The target, where one is named, and the detector.
@@ -93,7 +102,7 @@ impl FinderArgs {
             let size = self.rows.zip(self.cols);
             return Ok((None, Detector::for_grid(kind, size, config)));
         };
-        let target = target_file::read(path).context("--target")?;
+        let target = target_file::read(path, &self.limits()).context("--target")?;
         let family = target_file::family(&target, self.family.as_deref())?;
         if let (Some(limit), Some(family)) = (self.max_errors, &family)
             && limit > family.correctable()

@@ -95,6 +95,14 @@ fn matching(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(images)
 }
 
+/// What an image's results are called, but for their endings.
+pub fn stem(image: &Path) -> anyhow::Result<String> {
+    match image.file_stem() {
+        Some(stem) => Ok(stem.to_string_lossy().into_owned()),
+        None => bail!("{} is not a file name", image.display()),
+    }
+}
+
 /// Names of results, one per image.
 #[derive(Default)]
 pub struct Stems {
@@ -104,9 +112,7 @@ pub struct Stems {
 impl Stems {
     /// The stem of an image's results, which no other image may have.
     pub fn claim(&mut self, image: &Path) -> anyhow::Result<String> {
-        let Some(stem) = image.file_stem().map(|stem| stem.to_string_lossy().into_owned()) else {
-            bail!("{} is not a file name", image.display());
-        };
+        let stem = stem(image)?;
         if let Some(other) = self.taken.insert(stem.clone(), image.to_owned()) {
             bail!(
                 "{} and {} would both write {stem}.json: detect them into different folders with -o",

@@ -10,6 +10,8 @@ mod experiment;
 pub(in crate::cli) mod files;
 mod finder;
 mod images;
+mod in_flight;
+mod limits;
 mod pose;
 mod refine;
 mod render;

@@ -6,14 +6,16 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 
 use super::images::Images;
+use super::limits::ImageLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{self, Loss, Reference, Weights, views};
-use crate::cli::output::{self, say, tell};
+use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::FAILED;
 use crate::detect::{Detector, DetectorConfig};
 use crate::export::pose;
 use crate::raster;
+use crate::report::Named;
 
 /// Arguments of `deltille pose`.
 #[derive(clap::Args)]
@@ -35,16 +37,21 @@ pub struct Args {
     /// Write the lines to a file instead of standard output
     #[arg(short, long, value_name = "FILE.ndjson")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    limits: ImageLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// Finds the target in each image and says where it is, a line of JSON each.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let target = target_file::read(&args.target).context("--target")?;
+    let limits = args.limits.limits();
+    let target = target_file::read(&args.target, &limits).context("--target")?;
     let family = target_file::family(&target, args.family.as_deref())?;
     let camera = camera_file::read("--camera", &args.camera)?;
     let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
     let reference = Reference::Target(&target);
-    let sheet = args.sheet.read()?;
+    let sheet = args.sheet.read(&limits)?;
     let scale = sightings::solid_scale(&sheet, &target)?;
     let mut panels = reference.panels();
     panels.iter_mut().for_each(|panel| panel.translation *= scale);
@@ -55,7 +62,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let image = image?;
         all += 1;
         let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let found = detector.detect_any(&raster::read(&image)?, &name);
+        let found = detector.detect_any(&raster::read_within(&image, &limits)?, &name);
         let mut shown = views(&[(name, found)], &reference)?.views;
         sightings::put_on(&sheet, Some(&target), &mut shown)?;
         let (loss, weights) = (Loss::default(), Weights::default());
@@ -65,6 +72,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             without += 1;
             let why = solution.excluded.first().map_or("no target in it", |out| &out.reason);
             tell!("{}: {why}", image.display());
+        }
+        let named = Named { cameras: &[] };
+        for finding in &solution.findings {
+            tell!("{}: {}", image.display(), named.sentence(finding));
         }
         for view in &solution.views {
             let line = pose::write_line(view, &target.name);
@@ -78,7 +89,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         bail!("there is no image");
     }
     if let Some(path) = &path {
-        output::write(path, lines.as_bytes())?;
+        output::write(path, lines.as_bytes(), args.overwrite)?;
         say!("{}: {} of {all} images show the target", path.display(), all - without);
     }
     Ok(if without > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })

@@ -7,8 +7,10 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 
-use crate::cli::output;
+use super::limits::ImageLimits;
+use crate::cli::output::{self, Overwrite};
 use crate::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
+use crate::limits::Limits;
 use crate::raster::{self, AnyGray};
 use crate::target::GridKind;
 
@@ -37,6 +39,10 @@ pub struct Args {
     /// File for the results [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    limits: ImageLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// How corners are refined.
@@ -74,19 +80,20 @@ fn window(text: &str) -> Result<usize, String> {
 
 /// Refines all seeds; a seed that no corner is near is reported in its line, not as an error.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let seeds = read_seeds(&args.seeds).context("--seeds")?;
+    let limits = args.limits.limits();
+    let seeds = read_seeds(&args.seeds, &limits).context("--seeds")?;
     let kind = match args.kind {
         Kind::Deltille => GridKind::Deltille,
         Kind::Checker => GridKind::Checker,
     };
     let refiner = Refiner::new(kind, args.method.into(), args.window).with_tone(args.tone);
-    let refined: Vec<Refined> = match raster::read(&args.image)? {
+    let refined: Vec<Refined> = match raster::read_within(&args.image, &limits)? {
         AnyGray::U8(image) => refiner.refine_all(&image, &seeds),
         AnyGray::U16(image) => refiner.refine_all(&image, &seeds),
     };
     let table = table(&refined);
     match &args.output {
-        Some(path) => output::write(path, table.as_bytes())?,
+        Some(path) => output::write(path, table.as_bytes(), args.overwrite)?,
         None => output::print(&table)?,
     }
     Ok(ExitCode::SUCCESS)
@@ -108,9 +115,9 @@ fn table(refined: &[Refined]) -> String {
     text
 }
 
-fn read_seeds(path: &Path) -> anyhow::Result<Vec<[f64; 2]>> {
+fn read_seeds(path: &Path, limits: &Limits) -> anyhow::Result<Vec<[f64; 2]>> {
     let show = path.display();
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {show}"))?;
+    let text = limits.read_text(path)?;
     let mut seeds = Vec::new();
     for (i, line) in text.lines().enumerate() {
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();

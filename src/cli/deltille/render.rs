@@ -8,10 +8,13 @@ use glam::{DQuat, DVec3};
 use image::{DynamicImage, ImageBuffer, Luma};
 
 use super::files::{bytes_file, text_file, write_all};
+use super::limits::ImageLimits;
 use super::{camera_file, target_file};
 use crate::camera::{Camera, Pose};
-use crate::cli::output::{self, say, tell};
+use crate::cli::output::{self, Overwrite, say, tell};
+use crate::export::kind::signed_png;
 use crate::export::truth;
+use crate::quantity::place_mm;
 use crate::synth::{Light, scene_of_target};
 use crate::target::TargetSpec;
 
@@ -63,16 +66,25 @@ pub struct Args {
     /// corners in it are written beside it as .json
     #[arg(short, long, value_name = "FILE", default_value = ".")]
     output: PathBuf,
+    #[command(flatten)]
+    limits: ImageLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// Takes a picture of a target and writes it with its truth.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let target = target_file::read(&args.target)?;
+    let limits = args.limits.limits();
+    let target = target_file::read(&args.target, &limits)?;
     let family = target_file::family(&target, args.family.as_deref())?;
     if !matches!(target.spec, TargetSpec::Solid(_)) && target.panels.len() > 1 {
         bail!("{} has several loose boards: render targets of one board, or solids", target.name);
     }
     let camera = camera_file::read("--camera", &args.camera)?;
+    limits.check_pixels(camera.width, camera.height).with_context(|| {
+        let file = args.camera.display();
+        format!("--camera: {file}: a picture of {} × {} px", camera.width, camera.height)
+    })?;
     let in_range = |option: &str, value: f64, most: f64| match (0.0..=most).contains(&value) {
         true => Ok(value),
         false => bail!("{option}: {value} is not between 0 and {most}"),
@@ -104,8 +116,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut png = std::io::Cursor::new(Vec::new());
     picture.context("the picture is empty")?.write_to(&mut png, image::ImageFormat::Png)?;
     let truth_name = Path::new(&*name).with_extension("json").to_string_lossy().into_owned();
-    let files = [text_file(truth_name, truth), bytes_file(name.into_owned(), png.into_inner())];
-    write_all(output::folder_of(&path), &files)?;
+    let files =
+        [text_file(truth_name, truth), bytes_file(name.into_owned(), signed_png(png.into_inner()))];
+    write_all(output::folder_of(&path), &files, args.overwrite)?;
     say!("{}: {} corners in view", path.display(), seen.len());
     if seen.is_empty() {
         tell!(
@@ -152,12 +165,9 @@ impl Args {
     }
 }
 
-/// So many finite numbers, separated by commas.
+/// So many numbers of a size that places have, separated by commas.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let parsed = text.split(',').map(|word| word.trim().parse::<f64>());
-    let numbers = parsed.collect::<Result<Vec<f64>, _>>().map_err(|error| error.to_string())?;
-    if numbers.iter().any(|v| !v.is_finite()) {
-        return Err("all numbers must be finite".to_owned());
-    }
+    let parsed = text.split(',').map(|word| place_mm::RANGE.parse(word));
+    let numbers = parsed.collect::<Result<Vec<f64>, _>>()?;
     numbers.try_into().map_err(|v: Vec<f64>| format!("{} numbers instead of {N}", v.len()))
 }

@@ -8,6 +8,7 @@ use clap::ValueEnum;
 
 use super::calibrate::{Robust, Weighting, without_outliers};
 use super::files::{File, same_file, text_file, write_all};
+use super::limits::FileLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
@@ -15,10 +16,10 @@ use crate::calibrate::{
     wrong_cameras,
 };
 use crate::camera::{Camera, Pose};
-use crate::cli::output::{check_folder, fixed, say, tell};
+use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
 use crate::export::camera::{colmap, colmap_rig, kalibr};
 use crate::export::rig;
-use crate::report::{cannot_tell_apart, causes_of_rig};
+use crate::report::{Named, cannot_tell_apart, causes_of_rig};
 use crate::target::Name;
 use crate::words::counted;
 
@@ -55,6 +56,10 @@ pub struct Args {
     /// Folder for rig.json, <camera>.yaml and the refined target
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
+    #[command(flatten)]
+    limits: FileLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -95,14 +100,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     check_folders(&args.camera)?;
     check_folder(&args.output).context("-o")?;
-    let target = target_file::read(&args.target).context("--target")?;
+    let limits = args.limits.limits();
+    let target = target_file::read(&args.target, &limits).context("--target")?;
     let reference = Reference::Target(&target);
-    let sheet = args.sheet.read()?;
+    let sheet = args.sheet.read(&limits)?;
     let scale = sightings::solid_scale(&sheet, &target)?;
     let mut cameras = Vec::with_capacity(args.camera.len());
     let mut left_out: Vec<Excluded> = Vec::new();
     for (name, folder) in &args.camera {
-        let read = sightings::read(std::slice::from_ref(folder), &reference);
+        let read = sightings::read(std::slice::from_ref(folder), &reference, &limits);
         let sightings::Read { mut views, left_out: out, .. } =
             read.with_context(|| format!("--camera {name}"))?;
         sightings::put_on(&sheet, Some(&target), &mut views)?;
@@ -138,6 +144,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             tell!("warning: camera {}: {end}", camera.name);
         }
     }
+    let names: Vec<&str> = solution.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    let named = Named { cameras: &names };
+    for finding in &solution.findings {
+        tell!("warning: {}", named.sentence(finding));
+    }
     let is_given = |name: &str| args.known.iter().any(|(known, _)| known == name);
     for cause in causes_of_rig(&solution, args.model, is_given, &wrong, args.refine_target) {
         tell!("warning: {cause}");
@@ -166,7 +177,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         files.push(text_file(format!("{}.json", refined.name), refined.to_json()));
     }
-    let written = write_all(&args.output, &files)?;
+    let written = write_all(&args.output, &files, args.overwrite)?;
     say!("{text}");
     for path in written {
         say!("wrote {}", path.display());

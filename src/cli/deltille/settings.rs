@@ -7,7 +7,9 @@ use std::path::Path;
 use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
+use crate::export::GENERATOR;
 use crate::export::dsc::Dialect;
+use crate::limits;
 use crate::target::{
     BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, GridKind, MOST_ROWS, PaperSpec, SIDES, TagSpec,
     TagsIn, largest_edge_mm, parse_length_mm,
@@ -157,8 +159,8 @@ pub struct Plan {
 impl Settings {
     /// Reads a template of boards of a kind.
     pub fn read(path: &Path, grid: GridKind) -> anyhow::Result<Self> {
-        let text = std::fs::read_to_string(path)
-            .with_context(|| format!("--template: cannot read {}", path.display()))?;
+        let text =
+            limits::read_short_text(path, limits::MAX_SETTINGS_BYTES).context("--template")?;
         let settings: Self = toml::from_str(&text).map_err(|error| {
             let before = error.span().map_or("", |span| &text[..span.start]);
             let line = before.matches('\n').count() + 1;
@@ -178,7 +180,8 @@ impl Settings {
     /// The text of a template.
     pub fn to_toml(&self, grid: GridKind) -> String {
         let settings = Self { command: Some(command(grid).to_owned()), ..self.clone() };
-        toml::to_string(&settings).expect("plain settings have a TOML form")
+        let toml = toml::to_string(&settings).expect("plain settings have a TOML form");
+        format!("# {GENERATOR}, template\n{toml}")
     }
 
     /// These settings, and those of a template where these say nothing.

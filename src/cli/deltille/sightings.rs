@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
+use super::limits::FileLimits;
 use super::target_file;
 use crate::calibrate::{Excluded, Reference, Shown, UntaggedGrid, View, views};
 use crate::camera::Pose;
@@ -12,6 +13,8 @@ use crate::cli::output::tell;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::{self, Print, Sheet};
 use crate::export::detection;
+use crate::limits::{Limits, ReadError};
+use crate::quantity::{edge_mm, print_scale};
 use crate::target::{GridKind, Target, TargetSpec, parse_length_mm};
 use crate::words::counted;
 
@@ -38,6 +41,8 @@ pub struct SightingsArgs {
     edge: Option<String>,
     #[command(flatten)]
     sheet: SheetArgs,
+    #[command(flatten)]
+    limits: FileLimits,
 }
 
 /// What is known of the sheet beforehand.
@@ -52,14 +57,13 @@ pub struct SheetArgs {
     shape: Option<PathBuf>,
 }
 
-/// A print farther from its size was not printed by mistake alone: the bars were misread.
-const PRINT_SCALE: std::ops::RangeInclusive<f64> = 0.5..=2.0;
-
 fn scale(text: &str) -> Result<[f64; 2], String> {
     let parts: Vec<&str> = text.split(',').collect();
     let number = |part: &str| {
-        let value = part.trim().parse::<f64>().ok().filter(|value| PRINT_SCALE.contains(value));
-        value.ok_or_else(|| format!("`{part}` is no measured length over stated length, near 1"))
+        // Farther from its size no print is: the bars were misread.
+        print_scale::RANGE
+            .parse(part)
+            .map_err(|_| format!("`{part}` is no measured length over stated length, near 1"))
     };
     match parts.as_slice() {
         [both] => Ok([number(both)?; 2]),
@@ -93,14 +97,14 @@ impl SightingsArgs {
     fn edge_mm(&self) -> anyhow::Result<Option<f64>> {
         let Some(text) = &self.edge else { return Ok(None) };
         let mm = parse_length_mm(text).context("--edge")?;
-        ensure!(mm > 0.0, "--edge: {mm} mm is not more than 0 mm");
-        Ok(Some(mm))
+        Ok(Some(edge_mm::RANGE.check(mm).context("--edge")?))
     }
 
     /// Reads everything.
     pub fn read(&self) -> anyhow::Result<Sightings> {
-        let target: Option<Target> =
-            self.target.as_deref().map(target_file::read).transpose().context("--target")?;
+        let limits = self.limits.limits();
+        let target = self.target.as_deref().map(|path| target_file::read(path, &limits));
+        let target: Option<Target> = target.transpose().context("--target")?;
         let reference = match (&target, self.grid, self.edge_mm()?) {
             (Some(target), ..) => Reference::Target(target),
             (None, Some(kind), Some(edge_mm)) => {
@@ -115,8 +119,8 @@ impl SightingsArgs {
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
-        let Read { mut views, empty, left_out, ink } = read(&self.detections, &reference)?;
-        let sheet = self.sheet.read()?;
+        let Read { mut views, empty, left_out, ink } = read(&self.detections, &reference, &limits)?;
+        let sheet = self.sheet.read(&limits)?;
         put_on(&sheet, target.as_ref(), &mut views)?;
         let mut panels = reference.panels();
         if let Some(target) = &target {
@@ -130,12 +134,12 @@ impl SightingsArgs {
 
 impl SheetArgs {
     /// The sheet, where nothing is known as it was planned.
-    pub fn read(&self) -> anyhow::Result<Sheet> {
+    pub fn read(&self, limits: &Limits) -> anyhow::Result<Sheet> {
         let Some(path) = &self.shape else {
             return Ok(Sheet { print_scale: self.print_scale, shape: None });
         };
         let show = || format!("--shape: {}", path.display());
-        let text = std::fs::read_to_string(path).with_context(show)?;
+        let text = limits.read_text(path).context("--shape")?;
         calibration::read_sheet(&text).with_context(show)
     }
 }
@@ -181,7 +185,8 @@ pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> any
     }
     for sighting in views.iter_mut().flat_map(|view| &mut view.sightings) {
         if let Some(scale) = sheet.print_scale {
-            let angle_rad = target.map_or(0.0, |target| angle_on_sheet(target, sighting.panel));
+            let angle_rad =
+                target.map_or(0.0, |target| angle_on_sheet(target, sighting.panel.id()));
             sighting.stretch(scale, angle_rad);
         }
         // The shape was found on corners that the scale had moved.
@@ -192,9 +197,8 @@ pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> any
     Ok(())
 }
 
-/// How a panel is turned on its sheet, rad; 0 where no sheet is described.
-fn angle_on_sheet(target: &Target, panel: usize) -> f64 {
-    let id = target.panels[panel].id;
+/// How the panel of an id is turned on its sheet, rad; 0 where no sheet is described.
+fn angle_on_sheet(target: &Target, id: u32) -> f64 {
     let mut placements = target.sheets.iter().flat_map(|sheet| &sheet.placements);
     placements.find(|placement| placement.panel == id).map_or(0.0, |placement| placement.angle_rad)
 }
@@ -212,16 +216,16 @@ pub struct Read {
 
 /// The views that detections show, files or folders of them. What does not belong to the target is
 /// told on standard error, too.
-pub fn read(paths: &[PathBuf], reference: &Reference) -> anyhow::Result<Read> {
+pub fn read(paths: &[PathBuf], reference: &Reference, limits: &Limits) -> anyhow::Result<Read> {
     let (mut files, mut detections, mut foreign) = (Vec::new(), Vec::new(), Vec::new());
     for Place { path, is_named } in places(paths)? {
         let show = || path.display().to_string();
-        let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", show()))?;
-        let Ok(text) = String::from_utf8(bytes) else {
-            bail!(
+        let text = match limits.read_text(&path) {
+            Err(ReadError::NotText { .. }) => bail!(
                 "{}: no text: pictures go to `deltille detect`, what it writes goes here",
                 show()
-            );
+            ),
+            text => text?,
         };
         if !is_named && detection::is_foreign(&text) {
             foreign.push(path);

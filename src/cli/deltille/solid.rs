@@ -14,6 +14,7 @@ use crate::export::dsc::{self, Dialect};
 use crate::export::mesh::TexturedMesh;
 use crate::export::{dxf, gltf, obj, stl};
 use crate::family::Family;
+use crate::quantity::{dots_per_inch, unit_mm};
 use crate::target::{
     ClosedMesh, DEFAULT_MARGIN_MM, NEAR_EQUILATERAL, PaperSpec, Skeleton, SkeletonSpec, SolidShape,
     SolidSheets, SolidSpec, TagSpec, TagsIn, Target, TargetSpec, parse_length_mm,
@@ -76,7 +77,8 @@ pub struct Args {
     #[arg(long)]
     dxf: bool,
     /// Resolution of the texture, dots per inch [default: 20 texels per tag bit]
-    #[arg(long, value_name = "DPI", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DPI", allow_negative_numbers = true,
+          value_parser = |text: &str| dots_per_inch::RANGE.parse(text))]
     texture_dpi: Option<f64>,
     /// Write <name>.pdf: the net to cut out, fold and glue, or with --per-face a page per face
     #[arg(long)]
@@ -123,7 +125,8 @@ pub struct MeshArgs {
     #[arg(long, value_name = "FILE.obj")]
     mesh: PathBuf,
     /// Millimetres per unit of the mesh, such as 1000 for metres, 25.4 for inches [default: 1]
-    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, conflicts_with = "edge")]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, conflicts_with = "edge",
+          value_parser = |text: &str| unit_mm::RANGE.parse(text))]
     scale: Option<f64>,
     /// Take faces that are far from equilateral, as long as a board fits
     #[arg(long)]
@@ -136,10 +139,7 @@ pub struct MeshArgs {
 pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     let (path, scale) = (&mesh.mesh, mesh.scale.unwrap_or(1.0));
     let show = || format!("--mesh: {}", path.display());
-    if !(scale.is_finite() && scale > 0.0) {
-        bail!("--scale: {scale} is no scale: give millimetres per unit, such as 1000 for metres");
-    }
-    let text = std::fs::read(path).with_context(show)?;
+    let text = mesh.args.delivery.limits().read(path).context("--mesh")?;
     let (solid, inside_out) = obj::read(&text).with_context(show)?;
     let (face, deviation) = solid.most_skewed();
     if deviation > NEAR_EQUILATERAL && !mesh.allow_skew {

@@ -4,19 +4,21 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 
+use crate::cli::output;
 use crate::export::dsc;
 use crate::family::Family;
+use crate::limits::Limits;
 use crate::target::{Target, TargetSpec};
 
 /// Reads a target: `.dsc` by its extension, JSON otherwise.
-pub fn read(path: &Path) -> anyhow::Result<Target> {
+pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Target> {
     let show = || path.display().to_string();
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if ["pdf", "svg", "png", "glb", "obj", "stl", "dxf", "mtl"].contains(&extension.as_str()) {
         bail!("{}: a .{extension} describes no target: give the .json written with it", show());
     }
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", show()))?;
-    let Ok(text) = String::from_utf8(bytes) else { bail!("{}: not a text file", show()) };
+    output::settle(output::folder_of(path))?;
+    let text = limits.read_text(path)?;
     if extension == "dsc" {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         return dsc::read(&text, &stem).with_context(show);

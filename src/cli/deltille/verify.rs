@@ -8,11 +8,15 @@ use anyhow::{Context, bail};
 use serde::Serialize;
 
 use super::files::same_file;
+use super::limits::AllLimits;
 use super::target_file;
-use crate::cli::output::{self, say, tell};
-use crate::cli::run::FAILED;
-use crate::export::{atomic, sheet_file_name, stl};
+use crate::cli::interrupt;
+use crate::cli::output::{self, Overwrite, say, tell};
+use crate::cli::run::{self, FAILED};
+use crate::export::kind::Kind;
+use crate::export::{sheet_file_name, stl};
 use crate::family::Family;
+use crate::limits::Limits;
 use crate::target::Target;
 use crate::verify::{Verdict, Verifier};
 
@@ -29,13 +33,19 @@ pub struct Args {
     /// Write all that was measured and found as JSON
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    limits: AllLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// Compares files with the target that they should show.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let target = target_file::read(&args.target)?;
+    let limits = args.limits.limits();
+    let target = target_file::read(&args.target, &limits)?;
     let family = target_file::family(&target, args.family.as_deref())?;
     let folder = args.target.parent().unwrap_or(Path::new("."));
+    let alone = args.artifacts.len() == 1;
     let artifacts = match args.artifacts.as_slice() {
         [] => {
             let mut beside = artifacts_beside(folder, &target);
@@ -53,39 +63,62 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     }
     if let Some(path) = &args.report {
-        output::check_replaced(path, Some(SCHEMA)).context("--report")?;
+        args.overwrite.check(path, &Kind::of_schema(SCHEMA)).context("--report")?;
     }
-    verify(&target, family.as_ref(), &artifacts, args.report.as_deref())
+    interrupt::stands("not all was compared");
+    let report = args.report.as_deref().map(|path| (path, args.overwrite));
+    verify(&target, family.as_ref(), &artifacts, alone, report, limits)
 }
 
-/// Verifies files and prints a line on each, then the sum of it.
+/// Verifies files and prints a line on each, then the sum of it. All pages of a target are among them,
+/// unless one is verified `alone`.
 pub fn verify(
     target: &Target,
     family: Option<&Family>,
     artifacts: &[PathBuf],
-    report: Option<&Path>,
+    alone: bool,
+    report: Option<(&Path, Overwrite)>,
+    limits: Limits,
 ) -> anyhow::Result<ExitCode> {
-    let verifier = Verifier::new(target, family)?;
+    let verifier = Verifier::new(target, family)?.within(limits).stopped_by(interrupt::flag());
     let mut verdicts = Vec::with_capacity(artifacts.len());
     let mut done = BTreeSet::new();
+    let mut errors = Vec::new();
     for path in artifacts {
         // The pages of a net are verified together.
         if done.contains(path) {
             continue;
         }
         done.extend(verifier.set_of(path));
-        let verdict = verifier.verify(path)?;
+        match verifier.verify(path) {
+            Ok(verdict) => {
+                say!("{verdict}");
+                verdicts.push(verdict);
+            }
+            Err(error) if interrupt::is_raised() => return Err(error.into()),
+            // The others are verified all the same.
+            Err(error) => {
+                let error = anyhow::Error::from(error);
+                run::report(&error);
+                errors.push(run::message(&error));
+            }
+        }
+    }
+    for verdict in verifier.left_out(artifacts, alone) {
         say!("{verdict}");
         verdicts.push(verdict);
     }
     let failed = verdicts.iter().filter(|verdict| !verdict.passed).count();
-    if let Some(path) = report {
-        let report = Report::new(target, &verdicts);
+    if let Some((path, overwrite)) = report {
+        let report = Report::new(target, &verdicts, &errors);
         let json = serde_json::to_string_pretty(&report).context("--report")? + "\n";
-        atomic::write(path, |file| file.write_all(json.as_bytes())).context("--report")?;
+        output::write(path, json.as_bytes(), overwrite).context("--report")?;
     }
     let count = verdicts.len();
     let files = if count == 1 { "file" } else { "files" };
+    if !errors.is_empty() {
+        return Ok(ExitCode::from(run::BAD_INPUT));
+    }
     if failed > 0 {
         let differ = if failed == 1 { "differs" } else { "differ" };
         say!("FAILED: {failed} of {count} {files} {differ} from target {}", target.name);
@@ -132,11 +165,14 @@ struct Report<'a> {
     target: &'a str,
     passed: bool,
     artifacts: &'a [Verdict],
+    /// Files that could not be compared.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    errors: &'a [String],
 }
 
 impl<'a> Report<'a> {
-    fn new(target: &'a Target, artifacts: &'a [Verdict]) -> Self {
-        let passed = artifacts.iter().all(|verdict| verdict.passed);
-        Self { schema: SCHEMA, target: &target.name, passed, artifacts }
+    fn new(target: &'a Target, artifacts: &'a [Verdict], errors: &'a [String]) -> Self {
+        let passed = errors.is_empty() && artifacts.iter().all(|verdict| verdict.passed);
+        Self { schema: SCHEMA, target: &target.name, passed, artifacts, errors }
     }
 }

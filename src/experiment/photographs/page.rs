@@ -67,7 +67,7 @@ impl PrintedPage {
         let path = folder.path().join("page.pdf");
         pdf::write(&artwork, &path)?;
         let document = Document::open(&path)?;
-        let page = document.render(0, PX_PER_MM);
+        let page = document.render(0, PX_PER_MM)?;
         let vertices = Vertices::of_first_page(&std::fs::read(&path)?)?;
 
         let meeting = match panel.kind {

@@ -10,6 +10,7 @@ use super::axes::{Axis, Level};
 use super::photograph::TrueCorner;
 use super::scene::Scene;
 use super::score::Score;
+use crate::export::kind::signed_png;
 use crate::json;
 use crate::raster::Gray;
 
@@ -199,5 +200,5 @@ pub(super) fn png(picture: &Gray<u8>) -> Vec<u8> {
     PngEncoder::new(&mut bytes)
         .write_image(picture.pixels(), width, height, ExtendedColorType::L8)
         .expect("a grey picture is written to memory");
-    bytes
+    signed_png(bytes)
 }

@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 use super::{Dialect, DscError, FAMILIES};
 use crate::family::Family;
 use crate::lattice::Vertex;
+use crate::quantity::{Range, border_bits, edge_mm, place_mm};
 use crate::target::{
     Corner, FamilyRef, GridKind, ListFormat, ListedSpec, Name, Outline, Panel, PanelPose,
     TagPlacement, TagsIn, Target, TargetSpec,
@@ -116,10 +117,9 @@ impl<'a> Line<'a> {
         field.parse().map_err(|_| self.fault(format!("{what} `{field}` is not such a number")))
     }
 
-    fn finite(self, field: &str, what: &str) -> Result<f64, DscError> {
+    fn within(self, field: &str, what: &str, range: Range) -> Result<f64, DscError> {
         let value: f64 = self.number(field, what)?;
-        let finite = value.is_finite().then_some(value);
-        finite.ok_or_else(|| self.fault(format!("{what} `{field}` is not finite")))
+        range.check(value).map_err(|problem| self.fault(format!("{what} {problem}")))
     }
 }
 
@@ -149,11 +149,8 @@ impl<'a> Block<'a> {
     fn read<'l>(lines: &'l [Line<'a>]) -> Result<(Self, &'l [Line<'a>]), DscError> {
         let head = lines[0];
         let [id, a, b, size] = head.fields("id,A,B,size")?;
-        let (id, size) = (head.number(id, "board id")?, head.finite(size, "size")?);
+        let (id, size) = (head.number(id, "board id")?, head.within(size, "size", edge_mm::RANGE)?);
         let (a, b) = (head.number::<u32>(a, "A")?, head.number::<u32>(b, "B")?);
-        if size <= 0.0 {
-            return Err(head.fault("the size must be positive"));
-        }
         if a > MOST || b > MOST {
             return Err(head.fault(format!("A and B must be at most {MOST}")));
         }
@@ -161,10 +158,7 @@ impl<'a> Block<'a> {
             return Err(head.fault("the file ends after it: a line `family,border` must follow"));
         };
         let [family, border] = second.fields("family,border")?;
-        let border = second.finite(border, "border")?;
-        if border < 0.0 {
-            return Err(second.fault("the border must not be negative"));
-        }
+        let border = second.within(border, "border", border_bits::RANGE)?;
         let (family, dialect, kind) = family_of(family, b).ok_or_else(|| {
             let names = FAMILIES.map(|f| format!("delTag{f}, aprilTag{f}, t{f}")).join(", ");
             second.fault(format!("family `{family}` is none of {names}"))
@@ -223,12 +217,16 @@ impl<'a> Block<'a> {
             tags: Vec::new(),
         };
         for (&vertex, listed) in &by_vertex {
+            let target_mm = listed.position.map(|v| v * unit_mm);
+            for place in target_mm {
+                place_mm::RANGE.check(place).map_err(|what| listed.line.fault(what.to_string()))?;
+            }
             panel.corners.push(Corner {
                 id: *next_id,
                 row: vertex.row,
                 col: vertex.col,
                 panel_mm: panel.lattice_mm(vertex),
-                target_mm: listed.position.map(|v| v * unit_mm),
+                target_mm,
             });
             *next_id += 1;
             if let Some(id) = listed.tag {
@@ -271,7 +269,8 @@ impl<'a> Block<'a> {
             );
             self.head.fault(problem)
         })?;
-        Ok([self.size * edge, *unit])
+        let edge_mm = edge_mm::RANGE.check(self.size * edge);
+        Ok([edge_mm.map_err(|what| self.head.fault(format!("size {what}")))?, *unit])
     }
 }
 
@@ -288,7 +287,9 @@ impl<'a> ListedCorner<'a> {
             -1 => None,
             tag => Some(u32::try_from(tag).map_err(|_| line.fault(format!("{tag} is no tag")))?),
         };
-        let position = [line.finite(x, "x")?, line.finite(y, "y")?, line.finite(z, "z")?];
+        let position = [("x", x), ("y", y), ("z", z)];
+        let [x, y, z] = position.map(|(what, field)| line.within(field, what, place_mm::RANGE));
+        let position = [x?, y?, z?];
         Ok(Self { line, vertex: Vertex::new(row as i32, col as i32), tag, position })
     }
 }

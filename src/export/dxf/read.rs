@@ -43,7 +43,25 @@ pub fn read(text: &str) -> Result<CutDrawing, DxfError> {
     if extent.iter().zip(bounds).any(|(stated, found)| (stated - found).abs() > EXTENT_SLACK_MM) {
         return Err(records[0].fault("an extent that is not that of the paths"));
     }
+    written_otherwise(text, &drawing)?;
     Ok(drawing)
+}
+
+/// Refuses what is not written as what is read of it is; the words on the first lines may be of any
+/// version of the writer.
+fn written_otherwise(found: &str, drawing: &CutDrawing) -> Result<(), DxfError> {
+    let anew = super::text(drawing);
+    let of_writer = |line: &str| line.starts_with("deltille ") && line.ends_with(", millimetres");
+    let mut pairs = found.split('\n').zip(anew.split('\n')).enumerate();
+    let other = pairs.find(|(index, (a, b))| a != b && !(*index == 1 && of_writer(a)));
+    let same_length = found.split('\n').count() == anew.split('\n').count();
+    match other {
+        None if same_length => Ok(()),
+        other => Err(DxfError::Construct {
+            line: other.map_or(1, |(index, _)| index + 1),
+            construct: "a comment, a blank or a number that is written otherwise".to_owned(),
+        }),
+    }
 }
 
 /// A group of code 0, which begins something, and the groups that follow it.

@@ -2,12 +2,13 @@ use std::fmt::Write;
 
 use super::{LAYERS, layer_name};
 use crate::artwork::{CutDrawing, CutPath};
+use crate::export::GENERATOR;
 
 /// The text of a `.dxf` file.
 pub fn text(drawing: &CutDrawing) -> String {
     let [left, lower, right, upper] = drawing.bounds_mm().unwrap_or_default();
     let mut file = File::default();
-    file.comment(&format!("deltille {}, millimetres", env!("CARGO_PKG_VERSION")));
+    file.comment(&format!("{GENERATOR}, millimetres"));
     file.section("HEADER", |file| {
         file.tag(9, "$ACADVER").tag(1, "AC1009");
         // Millimetres, for readers that know the variable of later releases.

@@ -1,16 +1,19 @@
 //! The parts of a `.glb` that every viewer shows alike: one scene, a tree of nodes, triangles with
 //! one opaque, unlit-white material, and its texture inside.
 
+use std::collections::BTreeSet;
+
 use glam::{DMat4, DQuat, DVec3};
 
 use serde_json::Value;
 
 use super::glb_json::{Accessor, Material, Node, Primitive, Root, Sampler, Surface};
-use super::{Findings, png};
+use super::{Findings, Words, is_creator, png};
 use crate::export::gltf::{
     ARRAY_BUFFER, CLAMP_TO_EDGE, ELEMENT_ARRAY_BUFFER, FLOAT, LINEAR, LINEAR_MIPMAP_LINEAR,
-    UNSIGNED_SHORT,
+    MATERIAL, UNSIGNED_SHORT,
 };
+use crate::limits::{Exceeded, Limits};
 
 const TRIANGLES: u32 = 4;
 
@@ -19,7 +22,7 @@ const TRIANGLES: u32 = 4;
 const SLACK: f64 = 1e-5;
 
 /// Goes through a `.glb`.
-pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
+pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Findings, String> {
     let mut found = Findings::default();
     let Some(Chunks { json, binary }) = Chunks::read(bytes, &mut found)? else { return Ok(found) };
     let mut deserializer = serde_json::Deserializer::from_slice(json);
@@ -43,14 +46,25 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
         found.add("the JSON", "a list for an object or within a list");
         return Ok(found);
     }
-    let mut walk = Walk { root: &root, binary, found };
+    // Of what is spelled in two ways, or there twice, readers take one or the other.
+    let anew = value.to_string();
+    let filled = anew.len().next_multiple_of(4) == json.len();
+    if !filled || json.trim_ascii_end() != anew.as_bytes() {
+        let spelling = "blanks, a spelling, or a key that is there twice";
+        found.add("the JSON", spelling);
+    }
+    let mut walk = Walk { root: &root, binary, words, found };
     walk.counts();
     // What refers to something that is not there is not followed.
     if walk.found.0.is_empty() {
-        walk.nodes();
+        walk.sizes(limits).map_err(|exceeded| exceeded.to_string())?;
+        walk.nodes(limits).map_err(|exceeded| exceeded.to_string())?;
         walk.primitives();
         walk.material(&root.materials[0]);
-        walk.texture(&root.samplers[0]);
+        walk.texture(&root.samplers[0], limits)?;
+        walk.names();
+        walk.layout();
+        walk.unused();
     }
     Ok(walk.found)
 }
@@ -112,6 +126,7 @@ impl<'a> Chunks<'a> {
 struct Walk<'a> {
     root: &'a Root,
     binary: &'a [u8],
+    words: &'a Words,
     found: Findings,
 }
 
@@ -145,11 +160,6 @@ impl Walk<'_> {
                     .is_some_and(|end| end <= self.binary.len());
             let place = format!("bufferViews[{i}]");
             self.found.unless(inside, &place, "bytes outside the binary part");
-            let whole = view.byte_offset.is_multiple_of(4);
-            self.found.unless(whole, &place, "values that are not at whole words");
-            let target =
-                view.target.is_none_or(|t| [ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER].contains(&t));
-            self.found.unless(target, &place, "a target that is none");
         }
         for (i, accessor) in root.accessors.iter().enumerate() {
             let inside = self.bytes(accessor).is_some();
@@ -180,21 +190,33 @@ impl Walk<'_> {
         view.get(..length)
     }
 
+    /// No more nodes and triangles than are looked at.
+    fn sizes(&self, limits: &Limits) -> Result<(), Exceeded> {
+        let root = self.root;
+        let shapes = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        let indices = shapes.filter_map(|shape| root.accessors.get(shape.indices));
+        limits.check_nodes(root.nodes.len() + indices.map(|list| list.count / 3).sum::<usize>())
+    }
+
     /// The scene reaches every node, each on one way: there are no cycles and no node is shown
     /// twice. Motions keep shapes and sides.
-    fn nodes(&mut self) {
+    fn nodes(&mut self, limits: &Limits) -> Result<(), Exceeded> {
         let root = self.root;
         let mut parents = vec![0usize; root.nodes.len()];
-        let mut open = root.scenes[0].nodes.clone();
-        while let Some(index) = open.pop() {
+        let mut open: Vec<(usize, usize)> =
+            root.scenes[0].nodes.iter().map(|&node| (node, 1)).collect();
+        while let Some((index, depth)) = open.pop() {
             let Some(node) = root.nodes.get(index) else {
-                return self.found.add("scene", "a node that is not there");
+                self.found.add("scene", "a node that is not there");
+                return Ok(());
             };
+            limits.check_depth(depth)?;
             parents[index] += 1;
             if parents[index] > 1 {
-                return self.found.add(format!("nodes[{index}]"), "a node that is reached twice");
+                self.found.add(format!("nodes[{index}]"), "a node that is reached twice");
+                return Ok(());
             }
-            open.extend(&node.children);
+            open.extend(node.children.iter().map(|&child| (child, depth + 1)));
         }
         for (index, (node, parents)) in root.nodes.iter().zip(parents).enumerate() {
             let place = format!("nodes[{index}]");
@@ -206,6 +228,81 @@ impl Walk<'_> {
         let shown = |mesh: usize| root.nodes.iter().any(|node| node.mesh == Some(mesh));
         for mesh in (0..root.meshes.len()).filter(|&mesh| !shown(mesh)) {
             self.found.add(format!("meshes[{mesh}]"), "a mesh that no node shows");
+        }
+        Ok(())
+    }
+
+    /// The words are those of the target.
+    fn names(&mut self) {
+        let (root, title) = (self.root, &self.words.title);
+        self.found.unseen_unless(
+            is_creator(&root.asset.generator),
+            "asset",
+            "a generator other than deltille",
+        );
+        let extras = self.words.are_extras(&root.asset.extras);
+        self.found.unseen_unless(extras, "asset", "extras that do not describe the target");
+        let material = root.materials[0].name.as_deref();
+        let print = material.is_none_or(|name| name == MATERIAL);
+        self.found.unseen_unless(print, "materials[0]", format!("a name other than {MATERIAL}"));
+        let nodes = root.nodes.iter().map(|node| &node.name);
+        let meshes = root.meshes.iter().map(|mesh| &mesh.name);
+        let images = root.images.iter().map(|image| &image.name);
+        for name in nodes.chain(meshes).chain(images).flatten().filter(|name| *name != title) {
+            let problem = format!("{name:?} for the target's name");
+            self.found.unseen_unless(false, "the names", problem);
+        }
+    }
+
+    /// The bytes of the views follow each other, filled up with zeros to whole words, and there are no
+    /// others; values fill their view, which is said to hold what it holds.
+    fn layout(&mut self) {
+        let (root, binary) = (self.root, self.binary);
+        let mut end = 0usize;
+        for (i, view) in root.buffer_views.iter().enumerate() {
+            let place = format!("bufferViews[{i}]");
+            let follows = view.byte_offset == end.next_multiple_of(4);
+            self.found.unless(follows, &place, "bytes that do not follow those of the view before");
+            let filled = binary.get(end..view.byte_offset).unwrap_or_default();
+            self.found.unless(filled.iter().all(|&byte| byte == 0), &place, "bytes before it");
+            end = view.byte_offset + view.byte_length;
+        }
+        let rest = binary.get(end..).unwrap_or_default();
+        let ends = rest.len() < 4 && rest.iter().all(|&byte| byte == 0);
+        self.found.unless(ends, "buffers[0]", "bytes of no view");
+        for (i, accessor) in root.accessors.iter().enumerate() {
+            let place = format!("accessors[{i}]");
+            let view = &root.buffer_views[accessor.buffer_view];
+            let fill = self.bytes(accessor).is_some_and(|bytes| bytes.len() == view.byte_length);
+            self.found.unless(fill, &place, "values that do not fill their view");
+            let target = match accessor.component_type {
+                UNSIGNED_SHORT => ELEMENT_ARRAY_BUFFER,
+                _ => ARRAY_BUFFER,
+            };
+            let holds = view.target.is_none_or(|stated| stated == target);
+            self.found.unless(holds, &place, "a view for values of another kind");
+        }
+        let picture = root.buffer_views.get(root.images[0].buffer_view);
+        let bare = picture.is_some_and(|view| view.target.is_none());
+        self.found.unless(bare, "images[0]", "a view for values");
+    }
+
+    /// Everything that is there is part of what is shown.
+    fn unused(&mut self) {
+        let root = self.root;
+        let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        let accessors: BTreeSet<usize> = primitives
+            .flat_map(|Primitive { attributes: a, indices, .. }| {
+                [a.position, a.normal, a.texcoord_0, *indices]
+            })
+            .collect();
+        let views = accessors.iter().filter_map(|&i| Some(root.accessors.get(i)?.buffer_view));
+        let views: BTreeSet<usize> = views.chain([root.images[0].buffer_view]).collect();
+        for i in (0..root.accessors.len()).filter(|i| !accessors.contains(i)) {
+            self.found.add(format!("accessors[{i}]"), "values of no use");
+        }
+        for i in (0..root.buffer_views.len()).filter(|i| !views.contains(i)) {
+            self.found.add(format!("bufferViews[{i}]"), "bytes of no use");
         }
     }
 
@@ -244,8 +341,11 @@ impl Walk<'_> {
             let (what, inside) =
                 (format!("attribute {name} beyond the texture"), |v: &f32| (0.0..=1.0).contains(v));
             self.found.unless(kind != "VEC2" || values.iter().all(inside), place, what);
+            let Accessor { min, max, .. } = &self.root.accessors[index];
             if name == "POSITION" {
                 self.bounds(index, &values);
+            } else if min.is_some() || max.is_some() {
+                self.found.add(format!("accessors[{index}]"), "min and max of no use");
             }
         }
         self.indices(primitive.indices, count.unwrap_or_default(), place);
@@ -325,7 +425,7 @@ impl Walk<'_> {
         }
     }
 
-    fn texture(&mut self, sampler: &Sampler) {
+    fn texture(&mut self, sampler: &Sampler, limits: &Limits) -> Result<(), String> {
         let root = self.root;
         let Sampler { mag_filter, min_filter, wrap_s, wrap_t } = *sampler;
         let filters = [mag_filter, min_filter] == [LINEAR, LINEAR_MIPMAP_LINEAR];
@@ -339,11 +439,14 @@ impl Walk<'_> {
         self.found.unless(kind == "image/png", "images[0]", format!("mimeType {kind}"));
         let view = root.buffer_views.get(image.buffer_view);
         let bytes = view.and_then(|v| self.binary.get(v.byte_offset..)?.get(..v.byte_length));
-        match bytes.map(png::check) {
+        png::check_pixels(bytes.unwrap_or_default(), limits)
+            .map_err(|exceeded| format!("its texture: {exceeded}"))?;
+        match bytes.map(|bytes| png::check(bytes, &self.words.title, limits)) {
             Some(Ok(picture)) => self.found.add_of("images[0]", picture),
             Some(Err(problem)) => self.found.add("images[0]", problem),
             None => self.found.add("images[0]", "a view that is not there"),
         }
+        Ok(())
     }
 }
 

@@ -1,7 +1,7 @@
 //! The JSON of a `.glb` that every viewer shows alike, as types: what has no field here is refused.
 
 use serde::Deserialize;
-use serde::de::IgnoredAny;
+use serde_json::Value;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
@@ -24,10 +24,8 @@ pub(super) struct Root {
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Asset {
     pub version: String,
-    #[serde(rename = "generator")]
-    _generator: Option<String>,
-    #[serde(rename = "extras")]
-    _extras: Option<IgnoredAny>,
+    pub generator: String,
+    pub extras: Value,
 }
 
 #[derive(Deserialize)]
@@ -39,8 +37,7 @@ pub(super) struct Scene {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Node {
-    #[serde(rename = "name")]
-    _name: Option<String>,
+    pub name: Option<String>,
     pub mesh: Option<usize>,
     #[serde(default)]
     pub children: Vec<usize>,
@@ -53,8 +50,7 @@ pub(super) struct Node {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Mesh {
-    #[serde(rename = "name")]
-    _name: Option<String>,
+    pub name: Option<String>,
     pub primitives: Vec<Primitive>,
 }
 
@@ -79,8 +75,7 @@ pub(super) struct Attributes {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Material {
-    #[serde(rename = "name")]
-    _name: Option<String>,
+    pub name: Option<String>,
     pub pbr_metallic_roughness: Surface,
     pub alpha_mode: Option<String>,
     pub emissive_factor: Option<[f64; 3]>,
@@ -122,8 +117,7 @@ pub(super) struct Sampler {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Image {
-    #[serde(rename = "name")]
-    _name: Option<String>,
+    pub name: Option<String>,
     pub mime_type: String,
     pub buffer_view: usize,
 }

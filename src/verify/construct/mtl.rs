@@ -1,16 +1,11 @@
 //! The lines of a material library that every viewer takes alike: one material that shows its
 //! texture as it is.
 
-use super::{Findings, decimal, is_plain_file_name, start};
+use super::{Findings, is_creator, is_plain_file_name, start};
 
-/// Statements with the numbers that they must have: no light of its own, white, no gloss, opaque.
-const NUMBERS: [(&str, &[f64]); 5] = [
-    ("Ka", &[0.0, 0.0, 0.0]),
-    ("Kd", &[1.0, 1.0, 1.0]),
-    ("Ks", &[0.0, 0.0, 0.0]),
-    ("illum", &[1.0]),
-    ("d", &[1.0]),
-];
+/// What is stated of the material, word for word: no light of its own, white, no gloss. What is left out
+/// is something else in each viewer.
+const STATED: [&str; 4] = ["Ka 0 0 0", "Kd 1 1 1", "Ks 0 0 0", "illum 1"];
 
 /// The material of a library.
 #[derive(Default)]
@@ -21,38 +16,45 @@ pub(super) struct Material {
     pub texture: Option<String>,
 }
 
-/// Goes through a material library.
+/// Goes through a material library: what wrote it, and each statement once, the name first.
 pub(super) fn check(text: &str) -> (Material, Findings) {
     let (mut material, mut found) = (Material::default(), Findings::default());
-    for (index, line) in text.lines().enumerate() {
+    let mut stated: Vec<&str> = Vec::new();
+    for (index, line) in text.split_terminator('\n').enumerate() {
         let place = format!("line {}", index + 1);
-        if line.trim().is_empty() || line.starts_with('#') {
+        if index == 0 {
+            let creator =
+                line.strip_prefix("# ").and_then(|words| words.strip_suffix(", material"));
+            let construct = format!("`{}` instead of what wrote it", start(line, 60));
+            found.unless(creator.is_some_and(is_creator), place, construct);
             continue;
         }
         let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
-        let rest = rest.trim();
         let once = |slot: &mut Option<String>| slot.replace(rest.to_owned()).is_none();
+        let of_stated = |listed: &&str| listed.split(' ').next() == Some(word);
         let holds = match word {
-            "newmtl" => once(&mut material.name),
+            "newmtl" => once(&mut material.name) && index == 1,
             // A first word with a dash would be an option.
             "map_Kd" => {
                 once(&mut material.texture) && is_plain_file_name(rest) && !rest.starts_with('-')
             }
-            _ => match NUMBERS.iter().find(|(statement, _)| *statement == word) {
-                Some((_, stated)) => {
-                    let numbers: Option<Vec<f64>> = rest.split(' ').map(decimal).collect();
-                    numbers.as_deref() == Some(*stated)
-                }
-                None => {
-                    found.add(place, format!("statement {}", start(word, 20)));
-                    continue;
-                }
-            },
+            _ if STATED.iter().any(of_stated) => {
+                let new = !stated.contains(&line);
+                stated.push(line);
+                new && STATED.contains(&line)
+            }
+            _ => {
+                found.add(place, format!("statement {}", start(word, 20)));
+                continue;
+            }
         };
         found.unless(holds, place, format!("`{}`", start(line, 60)));
     }
-    let white = text.lines().any(|line| line.starts_with("Kd "));
-    found.unless(white, "the file", "no colour Kd 1 1 1");
+    for line in STATED {
+        let word = line.split(' ').next().unwrap_or_default();
+        let there = stated.iter().any(|stated| stated.split(' ').next() == Some(word));
+        found.unless(there, "the file", format!("no statement {line}"));
+    }
     found.unless(material.texture.is_some(), "the file", "no texture map_Kd");
     (material, found)
 }

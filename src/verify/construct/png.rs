@@ -1,20 +1,23 @@
 //! The PNG chunks and pixels that every viewer shows alike: grey of 8 bits without transparency,
 //! without a colour space to interpret and without a second picture.
 
-use std::io::{self, Read};
-
-use super::Findings;
+use super::{Findings, is_creator, unpack};
+use crate::export::kind::SOFTWARE;
+use crate::limits::{Exceeded, Limits};
 
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
-/// Pixels, their size on paper, and words.
-const CHUNKS: [&[u8]; 6] = [b"IHDR", b"pHYs", b"iTXt", b"tEXt", b"IDAT", b"IEND"];
+/// Pixels, their size on paper, what wrote them, and a title.
+const CHUNKS: [&[u8]; 6] = [b"IHDR", b"pHYs", b"tEXt", b"iTXt", b"IDAT", b"IEND"];
+
+/// What stands before the title: a word, and that it is neither packed nor in a language.
+const TITLE: &[u8] = b"Title\0\0\0\0\0";
 
 /// Depth, colour type, compression, filter and interlace of 8-bit grey.
 const GREY: [u8; 5] = [8, 0, 0, 0, 0];
 
-/// Goes through the chunks of a PNG.
-pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
+/// Goes through the chunks of a PNG with that title.
+pub(super) fn check(bytes: &[u8], title: &str, limits: &Limits) -> Result<Findings, String> {
     let mut rest = bytes.strip_prefix(&SIGNATURE).ok_or("not a readable PNG (its signature)")?;
     let mut found = Findings::default();
     let mut seen: Vec<&[u8]> = Vec::new();
@@ -29,14 +32,26 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
         if !CHUNKS.contains(&kind) {
             found.add(&place, format!("chunk {name}"));
         }
-        let twice = [b"IHDR".as_slice(), b"pHYs"].contains(&kind) && seen.contains(&kind);
+        let pixels = kind == b"IDAT";
+        let twice = !pixels && seen.contains(&kind);
         found.unless(!twice, &place, format!("a second chunk {name}"));
+        let in_row = !pixels || !seen.contains(&kind) || seen.last() == Some(&kind);
+        found.unless(in_row, &place, "pixels in two places");
+        let is_title = kind != b"iTXt" || data.strip_prefix(TITLE) == Some(title.as_bytes());
+        found.unseen_unless(is_title, &place, "words other than the target's name for a title");
+        let is_software = kind != b"tEXt" || names_writer(data);
+        found.unseen_unless(is_software, &place, "words other than the program that wrote it");
+        found.unless(kind != b"IEND" || data.is_empty(), &place, "data in the chunk IEND");
         let head = kind == b"IHDR";
         found.unless(head == seen.is_empty(), &place, format!("chunk {name} in this place"));
         if head {
             first = data;
         }
-        if kind == b"IDAT" {
+        // A head that is damaged is told, and its pixels are not looked at.
+        if head && is_intact {
+            check_size(data, limits).map_err(|exceeded| exceeded.to_string())?;
+        }
+        if pixels {
             packed.extend_from_slice(data);
         }
         if head && data.get(8..) != Some(&GREY) {
@@ -48,10 +63,12 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
         seen.push(kind);
         rest = after;
     }
+    found.unseen_unless(seen.contains(&b"iTXt".as_slice()), "the file", "no title");
+    found.unseen_unless(seen.contains(&b"tEXt".as_slice()), "the file", "no name of what wrote it");
     let place = format!("byte {}", bytes.len() - rest.len());
     found.unless(rest.is_empty(), place, "data after the end");
     // What is not grey of 8 bits is told already.
-    let is_whole = !found.0.is_empty() || is_whole(&packed, first);
+    let is_whole = found.refuse() || is_whole(&packed, first);
     found.unless(
         is_whole,
         "the pixels",
@@ -60,17 +77,36 @@ pub(super) fn check(bytes: &[u8]) -> Result<Findings, String> {
     Ok(found)
 }
 
+/// Whether words name this program as the software.
+fn names_writer(words: &[u8]) -> bool {
+    let name = words.strip_prefix(SOFTWARE.as_bytes()).and_then(|rest| rest.strip_prefix(b"\0"));
+    name.and_then(|name| std::str::from_utf8(name).ok()).is_some_and(is_creator)
+}
+
+/// Refuses a picture of too many pixels by its head.
+fn check_size(head: &[u8], limits: &Limits) -> Result<(), Exceeded> {
+    let (width, height) = size(head).unwrap_or_default();
+    limits.check_pixels(width, height)
+}
+
+/// Refuses a PNG of too many pixels; one that is damaged is left to [`check`].
+pub(super) fn check_pixels(bytes: &[u8], limits: &Limits) -> Result<(), Exceeded> {
+    let head = bytes.strip_prefix(&SIGNATURE).and_then(Chunk::first_of);
+    head.map_or(Ok(()), |head| check_size(head.data, limits))
+}
+
+/// Width and height, with which the head of a PNG begins.
+fn size(head: &[u8]) -> Option<(u32, u32)> {
+    let word = |at: usize| head.get(at..)?.first_chunk::<4>().map(|b| u32::from_be_bytes(*b));
+    Some((word(0)?, word(4)?))
+}
+
 /// Whether the packed pixels are whole, with their check sum and nothing behind it, and fill the picture: a byte and
 /// the pixels of each row.
 fn is_whole(packed: &[u8], head: &[u8]) -> bool {
-    let word = |at: usize| {
-        head.get(at..)?.first_chunk::<4>().map(|bytes| u64::from(u32::from_be_bytes(*bytes)))
-    };
-    let (Some(width), Some(height)) = (word(0), word(4)) else { return false };
-    let mut pixels = flate2::bufread::ZlibDecoder::new(packed);
-    let most = (width + 1) * height;
-    let unpacked = io::copy(&mut (&mut pixels).take(most + 1), &mut io::sink());
-    unpacked.is_ok_and(|length| length == most) && pixels.total_in() == packed.len() as u64
+    let Some((width, height)) = size(head) else { return false };
+    let length = (u64::from(width) + 1) * u64::from(height);
+    unpack(packed, length, |_| ()) == Some(length)
 }
 
 /// A chunk, which begins with the length of its content and ends with a check sum.

@@ -3,6 +3,7 @@
 
 use super::Findings;
 use crate::export::stl::header;
+use crate::limits::Limits;
 
 /// Bytes before the triangles, of a triangle, and of a triangle without its attributes.
 const HEAD: usize = 84;
@@ -10,7 +11,9 @@ const TRIANGLE: usize = 50;
 const GEOMETRY: usize = 48;
 
 /// Goes through an STL of a target of that name. What is too short is left to the reader.
-pub(super) fn check(bytes: &[u8], name: &str) -> Findings {
+pub(super) fn check(bytes: &[u8], name: &str, limits: &Limits) -> Result<Findings, String> {
+    let count = bytes.len().saturating_sub(HEAD) / TRIANGLE;
+    limits.check_nodes(count).map_err(|exceeded| exceeded.to_string())?;
     let mut found = Findings::default();
     let head = bytes.get(..80).is_none_or(|head| head == header(name));
     found.unless(head, "the head", "words other than the target's name");
@@ -19,5 +22,5 @@ pub(super) fn check(bytes: &[u8], name: &str) -> Findings {
     if let Some((index, _)) = coloured {
         found.add(format!("triangle {index}"), "attribute bytes");
     }
-    found
+    Ok(found)
 }

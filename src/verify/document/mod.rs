@@ -6,10 +6,11 @@ mod png;
 mod svg;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
 
+use crate::limits::{self, Broken, Kind, Limits, ReadError};
 use crate::raster::Gray;
-
-pub(super) use svg::length_mm;
 
 /// Largest picture that is drawn for a check, px.
 pub(super) const MAX_PIXELS: f64 = 60.0e6;
@@ -65,14 +66,10 @@ impl Format {
 #[derive(Debug, thiserror::Error)]
 pub enum DocumentError {
     /// The file cannot be opened.
-    #[error("cannot read {}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file is not what its name says, or has no size in units of length.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file is not what its name says, has no size in units of length, or takes more than the
+    /// [`Limits`].
     #[error("{}: {problem}", path.display())]
     Unreadable {
         /// The file.
@@ -89,20 +86,27 @@ impl DocumentError {
     }
 }
 
-/// The bytes of an artifact.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>, DocumentError> {
-    std::fs::read(path).map_err(|source| DocumentError::Io { path: path.to_owned(), source })
-}
-
-/// The text of an artifact.
-pub(super) fn read_text(path: &Path) -> Result<String, DocumentError> {
-    String::from_utf8(read(path)?).map_err(|_| DocumentError::unreadable(path, "not a text file"))
+/// Reads or draws a file by code of others, which may panic, or never end.
+pub(super) fn bounded<T: Send + 'static>(
+    path: &Path,
+    limits: &Limits,
+    work: impl FnOnce() -> Result<T, String> + Send + 'static,
+) -> Result<T, DocumentError> {
+    let problem = match limits::bounded(limits.time(), work) {
+        Ok(Ok(result)) => return Ok(result),
+        Ok(Err(problem)) => problem,
+        Err(Broken::Time) => limits.exceeded(Kind::Seconds).to_string(),
+        Err(broken) => broken.to_string(),
+    };
+    Err(DocumentError::unreadable(path, problem))
 }
 
 /// An opened artifact.
 pub struct Document {
-    content: Content,
+    path: PathBuf,
+    content: Arc<Content>,
     format: Format,
+    limits: Limits,
 }
 
 enum Content {
@@ -127,17 +131,24 @@ pub struct Page {
 impl Document {
     /// Opens a `.pdf`, `.svg` or `.png` file.
     pub fn open(path: &Path) -> Result<Self, DocumentError> {
+        Self::open_within(path, &Limits::default())
+    }
+
+    /// The same within other limits than the default.
+    pub fn open_within(path: &Path, limits: &Limits) -> Result<Self, DocumentError> {
         let unreadable = |problem: String| DocumentError::unreadable(path, problem);
         let Some(format) = Format::of(path).filter(|format| format.is_document()) else {
             return Err(unreadable("not a .pdf, .svg or .png file".to_owned()));
         };
-        let bytes = read(path)?;
-        let content = match format {
-            Format::Pdf => Content::Pdf(pdf::Pdf::parse(bytes).map_err(unreadable)?),
-            Format::Svg => Content::Svg(Box::new(svg::Svg::parse(&bytes).map_err(unreadable)?)),
-            _ => Content::Png(png::Png::parse(&bytes).map_err(unreadable)?),
-        };
-        Ok(Self { content, format })
+        let (bytes, limits) = (limits.read(path)?, *limits);
+        let content = bounded(path, &limits, move || {
+            Ok(match format {
+                Format::Pdf => Content::Pdf(pdf::Pdf::parse(bytes)?),
+                Format::Svg => Content::Svg(Box::new(svg::Svg::parse(&bytes)?)),
+                _ => Content::Png(png::Png::parse(&bytes, &limits)?),
+            })
+        })?;
+        Ok(Self { path: path.to_owned(), content: Arc::new(content), format, limits })
     }
 
     /// Kind of the file.
@@ -147,7 +158,7 @@ impl Document {
 
     /// Number of pages.
     pub fn pages(&self) -> usize {
-        match &self.content {
+        match &*self.content {
             Content::Pdf(pdf) => pdf.pages(),
             Content::Svg(_) | Content::Png(_) => 1,
         }
@@ -155,16 +166,26 @@ impl Document {
 
     /// Width and height of a page (counted from 0) as the file states them, mm.
     pub fn size_mm(&self, page: usize) -> [f64; 2] {
-        match &self.content {
+        match &*self.content {
             Content::Pdf(pdf) => pdf.size_mm(page),
             Content::Svg(svg) => svg.size_mm(),
             Content::Png(png) => png.size_mm(),
         }
     }
 
+    /// What is said of a page that is far larger than it should be.
+    pub(super) fn too_large(&self, found_mm: [f64; 2], stated_mm: [f64; 2]) -> DocumentError {
+        let [[width, height], [stated_width, stated_height]] = [found_mm, stated_mm];
+        let problem = format!(
+            "a page of {width} x {height} mm instead of {stated_width} x {stated_height} mm is not \
+             looked at"
+        );
+        DocumentError::unreadable(&self.path, problem)
+    }
+
     /// How far the stated size may be from the true one by the nature of the format, mm.
     pub fn size_tolerance_mm(&self) -> f64 {
-        match &self.content {
+        match &*self.content {
             // Points in single precision, and decimals written.
             Content::Pdf(_) | Content::Svg(_) => 1e-3,
             // Whole pixels: half of one, and as much again for the rounding of the resolution.
@@ -174,19 +195,32 @@ impl Document {
 
     /// A page as a picture, on white. `px_per_mm` is a wish: a PNG has its own resolution, and
     /// large pages are drawn coarser to bound the memory.
-    pub fn render(&self, page: usize, px_per_mm: f64) -> Page {
+    pub fn render(&self, page: usize, px_per_mm: f64) -> Result<Page, DocumentError> {
         let [width_mm, height_mm] = self.size_mm(page);
         let most = (MAX_PIXELS / (width_mm * height_mm)).sqrt();
-        let px_per_mm = match &self.content {
+        let px_per_mm = match &*self.content {
             Content::Png(png) => png.px_per_mm(),
             _ => px_per_mm.min(most),
         };
-        let image = match &self.content {
-            Content::Pdf(pdf) => pdf.render(page, px_per_mm),
-            Content::Svg(svg) => svg.render(px_per_mm),
+        let content = Arc::clone(&self.content);
+        let image = match &*self.content {
             Content::Png(png) => png.image().clone(),
+            _ => {
+                // A page of no breadth has a pixel across, and as many along as it is long.
+                let [width, height] = [width_mm, height_mm].map(|mm| pixels(mm, px_per_mm));
+                if width.saturating_mul(height) as f64 > 2.0 * MAX_PIXELS {
+                    let problem = format!("a page of {width_mm} x {height_mm} mm cannot be drawn");
+                    return Err(DocumentError::unreadable(&self.path, problem));
+                }
+                let end = Instant::now().checked_add(self.limits.time());
+                bounded(&self.path, &self.limits, move || match &*content {
+                    Content::Pdf(pdf) => Ok(pdf.render(page, px_per_mm, end)),
+                    Content::Svg(svg) => svg.render(px_per_mm, end),
+                    Content::Png(png) => Ok(png.image().clone()),
+                })?
+            }
         };
-        Page { width_mm, height_mm, px_per_mm, image }
+        Ok(Page { width_mm, height_mm, px_per_mm, image })
     }
 }
 
@@ -238,6 +272,11 @@ impl Page {
             && y < self.image.height() as f64 - 0.5;
         if inside { 1.0 - f64::from(self.image.bilinear(x, y)) / 255.0 } else { 0.0 }
     }
+}
+
+/// Whether the time for drawing is over; what is drawn after that is not looked at.
+fn is_over(end: Option<Instant>) -> bool {
+    end.is_some_and(|end| Instant::now() > end)
 }
 
 /// Whole pixels of a length.

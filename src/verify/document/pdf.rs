@@ -1,3 +1,5 @@
+use std::time::Instant;
+
 use hayro::hayro_interpret::InterpreterSettings;
 use hayro::hayro_syntax::page::Page;
 use hayro::kurbo::Affine;
@@ -5,7 +7,7 @@ use hayro::vello_cpu::color::palette::css::WHITE;
 use hayro::vello_cpu::{Pixmap, RasterizerSettings, RenderContext, Resources, TargetInit};
 use hayro::{RenderCache, RenderSettings, hayro_syntax, render_into};
 
-use super::{luma, pixels, stretch};
+use super::{is_over, luma, pixels, stretch};
 use crate::raster::Gray;
 
 const MM_PER_PT: f64 = 25.4 / 72.0;
@@ -38,7 +40,7 @@ impl Pdf {
         if upright == shown { [width, height] } else { [height, width] }
     }
 
-    pub fn render(&self, index: usize, px_per_mm: f64) -> Gray<u8> {
+    pub fn render(&self, index: usize, px_per_mm: f64, end: Option<Instant>) -> Gray<u8> {
         let page = &self.0.pages()[index];
         let [width_mm, height_mm] = self.size_mm(index);
         let (width, height) = (pixels(width_mm, px_per_mm), pixels(height_mm, px_per_mm));
@@ -46,6 +48,10 @@ impl Pdf {
         let cache = RenderCache::new();
         let mut grey = Vec::with_capacity(width * height);
         for y in (0..height).step_by(BAND) {
+            if is_over(end) {
+                grey.resize(width * height, 255);
+                break;
+            }
             band(page, &cache, scale, [width, BAND.min(height - y)], y, &mut grey);
         }
         stretch(Gray::from_vec(width, height, grey).expect("bands fill the page"))

@@ -3,6 +3,7 @@ use std::io::Cursor;
 use image::ImageReader;
 
 use super::stretch;
+use crate::limits::Limits;
 use crate::raster::Gray;
 
 /// A PNG with its resolution.
@@ -12,7 +13,7 @@ pub(super) struct Png {
 }
 
 impl Png {
-    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+    pub fn parse(bytes: &[u8], limits: &Limits) -> Result<Self, String> {
         let broken = |error: &dyn std::fmt::Display| format!("not a readable PNG ({error})");
         let reader =
             png::Decoder::new(Cursor::new(bytes)).read_info().map_err(|error| broken(&error))?;
@@ -26,6 +27,8 @@ impl Png {
                 );
             }
         };
+        let (width, height) = reader.info().size();
+        limits.check_pixels(width, height).map_err(|exceeded| exceeded.to_string())?;
         let mut reader = ImageReader::new(Cursor::new(bytes));
         reader.set_format(image::ImageFormat::Png);
         reader.no_limits();

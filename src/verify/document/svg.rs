@@ -1,8 +1,12 @@
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{self, roxmltree};
 
-use super::{luma, pixels, stretch};
+use super::{is_over, luma, pixels, stretch};
 use crate::export::{Block, SUBPIXELS, supersample};
+use crate::limits::{self, Broken};
 use crate::raster::Gray;
 
 /// An SVG, drawn by resvg.
@@ -32,21 +36,33 @@ impl Svg {
         self.size_mm
     }
 
-    pub fn render(&self, px_per_mm: f64) -> Gray<u8> {
+    pub fn render(&self, px_per_mm: f64, end: Option<Instant>) -> Result<Gray<u8>, String> {
         let [width, height] = self.size_mm.map(|mm| pixels(mm, px_per_mm));
         let scale = px_per_mm * self.size_mm[0] / f64::from(self.tree.size().width());
         let mut grey = Vec::with_capacity(width * height);
-        let drawn = supersample(
-            width,
-            height,
-            |block| self.coverage(block, scale),
-            |band| {
-                grey.extend_from_slice(band);
-                Ok::<_, std::convert::Infallible>(())
-            },
-        );
+        // Blocks are drawn on threads that are not this one.
+        let is_broken = AtomicBool::new(false);
+        let blank = |block: Block| vec![0; block.width * block.height * SUBPIXELS * SUBPIXELS];
+        let coverage = |block| {
+            if is_over(end) || is_broken.load(Ordering::Relaxed) {
+                return blank(block);
+            }
+            limits::caught(|| self.coverage(block, scale)).unwrap_or_else(|_| {
+                is_broken.store(true, Ordering::Relaxed);
+                blank(block)
+            })
+        };
+        let drawn = supersample(width, height, coverage, |band| {
+            grey.extend_from_slice(band);
+            Ok::<_, std::convert::Infallible>(())
+        });
+        if is_broken.into_inner() {
+            return Err(Broken::Panic.to_string());
+        }
         match drawn {
-            Ok(()) => stretch(Gray::from_vec(width, height, grey).expect("bands fill the page")),
+            Ok(()) => {
+                Ok(stretch(Gray::from_vec(width, height, grey).expect("bands fill the page")))
+            }
             Err(never) => match never {},
         }
     }
@@ -65,7 +81,7 @@ impl Svg {
 }
 
 /// A length with an absolute unit, mm; px are CSS pixels of 1/96 inch, and so are bare numbers.
-pub(in crate::verify) fn length_mm(text: &str) -> Option<f64> {
+fn length_mm(text: &str) -> Option<f64> {
     let number = text.trim().trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let mm = match text.trim()[number.len()..].to_ascii_lowercase().as_str() {
         "mm" => 1.0,

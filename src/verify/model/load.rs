@@ -1,37 +1,47 @@
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DVec3, Vec3};
+use image::ImageDecoder as _;
 
 use super::{Model, Triangle};
+use crate::limits::Limits;
 use crate::raster::Gray;
 use crate::verify::DocumentError;
+use crate::verify::document::bounded;
 
 /// Loads a `.glb` or an `.obj` with its material and texture.
-pub(in crate::verify) fn load(path: &Path) -> Result<Model, DocumentError> {
+pub(in crate::verify) fn load(path: &Path, limits: &Limits) -> Result<Model, DocumentError> {
     let unreadable = |problem: String| DocumentError::unreadable(path, problem);
     let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-    let model = if is_obj { obj(path) } else { glb(path) }.map_err(unreadable)?;
+    let (bytes, file, within) = (limits.read(path)?, path.to_owned(), *limits);
+    let model = bounded(path, limits, move || match is_obj {
+        true => obj(&bytes, &file, &within),
+        false => glb(&bytes, &within),
+    })?;
     if model.triangles.is_empty() {
         return Err(unreadable("it has no triangles".to_owned()));
     }
     Ok(model)
 }
 
-fn glb(path: &Path) -> Result<Model, String> {
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
-    let file = gltf::Gltf::from_slice(&bytes).map_err(|error| format!("not glTF: {error}"))?;
+fn glb(bytes: &[u8], limits: &Limits) -> Result<Model, String> {
+    let file = gltf::Gltf::from_slice(bytes).map_err(|error| format!("not glTF: {error}"))?;
     let blob = file.blob.as_deref().ok_or("it has no binary part")?;
     let mut triangles = Vec::new();
     let mut texture = None;
+    // The crate counts through all nodes for each child.
+    let nodes: Vec<gltf::Node> = file.nodes().collect();
     let roots = file.default_scene().into_iter().flat_map(|scene| scene.nodes());
-    // Every node is reached once, as was seen to before; chains of them may be long.
-    let mut open: Vec<(gltf::Node, DMat4)> = roots.map(|node| (node, DMat4::IDENTITY)).collect();
-    while let Some((node, parent)) = open.pop() {
-        let here = visit(&node, parent, blob, &mut triangles, &mut texture)?;
-        open.extend(node.children().map(|child| (child, here)));
+    // Every node is reached once, as was seen to before.
+    let mut open: Vec<(usize, DMat4)> = roots.map(|node| (node.index(), DMat4::IDENTITY)).collect();
+    while let Some((index, parent)) = open.pop() {
+        let here = visit(&nodes[index], parent, blob, &mut triangles, &mut texture)?;
+        let children = file.as_json().nodes[index].children.iter().flatten();
+        open.extend(children.map(|child| (child.value(), here)));
     }
     let texture = texture.ok_or("it has no texture")?;
-    Ok(Model { triangles, texture: image(texture)? })
+    Ok(Model { triangles, texture: image(texture, limits)? })
 }
 
 /// Adds the triangles of a node, and tells its motion; glTF is in metres.
@@ -69,9 +79,14 @@ fn visit<'a>(
     Ok(here)
 }
 
-fn obj(path: &Path) -> Result<Model, String> {
+fn obj(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model, String> {
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
-    let (models, materials) = tobj::load_obj(path, &options).map_err(|error| error.to_string())?;
+    let (models, materials) = tobj::load_obj_buf(&mut &*bytes, &options, |library| {
+        let library = limits.read(&path.with_file_name(library));
+        let library = library.map_err(|_| tobj::LoadError::OpenFileFailed)?;
+        tobj::load_mtl_buf(&mut &library[..])
+    })
+    .map_err(|error| error.to_string())?;
     let materials = materials.map_err(|error| format!("its material library: {error}"))?;
     let mut triangles = Vec::new();
     let mut texture: Option<PathBuf> = None;
@@ -94,9 +109,8 @@ fn obj(path: &Path) -> Result<Model, String> {
         texture = name.map(|name| path.with_file_name(name)).or(texture);
     }
     let texture = texture.ok_or("it has no texture")?;
-    let bytes =
-        std::fs::read(&texture).map_err(|error| format!("{}: {error}", texture.display()))?;
-    Ok(Model { triangles, texture: image(&bytes)? })
+    let bytes = limits.read(&texture).map_err(|error| error.to_string())?;
+    Ok(Model { triangles, texture: image(&bytes, limits)? })
 }
 
 /// Adds triangles from indexed lists.
@@ -128,9 +142,15 @@ fn add(
     Ok(())
 }
 
-fn image(bytes: &[u8]) -> Result<Gray<u8>, String> {
-    let decoded =
-        image::load_from_memory(bytes).map_err(|error| format!("its texture: {error}"))?;
+fn image(bytes: &[u8], limits: &Limits) -> Result<Gray<u8>, String> {
+    let broken = |error: &dyn std::fmt::Display| format!("its texture: {error}");
+    // Only PNG comes so far.
+    let mut reader = image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Png);
+    reader.no_limits();
+    let decoder = reader.into_decoder().map_err(|error| broken(&error))?;
+    let (width, height) = decoder.dimensions();
+    limits.check_pixels(width, height).map_err(|error| broken(&error))?;
+    let decoded = image::DynamicImage::from_decoder(decoder).map_err(|error| broken(&error))?;
     let grey = decoded.into_luma8();
     let (width, height) = (grey.width() as usize, grey.height() as usize);
     Gray::from_vec(width, height, grey.into_raw()).ok_or_else(|| "its texture is empty".to_owned())

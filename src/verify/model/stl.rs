@@ -2,8 +2,8 @@ use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
+use crate::limits::Limits;
 use crate::verify::DocumentError;
-use crate::verify::document::read;
 
 /// Bytes before the triangles of a binary STL, and of a triangle.
 const HEAD: usize = 84;
@@ -16,9 +16,12 @@ pub(in crate::verify) struct Facet {
 }
 
 /// Loads a binary STL.
-pub(in crate::verify) fn load_stl(path: &Path) -> Result<Vec<Facet>, DocumentError> {
+pub(in crate::verify) fn load_stl(
+    path: &Path,
+    limits: &Limits,
+) -> Result<Vec<Facet>, DocumentError> {
     let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
-    let bytes = read(path)?;
+    let bytes = limits.read(path)?;
     let (Some(head), Some(body)) = (bytes.get(..HEAD), bytes.get(HEAD..)) else {
         return Err(unreadable("too short for a binary STL"));
     };

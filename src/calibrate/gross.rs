@@ -1,0 +1,324 @@
+//! Gross errors, found before the last adjustment: panels, views, and panels in views that do not belong
+//! with the others.
+//!
+//! ```text
+//!   agree: all corners, with a loss that lets go of those far off, ever narrower
+//!      └─→ the panel of which most corners are off, where others are not, goes; again
+//!   wrong: medians of the rest, by view, and by panel in it
+//! ```
+//!
+//! What is wrong pulls what is right with it, least where the scale is the narrowest that still
+//! holds most corners. So the scale is walked down to before anything is called wrong.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
+
+use super::finding::{Count, Finding, Moved, Shared, shared_outliers};
+use super::loss::Loss;
+use super::minimise::{Until, minimise};
+use super::panel::PanelRef;
+use super::pose::planar_pose;
+use super::problem::{Block, Problem};
+use super::rig::middle;
+use super::settle::{Settled, deviations, residuals};
+use super::view::{LEAST_CORNERS, Sighting, View};
+use super::weights::{Weights, Whitening, median};
+use super::wrong::{limit_px, median_px};
+use crate::camera::Pose;
+
+/// The loss while the scale is walked down, as a part of the usual one: 1.5 deviations. A loss that
+/// lets go later comes to rest between two crowds of corners.
+const NARROW: f64 = 0.5;
+
+/// The walk ends when a round leaves more than this part of the scale, or after so many rounds.
+const STILL: f64 = 0.98;
+const MOST_ROUNDS: usize = 12;
+
+/// Panels of which one can be wrong: of two nothing tells which.
+const LEAST_PANELS: usize = 3;
+
+/// Corners farther outside their picture than it is large, by this factor, were not seen in it.
+const BEYOND: f64 = 1.0;
+
+/// A problem where most of its corners agree, and what does not belong.
+pub(super) struct Gross {
+    pub problem: Problem,
+    /// Blocks that take no part.
+    pub left_out: Vec<bool>,
+    /// Frames that do not belong.
+    pub frames: BTreeMap<usize, WrongFrame>,
+    /// The median error of frames that do, px.
+    pub usual_px: f64,
+    /// Panels that take no part.
+    panels: BTreeSet<PanelRef>,
+    /// The median error of every block, px.
+    off_px: Vec<f64>,
+}
+
+/// Why a frame does not belong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum WrongFrame {
+    /// The corners of a camera are off by so much.
+    Off { camera: usize, off_px: f64 },
+    /// Its corners are seen as in a mirror.
+    Mirrored,
+    /// It shows nothing but panels that take no part.
+    OnlyWrongPanels,
+}
+
+impl Gross {
+    /// Walks to where most corners of a problem agree, and finds what does not; `None` where nothing
+    /// can be adjusted.
+    pub(super) fn of(problem: Problem) -> Option<Self> {
+        let (problem, panels) = agree(problem)?;
+        let residuals = residuals(&problem);
+        let off_px: Vec<f64> = residuals.iter().map(median_px).collect();
+        // Of every camera in every frame.
+        let mut pictures: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+        for (index, block) in problem.blocks.iter().enumerate() {
+            if !panels.contains(&block.panel) {
+                pictures.entry((block.frame, block.camera)).or_default().push(index);
+            }
+        }
+        let medians: Vec<f64> = pictures
+            .values()
+            .map(|blocks| median_px(blocks.iter().flat_map(|&block| &residuals[block])))
+            .collect();
+        let limit = limit_px(&medians);
+        let mut left_out: Vec<bool> =
+            problem.blocks.iter().map(|block| panels.contains(&block.panel)).collect();
+        let mut frames: BTreeMap<usize, WrongFrame> = BTreeMap::new();
+        for block in mirrored(&problem) {
+            left_out[block] = true;
+        }
+        for ((&(frame, camera), blocks), &off) in pictures.iter().zip(&medians) {
+            if off > limit {
+                let worst = frames.entry(frame).or_insert(WrongFrame::Off { camera, off_px: off });
+                if matches!(worst, WrongFrame::Off { off_px, .. } if off > *off_px) {
+                    *worst = WrongFrame::Off { camera, off_px: off };
+                }
+            } else if blocks.iter().all(|&block| left_out[block]) {
+                frames.insert(frame, WrongFrame::Mirrored);
+            } else {
+                let wrong = |block: &&usize| nearest_px(&residuals[**block]) > limit;
+                blocks.iter().filter(wrong).for_each(|&block| left_out[block] = true);
+            }
+        }
+        for frame in 0..problem.frames.len() {
+            let mut of_frame = pictures.range((frame, 0)..=(frame, usize::MAX));
+            if of_frame.next().is_none() {
+                frames.insert(frame, WrongFrame::OnlyWrongPanels);
+            }
+        }
+        Some(Self { problem, left_out, frames, usual_px: median(medians), panels, off_px })
+    }
+
+    /// The problem without the frames that do not belong, and its blocks that take no part.
+    pub(super) fn kept(&self) -> (Problem, Vec<bool>) {
+        let belongs = |frame: usize| !self.frames.contains_key(&frame);
+        let of_blocks = self.problem.blocks.iter().zip(&self.left_out);
+        let left_out = of_blocks.filter(|(block, _)| belongs(block.frame)).map(|(_, out)| *out);
+        (self.problem.with_frames(belongs), left_out.collect())
+    }
+
+    /// What the outliers share; `names` are those of the frames, of the problem as it was at first.
+    pub(super) fn findings(
+        &self,
+        settled: &Settled,
+        names: impl Fn(usize) -> String,
+    ) -> Vec<Finding> {
+        let Settled { problem, outliers, .. } = settled;
+        let kept: Vec<usize> =
+            (0..self.problem.frames.len()).filter(|f| !self.frames.contains_key(f)).collect();
+        let (_, left_out) = self.kept();
+        let count = |belongs: &dyn Fn(&Block) -> bool| {
+            let mut count = Count::default();
+            let of_blocks = problem.blocks.iter().zip(outliers);
+            let of_blocks = of_blocks.filter(|(block, _)| belongs(block));
+            of_blocks.flat_map(|(_, outliers)| outliers).for_each(|&far| count.add(far));
+            count
+        };
+        let of_panels = self.panels.iter().map(|&panel| {
+            let Count { outliers, corners } = count(&|block| block.panel == panel);
+            let moved = moved(settled, panel);
+            Finding { shared: Shared::Panel { panel, moved }, outliers, corners, left_out: true }
+        });
+        let mut found: Vec<Finding> = of_panels.collect();
+        let single = self.problem.blocks.iter().zip(&self.left_out).zip(&self.off_px);
+        for ((block, _), &off_px) in single.filter(|((_, left_out), _)| **left_out) {
+            let Block { panel, camera, frame, ref observations } = *block;
+            if self.panels.contains(&panel) || self.frames.contains_key(&frame) {
+                continue;
+            }
+            let view = names(frame);
+            let corners = observations.len();
+            let shared = Shared::PanelInView { panel, camera, view, off_px };
+            found.push(Finding { shared, outliers: corners, corners, left_out: true });
+        }
+        found.extend(shared_outliers(problem, outliers, &left_out, |frame| names(kept[frame])));
+        found
+    }
+}
+
+/// What a quarter of the corners are off by at most, px: labels that are wrong fit none.
+fn nearest_px(residuals: &[[f64; 2]]) -> f64 {
+    let mut off: Vec<f64> = residuals.iter().map(|[x, y]| x.hypot(*y)).collect();
+    off.sort_by(f64::total_cmp);
+    off.get(off.len() / 4).copied().unwrap_or(f64::INFINITY)
+}
+
+/// The blocks of which the other side is seen than of most: a plane in a mirror has a pose like any
+/// other, from behind.
+fn mirrored(problem: &Problem) -> Vec<usize> {
+    let side = |block: &Block| {
+        let camera_from_target =
+            problem.cameras[block.camera].camera_from_rig.after(&problem.frames[block.frame]);
+        let pose = camera_from_target.after(&problem.panels[block.panel.index()].target_from_panel);
+        let corner = block.observations.first().map_or(DVec3::ZERO, |seen| seen.panel_mm);
+        (pose.rotation * DVec3::Z).dot(pose.apply(corner)).signum()
+    };
+    let sides: Vec<f64> = problem.blocks.iter().map(side).collect();
+    let most = sides.iter().sum::<f64>();
+    (0..sides.len()).filter(|&block| sides[block] * most < 0.0).collect()
+}
+
+/// Walks to where most corners agree, without the panels that most others speak against.
+fn agree(problem: Problem) -> Option<(Problem, BTreeSet<PanelRef>)> {
+    let seen: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
+    let mut wrong: BTreeSet<PanelRef> = BTreeSet::new();
+    let (all, sigma) = narrowed(problem.clone())?;
+    if seen.len() < LEAST_PANELS {
+        return Some((all, wrong));
+    }
+    let (mut current, mut sigma) = (all.clone(), sigma);
+    while let Some(panel) = worst_panel(&current, sigma, &wrong) {
+        wrong.insert(panel);
+        // Where as many are wrong as right, the target is another one.
+        if 2 * wrong.len() >= seen.len() {
+            return Some((all, BTreeSet::new()));
+        }
+        let mut part = current.part(|_, block| !wrong.contains(&block.panel));
+        (part.problem, sigma) = narrowed(part.problem)?;
+        current.take(part);
+    }
+    // What looked wrong beside what is may be right.
+    wrong.retain(|&panel| {
+        let (of_panel, others) = of_panel(&current, sigma, panel);
+        of_panel.stands_out(sum(of_panel, others))
+    });
+    Some((current, wrong))
+}
+
+fn sum(a: Count, b: Count) -> Count {
+    Count { outliers: a.outliers + b.outliers, corners: a.corners + b.corners }
+}
+
+/// Outliers on a panel, and on all others.
+fn of_panel(problem: &Problem, sigma: f64, panel: PanelRef) -> (Count, Count) {
+    let mut counts = panel_counts(problem, sigma);
+    let own = counts.remove(&panel).unwrap_or_default();
+    (own, counts.into_values().fold(Count::default(), sum))
+}
+
+fn panel_counts(problem: &Problem, sigma: f64) -> BTreeMap<PanelRef, Count> {
+    let mut counts: BTreeMap<PanelRef, Count> = BTreeMap::new();
+    let whitening = Whitening::fit(problem, Weights::Equal, &residuals(problem));
+    let limit = Whitening { sigma, ..whitening.clone() }.outlier_limit();
+    for (block, off) in problem.blocks.iter().zip(deviations(problem, &whitening)) {
+        let count = counts.entry(block.panel).or_default();
+        off.into_iter().for_each(|off| count.add(off > limit));
+    }
+    counts
+}
+
+/// The panel that stands out most among those that are not known to be wrong.
+fn worst_panel(problem: &Problem, sigma: f64, wrong: &BTreeSet<PanelRef>) -> Option<PanelRef> {
+    let mut counts = panel_counts(problem, sigma);
+    counts.retain(|panel, _| !wrong.contains(panel));
+    let all = counts.values().copied().fold(Count::default(), sum);
+    let most = counts.into_iter().filter(|(_, count)| count.stands_out(all));
+    most.max_by(|a, b| a.1.share().total_cmp(&b.1.share())).map(|(panel, _)| panel)
+}
+
+/// Walks to where most corners agree: with a loss that lets go of those far off, narrower in every
+/// round. The deviation of a coordinate there comes with it.
+fn narrowed(mut problem: Problem) -> Option<(Problem, f64)> {
+    let mut sigma = f64::INFINITY;
+    for _ in 0..MOST_ROUNDS {
+        let mut whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
+        if whitening.sigma > STILL * sigma {
+            break;
+        }
+        sigma = whitening.sigma;
+        whitening.sigma *= NARROW;
+        problem = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)?.problem;
+    }
+    Some((problem, sigma))
+}
+
+/// How far a panel that took no part is from its place: where its own corners have it while all
+/// others stay. `None` where no place explains them.
+fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
+    let Settled { problem, whitening, outliers, .. } = settled;
+    let of_panel = || problem.blocks.iter().filter(|block| block.panel == panel);
+    let places = of_panel().filter_map(|block| {
+        let unknowns = &problem.cameras[block.camera];
+        let camera_from_panel = planar_pose(&unknowns.camera, &block.observations)?;
+        let camera_from_target = unknowns.camera_from_rig.after(&problem.frames[block.frame]);
+        Some(camera_from_target.inverse().after(&camera_from_panel))
+    });
+    let places: Vec<Pose> = places.collect();
+    let start = if places.is_empty() { return None } else { middle(&places) };
+    let stated = problem.panels[panel.index()].target_from_panel;
+    let counting: Vec<Vec<bool>> = problem
+        .blocks
+        .iter()
+        .zip(outliers)
+        .map(|(block, outliers)| outliers.iter().map(|far| block.panel == panel || !far).collect())
+        .collect();
+    let mut free = problem.with_corners(&counting);
+    free.panels[panel.index()].target_from_panel = start;
+    free.panels[panel.index()].pose_free = true;
+    let (found, _) = narrowed(free)?;
+    let mut count = Count::default();
+    for (block, off) in found.blocks.iter().zip(deviations(&found, whitening)) {
+        if block.panel == panel {
+            off.into_iter().for_each(|off| count.add(off > whitening.outlier_limit()));
+        }
+    }
+    let place = found.panels[panel.index()].target_from_panel;
+    let seen = || of_panel().flat_map(|block| &block.observations).map(|seen| seen.panel_mm);
+    let middle = seen().sum::<DVec3>() / seen().count().max(1) as f64;
+    (2 * count.outliers < count.corners).then(|| Moved {
+        by_mm: place.apply(middle).distance(stated.apply(middle)),
+        turned_rad: place.rotation.angle_between(stated.rotation),
+    })
+}
+
+/// The views without corners that lie far beyond their pictures, and what was left out.
+pub(super) fn within_pictures(views: &[View], camera: usize) -> (Vec<View>, Vec<Finding>) {
+    let mut found = Vec::new();
+    let of_view = |view: &View| {
+        let is_within = |pixel: [f64; 2]| {
+            pixel.iter().zip(view.size_px).all(|(v, size)| {
+                let size = f64::from(size);
+                (-BEYOND * size..=(1.0 + BEYOND) * size).contains(v)
+            })
+        };
+        let sightings = view.sightings.iter().map(|sighting| {
+            let within = sighting.observations.iter().filter(|seen| is_within(seen.pixel));
+            Sighting { panel: sighting.panel, observations: within.copied().collect() }
+        });
+        let sightings = sightings.filter(|sighting| !sighting.observations.is_empty());
+        let within = View { sightings: sightings.collect(), ..view.clone() };
+        let (corners, left) = (view.corner_count(), within.corner_count());
+        if left < corners {
+            let shared = Shared::Beyond { camera, view: view.name.clone() };
+            let outliers = corners - left;
+            found.push(Finding { shared, outliers, corners, left_out: true });
+        }
+        (left == corners || left >= LEAST_CORNERS).then_some(within)
+    };
+    (views.iter().filter_map(of_view).collect(), found)
+}

@@ -1,0 +1,45 @@
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+/// One of the panels of what was photographed.
+///
+/// It has a place among them, by which everything that is kept for each is found, and an id, which stands
+/// in the target's file and on the print. Only the id is shown and written, and only the place finds anything.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PanelRef {
+    index: usize,
+    id: u32,
+}
+
+impl PanelRef {
+    /// The only panel of an untagged board that no file describes.
+    pub const ONLY: Self = Self { index: 0, id: 0 };
+
+    /// The panel with this place and this id.
+    pub fn new(index: usize, id: u32) -> Self {
+        Self { index, id }
+    }
+
+    /// Its place among the panels of the target.
+    pub fn index(self) -> usize {
+        self.index
+    }
+
+    /// Its id.
+    pub fn id(self) -> u32 {
+        self.id
+    }
+}
+
+impl fmt::Display for PanelRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.id.fmt(f)
+    }
+}
+
+impl Serialize for PanelRef {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.id.serialize(serializer)
+    }
+}

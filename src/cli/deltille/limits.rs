@@ -1,0 +1,77 @@
+//! The options that say how much of a file is read.
+
+use crate::limits::Limits;
+
+/// Heading of these options in the help.
+const HEADING: &str = "Limits of what is read";
+
+/// The limit of files of text.
+#[derive(clap::Args)]
+pub struct FileLimits {
+    /// Most bytes of a file, such as 500M [default: 200M]
+    #[arg(long, help_heading = HEADING, value_name = "BYTES", value_parser = count)]
+    max_bytes: Option<u64>,
+}
+
+/// The limits of commands that read pictures or take them.
+#[derive(clap::Args)]
+pub struct ImageLimits {
+    #[command(flatten)]
+    files: FileLimits,
+    /// Most pixels of a picture, and of all that are looked at at a time, such as 400M
+    /// [default: 150M]
+    #[arg(long, help_heading = HEADING, value_name = "PIXELS", value_parser = count)]
+    max_pixels: Option<u64>,
+}
+
+/// All limits.
+#[derive(clap::Args)]
+pub struct AllLimits {
+    #[command(flatten)]
+    images: ImageLimits,
+    /// Most parts of a file: elements, operators, nodes, triangles [default: 4M]
+    #[arg(long, help_heading = HEADING, value_name = "PARTS", value_parser = count)]
+    max_nodes: Option<u64>,
+    /// How deep parts may lie within each other [default: 64]
+    #[arg(long, help_heading = HEADING, value_name = "LEVELS", value_parser = clap::value_parser!(u16).range(1..))]
+    max_depth: Option<u16>,
+    /// Most seconds for reading a file, and for drawing a page [default: 60]
+    #[arg(long, help_heading = HEADING, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
+    max_seconds: Option<u32>,
+}
+
+impl FileLimits {
+    pub fn limits(&self) -> Limits {
+        let default = Limits::default();
+        Limits { max_bytes: self.max_bytes.unwrap_or(default.max_bytes), ..default }
+    }
+}
+
+impl ImageLimits {
+    pub fn limits(&self) -> Limits {
+        let files = self.files.limits();
+        Limits { max_pixels: self.max_pixels.unwrap_or(files.max_pixels), ..files }
+    }
+}
+
+impl AllLimits {
+    pub fn limits(&self) -> Limits {
+        let images = self.images.limits();
+        Limits {
+            max_nodes: self.max_nodes.unwrap_or(images.max_nodes),
+            max_depth: self.max_depth.map_or(images.max_depth, usize::from),
+            max_seconds: self.max_seconds.map_or(images.max_seconds, f64::from),
+            ..images
+        }
+    }
+}
+
+/// A whole number above zero, with k, M or G for thousands, millions and milliards.
+fn count(text: &str) -> Result<u64, String> {
+    let unit = |suffix: char, factor: u64| Some((text.strip_suffix(suffix)?, factor));
+    let units = [unit('k', 1_000), unit('M', 1_000_000), unit('G', 1_000_000_000)];
+    let (digits, factor) = units.into_iter().flatten().next().unwrap_or((text, 1));
+    let number = digits.parse::<u64>().ok().and_then(|number| number.checked_mul(factor));
+    let number = number.filter(|&number| number > 0);
+    number.ok_or_else(|| "give a whole number above 0, such as 200000, 500k, 150M or 2G".to_owned())
+}
