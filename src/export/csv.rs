@@ -1,4 +1,5 @@
-//! Detections as comma-separated values, one corner a line, for spreadsheets and data frames.
+//! Detections as comma-separated values, one corner a line, for spreadsheets and data frames; and
+//! lists of points, which are read.
 //!
 //! Columns: `grid` (counted from 0 in the image), `kind`, `panel`, `row`, `col`, `id`, `x`, `y`
 //! (px, pixel centres at integers, y down), `cov_xx`, `cov_xy`, `cov_yy` (px²). A cell is empty
@@ -32,4 +33,22 @@ pub fn write(detection: &Detection) -> String {
         }
     }
     text
+}
+
+/// Reads points, `x,y` a line, in px; a header line and empty lines are skipped. The error names the
+/// line.
+pub fn read_points(text: &str) -> Result<Vec<[f64; 2]>, String> {
+    let mut points = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+        let numbers: Option<Vec<f64>> =
+            fields.iter().map(|f| f.parse().ok().filter(|n: &f64| n.is_finite())).collect();
+        match numbers.as_deref() {
+            Some(&[x, y]) => points.push([x, y]),
+            _ if line.trim().is_empty() => {}
+            _ if i == 0 && fields == ["x", "y"] => {}
+            _ => return Err(format!("line {}: write x,y in px, not {line:?}", i + 1)),
+        }
+    }
+    Ok(points)
 }

@@ -16,7 +16,7 @@ mod pose;
 mod refine;
 mod render;
 mod rig;
-mod settings;
+pub mod settings;
 mod sightings;
 mod solid;
 mod target_file;

@@ -4,12 +4,13 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow};
 use clap::ValueEnum;
 
 use super::limits::ImageLimits;
 use crate::cli::output::{self, Overwrite};
 use crate::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
+use crate::export::csv;
 use crate::limits::Limits;
 use crate::raster::{self, AnyGray};
 use crate::target::GridKind;
@@ -116,19 +117,6 @@ fn table(refined: &[Refined]) -> String {
 }
 
 fn read_seeds(path: &Path, limits: &Limits) -> anyhow::Result<Vec<[f64; 2]>> {
-    let show = path.display();
     let text = limits.read_text(path)?;
-    let mut seeds = Vec::new();
-    for (i, line) in text.lines().enumerate() {
-        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-        let numbers: Option<Vec<f64>> =
-            fields.iter().map(|f| f.parse().ok().filter(|n: &f64| n.is_finite())).collect();
-        match numbers.as_deref() {
-            Some(&[x, y]) => seeds.push([x, y]),
-            _ if line.trim().is_empty() => {}
-            _ if i == 0 && fields == ["x", "y"] => {}
-            _ => bail!("{show}: line {}: write x,y in px, not {line:?}", i + 1),
-        }
-    }
-    Ok(seeds)
+    csv::read_points(&text).map_err(|problem| anyhow!("{}: {problem}", path.display()))
 }

@@ -146,13 +146,21 @@ fn is_false(value: &bool) -> bool {
 
 /// Settings understood.
 pub struct Plan {
+    /// Stem of the files' names.
     pub name: String,
+    /// The board.
     pub spec: BoardSpec,
+    /// What it is printed on.
     pub paper: PaperSpec,
+    /// Whether there is a PDF,
     pub pdf: bool,
+    /// an SVG for each page,
     pub svg: bool,
+    /// a PNG for each,
     pub png: bool,
+    /// a list for other detectors.
     pub dsc: Option<Dialect>,
+    /// Resolution of the PNG, dots per inch.
     pub dpi: u32,
 }
 

@@ -1,0 +1,136 @@
+//! What each reader does with a file, and what must hold of what it has read.
+
+use std::path::Path;
+
+use deltille::camera::Camera;
+use deltille::cli::deltille::settings::Settings;
+use deltille::export::dsc::{self, Dialect};
+use deltille::export::{calibration, csv, detection as detections, obj, orpc};
+use deltille::family::Family;
+use deltille::limits::Limits;
+use deltille::raster;
+use deltille::target::{GridKind, Target};
+use deltille::verify::Verifier;
+use glam::DVec3;
+
+use super::good::{BOARD, FAMILY, SOLID};
+
+/// A file, and what is in it.
+pub struct File<'a> {
+    pub path: &'a Path,
+    pub bytes: &'a [u8],
+}
+
+impl File<'_> {
+    fn text(&self) -> Option<&str> {
+        std::str::from_utf8(self.bytes).ok()
+    }
+}
+
+/// A hundredth of the default, so that what gets by shows soon.
+fn limits() -> Limits {
+    Limits {
+        max_bytes: 2_000_000,
+        max_pixels: 1_500_000,
+        max_nodes: 40_000,
+        max_seconds: 20.0,
+        ..Limits::default()
+    }
+}
+
+fn assert_finite(numbers: impl IntoIterator<Item = f64>) {
+    numbers.into_iter().for_each(|number| assert!(number.is_finite(), "{number} was let in"));
+}
+
+pub fn target(file: File) {
+    let Some(Ok(target)) = file.text().map(Target::from_json) else { return };
+    for panel in &target.panels {
+        let corners = panel.corners.iter();
+        assert_finite(corners.flat_map(|c| c.panel_mm.into_iter().chain(c.target_mm)));
+    }
+    let again = Target::from_json(&target.to_json()).expect("what is written is read");
+    assert_eq!(again, target);
+}
+
+pub fn detection(file: File) {
+    let Some(Ok(found)) = file.text().map(detections::read) else { return };
+    assert_finite(found.grids.iter().flat_map(|grid| &grid.corners).flat_map(|c| [c.x, c.y]));
+    let again = detections::read(&detections::write(&found)).expect("what is written is read");
+    assert_eq!(again, found);
+    for list in [csv::write(&found), orpc::write(&found, None), orpc::write(&found, Some(&BOARD))] {
+        assert!(!list.contains("NaN") && !list.contains("inf"), "{list}");
+    }
+}
+
+pub fn sheet(file: File) {
+    let Some(Ok(sheet)) = file.text().map(calibration::read_sheet) else { return };
+    assert_finite(sheet.print_scale.into_iter().flatten());
+}
+
+pub fn family(file: File) {
+    let Some(Ok(family)) = file.text().map(Family::from_json) else { return };
+    assert_eq!(Family::from_json(&family.to_json()).expect("what is written is read"), family);
+}
+
+pub fn camera(file: File) {
+    let Some(Ok(camera)) = file.text().map(Camera::from_yaml) else { return };
+    assert_eq!(Camera::from_yaml(&camera.to_yaml()).expect("what is written is read"), camera);
+    for point in [DVec3::Z, DVec3::new(0.3, -0.2, 1.0), DVec3::new(1.0, 1.0, 1e-9), DVec3::NEG_Z] {
+        assert_finite(camera.project(point).into_iter().flatten());
+    }
+    let _ = camera.unproject([1.0, 2.0]);
+}
+
+pub fn template(file: File) {
+    for grid in [GridKind::Deltille, GridKind::Checker] {
+        let Ok(settings) = Settings::read(file.path, grid) else { continue };
+        let _ = settings.plan(grid);
+    }
+}
+
+pub fn points(file: File) {
+    let Some(Ok(points)) = file.text().map(csv::read_points) else { return };
+    assert_finite(points.into_iter().flatten());
+}
+
+pub fn dsc(file: File) {
+    let Some(Ok(list)) = file.text().map(|text| dsc::read(text, "b")) else { return };
+    let corners = list.panels.iter().flat_map(|panel| &panel.corners);
+    assert_finite(corners.flat_map(|c| c.panel_mm.into_iter().chain(c.target_mm)));
+    for dialect in [Dialect::Fork, Dialect::Original] {
+        let Ok(text) = dsc::write(&list, dialect) else { continue };
+        dsc::read(&text, "b").expect("what is written is read");
+    }
+}
+
+pub fn mesh(file: File) {
+    let Ok((mesh, _)) = obj::read(file.bytes) else { return };
+    assert_finite(mesh.vertices().iter().flat_map(|v| v.to_array()));
+}
+
+pub fn photograph(file: File) {
+    for accept_damaged in [false, true] {
+        let Ok(photograph) = raster::photograph(file.path, &limits(), accept_damaged) else {
+            continue;
+        };
+        assert!(photograph.image.width() * photograph.image.height() <= 1_500_000);
+        assert!(accept_damaged || photograph.notes.damage.is_none());
+    }
+}
+
+pub fn page(file: File) {
+    verify(&BOARD, file.path);
+}
+
+pub fn solid(file: File) {
+    verify(&SOLID, file.path);
+}
+
+fn verify(target: &Target, path: &Path) {
+    let verifier = Verifier::new(target, Some(&FAMILY)).expect("it was built with this family");
+    let Ok(verdict) = verifier.within(limits()).verify(path) else { return };
+    let sheets = verdict.sheets.iter().flat_map(|sheet| &sheet.findings);
+    let faces = verdict.faces.iter().flat_map(|face| &face.findings);
+    let findings = verdict.findings.iter().chain(sheets).chain(faces).count();
+    assert_eq!(verdict.passed, findings == 0, "{verdict}");
+}
