@@ -88,6 +88,7 @@ fn panels(value: &Value, found: &mut Vec<u64>) {
 
 /// Every panel, or board, that a text names by a number.
 fn named(text: &str) -> Vec<u64> {
+    let text = text.to_lowercase();
     let words: Vec<&str> =
         text.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect();
     let names = |pair: &&[&str]| matches!(pair[0], "panel" | "board" | "panels" | "boards");

@@ -1,10 +1,10 @@
 //! Whatever comes in, nothing panics, and what comes out is finite.
 
 use deltille::camera::Camera;
-use deltille::detect::{Detection, Detector, DetectorConfig};
+use deltille::detect::{Detection, Detector, DetectorConfig, Pixel};
 use deltille::export::{detection, dsc, obj};
 use deltille::family::Family;
-use deltille::raster::{self, Gray, Intensity};
+use deltille::raster::{self, Gray};
 use deltille::target::{
     BoardSpec, GridKind, PaperSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec,
 };
@@ -34,7 +34,7 @@ fn detectors() -> [Detector; 3] {
     ]
 }
 
-fn nothing_in<T: Intensity>(image: &Gray<T>) {
+fn nothing_in<T: Pixel>(image: &Gray<T>) {
     for detector in detectors() {
         assert!(detector.detect(image, "").grids.is_empty());
     }

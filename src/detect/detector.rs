@@ -14,6 +14,7 @@ use super::ink::{Ink, InkEstimate};
 use super::label::Budget;
 use super::labels::{Labels, report_once};
 use super::optics::Optics;
+use super::pixel::Pixel;
 use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
 use super::refine_grid::{is_sampled, sharp_level};
@@ -154,7 +155,11 @@ impl Detector {
     }
 
     /// Finds grids in one image; `name` is only noted in the result.
-    pub fn detect<T: Intensity>(&self, image: &Gray<T>, name: &str) -> Detection {
+    pub fn detect<T: Pixel>(&self, image: &Gray<T>, name: &str) -> Detection {
+        T::detect(self, image, name)
+    }
+
+    pub(super) fn detect_in<T: Intensity>(&self, image: &Gray<T>, name: &str) -> Detection {
         match &self.finder {
             Finder::Deltille(finder) => self.detect_with(finder, image, name),
             Finder::Checker(finder) => self.detect_with(finder, image, name),
@@ -254,8 +259,9 @@ impl Detector {
                 Some(Reason::new(ReasonKind::TooSmall, figures))
             } else if corners > most {
                 let figures = [("corners", corners as f64), ("expected", most as f64)];
-                // Where there are tags, they tell more.
-                no_labels.clone().or_else(|| Some(Reason::new(ReasonKind::NotWhole, figures)))
+                // Tags that were read tell more.
+                let by_tags = no_labels.clone().filter(|reason| reason.kind.is_of_tags_read());
+                by_tags.or_else(|| Some(Reason::new(ReasonKind::NotWhole, figures)))
             } else {
                 None
             };

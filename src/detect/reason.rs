@@ -70,6 +70,13 @@ pub enum ReasonKind {
     TooManyGrids,
 }
 
+impl ReasonKind {
+    /// Whether tags were read, and belong elsewhere.
+    pub(super) fn is_of_tags_read(self) -> bool {
+        matches!(self, Self::OtherIds | Self::OtherLayout | Self::OtherFamily)
+    }
+}
+
 impl Reason {
     /// A reason with what was measured.
     pub(super) fn new<const N: usize>(kind: ReasonKind, figures: [(&str, f64); N]) -> Self {

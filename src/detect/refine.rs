@@ -20,6 +20,7 @@ use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Wi
 use super::corner_start::{start, start_along};
 use super::curve::Tone;
 use super::optics::{Optics, SAMPLES, Sample};
+use super::pixel::Pixel;
 use super::polynomial::Polynomial;
 use crate::raster::{Gray, Intensity};
 use crate::target::GridKind;
@@ -210,12 +211,20 @@ impl Refiner {
     /// The corner near `start`, in the whole window.
     ///
     /// An unknown tone curve is estimated from this corner; [`Self::refine_all`] asks all of a picture.
-    pub fn refine<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Refined {
+    pub fn refine<T: Pixel>(&self, image: &Gray<T>, start: [f64; 2]) -> Refined {
         self.refine_all(image, &[start])[0]
     }
 
     /// The corners of a picture near `starts`, each in the whole window.
-    pub fn refine_all<T: Intensity>(&self, image: &Gray<T>, starts: &[[f64; 2]]) -> Vec<Refined> {
+    pub fn refine_all<T: Pixel>(&self, image: &Gray<T>, starts: &[[f64; 2]]) -> Vec<Refined> {
+        T::refine_all(self, image, starts)
+    }
+
+    pub(super) fn refine_in<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        starts: &[[f64; 2]],
+    ) -> Vec<Refined> {
         let mut fitter = CornerFitter::default();
         let mut fit = |start: &[f64; 2]| self.refine_with(&mut fitter, image, *start, &self.known);
         let first: Vec<(Refined, Option<Fit>)> = starts.iter().map(&mut fit).collect();

@@ -10,6 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::model::{Facet, load_stl};
+use super::solid::MOST_TRIANGLES;
 use super::{BodyVerdict, DocumentError, Finding, Format, MESH_TOLERANCE_MM, Verdict, Verifier};
 use crate::export::stl::skeleton_name;
 use crate::target::{ClosedMesh, Incircle, Polyhedron, Skeleton, SkeletonSpec, TargetSpec};
@@ -44,12 +45,28 @@ pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, Docume
         seats: 0,
         max_deviation_mm: 0.0,
     };
-    let mut findings = check_surface(&facets);
     let is_skeleton = artifact.ends_with(&skeleton_name(""));
-    match spec.skeleton.as_ref().filter(|_| is_skeleton) {
-        Some(skeleton) => check_seats(&facets, &solid, skeleton, &mut body, &mut findings),
+    let skeleton = match spec.skeleton.as_ref().filter(|_| is_skeleton) {
+        Some(skeleton) => Some((
+            Skeleton::new(&solid, skeleton).map_err(|error| unreadable(&error.to_string()))?,
+            skeleton,
+        )),
         None if is_skeleton => return Err(unreadable("the target has no skeleton")),
-        None => check_faces(&facets, &solid, &mut body, &mut findings),
+        None => None,
+    };
+    let stated = skeleton.as_ref().map_or(solid.faces.len(), |(s, _)| s.triangles_mm.len());
+    let mut findings = Vec::new();
+    if facets.len() > MOST_TRIANGLES * stated {
+        let problem = format!("{} triangles instead of {stated}", facets.len());
+        findings.push(Finding::Body { problem });
+    } else {
+        findings = check_surface(&facets);
+        match skeleton {
+            Some((skeleton, spec)) => {
+                check_seats(&facets, &solid, (&skeleton, spec), &mut body, &mut findings);
+            }
+            None => check_faces(&facets, &solid, &mut body, &mut findings),
+        }
     }
     Ok(Verdict { body: Some(body), ..Verdict::new(path, Format::Stl, findings) })
 }
@@ -124,14 +141,10 @@ fn check_faces(
 fn check_seats(
     facets: &[Facet],
     solid: &Polyhedron,
-    spec: &SkeletonSpec,
+    (skeleton, spec): (&Skeleton, &SkeletonSpec),
     body: &mut BodyVerdict,
     findings: &mut Vec<Finding>,
 ) {
-    let skeleton = match Skeleton::new(solid, spec) {
-        Ok(skeleton) => skeleton,
-        Err(error) => return findings.push(Finding::Body { problem: error.to_string() }),
-    };
     let (thickness, through) = (spec.panel_thickness_mm, spec.panel_thickness_mm + spec.wall_mm);
     let (rib, window) = (skeleton.rib_mm, skeleton.window_mm);
     // Distance from the edges, and the depth there; `None` in the window.

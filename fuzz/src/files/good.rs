@@ -20,7 +20,7 @@ pub static FAMILY: LazyLock<Family> = LazyLock::new(|| Family::resolve("d16h5").
 
 /// A board of which there are pages.
 pub static BOARD: LazyLock<Target> = LazyLock::new(|| {
-    let mut spec = BoardSpec::new(GridKind::Deltille, 3, 4, 14.0);
+    let mut spec = BoardSpec::new(GridKind::Deltille, 3, 4, 9.0);
     if let Some(tags) = &mut spec.tags {
         tags.family = "d16h5".to_owned();
     }
