@@ -25,6 +25,9 @@ impl Name {
                 "{name:?} may hold only ASCII letters (A-Z, a-z), digits, -, _ and ., and not start with . or -"
             ));
         }
+        if is_reserved(name) || name.ends_with('.') {
+            return Err(format!("{name:?} is no name of a file on every system"));
+        }
         Ok(Self(name.to_owned()))
     }
 
@@ -32,7 +35,8 @@ impl Name {
     pub fn like(text: &str) -> Self {
         let plain = text.trim_start_matches(['.', '-', '/', '\\']).chars().take(LONGEST);
         let name: String = plain.map(|c| if is_plain(c) { c } else { '-' }).collect();
-        Self(if name.is_empty() { "target".to_owned() } else { name })
+        let name = name.trim_end_matches('.');
+        Self(if name.is_empty() || is_reserved(name) { "target" } else { name }.to_owned())
     }
 }
 
@@ -50,6 +54,16 @@ pub(crate) fn within(path: &str) -> &str {
 
 /// What separates folders, here or elsewhere.
 const SEPARATORS: [char; 2] = ['/', '\\'];
+
+/// Whether Windows takes a file of this name for a device.
+fn is_reserved(name: &str) -> bool {
+    let stem = name.split('.').next().unwrap_or_default().to_ascii_lowercase();
+    let numbered = |kind| {
+        let number = stem.strip_prefix(kind);
+        number.is_some_and(|n| n.len() == 1 && n.as_bytes()[0].is_ascii_digit())
+    };
+    matches!(stem.as_str(), "con" | "prn" | "aux" | "nul") || numbered("com") || numbered("lpt")
+}
 
 fn is_plain(c: char) -> bool {
     c.is_ascii_alphanumeric() || "-_.".contains(c)

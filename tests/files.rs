@@ -296,7 +296,10 @@ fn signals_end_the_work_soon_and_leave_nothing() {
         assert_eq!(output.status.code(), Some(code), "{args}: {said}");
         assert!(said.starts_with("interrupted: ") && said.lines().count() == 1, "{args}: {said}");
         assert!(took < SOON, "{args}: {took:?}");
-        assert!(names(folder.path()).is_empty(), "{args}: {:?}", names(folder.path()));
+        // Detections of pictures that were done in time stay.
+        let is_done = |name: &String| args.starts_with("detect") && name == "board.json";
+        let left: Vec<String> = names(folder.path()).into_iter().filter(|n| !is_done(n)).collect();
+        assert!(left.is_empty(), "{args}: {left:?}");
         eprintln!("{args}: {took:?} after {signal}");
     }
 }

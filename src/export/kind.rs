@@ -130,7 +130,7 @@ impl Kind {
         }
         let marked = text.lines().take(HEAD_LINES).find_map(marked);
         let words = plain(first);
-        Self::words(match marked {
+        Self::words(match marked.filter(|marked| *marked != words) {
             Some(marked) => format!("a text that begins `{words}`, by {marked}"),
             None => format!("a text that begins `{words}`"),
         })

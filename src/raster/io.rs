@@ -6,8 +6,9 @@
 //!   OpenCV with `IMREAD_IGNORE_ORIENTATION`; the orientation is noted;
 //! - colour profiles and gamma chunks are not applied: corners come with an estimate of the tone curve of their own;
 //! - of a TIFF there must be one page, thumbnails (reduced images) aside, and of an animation the first picture is taken;
-//! - a JPEG whose pixels do not all come from the file is damaged, and not read unless that is asked for; all other
-//!   formats are read whole or not at all.
+//! - a JPEG whose pixels do not all come from the file, or do not need all of it, is damaged, and not read unless that is
+//!   asked for; all other formats are read whole or not at all. Neither JPEG nor WebP has check sums: of changed bytes that
+//!   make as many pixels nothing tells.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek};
@@ -36,6 +37,13 @@ const HEAD_BYTES: u64 = 64;
 
 /// What strict readers of JPEG refuse although no pixel depends on it.
 const PADDING: &str = "Extra bytes between headers";
+
+/// The marker that ends a JPEG.
+const END_OF_IMAGE: &[u8] = &[0xFF, 0xD9];
+
+/// Bytes that hold some of the last pixels, and so many as no block of pixels has.
+const LAST_BYTES: usize = 4;
+const NOISE_BYTES: u32 = 1000;
 
 /// A photograph, and what its file says beside its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -298,11 +306,7 @@ impl<'a> ImageFile<'a> {
         let (Some(ImageFormat::Jpeg), Some(bytes)) = (self.format, &self.bytes) else {
             return Ok(None);
         };
-        let strict = DecoderOptions::default()
-            .set_strict_mode(true)
-            .set_max_width(usize::MAX)
-            .set_max_height(usize::MAX);
-        let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes.as_slice()), strict);
+        let mut decoder = jpeg_decoder(bytes, true);
         let pixels = match decoder.decode() {
             Ok(pixels) => pixels,
             Err(error) => {
@@ -310,6 +314,7 @@ impl<'a> ImageFile<'a> {
                 return if problem.contains(PADDING) { Ok(None) } else { Err(told(&problem)) };
             }
         };
+        check_scans(bytes, &pixels)?;
         let (width, height) = decoder.dimensions().unwrap_or_default();
         let as_seen = matches!(
             decoder.input_colorspace(),
@@ -317,6 +322,53 @@ impl<'a> ImageFile<'a> {
         );
         let image = RgbImage::from_raw(width as u32, height as u32, pixels);
         Ok(image.filter(|_| as_seen).map(DynamicImage::ImageRgb8))
+    }
+}
+
+fn jpeg_decoder(bytes: &[u8], strict: bool) -> JpegDecoder<ZCursor<&[u8]>> {
+    let options = DecoderOptions::default()
+        .set_strict_mode(strict)
+        .set_max_width(usize::MAX)
+        .set_max_height(usize::MAX);
+    JpegDecoder::new_with_options(ZCursor::new(bytes), options)
+}
+
+/// Refuses a JPEG whose pixels do not need all of its bytes, or need more: its decoder fills what is missing with grey
+/// and leaves what is too much, without a word. So it is asked twice more, with noise behind the pixels, which must not
+/// show, and in the place of the last bytes, which must.
+fn check_scans(bytes: &[u8], pixels: &[u8]) -> Result<(), String> {
+    let end = end_of_scans(bytes).unwrap_or(bytes.len());
+    let padding = bytes[..end].iter().rev().take_while(|byte| matches!(byte, 0 | 0xFF)).count();
+    let last = (end - padding).saturating_sub(LAST_BYTES);
+    // Not 0xFF, with which markers begin.
+    let noise: Vec<u8> =
+        (1..NOISE_BYTES).map(|i| (i.wrapping_mul(0x9E37_79B9) >> 25) as u8).collect();
+    let with = |upto: usize, noise: &[u8]| {
+        let changed = [&bytes[..upto], noise, END_OF_IMAGE].concat();
+        jpeg_decoder(&changed, false).decode().is_ok_and(|found| found == pixels)
+    };
+    let (is_enough, is_too_much) =
+        rayon::join(|| with(end, &noise), || with(last, &noise[..LAST_BYTES + padding]));
+    match (is_enough, is_too_much) {
+        (false, _) => Err("not all pixels are in it".to_owned()),
+        (_, true) => Err("it has more than its pixels".to_owned()),
+        (true, false) => Ok(()),
+    }
+}
+
+/// Where the marker is that ends the picture, if there is one.
+fn end_of_scans(bytes: &[u8]) -> Option<usize> {
+    let mut at = 2;
+    loop {
+        // In a scan 0xFF is followed by 0 or a restart.
+        let is_marker =
+            |pair: &[u8]| pair[0] == 0xFF && !matches!(pair[1], 0 | 1 | 0xD0..=0xD8 | 0xFF);
+        at += bytes.get(at..)?.windows(2).position(is_marker)?;
+        if bytes[at..].starts_with(END_OF_IMAGE) {
+            return Some(at);
+        }
+        let length = bytes.get(at + 2..)?.first_chunk::<2>()?;
+        at += 2 + usize::from(u16::from_be_bytes(*length));
     }
 }
 

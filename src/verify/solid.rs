@@ -43,7 +43,7 @@ const NORMAL_SLACK: f64 = 1e-4;
 const MAX_SCALE_ERROR: f64 = 0.05;
 
 /// A mesh with so many times the stated triangles is not looked at any further either.
-pub(super) const MOST_TRIANGLES: usize = 4;
+pub(super) const MOST_TRIANGLES: usize = 2;
 
 /// Reads a mesh from disk and compares it with the target.
 pub(super) fn verify(

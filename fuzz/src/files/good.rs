@@ -16,13 +16,13 @@ use image::{DynamicImage, GrayImage, ImageFormat};
 use tempfile::TempDir;
 
 /// The family of the tags.
-pub static FAMILY: LazyLock<Family> = LazyLock::new(|| Family::resolve("d16h5").unwrap());
+pub static FAMILY: LazyLock<Family> = LazyLock::new(|| Family::resolve("delTag16h5").unwrap());
 
 /// A board of which there are pages.
 pub static BOARD: LazyLock<Target> = LazyLock::new(|| {
     let mut spec = BoardSpec::new(GridKind::Deltille, 3, 4, 9.0);
     if let Some(tags) = &mut spec.tags {
-        tags.family = "d16h5".to_owned();
+        tags.family = "delTag16h5".to_owned();
     }
     let paper = PaperSpec { size: Some("74x52mm".parse().unwrap()), ..PaperSpec::default() };
     Target::build("b", &TargetSpec::Board(spec), Some(&FAMILY), Some(&paper)).unwrap()
@@ -36,7 +36,7 @@ pub static SOLID: LazyLock<Target> = LazyLock::new(|| {
         margin_mm: 3.0,
         ..SolidSpec::new(SolidShape::Tetrahedron)
     };
-    spec.tags.family = "d16h5".to_owned();
+    spec.tags.family = "delTag16h5".to_owned();
     Target::build("t", &TargetSpec::Solid(spec), Some(&FAMILY), Some(&PaperSpec::default()))
         .unwrap()
 });
