@@ -12,7 +12,7 @@ use std::path::Path;
 use files::{Dice, READERS, Reader};
 
 /// Changed files of each reader.
-const CHANGED: u64 = 60;
+const CHANGED: u64 = 300;
 
 /// Reads a file; what panicked is named.
 fn harm(reader: &Reader, what: &str, bytes: &[u8]) -> Option<String> {

@@ -31,8 +31,8 @@ pub static BOARD: LazyLock<Target> = LazyLock::new(|| {
 /// A solid of which there are meshes.
 pub static SOLID: LazyLock<Target> = LazyLock::new(|| {
     let mut spec = SolidSpec {
-        edge_mm: 40.0,
-        tiles: 4,
+        edge_mm: 60.0,
+        tiles: 6,
         margin_mm: 3.0,
         ..SolidSpec::new(SolidShape::Tetrahedron)
     };
