@@ -1,6 +1,8 @@
 //! What `deltille board` and `deltille checkerboard` are told: the same settings as options and as a
 //! TOML template.
 
+#![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
+
 use std::ops::RangeInclusive;
 use std::path::Path;
 
