@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 const LONGEST: usize = 64;
 
 /// The name of a target or a camera, which is the stem of its files and part of labels: ASCII letters, digits, `-`, `_` and
-/// `.`, the first of them a letter, a digit or `_`. So it never names another folder, and the label's font has all of it.
+/// `.`, the first of them a letter, a digit or `_`, and none of the names that Windows gives to devices. So it never names
+/// another folder, and the label's font has all of it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Name(String);
@@ -29,6 +30,14 @@ impl Name {
             return Err(format!("{name:?} is no name of a file on every system"));
         }
         Ok(Self(name.to_owned()))
+    }
+
+    /// This name, if it has no dots either, as names of families have none: they stand before other endings.
+    pub(crate) fn without_dots(name: &str) -> Result<Self, String> {
+        if name.contains('.') {
+            return Err(format!("{name:?} may hold only ASCII letters, digits, - and _"));
+        }
+        Self::new(name)
     }
 
     /// The name most like a text: with `-` for what a name cannot hold.
@@ -128,8 +137,12 @@ mod tests {
             assert_eq!(&*Name::like(name), name);
         }
         let long = "x".repeat(LONGEST + 1);
+        assert!(Name::without_dots("a_b").is_ok() && Name::without_dots("a.b").is_err());
         for (text, like) in [
             ("", "target"),
+            ("nul", "target"),
+            ("Com1.txt", "target"),
+            ("a.", "a"),
             ("../../x", "x"),
             ("/etc/passwd", "etc-passwd"),
             ("-rf", "rf"),

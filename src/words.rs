@@ -7,12 +7,12 @@ pub(crate) fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
-/// A text that may come from a file as it is shown: what would move the cursor, change colours or turn the direction of
-/// writing is escaped; lines and tabs stay.
+/// A line with words that may come from a file or its name, as it is shown: what would end the line, move the cursor,
+/// change colours or turn the direction of writing is escaped; tabs stay.
 pub(crate) fn shown(text: &str) -> Cow<'_, str> {
     let is_harmful = |c: char| {
         let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-        turns || c.is_control() && c != '\n' && c != '\t'
+        turns || c.is_control() && c != '\t'
     };
     if !text.contains(is_harmful) {
         return Cow::Borrowed(text);
@@ -29,7 +29,7 @@ mod tests {
 
     #[test]
     fn texts_of_others_do_nothing_to_a_terminal() {
-        assert_eq!(shown("a\tb\nµ Ω 板"), "a\tb\nµ Ω 板");
-        assert_eq!(shown("\u{1b}[2Jx\r\u{202e}"), r"\u{1b}[2Jx\r\u{202e}");
+        assert_eq!(shown("a\tb µ Ω 板"), "a\tb µ Ω 板");
+        assert_eq!(shown("\u{1b}[2Jx\r\n\u{202e}"), r"\u{1b}[2Jx\r\n\u{202e}");
     }
 }

@@ -62,15 +62,10 @@ fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8
         tags: Vec::new(),
     };
     Detection {
-        image: String::new(),
         width: camera.width,
         height: camera.height,
-        file: Default::default(),
         grids: vec![grid],
-        tone: None,
-        ink: None,
-        reasons: Vec::new(),
-        timing_ms: Default::default(),
+        ..Detection::default()
     }
 }
 
@@ -666,17 +661,7 @@ fn of_displaced_panel(target: &Target, count: usize, by_mm: DVec3) -> Vec<Detect
             let (kind, panel) = (panel.kind, Some(panel.id));
             faces.then(|| Grid { kind, panel, mirrored: false, corners, tags: Vec::new() })
         });
-        Detection {
-            image: String::new(),
-            width: 1600,
-            height: 1200,
-            file: Default::default(),
-            grids: grids.collect(),
-            tone: None,
-            ink: None,
-            reasons: Vec::new(),
-            timing_ms: Default::default(),
-        }
+        Detection { width: 1600, height: 1200, grids: grids.collect(), ..Detection::default() }
     });
     pictures.collect()
 }
@@ -705,4 +690,12 @@ fn a_displaced_panel_is_named_on_the_terminal_in_the_file_and_on_the_page() {
     assert!(outliers <= of_panel["corners"].as_u64().unwrap() + 2, "{outliers} {of_panel}");
     let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
     assert!(page.contains(&format!("Panel {id}: ")), "the page names it");
+    // Of less than makes outliers the residuals tell, and of nothing they tell nothing.
+    for (by_mm, is_named) in [(0.15, true), (0.0, false)] {
+        let detections = of_displaced_panel(&target, 20, DVec3::new(by_mm, 0.0, 0.0));
+        let folder = self::folder(&target, &detections);
+        let output = self::output(folder.path(), CALIBRATE);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(said.contains(&format!("most of all panel {id}")), is_named, "{by_mm}: {said}");
+    }
 }

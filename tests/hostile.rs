@@ -3,6 +3,8 @@
 
 mod common {
     pub mod command;
+    pub mod glb;
+    pub mod png;
 }
 
 use std::fs::{self, File};
@@ -13,6 +15,8 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use common::command::deltille;
+use common::glb::Parts;
+use common::png::chunk;
 use flate2::{Compression, write::ZlibEncoder};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -211,13 +215,6 @@ fn png(width: u32, height: u32, more: &[u8]) -> Vec<u8> {
     .concat()
 }
 
-fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
-    let mut sum = flate2::Crc::new();
-    sum.update(kind);
-    sum.update(data);
-    [&(data.len() as u32).to_be_bytes()[..], kind, data, &sum.sum().to_be_bytes()].concat()
-}
-
 /// So many bytes of zero, packed a thousandfold.
 fn zeros(count: u64) -> Vec<u8> {
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::best());
@@ -227,16 +224,11 @@ fn zeros(count: u64) -> Vec<u8> {
 
 /// The good mesh with another JSON.
 fn glb(edit: impl Fn(&mut Value)) -> Vec<u8> {
-    let bytes = good("s.glb");
-    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
-    let mut root: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+    let mut parts = Parts::of(&good("s.glb"));
+    let mut root: Value = serde_json::from_slice(&parts.json).unwrap();
     edit(&mut root);
-    let mut json = root.to_string().into_bytes();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let binary = &bytes[20 + length..];
-    let all = (20 + json.len() + binary.len()) as u32;
-    let head = [&b"glTF\x02\0\0\0"[..], &all.to_le_bytes(), &(json.len() as u32).to_le_bytes()];
-    [&head.concat()[..], b"JSON", &json, binary].concat()
+    parts.json = root.to_string().into_bytes();
+    parts.join()
 }
 
 /// A chain of nodes, each of which has the next so many times for a child.
@@ -367,6 +359,8 @@ fn pictures() -> Vec<Bomb> {
     vec![
         ("bomb.png", png(30_000, 30_000, &[]), BOARD, 2, "--max-pixels"),
         ("photograph.png", png(30_000, 30_000, &[]), DETECT, 2, "--max-pixels"),
+        ("large.png", png(12_000, 12_000, &[]), DETECT, 2, "--max-pixels-per-byte"),
+        ("page.png", png(12_000, 12_000, &[]), BOARD, 1, ""),
         ("profile.png", png(8, 8, &profile), DETECT, 1, ""),
     ]
 }
@@ -445,8 +439,12 @@ fn many_large_pictures_at_a_time_take_the_memory_of_one() {
     for name in ["a.png", "b.png", "c.png", "d.png"] {
         fs::write(folder.path().join(name), &picture).unwrap();
     }
-    let end =
-        run(folder.path(), "deltille detect --grid deltille -j 4 --stream . --max-pixels 90M", "");
+    let end = run(
+        folder.path(),
+        "deltille detect --grid deltille -j 4 --stream . --max-pixels 90M \
+            --max-pixels-per-byte 10k",
+        "",
+    );
     assert_eq!(fault(&end, &[1], ""), None);
 }
 

@@ -169,12 +169,8 @@ fn pictures(target: &Target) -> Vec<(String, Detection)> {
                 image: format!("{index}.png"),
                 width: camera.width,
                 height: camera.height,
-                file: Default::default(),
                 grids: vec![grid],
-                tone: None,
-                ink: None,
-                reasons: Vec::new(),
-                timing_ms: Default::default(),
+                ..Detection::default()
             };
             (index.to_string(), detection)
         })

@@ -61,12 +61,8 @@ fn seen(target: &Target, camera: &Camera, camera_from_target: &Pose, view: u32) 
         image: format!("{view:02}.png"),
         width: camera.width,
         height: camera.height,
-        file: Default::default(),
         grids: target.panels.iter().filter_map(grid).collect(),
-        tone: None,
-        ink: None,
-        reasons: Vec::new(),
-        timing_ms: Default::default(),
+        ..Detection::default()
     }
 }
 

@@ -1,9 +1,14 @@
 //! What becomes of photographs whose files are damaged, or say more than their pixels.
 
+mod common {
+    pub mod png;
+}
+
 use std::fs;
 use std::io::Cursor;
 use std::path::PathBuf;
 
+use common::png::chunk;
 use deltille::limits::Limits;
 use deltille::raster::{self, AnyGray, FileNotes, Gray, ImageError, Photograph};
 use image::{DynamicImage, GrayImage, ImageFormat};
@@ -59,8 +64,7 @@ fn a_jpeg_of_which_a_part_is_missing_is_not_read_unless_that_is_accepted() {
     assert_eq!(folder.read(&whole, false).unwrap().notes, FileNotes::default());
     let scan = whole.windows(2).position(|marker| marker == [0xFF, 0xDA]).unwrap() + 14;
     let cut = |end: usize| whole[..end].to_vec();
-    // Of fewer than a row of blocks that are missing its decoder does not always tell.
-    let hole = |at: usize| [&whole[..at], &whole[at + 1000..]].concat();
+    let hole = |at: usize| [&whole[..at], &whole[at + 200..]].concat();
     let places = (scan..whole.len() - 2).step_by((whole.len() - scan) / 40);
     let holes = (scan..whole.len() - whole.len() / 4).step_by((whole.len() - scan) / 10).map(hole);
     // As some programs and cameras end what they could not finish.
@@ -78,6 +82,18 @@ fn a_jpeg_of_which_a_part_is_missing_is_not_read_unless_that_is_accepted() {
     // Without its last marker it still has all pixels.
     let unended = folder.read(&cut(whole.len() - 2), false).unwrap();
     assert_eq!(unended, folder.read(&whole, false).unwrap());
+}
+
+/// Some programs leave bytes between the parts of a head that belong to neither.
+#[test]
+fn padding_between_headers_hides_no_missing_part() {
+    let (folder, whole) = (Folder::new(), encoded(ImageFormat::Jpeg));
+    let table = whole.windows(2).position(|marker| marker == [0xFF, 0xDB]).unwrap();
+    let padded =
+        |end: usize| [&whole[..table], &[0; 4], &whole[table..end], &[0xFF, 0xD9]].concat();
+    let pixels = folder.read(&whole, false).unwrap();
+    assert_eq!(folder.read(&padded(whole.len() - 2), false).unwrap(), pixels);
+    assert!(folder.read(&padded(whole.len() / 2), false).is_err());
 }
 
 #[test]
@@ -121,15 +137,6 @@ fn pixels_stay_where_the_sensor_had_them() {
         assert_eq!(turned.image, plain.image);
         assert_eq!(turned.notes.exif_orientation, (orientation > 1).then_some(orientation));
     }
-}
-
-/// A chunk of a PNG.
-fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
-    let mut sum = flate2::Crc::new();
-    sum.update(name);
-    sum.update(data);
-    let length = (data.len() as u32).to_be_bytes();
-    [&length[..], name, data, &sum.sum().to_be_bytes()].concat()
 }
 
 #[test]

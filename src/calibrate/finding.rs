@@ -164,20 +164,18 @@ pub(super) fn shared_outliers(
         corners: count.corners,
         left_out: false,
     };
-    let of_cameras = cameras.iter().filter(|(_, count)| count.stands_out(all));
+    cameras.retain(|_, count| count.stands_out(all));
     let mut found: Vec<Finding> =
-        of_cameras.map(|(&camera, &count)| finding(Shared::Camera { camera }, count)).collect();
-    let named: Vec<usize> =
-        cameras.iter().filter(|(_, c)| c.stands_out(all)).map(|(&c, _)| c).collect();
+        cameras.iter().map(|(&camera, &count)| finding(Shared::Camera { camera }, count)).collect();
     for (&(camera, frame), &count) in views.iter().filter(|(_, count)| count.stands_out(all)) {
-        if !named.contains(&camera) {
+        if !cameras.contains_key(&camera) {
             found.push(finding(Shared::View { camera, view: names(frame) }, count));
         }
     }
     // The cells of a camera that stand out, as one rectangle.
     let mut regions: BTreeMap<usize, (Count, [i32; 2], [i32; 2])> = BTreeMap::new();
     for (&(camera, cell), (count, of_views)) in &cells {
-        let is_of_image = of_views.len() >= LEAST_VIEWS && !named.contains(&camera);
+        let is_of_image = of_views.len() >= LEAST_VIEWS && !cameras.contains_key(&camera);
         if is_of_image && count.stands_out(all) {
             let (sum, from, to) = regions.entry(camera).or_insert((Count::default(), cell, cell));
             sum.outliers += count.outliers;

@@ -3,7 +3,7 @@
 //! ```text
 //!   over the image    the mean residual of a cell, against how it differs between views
 //!   over the target   the move of a corner in space that explains its residuals in all views best,
-//!                     against what is left
+//!                     against what is left; the same of a panel as a whole
 //! ```
 //!
 //! Both are analyses of variance: what a pattern explains, for each of its unknowns, over what is left,
@@ -13,7 +13,7 @@
 use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::panel::PanelRef;
 use super::problem::Problem;
@@ -30,6 +30,12 @@ pub(super) const SIGNIFICANT: f64 = 3.09;
 /// independent; a pattern is the same in all views, so that it does not average out, and with half of the
 /// noise it outweighs what the noise leaves of a parameter as soon as a few corners bear on it.
 pub(super) const MATTERS: f64 = 0.5;
+
+/// Of many panels one must be displaced by more: of a million hardly one is by chance.
+const SIGNIFICANT_PANEL: f64 = 5.0;
+
+/// Fewest panels of which one can be displaced against the others.
+const LEAST_PANELS: usize = 3;
 
 /// A direction in which views move a corner by less than this part of what they do in the best one is
 /// not sought: its information is the square. All views came from the same side then.
@@ -66,6 +72,7 @@ struct Seen {
     panel: PanelRef,
     cell: [i32; 2],
     label: [i32; 2],
+    place_mm: DVec3,
     residual: [f64; 2],
     /// The residual by the corner's place on the panel, 1/mm.
     by_place: [DVec3; 2],
@@ -76,6 +83,7 @@ struct Seen {
 enum Source {
     Lens(usize),
     Target,
+    Panels,
 }
 
 /// What a source explains of the residuals.
@@ -99,13 +107,14 @@ struct Explained {
 pub(super) fn misfits(problem: &Problem, whitening: &Whitening) -> Vec<Misfit> {
     let (mut seen, px) = seen(problem, whitening);
     let mut open: Vec<Source> = (0..problem.cameras.len()).map(Source::Lens).collect();
-    open.push(Source::Target);
+    open.extend([Source::Target, Source::Panels]);
     let mut found = Vec::new();
     loop {
         let patterns = open.iter().enumerate().filter_map(|(index, &source)| {
             let explained = match source {
                 Source::Lens(camera) => over_image(&seen, camera),
                 Source::Target => over_target(&seen),
+                Source::Panels => over_panels(&seen),
             };
             let part = explained.pattern()?;
             Some((index, part, explained))
@@ -113,9 +122,14 @@ pub(super) fn misfits(problem: &Problem, whitening: &Whitening) -> Vec<Misfit> {
         let strongest = patterns.max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((index, part, explained)) = strongest else { return found };
         let rms_px = px * (part * explained.all / (2 * explained.fitted.len()) as f64).sqrt();
-        found.push(match open.remove(index) {
+        let source = open.remove(index);
+        if !matches!(source, Source::Lens(_)) {
+            // Where panels are displaced their corners are.
+            open.retain(|other| matches!(other, Source::Lens(_)));
+        }
+        found.push(match source {
             Source::Lens(camera) => Misfit::Lens { camera, rms_px },
-            Source::Target => {
+            Source::Target | Source::Panels => {
                 let most = explained.by_panel.iter().max_by(|a, b| a.1.total_cmp(b.1));
                 Misfit::Target {
                     panel: most.map_or(PanelRef::ONLY, |(&panel, _)| panel),
@@ -161,6 +175,7 @@ fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
                 panel: block.panel,
                 cell: corner.pixel.map(|v| (v / cell_px).floor() as i32),
                 label: [corner.row, corner.col],
+                place_mm: corner.panel_mm,
                 residual: whitened,
                 by_place: [a * x, b * x + c * y],
             });
@@ -211,51 +226,132 @@ fn over_target(seen: &[Seen]) -> Explained {
     }
     let mut found = Explained::default();
     for ((panel, _), views) in corners.iter().filter(|(_, views)| views.len() >= LEAST_VIEWS) {
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        let mut all = 0.0;
-        for corner in views.iter().map(|&index| &seen[index]) {
-            for (by, residual) in corner.by_place.iter().zip(corner.residual) {
-                let by = Vector3::from(by.to_array());
-                normal += by * by.transpose();
-                right += by * residual;
-            }
-            all += square(corner.residual);
-        }
-        let eigen = SymmetricEigen::new(normal);
-        let most = eigen.eigenvalues.max();
-        let (mut moved, mut variances, mut unknowns) = (Vector3::zeros(), 0.0, 0.0);
-        for (&value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if value > BLIND * BLIND * most {
-                moved += direction * (direction.dot(&right) / value);
-                variances += 1.0 / value;
-                unknowns += 1.0;
-            }
-        }
-        let explained = right.dot(&moved);
-        found.all += all;
-        found.explained += explained;
-        found.unknowns += unknowns;
-        found.left += all - explained;
-        found.freedom += (2 * views.len()) as f64 - unknowns;
-        *found.by_panel.entry(*panel).or_default() += explained - unknowns;
+        let row = |by: DVec3, _: &Seen| by.to_array();
+        let of_corner = best_move(seen, views, row);
+        let [x, y, z] = of_corner.by;
+        let moved = DVec3::new(x, y, z);
+        found.add(*panel, seen, views, &of_corner, |_| moved);
         let [squares, noise, count] = &mut found.moves;
-        *squares += moved.norm_squared();
-        *noise += variances;
+        *squares += moved.length_squared();
+        *noise += of_corner.variances.iter().sum::<f64>();
         *count += 1.0;
-        let moved = DVec3::new(moved.x, moved.y, moved.z);
-        let fitted = |&index: &usize| (index, seen[index].by_place.map(|by| by.dot(moved)));
-        found.fitted.extend(views.iter().map(fitted));
+    }
+    found
+}
+
+/// Moves of panels as a whole, of those alone that show one.
+fn over_panels(seen: &[Seen]) -> Explained {
+    let mut panels: BTreeMap<PanelRef, Vec<usize>> = BTreeMap::new();
+    for (index, corner) in seen.iter().enumerate() {
+        panels.entry(corner.panel).or_default().push(index);
+    }
+    let mut found = Explained::default();
+    // Of two nothing tells which is wrong, and of one there is nothing that it could be wrong to.
+    if panels.len() < LEAST_PANELS {
+        return found;
+    }
+    for (&panel, views) in &panels {
+        let places = || views.iter().map(|&index| seen[index].place_mm);
+        let middle = places().sum::<DVec3>() / views.len() as f64;
+        let reach = places().map(|at| at.distance(middle)).fold(f64::MIN_POSITIVE, f64::max);
+        // Turns in lengths at the rim, so that all unknowns are alike.
+        let arm = |seen: &Seen| (seen.place_mm - middle) / reach;
+        let row = |by: DVec3, seen: &Seen| {
+            let turn = arm(seen).cross(by);
+            [by.x, by.y, by.z, turn.x, turn.y, turn.z]
+        };
+        let of_panel = best_move(seen, views, row);
+        let [x, y, z, u, v, w] = of_panel.by;
+        let [shift, turn] = [DVec3::new(x, y, z), DVec3::new(u, v, w)];
+        let moved = |seen: &Seen| shift + turn.cross(arm(seen));
+        let mut single = Explained::default();
+        single.add(panel, seen, views, &of_panel, moved);
+        if single.deviate() > SIGNIFICANT_PANEL && single.pattern().is_some() {
+            found.add(panel, seen, views, &of_panel, moved);
+            let [squares, noise, count] = &mut found.moves;
+            *squares += views.iter().map(|&i| moved(&seen[i]).length_squared()).sum::<f64>();
+            *noise += views.len() as f64 * of_panel.variances[..3].iter().sum::<f64>();
+            *count += views.len() as f64;
+        }
+    }
+    found
+}
+
+/// What explains the residuals of some corners best.
+struct Move<const N: usize> {
+    by: [f64; N],
+    /// By the variance of a residual.
+    variances: [f64; N],
+    explained: f64,
+    unknowns: f64,
+}
+
+/// Least squares of some corners' residuals, of which each coordinate has a row; what views hardly see is not sought.
+fn best_move<const N: usize>(
+    seen: &[Seen],
+    corners: &[usize],
+    row: impl Fn(DVec3, &Seen) -> [f64; N],
+) -> Move<N> {
+    let (mut normal, mut right) = (DMatrix::zeros(N, N), DVector::zeros(N));
+    for corner in corners.iter().map(|&index| &seen[index]) {
+        for (&by, residual) in corner.by_place.iter().zip(corner.residual) {
+            let by = DVector::from_row_slice(&row(by, corner));
+            right.axpy(residual, &by, 1.0);
+            normal.ger(1.0, &by, &by, 1.0);
+        }
+    }
+    let eigen = SymmetricEigen::new(normal);
+    let most = eigen.eigenvalues.max();
+    let mut found = Move { by: [0.0; N], variances: [0.0; N], explained: 0.0, unknowns: 0.0 };
+    for (&value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if value > BLIND * BLIND * most {
+            let along = direction.dot(&right);
+            for (i, part) in direction.iter().enumerate() {
+                found.by[i] += part * along / value;
+                found.variances[i] += part * part / value;
+            }
+            found.explained += along * along / value;
+            found.unknowns += 1.0;
+        }
     }
     found
 }
 
 impl Explained {
+    /// Adds what a move explains of some corners of a panel.
+    fn add<const N: usize>(
+        &mut self,
+        panel: PanelRef,
+        seen: &[Seen],
+        corners: &[usize],
+        found: &Move<N>,
+        moved: impl Fn(&Seen) -> DVec3,
+    ) {
+        let all: f64 = corners.iter().map(|&index| square(seen[index].residual)).sum();
+        self.all += all;
+        self.explained += found.explained;
+        self.unknowns += found.unknowns;
+        self.left += all - found.explained;
+        self.freedom += (2 * corners.len()) as f64 - found.unknowns;
+        *self.by_panel.entry(panel).or_default() += found.explained - found.unknowns;
+        let fitted = |&index: &usize| {
+            let corner = &seen[index];
+            (index, corner.by_place.map(|by| by.dot(moved(corner))))
+        };
+        self.fitted.extend(corners.iter().map(fitted));
+    }
+
+    /// How rare it is that chance makes as much of a pattern, as a normal deviate.
+    fn deviate(&self) -> f64 {
+        let f_ratio = self.explained / self.unknowns / (self.left / self.freedom);
+        deviate_of_f(f_ratio, self.unknowns, self.freedom)
+    }
+
     /// The part of all squares that the pattern makes, where that is more than chance and matters.
     fn pattern(&self) -> Option<f64> {
         let noise = self.left / self.freedom;
         let pattern = self.explained - self.unknowns * noise;
-        let f_ratio = self.explained / self.unknowns / noise;
-        let is_sure = deviate_of_f(f_ratio, self.unknowns, self.freedom) > SIGNIFICANT;
+        let is_sure = self.deviate() > SIGNIFICANT;
         let matters = pattern > MATTERS * MATTERS * (self.all - pattern);
         (is_sure && matters).then_some(pattern / self.all)
     }

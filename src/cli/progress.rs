@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -24,6 +25,8 @@ pub fn bar(total: u64, unit: &str) -> ProgressBar {
 /// A search for codes: a bar on a terminal, and a line every ten seconds elsewhere.
 pub struct SearchProgress {
     bar: ProgressBar,
+    /// The most codes of any attempt so far: the next one begins with few.
+    codes: AtomicUsize,
     /// When the last line was written; `None` on a terminal.
     last: Option<Mutex<Instant>>,
 }
@@ -36,13 +39,14 @@ impl SearchProgress {
     pub fn new(total: u64, unit: &str) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let last = (!is_terminal).then(|| Mutex::new(Instant::now()));
-        Self { bar: bar(total, unit), last }
+        Self { bar: bar(total, unit), codes: AtomicUsize::new(0), last }
     }
 
     /// Shows how far the search has come.
     pub fn show(&self, progress: Progress) {
         let Progress { done, total, codes } = progress;
-        let codes = counted(codes, "code");
+        let before = self.codes.fetch_max(codes, Ordering::Relaxed);
+        let codes = counted(codes.max(before), "code");
         let Some(last) = &self.last else {
             self.bar.set_position(done);
             self.bar.set_message(codes);

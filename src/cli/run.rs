@@ -1,10 +1,13 @@
 //! From a command's result to an exit code and one line on standard error.
 
+use std::io;
 use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::Parser;
 
 use crate::cli::interrupt;
 use crate::cli::output::tell;
-use clap::Parser;
 
 /// Exit code for bad input of every kind.
 pub const BAD_INPUT: u8 = 2;
@@ -27,8 +30,12 @@ pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> Ex
         Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error))),
         Err(help_or_version) => {
             // Nothing is left to say when the reader of the help text has gone away.
-            let _ = help_or_version.print();
-            return ExitCode::SUCCESS;
+            match help_or_version.print() {
+                Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+                    Err(error).context("cannot write to the standard output")
+                }
+                _ => return ExitCode::SUCCESS,
+            }
         }
     };
     result.unwrap_or_else(|error| {

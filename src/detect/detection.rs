@@ -10,7 +10,7 @@ use crate::raster::{FileNotes, Pyramid};
 use crate::target::GridKind;
 
 /// What was found in one image.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Detection {
     /// File name of the image, or a name given by the caller.
     pub image: String,

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::GENERATOR;
 use super::mesh::TexturedMesh;
+use crate::limits;
 use crate::target::{ClosedMesh, ClosedMeshError, is_coordinate};
 
 /// Why an OBJ is not taken for a solid.
@@ -14,6 +15,9 @@ pub enum ObjError {
     /// Not an OBJ.
     #[error("not a readable OBJ: {0}")]
     Grammar(#[from] tobj::LoadError),
+    /// Its reader fails within.
+    #[error(transparent)]
+    Broken(#[from] limits::Broken),
     /// A face of more than three corners.
     #[error("face {face} has {corners} corners: triangles are needed")]
     NotTriangle {
@@ -33,7 +37,8 @@ pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
     let options =
         tobj::LoadOptions { ignore_lines: true, ignore_points: true, ..Default::default() };
     let no_materials = |_: &std::path::Path| Ok(Default::default());
-    let (models, _) = tobj::load_obj_buf(&mut &text[..], &options, no_materials)?;
+    let load = || tobj::load_obj_buf(&mut &text[..], &options, no_materials);
+    let (models, _) = limits::caught(load)??;
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for mesh in models.iter().map(|model| &model.mesh) {
         let corners = mesh.face_arities.iter().position(|&n| n != 3);

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 use super::algebra::AlgebraicConstruction;
 use super::{Family, FamilyError, Rules, TagWords, false_positive_rates};
 use crate::lattice::{Dimension, GridKind};
+use crate::name::Name;
 
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/family/1";
@@ -154,11 +155,7 @@ pub(super) fn check_form(
     rules: &Rules,
 ) -> Result<(), FamilyError> {
     let bits = dimension.bits();
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if name.is_empty() || !name.chars().all(plain) {
-        let problem = format!("`{name}` may hold only letters, digits, - and _, and not nothing");
-        return Err(FamilyError::field("name", problem));
-    }
+    Name::without_dots(name).map_err(|problem| FamilyError::field("name", problem))?;
     if !(1..=bits).contains(&distance) {
         let problem = format!("{distance} is not between 1 and the {bits} bits of a tag");
         return Err(FamilyError::field("distance", problem));

@@ -33,6 +33,9 @@ pub const MAX_SETTINGS_BYTES: usize = 50_000;
 /// of the largest family take.
 pub const MAX_FAMILY_BYTES: usize = 150_000_000;
 
+/// Pixels of a picture that may be in a file of any size.
+const FREE_PIXELS: u64 = 20_000_000;
+
 /// Bytes that a pixel may take while a picture is decoded: 8 bits of four colours.
 const BYTES_PER_PIXEL: u64 = 4;
 
@@ -44,6 +47,9 @@ pub struct Limits {
     /// Pixels of a picture: of a photograph, of a page or texture as PNG, and of all photographs
     /// that are in memory at a time.
     pub max_pixels: u64,
+    /// Pixels of a photograph of more than 20 megapixels for each byte of its file. The noise of sensors takes bytes: a
+    /// compressed photograph has some 5, and what has so many more was made to keep its reader busy.
+    pub max_pixels_per_byte: u64,
     /// Parts of a file: elements of an SVG, operators of a PDF page, nodes and triangles of a mesh.
     pub max_nodes: u64,
     /// How deep parts lie within each other.
@@ -57,6 +63,7 @@ impl Default for Limits {
         Self {
             max_bytes: 200_000_000,
             max_pixels: 150_000_000,
+            max_pixels_per_byte: 100,
             max_nodes: 4_000_000,
             max_depth: 64,
             max_seconds: 60.0,
@@ -71,6 +78,8 @@ pub enum Kind {
     Bytes,
     /// [`Limits::max_pixels`]
     Pixels,
+    /// [`Limits::max_pixels_per_byte`]
+    PixelsPerByte,
     /// [`Limits::max_nodes`]
     Nodes,
     /// [`Limits::max_depth`]
@@ -96,6 +105,10 @@ impl fmt::Display for Exceeded {
             Kind::Pixels => {
                 let mega = limit / 1e6;
                 write!(f, "more than {mega} megapixels; --max-pixels sets how many are read")
+            }
+            Kind::PixelsPerByte => {
+                write!(f, "more than {limit} pixels for each byte, as no photograph has; ")?;
+                write!(f, "--max-pixels-per-byte sets how many are read")
             }
             Kind::Nodes => write!(f, "more than {limit} parts; --max-nodes sets how many are read"),
             Kind::Depth => {
@@ -156,6 +169,7 @@ impl Limits {
     pub const NONE: Self = Self {
         max_bytes: u64::MAX,
         max_pixels: u64::MAX,
+        max_pixels_per_byte: u64::MAX,
         max_nodes: u64::MAX,
         max_depth: usize::MAX,
         max_seconds: f64::INFINITY,
@@ -178,6 +192,7 @@ impl Limits {
         let limit = match kind {
             Kind::Bytes => self.max_bytes as f64,
             Kind::Pixels => self.max_pixels as f64,
+            Kind::PixelsPerByte => self.max_pixels_per_byte as f64,
             Kind::Nodes => self.max_nodes as f64,
             Kind::Depth => self.max_depth as f64,
             Kind::Seconds => self.max_seconds,
@@ -188,6 +203,14 @@ impl Limits {
     /// Refuses a picture of too many pixels.
     pub fn check_pixels(&self, width: u32, height: u32) -> Result<(), Exceeded> {
         self.check(Kind::Pixels, u64::from(width) * u64::from(height), self.max_pixels)
+    }
+
+    /// Refuses a photograph of too many pixels, or of too many for a file of so many bytes.
+    pub fn check_photograph(&self, width: u32, height: u32, bytes: u64) -> Result<(), Exceeded> {
+        self.check_pixels(width, height)?;
+        let pixels = u64::from(width) * u64::from(height);
+        let most = bytes.saturating_mul(self.max_pixels_per_byte).max(FREE_PIXELS);
+        self.check(Kind::PixelsPerByte, pixels, most)
     }
 
     /// Refuses so many parts.

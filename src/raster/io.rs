@@ -19,6 +19,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 use serde::{Deserialize, Serialize};
 use tiff::tags::Tag;
 use zune_jpeg::JpegDecoder;
+use zune_jpeg::errors::DecodeErrors;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
@@ -227,6 +228,8 @@ struct ImageFile<'a> {
     path: &'a Path,
     /// What is read as a whole: a JPEG, as its decoders take it so, and what comes through a pipe.
     bytes: Option<Vec<u8>>,
+    /// How many bytes the file has.
+    length: u64,
     format: Option<ImageFormat>,
 }
 
@@ -251,7 +254,8 @@ impl<'a> ImageFile<'a> {
                 return Err(too_many());
             }
         }
-        Ok(Self { path, bytes: is_whole.then_some(bytes), format })
+        let length = if metadata.is_file() { metadata.len() } else { bytes.len() as u64 };
+        Ok(Self { path, bytes: is_whole.then_some(bytes), length, format })
     }
 
     fn source(&self) -> Result<Box<dyn Source + '_>, ImageError> {
@@ -279,7 +283,7 @@ impl<'a> ImageFile<'a> {
         reader.limits(most);
         let decoder = reader.into_decoder().map_err(decode)?;
         let (width, height) = decoder.dimensions();
-        limits.check_pixels(width, height).map_err(exceeded)?;
+        limits.check_photograph(width, height, self.length).map_err(exceeded)?;
         let bytes = limits.picture_bytes();
         if decoder.total_bytes() > bytes {
             return Err(ImageError::Memory { path: path(), bytes });
@@ -305,14 +309,14 @@ impl<'a> ImageFile<'a> {
         let (Some(ImageFormat::Jpeg), Some(bytes)) = (self.format, &self.bytes) else {
             return Ok(None);
         };
+        let problem = |error: DecodeErrors| told(&error.to_string());
         let mut decoder = jpeg_decoder(bytes, true);
-        let pixels = match decoder.decode() {
-            Ok(pixels) => pixels,
-            Err(error) => {
-                let problem = error.to_string();
-                return if problem.contains(PADDING) { Ok(None) } else { Err(told(&problem)) };
-            }
-        };
+        let mut pixels = decoder.decode().map_err(problem);
+        if pixels.as_ref().is_err_and(|problem| problem.contains(PADDING)) {
+            decoder = jpeg_decoder(bytes, false);
+            pixels = decoder.decode().map_err(problem);
+        }
+        let pixels = pixels?;
         check_scans(bytes, &pixels)?;
         let (width, height) = decoder.dimensions().unwrap_or_default();
         let as_seen = matches!(

@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::Finding;
-use super::document::Page;
+use super::document::{Page, RESAMPLED_INK_ERROR};
 use crate::raster::Gray;
 use crate::target::{SheetLayout, SheetPage};
 
@@ -36,6 +36,7 @@ pub(super) fn assemble(
         height_mm: layout.height_mm,
         px_per_mm,
         image: Gray::from_fn(0, 0, |_, _| 255),
+        max_ink_error: RESAMPLED_INK_ERROR,
     };
     let at_mm = |x: usize, y: usize| sheet.page_from_px([x as f64, y as f64]);
     let mut pixels = vec![255u8; size_px[0] * size_px[1]];

@@ -117,7 +117,13 @@ mod tests {
         ];
         let (width_mm, height_mm) = if upright { (20.0, 80.0) } else { (80.0, 20.0) };
         let size = [width_mm, height_mm].map(|mm: f64| (mm * px_per_mm).round() as usize);
-        let mut page = Page { width_mm, height_mm, px_per_mm, image: Gray::new(size[0], size[1]) };
+        let mut page = Page {
+            width_mm,
+            height_mm,
+            px_per_mm,
+            image: Gray::new(size[0], size[1]),
+            max_ink_error: 0.01,
+        };
         let mut coverage = Coverage::new(size[0], size[1]);
         for [x0, y0, x1, y1] in rectangles {
             let corners = [[x0, y0], [x0, y1], [x1, y1], [x1, y0]].map(|[u, v]| {

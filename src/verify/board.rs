@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::document::Page;
 use super::fit::AffineMap;
 use super::fold::Seen;
-use super::tiles::{MAX_INK_ERROR, PlacedPanel};
+use super::tiles::PlacedPanel;
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
 use crate::detect::{Detection, Detector, DetectorConfig, GridCorner, Ink, Tone};
 use crate::target::{Corner, Panel, SheetLayout};
@@ -20,6 +20,9 @@ const MAX_WRONG_TILES: f64 = 0.25;
 
 /// With a larger share of corners missing, or more than stated, it is another board.
 const MAX_MISSING: f64 = 0.25;
+
+/// How far the ink in the middle of a tile may be from 0 or 1: what rounding leaves of 255 grey values.
+const MAX_TONE_ERROR: f64 = 0.01;
 
 /// Difference of ink below which a sheet is called blank rather than faint.
 const MIN_CONTRAST: f64 = 0.03;
@@ -89,7 +92,7 @@ fn wrong_tones(placed: &PlacedPanel) -> Option<Finding> {
     if white - black > 0.5 {
         return Some(Finding::Inverted { panel });
     }
-    let faint = black < 1.0 - MAX_INK_ERROR || white > MAX_INK_ERROR;
+    let faint = black < 1.0 - MAX_TONE_ERROR || white > MAX_TONE_ERROR;
     (faint && black - white > MIN_CONTRAST).then_some(Finding::Contrast { panel, ink })
 }
 

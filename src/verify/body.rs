@@ -10,7 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::model::{Facet, load_stl};
-use super::solid::MOST_TRIANGLES;
+use super::solid::{is_other_mesh, other_count};
 use super::{BodyVerdict, DocumentError, Finding, Format, MESH_TOLERANCE_MM, Verdict, Verifier};
 use crate::export::stl::skeleton_name;
 use crate::target::{ClosedMesh, Incircle, Polyhedron, Skeleton, SkeletonSpec, TargetSpec};
@@ -56,9 +56,8 @@ pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, Docume
     };
     let stated = skeleton.as_ref().map_or(solid.faces.len(), |(s, _)| s.triangles_mm.len());
     let mut findings = Vec::new();
-    if facets.len() > MOST_TRIANGLES * stated {
-        let problem = format!("{} triangles instead of {stated}", facets.len());
-        findings.push(Finding::Body { problem });
+    if is_other_mesh(facets.len(), stated) {
+        findings.extend(other_count(facets.len(), stated));
     } else {
         findings = check_surface(&facets);
         match skeleton {
@@ -113,10 +112,7 @@ fn check_faces(
         findings.push(Finding::Body { problem });
         return;
     }
-    let (found, number) = (facets.len(), stated.len());
-    if found != number {
-        findings.push(Finding::Body { problem: format!("{found} triangles instead of {number}") });
-    }
+    findings.extend(other_count(facets.len(), stated.len()));
     let deviation = |facet: &Facet, face: &[DVec3; 3]| {
         let turned = |turn: usize| {
             let apart = (0..3).map(|i| facet.vertices_mm[(i + turn) % 3].distance(face[i]));

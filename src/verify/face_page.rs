@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::document::Page;
+use super::document::{Page, RESAMPLED_INK_ERROR};
 use super::model::Model;
 use crate::raster::Gray;
 use crate::target::{Panel, Placement};
@@ -75,6 +75,6 @@ pub(super) fn face_page(
         let sum: u32 = rows.flat_map(|at| &shades[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
         (sum / (SAMPLES * SAMPLES) as u32) as u8
     });
-    let page = Page { width_mm, height_mm, px_per_mm, image };
+    let page = Page { width_mm, height_mm, px_per_mm, image, max_ink_error: RESAMPLED_INK_ERROR };
     (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [-left, -lower] })
 }

@@ -10,7 +10,7 @@ use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape};
 use rayon::prelude::*;
 
 use super::document::Page;
-use super::tiles::{EDGE_PX, MAX_INK_ERROR, PlacedPanel};
+use super::tiles::{EDGE_PX, PROBES, PlacedPanel};
 use super::{Finding, SheetVerdict};
 use crate::artwork;
 use crate::lattice::Tile;
@@ -38,8 +38,8 @@ const LINE_END_PX: f64 = 1.5;
 /// through pixels and through the width of lines.
 const WINDOW_BLANK_PX: f64 = 3.0;
 
-/// Directions in which a tile is looked for beside a pixel.
-const PROBES: u32 = 24;
+/// More spots of a page are not listed: it is dirty all over.
+const MOST_SPOTS: usize = 200;
 
 /// How finely curves are turned into lines, mm.
 const FLATNESS_MM: f64 = 0.002;
@@ -243,18 +243,22 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
             let ink = 1.0 - f64::from(pixel) / 255.0;
             let at = [x as f64, y as f64];
             // White is right wherever no inverted panel is; most of the sheet is done here.
-            let plain = ink <= MAX_INK_ERROR && grounds.iter().all(|ground| !ground.inverted());
+            let plain =
+                ink <= page.max_ink_error && grounds.iter().all(|ground| !ground.inverted());
             *wrong = !plain
                 && !known[y * width + x]
                 && grounds
                     .iter()
                     .find_map(|ground| ground.expected(page, at))
                     .unwrap_or(Some(0.0))
-                    .is_some_and(|expected| (ink - expected).abs() > MAX_INK_ERROR);
+                    .is_some_and(|expected| (ink - expected).abs() > page.max_ink_error);
         }
     });
     let mut spots = Vec::new();
     for start in 0..wrong.len() {
+        if spots.len() == MOST_SPOTS {
+            break;
+        }
         if !std::mem::take(&mut wrong[start]) {
             continue;
         }

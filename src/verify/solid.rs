@@ -43,7 +43,18 @@ const NORMAL_SLACK: f64 = 1e-4;
 const MAX_SCALE_ERROR: f64 = 0.05;
 
 /// A mesh with so many times the stated triangles is not looked at any further either.
-pub(super) const MOST_TRIANGLES: usize = 2;
+const MOST_TRIANGLES: usize = 2;
+
+/// What there is to say of a mesh that has not the stated number of triangles.
+pub(super) fn other_count(found: usize, stated: usize) -> Option<Finding> {
+    let problem = || format!("{found} triangles instead of {stated}");
+    (found != stated).then(|| Finding::Body { problem: problem() })
+}
+
+/// Whether a mesh has so many triangles that it is another one.
+pub(super) fn is_other_mesh(found: usize, stated: usize) -> bool {
+    found > MOST_TRIANGLES * stated
+}
 
 /// Reads a mesh from disk and compares it with the target.
 pub(super) fn verify(
@@ -63,11 +74,8 @@ pub(super) fn verify(
     if let TargetSpec::Solid(spec) = &verifier.target.spec {
         // As many as there are faces, all of which are looked at: there is nothing else.
         let [found, stated] = [model.triangles.len(), spec.polyhedron().faces.len()];
-        if found != stated {
-            findings
-                .push(Finding::Body { problem: format!("{found} triangles instead of {stated}") });
-        }
-        if found > MOST_TRIANGLES * stated {
+        findings.extend(other_count(found, stated));
+        if is_other_mesh(found, stated) {
             return Ok(Verdict::new(path, format, findings));
         }
     }

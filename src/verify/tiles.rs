@@ -5,6 +5,7 @@
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
 
 use super::Finding;
 use super::document::Page;
@@ -17,8 +18,12 @@ use crate::target::{Panel, Placement, TagPlacement};
 /// (0.71), over which an edge is smeared, and 0.02 mm at 300 dpi (0.24), and some blur.
 pub(super) const EDGE_PX: f64 = 1.25;
 
-/// A pixel is wrong when its ink differs by more than this from 0 or 1.
-pub(super) const MAX_INK_ERROR: f64 = 0.3;
+/// Directions in which an edge is looked for beside a pixel: so fine that no tip of a tile or cell, of 60°, slips between
+/// two of them and reaches the pixel.
+pub(super) const PROBES: u32 = 24;
+
+/// Every so many of these are enough to count pixels.
+const COARSE: usize = 3;
 
 /// Tiles of one colour are alike where the ink of nine in ten is so near to their median.
 const TONE_SPREAD: f64 = 0.1;
@@ -214,8 +219,8 @@ impl PlacedPanel<'_> {
         let (ab, ac) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
         let det = ab[0] * ac[1] - ab[1] * ac[0];
         let uv = |[x, y]: [f64; 2]| [(x * ac[1] - y * ac[0]) / det, (y * ab[0] - x * ab[1]) / det];
-        let around: Vec<[f64; 2]> = (0..8)
-            .map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4)
+        let around: Vec<[f64; 2]> = (0..PROBES)
+            .map(|i| f64::from(i) * TAU / f64::from(PROBES))
             .map(|angle| uv([EDGE_PX * angle.cos(), EDGE_PX * angle.sin()]))
             .collect();
         let bit = |p: [f64; 2]| expected.tag.as_ref().and_then(|tag| tag.looks.bit(p));
@@ -244,17 +249,20 @@ impl PlacedPanel<'_> {
                 }
                 let here = bit(p);
                 let black = black_at(p);
-                let uniform = around.iter().all(|d| {
+                let found = 1.0 - f64::from(image.at(x, y)) / 255.0;
+                let is_wrong = (found - f64::from(u8::from(black))).abs() > self.page.max_ink_error;
+                // Most pixels are right, and those that are need not be looked at as closely.
+                let step = if is_wrong { 1 } else { COARSE };
+                let uniform = around.iter().step_by(step).all(|d| {
                     let q = [p[0] + d[0], p[1] + d[1]];
                     inside(q) && black_at(q) == black
                 });
                 if !uniform {
                     continue;
                 }
-                let found = 1.0 - f64::from(image.at(x, y)) / 255.0;
                 let tally = tallies.entry(here).or_default();
                 tally.checked += 1;
-                if (found - f64::from(u8::from(black))).abs() > MAX_INK_ERROR {
+                if is_wrong {
                     tally.wrong += 1;
                     tally.moment[0] += position[0];
                     tally.moment[1] += position[1];

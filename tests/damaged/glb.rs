@@ -2,32 +2,10 @@
 
 use serde_json::{Value, json};
 
+use super::common::glb::Parts;
 use super::edit::{append, swap};
 use super::png;
 use super::{Case, Damage, cases};
-
-/// The JSON and the binary part of a file.
-struct Parts {
-    json: Vec<u8>,
-    binary: Vec<u8>,
-}
-
-impl Parts {
-    fn of(bytes: &[u8]) -> Self {
-        let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
-        Self { json: bytes[20..20 + length].to_vec(), binary: bytes[28 + length..].to_vec() }
-    }
-
-    fn join(mut self) -> Vec<u8> {
-        self.json.resize(self.json.len().next_multiple_of(4), b' ');
-        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
-        let word = |n: usize| (n as u32).to_le_bytes();
-        let length = 28 + self.json.len() + self.binary.len();
-        let head =
-            [&b"glTF\x02\0\0\0"[..], &word(length), &word(self.json.len()), b"JSON"].concat();
-        [&head[..], &self.json, &word(self.binary.len()), b"BIN\0", &self.binary].concat()
-    }
-}
 
 /// Changes the JSON.
 fn json(edit: impl Fn(&mut Value) + 'static) -> Damage {
@@ -416,7 +394,7 @@ pub fn all() -> Vec<Case> {
             (
                 "a gamma of the texture",
                 "chunk gAMA",
-                texture(png::with_chunk("gAMA", &[0, 0, 0, 1])),
+                texture(png::with_chunk(b"gAMA", &[0, 0, 0, 1])),
             ),
             ("a spot on the texture", "at row", texture(png::square([0.33, 0.83], 30))),
         ],

@@ -4,6 +4,11 @@
 //! Most of the damage does not show in the picture that the verifier draws: it is what other
 //! viewers would show otherwise. A table for each format has a line for each cause.
 
+#[path = "../common"]
+mod common {
+    pub mod glb;
+    pub mod png;
+}
 mod edit;
 mod glb;
 mod lists;

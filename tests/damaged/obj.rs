@@ -170,7 +170,7 @@ pub fn texture() -> Vec<Case> {
                 png::pixels(|p| image::DynamicImage::from(p).to_luma_alpha8().into()),
             ),
             ("another title", "t-texture.png, byte 89: words", swap("\0t", "\0u")),
-            ("a gamma", "t-texture.png, byte ", png::with_chunk("gAMA", &[0, 0, 0, 1])),
+            ("a gamma", "t-texture.png, byte ", png::with_chunk(b"gAMA", &[0, 0, 0, 1])),
             ("a spot", "at row", png::square([0.33, 0.83], 30)),
             (
                 "a file that is cut off",

@@ -254,6 +254,19 @@ pub fn board() -> Vec<Case> {
                 "a mark before any operator w",
                 operators("0 0 0 1 K 9 9 m 99 9 l S"),
             ),
+            ("a hairline", "a mark so thin", operators("0 0 0 1 k 9 9 m 99 9 l h f*")),
+            ("a thin line", "a mark so thin", operators("0 0 0 1 K 0.01 w 9 9 m 99 9 l S")),
+            (
+                "a thin area beside a thick one",
+                "a mark so thin",
+                operators("0 0 0 1 k 9 9 m 19 9 l 9 19 l h 9 9 m 99 9.01 l 9 9.02 l h f*"),
+            ),
+            ("a faint line", "spot of", operators("0 0 0 1 K 0.05 w 9 9 m 99 9 l S")),
+            (
+                "a dot of dust",
+                "spot of",
+                operators("0 0 0 1 k 9 9 m 9.1 9 l 9.1 9.1 l 9 9.1 l h f*"),
+            ),
             (
                 "marks off the page",
                 "over the edge of the page",

@@ -2,24 +2,12 @@
 
 use image::{DynamicImage, GrayImage, ImageFormat, Luma};
 
+use super::common::png::chunk;
 use super::edit::{append, find, swap};
 use super::{Case, Damage, cases};
 
-/// A chunk with its check sum.
-pub fn chunk(name: &str, data: &[u8]) -> Vec<u8> {
-    let body = [name.as_bytes(), data].concat();
-    let mut crc = u32::MAX;
-    for &byte in &body {
-        crc ^= u32::from(byte);
-        for _ in 0..8 {
-            crc = if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 };
-        }
-    }
-    [&(data.len() as u32).to_be_bytes(), &body[..], &(!crc).to_be_bytes()].concat()
-}
-
 /// Puts a chunk before the pixels.
-pub fn with_chunk(name: &'static str, data: &'static [u8]) -> Damage {
+pub fn with_chunk(name: &'static [u8; 4], data: &'static [u8]) -> Damage {
     Box::new(move |bytes| {
         // The length stands before the name.
         let at = find(bytes, b"IDAT") - 4;
@@ -32,7 +20,7 @@ fn head(at: usize, value: u8) -> Damage {
     Box::new(move |bytes| {
         let mut head = bytes[16..29].to_vec();
         head[at] = value;
-        [&bytes[..8], &chunk("IHDR", &head), &bytes[33..]].concat()
+        [&bytes[..8], &chunk(b"IHDR", &head), &bytes[33..]].concat()
     })
 }
 
@@ -59,12 +47,37 @@ pub fn square([across, down]: [f64; 2], side: u32) -> Damage {
     })
 }
 
+/// Makes a square grey; its corner in parts of the picture, its side in pixels.
+fn level([across, down]: [f64; 2], side: u32, level: u8) -> Damage {
+    pixels(move |mut picture| {
+        let [x, y] = [across * f64::from(picture.width()), down * f64::from(picture.height())];
+        for (dx, dy) in (0..side).flat_map(|dx| (0..side).map(move |dy| (dx, dy))) {
+            picture.put_pixel(x as u32 + dx, y as u32 + dy, Luma([level]));
+        }
+        picture.into()
+    })
+}
+
+/// Changes all grey values.
+fn grey(mut picture: GrayImage, change: impl Fn(u8) -> u8) -> DynamicImage {
+    picture.pixels_mut().for_each(|Luma([grey])| *grey = change(*grey));
+    picture.into()
+}
+
+/// Lets every fifth pixel of every third row be a little greyer.
+fn noise(mut picture: GrayImage) -> DynamicImage {
+    for (x, y, Luma([grey])) in picture.enumerate_pixels_mut() {
+        *grey ^= if x % 5 == 0 && y % 3 == 0 { 16 } else { 0 };
+    }
+    picture.into()
+}
+
 /// The resolution, in pixels along each side.
 fn resolution(along: u32, up: u32, unit: u8) -> Damage {
     Box::new(move |bytes| {
         let at = find(bytes, b"pHYs") - 4;
         let data = [&along.to_be_bytes()[..], &up.to_be_bytes(), &[unit]].concat();
-        [&bytes[..at], &chunk("pHYs", &data), &bytes[at + 21..]].concat()
+        [&bytes[..at], &chunk(b"pHYs", &data), &bytes[at + 21..]].concat()
     })
 }
 
@@ -75,7 +88,7 @@ fn packed_sum() -> Damage {
         let at = bytes[..end].windows(4).rposition(|name| name == b"IDAT").unwrap();
         let mut data = bytes[at + 4..end - 4].to_vec();
         *data.last_mut().unwrap() ^= 1;
-        [&bytes[..at - 4], &chunk("IDAT", &data), &bytes[end..]].concat()
+        [&bytes[..at - 4], &chunk(b"IDAT", &data), &bytes[end..]].concat()
     })
 }
 
@@ -83,7 +96,7 @@ fn packed_sum() -> Damage {
 fn more_packed() -> Damage {
     Box::new(|bytes| {
         let end = bytes.len() - 12;
-        [&bytes[..end], &chunk("IDAT", b"more"), &bytes[end..]].concat()
+        [&bytes[..end], &chunk(b"IDAT", b"more"), &bytes[end..]].concat()
     })
 }
 
@@ -98,7 +111,7 @@ fn packed(edit: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
             at += 12 + length;
         }
         edit(&mut data);
-        [&bytes[..first], &chunk("IDAT", &data), &bytes[at..]].concat()
+        [&bytes[..first], &chunk(b"IDAT", &data), &bytes[at..]].concat()
     })
 }
 
@@ -125,17 +138,17 @@ pub fn board() -> Vec<Case> {
     cases(
         "b.png",
         vec![
-            ("a gamma", "chunk gAMA", with_chunk("gAMA", &[0, 0, 0, 1])),
-            ("a colour space", "chunk sRGB", with_chunk("sRGB", &[0])),
-            ("a profile", "chunk iCCP", with_chunk("iCCP", b"a\0\0")),
-            ("primary colours", "chunk cHRM", with_chunk("cHRM", &[0; 32])),
-            ("transparent black", "chunk tRNS", with_chunk("tRNS", &[0, 0])),
-            ("a background", "chunk bKGD", with_chunk("bKGD", &[0, 0])),
-            ("an animation", "chunk acTL", with_chunk("acTL", &[0, 0, 0, 2, 0, 0, 0, 0])),
-            ("a turn", "chunk eXIf", with_chunk("eXIf", b"MM")),
-            ("a palette", "chunk PLTE", with_chunk("PLTE", &[0; 3])),
-            ("significant bits", "chunk sBIT", with_chunk("sBIT", &[1])),
-            ("a second resolution", "a second chunk pHYs", with_chunk("pHYs", &[0; 9])),
+            ("a gamma", "chunk gAMA", with_chunk(b"gAMA", &[0, 0, 0, 1])),
+            ("a colour space", "chunk sRGB", with_chunk(b"sRGB", &[0])),
+            ("a profile", "chunk iCCP", with_chunk(b"iCCP", b"a\0\0")),
+            ("primary colours", "chunk cHRM", with_chunk(b"cHRM", &[0; 32])),
+            ("transparent black", "chunk tRNS", with_chunk(b"tRNS", &[0, 0])),
+            ("a background", "chunk bKGD", with_chunk(b"bKGD", &[0, 0])),
+            ("an animation", "chunk acTL", with_chunk(b"acTL", &[0, 0, 0, 2, 0, 0, 0, 0])),
+            ("a turn", "chunk eXIf", with_chunk(b"eXIf", b"MM")),
+            ("a palette", "chunk PLTE", with_chunk(b"PLTE", &[0; 3])),
+            ("significant bits", "chunk sBIT", with_chunk(b"sBIT", &[1])),
+            ("a second resolution", "a second chunk pHYs", with_chunk(b"pHYs", &[0; 9])),
             ("interlacing", "pixels other than grey", head(12, 1)),
             ("one bit", "pixels other than grey", head(8, 1)),
             (
@@ -170,19 +183,24 @@ pub fn board() -> Vec<Case> {
             ("a check sum of the title", "a check sum of iTXt", sum_of("iTXt", 11)),
             ("a check sum of the end", "a check sum", last_byte()),
             ("another title", "words other than", swap("Title\0\0\0\0\0b", "Title\0\0\0\0\0c")),
-            ("a second title", "a second chunk iTXt", with_chunk("iTXt", b"Title\0\0\0\0\0b")),
+            ("a second title", "a second chunk iTXt", with_chunk(b"iTXt", b"Title\0\0\0\0\0b")),
             ("no title", "no title", {
                 Box::new(|bytes| [&bytes[..54], &bytes[find(bytes, b"IDAT") - 4..]].concat())
             }),
-            ("words on the side", "chunk tEXt", with_chunk("tEXt", b"Comment\0desk")),
-            ("a time", "chunk tIME", with_chunk("tIME", &[7, 234, 1, 1, 0, 0, 0])),
+            ("words on the side", "chunk tEXt", with_chunk(b"tEXt", b"Comment\0desk")),
+            ("a time", "chunk tIME", with_chunk(b"tIME", &[7, 234, 1, 1, 0, 0, 0])),
             ("data at the end", "data in the chunk IEND", {
-                Box::new(|bytes| [&bytes[..bytes.len() - 12], &chunk("IEND", b"a")].concat())
+                Box::new(|bytes| [&bytes[..bytes.len() - 12], &chunk(b"IEND", b"a")].concat())
             }),
             ("a larger page", "page of", resolution(11_000, 11_000, 1)),
             ("pixels that are not square", "no resolution", resolution(11_811, 11_000, 1)),
             ("a resolution without a unit", "no resolution", resolution(11_811, 11_811, 0)),
             ("a spot", "spot of", square([0.02, 0.02], 12)),
+            ("a faint spot", "spot of", level([0.02, 0.02], 1, 240)),
+            ("a faint spot in the board", "at row", level([0.5, 0.5], 6, 128)),
+            ("grey for black", "contrast", pixels(|p| grey(p, |v| v.max(100)))),
+            ("grey paper", "contrast", pixels(|p| grey(p, |v| v.min(250)))),
+            ("noise", "spot of", pixels(noise)),
             ("a hole in the board", "at row", square([0.5, 0.5], 40)),
             (
                 "black and white exchanged",

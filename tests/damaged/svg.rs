@@ -57,6 +57,16 @@ pub fn board() -> Vec<Case> {
             ("a choice by language", "element <switch>", over("<switch/>")),
             ("a link", "element <a>", over("<a href=\"http://example.org\"/>")),
             ("a filter", "element <filter>", over("<filter id=\"f\"/>")),
+            (
+                "a hairline",
+                "a mark so thin",
+                swap("<path ", "<path d=\"M9 9L20 9Z\" id=\"x\"/><path "),
+            ),
+            (
+                "a dot of dust",
+                "spot of",
+                swap("<path ", "<path d=\"M3 3L3.03 3L3.03 3.03L3 3.03Z\" id=\"x\"/><path "),
+            ),
             ("a mask", "element <mask>", over("<mask id=\"m\"/>")),
             ("a pattern", "element <pattern>", over("<pattern id=\"p\"/>")),
             ("a view of a part", "element <view>", over("<view id=\"v\" viewBox=\"0 0 9 9\"/>")),

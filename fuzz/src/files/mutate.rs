@@ -1,5 +1,8 @@
 //! Changes of files that keep their form, so that they get past the door of a reader.
 
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
 use super::{json, pdf, png, text};
 
 /// How files are built.
@@ -19,27 +22,19 @@ pub enum Form {
     Glb,
 }
 
-/// Numbers without an end from a seed (SplitMix64).
+/// Numbers without an end from a seed.
 #[derive(Clone, Debug)]
-pub struct Dice(u64);
+pub struct Dice(ChaCha8Rng);
 
 impl Dice {
     /// Those of a seed.
     pub fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    /// The next number.
-    pub fn roll(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        Self(ChaCha8Rng::seed_from_u64(seed))
     }
 
     /// A number less than another; 0 where that is 0.
     pub fn below(&mut self, end: usize) -> usize {
-        (self.roll() % end.max(1) as u64) as usize
+        self.0.random_range(0..end.max(1))
     }
 
     /// One of some things.
@@ -84,7 +79,7 @@ pub fn noise(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
             let number = dice.one_of(&FLOATS).to_le_bytes();
             bytes[at..at + 4].copy_from_slice(&number);
         }
-        _ => bytes[at] = dice.roll() as u8,
+        _ => bytes[at] = dice.below(256) as u8,
     }
     bytes
 }

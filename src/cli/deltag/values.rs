@@ -4,6 +4,8 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use crate::name::Name;
+
 /// A whole number of a range. The ends of the number's own type go unsaid.
 pub(super) fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone
 where
@@ -52,16 +54,7 @@ pub(super) fn number(
 
 /// A name that can be the stem of a file and the name of a family.
 pub(super) fn name(text: &str) -> Result<String, String> {
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    match text {
-        "" => Err("write at least one letter or digit".to_owned()),
-        _ if text.len() > 64 => Err("write at most 64 characters".to_owned()),
-        _ if text.starts_with('-') => Err("begin with a letter or digit".to_owned()),
-        _ if !text.chars().all(plain) => {
-            Err("write only letters A-Z and a-z, digits, - and _; -o names the folder".to_owned())
-        }
-        _ => Ok(text.to_owned()),
-    }
+    Name::without_dots(text).map(Into::into)
 }
 
 /// Ids of tags, in the order given.

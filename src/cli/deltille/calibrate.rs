@@ -203,9 +203,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let _ = writeln!(text, "held out: {}", headline(test));
     }
     for path in written {
-        let _ = writeln!(text, "wrote {}", path.display());
+        let _ = writeln!(text, "wrote {}", shown(&path.display().to_string()));
     }
-    output::print(&shown(&text))?;
+    output::print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -404,7 +404,8 @@ fn table(solution: &Solution) -> String {
     let _ = writeln!(text, "view             corners  rms px  outliers");
     for view in &solution.views {
         let (corners, outliers) = (view.corners.len(), view.outlier_count());
-        let _ = writeln!(text, "{:16} {corners:7}  {:.4}  {outliers:8}", view.name, view.rms_px);
+        let name = shown(&view.name);
+        let _ = writeln!(text, "{name:16} {corners:7}  {:.4}  {outliers:8}", view.rms_px);
     }
     text += &headline(solution);
     text.push('\n');

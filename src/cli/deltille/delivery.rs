@@ -63,7 +63,9 @@ impl Delivery {
         summary: &str,
     ) -> anyhow::Result<ExitCode> {
         let written = write_all(&self.output, files, self.overwrite)?;
-        say!("{summary}");
+        for line in summary.lines() {
+            say!("{line}");
+        }
         for path in &written {
             say!("wrote {}", path.display());
         }

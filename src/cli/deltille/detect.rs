@@ -345,7 +345,7 @@ fn one_image(
     Ok(Outcome::Seen(Found { line, ink: found.ink, is_there }))
 }
 
-/// A line on what was found in an image.
+/// What was found in an image, in a line, and why there is no more.
 fn summary(path: &Path, found: &Detection) -> String {
     let corners: usize = found.grids.iter().map(|grid| grid.corners.len()).sum();
     let tags: usize = found.grids.iter().map(|grid| grid.tags.len()).sum();
@@ -358,13 +358,11 @@ fn summary(path: &Path, found: &Detection) -> String {
     if tags > 0 {
         line += &format!(", {}", counted(tags, "tag"));
     }
-    line += "\n";
+    let mut lines = vec![line];
     if let Some(damage) = &found.file.damage {
-        line +=
-            &format!("  the file is damaged ({damage}): pixels that it does not have are grey\n");
+        let grey = "pixels that it does not have are grey";
+        lines.push(format!("  the file is damaged ({damage}): {grey}"));
     }
-    for reason in &found.reasons {
-        line += &format!("  {reason}\n");
-    }
-    shown(&line).into_owned()
+    lines.extend(found.reasons.iter().map(|reason| format!("  {reason}")));
+    lines.iter().map(|line| shown(line) + "\n").collect()
 }

@@ -22,6 +22,9 @@ pub struct ImageLimits {
     /// [default: 150M]
     #[arg(long, help_heading = HEADING, value_name = "PIXELS", value_parser = count)]
     max_pixels: Option<u64>,
+    /// Most pixels for each byte of the file of a photograph of more than 20 megapixels [default: 100]
+    #[arg(long, help_heading = HEADING, value_name = "PIXELS", value_parser = count)]
+    max_pixels_per_byte: Option<u64>,
 }
 
 /// All limits.
@@ -50,7 +53,11 @@ impl FileLimits {
 impl ImageLimits {
     pub fn limits(&self) -> Limits {
         let files = self.files.limits();
-        Limits { max_pixels: self.max_pixels.unwrap_or(files.max_pixels), ..files }
+        Limits {
+            max_pixels: self.max_pixels.unwrap_or(files.max_pixels),
+            max_pixels_per_byte: self.max_pixels_per_byte.unwrap_or(files.max_pixels_per_byte),
+            ..files
+        }
     }
 }
 

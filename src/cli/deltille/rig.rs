@@ -21,7 +21,7 @@ use crate::export::camera::{colmap, colmap_rig, kalibr};
 use crate::export::rig;
 use crate::report::{Named, cannot_tell_apart, causes_of_rig};
 use crate::target::Name;
-use crate::words::counted;
+use crate::words::{counted, shown};
 
 /// Arguments of `deltille rig`.
 #[derive(clap::Args)]
@@ -178,7 +178,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         files.push(text_file(format!("{}.json", refined.name), refined.to_json()));
     }
     let written = write_all(&args.output, &files, args.overwrite)?;
-    say!("{text}");
+    for line in text.lines() {
+        say!("{line}");
+    }
     for path in written {
         say!("wrote {}", path.display());
     }
@@ -250,7 +252,8 @@ fn summary(solution: &RigSolution) -> String {
         text.push('\n');
     }
     for out in &solution.excluded {
-        text += &format!("left out {}: {}\n", out.shown(), out.reason);
+        text += &shown(&format!("left out {}: {}", out.shown(), out.reason));
+        text.push('\n');
     }
     text.trim_end().to_owned()
 }

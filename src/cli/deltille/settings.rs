@@ -154,13 +154,13 @@ pub struct Plan {
     pub spec: BoardSpec,
     /// What it is printed on.
     pub paper: PaperSpec,
-    /// Whether there is a PDF,
+    /// Whether a PDF of all pages is written.
     pub pdf: bool,
-    /// an SVG for each page,
+    /// Whether an SVG of each page is written.
     pub svg: bool,
-    /// a PNG for each,
+    /// Whether a PNG of each page is written.
     pub png: bool,
-    /// a list for other detectors.
+    /// Whose list of corners and tags is written, if any.
     pub dsc: Option<Dialect>,
     /// Resolution of the PNG, dots per inch.
     pub dpi: u32,

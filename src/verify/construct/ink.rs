@@ -1,7 +1,7 @@
 //! How much there is to draw on a page. Lines that cross it a thousand times, or a thousand areas
 //! on top of each other, keep a renderer busy for hours, and no target has them.
 
-use kurbo::BezPath;
+use kurbo::{BezPath, PathEl, Shape};
 
 /// Length of all contours over the area of the page, 1/mm: tags in all tiles, with cells of
 /// 0.1 mm, have less.
@@ -9,6 +9,16 @@ const MOST_PER_MM: f64 = 40.0;
 
 /// Area around all contours in pages: tiles and cells have one each, and do not overlap.
 const MOST_PAGES: f64 = 40.0;
+
+/// Areas and lines thinner than this are drawn by some viewers as wide as a pixel, and by others not at all, mm. Cells
+/// and strokes of letters have more.
+const LEAST_WIDTH_MM: f64 = 0.01;
+
+/// Of a mark that is thinner.
+pub(super) const THIN: &str = "a mark so thin that not all viewers draw it alike";
+
+/// How finely lengths of curves are measured, relative to the least width.
+const LENGTH_ERROR: f64 = 0.1;
 
 /// What is on a page so far, in its own units.
 pub(super) struct Ink {
@@ -52,6 +62,24 @@ impl Ink {
         }
     }
 
+    /// Whether a filled path, or one that is drawn by a pen of some width, is thick enough in each of its contours
+    /// that all viewers draw it alike.
+    pub fn is_thick(&self, path: &BezPath, pen: Option<f64>) -> bool {
+        let least = LEAST_WIDTH_MM / self.mm;
+        if let Some(width) = pen {
+            return width >= least;
+        }
+        let elements = path.elements();
+        let is_start = |element: &PathEl| matches!(element, PathEl::MoveTo(_));
+        let contours = elements.chunk_by(|_, next| !is_start(next));
+        contours.map(|contour| BezPath::from_vec(contour.to_vec())).all(|mut contour| {
+            contour.close_path();
+            // Of a long rectangle this is its width.
+            let width = 2.0 * contour.area().abs() / contour.perimeter(LENGTH_ERROR * least);
+            width >= least
+        })
+    }
+
     /// Whether a target may have so much.
     pub fn is_drawable(&self) -> bool {
         // Negations, so that what is no number is refused too.
@@ -62,6 +90,18 @@ impl Ink {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn thin_marks_are_told_from_thick_ones() {
+        let ink = Ink::new([100.0, 100.0], 1.0);
+        let is_thick = |path: &str| ink.is_thick(&BezPath::from_svg(path).unwrap(), None);
+        assert!(is_thick("M0,0 L20,20 L20.1,20 L0.1,0 z"));
+        assert!(!is_thick("M0,0 L20,20 L20.01,20 L0.01,0 z"));
+        assert!(!is_thick("M0,0 L9,0 L0,9 z M0,0 L20,20 z"));
+        assert!(!is_thick("M0,0 L20,20"));
+        let line = BezPath::from_svg("M0,0 L20,20").unwrap();
+        assert!(ink.is_thick(&line, Some(0.1)) && !ink.is_thick(&line, Some(1e-3)));
+    }
 
     #[test]
     fn a_page_is_covered_some_times_and_not_often() {

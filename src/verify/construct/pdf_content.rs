@@ -3,7 +3,7 @@
 
 use kurbo::BezPath;
 
-use super::ink::Ink;
+use super::ink::{Ink, THIN};
 use super::{Findings, OFF_PAGE, start};
 use crate::limits::{Exceeded, Limits};
 
@@ -146,32 +146,31 @@ impl Painter {
             }
             ("h", []) if has_begun => self.contours.close_path(),
             ("w", &[width]) => self.width_pt = width,
-            ("f*", _) => {
-                self.ink.add(&std::mem::take(&mut self.contours), None);
-                return self.paint(&["k"], path, 0.0);
-            }
-            ("S", _) => {
-                self.ink.add(&std::mem::take(&mut self.contours), Some(self.width_pt));
-                return self.paint(&["K", "w"], path, self.width_pt);
-            }
+            ("f*", _) => return self.paint(&["k"], path, None),
+            ("S", _) => return self.paint(&["K", "w"], path, Some(self.width_pt)),
             _ => {}
         }
         Ok(true)
     }
 
-    /// Paints a path, as wide as a line is.
+    /// Fills a path, or draws it by a pen of some width.
     fn paint(
-        &self,
+        &mut self,
         needed: &[&str],
         path: Option<[f64; 4]>,
-        width_pt: f64,
+        pen: Option<f64>,
     ) -> Result<bool, String> {
+        let contours = std::mem::take(&mut self.contours);
+        self.ink.add(&contours, pen);
         if let Some(unsaid) = needed.iter().find(|needed| !self.said.contains(needed)) {
             return Err(format!("a mark before any operator {unsaid}"));
         }
+        if !self.ink.is_thick(&contours, pen) {
+            return Err(THIN.to_owned());
+        }
         let [left, lower, right, upper] = path.unwrap_or_default();
         let [width, height] = self.size_pt;
-        let half = width_pt / 2.0;
+        let half = pen.unwrap_or_default() / 2.0;
         Ok(left - half > -EDGE_SLACK_PT
             && lower - half > -EDGE_SLACK_PT
             && right + half < width + EDGE_SLACK_PT

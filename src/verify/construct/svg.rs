@@ -3,7 +3,7 @@
 use kurbo::BezPath;
 use resvg::usvg::roxmltree::{Document, Error, Node, NodeType, ParsingOptions};
 
-use super::ink::Ink;
+use super::ink::{Ink, THIN};
 use super::{Findings, OFF_PAGE, Words, decimal, is_creator, start, text};
 use crate::limits::{Kind, Limits};
 
@@ -63,7 +63,7 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
     let view = view.unwrap_or_default();
     let mut ink = Ink::new(view.size(), view.unit_mm);
     for node in document.root().descendants() {
-        let constructs = match node.node_type() {
+        let mut constructs = match node.node_type() {
             NodeType::Element => element(&node),
             NodeType::Text => loose_text(&node),
             NodeType::PI => {
@@ -75,7 +75,8 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
             NodeType::Root => continue,
         };
         if let ("path", []) = (node.tag_name().name(), &constructs[..]) {
-            add(&node, &mut ink);
+            let is_thick = add(&node, &mut ink);
+            constructs.extend((!is_thick).then(|| THIN.to_owned()));
         }
         let on_page = !node.is_element() || is_on_page(&node, &view);
         let is_listed = constructs.is_empty() && on_page;
@@ -114,14 +115,15 @@ fn is_writer(comment: &Node) -> bool {
     first && words.is_some_and(is_creator)
 }
 
-/// Adds what a path draws.
-fn add(node: &Node, ink: &mut Ink) {
-    let Ok(path) = BezPath::from_svg(node.attribute("d").unwrap_or_default()) else { return };
+/// Adds what a path draws, and says whether it is so thick that it is drawn alike everywhere.
+fn add(node: &Node, ink: &mut Ink) -> bool {
+    let Ok(path) = BezPath::from_svg(node.attribute("d").unwrap_or_default()) else { return true };
     let pen = node.attribute("stroke").map(|_| {
         let width = node.attribute("stroke-width").and_then(decimal);
         width.unwrap_or(1.0)
     });
     ink.add(&path, pen);
+    ink.is_thick(&path, pen)
 }
 
 /// The words are those of the target: viewers show them for a title, and read them aloud.

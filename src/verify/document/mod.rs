@@ -15,6 +15,13 @@ use crate::raster::Gray;
 /// Largest picture that is drawn for a check, px.
 pub(super) const MAX_PIXELS: f64 = 60.0e6;
 
+/// How far the ink of an area may be from 0 or 1 on a page that is drawn or read: what rounding leaves of 255 grey
+/// values.
+const DRAWN_INK_ERROR: f64 = 0.01;
+
+/// The same on a page that is put together from pixels of others, over which edges reach further.
+pub(super) const RESAMPLED_INK_ERROR: f64 = 0.3;
+
 /// Which kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -126,6 +133,8 @@ pub struct Page {
     pub px_per_mm: f64,
     /// The picture.
     pub image: Gray<u8>,
+    /// How far the ink of a pixel in an area of one colour may be from 0 or 1.
+    pub max_ink_error: f64,
 }
 
 impl Document {
@@ -199,7 +208,7 @@ impl Document {
         let [width_mm, height_mm] = self.size_mm(page);
         let most = (MAX_PIXELS / (width_mm * height_mm)).sqrt();
         let px_per_mm = match &*self.content {
-            Content::Png(png) => png.px_per_mm(),
+            Content::Png(png) => png.image_px_per_mm(),
             _ => px_per_mm.min(most),
         };
         let content = Arc::clone(&self.content);
@@ -220,7 +229,7 @@ impl Document {
                 })?
             }
         };
-        Ok(Page { width_mm, height_mm, px_per_mm, image })
+        Ok(Page { width_mm, height_mm, px_per_mm, image, max_ink_error: DRAWN_INK_ERROR })
     }
 }
 
@@ -287,18 +296,4 @@ fn pixels(mm: f64, px_per_mm: f64) -> usize {
 /// Luma of an opaque colour, Rec. 709 weights.
 fn luma([r, g, b]: [u8; 3]) -> u8 {
     (0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b)).round() as u8
-}
-
-/// Stretches the grey values so that the darkest pixel is 0 and the brightest 255: pure K is not
-/// quite black on screen.
-fn stretch(mut image: Gray<u8>) -> Gray<u8> {
-    let (least, most) = image.pixels().iter().fold((255, 0), |(lo, hi), &v| (v.min(lo), v.max(hi)));
-    if most - least.min(most) >= 128 {
-        let range = f32::from(most - least);
-        let table: Vec<u8> = (0..=255u8)
-            .map(|v| (f32::from(v.saturating_sub(least)) * 255.0 / range).round() as u8)
-            .collect();
-        image.pixels_mut().iter_mut().for_each(|v| *v = table[usize::from(*v)]);
-    }
-    image
 }

@@ -7,7 +7,7 @@ use hayro::vello_cpu::color::palette::css::WHITE;
 use hayro::vello_cpu::{Pixmap, RasterizerSettings, RenderContext, Resources, TargetInit};
 use hayro::{RenderCache, RenderSettings, hayro_syntax, render_into};
 
-use super::{is_over, luma, pixels, stretch};
+use super::{is_over, luma, pixels};
 use crate::raster::Gray;
 
 const MM_PER_PT: f64 = 25.4 / 72.0;
@@ -56,6 +56,20 @@ impl Pdf {
         }
         stretch(Gray::from_vec(width, height, grey).expect("bands fill the page"))
     }
+}
+
+/// Stretches the grey values so that the darkest pixel is 0 and the brightest 255: pure K is not
+/// quite black on screen.
+fn stretch(mut image: Gray<u8>) -> Gray<u8> {
+    let (least, most) = image.pixels().iter().fold((255, 0), |(lo, hi), &v| (v.min(lo), v.max(hi)));
+    if most - least.min(most) >= 128 {
+        let range = f32::from(most - least);
+        let table: Vec<u8> = (0..=255u8)
+            .map(|v| (f32::from(v.saturating_sub(least)) * 255.0 / range).round() as u8)
+            .collect();
+        image.pixels_mut().iter_mut().for_each(|v| *v = table[usize::from(*v)]);
+    }
+    image
 }
 
 fn band<'a>(

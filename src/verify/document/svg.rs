@@ -4,7 +4,7 @@ use std::time::Instant;
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{self, roxmltree};
 
-use super::{is_over, luma, pixels, stretch};
+use super::{is_over, luma, pixels};
 use crate::export::{Block, SUBPIXELS, supersample};
 use crate::limits::{self, Broken};
 use crate::raster::Gray;
@@ -60,9 +60,7 @@ impl Svg {
             return Err(Broken::Panic.to_string());
         }
         match drawn {
-            Ok(()) => {
-                Ok(stretch(Gray::from_vec(width, height, grey).expect("bands fill the page")))
-            }
+            Ok(()) => Ok(Gray::from_vec(width, height, grey).expect("bands fill the page")),
             Err(never) => match never {},
         }
     }
