@@ -8,7 +8,7 @@ mod common {
 }
 
 use std::fs::{self, File};
-use std::io::{Read, Write};
+use std::io::{Cursor, Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::LazyLock;
@@ -215,6 +215,15 @@ fn png(width: u32, height: u32, more: &[u8]) -> Vec<u8> {
     .concat()
 }
 
+/// Almost half a million corners.
+fn fabric() -> Vec<u8> {
+    let weave = |x, y| image::Luma([if (x / 5 + y / 5) % 2 == 0 { 250u8 } else { 5 }]);
+    let mut bytes = Cursor::new(Vec::new());
+    let picture = image::GrayImage::from_fn(3150, 3150, weave);
+    picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
 /// So many bytes of zero, packed a thousandfold.
 fn zeros(count: u64) -> Vec<u8> {
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::best());
@@ -360,6 +369,7 @@ fn pictures() -> Vec<Bomb> {
         ("bomb.png", png(30_000, 30_000, &[]), BOARD, 2, "--max-pixels"),
         ("photograph.png", png(30_000, 30_000, &[]), DETECT, 2, "--max-pixels"),
         ("large.png", png(12_000, 12_000, &[]), DETECT, 2, "--max-pixels-per-byte"),
+        ("fabric.png", fabric(), "deltille detect --grid checker @ -o out", 1, ""),
         ("page.png", png(12_000, 12_000, &[]), BOARD, 1, ""),
         ("profile.png", png(8, 8, &profile), DETECT, 1, ""),
     ]

@@ -261,7 +261,11 @@ impl Detector {
                 let figures = [("corners", corners as f64), ("expected", most as f64)];
                 // Tags that were read tell more.
                 let by_tags = no_labels.clone().filter(|reason| reason.kind.is_of_tags_read());
-                by_tags.or_else(|| Some(Reason::new(ReasonKind::NotWhole, figures)))
+                let kind = match self.labels.are_wanted() {
+                    true => ReasonKind::NotWhole,
+                    false => ReasonKind::TooManyCorners,
+                };
+                by_tags.or_else(|| Some(Reason::new(kind, figures)))
             } else {
                 None
             };

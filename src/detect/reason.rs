@@ -62,7 +62,9 @@ pub enum ReasonKind {
     Ambiguous,
     /// The grid is less, or more, than the whole board whose outline would label it: `corners`, `expected`.
     NotWhole,
-    /// The same, and it ends at the border of the picture: `corners`, and `expected` where there are no tags.
+    /// The grid is larger than any board, and no certain one is looked for: `corners`, `expected` at most.
+    TooManyCorners,
+    /// The same as [`NotWhole`](Self::NotWhole), and it ends at the border of the picture: `corners`, and `expected` where there are no tags.
     CutByBorder,
     /// Corners of a panel that is seen elsewhere in the picture too, and are left out: `corners`.
     SeenTwice,
@@ -169,6 +171,12 @@ impl fmt::Display for Reason {
             ReasonKind::NotWhole => write!(
                 f,
                 "a grid of {} corners is not the whole board of {}",
+                figure("corners"),
+                figure("expected")
+            ),
+            ReasonKind::TooManyCorners => write!(
+                f,
+                "a grid of {} corners is larger than any board, which has at most {}",
                 figure("corners"),
                 figure("expected")
             ),

@@ -34,7 +34,7 @@ pub const MAX_SETTINGS_BYTES: usize = 50_000;
 pub const MAX_FAMILY_BYTES: usize = 150_000_000;
 
 /// Pixels of a picture that may be in a file of any size.
-const FREE_PIXELS: u64 = 20_000_000;
+const FREE_PIXELS: u64 = 10_000_000;
 
 /// Bytes that a pixel may take while a picture is decoded: 8 bits of four colours.
 const BYTES_PER_PIXEL: u64 = 4;
@@ -47,7 +47,7 @@ pub struct Limits {
     /// Pixels of a picture: of a photograph, of a page or texture as PNG, and of all photographs
     /// that are in memory at a time.
     pub max_pixels: u64,
-    /// Pixels of a photograph of more than 20 megapixels for each byte of its file. The noise of sensors takes bytes: a
+    /// Pixels of a photograph of more than 10 megapixels for each byte of its file. The noise of sensors takes bytes: a
     /// compressed photograph has some 5, and what has so many more was made to keep its reader busy.
     pub max_pixels_per_byte: u64,
     /// Parts of a file: elements of an SVG, operators of a PDF page, nodes and triangles of a mesh.

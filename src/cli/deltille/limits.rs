@@ -22,7 +22,7 @@ pub struct ImageLimits {
     /// [default: 150M]
     #[arg(long, help_heading = HEADING, value_name = "PIXELS", value_parser = count)]
     max_pixels: Option<u64>,
-    /// Most pixels for each byte of the file of a photograph of more than 20 megapixels [default: 100]
+    /// Most pixels for each byte of the file of a photograph of more than 10 megapixels [default: 100]
     #[arg(long, help_heading = HEADING, value_name = "PIXELS", value_parser = count)]
     max_pixels_per_byte: Option<u64>,
 }
