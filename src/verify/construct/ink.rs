@@ -17,9 +17,6 @@ const LEAST_WIDTH_MM: f64 = 0.01;
 /// Of a mark that is thinner.
 pub(super) const THIN: &str = "a mark so thin that not all viewers draw it alike";
 
-/// How finely lengths of curves are measured, relative to the least width.
-const LENGTH_ERROR: f64 = 0.1;
-
 /// What is on a page so far, in its own units.
 pub(super) struct Ink {
     /// Area of the page.
@@ -38,17 +35,7 @@ impl Ink {
 
     /// Adds a filled path, or one that is drawn by a pen of some width.
     pub fn add(&mut self, path: &BezPath, pen: Option<f64>) {
-        let segments = path.segments();
-        // Control points lie no nearer than the curve.
-        let lengths = segments.map(|segment| {
-            let points = segment.to_cubic();
-            let [a, b, c, d] = [points.p0, points.p1, points.p2, points.p3];
-            a.distance(b) + b.distance(c) + c.distance(d)
-        });
-        let (mut length, mut count) = (0.0, 0.0);
-        for one in lengths {
-            (length, count) = (length + one, count + 1.0);
-        }
+        let (length, count) = length(path);
         match pen {
             // Either side of the line, and the ends or corners.
             Some(width) => {
@@ -75,7 +62,7 @@ impl Ink {
         contours.map(|contour| BezPath::from_vec(contour.to_vec())).all(|mut contour| {
             contour.close_path();
             // Of a long rectangle this is its width.
-            let width = 2.0 * contour.area().abs() / contour.perimeter(LENGTH_ERROR * least);
+            let width = 2.0 * contour.area().abs() / length(&contour).0;
             width >= least
         })
     }
@@ -85,6 +72,17 @@ impl Ink {
         // Negations, so that what is no number is refused too.
         self.length <= MOST_PER_MM * self.mm * self.page && self.area <= MOST_PAGES * self.page
     }
+}
+
+/// The length of a path, and how many segments it has. Of a curve it is that of its control points, which is no less and
+/// takes no time.
+fn length(path: &BezPath) -> (f64, f64) {
+    let lengths = path.segments().map(|segment| {
+        let points = segment.to_cubic();
+        let [a, b, c, d] = [points.p0, points.p1, points.p2, points.p3];
+        a.distance(b) + b.distance(c) + c.distance(d)
+    });
+    lengths.fold((0.0, 0.0), |(length, count), one| (length + one, count + 1.0))
 }
 
 #[cfg(test)]
