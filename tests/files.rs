@@ -133,6 +133,20 @@ fn another_board_of_the_same_name_says_what_is_left_of_the_first() {
     );
 }
 
+/// What a link leads to is written, and verified as what the link's name says.
+#[cfg(unix)]
+#[test]
+fn files_behind_links_of_any_name_are_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("out.bin"), "x").unwrap();
+    std::os::unix::fs::symlink("out.bin", folder.path().join("board.pdf")).unwrap();
+    deltille(folder.path(), "board --rows 5 --cols 6 --pdf --force")
+        .success()
+        .stdout(contains("board.pdf").and(contains("verified: 1 file")));
+    assert!(std::fs::read(folder.path().join("out.bin")).unwrap().starts_with(b"%PDF"));
+    assert!(folder.path().join("board.pdf").is_symlink());
+}
+
 /// Two boards that differ, by the content of all their files.
 struct Boards {
     folder: tempfile::TempDir,

@@ -8,7 +8,9 @@
 //! ```
 //!
 //! What is wrong pulls what is right with it, least where the scale is the narrowest that still
-//! holds most corners. So the scale is walked down to before anything is called wrong.
+//! holds most corners. So the scale is walked down to before anything is called wrong. Where corners are off
+//! alike, the walk may rest between them and the others; from there the nearest are followed, which are
+//! mostly those of the larger crowd.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,7 +23,7 @@ use super::panel::PanelRef;
 use super::pose::planar_pose;
 use super::problem::{Block, Problem};
 use super::rig::middle;
-use super::settle::{Settled, deviations, residuals};
+use super::settle::{Settled, deviations, residuals, with_gross_errors};
 use super::view::{LEAST_CORNERS, Sighting, View};
 use super::weights::{Weights, Whitening, median};
 use super::wrong::{limit_px, median_px};
@@ -34,6 +36,12 @@ const NARROW: f64 = 0.5;
 /// The walk ends when a round leaves more than this part of the scale, or after so many rounds.
 const STILL: f64 = 0.98;
 const MOST_ROUNDS: usize = 12;
+
+/// Of each frame this part of the corners is followed away from between two crowds, as most corners are right.
+const FOLLOWED: f64 = 0.5;
+
+/// There were two crowds if that leaves less than this part of the scale: noise without crowds hardly shrinks.
+const SHRUNK: f64 = 0.5;
 
 /// Panels of which one can be wrong: of two nothing tells which.
 const LEAST_PANELS: usize = 3;
@@ -54,6 +62,29 @@ pub(super) struct Gross {
     panels: BTreeSet<PanelRef>,
     /// The median error of every block, px.
     off_px: Vec<f64>,
+    /// See [`Kept::some_stand_out`].
+    some_stand_out: bool,
+}
+
+/// What of a problem belongs.
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    pub problem: Problem,
+    /// Blocks that take no part.
+    pub left_out: Vec<bool>,
+    /// Whether corners with gross errors stand out from the others at once. Then they must not pull even at first:
+    /// two fifths that are off alike pull so much that they would no longer stand out.
+    pub some_stand_out: bool,
+}
+
+/// Where a walk to where most corners agree ended.
+#[derive(Clone, Debug)]
+struct Walked {
+    problem: Problem,
+    /// The deviation of a coordinate.
+    sigma: f64,
+    /// See [`Kept::some_stand_out`].
+    some_stand_out: bool,
 }
 
 /// Why a frame does not belong.
@@ -71,7 +102,7 @@ impl Gross {
     /// Walks to where most corners of a problem agree, and finds what does not; `None` where nothing
     /// can be adjusted.
     pub(super) fn of(problem: Problem) -> Option<Self> {
-        let (problem, panels) = agree(problem)?;
+        let (Walked { problem, some_stand_out, .. }, panels) = agree(problem)?;
         let residuals = residuals(&problem);
         let off_px: Vec<f64> = residuals.iter().map(median_px).collect();
         // Of every camera in every frame.
@@ -111,15 +142,17 @@ impl Gross {
                 frames.insert(frame, WrongFrame::OnlyWrongPanels);
             }
         }
-        Some(Self { problem, left_out, frames, usual_px: median(medians), panels, off_px })
+        let usual_px = median(medians);
+        Some(Self { problem, left_out, frames, usual_px, panels, off_px, some_stand_out })
     }
 
-    /// The problem without the frames that do not belong, and its blocks that take no part.
-    pub(super) fn kept(&self) -> (Problem, Vec<bool>) {
+    /// The problem without the frames that do not belong.
+    pub(super) fn kept(&self) -> Kept {
         let belongs = |frame: usize| !self.frames.contains_key(&frame);
         let of_blocks = self.problem.blocks.iter().zip(&self.left_out);
         let left_out = of_blocks.filter(|(block, _)| belongs(block.frame)).map(|(_, out)| *out);
-        (self.problem.with_frames(belongs), left_out.collect())
+        let (problem, left_out) = (self.problem.with_frames(belongs), left_out.collect());
+        Kept { problem, left_out, some_stand_out: self.some_stand_out }
     }
 
     /// What the outliers share; `names` are those of the frames, of the problem as it was at first.
@@ -131,7 +164,7 @@ impl Gross {
         let Settled { problem, outliers, .. } = settled;
         let kept: Vec<usize> =
             (0..self.problem.frames.len()).filter(|f| !self.frames.contains_key(f)).collect();
-        let (_, left_out) = self.kept();
+        let Kept { left_out, .. } = self.kept();
         let count = |belongs: &dyn Fn(&Block) -> bool| {
             let mut count = Count::default();
             let of_blocks = problem.blocks.iter().zip(outliers);
@@ -184,14 +217,14 @@ fn mirrored(problem: &Problem) -> Vec<usize> {
 }
 
 /// Walks to where most corners agree, without the panels that most others speak against.
-fn agree(problem: Problem) -> Option<(Problem, BTreeSet<PanelRef>)> {
+fn agree(problem: Problem) -> Option<(Walked, BTreeSet<PanelRef>)> {
     let seen: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
     let mut wrong: BTreeSet<PanelRef> = BTreeSet::new();
-    let (all, sigma) = narrowed(problem.clone())?;
+    let all = narrowed(problem)?;
     if seen.len() < LEAST_PANELS {
         return Some((all, wrong));
     }
-    let (mut current, mut sigma) = (all.clone(), sigma);
+    let Walked { problem: mut current, mut sigma, mut some_stand_out } = all.clone();
     while let Some(panel) = worst_panel(&current, sigma, &wrong) {
         wrong.insert(panel);
         // Where as many are wrong as right, the target is another one.
@@ -199,7 +232,7 @@ fn agree(problem: Problem) -> Option<(Problem, BTreeSet<PanelRef>)> {
             return Some((all, BTreeSet::new()));
         }
         let mut part = current.part(|_, block| !wrong.contains(&block.panel));
-        (part.problem, sigma) = narrowed(part.problem)?;
+        Walked { problem: part.problem, sigma, some_stand_out } = narrowed(part.problem)?;
         current.take(part);
     }
     // What looked wrong beside what is may be right.
@@ -207,7 +240,7 @@ fn agree(problem: Problem) -> Option<(Problem, BTreeSet<PanelRef>)> {
         let (of_panel, others) = of_panel(&current, sigma, panel);
         of_panel.stands_out(sum(of_panel, others))
     });
-    Some((current, wrong))
+    Some((Walked { problem: current, sigma, some_stand_out }, wrong))
 }
 
 fn sum(a: Count, b: Count) -> Count {
@@ -242,11 +275,11 @@ fn worst_panel(problem: &Problem, sigma: f64, wrong: &BTreeSet<PanelRef>) -> Opt
 }
 
 /// Walks to where most corners agree: with a loss that lets go of those far off, narrower in every
-/// round. The deviation of a coordinate there comes with it.
-fn narrowed(mut problem: Problem) -> Option<(Problem, f64)> {
+/// round.
+fn narrowed(mut problem: Problem) -> Option<Walked> {
     let mut sigma = f64::INFINITY;
     for _ in 0..MOST_ROUNDS {
-        let mut whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
+        let mut whitening = scale(&problem);
         if whitening.sigma > STILL * sigma {
             break;
         }
@@ -254,7 +287,54 @@ fn narrowed(mut problem: Problem) -> Option<(Problem, f64)> {
         whitening.sigma *= NARROW;
         problem = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)?.problem;
     }
-    Some((problem, sigma))
+    let mut whitening = Whitening { sigma, ..scale(&problem) };
+    if let Some(apart) = to_larger_crowd(&problem) {
+        (problem, whitening) = apart;
+    }
+    let none_left_out = vec![false; problem.blocks.len()];
+    let gross = with_gross_errors(&problem, &none_left_out, &whitening);
+    let some_stand_out = gross.concat().contains(&true);
+    Some(Walked { problem, sigma: whitening.sigma, some_stand_out })
+}
+
+/// The deviation of a coordinate, and corners by it.
+fn scale(problem: &Problem) -> Whitening {
+    Whitening::fit(problem, Weights::Equal, &residuals(problem))
+}
+
+/// Follows the nearest corners of every frame away from between two crowds; `None` where there are not two.
+fn to_larger_crowd(problem: &Problem) -> Option<(Problem, Whitening)> {
+    let between = scale(problem);
+    let (mut found, mut whitening) = (problem.clone(), between.clone());
+    for _ in 0..MOST_ROUNDS {
+        let part = found.with_corners(&nearest_of_frames(&found, &whitening));
+        let of_part = scale(&part);
+        found = found.at(&minimise(part, &of_part, Loss::Squared, Until::Rough)?.problem);
+        let before = std::mem::replace(&mut whitening, scale(&found)).sigma;
+        if whitening.sigma > STILL * before {
+            break;
+        }
+    }
+    (whitening.sigma < SHRUNK * between.sigma).then_some((found, whitening))
+}
+
+/// Which corners are the nearest of their frames, [`FOLLOWED`] of them or as many as a pose needs.
+fn nearest_of_frames(problem: &Problem, whitening: &Whitening) -> Vec<Vec<bool>> {
+    let off = deviations(problem, whitening);
+    let mut of_frames = vec![Vec::new(); problem.frames.len()];
+    for (block, off) in problem.blocks.iter().zip(&off) {
+        of_frames[block.frame].extend_from_slice(off);
+    }
+    let farthest = of_frames.into_iter().map(|mut off| {
+        off.sort_by(f64::total_cmp);
+        let followed = (FOLLOWED * off.len() as f64).ceil() as usize;
+        off.get(followed.max(LEAST_CORNERS).min(off.len()).saturating_sub(1)).copied()
+    });
+    let farthest: Vec<f64> = farthest.map(Option::unwrap_or_default).collect();
+    let of_block = |(block, off): (&Block, &Vec<f64>)| {
+        off.iter().map(|off| *off <= farthest[block.frame] && off.is_finite()).collect()
+    };
+    problem.blocks.iter().zip(&off).map(of_block).collect()
 }
 
 /// How far a panel that took no part is from its place: where its own corners have it while all
@@ -280,7 +360,7 @@ fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
     let mut free = problem.with_corners(&counting);
     free.panels[panel.index()].target_from_panel = start;
     free.panels[panel.index()].pose_free = true;
-    let (found, _) = narrowed(free)?;
+    let found = narrowed(free)?.problem;
     let mut count = Count::default();
     for (block, off) in found.blocks.iter().zip(deviations(&found, whitening)) {
         if block.panel == panel {

@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
 
 use super::error::CalibrationError;
+use super::gross::Kept;
 use super::loss::Loss;
 use super::minimise::{Minimum, Until, minimise};
 use super::problem::{Block, Observation, Problem};
@@ -24,10 +25,12 @@ const GROSS_SIGMA: f64 = 2.0 * OUTLIER_SIGMA;
 const IN_THE_GAP: f64 = 0.25;
 
 /// What a lens leaves is smooth: of the neighbours of corners that are far off more than this part are off
-/// towards the same side, by more than this part as much. Wrong places are smooth nowhere, and of labels
-/// or corners that are off alike so many have such neighbours as there are such corners.
+/// towards the same side, by more than this part as much and by more than so many deviations. Wrong places are
+/// smooth nowhere, and of labels or corners that are off alike so many have such neighbours as there are such
+/// corners.
 const SMOOTH: f64 = 0.5;
 const FALLS_OFF: f64 = 0.05;
+const LEAST_SMOOTH_SIGMA: f64 = 3.0;
 
 /// Seen less predicted positions; empty blocks where a corner is out of reach, which problems that
 /// were started do not have.
@@ -48,27 +51,32 @@ pub(super) struct Settled {
 }
 
 /// The minimum of a problem whose weights fit its own residuals. Corners with gross errors take no part, nor
-/// do blocks that are `left_out`, so that deviations are those of what does; with [`Loss::Squared`] every
+/// do blocks that are left out, so that deviations are those of what does; with [`Loss::Squared`] every
 /// corner takes part.
 pub(super) fn settle(
-    problem: Problem,
-    left_out: &[bool],
+    kept: Kept,
     weights: Weights,
     loss: Loss,
 ) -> Result<Settled, CalibrationError> {
+    let Kept { problem, left_out, some_stand_out } = kept;
     let start = || CalibrationError::NoStart;
     let all_of = |keep: bool| move |block: &Block| vec![keep; block.observations.len()];
     let none: Vec<Vec<bool>> = problem.blocks.iter().map(all_of(false)).collect();
     let counting = |problem: &Problem, gross: &[Vec<bool>]| {
-        let kept = gross.iter().zip(left_out);
+        let kept = gross.iter().zip(&left_out);
         let kept = kept.map(|(of_block, out)| of_block.iter().map(|far| !far && !out).collect());
         problem.with_corners(&kept.collect::<Vec<_>>())
     };
     let mut all = problem;
     let mut gross = none.clone();
+    if some_stand_out && loss != Loss::Squared {
+        let whitening = Whitening::fit(&all, weights, &residuals(&all));
+        gross = with_gross_errors(&all, &left_out, &whitening);
+    }
     let mut part = counting(&all, &gross);
     let mut whitening = Whitening::fit(&part, weights, &residuals(&part));
-    // In the first round all corners pull, so that a lens is judged as its rim bends it. Where corners are alike and losses square, weights change nothing.
+    // In the first round all corners pull but those that stand out, so that a lens is judged as its rim bends
+    // it. Where corners are alike and losses square, weights change nothing.
     let rounds = match whitening.common_px.is_some() || loss != Loss::Squared {
         true => MOST_ROUNDS,
         false => 0,
@@ -79,7 +87,7 @@ pub(super) fn settle(
         whitening = Whitening::fit(&part, weights, &residuals(&part));
         let now = match loss {
             Loss::Squared => none.clone(),
-            Loss::Huber | Loss::Cauchy => with_gross_errors(&all, left_out, &whitening),
+            Loss::Huber | Loss::Cauchy => with_gross_errors(&all, &left_out, &whitening),
         };
         let is_same = now == gross;
         if !is_same {
@@ -100,7 +108,7 @@ pub(super) fn settle(
 }
 
 /// Which corners have gross errors. A frame keeps as many of its corners as a pose needs, the nearest.
-fn with_gross_errors(
+pub(super) fn with_gross_errors(
     problem: &Problem,
     left_out: &[bool],
     whitening: &Whitening,
@@ -118,18 +126,16 @@ fn with_gross_errors(
         needed.filter(|off| off.is_finite()).unwrap_or_default().max(limit)
     });
     let limits: Vec<f64> = limits.collect();
-    let of_blocks = problem.blocks.iter().zip(off);
+    let of_blocks = problem.blocks.iter().zip(&off);
     let mut gross: Vec<Vec<bool>> = of_blocks
-        .map(|(block, off)| off.into_iter().map(|off| off > limits[block.frame]).collect())
+        .map(|(block, off)| off.iter().map(|off| *off > limits[block.frame]).collect())
         .collect();
-    let smooth: Vec<Vec<[usize; 2]>> = problem
-        .blocks
-        .iter()
-        .zip(&gross)
-        .zip(left_out)
-        .map(|((block, gross), out)| match *out || !gross.contains(&true) {
+    let least = LEAST_SMOOTH_SIGMA * whitening.sigma;
+    let of_blocks = problem.blocks.iter().zip(&gross).zip(&off).zip(left_out);
+    let smooth: Vec<Vec<[usize; 2]>> = of_blocks
+        .map(|(((block, gross), off), out)| match *out || !gross.contains(&true) {
             true => Vec::new(),
-            false => smooth_neighbours(problem, block, gross),
+            false => smooth_neighbours(problem, block, gross, |corner| off[corner] > least),
         })
         .collect();
     let all = smooth.iter().flatten();
@@ -140,9 +146,14 @@ fn with_gross_errors(
     gross
 }
 
-/// Of every corner with a gross error how many of its neighbours are off towards the same side, and not by much
+/// Of every corner with a gross error how many of its neighbours are off, and towards the same side, and not by much
 /// less, and how many it has.
-fn smooth_neighbours(problem: &Problem, block: &Block, gross: &[bool]) -> Vec<[usize; 2]> {
+fn smooth_neighbours(
+    problem: &Problem,
+    block: &Block,
+    gross: &[bool],
+    is_off: impl Fn(usize) -> bool,
+) -> Vec<[usize; 2]> {
     let off: Vec<Option<[f64; 2]>> =
         block.observations.iter().map(|seen| problem.residual(block, seen)).collect();
     let places: BTreeMap<(i32, i32), usize> =
@@ -150,12 +161,13 @@ fn smooth_neighbours(problem: &Problem, block: &Block, gross: &[bool]) -> Vec<[u
     let of_corner = |(index, seen): (usize, &Observation)| {
         let (true, Some([x, y])) = (gross[index], off[index]) else { return [0, 0] };
         let steps = [(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)];
-        let neighbours = steps
-            .iter()
-            .filter_map(|(rows, cols)| off[*places.get(&(seen.row + rows, seen.col + cols))?]);
-        neighbours.fold([0, 0], |[alike, count], [u, v]| {
+        let neighbours = steps.iter().filter_map(|(rows, cols)| {
+            let &neighbour = places.get(&(seen.row + rows, seen.col + cols))?;
+            Some((neighbour, off[neighbour]?))
+        });
+        neighbours.fold([0, 0], |[alike, count], (neighbour, [u, v])| {
             let along = (x * u + y * v) / (x * x + y * y);
-            [alike + usize::from(along > FALLS_OFF), count + 1]
+            [alike + usize::from(along > FALLS_OFF && is_off(neighbour)), count + 1]
         })
     };
     block.observations.iter().enumerate().map(of_corner).collect()

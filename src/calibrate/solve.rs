@@ -4,7 +4,7 @@ use super::consensus::agreeing;
 use super::error::CalibrationError;
 use super::excluded::Excluded;
 use super::finding::Finding;
-use super::gross::{Gross, WrongFrame, within_pictures};
+use super::gross::{Gross, Kept, WrongFrame, within_pictures};
 use super::loss::Loss;
 use super::minimise::{Minimum, Until, minimise};
 use super::misfit::misfits;
@@ -269,8 +269,8 @@ impl Search<'_> {
         });
         let excluded = excluded.collect();
 
-        let (problem, left_out) = gross.kept();
-        let mut settled = settle(problem, &left_out, weights, loss)?;
+        let belonging = gross.kept();
+        let mut settled = settle(belonging.clone(), weights, loss)?;
         let mut f_ratio = 0.0;
         if with_shape {
             let flat = settled.minimum.normal.cost;
@@ -281,7 +281,8 @@ impl Search<'_> {
             let bent = minimise(problem, &settled.whitening, loss, Until::Fine)
                 .ok_or(CalibrationError::NoStart)?;
             f_ratio = (flat - bent.normal.cost) / shape::COUNT as f64 / variance(&bent);
-            settled = settle(settled.problem.at(&bent.problem), &left_out, weights, loss)?;
+            let problem = settled.problem.at(&bent.problem);
+            settled = settle(Kept { problem, ..belonging }, weights, loss)?;
         }
         let findings = gross.findings(&settled, |frame| self.views[used[frame]].name.clone());
         let solution = self.solution(&kept, excluded, &settled, f_ratio)?;

@@ -12,13 +12,13 @@ use super::foreshortened::foreshortened_grids;
 use super::grow::{SaddleGrid, grids};
 use super::ink::{Ink, InkEstimate};
 use super::label::Budget;
-use super::labels::{Labels, report_once};
+use super::labels::{Labels, MOST_CORNERS, report_once};
 use super::optics::Optics;
 use super::pixel::Pixel;
 use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
 use super::refine_grid::{is_sampled, sharp_level};
-use super::saddles::SaddleFinder;
+use super::saddles::{SaddleFinder, too_many};
 use super::tile_shape::is_of_squares;
 use super::tiling::{CHECKER, DELTILLE, kind};
 use super::why;
@@ -178,9 +178,14 @@ impl Detector {
         let saddles = finder.find(&pyramid);
         timing.lap("saddles");
         let found = grids(finder, &pyramid, &saddles);
+        let mut left_out = Vec::new();
+        if too_many(&pyramid, saddles.len()) {
+            let edge_px = (image.pixels().len() as f64 / saddles.len() as f64).sqrt();
+            let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+            left_out.push(Reason::new(ReasonKind::TooSmall, figures));
+        }
         timing.lap("grids");
         let least = least_untagged_corners(kind::<N>()) as usize;
-        let mut left_out = Vec::new();
         let mut grids = self.plausible::<N, T>(image, &pyramid, &found, &mut left_out);
         timing.lap("labels");
         if grids.is_empty() && self.labels.are_wanted() {
@@ -216,7 +221,9 @@ impl Detector {
         } else {
             Vec::new()
         };
-        let is_of_others = |reason: &Reason| reason.kind == ReasonKind::SeenTwice;
+        let is_of_others = |reason: &Reason| {
+            matches!(reason.kind, ReasonKind::SeenTwice | ReasonKind::TooManyGrids)
+        };
         reasons.extend(
             left_out.into_iter().filter(|reason| !grids.is_empty() && is_of_others(reason)),
         );
@@ -276,6 +283,12 @@ impl Detector {
         left_out.extend(refused);
         refuse_patterns(pyramid, &mut grids);
         left_out.extend(report_once(&mut grids));
+        let (count, mut corners) = (grids.len(), 0);
+        grids.retain(|(grid, _)| {
+            corners += grid.corners.len();
+            is_vouched_for(grid) || corners <= MOST_CORNERS
+        });
+        left_out.extend((grids.len() < count).then(|| Reason::new(ReasonKind::TooManyGrids, [])));
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
         grids.sort_by_key(|(grid, _)| grid.panel.unwrap_or(u32::MAX));
         grids

@@ -5,15 +5,19 @@
 //! even, and the upright tiles are the dark ones, whatever the board's colours. On a checkerboard
 //! the turn is even where row + column is, and there the square up and right is dark.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
+
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, RTree};
 
 use super::buckets::Buckets;
 use super::edge::{MAX_CHORD_RAD, is_clean_somehow};
+use super::effort::Effort;
 use super::links::{Link, Links, facing_ray, links};
 use super::local_map::{Bend, LocalMap};
 use super::parts::join;
 use super::rectified::Rectified;
-use super::saddles::{Saddle, SaddleFinder, merge_px};
+use super::saddles::{Saddle, SaddleFinder, merge_px, too_many};
 use super::sectors::turn;
 use super::tiling::{kind, neighbours, step, tiles_at};
 use crate::lattice::Vertex;
@@ -26,6 +30,9 @@ const MAX_SURPRISE: f64 = 0.2;
 /// Corners nearer to each other than this part of an edge are the same: under blur and motion one may be
 /// found twice.
 const SAME_PART: f64 = 0.2;
+
+/// A corner that is missing is looked for in several views.
+const LOOKS_FOR_CORNER: usize = 20;
 
 /// A corner's place in a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,46 +72,50 @@ impl<const N: usize> GrownSaddle<N> {
 /// A grid while it grows.
 pub type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
 
-/// All grids among the saddles, largest first.
+/// All grids among the saddles, largest first; none where there are more saddles than any board has.
 pub fn grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
     saddles: &[Saddle<N>],
 ) -> Vec<SaddleGrid> {
+    if too_many(pyramid, saddles.len()) {
+        return Vec::new();
+    }
     let links = links(pyramid, saddles);
-    let mut taken = vec![false; saddles.len()];
+    let mut growth = Growth::new(&links);
+    let mut effort = Effort::default();
     let finest = &pyramid.levels()[0];
     let no_places = Buckets::new(finest.width(), finest.height());
     let mut index = no_places.clone();
     saddles.iter().for_each(|saddle| index.insert(saddle.position));
     let (mut growing, mut members) = (Vec::new(), Vec::new());
     for seed in seeds(&links) {
-        if seed.iter().any(|&(corner, _)| taken[corner]) {
+        if seed.iter().any(|&(corner, _)| growth.taken[corner]) {
             continue;
         }
-        let places = grow(&links, &seed, &taken);
-        let mut own: BTreeMap<usize, Vertex> = BTreeMap::new();
-        let mut grid: Growing<N> = BTreeMap::new();
-        for (corner, Place { vertex, turn }) in places {
-            own.insert(corner, vertex);
-            grid.insert(vertex, GrownSaddle { saddle: saddles[corner], turn });
-        }
-        fill_gaps(finder, pyramid, &mut grid);
+        let places = growth.grow(&seed);
+        let mut own: BTreeMap<usize, Vertex> =
+            places.iter().map(|&(corner, place)| (corner, place.vertex)).collect();
+        let placed = places.into_iter().map(|(corner, Place { vertex, turn })| {
+            (vertex, GrownSaddle { saddle: saddles[corner], turn })
+        });
+        let mut grid: Growing<N> = placed.collect();
+        fill_gaps(finder, pyramid, &mut grid, &mut effort);
         // What is found in a gap may have been found before, without its links.
         grid.retain(|&vertex, grown| match same(&index, &grown.saddle) {
-            Some(corner) if taken[corner] => false,
+            Some(corner) if growth.taken[corner] => false,
             Some(corner) => *own.entry(corner).or_insert(vertex) == vertex,
             None => true,
         });
-        own.keys().for_each(|&corner| taken[corner] = true);
+        own.keys().for_each(|&corner| growth.taken[corner] = true);
         growing.push(grid);
         members.push(own);
     }
-    let mut grids: Vec<SaddleGrid> = join(pyramid, saddles, growing, members)
+    let mut grids: Vec<SaddleGrid> = join(pyramid, saddles, growing, members, &mut effort)
         .into_iter()
         .map(|(mut grid, has_grown)| {
             if has_grown {
-                fill_gaps(finder, pyramid, &mut grid);
+                fill_gaps(finder, pyramid, &mut grid, &mut effort);
             }
             grid.into_iter().map(|(v, grown)| (v, plain(&grown))).collect()
         })
@@ -147,29 +158,48 @@ fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
     grids.retain(|grid| !grid.is_empty());
 }
 
-/// Drops grids that lie within one tile of a larger grid: the cells of a tag are a tiling too.
-fn without_tag_cells<const N: usize>(grids: Vec<SaddleGrid>) -> Vec<SaddleGrid> {
-    let mut kept: Vec<SaddleGrid> = Vec::new();
-    for grid in grids {
-        if !kept.iter().any(|larger| in_one_tile::<N>(larger, &grid)) {
-            kept.push(grid);
-        }
+/// Drops grids that lie within one tile of a larger grid: the cells of a tag are a tiling too. The largest
+/// grid comes first.
+fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGrid> {
+    if grids.len() < 2 {
+        return grids;
     }
-    kept
+    let tiles = grids.iter().enumerate().flat_map(|(i, grid)| {
+        tiles_of::<N>(grid).map(move |tile| {
+            let around = AABB::from_points(&tile);
+            GeomWithData::new(Rectangle::from_aabb(around), (i, tile))
+        })
+    });
+    let tiles = RTree::bulk_load(tiles.collect());
+    let mut index = 0..;
+    grids.retain(|grid| {
+        let own = index.next();
+        let Some(first) = grid.values().next() else {
+            return false;
+        };
+        // What lies in a tile of a grid that is dropped itself lies in the tile around that.
+        !tiles.locate_all_at_point(first.position).any(
+            |GeomWithData { data: (i, tile), .. }| {
+                Some(*i) < own && grid.values().all(|placed| is_inside(tile, placed.position))
+            },
+        )
+    });
+    grids
 }
 
-fn in_one_tile<const N: usize>(larger: &SaddleGrid, grid: &SaddleGrid) -> bool {
-    let mut tiles = larger.keys().flat_map(|&v| tiles_at::<N>(v)).filter_map(|tile| {
-        tile.into_iter().map(|v| larger.get(&v).map(|p| p.position)).collect::<Option<Vec<_>>>()
-    });
-    let inside = |tile: &[[f64; 2]], p: [f64; 2]| {
-        // Counter-clockwise on the print is clockwise in the image's axes.
-        (0..tile.len()).all(|i| {
-            let (a, b) = (tile[i], tile[(i + 1) % tile.len()]);
-            (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) < 0.0
-        })
-    };
-    tiles.any(|tile| grid.values().all(|placed| inside(&tile, placed.position)))
+/// The tiles of which all vertices are in a grid.
+fn tiles_of<const N: usize>(grid: &SaddleGrid) -> impl Iterator<Item = Vec<[f64; 2]>> {
+    let place = |v: &Vertex| grid.get(v).map(|p| p.position);
+    let tiles = grid.keys().flat_map(|&v| tiles_at::<N>(v));
+    tiles.filter_map(move |tile| tile.iter().map(place).collect())
+}
+
+/// Whether a point lies in a tile. Counter-clockwise on the print is clockwise in the image's axes.
+fn is_inside(tile: &[[f64; 2]], p: [f64; 2]) -> bool {
+    (0..tile.len()).all(|i| {
+        let (a, b) = (tile[i], tile[(i + 1) % tile.len()]);
+        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) < 0.0
+    })
 }
 
 /// A corner with its place.
@@ -229,49 +259,72 @@ fn across<const N: usize>(from: Place, k: usize, link: Link) -> Place {
     Place { vertex: from.vertex + step::<N>(k), turn: (k + N / 2 + N - link.ray) % N }
 }
 
-/// A grid that grows along links.
+/// Grids that grow along links, one after the other.
 struct Growth<'a, const N: usize> {
     links: &'a [Links<N>],
-    /// Corners of other grids.
-    taken: &'a [bool],
-    places: BTreeMap<usize, Place>,
-    occupied: BTreeSet<Vertex>,
+    /// By corner, whether another grid has it.
+    taken: Vec<bool>,
+    /// By corner, its place in the grid that grows.
+    places: Vec<Option<Place>>,
+    /// The corners of the grid that grows, as they came.
+    members: Vec<usize>,
+    occupied: HashSet<Vertex>,
     queue: VecDeque<usize>,
 }
 
-/// Breadth-first growth: corners join when they close a tile with the grid.
-///
-/// A corner closes a triangle, or a corner that a row bends around closes a square, when two of the
-/// grid agree on its place. A square on a straight side is closed by two new corners at once.
-fn grow<const N: usize>(links: &[Links<N>], seed: &Seed, taken: &[bool]) -> BTreeMap<usize, Place> {
-    let mut growth = Growth {
-        links,
-        taken,
-        places: seed.iter().copied().collect(),
-        occupied: seed.iter().map(|&(_, place)| place.vertex).collect(),
-        queue: seed.iter().map(|&(corner, _)| corner).collect(),
-    };
-    while let Some(corner) = growth.queue.pop_front() {
-        let at = (corner, growth.places[&corner]);
-        for k in 0..N {
-            let Some(next) = follow(links, at, k).filter(|&next| growth.is_free(next)) else {
-                continue;
-            };
-            match growth.votes(next) {
-                Some(2..) => growth.join(next),
-                Some(1) if kind::<N>() == GridKind::Checker => growth.join_by_square(at, k),
-                _ => {}
-            }
+impl<'a, const N: usize> Growth<'a, N> {
+    fn new(links: &'a [Links<N>]) -> Self {
+        let count = links.len();
+        let (members, occupied, queue) = (Vec::new(), HashSet::new(), VecDeque::new());
+        Self {
+            links,
+            taken: vec![false; count],
+            places: vec![None; count],
+            members,
+            occupied,
+            queue,
         }
     }
-    growth.places
-}
 
-impl<const N: usize> Growth<'_, N> {
+    /// Breadth-first growth: corners join when they close a tile with the grid.
+    ///
+    /// A corner closes a triangle, or a corner that a row bends around closes a square, when two of the
+    /// grid agree on its place. A square on a straight side is closed by two new corners at once.
+    fn grow(&mut self, seed: &Seed) -> Vec<Placed> {
+        self.occupied.clear();
+        seed.iter().for_each(|&placed| self.add(placed));
+        while let Some(corner) = self.queue.pop_front() {
+            let Some(place) = self.places[corner] else {
+                continue;
+            };
+            let at = (corner, place);
+            for k in 0..N {
+                let Some(next) = follow(self.links, at, k).filter(|&next| self.is_free(next))
+                else {
+                    continue;
+                };
+                match self.votes(next) {
+                    Some(2..) => self.join(next),
+                    Some(1) if kind::<N>() == GridKind::Checker => self.join_by_square(at, k),
+                    _ => {}
+                }
+            }
+        }
+        let members = std::mem::take(&mut self.members).into_iter();
+        members.filter_map(|corner| Some((corner, self.places[corner].take()?))).collect()
+    }
+
+    fn add(&mut self, (corner, place): Placed) {
+        self.places[corner] = Some(place);
+        self.members.push(corner);
+        self.occupied.insert(place.vertex);
+        self.queue.push_back(corner);
+    }
+
     /// Whether neither the corner nor its vertex belongs to a grid.
     fn is_free(&self, (corner, place): Placed) -> bool {
         !self.taken[corner]
-            && !self.places.contains_key(&corner)
+            && self.places[corner].is_none()
             && !self.occupied.contains(&place.vertex)
     }
 
@@ -279,18 +332,15 @@ impl<const N: usize> Growth<'_, N> {
     /// as if it were elsewhere.
     fn votes(&self, next: Placed) -> Option<usize> {
         let linked = (0..N).filter_map(|k| follow(self.links, next, k));
-        let mut known =
-            linked.filter_map(|(corner, place)| Some(*self.places.get(&corner)? == place));
+        let mut known = linked.filter_map(|(corner, place)| Some(self.places[corner]? == place));
         known.try_fold(0, |votes, agrees| agrees.then_some(votes + 1))
     }
 
     fn join(&mut self, next: Placed) {
-        self.places.insert(next.0, next.1);
-        self.occupied.insert(next.1.vertex);
-        self.queue.push_back(next.0);
+        self.add(next);
         // Corners that were one vote short may now have it.
         let linked = (0..N).filter_map(|k| follow(self.links, next, k)).map(|(corner, _)| corner);
-        self.queue.extend(linked.filter(|corner| self.places.contains_key(corner)));
+        self.queue.extend(linked.filter(|&corner| self.places[corner].is_some()));
     }
 
     /// The corner that follows `at` along step `k` joins together with the next one beside it.
@@ -299,7 +349,7 @@ impl<const N: usize> Growth<'_, N> {
             let Some([_, next, beside, known]) = square(self.links, at, k, side % N) else {
                 continue;
             };
-            let in_grid = self.places.get(&known.0) == Some(&known.1);
+            let in_grid = self.places[known.0] == Some(known.1);
             if in_grid && self.is_free(beside) && self.votes(beside) == Some(1) {
                 self.join(next);
                 self.join(beside);
@@ -310,7 +360,12 @@ impl<const N: usize> Growth<'_, N> {
 }
 
 /// Looks for missing corners where their neighbours predict them, until none is found.
-fn fill_gaps<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid, grid: &mut Growing<N>) {
+fn fill_gaps<const N: usize>(
+    finder: &SaddleFinder<N>,
+    pyramid: &Pyramid,
+    grid: &mut Growing<N>,
+    effort: &mut Effort,
+) {
     let mut tried = BTreeSet::new();
     loop {
         let empty: BTreeSet<Vertex> = grid
@@ -323,7 +378,9 @@ fn fill_gaps<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid, grid: 
             let Some((position, edge)) = predict(grid, vertex) else {
                 continue;
             };
-            if let Some(placed) = corner_near(finder, pyramid, grid, vertex, position, edge) {
+            if let Some(placed) =
+                corner_near(finder, pyramid, grid, (vertex, position, edge), effort)
+            {
                 grid.insert(vertex, placed);
                 grown = true;
                 // What this corner's surroundings predict has changed.
@@ -374,10 +431,12 @@ fn corner_near<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
     grid: &Growing<N>,
-    vertex: Vertex,
-    position: [f64; 2],
-    edge_px: f64,
+    (vertex, position, edge_px): (Vertex, [f64; 2], f64),
+    effort: &mut Effort,
 ) -> Option<GrownSaddle<N>> {
+    if !effort.spend(LOOKS_FOR_CORNER) {
+        return None;
+    }
     let reach = (MAX_SURPRISE * edge_px).max(1.0);
     let neighbours = neighbours::<N>(vertex);
     // What is blurred around it is best looked for where its neighbours were found.

@@ -52,7 +52,7 @@ struct TargetPanel {
 
 /// More corners than any board has: of 140 × 140 every one would have 14 px in a picture of 4 megapixels. Fabrics and
 /// grids on screens have more, and made-up pictures so many that to refine them takes minutes.
-const MOST_CORNERS: usize = 20_000;
+pub(super) const MOST_CORNERS: usize = 20_000;
 
 impl Labels {
     /// By the rows and columns of an untagged board, where they are known.

@@ -34,6 +34,7 @@ mod curve;
 mod detection;
 mod detector;
 mod edge;
+mod effort;
 mod foreshortened;
 mod grid_light;
 mod grow;

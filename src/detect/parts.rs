@@ -9,22 +9,27 @@
 
 use std::collections::BTreeMap;
 
-use rstar::RTree;
 use rstar::primitives::GeomWithData;
+use rstar::{AABB, Envelope, RTree};
 
+use super::buckets::Buckets;
 use super::edge::{MAX_CHORD_RAD, is_clean};
+use super::effort::Effort;
 use super::grow::{Growing, GrownSaddle};
 use super::links::MAX_CONTRAST_RATIO;
 use super::local_map::{Bend, LocalMap};
 use super::saddles::Saddle;
 use super::sectors::turn;
-use super::tiling::{kind, step};
+use super::tiling::{kind, neighbours, step};
 use crate::lattice::{GridKind, LatticeMap, Vertex};
 use crate::raster::Pyramid;
 
 /// Vertices farther than this from all corners of a grid are not looked for, in edges of the map at the
 /// nearest: the map says next to nothing there.
 const MAX_REACH: f64 = 4.0;
+
+/// Beyond a grid, where it comes nearer, edges are on the average at most so many times as long as its longest.
+const NEARER: f64 = 2.0;
 
 /// Largest deviations of a predicted place, in edges, in the order of trial: what is surer makes the rest
 /// surer. Within three of the largest a place is nearer to its vertex than anything else that a tile
@@ -40,6 +45,9 @@ const MOST_COVERED: usize = 3;
 /// A grid of fewer corners predicts nothing: four are where it began.
 const LEAST: usize = 5;
 
+/// So many corners are compared in the time of a look.
+const CORNERS_IN_A_LOOK: usize = 100;
+
 /// Where a saddle is in a set of grids.
 type Owners = BTreeMap<usize, (usize, Vertex)>;
 
@@ -50,6 +58,7 @@ pub fn join<const N: usize>(
     saddles: &[Saddle<N>],
     mut grids: Vec<Growing<N>>,
     members: Vec<BTreeMap<usize, Vertex>>,
+    effort: &mut Effort,
 ) -> Vec<(Growing<N>, bool)> {
     let mut owners: Owners = BTreeMap::new();
     for (grid, members) in members.into_iter().enumerate() {
@@ -58,13 +67,20 @@ pub fn join<const N: usize>(
     let mut order: Vec<usize> = (0..grids.len()).collect();
     order.sort_by_key(|&i| std::cmp::Reverse(grids[i].len()));
     let mut has_grown = vec![false; grids.len()];
+    let finest = &pyramid.levels()[0];
+    let mut places = Buckets::new(finest.width(), finest.height());
+    saddles.iter().for_each(|saddle| places.insert(saddle.position));
     for base in order {
         while grids[base].len() >= LEAST {
             let bend = bend(&grids[base]);
-            let candidates = candidates(saddles, &grids[base], &owners, base, bend);
+            let candidates = candidates((saddles, &places), &grids[base], &owners, base, bend);
+            if !effort.spend(grids[base].len() + candidates.len()) {
+                break;
+            }
             // Nothing changes before something is adopted.
             let mut adopt = |sigma| {
-                adopt((pyramid, saddles), &mut grids, &mut owners, base, (&candidates, bend, sigma))
+                let given = (&candidates[..], bend, sigma);
+                adopt((pyramid, saddles), &mut grids, &mut owners, base, given, effort)
             };
             if !SIGMAS.into_iter().any(&mut adopt) {
                 break;
@@ -83,9 +99,14 @@ fn adopt<const N: usize>(
     owners: &mut Owners,
     base: usize,
     (candidates, bend, sigma): (&[(usize, Vertex)], Bend, f64),
+    effort: &mut Effort,
 ) -> bool {
     let mut adopted = false;
     for &(index, vertex) in candidates {
+        // The nearest corner of the grid is sought among all.
+        if !effort.spend(1 + grids[base].len() / CORNERS_IN_A_LOOK) {
+            break;
+        }
         if grids[base].contains_key(&vertex) {
             continue;
         }
@@ -100,7 +121,8 @@ fn adopt<const N: usize>(
             Some((part, from)) => {
                 let turned = (grown.turn + N - grids[part][&from].turn) % N;
                 let map = LatticeMap::taking(kind::<N>(), from, vertex, turned as i32);
-                if is_part(&grids[base], &grids[part], map, bend, sigma) {
+                let is_worth = effort.spend(grids[part].len() + owners.len() / CORNERS_IN_A_LOOK);
+                if is_worth && is_part(&grids[base], &grids[part], map, bend, sigma) {
                     for (from, corner) in std::mem::take(&mut grids[part]) {
                         let turn = (corner.turn + turned) % N;
                         grids[base].insert(map.apply(from), GrownSaddle { turn, ..corner });
@@ -132,17 +154,21 @@ fn bend<const N: usize>(grid: &Growing<N>) -> Bend {
 
 /// Saddles that lie near a vertex without a corner, with that vertex, the nearest to the grid first.
 fn candidates<const N: usize>(
-    saddles: &[Saddle<N>],
+    (saddles, indices): (&[Saddle<N>], &Buckets),
     grid: &Growing<N>,
     owners: &Owners,
     base: usize,
     bend: Bend,
 ) -> Vec<(usize, Vertex)> {
+    let Some((middle, reach_px)) = surroundings(grid) else {
+        return Vec::new();
+    };
     let places = grid.iter().map(|(&v, grown)| GeomWithData::new(grown.saddle.position, v));
     let tree = RTree::bulk_load(places.collect());
     let mut maps: BTreeMap<Vertex, Option<LocalMap>> = BTreeMap::new();
     let mut found: Vec<(f64, usize, Vertex)> = Vec::new();
-    for (index, saddle) in saddles.iter().enumerate() {
+    for (index, _) in indices.within(middle, reach_px) {
+        let saddle = &saddles[index];
         if owners.get(&index).is_some_and(|&(grid, _)| grid == base) {
             continue;
         }
@@ -164,6 +190,23 @@ fn candidates<const N: usize>(
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     found.into_iter().map(|(_, index, vertex)| (index, vertex)).collect()
+}
+
+/// A circle around all places that a grid says anything of.
+fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<([f64; 2], f64)> {
+    let places: Vec<[f64; 2]> = grid.values().map(|grown| grown.saddle.position).collect();
+    let edges_px = grid.iter().flat_map(|(&v, grown)| {
+        let neighbours = neighbours::<N>(v).into_iter().filter_map(at(grid));
+        neighbours.map(|p| distance(p, grown.saddle.position))
+    });
+    let longest_px = edges_px.reduce(f64::max)?;
+    let around = AABB::from_points(&places);
+    let half_diagonal_px = distance(around.lower(), around.upper()) / 2.0;
+    Some((around.center(), half_diagonal_px + NEARER * MAX_REACH * longest_px))
+}
+
+fn distance(p: [f64; 2], q: [f64; 2]) -> f64 {
+    (p[0] - q[0]).hypot(p[1] - q[1])
 }
 
 /// The saddle as a corner of a grid, if it lies at a vertex and looks as the map of the grid says.

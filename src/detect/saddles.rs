@@ -268,6 +268,11 @@ fn candidates_above_noise<const N: usize>(level: &Gray<i16>, noise: f32) -> Vec<
     found
 }
 
+/// Whether a picture has more corners than any board would have in it.
+pub fn too_many(pyramid: &Pyramid, corners: usize) -> bool {
+    corners > pyramid.levels()[0].pixels().len() / LEAST_TILE_PX2
+}
+
 /// Keeps the strongest candidates, so many.
 fn strongest(candidates: &mut Vec<Candidate>, count: usize) {
     if candidates.len() <= count || count == 0 {

@@ -43,9 +43,12 @@ fn corner_lines(grid: &Grid, target: Option<&Target>) -> Vec<String> {
         let board = target.panels.iter().position(|panel| panel.id == id)?;
         Some((board, &target.panels[board], Dialect::of(target)))
     });
-    let low = |of: fn(&crate::detect::GridCorner) -> i32| grid.corners.iter().map(of).min();
-    let (row0, col0) = (low(|c| c.row).unwrap_or(0), low(|c| c.col).unwrap_or(0));
-    let cols = grid.corners.iter().map(|c| c.col - col0 + 1).max().unwrap_or(0);
+    // The product of numbers that a file has takes more than 32 bits.
+    let low = |of: fn(&crate::detect::GridCorner) -> i32| {
+        grid.corners.iter().map(of).min().map_or(0, i64::from)
+    };
+    let (row0, col0) = (low(|c| c.row), low(|c| c.col));
+    let cols = grid.corners.iter().map(|c| i64::from(c.col) - col0 + 1).max().unwrap_or(0);
     let line = |corner: &crate::detect::GridCorner| {
         let (x, y) = (corner.x, corner.y);
         match labelled {
@@ -54,7 +57,8 @@ fn corner_lines(grid: &Grid, target: Option<&Target>) -> Vec<String> {
                 format!("{board},{point},1,{x},{y}")
             }
             None => {
-                let point = (corner.row - row0) * cols + corner.col - col0;
+                let [row, col] = [corner.row, corner.col].map(i64::from);
+                let point = (row - row0) * cols + col - col0;
                 format!("-1,{point},0,{x},{y}")
             }
         }

@@ -254,6 +254,13 @@ pub fn board() -> Vec<Case> {
                 "a mark before any operator w",
                 operators("0 0 0 1 K 9 9 m 99 9 l S"),
             ),
+            ("a tile twice", "a mark that is drawn twice", {
+                content(|text| {
+                    let end = text.find("f*").unwrap() + 2;
+                    let begin = text[..end].rfind("K\n").unwrap() + 2;
+                    format!("{}\n{}", &text[..end], &text[begin..])
+                })
+            }),
             ("a hairline", "a mark so thin", operators("0 0 0 1 k 9 9 m 99 9 l h f*")),
             ("a thin line", "a mark so thin", operators("0 0 0 1 K 0.01 w 9 9 m 99 9 l S")),
             (

@@ -58,6 +58,11 @@ pub fn board() -> Vec<Case> {
             ("a link", "element <a>", over("<a href=\"http://example.org\"/>")),
             ("a filter", "element <filter>", over("<filter id=\"f\"/>")),
             (
+                "a tile twice",
+                "a mark that is drawn twice",
+                line("<path", |path| format!("{path}\n{}", path.replace("id=\"", "id=\"x"))),
+            ),
+            (
                 "a hairline",
                 "a mark so thin",
                 swap("<path ", "<path d=\"M9 9L20 9Z\" id=\"x\"/><path "),

@@ -129,22 +129,23 @@ pub fn calibrate_rig(
         return Err(CalibrationError::NotRigid { camera, wrong, all });
     }
     let kept: Vec<usize> = (0..all).filter(|frame| !gross.frames.contains_key(frame)).collect();
-    let (mut problem, left_out) = gross.kept();
-    let taking_part: Vec<Block> = problem
+    let mut belonging = gross.kept();
+    let taking_part: Vec<Block> = belonging
+        .problem
         .blocks
         .iter()
-        .zip(&left_out)
+        .zip(&belonging.left_out)
         .filter(|(_, out)| !**out)
         .map(|(block, _)| block.clone())
         .collect();
     let unknowns = panel_unknowns(&taking_part, panels, options.refine_target);
-    for (panel, unknown) in problem.panels.iter_mut().zip(unknowns) {
+    for (panel, unknown) in belonging.problem.panels.iter_mut().zip(unknowns) {
         // Where frames went, a panel may hang together with no other, or another be held.
         if panel.pose_free != unknown.pose_free {
             *panel = unknown;
         }
     }
-    let settled = settle(problem, &left_out, options.weights, options.loss)?;
+    let settled = settle(belonging, options.weights, options.loss)?;
     findings.extend(gross.findings(&settled, |frame| start.frames[frame].clone()));
     let names = |index: usize| start.frames[kept[index]].clone();
     let solution = RigSolution::new(cameras, names, &settled)?;

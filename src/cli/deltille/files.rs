@@ -90,7 +90,8 @@ pub fn same_file(written: &Path, other: &Path) -> bool {
     written.is_some() && written == other
 }
 
-/// Writes all files, all or none: see [`staging`](crate::export::staging).
+/// Writes all files, all or none, and returns where they are, by the names that were asked for: see
+/// [`staging`](crate::export::staging).
 pub fn write_all(
     folder: &Path,
     files: &[File],
@@ -131,7 +132,7 @@ pub fn write_all(
     staging.commit().with_context(context)?;
     interrupt::stands("the files are whole, but were not all compared");
     replaced.iter().for_each(|line| tell!("{line}"));
-    Ok(paths)
+    Ok(files.iter().map(|file| folder.join(&file.name)).collect())
 }
 
 fn check_interrupt() -> anyhow::Result<()> {

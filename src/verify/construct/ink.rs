@@ -1,6 +1,8 @@
 //! How much there is to draw on a page. Lines that cross it a thousand times, or a thousand areas
 //! on top of each other, keep a renderer busy for hours, and no target has them.
 
+use std::collections::HashSet;
+
 use kurbo::{BezPath, PathEl, Shape};
 
 /// Length of all contours over the area of the page, 1/mm: tags in all tiles, with cells of
@@ -15,7 +17,14 @@ const MOST_PAGES: f64 = 40.0;
 const LEAST_WIDTH_MM: f64 = 0.01;
 
 /// Of a mark that is thinner.
-pub(super) const THIN: &str = "a mark so thin that not all viewers draw it alike";
+const THIN: &str = "a mark so thin that not all viewers draw it alike";
+
+/// Of a mark on top of its like: where both cover a part of a pixel, some viewers draw it darker.
+const TWICE: &str = "a mark that is drawn twice";
+
+/// What tells marks apart, in parts of [`LEAST_WIDTH_MM`]: where one ends on each side, the side of a square of its
+/// area, along which diagonal its points lie, and the width of its pen.
+type Outline = [i64; 7];
 
 /// What is on a page so far, in its own units.
 pub(super) struct Ink {
@@ -25,17 +34,19 @@ pub(super) struct Ink {
     mm: f64,
     length: f64,
     area: f64,
+    marks: HashSet<Outline>,
 }
 
 impl Ink {
     /// An empty page of this width and height, with so many millimetres in a unit.
     pub fn new([width, height]: [f64; 2], mm: f64) -> Self {
-        Self { page: width * height, mm, length: 0.0, area: 0.0 }
+        Self { page: width * height, mm, length: 0.0, area: 0.0, marks: HashSet::new() }
     }
 
-    /// Adds a filled path, or one that is drawn by a pen of some width.
-    pub fn add(&mut self, path: &BezPath, pen: Option<f64>) {
+    /// Adds a filled path, or one that is drawn by a pen of some width, and says why not all viewers draw it alike.
+    pub fn add(&mut self, path: &BezPath, pen: Option<f64>) -> Option<&'static str> {
         let (length, count) = length(path);
+        let around = path.control_box();
         match pen {
             // Either side of the line, and the ends or corners.
             Some(width) => {
@@ -44,14 +55,33 @@ impl Ink {
             }
             None => {
                 self.length += length;
-                self.area += path.control_box().area();
+                self.area += around.area();
             }
         }
+        let is_thick = self.is_thick(path, pen);
+        let least = LEAST_WIDTH_MM / self.mm;
+        let side = path.area().abs().sqrt();
+        let middle = around.center();
+        let products: Vec<f64> = path
+            .elements()
+            .iter()
+            .filter_map(|element| element.end_point())
+            .map(|point| (point.x - middle.x) * (point.y - middle.y))
+            .collect();
+        let product = products.iter().sum::<f64>() / products.len().max(1) as f64;
+        let along = product / around.width().hypot(around.height());
+        let pen = pen.unwrap_or(0.0);
+        let outline = [around.x0, around.y0, around.x1, around.y1, side, along, pen];
+        let is_new = self.marks.insert(outline.map(|value| (value / least).round() as i64));
+        if !is_thick {
+            return Some(THIN);
+        }
+        (!is_new).then_some(TWICE)
     }
 
     /// Whether a filled path, or one that is drawn by a pen of some width, is thick enough in each of its contours
     /// that all viewers draw it alike.
-    pub fn is_thick(&self, path: &BezPath, pen: Option<f64>) -> bool {
+    fn is_thick(&self, path: &BezPath, pen: Option<f64>) -> bool {
         let least = LEAST_WIDTH_MM / self.mm;
         if let Some(width) = pen {
             return width >= least;
@@ -102,12 +132,25 @@ mod tests {
     }
 
     #[test]
+    fn a_mark_is_drawn_once() {
+        let mut ink = Ink::new([100.0, 100.0], 1.0);
+        let mut add = |path: &str, pen| ink.add(&BezPath::from_svg(path).unwrap(), pen);
+        assert_eq!(add("M0,0 L20,0 L10,17 z", None), None);
+        assert_eq!(add("M20,0 L40,0 L30,17 z", None), None);
+        assert_eq!(add("M0,0 L20,0 L10,17 z", Some(0.1)), None);
+        assert_eq!(add("M20,0 L10,17 L0,0.001 z", None), Some(TWICE));
+        assert_eq!(add("M0,0 L20,20", Some(0.1)), None);
+        assert_eq!(add("M0,20 L20,0", Some(0.1)), None);
+        assert_eq!(add("M20,20 L0,0", Some(0.1)), Some(TWICE));
+    }
+
+    #[test]
     fn a_page_is_covered_some_times_and_not_often() {
         let page = kurbo::Shape::to_path(&kurbo::Rect::new(0.0, 0.0, 100.0, 100.0), 0.1);
         let mut ink = Ink::new([100.0, 100.0], 1.0);
-        (0..10).for_each(|_| ink.add(&page, None));
+        (0..10).for_each(|_| _ = ink.add(&page, None));
         assert!(ink.is_drawable());
-        (0..40).for_each(|_| ink.add(&page, None));
+        (0..40).for_each(|_| _ = ink.add(&page, None));
         assert!(!ink.is_drawable());
         let mut ink = Ink::new([100.0, 100.0], 1.0);
         ink.add(&page, Some(1e9));

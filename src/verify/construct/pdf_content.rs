@@ -3,7 +3,7 @@
 
 use kurbo::BezPath;
 
-use super::ink::{Ink, THIN};
+use super::ink::Ink;
 use super::{Findings, OFF_PAGE, start};
 use crate::limits::{Exceeded, Limits};
 
@@ -161,12 +161,12 @@ impl Painter {
         pen: Option<f64>,
     ) -> Result<bool, String> {
         let contours = std::mem::take(&mut self.contours);
-        self.ink.add(&contours, pen);
+        let problem = self.ink.add(&contours, pen);
         if let Some(unsaid) = needed.iter().find(|needed| !self.said.contains(needed)) {
             return Err(format!("a mark before any operator {unsaid}"));
         }
-        if !self.ink.is_thick(&contours, pen) {
-            return Err(THIN.to_owned());
+        if let Some(problem) = problem {
+            return Err(problem.to_owned());
         }
         let [left, lower, right, upper] = path.unwrap_or_default();
         let [width, height] = self.size_pt;

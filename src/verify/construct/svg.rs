@@ -3,7 +3,7 @@
 use kurbo::BezPath;
 use resvg::usvg::roxmltree::{Document, Error, Node, NodeType, ParsingOptions};
 
-use super::ink::{Ink, THIN};
+use super::ink::Ink;
 use super::{Findings, OFF_PAGE, Words, decimal, is_creator, start, text};
 use crate::limits::{Kind, Limits};
 
@@ -75,8 +75,7 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
             NodeType::Root => continue,
         };
         if let ("path", []) = (node.tag_name().name(), &constructs[..]) {
-            let is_thick = add(&node, &mut ink);
-            constructs.extend((!is_thick).then(|| THIN.to_owned()));
+            constructs.extend(add(&node, &mut ink).map(str::to_owned));
         }
         let on_page = !node.is_element() || is_on_page(&node, &view);
         let is_listed = constructs.is_empty() && on_page;
@@ -115,15 +114,14 @@ fn is_writer(comment: &Node) -> bool {
     first && words.is_some_and(is_creator)
 }
 
-/// Adds what a path draws, and says whether it is so thick that it is drawn alike everywhere.
-fn add(node: &Node, ink: &mut Ink) -> bool {
-    let Ok(path) = BezPath::from_svg(node.attribute("d").unwrap_or_default()) else { return true };
+/// Adds what a path draws, and says why it is not drawn alike everywhere.
+fn add(node: &Node, ink: &mut Ink) -> Option<&'static str> {
+    let path = BezPath::from_svg(node.attribute("d").unwrap_or_default()).ok()?;
     let pen = node.attribute("stroke").map(|_| {
         let width = node.attribute("stroke-width").and_then(decimal);
         width.unwrap_or(1.0)
     });
-    ink.add(&path, pen);
-    ink.is_thick(&path, pen)
+    ink.add(&path, pen)
 }
 
 /// The words are those of the target: viewers show them for a title, and read them aloud.
