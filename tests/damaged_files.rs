@@ -22,9 +22,9 @@ fn harm(reader: &Reader, what: &str, bytes: &[u8]) -> Option<String> {
 
 #[test]
 fn good_files_are_read() {
-    let harms: Vec<String> =
-        READERS.iter().filter_map(|reader| harm(reader, "its good file", &reader.good())).collect();
-    assert!(harms.is_empty(), "{harms:?}");
+    let refused = READERS.iter().filter(|reader| !reader.read(&reader.good()));
+    let refused: Vec<&str> = refused.map(|reader| reader.name).collect();
+    assert!(refused.is_empty(), "{refused:?}");
 }
 
 #[test]

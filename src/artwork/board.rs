@@ -6,7 +6,7 @@ use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_m
 use crate::family::Family;
 use crate::lattice::{TagCells, Tile};
 use crate::target::{
-    Panel, Placement, SheetLayout, SheetPage, SheetText, TagPlacement, TagsIn, Target,
+    Panel, Placement, SheetLayout, SheetLine, SheetPage, SheetText, TagPlacement, TagsIn, Target,
 };
 
 /// The shapes of sheet `index` of a target.
@@ -63,6 +63,10 @@ fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
         shapes.push(Shape { part: Part::CheckBar { index }, paint: Paint::Fill, path });
     }
     for (index, line) in layout.lines.iter().enumerate() {
+        // Faces that touch without hanging together each have their line to cut, there and back.
+        if layout.lines[..index].iter().any(|drawn| is_back(drawn, line)) {
+            continue;
+        }
         let mut path = BezPath::new();
         for [from, to] in strokes_mm(line) {
             path.move_to(Point::from((from[0], from[1])));
@@ -76,6 +80,14 @@ fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
         shapes.push(Shape { part: Part::Label { index }, paint: Paint::Fill, path });
     }
     Ok(shapes)
+}
+
+/// Whether a line runs where another does, from its end to its beginning.
+fn is_back(line: &SheetLine, other: &SheetLine) -> bool {
+    let near = |p: [f64; 2], q: [f64; 2]| {
+        (p[0] - q[0]).hypot(p[1] - q[1]) < line.width_mm.min(other.width_mm) / 2.0
+    };
+    line.kind == other.kind && near(line.from_mm, other.to_mm) && near(line.to_mm, other.from_mm)
 }
 
 /// The tiles of a panel on its page: one shape each, or one field on an inverted panel.

@@ -37,6 +37,8 @@ pub static SOLID: LazyLock<Target> = LazyLock::new(|| {
         ..SolidSpec::new(SolidShape::Tetrahedron)
     };
     spec.tags.family = "delTag16h5".to_owned();
+    // The wider the bits, the smaller is the texture.
+    spec.tags.border_bits = 0.6;
     Target::build("t", &TargetSpec::Solid(spec), Some(&FAMILY), Some(&PaperSpec::default()))
         .unwrap()
 });

@@ -26,7 +26,7 @@ pub struct Reader {
     /// Extension of a file's name.
     extension: &'static str,
     good: fn() -> Vec<u8>,
-    read: fn(read::File),
+    read: fn(read::File) -> bool,
 }
 
 /// All readers.
@@ -61,7 +61,7 @@ const fn of(
     form: Form,
     extension: &'static str,
     good: fn() -> Vec<u8>,
-    read: fn(read::File),
+    read: fn(read::File) -> bool,
 ) -> Reader {
     Reader { name, form, extension, good, read }
 }
@@ -72,8 +72,8 @@ impl Reader {
         (self.good)()
     }
 
-    /// Reads a file. Panics where something holds that must not.
-    pub fn read(&self, bytes: &[u8]) {
+    /// Reads a file, and tells whether it was let in. Panics where something holds that must not.
+    pub fn read(&self, bytes: &[u8]) -> bool {
         thread_local!(static FOLDER: TempDir = {
             let memory = std::path::Path::new("/dev/shm");
             let folder = if memory.is_dir() { TempDir::new_in(memory) } else { TempDir::new() };
@@ -89,8 +89,8 @@ impl Reader {
                 }
             }
             fs::write(&path, bytes).expect("the file is written");
-            (self.read)(read::File { path: &path, bytes });
-        });
+            (self.read)(read::File { path: &path, bytes })
+        })
     }
 
     /// A file with some of it changed; now and then a good one, from which changes begin anew.

@@ -1,4 +1,4 @@
-//! What each reader does with a file, and what must hold of what it has read.
+//! What each reader does with a file, and what must hold of what it has read. Tells whether it was let in.
 
 use std::path::Path;
 
@@ -27,11 +27,11 @@ impl File<'_> {
     }
 }
 
-/// A hundredth of the default, so that what gets by shows soon.
+/// About a hundredth of the default, so that what gets by shows soon: as much as the texture of a good mesh has.
 fn limits() -> Limits {
     Limits {
         max_bytes: 2_000_000,
-        max_pixels: 1_500_000,
+        max_pixels: 2_500_000,
         max_nodes: 40_000,
         max_seconds: 20.0,
         ..Limits::default()
@@ -42,95 +42,107 @@ fn assert_finite(numbers: impl IntoIterator<Item = f64>) {
     numbers.into_iter().for_each(|number| assert!(number.is_finite(), "{number} was let in"));
 }
 
-pub fn target(file: File) {
-    let Some(Ok(target)) = file.text().map(Target::from_json) else { return };
+pub fn target(file: File) -> bool {
+    let Some(Ok(target)) = file.text().map(Target::from_json) else { return false };
     for panel in &target.panels {
         let corners = panel.corners.iter();
         assert_finite(corners.flat_map(|c| c.panel_mm.into_iter().chain(c.target_mm)));
     }
     let again = Target::from_json(&target.to_json()).expect("what is written is read");
     assert_eq!(again, target);
+    true
 }
 
-pub fn detection(file: File) {
-    let Some(Ok(found)) = file.text().map(detections::read) else { return };
+pub fn detection(file: File) -> bool {
+    let Some(Ok(found)) = file.text().map(detections::read) else { return false };
     assert_finite(found.grids.iter().flat_map(|grid| &grid.corners).flat_map(|c| [c.x, c.y]));
     let again = detections::read(&detections::write(&found)).expect("what is written is read");
     assert_eq!(again, found);
     for list in [csv::write(&found), orpc::write(&found, None), orpc::write(&found, Some(&BOARD))] {
         assert!(!list.contains("NaN") && !list.contains("inf"), "{list}");
     }
+    true
 }
 
-pub fn sheet(file: File) {
-    let Some(Ok(sheet)) = file.text().map(calibration::read_sheet) else { return };
+pub fn sheet(file: File) -> bool {
+    let Some(Ok(sheet)) = file.text().map(calibration::read_sheet) else { return false };
     assert_finite(sheet.print_scale.into_iter().flatten());
+    true
 }
 
-pub fn family(file: File) {
-    let Some(Ok(family)) = file.text().map(Family::from_json) else { return };
+pub fn family(file: File) -> bool {
+    let Some(Ok(family)) = file.text().map(Family::from_json) else { return false };
     assert_eq!(Family::from_json(&family.to_json()).expect("what is written is read"), family);
+    true
 }
 
-pub fn camera(file: File) {
-    let Some(Ok(camera)) = file.text().map(Camera::from_yaml) else { return };
+pub fn camera(file: File) -> bool {
+    let Some(Ok(camera)) = file.text().map(Camera::from_yaml) else { return false };
     assert_eq!(Camera::from_yaml(&camera.to_yaml()).expect("what is written is read"), camera);
     for point in [DVec3::Z, DVec3::new(0.3, -0.2, 1.0), DVec3::new(1.0, 1.0, 1e-9), DVec3::NEG_Z] {
         assert_finite(camera.project(point).into_iter().flatten());
     }
     let _ = camera.unproject([1.0, 2.0]);
+    true
 }
 
-pub fn template(file: File) {
-    for grid in [GridKind::Deltille, GridKind::Checker] {
-        let Ok(settings) = Settings::read(file.path, grid) else { continue };
-        let _ = settings.plan(grid);
-    }
+pub fn template(file: File) -> bool {
+    let read = |grid| {
+        let settings = Settings::read(file.path, grid).ok()?;
+        Some(settings.plan(grid).is_ok())
+    };
+    [GridKind::Deltille, GridKind::Checker].map(read).contains(&Some(true))
 }
 
-pub fn points(file: File) {
-    let Some(Ok(points)) = file.text().map(csv::read_points) else { return };
+pub fn points(file: File) -> bool {
+    let Some(Ok(points)) = file.text().map(csv::read_points) else { return false };
     assert_finite(points.into_iter().flatten());
+    true
 }
 
-pub fn dsc(file: File) {
-    let Some(Ok(list)) = file.text().map(|text| dsc::read(text, "b")) else { return };
+pub fn dsc(file: File) -> bool {
+    let Some(Ok(list)) = file.text().map(|text| dsc::read(text, "b")) else { return false };
     let corners = list.panels.iter().flat_map(|panel| &panel.corners);
     assert_finite(corners.flat_map(|c| c.panel_mm.into_iter().chain(c.target_mm)));
     for dialect in [Dialect::Fork, Dialect::Original] {
         let Ok(text) = dsc::write(&list, dialect) else { continue };
         dsc::read(&text, "b").expect("what is written is read");
     }
+    true
 }
 
-pub fn mesh(file: File) {
-    let Ok((mesh, _)) = obj::read(file.bytes) else { return };
+pub fn mesh(file: File) -> bool {
+    let Ok((mesh, _)) = obj::read(file.bytes) else { return false };
     assert_finite(mesh.vertices().iter().flat_map(|v| v.to_array()));
+    true
 }
 
-pub fn photograph(file: File) {
-    for accept_damaged in [false, true] {
-        let Ok(photograph) = raster::photograph(file.path, &limits(), accept_damaged) else {
-            continue;
-        };
-        assert!(photograph.image.width() * photograph.image.height() <= 1_500_000);
+pub fn photograph(file: File) -> bool {
+    let read = |accept_damaged| {
+        let photograph = raster::photograph(file.path, &limits(), accept_damaged).ok()?;
+        let pixels = photograph.image.width() * photograph.image.height();
+        assert!(pixels as u64 <= limits().max_pixels);
         assert!(accept_damaged || photograph.notes.damage.is_none());
-    }
+        Some(photograph.notes.damage)
+    };
+    let [undamaged, _] = [false, true].map(read);
+    undamaged.is_some()
 }
 
-pub fn page(file: File) {
-    verify(&BOARD, file.path);
+pub fn page(file: File) -> bool {
+    verify(&BOARD, file.path)
 }
 
-pub fn solid(file: File) {
-    verify(&SOLID, file.path);
+pub fn solid(file: File) -> bool {
+    verify(&SOLID, file.path)
 }
 
-fn verify(target: &Target, path: &Path) {
+fn verify(target: &Target, path: &Path) -> bool {
     let verifier = Verifier::new(target, Some(&FAMILY)).expect("it was built with this family");
-    let Ok(verdict) = verifier.within(limits()).verify(path) else { return };
+    let Ok(verdict) = verifier.within(limits()).verify(path) else { return false };
     let sheets = verdict.sheets.iter().flat_map(|sheet| &sheet.findings);
     let faces = verdict.faces.iter().flat_map(|face| &face.findings);
     let findings = verdict.findings.iter().chain(sheets).chain(faces).count();
     assert_eq!(verdict.passed, findings == 0, "{verdict}");
+    verdict.passed
 }
