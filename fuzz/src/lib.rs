@@ -8,7 +8,9 @@ use files::{Dice, READERS, Reader};
 #[macro_export]
 macro_rules! target {
     ($name:literal) => {
-        libfuzzer_sys::fuzz_target!(|bytes: &[u8]| _ = $crate::reader($name).read(bytes));
+        libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+            let _ = $crate::reader($name).read(bytes);
+        });
 
         libfuzzer_sys::fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
             $crate::changed_or($name, data, size, max_size, seed, libfuzzer_sys::fuzzer_mutate)
