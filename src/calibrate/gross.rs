@@ -23,9 +23,9 @@ use super::panel::PanelRef;
 use super::pose::planar_pose;
 use super::problem::{Block, Problem};
 use super::rig::middle;
-use super::settle::{Settled, deviations, residuals, with_gross_errors};
+use super::settle::{Settled, deviations, residuals, scale, with_gross_errors};
 use super::view::{LEAST_CORNERS, Sighting, View};
-use super::weights::{Weights, Whitening, median};
+use super::weights::{Whitening, median};
 use super::wrong::{limit_px, median_px};
 use crate::camera::Pose;
 
@@ -256,8 +256,8 @@ fn of_panel(problem: &Problem, sigma: f64, panel: PanelRef) -> (Count, Count) {
 
 fn panel_counts(problem: &Problem, sigma: f64) -> BTreeMap<PanelRef, Count> {
     let mut counts: BTreeMap<PanelRef, Count> = BTreeMap::new();
-    let whitening = Whitening::fit(problem, Weights::Equal, &residuals(problem));
-    let limit = Whitening { sigma, ..whitening.clone() }.outlier_limit();
+    let whitening = Whitening { sigma, ..scale(problem) };
+    let limit = whitening.outlier_limit();
     for (block, off) in problem.blocks.iter().zip(deviations(problem, &whitening)) {
         let count = counts.entry(block.panel).or_default();
         off.into_iter().for_each(|off| count.add(off > limit));
@@ -295,11 +295,6 @@ fn narrowed(mut problem: Problem) -> Option<Walked> {
     let gross = with_gross_errors(&problem, &none_left_out, &whitening);
     let some_stand_out = gross.concat().contains(&true);
     Some(Walked { problem, sigma: whitening.sigma, some_stand_out })
-}
-
-/// The deviation of a coordinate, and corners by it.
-fn scale(problem: &Problem) -> Whitening {
-    Whitening::fit(problem, Weights::Equal, &residuals(problem))
 }
 
 /// Follows the nearest corners of every frame away from between two crowds; `None` where there are not two.

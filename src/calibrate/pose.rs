@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, SMatrix};
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
 use super::problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem};
-use super::settle::residuals;
+use super::settle::scale;
 use super::view::Sighting;
 use super::weights::{Weights, Whitening, median};
 use crate::camera::{Camera, Pose};
@@ -161,9 +161,7 @@ fn refine(
     let cost = match loss {
         Loss::Squared => minimum.normal.cost,
         // Scales differ, so that costs do not compare.
-        Loss::Huber | Loss::Cauchy => {
-            Whitening::fit(&minimum.problem, Weights::Equal, &residuals(&minimum.problem)).sigma
-        }
+        Loss::Huber | Loss::Cauchy => scale(&minimum.problem).sigma,
     };
     Some((minimum.problem.frames[0], cost))
 }

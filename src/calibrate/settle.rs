@@ -38,6 +38,11 @@ pub(super) fn residuals(problem: &Problem) -> Vec<Vec<[f64; 2]>> {
     problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
 }
 
+/// Corners that are all alike, with the deviation of their coordinates.
+pub(super) fn scale(problem: &Problem) -> Whitening {
+    Whitening::fit(problem, Weights::Equal, &residuals(problem))
+}
+
 /// Where weights, corners that count, and unknowns fit each other.
 pub(super) struct Settled {
     /// Of the corners that count.

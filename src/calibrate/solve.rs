@@ -12,12 +12,12 @@ use super::model::Model;
 use super::normal::Covariances;
 use super::pose::{blocks, estimate_pose, fixed};
 use super::problem::{CameraUnknowns, Problem};
-use super::settle::{Settled, residuals, settle, variance};
+use super::settle::{Settled, scale, settle, variance};
 use super::shape::{self, BoardShape, Shape};
 use super::solution::{Corner, Parameter, Solution, ViewSolution, rms_px};
 use super::start::first_camera;
 use super::view::{MIRRORED, View};
-use super::weights::{Weights, Whitening, median};
+use super::weights::{Weights, median};
 use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Pose};
 
 /// Two views of a plane determine focal lengths and principal point if nothing is off; a third
@@ -199,7 +199,7 @@ impl Search<'_> {
     fn adjust(&mut self, free: Vec<bool>) -> Result<(), CalibrationError> {
         let (used, problem) = self.problem(&self.agreeing, free);
         enough(used.len(), self.views.len())?;
-        let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
+        let whitening = scale(&problem);
         let minimum = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
             .ok_or(CalibrationError::NoStart)?;
         self.camera = minimum.problem.cameras[0].camera.clone();

@@ -111,15 +111,16 @@ pub fn grids<const N: usize>(
         growing.push(grid);
         members.push(own);
     }
-    let mut grids: Vec<SaddleGrid> = join(pyramid, saddles, growing, members, &mut effort)
-        .into_iter()
-        .map(|(mut grid, has_grown)| {
-            if has_grown {
-                fill_gaps(finder, pyramid, &mut grid, &mut effort);
-            }
-            grid.into_iter().map(|(v, grown)| (v, plain(&grown))).collect()
-        })
-        .collect();
+    let mut grids: Vec<SaddleGrid> =
+        join(pyramid, (saddles, &index), growing, members, &mut effort)
+            .into_iter()
+            .map(|(mut grid, has_grown)| {
+                if has_grown {
+                    fill_gaps(finder, pyramid, &mut grid, &mut effort);
+                }
+                grid.into_iter().map(|(v, grown)| (v, plain(&grown))).collect()
+            })
+            .collect();
     grids.sort_by_key(|grid: &SaddleGrid| std::cmp::Reverse(grid.len()));
     let mut grids = without_tag_cells::<N>(grids);
     each_once(&mut grids, no_places);

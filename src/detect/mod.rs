@@ -10,7 +10,7 @@
 //! 4. `links` joins corners along clean edges (`edge`).
 //! 5. `grow` starts from four corners, grows tile by tile and fills the gaps, where tiles are narrow
 //!    in the frame of their neighbours (`rectified`). `parts` joins what a cover separates, by where
-//!    the map of a grid (`local_map`) goes on.
+//!    the map of a grid (`local_map`) goes on. Both look as often as a picture is worth (`effort`).
 //! 6. `tags` reads the tiles, `label` lets all tags together decide panel, rows and columns; `labels`
 //!    gives them to the grids.
 //!    `beyond` refuses checkerboards without tags whose pattern goes on where they end, `tile_shape` those

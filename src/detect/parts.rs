@@ -51,11 +51,11 @@ const CORNERS_IN_A_LOOK: usize = 100;
 /// Where a saddle is in a set of grids.
 type Owners = BTreeMap<usize, (usize, Vertex)>;
 
-/// Joins grids that are parts of one board, and lets them adopt single corners. `members` are the indices
-/// of the saddles in the grids. Tells which grids have grown.
+/// Joins grids that are parts of one board, and lets them adopt single corners. `places` are those of
+/// all saddles, `members` the indices of those in the grids. Tells which grids have grown.
 pub fn join<const N: usize>(
     pyramid: &Pyramid,
-    saddles: &[Saddle<N>],
+    (saddles, places): (&[Saddle<N>], &Buckets),
     mut grids: Vec<Growing<N>>,
     members: Vec<BTreeMap<usize, Vertex>>,
     effort: &mut Effort,
@@ -67,13 +67,10 @@ pub fn join<const N: usize>(
     let mut order: Vec<usize> = (0..grids.len()).collect();
     order.sort_by_key(|&i| std::cmp::Reverse(grids[i].len()));
     let mut has_grown = vec![false; grids.len()];
-    let finest = &pyramid.levels()[0];
-    let mut places = Buckets::new(finest.width(), finest.height());
-    saddles.iter().for_each(|saddle| places.insert(saddle.position));
     for base in order {
         while grids[base].len() >= LEAST {
             let bend = bend(&grids[base]);
-            let candidates = candidates((saddles, &places), &grids[base], &owners, base, bend);
+            let candidates = candidates((saddles, places), &grids[base], &owners, base, bend);
             if !effort.spend(grids[base].len() + candidates.len()) {
                 break;
             }
@@ -154,7 +151,7 @@ fn bend<const N: usize>(grid: &Growing<N>) -> Bend {
 
 /// Saddles that lie near a vertex without a corner, with that vertex, the nearest to the grid first.
 fn candidates<const N: usize>(
-    (saddles, indices): (&[Saddle<N>], &Buckets),
+    (saddles, places): (&[Saddle<N>], &Buckets),
     grid: &Growing<N>,
     owners: &Owners,
     base: usize,
@@ -163,11 +160,11 @@ fn candidates<const N: usize>(
     let Some((middle, reach_px)) = surroundings(grid) else {
         return Vec::new();
     };
-    let places = grid.iter().map(|(&v, grown)| GeomWithData::new(grown.saddle.position, v));
-    let tree = RTree::bulk_load(places.collect());
+    let corners = grid.iter().map(|(&v, grown)| GeomWithData::new(grown.saddle.position, v));
+    let tree = RTree::bulk_load(corners.collect());
     let mut maps: BTreeMap<Vertex, Option<LocalMap>> = BTreeMap::new();
     let mut found: Vec<(f64, usize, Vertex)> = Vec::new();
-    for (index, _) in indices.within(middle, reach_px) {
+    for (index, _) in places.within(middle, reach_px) {
         let saddle = &saddles[index];
         if owners.get(&index).is_some_and(|&(grid, _)| grid == base) {
             continue;

@@ -64,7 +64,8 @@ pub enum ReasonKind {
     NotWhole,
     /// The grid is larger than any board, and no certain one is looked for: `corners`, `expected` at most.
     TooManyCorners,
-    /// The same as [`NotWhole`](Self::NotWhole), and it ends at the border of the picture: `corners`, and `expected` where there are no tags.
+    /// The same as [`NotWhole`](Self::NotWhole), and it ends at the border of the picture: `corners`, and `expected`
+    /// where there are no tags.
     CutByBorder,
     /// Corners of a panel that is seen elsewhere in the picture too, and are left out: `corners`.
     SeenTwice,

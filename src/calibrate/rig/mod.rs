@@ -24,10 +24,10 @@ use super::minimise::{Until, minimise};
 use super::model::Model;
 use super::problem::{Block, CameraUnknowns, PanelUnknowns, Prior};
 use super::remedy::{Instead, remedy_of_given};
-use super::settle::{residuals, settle};
+use super::settle::{scale, settle};
 use super::solve::{self, Options};
 use super::view::{MIRRORED, View};
-use super::weights::{Weights, Whitening};
+use super::weights::Weights;
 use crate::camera::{Camera, Pose};
 use crate::target::PanelPose;
 use start::Start;
@@ -94,7 +94,7 @@ pub fn calibrate_rig(
     let mut excluded = start.excluded.clone();
     let problem = start.problem(cameras, panels, options);
     // A first pass in which frames that were not taken at one moment hardly count.
-    let whitening = Whitening::fit(&problem, Weights::Equal, &residuals(&problem));
+    let whitening = scale(&problem);
     let first = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
         .ok_or(CalibrationError::NoStart)?;
     let gross = Gross::of(first.problem).ok_or(CalibrationError::NoStart)?;
