@@ -70,8 +70,9 @@ fn in_pieces(arguments: &[&str], folder: &Path, mut after: impl FnMut(&Output)) 
             }
             Some(130) => {
                 let stderr = text(&output.stderr);
-                assert!(stderr.starts_with("interrupted: ") && stderr.lines().count() == 1);
-                assert!(stderr.contains(resume), "{stderr}");
+                // A slow machine tells its progress before that.
+                let last = stderr.lines().last().unwrap();
+                assert!(last.starts_with("interrupted: ") && last.contains(resume), "{stderr}");
                 after(&output);
             }
             other => panic!("{other:?}: {}", text(&output.stderr)),
