@@ -84,6 +84,29 @@ fn a_jpeg_of_which_a_part_is_missing_is_not_read_unless_that_is_accepted() {
     assert_eq!(unended, folder.read(&whole, false).unwrap());
 }
 
+#[test]
+fn a_jpeg_that_makes_more_pixels_than_it_has_is_damaged() {
+    let (folder, whole) = (Folder::new(), encoded(ImageFormat::Jpeg));
+    let pixels = folder.read(&whole, false).unwrap();
+    let end = whole.len() - 2;
+    let with = |more: &[u8]| [&whole[..end], more, &whole[end..]].concat();
+    let scan = whole.windows(2).position(|marker| marker == [0xFF, 0xDA]).unwrap() + 14;
+    let twice = [&whole[..scan + 900], &whole[scan + 600..]].concat();
+    let frame = whole.windows(2).position(|marker| marker == [0xFF, 0xC0]).unwrap();
+    let mut too_low = whole.clone();
+    let height = u16::from_be_bytes([whole[frame + 5], whole[frame + 6]]) - 16;
+    too_low[frame + 5..frame + 7].copy_from_slice(&height.to_be_bytes());
+    for damaged in [with(&whole[scan..scan + 100]), twice, too_low] {
+        let error = folder.read(&damaged, false).unwrap_err();
+        assert!(error.to_string().contains("go on after the last pixel"), "{error}");
+        assert!(folder.read(&damaged, true).unwrap().notes.damage.is_some());
+    }
+    // Cameras fill up what they send in whole words.
+    for fill in [&[0; 7][..], &[0xFF; 3], &[0; 500]] {
+        assert_eq!(folder.read(&with(fill), false).unwrap(), pixels, "{fill:?}");
+    }
+}
+
 /// Some programs leave bytes between the parts of a head that belong to neither.
 #[test]
 fn padding_between_headers_hides_no_missing_part() {

@@ -6,14 +6,16 @@
 //!   OpenCV with `IMREAD_IGNORE_ORIENTATION`; the orientation is noted;
 //! - colour profiles and gamma chunks are not applied: corners come with an estimate of the tone curve of their own;
 //! - of a TIFF there must be one page, thumbnails (reduced images) aside, and of an animation the first picture is taken;
-//! - a JPEG whose pixels do not all come from the file is damaged, and not read unless that is asked for; all other
+//! - a JPEG that holds fewer pixels than it says, or more, is damaged, and not read unless that is asked for; all other
 //!   formats are read whole or not at all. Neither JPEG nor WebP has check sums: of changed bytes nothing tells that make
-//!   as many pixels, or more.
+//!   as many pixels, nor of those of a WebP that make more.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
+use image::ImageError::Decoding;
+use image::error::DecodingError;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 use serde::{Deserialize, Serialize};
@@ -44,6 +46,13 @@ const END_OF_IMAGE: &[u8] = &[0xFF, 0xD9];
 
 /// Bytes of noise: more than any block of pixels has.
 const NOISE_BYTES: u32 = 1000;
+
+/// What makes noise, whose first bits differ.
+const NOISES: [u32; 3] = [0x9E37_79B9, 0x45EB_CA6B, 0xF1BB_CDCB];
+
+/// The last bytes of a picture cannot be replaced by noise, as many as these, without that it shows: the last byte alone
+/// may hold but a bit of it, and some noise may say the same.
+const SURPLUS_BYTES: usize = 3;
 
 /// A photograph, and what its file says beside its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -255,6 +264,12 @@ impl<'a> ImageFile<'a> {
             }
         }
         let length = if metadata.is_file() { metadata.len() } else { bytes.len() as u64 };
+        if format == Some(ImageFormat::WebP)
+            && riff_bytes(&bytes).is_none_or(|whole| length < whole)
+        {
+            let source = DecodingError::new(ImageFormat::WebP.into(), "it is cut off");
+            return Err(ImageError::Decode { path: path.to_owned(), source: Decoding(source) });
+        }
         Ok(Self { path, bytes: is_whole.then_some(bytes), length, format })
     }
 
@@ -336,33 +351,70 @@ fn jpeg_decoder(bytes: &[u8], strict: bool) -> JpegDecoder<ZCursor<&[u8]>> {
     JpegDecoder::new_with_options(ZCursor::new(bytes), options)
 }
 
-/// Refuses a JPEG of which some pixels are not in the file. Its decoder makes them up without a word, so it is asked once
-/// more, with noise behind the last byte: that must not show.
+/// Refuses a JPEG of which some pixels are not in the file, or that makes more than it has. Its decoder says neither, so
+/// it is asked again: noise behind the last byte must not show, and noise for the last bytes must.
 fn check_scans(bytes: &[u8], pixels: &[u8]) -> Result<(), String> {
-    let end = end_of_scans(bytes).unwrap_or(bytes.len());
-    // Not 0xFF, with which markers begin.
-    let noise: Vec<u8> =
-        (1..NOISE_BYTES).map(|i| (i.wrapping_mul(0x9E37_79B9) >> 25) as u8).collect();
-    let longer = [&bytes[..end], &noise, END_OF_IMAGE].concat();
-    match jpeg_decoder(&longer, false).decode() {
-        Ok(found) if found == pixels => Ok(()),
-        _ => Err("not all pixels are in it".to_owned()),
+    let Scans { end, is_one_run } = Scans::of(bytes);
+    // Without 0xFF, with which markers begin; in a scan it is followed by 0.
+    let scans = trimmed(&bytes[..end.unwrap_or(bytes.len())], |byte| byte == 0xFF);
+    let noises = NOISES.map(|factor: u32| -> Vec<u8> {
+        (1..NOISE_BYTES).map(|i| (i.wrapping_mul(factor) >> 24) as u8 & 0xFE).collect()
+    });
+    let is_shown_by = |scans: &[u8], noise: &Vec<u8>, strict: bool| {
+        let found = jpeg_decoder(&[scans, noise, END_OF_IMAGE].concat(), strict).decode();
+        found.is_ok_and(|found| found == pixels)
+    };
+    if !is_shown_by(scans, &noises[0], false) {
+        return Err("not all pixels are in it".to_owned());
     }
+    // Some cameras fill up the last words.
+    let used = trimmed(scans, |byte| matches!(byte, 0 | 0xFF));
+    let used = &used[..used.len().saturating_sub(SURPLUS_BYTES)];
+    if is_one_run && noises.iter().all(|noise| is_shown_by(used, noise, true)) {
+        return Err("its data go on after the last pixel".to_owned());
+    }
+    Ok(())
 }
 
-/// Where the marker is that ends the picture, if there is one.
-fn end_of_scans(bytes: &[u8]) -> Option<usize> {
-    let mut at = 2;
-    loop {
+/// The bytes without the last of these.
+fn trimmed(bytes: &[u8], of: impl Fn(u8) -> bool) -> &[u8] {
+    let end = bytes.iter().rposition(|&byte| !of(byte)).map_or(0, |last| last + 1);
+    &bytes[..end]
+}
+
+/// How long a RIFF file says that it is, from its first bytes.
+fn riff_bytes(head: &[u8]) -> Option<u64> {
+    let beyond = head.get(4..)?.first_chunk::<4>()?;
+    Some(8 + u64::from(u32::from_le_bytes(*beyond)))
+}
+
+/// Where the pixels of a JPEG are.
+struct Scans {
+    /// Where the marker is that ends the picture, if there is one.
+    end: Option<usize>,
+    /// Whether they are one run of codes in which each begins where the last ends: not refined step by step, nor begun
+    /// anew on the way.
+    is_one_run: bool,
+}
+
+impl Scans {
+    fn of(bytes: &[u8]) -> Self {
+        let (mut at, mut is_one_run) = (2, true);
         // In a scan 0xFF is followed by 0 or a restart.
         let is_marker =
             |pair: &[u8]| pair[0] == 0xFF && !matches!(pair[1], 0 | 1 | 0xD0..=0xD8 | 0xFF);
-        at += bytes.get(at..)?.windows(2).position(is_marker)?;
-        if bytes[at..].starts_with(END_OF_IMAGE) {
-            return Some(at);
+        while let Some(next) = bytes.get(at..).and_then(|rest| rest.windows(2).position(is_marker))
+        {
+            at += next;
+            if bytes[at..].starts_with(END_OF_IMAGE) {
+                return Self { end: Some(at), is_one_run };
+            }
+            // Progressive frames of both kinds, and restarts.
+            is_one_run &= !matches!(bytes[at + 1], 0xC2 | 0xCA | 0xDD);
+            let length = bytes.get(at + 2..).and_then(|rest| rest.first_chunk::<2>());
+            at += 2 + length.map_or(0, |length| usize::from(u16::from_be_bytes(*length)));
         }
-        let length = bytes.get(at + 2..)?.first_chunk::<2>()?;
-        at += 2 + usize::from(u16::from_be_bytes(*length));
+        Self { end: None, is_one_run }
     }
 }
 
