@@ -182,7 +182,10 @@ impl Detector {
         if too_many(&pyramid, saddles.len()) {
             let edge_px = (image.pixels().len() as f64 / saddles.len() as f64).sqrt();
             let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
-            left_out.push(Reason::new(ReasonKind::TooSmall, figures));
+            left_out.push(match edge_px < MIN_UNTAGGED_EDGE_PX {
+                true => Reason::new(ReasonKind::TooSmall, figures),
+                false => Reason::new(ReasonKind::TooManyGrids, []),
+            });
         }
         timing.lap("grids");
         let least = least_untagged_corners(kind::<N>()) as usize;

@@ -192,7 +192,7 @@ impl fmt::Display for Reason {
                 counted(figure("corners") as usize, "corner")
             ),
             ReasonKind::TooManyGrids => {
-                write!(f, "the picture holds more grids than are worth the time")
+                write!(f, "the picture holds more grids, or corners, than are worth the time")
             }
         }
     }
