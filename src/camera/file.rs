@@ -99,7 +99,24 @@ struct Foreign {
 
 #[derive(Deserialize)]
 struct Matrix {
+    #[serde(default)]
+    rows: Option<usize>,
+    #[serde(default)]
+    cols: Option<usize>,
     data: Vec<f64>,
+}
+
+impl Matrix {
+    /// What is wrong with its size, as far as that is stated.
+    fn check(&self) -> Result<(), String> {
+        let stated = self.rows.zip(self.cols).map(|(rows, cols)| rows.saturating_mul(cols));
+        match (stated, self.data.len()) {
+            (Some(stated), found) if found != stated => {
+                Err(format!("it has {found} numbers, and {stated} by its rows and cols"))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Model {
@@ -224,9 +241,16 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
     let plain: Vec<&str> = text.lines().filter(|line| !line.starts_with('%')).collect();
     let file: Foreign = parse(&plain.join("\n").replace("!!opencv-matrix", ""))?;
     let key = |key, problem: String| CameraFileError::Key { key, problem };
+    file.camera_matrix.check().map_err(|problem| key("camera_matrix", problem))?;
+    let coefficients = file.distortion_coefficients;
+    coefficients.check().map_err(|problem| key("distortion_coefficients", problem))?;
     let m: [f64; 9] = file.camera_matrix.data.try_into().map_err(|data: Vec<f64>| {
         key("camera_matrix", format!("it has {} numbers instead of 9", data.len()))
     })?;
+    if [m[1], m[3], m[6], m[7], m[8]] != [0.0, 0.0, 0.0, 0.0, 1.0] {
+        let problem = "it is not `fx, 0, cx, 0, fy, cy, 0, 0, 1`, row by row".to_owned();
+        return Err(key("camera_matrix", problem));
+    }
     let model = match file.distortion_model.as_deref() {
         None | Some("plumb_bob" | "rational_polynomial") => Model::Pinhole,
         Some("equidistant" | "fisheye") => Model::Fisheye,
@@ -238,7 +262,7 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
         focal_px: [m[0], m[4]],
         centre_px: [m[2], m[5]],
         model,
-        distortion: file.distortion_coefficients.data,
+        distortion: coefficients.data,
     })
 }
 
@@ -293,5 +317,16 @@ mod tests {
         let said = Camera::from_yaml(&own.replace("500, 501", "0, 501")).unwrap_err().to_string();
         assert!(said.contains("focal_px"), "{said}");
         assert!(Camera::from_yaml(&own.replace("width", "wdith")).is_err());
+        // Transposed, skewed, scaled, and of another size.
+        for (from, to) in [
+            ("500, 0, 320, 0, 501, 240, 0, 0, 1", "500, 0, 0, 0, 501, 0, 320, 240, 1"),
+            ("500, 0, 320", "500, 5, 320"),
+            ("240, 0, 0, 1", "240, 0, 0, 2"),
+            ("240, 0, 0, 1", "240, 0, .nan, 1"),
+            ("cols: 3", "cols: 4"),
+        ] {
+            let said = Camera::from_yaml(&ros.replace(from, to)).unwrap_err().to_string();
+            assert!(said.contains("camera_matrix"), "{said}");
+        }
     }
 }

@@ -57,7 +57,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let place = |extension| output::file(&args.output, stem, extension);
     let png_path = args.png.then(|| place("png")).transpose()?;
     let svg_path = svg.then(|| place("svg")).transpose()?;
-    let kinds = [(&png_path, Kind::own_png()), (&svg_path, Kind::of(svg::HEAD.as_bytes()))];
+    let kinds = [(&png_path, Kind::own_printed_png()), (&svg_path, Kind::of(svg::HEAD.as_bytes()))];
     for (path, kind) in kinds {
         let Some(path) = path else { continue };
         args.overwrite.check(path, &kind)?;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 use clap::ValueEnum;
 
 use super::limits::ImageLimits;
@@ -14,6 +14,9 @@ use crate::export::csv;
 use crate::limits::Limits;
 use crate::raster::{self, AnyGray};
 use crate::target::GridKind;
+
+/// Corners that are refined at a time: as many as of one picture.
+const MOST_SEEDS: usize = 20_000;
 
 /// Arguments of `deltille refine`.
 #[derive(clap::Args)]
@@ -118,5 +121,10 @@ fn table(refined: &[Refined]) -> String {
 
 fn read_seeds(path: &Path, limits: &Limits) -> anyhow::Result<Vec<[f64; 2]>> {
     let text = limits.read_text(path)?;
-    csv::read_points(&text).map_err(|problem| anyhow!("{}: {problem}", path.display()))
+    let seeds = csv::read_points(&text);
+    let seeds = seeds.map_err(|problem| anyhow!("{}: {problem}", path.display()))?;
+    if seeds.len() > MOST_SEEDS {
+        bail!("{}: {} points; at most {MOST_SEEDS} at a time", path.display(), seeds.len());
+    }
+    Ok(seeds)
 }
