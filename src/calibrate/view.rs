@@ -19,9 +19,13 @@ pub(super) const LEAST_CORNERS: usize = 6;
 pub(super) const MIRRORED: &str =
     "the labels are mirrored: rows and columns are exchanged, or the image was flipped";
 
-/// Corners of a mirrored grid turn the wrong way round, but for wrong ones: by so much, at least, of all of
+/// Corners of a mirrored picture turn the wrong way round, but for wrong ones: by so much, at least, of all of
 /// them more do than do not.
 const MIRRORED_MOST: f64 = 0.5;
+
+/// And by so many deviations: places anywhere turn either way, of a few all may turn the wrong one. By chance
+/// as many do once in a thousand pictures that show nothing else.
+const MIRRORED_SURE: f64 = 3.09;
 
 /// What is wrong with a board of the other tiling.
 const OTHER_KIND: &str = "the board in it has the other tiling: give --grid that of the board";
@@ -235,9 +239,10 @@ fn sightings(
 ) -> Result<Vec<Sighting>, (Option<u32>, String)> {
     let mut sightings = reference.sightings(detection)?;
     sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
-    match sightings.iter().find(|sighting| is_mirrored(sighting)) {
-        Some(wrong) => Err((reference.panel_id(wrong.panel), MIRRORED.to_owned())),
-        None => Ok(sightings),
+    match (is_mirrored(&sightings), sightings.as_slice()) {
+        (true, [only]) => Err((reference.panel_id(only.panel), MIRRORED.to_owned())),
+        (true, _) => Err((None, MIRRORED.to_owned())),
+        (false, _) => Ok(sightings),
     }
 }
 
@@ -332,19 +337,25 @@ fn observations(grid: &Grid, at: impl Fn(i32, i32) -> DVec3) -> Vec<Observation>
     seen.collect()
 }
 
-/// Whether the corners with two neighbours are mirrored, nearly all: of a picture in which two fifths of the
-/// corners are anywhere two fifths of these are mirrored too. In a picture, y down, rows and columns that
-/// run as on the print turn clockwise.
-fn is_mirrored(sighting: &Sighting) -> bool {
+/// Whether the corners with two neighbours are mirrored, nearly all of the picture: of one in which two fifths
+/// of the corners are anywhere two fifths of these are mirrored too, and a panel of a few may be by chance.
+fn is_mirrored(sightings: &[Sighting]) -> bool {
+    let turns: Vec<f64> = sightings.iter().flat_map(turns).collect();
+    let (count, more) = (turns.len() as f64, turns.iter().sum::<f64>());
+    more > MIRRORED_MOST * count && more > MIRRORED_SURE * count.sqrt()
+}
+
+/// Which way corners turn to their neighbours in column and row: 1 where they are mirrored. In a picture, y
+/// down, rows and columns that run as on the print turn clockwise.
+fn turns(sighting: &Sighting) -> Vec<f64> {
     let places: BTreeMap<(i32, i32), [f64; 2]> =
         sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();
-    let turns = places.iter().filter_map(|(&(row, col), &[x, y])| {
+    let turn = |(&(row, col), &[x, y]): (&(i32, i32), &[f64; 2])| {
         let [ax, ay] = places.get(&(row, col + 1))?;
         let [bx, by] = places.get(&(row + 1, col))?;
         Some(((ax - x) * (by - y) - (ay - y) * (bx - x)).signum())
-    });
-    let turns: Vec<f64> = turns.collect();
-    turns.iter().sum::<f64>() > MIRRORED_MOST * turns.len() as f64
+    };
+    places.iter().filter_map(turn).collect()
 }
 
 #[cfg(test)]
@@ -353,10 +364,10 @@ mod tests {
 
     use super::*;
 
-    /// A board of 6 × 8 corners from above, of which a part are anywhere in the picture.
-    fn board(part_anywhere: f64, is_flipped: bool, seed: u64) -> Sighting {
+    /// A board of `rows` × 8 corners from above, of which a part are anywhere in the picture.
+    fn board(rows: i32, part_anywhere: f64, is_flipped: bool, seed: u64) -> Sighting {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        let places = (0..6).flat_map(|row| (0..8).map(move |col| (row, col)));
+        let places = (0..rows).flat_map(|row| (0..8).map(move |col| (row, col)));
         let observations = places.map(|(row, col)| {
             let [x, y] = [100.0 * f64::from(col), 800.0 - 100.0 * f64::from(row)];
             let pixel = match random.random_bool(part_anywhere) {
@@ -372,8 +383,18 @@ mod tests {
     #[test]
     fn a_mirror_is_told_from_wrong_places() {
         for seed in 0..100 {
-            assert!(!is_mirrored(&board(0.4, false, seed)), "seed {seed}");
-            assert!(is_mirrored(&board(0.05, true, seed)), "seed {seed}");
+            assert!(!is_mirrored(&[board(6, 0.4, false, seed)]), "seed {seed}");
+            assert!(is_mirrored(&[board(6, 0.05, true, seed)]), "seed {seed}");
+        }
+    }
+
+    /// A panel of a few corners, of which most are wrong, beside one that is not mirrored, and by itself.
+    #[test]
+    fn a_few_wrong_corners_are_no_mirror() {
+        for seed in 0..100 {
+            let few = board(2, 0.8, false, seed);
+            assert!(!is_mirrored(&[few.clone(), board(6, 0.2, false, seed)]), "seed {seed}");
+            assert!(!is_mirrored(&[few]), "seed {seed}");
         }
     }
 }
