@@ -301,6 +301,13 @@ fn check_named(found: &Solution, target: &Target, wrong: Wrong, case: &str) {
                 innocent.filter(|corner| corner.outlier && corner.panel != *panel).count();
             assert!(innocent <= 1, "{case}: {innocent} innocent corners");
         }
+        Wrong::Exchanged => {
+            let panels = shared.iter().map(|shared| match shared {
+                Shared::Panel { panel, .. } => panel.index(),
+                other => panic!("{case}: {other:?}"),
+            });
+            assert_eq!(panels.collect::<Vec<_>>(), [7, 12], "{case}");
+        }
         Wrong::PanelPermuted => {
             assert!(matches!(shared[..], [Shared::PanelInView { .. }]), "{case}: {shared:?}");
         }
@@ -390,9 +397,9 @@ fn gross_errors_over_twenty_seeds() {
 }
 
 /// Three cameras around an icosahedron, each with its own views of the same frames.
-fn rig(wrong: Wrong, frames: usize) -> (Vec<RigViews>, Vec<PanelPlace>) {
+fn rig(wrong: Wrong, frames: usize, seed: u64) -> (Vec<RigViews>, Vec<PanelPlace>) {
     let target = icosahedron();
-    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let camera = camera(RADTAN);
     let stated: Vec<Pose> = target.panels.iter().map(|panel| panel.pose.to_pose()).collect();
     let mut panels = stated.clone();
@@ -427,7 +434,7 @@ fn what_is_wrong_in_a_rig_is_named() {
         weights: Weights::default(),
         refine_target: false,
     };
-    let (views, panels) = rig(Wrong::Displaced(0.6), 20);
+    let (views, panels) = rig(Wrong::Displaced(0.6), 20, 5);
     let found = calibrate_rig(&views, &panels, options).unwrap();
     let [Finding { shared: Shared::Panel { panel, moved: Some(moved) }, .. }] = found.findings[..]
     else {
@@ -437,13 +444,44 @@ fn what_is_wrong_in_a_rig_is_named() {
     assert!((moved.by_mm - 0.6).abs() < 0.02, "{moved:?}");
     assert!(found.inlier_rms_px() < 1.1 * NOISE_PX && found.excluded.is_empty());
     // One camera's pictures bear the names of other moments.
-    let (mut late, _) = rig(Wrong::Nothing, 20);
+    let (mut late, _) = rig(Wrong::Nothing, 20, 5);
     let names: Vec<String> = late[1].views.iter().map(|view| view.name.clone()).collect();
     late[1].views.iter_mut().zip(names.iter().cycle().skip(3)).for_each(|(view, name)| {
         view.name.clone_from(name);
     });
     let error = calibrate_rig(&late, &panels, options).unwrap_err();
     assert!(error.to_string().contains("most of all camera c1"), "{error}");
+}
+
+/// A camera that is turned after half of the frames: these go, and no panel is to blame.
+#[test]
+fn panels_are_not_to_blame_for_a_camera_that_was_moved() {
+    let options = RigOptions {
+        model: RADTAN,
+        loss: Loss::default(),
+        weights: Weights::default(),
+        refine_target: false,
+    };
+    for seed in 0..4 {
+        let (mut views, panels) = rig(Wrong::Nothing, 20, seed);
+        let late = views[1].views.iter_mut().filter(|view| view.name.as_str() >= "10");
+        for seen in late.flat_map(|view| &mut view.sightings).flat_map(|s| &mut s.observations) {
+            seen.pixel[0] += 15.0;
+        }
+        let found = calibrate_rig(&views, &panels, options).unwrap();
+        assert!(found.findings.is_empty(), "seed {seed}: {:?}", found.findings);
+        assert!(found.frames.len() >= 10, "seed {seed}: {}", found.frames.len());
+    }
+}
+
+/// What looks wrong beside two panels at each other's place is let back in.
+#[test]
+fn only_panels_that_were_exchanged_are_named() {
+    for seed in 0..6 {
+        let found = solve(FISHEYE, &icosahedron(), Wrong::Exchanged, seed).unwrap();
+        check_named(&found, &icosahedron(), Wrong::Exchanged, &format!("seed {seed}"));
+        assert!(found.excluded.is_empty(), "seed {seed}: {:?}", found.excluded);
+    }
 }
 
 #[test]

@@ -118,12 +118,17 @@ impl Count {
     pub(super) fn stands_out(self, all: Count) -> bool {
         let others =
             Count { outliers: all.outliers - self.outliers, corners: all.corners - self.corners };
+        self.exceeds(others)
+            && self.share() >= MOST
+            && others.corners > 0
+            && others.share() <= ELSEWHERE * self.share()
+    }
+
+    /// Whether these are outliers more often than others, by more than chance.
+    pub(super) fn exceeds(self, others: Count) -> bool {
         let (count, chance) = (self.corners as f64, others.share());
         let more = count * (self.share() - chance);
         self.outliers >= LEAST_OUTLIERS
-            && self.share() >= MOST
-            && others.corners > 0
-            && chance <= ELSEWHERE * self.share()
             && more > SIGNIFICANT * (count * chance * (1.0 - chance)).sqrt()
     }
 }

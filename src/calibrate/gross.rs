@@ -5,6 +5,8 @@
 //!   agree: all corners, with a loss that lets go of those far off, ever narrower
 //!      └─→ the panel of which most corners are off, where others are not, goes; again
 //!   wrong: medians of the rest, by view, and by panel in it
+//!   settled: what is left is adjusted
+//!      └─→ a panel that then has no more outliers than others comes back; wrong again
 //! ```
 //!
 //! What is wrong pulls what is right with it, least where the scale is the narrowest that still
@@ -16,6 +18,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
+use super::error::CalibrationError;
 use super::finding::{Count, Finding, Moved, Shared, shared_outliers};
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
@@ -23,9 +26,9 @@ use super::panel::PanelRef;
 use super::pose::planar_pose;
 use super::problem::{Block, Problem};
 use super::rig::middle;
-use super::settle::{Settled, deviations, residuals, scale, with_gross_errors};
+use super::settle::{Settled, deviations, residuals, scale, settle, with_gross_errors};
 use super::view::{LEAST_CORNERS, Sighting, View};
-use super::weights::{Whitening, median};
+use super::weights::{Weights, Whitening, median};
 use super::wrong::{limit_px, median_px};
 use crate::camera::Pose;
 
@@ -102,7 +105,12 @@ impl Gross {
     /// Walks to where most corners of a problem agree, and finds what does not; `None` where nothing
     /// can be adjusted.
     pub(super) fn of(problem: Problem) -> Option<Self> {
-        let (Walked { problem, some_stand_out, .. }, panels) = agree(problem)?;
+        agree(problem).map(|(walked, panels)| Self::without(walked, panels))
+    }
+
+    /// Finds what does not belong where most corners agree, beside panels that do not.
+    fn without(walked: Walked, panels: BTreeSet<PanelRef>) -> Self {
+        let Walked { problem, some_stand_out, .. } = walked;
         let residuals = residuals(&problem);
         let off_px: Vec<f64> = residuals.iter().map(median_px).collect();
         // Of every camera in every frame.
@@ -143,7 +151,45 @@ impl Gross {
             }
         }
         let usual_px = median(medians);
-        Some(Self { problem, left_out, frames, usual_px, panels, off_px, some_stand_out })
+        Self { problem, left_out, frames, usual_px, panels, off_px, some_stand_out }
+    }
+
+    /// What belongs, adjusted after `prepare`. A panel that looked wrong beside what is may be right, which shows
+    /// where all that is wrong has gone: it is let back in then.
+    pub(super) fn settled(
+        mut self,
+        weights: Weights,
+        loss: Loss,
+        prepare: impl Fn(&mut Kept),
+    ) -> Result<(Self, Settled), CalibrationError> {
+        loop {
+            let mut kept = self.kept();
+            prepare(&mut kept);
+            let settled = settle(kept, weights, loss)?;
+            let wrong = self.wrong_in(&settled);
+            if wrong == self.panels {
+                return Ok((self, settled));
+            }
+            let walked = walked_without(self.problem, &wrong).ok_or(CalibrationError::NoStart)?;
+            self = Self::without(walked, wrong);
+        }
+    }
+
+    /// Which of the panels that took no part have more outliers than others in what was settled.
+    fn wrong_in(&self, settled: &Settled) -> BTreeSet<PanelRef> {
+        let mut others = Count::default();
+        let mut counts: BTreeMap<PanelRef, Count> = BTreeMap::new();
+        let of_blocks = settled.problem.blocks.iter().zip(&settled.outliers);
+        for ((block, outliers), left_out) in of_blocks.zip(self.kept().left_out) {
+            let count = match (self.panels.contains(&block.panel), left_out) {
+                (true, _) => counts.entry(block.panel).or_default(),
+                (false, false) => &mut others,
+                (false, true) => continue,
+            };
+            outliers.iter().for_each(|&far| count.add(far));
+        }
+        counts.retain(|_, count| count.exceeds(others));
+        counts.into_keys().collect()
     }
 
     /// The problem without the frames that do not belong.
@@ -224,34 +270,29 @@ fn agree(problem: Problem) -> Option<(Walked, BTreeSet<PanelRef>)> {
     if seen.len() < LEAST_PANELS {
         return Some((all, wrong));
     }
-    let Walked { problem: mut current, mut sigma, mut some_stand_out } = all.clone();
-    while let Some(panel) = worst_panel(&current, sigma, &wrong) {
+    let mut walked = all.clone();
+    while let Some(panel) = worst_panel(&walked.problem, walked.sigma, &wrong) {
         wrong.insert(panel);
         // Where as many are wrong as right, the target is another one.
         if 2 * wrong.len() >= seen.len() {
             return Some((all, BTreeSet::new()));
         }
-        let mut part = current.part(|_, block| !wrong.contains(&block.panel));
-        Walked { problem: part.problem, sigma, some_stand_out } = narrowed(part.problem)?;
-        current.take(part);
+        walked = walked_without(walked.problem, &wrong)?;
     }
-    // What looked wrong beside what is may be right.
-    wrong.retain(|&panel| {
-        let (of_panel, others) = of_panel(&current, sigma, panel);
-        of_panel.stands_out(sum(of_panel, others))
-    });
-    Some((Walked { problem: current, sigma, some_stand_out }, wrong))
+    Some((walked, wrong))
+}
+
+/// Walks to where most corners agree without some panels.
+fn walked_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Walked> {
+    let mut part = problem.part(|_, block| !wrong.contains(&block.panel));
+    let walked = narrowed(part.problem)?;
+    part.problem = walked.problem;
+    problem.take(part);
+    Some(Walked { problem, ..walked })
 }
 
 fn sum(a: Count, b: Count) -> Count {
     Count { outliers: a.outliers + b.outliers, corners: a.corners + b.corners }
-}
-
-/// Outliers on a panel, and on all others.
-fn of_panel(problem: &Problem, sigma: f64, panel: PanelRef) -> (Count, Count) {
-    let mut counts = panel_counts(problem, sigma);
-    let own = counts.remove(&panel).unwrap_or_default();
-    (own, counts.into_values().fold(Count::default(), sum))
 }
 
 fn panel_counts(problem: &Problem, sigma: f64) -> BTreeMap<PanelRef, Count> {

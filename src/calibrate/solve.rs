@@ -245,11 +245,12 @@ impl Search<'_> {
         let calibrating = free.contains(&true);
         let (used, all) = self.problem(self.views, free);
         let gross = Gross::of(all).ok_or(CalibrationError::NoStart)?;
+        if calibrating {
+            enough(used.len() - gross.frames.len(), self.views.len())?;
+        }
+        let (gross, mut settled) = gross.settled(weights, loss, |_| ())?;
         let kept = (0..used.len()).filter(|frame| !gross.frames.contains_key(frame));
         let kept: Vec<usize> = kept.map(|frame| used[frame]).collect();
-        if calibrating {
-            enough(kept.len(), self.views.len())?;
-        }
         let excluded = self.views.iter().enumerate().filter(|(index, _)| !kept.contains(index));
         let excluded = excluded.map(|(index, view)| {
             let frame = used.iter().position(|used| *used == index);
@@ -269,8 +270,6 @@ impl Search<'_> {
         });
         let excluded = excluded.collect();
 
-        let belonging = gross.kept();
-        let mut settled = settle(belonging.clone(), weights, loss)?;
         let mut f_ratio = 0.0;
         if with_shape {
             let flat = settled.minimum.normal.cost;
@@ -282,7 +281,7 @@ impl Search<'_> {
                 .ok_or(CalibrationError::NoStart)?;
             f_ratio = (flat - bent.normal.cost) / shape::COUNT as f64 / variance(&bent);
             let problem = settled.problem.at(&bent.problem);
-            settled = settle(Kept { problem, ..belonging }, weights, loss)?;
+            settled = settle(Kept { problem, ..gross.kept() }, weights, loss)?;
         }
         let findings = gross.findings(&settled, |frame| self.views[used[frame]].name.clone());
         let solution = self.solution(&kept, excluded, &settled, f_ratio)?;

@@ -18,13 +18,13 @@ use std::collections::BTreeSet;
 
 use super::error::CalibrationError;
 use super::excluded::Excluded;
-use super::gross::{Gross, WrongFrame, within_pictures};
+use super::gross::{Gross, Kept, WrongFrame, within_pictures};
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
 use super::model::Model;
 use super::problem::{Block, CameraUnknowns, PanelUnknowns, Prior};
 use super::remedy::{Instead, remedy_of_given};
-use super::settle::{scale, settle};
+use super::settle::scale;
 use super::solve::{self, Options};
 use super::view::{MIRRORED, View};
 use super::weights::Weights;
@@ -98,6 +98,9 @@ pub fn calibrate_rig(
     let first = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
         .ok_or(CalibrationError::NoStart)?;
     let gross = Gross::of(first.problem).ok_or(CalibrationError::NoStart)?;
+    check_rigid(cameras, &gross)?;
+    let prepare = |kept: &mut Kept| hold_panels(kept, panels, options.refine_target);
+    let (gross, settled) = gross.settled(options.weights, options.loss, prepare)?;
     for (&frame, why) in &gross.frames {
         let reason = match why {
             WrongFrame::Off { camera, off_px } => format!(
@@ -118,38 +121,40 @@ pub fn calibrate_rig(
             reason,
         });
     }
-    let (wrong, all) = (gross.frames.len(), start.frames.len());
-    if 2 * wrong > all {
-        let of_camera = |camera: usize| {
-            let off = |why: &&WrongFrame| matches!(why, WrongFrame::Off { camera: c, .. } if *c == camera);
-            gross.frames.values().filter(off).count()
-        };
-        let most = (0..cameras.len()).max_by_key(|&camera| of_camera(camera)).unwrap_or_default();
-        let camera = cameras[most].name.clone();
-        return Err(CalibrationError::NotRigid { camera, wrong, all });
-    }
-    let kept: Vec<usize> = (0..all).filter(|frame| !gross.frames.contains_key(frame)).collect();
-    let mut belonging = gross.kept();
-    let taking_part: Vec<Block> = belonging
-        .problem
-        .blocks
-        .iter()
-        .zip(&belonging.left_out)
-        .filter(|(_, out)| !**out)
-        .map(|(block, _)| block.clone())
-        .collect();
-    let unknowns = panel_unknowns(&taking_part, panels, options.refine_target);
-    for (panel, unknown) in belonging.problem.panels.iter_mut().zip(unknowns) {
-        // Where frames went, a panel may hang together with no other, or another be held.
-        if panel.pose_free != unknown.pose_free {
-            *panel = unknown;
-        }
-    }
-    let settled = settle(belonging, options.weights, options.loss)?;
+    let belongs = |frame: &usize| !gross.frames.contains_key(frame);
+    let kept: Vec<usize> = (0..start.frames.len()).filter(belongs).collect();
     findings.extend(gross.findings(&settled, |frame| start.frames[frame].clone()));
     let names = |index: usize| start.frames[kept[index]].clone();
     let solution = RigSolution::new(cameras, names, &settled)?;
     Ok(RigSolution { excluded, findings, ..solution })
+}
+
+/// Refuses cameras of which most frames do not belong together.
+fn check_rigid(cameras: &[RigViews], gross: &Gross) -> Result<(), CalibrationError> {
+    let (wrong, all) = (gross.frames.len(), gross.problem.frames.len());
+    if 2 * wrong <= all {
+        return Ok(());
+    }
+    let of_camera = |camera: usize| {
+        let off =
+            |why: &&WrongFrame| matches!(why, WrongFrame::Off { camera: c, .. } if *c == camera);
+        gross.frames.values().filter(off).count()
+    };
+    let most = (0..cameras.len()).max_by_key(|&camera| of_camera(camera)).unwrap_or_default();
+    Err(CalibrationError::NotRigid { camera: cameras[most].name.clone(), wrong, all })
+}
+
+/// Holds a panel of those that take part. Where frames went, a panel may hang together with no other, or
+/// another be held.
+fn hold_panels(kept: &mut Kept, panels: &[PanelPlace], refine: bool) {
+    let of_blocks = kept.problem.blocks.iter().zip(&kept.left_out);
+    let taking_part = of_blocks.filter(|(_, out)| !**out).map(|(block, _)| block.clone());
+    let unknowns = panel_unknowns(&taking_part.collect::<Vec<_>>(), panels, refine);
+    for (panel, unknown) in kept.problem.panels.iter_mut().zip(unknowns) {
+        if panel.pose_free != unknown.pose_free {
+            *panel = unknown;
+        }
+    }
 }
 
 /// The panel to be held: the one seen most of those that no measurement moves, which an earlier
