@@ -6,7 +6,8 @@
 //!      └─→ the panel of which most corners are off, where others are not, goes; again
 //!   wrong: medians of the rest, by view, and by panel in it
 //!   settled: what is left is adjusted
-//!      └─→ a panel that then has no more outliers than others comes back; wrong again
+//!      ├─→ a panel that then has no more outliers than others comes back; wrong again
+//!      └─→ a view that speaks for another camera than all others goes; settled again
 //! ```
 //!
 //! What is wrong pulls what is right with it, least where the scale is the narrowest that still
@@ -22,11 +23,13 @@ use super::error::CalibrationError;
 use super::finding::{Count, Finding, Moved, Shared, shared_outliers};
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
+use super::misfit::misfits;
 use super::panel::PanelRef;
-use super::pose::planar_pose;
-use super::problem::{Block, Problem};
+use super::pose::{estimate_pose, planar_pose};
+use super::problem::{Block, CameraUnknowns, Problem};
 use super::rig::middle;
 use super::settle::{Settled, deviations, residuals, scale, settle, with_gross_errors};
+use super::stranger::stranger;
 use super::view::{LEAST_CORNERS, Sighting, View};
 use super::weights::{Weights, Whitening, median};
 use super::wrong::{limit_px, median_px};
@@ -99,6 +102,8 @@ pub(super) enum WrongFrame {
     Mirrored,
     /// It shows nothing but panels that take no part.
     OnlyWrongPanels,
+    /// It speaks for other cameras than the others do, and would move them by so many deviations.
+    Stranger { deviations: f64 },
 }
 
 impl Gross {
@@ -154,8 +159,8 @@ impl Gross {
         Self { problem, left_out, frames, usual_px, panels, off_px, some_stand_out }
     }
 
-    /// What belongs, adjusted after `prepare`. A panel that looked wrong beside what is may be right, which shows
-    /// where all that is wrong has gone: it is let back in then.
+    /// What belongs, adjusted after `prepare`. A panel that looked wrong beside what is may be right, which
+    /// shows where all that is wrong has gone: it is let back in then.
     pub(super) fn settled(
         mut self,
         weights: Weights,
@@ -167,12 +172,25 @@ impl Gross {
             prepare(&mut kept);
             let settled = settle(kept, weights, loss)?;
             let wrong = self.wrong_in(&settled);
-            if wrong == self.panels {
-                return Ok((self, settled));
+            if wrong != self.panels {
+                let walked = walked_without(self.problem, &wrong);
+                self = Self::without(walked.ok_or(CalibrationError::NoStart)?, wrong);
+                continue;
             }
-            let walked = walked_without(self.problem, &wrong).ok_or(CalibrationError::NoStart)?;
-            self = Self::without(walked, wrong);
+            // Where as many are strange as not, nothing tells which; where panels are displaced, the board is bent or
+            // the lens another one, views are strange by that.
+            let most_belong = 2 * (self.frames.len() + 1) < self.problem.frames.len();
+            let can_tell = most_belong && self.panels.is_empty() && has_no_pattern(&settled);
+            let stranger = if can_tell { stranger(&settled, loss) } else { None };
+            let Some((index, deviations)) = stranger else { return Ok((self, settled)) };
+            let frame = self.belonging().nth(index);
+            self.frames.extend(frame.map(|frame| (frame, WrongFrame::Stranger { deviations })));
         }
+    }
+
+    /// The frames that belong.
+    pub(super) fn belonging(&self) -> impl Iterator<Item = usize> {
+        (0..self.problem.frames.len()).filter(|frame| !self.frames.contains_key(frame))
     }
 
     /// Which of the panels that took no part have more outliers than others in what was settled.
@@ -208,8 +226,7 @@ impl Gross {
         names: impl Fn(usize) -> String,
     ) -> Vec<Finding> {
         let Settled { problem, outliers, .. } = settled;
-        let kept: Vec<usize> =
-            (0..self.problem.frames.len()).filter(|f| !self.frames.contains_key(f)).collect();
+        let kept: Vec<usize> = self.belonging().collect();
         let Kept { left_out, .. } = self.kept();
         let count = |belongs: &dyn Fn(&Block) -> bool| {
             let mut count = Count::default();
@@ -282,13 +299,47 @@ fn agree(problem: Problem) -> Option<(Walked, BTreeSet<PanelRef>)> {
     Some((walked, wrong))
 }
 
-/// Walks to where most corners agree without some panels.
+/// Walks to where most corners agree without some panels, by which frames that show them were misplaced.
 fn walked_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Walked> {
+    let of_wrong = problem.blocks.iter().filter(|block| wrong.contains(&block.panel));
+    let frames: BTreeSet<usize> = of_wrong.map(|block| block.frame).collect();
+    frames.into_iter().for_each(|frame| place_anew(&mut problem, frame, wrong));
     let mut part = problem.part(|_, block| !wrong.contains(&block.panel));
     let walked = narrowed(part.problem)?;
     part.problem = walked.problem;
     problem.take(part);
     Some(Walked { problem, ..walked })
+}
+
+/// Whether residuals depend neither on the place in the image nor on that on the target.
+fn has_no_pattern(settled: &Settled) -> bool {
+    misfits(&settled.minimum.problem, &settled.whitening).is_empty()
+}
+
+/// Estimates the pose of a frame anew, from the panels that are not wrong, and keeps the better one.
+fn place_anew(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRef>) {
+    let is_right = |block: &&Block| block.frame == frame && !wrong.contains(&block.panel);
+    let off_px = |problem: &Problem| {
+        let blocks = problem.blocks.iter().filter(is_right);
+        let seen =
+            blocks.flat_map(|block| block.observations.iter().map(move |seen| (block, seen)));
+        let residuals = seen.map(|(block, seen)| problem.residual(block, seen));
+        median(residuals.map(|r| r.map_or(f64::INFINITY, |[x, y]| x.hypot(y))).collect())
+    };
+    let blocks = problem.blocks.iter().filter(is_right);
+    let Some(largest) = blocks.clone().max_by_key(|block| block.observations.len()) else { return };
+    let sightings = blocks
+        .filter(|block| block.camera == largest.camera)
+        .map(|block| Sighting { panel: block.panel, observations: block.observations.clone() });
+    let CameraUnknowns { camera, camera_from_rig, .. } = &problem.cameras[largest.camera];
+    let panels: Vec<Pose> = problem.panels.iter().map(|panel| panel.target_from_panel).collect();
+    let pose = estimate_pose(camera, &panels, &sightings.collect::<Vec<_>>());
+    let Some(camera_from_target) = pose else { return };
+    let (place, before) = (camera_from_rig.inverse().after(&camera_from_target), off_px(problem));
+    let old = std::mem::replace(&mut problem.frames[frame], place);
+    if off_px(problem) > before {
+        problem.frames[frame] = old;
+    }
 }
 
 fn sum(a: Count, b: Count) -> Count {

@@ -42,6 +42,7 @@ mod shape;
 mod solution;
 mod solve;
 mod start;
+mod stranger;
 mod sufficient;
 mod view;
 mod weights;

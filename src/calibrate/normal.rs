@@ -205,6 +205,18 @@ impl Normal {
         self.right.dot(&step.shared) + frames.map(|(f, step)| f.right.dot(step)).sum::<f64>()
     }
 
+    /// What is left of the equations when poses are eliminated: S and s of S shared = s. `None` where a frame's
+    /// pose is open by itself.
+    pub(super) fn reduced(&self) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let (mut matrix, mut right) = (self.a.clone(), self.right.clone());
+        for Frame { b, c, right: of_frame } in &self.frames {
+            let through = b * c.cholesky()?.inverse();
+            matrix -= &through * b.transpose();
+            right -= &through * of_frame;
+        }
+        Some((matrix, right))
+    }
+
     /// The inverse of the equations; `None` where a frame's pose is open by itself.
     pub(super) fn covariances(&self) -> Option<Covariances> {
         let mut reduced = self.a.clone();

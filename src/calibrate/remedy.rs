@@ -1,7 +1,11 @@
 //! What would make a calibration fit that does not: what it takes for given is found instead.
 
+use std::collections::BTreeSet;
+
+use super::error::CalibrationError;
 use super::loss::Loss;
 use super::misfit::{MATTERS, SIGNIFICANT, deviate_of_f};
+use super::rig::{PanelPlace, RigOptions, RigViews, calibrate_rig};
 use super::solution::{Corner, Solution};
 use super::solve::{self, Options, calibrated};
 use super::start::evenly;
@@ -53,6 +57,8 @@ pub enum Instead {
     Model(Model),
     /// The shape of the board's sheet.
     Shape,
+    /// The places of the target's panels.
+    Panels,
     /// The camera itself.
     Camera,
 }
@@ -69,15 +75,36 @@ pub fn remedy(
         return None;
     }
     let with_shape = solution.shape.is_some();
-    let (views, solution) = trial(views, panels, options, solution)?;
+    let (views, tried_on) = trial(views, panels, options, solution)?;
     let models = options.model.richer().iter().map(|&model| {
         let other = calibrated(&views, panels, Options { model, ..options }, with_shape);
         (Instead::Model(model), other)
     });
     let shape = (panels.len() == 1 && !with_shape)
         .then(|| (Instead::Shape, calibrated(&views, panels, options, true)));
-    let tried = shape.into_iter().chain(models);
-    best(&solution, tried.filter_map(|(instead, other)| Some((instead, other.ok()?))))
+    let places = views
+        .iter()
+        .any(|view| view.sightings.len() > 1)
+        .then(|| (Instead::Panels, with_panels_found(&views, panels, options)));
+    let tried = shape.into_iter().chain(models).chain(places);
+    let tried = tried.filter_map(|(instead, other)| Some((instead, other.ok()?)));
+    best(&tried_on, tried).filter(|found| found.rms_px < solution.inlier_rms_px())
+}
+
+/// The calibration with the panels where the views have them.
+fn with_panels_found(
+    views: &[View],
+    panels: &[Pose],
+    options: Options,
+) -> Result<Solution, CalibrationError> {
+    let Options { model, loss, weights } = options;
+    let stated = |&target_from_panel: &Pose| PanelPlace { target_from_panel, covariance: None };
+    let stated: Vec<PanelPlace> = panels.iter().map(stated).collect();
+    let camera = RigViews { name: String::new(), views: views.to_vec(), known: None };
+    let with_panels = RigOptions { model, loss, weights, refine_target: true };
+    let found = calibrate_rig(&[camera], &stated, with_panels)?;
+    let places: Vec<Pose> = found.panels.iter().map(|place| place.target_from_panel).collect();
+    calibrated(views, &places, options, false)
 }
 
 /// The same where the camera was given: whether it is another one, or the board is bent.
@@ -110,7 +137,7 @@ fn is_explained(solution: &Solution) -> bool {
 
 fn best(solution: &Solution, tried: impl Iterator<Item = (Instead, Solution)>) -> Option<Remedy> {
     let better = tried.filter_map(|(instead, other)| {
-        let gain = gain(solution, &other)?;
+        let gain = gain(solution, &other, instead)?;
         Some((gain, Remedy { instead, rms_px: other.inlier_rms_px() }))
     });
     let better: Vec<_> = better.collect();
@@ -120,8 +147,8 @@ fn best(solution: &Solution, tried: impl Iterator<Item = (Instead, Solution)>) -
 }
 
 /// How many times smaller the mean square is. What is an outlier where the fit is better counts as just
-/// one in both, so that wild corners are no gain.
-fn gain(solution: &Solution, other: &Solution) -> Option<f64> {
+/// one in both, so that wild corners are no gain; nor is it one to call more of them wild.
+fn gain(solution: &Solution, other: &Solution, instead: Instead) -> Option<f64> {
     let squares = |solution: &Solution| -> Vec<f64> {
         let of = |corner: &Corner| corner.residual.iter().map(|r| r * r).sum::<f64>();
         solution.views.iter().flat_map(|view| &view.corners).map(of).collect()
@@ -136,11 +163,24 @@ fn gain(solution: &Solution, other: &Solution) -> Option<f64> {
         let of_shape = if solution.shape.is_some() { SHAPE_COEFFICIENTS } else { 0 };
         (solution.found().count() + of_shape) as f64
     };
+    let of_panels = match instead {
+        Instead::Panels => 6.0 * (panel_count(other) - 1.0),
+        Instead::Model(_) | Instead::Shape | Instead::Camera => 0.0,
+    };
     let gain = mean(solution) / mean(other);
-    let more = (unknowns(other) - unknowns(solution)).max(1.0);
-    let freedom =
-        (2 * other.corner_count()) as f64 - unknowns(other) - 6.0 * other.views.len() as f64;
+    let more = (unknowns(other) + of_panels - unknowns(solution)).max(1.0);
+    let freedom = (2 * other.corner_count()) as f64
+        - unknowns(other)
+        - of_panels
+        - 6.0 * other.views.len() as f64;
     let is_sure = deviate_of_f((gain - 1.0) * freedom / more, more, freedom) > SIGNIFICANT;
     let is_of_all = other.views.len() >= solution.views.len();
-    (is_of_all && is_sure && gain > 1.0 + MATTERS * MATTERS).then_some(gain)
+    let is_smaller = other.inlier_rms_px() < solution.inlier_rms_px();
+    (is_of_all && is_sure && is_smaller && gain > 1.0 + MATTERS * MATTERS).then_some(gain)
+}
+
+/// How many panels were seen.
+fn panel_count(solution: &Solution) -> f64 {
+    let corners = solution.views.iter().flat_map(|view| &view.corners);
+    corners.map(|corner| corner.panel.index()).collect::<BTreeSet<usize>>().len() as f64
 }

@@ -249,8 +249,7 @@ impl Search<'_> {
             enough(used.len() - gross.frames.len(), self.views.len())?;
         }
         let (gross, mut settled) = gross.settled(weights, loss, |_| ())?;
-        let kept = (0..used.len()).filter(|frame| !gross.frames.contains_key(frame));
-        let kept: Vec<usize> = kept.map(|frame| used[frame]).collect();
+        let kept: Vec<usize> = gross.belonging().map(|frame| used[frame]).collect();
         let excluded = self.views.iter().enumerate().filter(|(index, _)| !kept.contains(index));
         let excluded = excluded.map(|(index, view)| {
             let frame = used.iter().position(|used| *used == index);
@@ -261,6 +260,11 @@ impl Search<'_> {
                     gross.usual_px
                 ),
                 Some(WrongFrame::Mirrored) => MIRRORED.to_owned(),
+                Some(WrongFrame::Stranger { deviations }) => format!(
+                    "it speaks for another camera than the other views do, and would move theirs by \
+                     {deviations:.1} deviations: another zoom, focus or crop, a board that was bent, or a lens \
+                     that is not the model's"
+                ),
                 Some(WrongFrame::OnlyWrongPanels) => ONLY_WRONG_PANELS.to_owned(),
                 None => "no pose explains its corners: wrong labels, another target, or corners \
                          where the lens model has ended"

@@ -1,6 +1,8 @@
 //! What a calibration that does not fit may come from, in words, for a page and for a terminal.
 
-use crate::calibrate::{Instead, Misfit, Model, Remedy, RigCamera, RigSolution, Solution};
+use crate::calibrate::{
+    Instead, Misfit, Model, PanelRef, Remedy, RigCamera, RigSolution, Solution,
+};
 
 /// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
 /// have the lens of the model.
@@ -20,19 +22,27 @@ pub struct Given {
 /// Why residuals are no noise: a sentence for each cause, without capital and full stop; none where
 /// nothing speaks for one.
 pub fn causes(solution: &Solution, given: Given) -> Vec<String> {
-    if let Some(Remedy { instead, rms_px }) = given.remedy {
-        let cause = match instead {
-            Instead::Shape => board(false, given),
-            Instead::Camera => GIVEN_CAMERA.to_owned(),
+    let of_target = |misfit: &&Misfit| matches!(misfit, Misfit::Target { .. });
+    let of_panels = given.remedy.is_some_and(|remedy| remedy.instead == Instead::Panels);
+    // Where panels are moved their corners tell most of it.
+    let told: Vec<&Misfit> = match of_panels {
+        true => solution.misfits.iter().filter(of_target).collect(),
+        false => solution.misfits.iter().collect(),
+    };
+    if let Some(Remedy { instead, rms_px }) = given.remedy
+        && (!of_panels || told.is_empty())
+    {
+        let (cause, found) = match instead {
+            Instead::Shape => (board(false, given), "the shape of the board".to_owned()),
+            Instead::Panels => (moved_panels(None), "the place of every panel".to_owned()),
+            Instead::Camera => (GIVEN_CAMERA.to_owned(), "the camera".to_owned()),
             Instead::Model(other) => match given.model {
-                Some(model) => format!("the lens is not one of `{model}`: take --model {other}"),
-                None => GIVEN_CAMERA.to_owned(),
+                Some(model) => (
+                    format!("the lens is not one of `{model}`: take --model {other}"),
+                    format!("a lens of `{other}`"),
+                ),
+                None => (GIVEN_CAMERA.to_owned(), format!("a lens of `{other}`")),
             },
-        };
-        let found = match instead {
-            Instead::Shape => "the shape of the board".to_owned(),
-            Instead::Camera => "the camera".to_owned(),
-            Instead::Model(other) => format!("a lens of `{other}`"),
         };
         return vec![format!(
             "corners are off by {:.3} px, and by {rms_px:.3} px where {found} is found: {cause}",
@@ -51,16 +61,14 @@ pub fn causes(solution: &Solution, given: Given) -> Vec<String> {
                 lens(given.model)
             )
         }
-        Misfit::Target { rms_px, rms_mm, panel } if is_solid => format!(
-            "{}: panels are not where the target's file has them, most of all panel {panel}: \
-             `deltille rig --refine-target` finds where they are",
-            beside(rms_px, rms_mm)
-        ),
+        Misfit::Target { rms_px, rms_mm, panel } if is_solid => {
+            format!("{}: {}", beside(rms_px, rms_mm), moved_panels(Some(panel)))
+        }
         Misfit::Target { rms_px, rms_mm, .. } => {
             format!("{}: {}", beside(rms_px, rms_mm), board(solution.shape.is_some(), given))
         }
     };
-    let mut causes: Vec<String> = solution.misfits.iter().map(cause).collect();
+    let mut causes: Vec<String> = told.into_iter().map(cause).collect();
     // A few wild corners are no fault of the model.
     let rms_px = solution.inlier_rms_px();
     if rms_px > POOR_RMS_PX && causes.is_empty() {
@@ -148,6 +156,14 @@ pub fn cannot_tell_apart(parameters: &[String], sufficient: Option<Model>) -> St
 fn beside(rms_px: f64, rms_mm: f64) -> String {
     format!(
         "corners lie {rms_mm:.2} mm beside their places on the target, in all views alike ({rms_px:.3} px)"
+    )
+}
+
+fn moved_panels(most: Option<PanelRef>) -> String {
+    let most = most.map_or(String::new(), |panel| format!(", most of all panel {panel}"));
+    format!(
+        "panels are not where the target's file has them{most}: `deltille rig --refine-target` finds where \
+         they are"
     )
 }
 

@@ -109,6 +109,10 @@ pub fn calibrate_rig(
                 cameras[*camera].name
             ),
             WrongFrame::Mirrored => MIRRORED.to_owned(),
+            WrongFrame::Stranger { deviations } => format!(
+                "it speaks for other cameras than the other frames do, and would move theirs by \
+                 {deviations:.1} deviations: not taken at the same moment, or one had moved"
+            ),
             WrongFrame::OnlyWrongPanels => solve::ONLY_WRONG_PANELS.to_owned(),
         };
         let of_frame = gross.problem.blocks.iter().filter(|block| block.frame == frame);
@@ -121,8 +125,7 @@ pub fn calibrate_rig(
             reason,
         });
     }
-    let belongs = |frame: &usize| !gross.frames.contains_key(frame);
-    let kept: Vec<usize> = (0..start.frames.len()).filter(belongs).collect();
+    let kept: Vec<usize> = gross.belonging().collect();
     findings.extend(gross.findings(&settled, |frame| start.frames[frame].clone()));
     let names = |index: usize| start.frames[kept[index]].clone();
     let solution = RigSolution::new(cameras, names, &settled)?;
