@@ -101,6 +101,9 @@ fn only_files_of_the_same_kind_are_replaced() {
         assert_eq!(run(program, at, args).0, Some(0), "{args}");
         std::fs::remove_dir_all(&out).unwrap();
     }
+    std::fs::copy(at.join("t.png"), at.join("page.png")).unwrap();
+    let said = refused(at, "render t.json --camera camera.yaml --eye 10,10,300 -o page.png");
+    assert!(said.contains("page.png holds a PNG to scale"), "{said}");
 }
 
 #[test]

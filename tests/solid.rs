@@ -357,7 +357,7 @@ fn wrong_marks_on_a_mesh_are_named() {
         changed.save(path.join("t-texture.png")).unwrap();
         let result = deltille(path, "verify t.json t.obj").code(1);
         let output = String::from_utf8_lossy(&result.get_output().stdout).into_owned();
-        assert!(output.contains("face 0: ") && output.contains(said), "{name}: {output}");
+        assert!(output.contains("on board 0: ") && output.contains(said), "{name}: {output}");
     }
     std::fs::write(path.join("t-texture.png"), written).unwrap();
     deltille(path, "verify t.json t.obj").success();
@@ -389,6 +389,22 @@ fn wrong_bodies_are_named() {
     numbers(&mut turned, &|_, [x, y, z]| [-y, x, z]);
     let mut thick = read("i-skeleton.stl");
     numbers(&mut thick, &|i, v| if i == 0 { v } else { v.map(|x| x * 1.002) });
+    // A wall that is thinner deep inside, where no seat is felt.
+    let mut thin = read("i-skeleton.stl");
+    let far = |v: [f32; 3]| v.iter().map(|x| x * x).sum::<f32>().sqrt();
+    let nearest_mm = std::cell::Cell::new(f32::INFINITY);
+    numbers(&mut thin, &|i, v| {
+        nearest_mm.set(nearest_mm.get().min(if i > 0 { far(v) } else { f32::INFINITY }));
+        v
+    });
+    let is_deep = |v: [f32; 3]| far(v) < 1.001 * nearest_mm.get();
+    numbers(&mut thin, &|i, v| if i > 0 && is_deep(v) { v.map(|x| x * 1.02) } else { v });
+    for at in (84..thin.len()).step_by(50) {
+        let number = |i: usize| f32::from_le_bytes(thin[at + 4 * i..][..4].try_into().unwrap());
+        let [a, b, c] = [1, 2, 3].map(|k| glam::Vec3::from([0, 1, 2].map(|i| number(3 * k + i))));
+        let normal = (b - a).cross(c - a).normalize().to_array();
+        thin.splice(at..at + 12, normal.into_iter().flat_map(f32::to_le_bytes));
+    }
     for (name, bytes, code, said) in [
         ("open.stl", open, 1, "it is open"),
         ("mirrored.stl", mirrored, 1, "inside out"),
@@ -396,6 +412,7 @@ fn wrong_bodies_are_named() {
         ("turned.stl", turned, 1, "is not there"),
         ("cut.stl", bare[..300].to_vec(), 2, "not a binary STL"),
         ("i-skeleton.stl", thick, 1, "below it instead of"),
+        ("i-skeleton.stl", thin, 1, "volume of"),
     ] {
         std::fs::write(path.join(name), bytes).unwrap();
         let result = deltille(path, &format!("verify i.json {name}")).code(code);

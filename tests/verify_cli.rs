@@ -60,7 +60,13 @@ fn a_page_that_is_missing_fails_unless_one_is_verified_alone() {
     let path = folder.path();
     let arguments = ["board", "--rows", "3", "--cols", "4", "--edge", "20mm", "--boards", "3"];
     deltille(path, &[&arguments[..], &["--name", "b", "--svg", "--no-verify"]].concat()).success();
-    deltille(path, &["verify", "b.json"]).success().stdout(contains("verified: 3 files"));
+    deltille(path, &["verify", "b.json"])
+        .success()
+        .stdout(contains("verified: 3 files"))
+        .stderr("");
+    fs::write(path.join("b-4.svg"), "").unwrap();
+    let too_many = contains("b-4.svg: not compared, b has 3 pages").and(contains("b-3").not());
+    deltille(path, &["verify", "b.json"]).success().stderr(too_many);
     deltille(path, &["verify", "b.json", "b-2.svg"]).success();
     let left_out = || contains("b-1.svg to b-3.svg: FAILED").and(contains("b-2.svg is missing"));
     deltille(path, &["verify", "b.json", "b-1.svg", "b-3.svg"]).code(1).stdout(left_out());
@@ -99,11 +105,12 @@ fn bad_input_is_one_line_and_exit_code_2() {
     fs::write(path.join("broken.json"), "{").unwrap();
     fs::create_dir(path.join("alone")).unwrap();
     fs::copy(path.join("b.json"), path.join("alone/b.json")).unwrap();
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 9] = [
         (&["b.json", "empty.pdf"], "empty.pdf"),
         (&["b.json", "cut.pdf"], "cut.pdf"),
         (&["b.json", "absent.png"], "absent.png"),
         (&["b.json", "b.json"], "only .pdf, .svg, .png"),
+        (&["b.json", "b.mtl"], "it is compared with b.obj: name that"),
         (&["broken.json"], "broken.json"),
         (&["alone/b.json"], "no b.pdf, .svg, .png, .glb, .obj, .stl, .dsc or .dxf beside"),
         (&["b.json", "--report", "b.pdf/r.json"], "b.pdf"),

@@ -62,11 +62,7 @@ fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
         let path = check_bar::outline(bar);
         shapes.push(Shape { part: Part::CheckBar { index }, paint: Paint::Fill, path });
     }
-    for (index, line) in layout.lines.iter().enumerate() {
-        // Faces that touch without hanging together each have their line to cut, there and back.
-        if layout.lines[..index].iter().any(|drawn| is_back(drawn, line)) {
-            continue;
-        }
+    for (index, line) in drawn_lines(layout) {
         let mut path = BezPath::new();
         for [from, to] in strokes_mm(line) {
             path.move_to(Point::from((from[0], from[1])));
@@ -80,6 +76,13 @@ fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
         shapes.push(Shape { part: Part::Label { index }, paint: Paint::Fill, path });
     }
     Ok(shapes)
+}
+
+/// The lines that are drawn, with their indices. Faces that touch without hanging together each have their line to
+/// cut, there and back; it is drawn once.
+pub fn drawn_lines(layout: &SheetLayout) -> impl Iterator<Item = (usize, &SheetLine)> {
+    let lines = layout.lines.iter().enumerate();
+    lines.filter(|(index, line)| !layout.lines[..*index].iter().any(|drawn| is_back(drawn, line)))
 }
 
 /// Whether a line runs where another does, from its end to its beginning.

@@ -13,7 +13,7 @@ const LINE_MM: f64 = 0.2;
 /// ```text
 ///   from ┃━━━━━━━━━━━━━━━━━━━━━━━━━━━━┃ to
 /// ```
-pub(super) fn outline(bar: &CheckBar) -> BezPath {
+pub fn outline(bar: &CheckBar) -> BezPath {
     let [dx, dy] = [bar.to_mm[0] - bar.from_mm[0], bar.to_mm[1] - bar.from_mm[1]];
     let (length, stroke, line) = (dx.hypot(dy), CHECK_BAR_STROKE_MM / 2.0, LINE_MM / 2.0);
     let (inner, outer) = (STROKE_WIDTH_MM, length - STROKE_WIDTH_MM);

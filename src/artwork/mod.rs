@@ -27,8 +27,9 @@ use crate::family::Family;
 use crate::target::{GridKind, LineKind, Panel, Placement, SheetText, Target};
 
 pub use atlas::Atlas;
+pub use board::drawn_lines;
 pub use cells::white_outlines;
-pub use check_bar::STROKE_WIDTH_MM;
+pub use check_bar::{STROKE_WIDTH_MM, outline as check_bar_outline};
 pub use cutting::{CutDrawing, CutLayer, CutPath, CuttingError, net_to_cut, panels_to_cut};
 pub use gallery::{GalleryTile, tag_gallery};
 pub use line::strokes_mm;

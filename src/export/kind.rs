@@ -20,6 +20,9 @@ const HEAD_LINES: usize = 3;
 /// Bytes of a text within which its first lines are looked for.
 const HEAD: usize = 4096;
 
+/// How a PDF written here names its creator.
+const PDF_CREATOR: &[u8] = b"/Creator(deltille ";
+
 /// What a list of corners for another detector is called here; it has no place for its writer.
 const DSC: &str = "a .dsc";
 
@@ -58,9 +61,11 @@ impl Kind {
             })
         };
         if content.starts_with(b"%PDF-") {
-            signed("PDF", contains(content, b"(deltille "))
+            signed("PDF", contains(content, PDF_CREATOR))
         } else if content.starts_with(PNG_SIGNATURE) {
-            signed("PNG", png_software(content).is_some_and(|by| by.starts_with(b"deltille ")))
+            let Png { software, is_to_scale } = Png::of(content);
+            let is_own = software.is_some_and(|by| by.starts_with(b"deltille "));
+            signed(if is_to_scale && is_own { "PNG to scale" } else { "PNG" }, is_own)
         } else if content.starts_with(b"glTF") {
             signed("glTF", contains(glb_json(content), b"\"generator\":\"deltille "))
         } else if content.starts_with(b"deltille ") && content.get(80..84).is_some() {
@@ -81,12 +86,17 @@ impl Kind {
 
     /// That of the PDF files written here.
     pub fn own_pdf() -> Self {
-        Self::of(b"%PDF-(deltille ")
+        Self::of(&[b"%PDF-", PDF_CREATOR].concat())
     }
 
-    /// That of the PNG files written here.
+    /// That of the PNG files written here to be looked at: overlays, renderings, plots.
     pub fn own_png() -> Self {
         Self::words("a PNG of deltille")
+    }
+
+    /// That of the PNG files written here to be printed.
+    pub fn own_printed_png() -> Self {
+        Self::words("a PNG to scale of deltille")
     }
 
     /// Whether it is known to have been written here.
@@ -107,7 +117,10 @@ impl Kind {
         }
         let object = first().into_iter::<BTreeMap<String, IgnoredAny>>().next()?.ok()?;
         let keys: Vec<&str> = object.keys().map(String::as_str).collect();
-        Some(Self::words(format!("a JSON of {}", keys.join(", "))))
+        Some(Self::words(match keys.as_slice() {
+            [] => "an empty JSON object".to_owned(),
+            keys => format!("a JSON of {}", keys.join(", ")),
+        }))
     }
 
     /// By the first line without its values, and the one that names the writer.
@@ -164,25 +177,36 @@ const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// The keyword under which a PNG names what wrote it.
 pub(crate) const SOFTWARE: &str = "Software";
 
-/// What the chunks before the pixels of a PNG say about the software.
-fn png_software(content: &[u8]) -> Option<&[u8]> {
-    let mut rest = &content[PNG_SIGNATURE.len()..];
-    loop {
-        let (length, after) = rest.split_first_chunk::<4>()?;
-        let (name, after) = after.split_at_checked(4)?;
-        let (data, after) = after.split_at_checked(u32::from_be_bytes(*length) as usize)?;
-        match name {
-            b"IDAT" => return None,
-            b"tEXt" => {
-                let words = data.strip_prefix(SOFTWARE.as_bytes());
-                if let Some(words) = words.and_then(|words| words.strip_prefix(b"\0")) {
-                    return Some(words);
-                }
-            }
-            _ => {}
+/// What the chunks before the pixels of a PNG say.
+#[derive(Default)]
+struct Png<'a> {
+    /// What wrote it.
+    software: Option<&'a [u8]>,
+    /// Whether they state a resolution.
+    is_to_scale: bool,
+}
+
+impl<'a> Png<'a> {
+    fn of(content: &'a [u8]) -> Self {
+        let (mut png, mut rest) = (Self::default(), &content[PNG_SIGNATURE.len()..]);
+        while let Some((name, data, after)) = next_chunk(rest).filter(|(name, ..)| name != b"IDAT")
+        {
+            let words = data.strip_prefix(SOFTWARE.as_bytes());
+            let software = words.and_then(|words| words.strip_prefix(b"\0"));
+            png.software = png.software.or(software.filter(|_| name == b"tEXt"));
+            png.is_to_scale |= name == b"pHYs";
+            rest = after;
         }
-        rest = after.get(4..)?;
+        png
     }
+}
+
+/// The name and the data of the first chunk of a PNG, and what follows it.
+fn next_chunk(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
+    let (length, after) = bytes.split_first_chunk::<4>()?;
+    let (name, after) = after.split_at_checked(4)?;
+    let (data, after) = after.split_at_checked(u32::from_be_bytes(*length) as usize)?;
+    Some((name, data, after.get(4..)?))
 }
 
 /// A PNG with the name of its writer, which goes before all but the head.

@@ -15,10 +15,13 @@ use crate::quantity;
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/target/1";
 
-/// How far a corner may lie from its place in the lattice, and its target position from that of
-/// its panel, in edges. Measured positions differ by far less; another unit or another corner's
-/// position differs by more.
+/// How far a corner may lie from its place in the lattice, in edges. Measured positions differ by far
+/// less; another unit or another corner's position differs by more.
 const SLACK_EDGES: f64 = 0.01;
+
+/// How far its target position may be from that by its panel's pose, in edges: what six written digits of a
+/// rotation leave on a panel of a thousand edges.
+const POSE_SLACK_EDGES: f64 = 0.001;
 
 /// How far an edge may be from that of the spec, mm: what written digits leave.
 const SPEC_SLACK_MM: f64 = 1e-6;
@@ -298,8 +301,8 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
             return problem(field("panel_mm"), what);
         }
         let expected = panel.pose.target_from_panel(corner.panel_mm);
-        if distance(&corner.target_mm, &expected) > slack {
-            let what = "it is more than 1 % of an edge away from rotation · panel + translation";
+        if distance(&corner.target_mm, &expected) > POSE_SLACK_EDGES * panel.edge_mm {
+            let what = "it is more than 0.1 % of an edge away from rotation · panel + translation";
             return problem(field("target_mm"), what);
         }
     }

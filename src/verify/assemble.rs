@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::Finding;
-use super::document::{Page, RESAMPLED_INK_ERROR};
+use super::document::Page;
 use crate::raster::Gray;
 use crate::target::{SheetLayout, SheetPage};
 
@@ -31,12 +31,14 @@ pub(super) fn assemble(
 ) -> (Page, Vec<Finding>) {
     let size_px =
         [layout.width_mm, layout.height_mm].map(|mm| ((mm * px_per_mm).round() as usize).max(1));
+    // Between two pixels of a page lie at most so many of the sheet; each is the mean of a pixel's area.
+    let coarsest = pages.iter().map(|page| page.px_per_mm).fold(f64::INFINITY, f64::min);
     let mut sheet = Page {
         width_mm: layout.width_mm,
         height_mm: layout.height_mm,
         px_per_mm,
         image: Gray::from_fn(0, 0, |_, _| 255),
-        max_ink_error: RESAMPLED_INK_ERROR,
+        smear_px: 1.0 + px_per_mm / coarsest,
     };
     let at_mm = |x: usize, y: usize| sheet.page_from_px([x as f64, y as f64]);
     let mut pixels = vec![255u8; size_px[0] * size_px[1]];

@@ -86,7 +86,7 @@ pub(super) fn check(
 }
 
 /// Whether the tiles lie where they should, but are too grey, or black for white.
-fn wrong_tones(placed: &PlacedPanel) -> Option<Finding> {
+pub(super) fn wrong_tones(placed: &PlacedPanel) -> Option<Finding> {
     let panel = placed.panel.id;
     let ink @ [white, black] = placed.tones()?;
     if white - black > 0.5 {

@@ -1,13 +1,15 @@
 //! Bodies to print, as STL: closed, outside out, of the stated shape.
 //!
-//! The bare solid is compared face by face. A skeleton is felt from outside with rays: on the ribs
-//! they meet the planes of the faces, in the seats they stop at the thickness of a panel below, and
-//! in the windows they pass.
+//! A skeleton is felt from outside with rays: on the ribs they meet the planes of the faces, in the
+//! seats they stop at the thickness of a panel below, and in the windows they pass. Then it is compared
+//! triangle by triangle, as the bare solid is.
 
 use std::path::Path;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
 
 use super::model::{Facet, load_stl};
 use super::solid::{is_other_mesh, other_count};
@@ -25,6 +27,9 @@ const VOLUME_SLACK: f64 = 1e-4;
 /// seats and windows meet.
 const ABOVE_MM: f64 = 0.5;
 const BESIDE_MM: f64 = 0.02;
+
+/// Triangles that may have one middle.
+const SAME_MIDDLE: usize = 4;
 
 /// Places along a side of a face at which it is felt.
 const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
@@ -54,18 +59,23 @@ pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, Docume
         None if is_skeleton => return Err(unreadable("the target has no skeleton")),
         None => None,
     };
-    let stated = skeleton.as_ref().map_or(solid.faces.len(), |(s, _)| s.triangles_mm.len());
+    let stated = match &skeleton {
+        Some((skeleton, _)) => skeleton.triangles_mm.clone(),
+        None => solid.triangles_mm(),
+    };
     let mut findings = Vec::new();
-    if is_other_mesh(facets.len(), stated) {
-        findings.extend(other_count(facets.len(), stated));
+    if is_other_mesh(facets.len(), stated.len()) {
+        findings.extend(other_count(facets.len(), stated.len()));
     } else {
         findings = check_surface(&facets);
-        match skeleton {
-            Some((skeleton, spec)) => {
-                check_seats(&facets, &solid, (&skeleton, spec), &mut body, &mut findings);
-            }
-            None => check_faces(&facets, &solid, &mut body, &mut findings),
+        let wrong_seats = skeleton.map_or_else(Vec::new, |(skeleton, spec)| {
+            check_seats(&facets, &solid, (&skeleton, spec), &mut body)
+        });
+        // Where a seat is wrong, its triangles would only repeat that.
+        if wrong_seats.is_empty() {
+            check_triangles(&facets, &stated, &mut body, &mut findings);
         }
+        findings.extend(wrong_seats);
     }
     Ok(Verdict { body: Some(body), ..Verdict::new(path, Format::Stl, findings) })
 }
@@ -95,14 +105,13 @@ fn check_surface(facets: &[Facet]) -> Vec<Finding> {
     findings
 }
 
-/// Every stated face is there once, and nothing else.
-fn check_faces(
+/// Every stated triangle is there once, and nothing else.
+fn check_triangles(
     facets: &[Facet],
-    solid: &Polyhedron,
+    stated: &[[DVec3; 3]],
     body: &mut BodyVerdict,
     findings: &mut Vec<Finding>,
 ) {
-    let stated = solid.triangles_mm();
     let volume_mm3 = volume(stated.iter().copied());
     if (body.volume_mm3 / volume_mm3 - 1.0).abs() > VOLUME_SLACK {
         let [found, stated] = [body.volume_mm3, volume_mm3].map(|mm3| mm3 / 1e3);
@@ -113,19 +122,25 @@ fn check_faces(
         return;
     }
     findings.extend(other_count(facets.len(), stated.len()));
-    let deviation = |facet: &Facet, face: &[DVec3; 3]| {
+    let middle = |corners: &[DVec3; 3]| (corners.iter().sum::<DVec3>() / 3.0).to_array();
+    let places = facets.iter().map(|facet| GeomWithData::new(middle(&facet.vertices_mm), facet));
+    let places = RTree::bulk_load(places.collect());
+    let deviation = |facet: &Facet, triangle: &[DVec3; 3]| {
         let turned = |turn: usize| {
-            let apart = (0..3).map(|i| facet.vertices_mm[(i + turn) % 3].distance(face[i]));
+            let apart = (0..3).map(|i| facet.vertices_mm[(i + turn) % 3].distance(triangle[i]));
             apart.fold(0.0, f64::max)
         };
         (0..3).map(turned).fold(f64::INFINITY, f64::min)
     };
-    for (index, face) in stated.iter().enumerate() {
-        let nearest = facets.iter().map(|facet| deviation(facet, face));
-        let nearest = nearest.fold(f64::INFINITY, f64::min);
+    for (index, triangle) in stated.iter().enumerate() {
+        let near = places.nearest_neighbor_iter(middle(triangle)).take(SAME_MIDDLE);
+        let nearest = near.map(|near| deviation(near.data, triangle)).fold(f64::INFINITY, f64::min);
         if nearest > MESH_TOLERANCE_MM {
-            let problem =
-                format!("face {index} is not there, the nearest is off by {nearest:.3} mm");
+            let [x, y, z] = middle(triangle);
+            let problem = format!(
+                "triangle {index}, around ({x:.2}, {y:.2}, {z:.2}) mm, is not there; the nearest is off by \
+                 {nearest:.3} mm"
+            );
             findings.push(Finding::Body { problem });
         } else {
             body.max_deviation_mm = body.max_deviation_mm.max(nearest);
@@ -139,8 +154,7 @@ fn check_seats(
     solid: &Polyhedron,
     (skeleton, spec): (&Skeleton, &SkeletonSpec),
     body: &mut BodyVerdict,
-    findings: &mut Vec<Finding>,
-) {
+) -> Vec<Finding> {
     let (thickness, through) = (spec.panel_thickness_mm, spec.panel_thickness_mm + spec.wall_mm);
     let (rib, window) = (skeleton.rib_mm, skeleton.window_mm);
     // Distance from the edges, and the depth there; `None` in the window.
@@ -181,11 +195,13 @@ fn check_seats(
             (face, most, None)
         })
         .collect();
+    let mut findings = Vec::new();
     for (_, off, problem) in faces {
         body.seats += usize::from(problem.is_none());
         body.max_deviation_mm = body.max_deviation_mm.max(off);
         findings.extend(problem.map(|problem| Finding::Body { problem }));
     }
+    findings
 }
 
 /// How far a ray gets, mm.

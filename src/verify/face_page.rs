@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::document::{Page, RESAMPLED_INK_ERROR};
+use super::document::Page;
 use super::model::Model;
 use crate::raster::Gray;
 use crate::target::{Panel, Placement};
@@ -33,6 +33,8 @@ pub(super) fn face_page(
     let texture = &model.texture;
     let size = DVec2::new(texture.width() as f64, texture.height() as f64);
     let mut shades = vec![u8::MAX; width * height];
+    // The largest pixel of the texture, px of the page.
+    let mut texel_px = 0.0f64;
     for triangle in &model.triangles {
         let flat = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v));
         let middle = flat.iter().sum::<DVec3>().truncate() / 3.0;
@@ -51,6 +53,9 @@ pub(super) fn face_page(
         if area >= 0.0 {
             continue;
         }
+        let [p, q, r] = triangle.uv.map(|uv| DVec2::from(uv) * size);
+        let texels = (q - p).perp_dot(r - p).abs();
+        texel_px = texel_px.max((area.abs() / texels).sqrt() / SAMPLES as f64);
         let low = a.min(b).min(c).ceil().max(DVec2::ZERO);
         let high = a.max(b).max(c).floor() + 1.0;
         let end = |high: f64, size: usize| (high.max(0.0) as usize).min(size);
@@ -75,6 +80,6 @@ pub(super) fn face_page(
         let sum: u32 = rows.flat_map(|at| &shades[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
         (sum / (SAMPLES * SAMPLES) as u32) as u8
     });
-    let page = Page { width_mm, height_mm, px_per_mm, image, max_ink_error: RESAMPLED_INK_ERROR };
+    let page = Page { width_mm, height_mm, px_per_mm, image, smear_px: 1.0 + texel_px };
     (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [-left, -lower] })
 }

@@ -110,6 +110,11 @@ pub enum Finding {
         /// Ink of white and black tiles, 0 to 1.
         ink: [f64; 2],
     },
+    /// A check bar of the stated length is drawn otherwise.
+    CheckBarDiffers {
+        /// Which bar, from 1.
+        bar: usize,
+    },
     /// A text is not there, or reads otherwise.
     TextDiffers {
         /// Which text of the sheet, from 1.
@@ -185,7 +190,7 @@ pub enum Finding {
         /// Where on the sheet.
         at_mm: [f64; 2],
     },
-    /// A line is not there, or a dashed one is drawn through.
+    /// A line is not there, or drawn otherwise.
     LineDiffers {
         /// Which line of the sheet, from 1.
         line: usize,
@@ -376,6 +381,17 @@ pub enum Finding {
         /// Its area, mm².
         area_mm2: f64,
     },
+    /// An edge of a tile, or of a cell in it, lies elsewhere than stated.
+    EdgeMoved {
+        /// Row of the tile's lower-left vertex.
+        row: i32,
+        /// Column of the tile's lower-left vertex.
+        col: i32,
+        /// Where.
+        at_mm: [f64; 2],
+        /// How far, mm, positive where more is black.
+        by_mm: f64,
+    },
 }
 
 impl Finding {
@@ -390,6 +406,7 @@ impl Finding {
                 | TagExtra { .. }
                 | TileColour { .. }
                 | Blemish { .. }
+                | EdgeMoved { .. }
                 | CornerMissing { .. }
                 | CornerOff { .. }
                 | CornerExtra { .. }
@@ -430,6 +447,9 @@ impl fmt::Display for Finding {
                 write!(f, "check bar {bar} measures {found:.3} mm instead of {stated_mm:.3} mm")
             }
             Self::CheckBar { bar, found_mm: None, .. } => write!(f, "check bar {bar} not found"),
+            Self::CheckBarDiffers { bar } => {
+                write!(f, "check bar {bar} differs from the description")
+            }
             Self::TagMissing { id } => write!(f, "tag {id} is not where it should be"),
             Self::PanelMissing { panel } => write!(f, "board {panel} not recognised"),
             Self::AnotherBoard { found, stated } => {
@@ -555,6 +575,13 @@ impl fmt::Display for Finding {
             Self::Blemish { row, col, at_mm: [x, y], area_mm2 } => write!(
                 f,
                 "spot of {area_mm2:.3} mm² at ({x:.2}, {y:.2}) mm in the tile at row {row} col {col}"
+            ),
+            Self::EdgeMoved { row, col, at_mm: [x, y], by_mm } => write!(
+                f,
+                "an edge at ({x:.2}, {y:.2}) mm in the tile at row {row} col {col} is {:.3} mm beside its \
+                 place, towards {}",
+                by_mm.abs(),
+                if *by_mm > 0.0 { "white" } else { "black" }
             ),
         }
     }

@@ -41,6 +41,16 @@ impl AffineMap {
         [0, 1].map(|i| self.linear[i][0] * x + self.linear[i][1] * y + self.shift[i])
     }
 
+    /// The map back; `None` of one that leaves no area.
+    pub fn inverse(&self) -> Option<Self> {
+        let [[a, b], [c, d]] = self.linear;
+        let det = a * d - b * c;
+        let linear = [[d / det, -b / det], [-c / det, a / det]];
+        let back = Self { linear, shift: [0.0; 2] };
+        let shift = back.apply(self.shift).map(|v| -v);
+        (det != 0.0 && det.is_finite()).then_some(Self { linear, shift })
+    }
+
     /// Lengths of the images of the unit vectors.
     pub fn scales(&self) -> [f64; 2] {
         [0, 1].map(|i| self.linear[0][i].hypot(self.linear[1][i]))

@@ -1,38 +1,33 @@
-//! What lies outside the tiles: every text has its ink, and nothing else is on the sheet.
+//! What lies outside the tiles: every text, check bar and line has its ink, and nothing else is on the sheet.
 //!
-//! The letters are those of the built-in font, so that their outlines come from the same place as
-//! those printed; what is proved is that the sheet has the words of the description.
+//! Outlines of marks come from the same place as those printed; what is proved is that the sheet has
+//! what the description says, and no more. The length of check bars is measured by itself.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape};
 use rayon::prelude::*;
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, RTree};
 
-use super::document::Page;
+use super::document::{MAX_INK_ERROR, Page};
 use super::tiles::{EDGE_PX, PROBES, PlacedPanel};
 use super::{Finding, SheetVerdict};
 use crate::artwork;
 use crate::lattice::Tile;
 use crate::raster::{Coverage, Gray};
-use crate::target::{CHECK_BAR_STROKE_MM, SheetLayout, SheetLine, SheetText};
+use crate::target::{CHECK_BAR_STROKE_MM, SheetLayout};
 
-/// Ink of a text and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
+/// Ink of a mark and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
 /// that lies 0.02 mm off at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
-const MAX_TEXT_ERROR: f64 = 0.3;
+const MAX_MARK_ERROR: f64 = 0.3;
 
-/// White around a text that belongs to it, px.
-const TEXT_BLANK_PX: f64 = 3.0;
+/// White around a mark that belongs to it, px.
+const BLANK_PX: f64 = 3.0;
 
-/// Beyond the ends and strokes of a check bar nothing is called a spot, mm: what is wrong with a
-/// bar, its measurement tells.
-const BAR_BLANK_MM: f64 = 0.3;
-
-/// Least ink of a line, relative to what its width lets a pixel have at most.
-const LEAST_LINE_INK: f64 = 0.3;
-
-/// So near to the ends of a stroke its ink is not looked at, px.
-const LINE_END_PX: f64 = 1.5;
+/// Long marks are compared in pieces of at most this length, mm.
+const PIECE_MM: f64 = 20.0;
 
 /// Blank around the window of a page that belongs to it, px: what it shows is cut off at its rim,
 /// through pixels and through the width of lines.
@@ -44,7 +39,7 @@ const MOST_SPOTS: usize = 200;
 /// How finely curves are turned into lines, mm.
 const FLATNESS_MM: f64 = 0.002;
 
-/// Compares the texts and lines, and looks for ink where none should be. What is in `window`
+/// Compares the marks, and looks for ink where none should be. What is in `window`
 /// (left, lower, right, upper end, mm), the part of a larger sheet, is left to others.
 pub(super) fn check(
     page: &Page,
@@ -53,90 +48,243 @@ pub(super) fn check(
     window: Option<[f64; 4]>,
     verdict: &mut SheetVerdict,
 ) {
-    let (width, height) = (page.image.width(), page.image.height());
-    let mut known = vec![false; width * height];
-    for (index, text) in layout.texts.iter().enumerate() {
-        let words = Words::new(text);
-        if words.as_ref().is_none_or(|words| !words.has_ink(page)) {
-            let SheetText { text, .. } = text;
-            verdict.findings.push(Finding::TextDiffers { text: index + 1, stated: text.clone() });
-        }
-        words.iter().for_each(|words| words.cover(page, &mut known));
-    }
-    let mut cover = |[x0, y0, x1, y1]: [usize; 4]| {
-        (y0..y1).for_each(|y| known[y * width + x0..y * width + x1].fill(true));
+    let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
+    let window = window.map(|window| pixels(page, window, WINDOW_BLANK_PX));
+    // What the window or a panel shows is compared by itself.
+    let is_own = |x: usize, y: usize| {
+        let in_window =
+            |[x0, y0, x1, y1]: [usize; 4]| (x0..x1).contains(&x) && (y0..y1).contains(&y);
+        let at = [x as f64, y as f64];
+        let is_beside = |ground: &Ground| ground.expected(page, at, EDGE_PX).is_none();
+        !window.is_some_and(in_window) && grounds.iter().all(is_beside)
     };
-    for bar in &layout.check_bars {
-        let blank = (CHECK_BAR_STROKE_MM / 2.0 + BAR_BLANK_MM) * page.px_per_mm;
-        cover(pixels(page, spanned(bar.from_mm, bar.to_mm), blank));
+    let (marks, mut findings) = marks(layout);
+    let drawn = Drawn::new(page, &marks);
+    findings.par_extend(marks.par_iter().filter_map(|mark| {
+        let is_right = mark.areas.iter().all(|area| drawn.is_in(area, is_own));
+        (!is_right).then(|| mark.what.differs(layout))
+    }));
+    // Of a bar of another length there is no more to say.
+    let is_said = |differs: &Finding| {
+        let is_same = |found: &Finding| match (found, differs) {
+            (Finding::CheckBar { bar, .. }, Finding::CheckBarDiffers { bar: other }) => {
+                bar == other
+            }
+            _ => false,
+        };
+        verdict.findings.iter().any(is_same)
+    };
+    findings.retain(|finding| !is_said(finding));
+    verdict.findings.extend(findings);
+    let width = page.image.width();
+    let mut known = vec![false; page.image.pixels().len()];
+    if let Some([x0, y0, x1, y1]) = window {
+        (y0..y1).for_each(|y| known[y * width + x0..y * width + x1].fill(true));
     }
-    for (index, line) in layout.lines.iter().enumerate() {
-        if !has_strokes(page, line) {
-            let finding = Finding::LineDiffers { line: index + 1, purpose: line.kind };
-            verdict.findings.push(finding);
-        }
-        let blank = (line.width_mm / 2.0 + BAR_BLANK_MM) * page.px_per_mm;
-        let length_px = distance(line.from_mm, line.to_mm) * page.px_per_mm;
-        let steps = length_px.ceil().max(1.0) as usize;
-        for n in 0..=steps {
-            let at = between(line.from_mm, line.to_mm, n as f64 / steps as f64);
-            cover(pixels(page, spanned(at, at), blank));
-        }
-    }
-    window.into_iter().for_each(|window| cover(pixels(page, window, WINDOW_BLANK_PX)));
+    marks.iter().flat_map(|mark| &mark.areas).for_each(|area| area.cover(page, &mut known));
     verdict.findings.extend(spots(page, &known, panels));
 }
 
-/// Whether a line is there: ink along its strokes, and none between them.
-fn has_strokes(page: &Page, line: &SheetLine) -> bool {
-    let strokes = artwork::strokes_mm(line);
-    let across = {
-        let length = distance(line.from_mm, line.to_mm);
-        [0, 1]
-            .map(|i| [line.from_mm[1] - line.to_mm[1], line.to_mm[0] - line.from_mm[0]][i] / length)
+/// What a mark is, with its index.
+#[derive(Clone, Copy)]
+enum What {
+    Text(usize),
+    CheckBar(usize),
+    Line(usize),
+}
+
+impl What {
+    /// That a mark is not as the layout has it.
+    fn differs(self, layout: &SheetLayout) -> Finding {
+        match self {
+            Self::Text(i) => {
+                Finding::TextDiffers { text: i + 1, stated: layout.texts[i].text.clone() }
+            }
+            Self::CheckBar(i) => Finding::CheckBarDiffers { bar: i + 1 },
+            Self::Line(i) => Finding::LineDiffers { line: i + 1, purpose: layout.lines[i].kind },
+        }
+    }
+}
+
+/// A mark beside the panels.
+struct Mark {
+    what: What,
+    /// What is black, on the page, mm.
+    outlines: Vec<Vec<[f64; 2]>>,
+    /// What belongs to it, in pieces.
+    areas: Vec<Area>,
+}
+
+/// A rectangle along a mark, so that what is slanted claims no more than what is upright.
+struct Area {
+    /// From the page to a frame along the mark.
+    along: Affine,
+    /// In that frame, mm.
+    bounds: Rect,
+}
+
+/// All marks of a layout; of texts that cannot be drawn it is said that they differ.
+fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<Finding>) {
+    let (mut marks, mut findings) = (Vec::new(), Vec::new());
+    for (index, text) in layout.texts.iter().enumerate() {
+        match artwork::text_outline(text) {
+            Ok(path) if path.is_empty() => {}
+            Ok(path) => {
+                let along = Affine::rotate(-text.angle_rad);
+                let bounds = (along * &path).bounding_box();
+                let areas = vec![Area { along, bounds }];
+                marks.push(Mark { what: What::Text(index), outlines: polygons(&path), areas });
+            }
+            Err(_) => findings.push(What::Text(index).differs(layout)),
+        }
+    }
+    for (index, bar) in layout.check_bars.iter().enumerate() {
+        let areas = pieces([bar.from_mm, bar.to_mm], CHECK_BAR_STROKE_MM);
+        let outlines = polygons(&artwork::check_bar_outline(bar));
+        marks.push(Mark { what: What::CheckBar(index), outlines, areas });
+    }
+    for (index, line) in artwork::drawn_lines(layout) {
+        let areas = pieces([line.from_mm, line.to_mm], line.width_mm);
+        let stroke = |[from, to]: [[f64; 2]; 2]| {
+            let length = distance(from, to).max(f64::MIN_POSITIVE);
+            let across =
+                [from[1] - to[1], to[0] - from[0]].map(|d| d / length * line.width_mm / 2.0);
+            let beside = |p: [f64; 2], side: f64| [0, 1].map(|i| p[i] + side * across[i]);
+            vec![beside(from, 1.0), beside(from, -1.0), beside(to, -1.0), beside(to, 1.0)]
+        };
+        let outlines = artwork::strokes_mm(line).into_iter().map(stroke).collect();
+        marks.push(Mark { what: What::Line(index), outlines, areas });
+    }
+    (marks, findings)
+}
+
+/// A path as polygons.
+fn polygons(path: &BezPath) -> Vec<Vec<[f64; 2]>> {
+    let mut polygons: Vec<Vec<[f64; 2]>> = Vec::new();
+    kurbo::flatten(path, FLATNESS_MM, |element| match (element, polygons.last_mut()) {
+        (PathEl::MoveTo(p), _) => polygons.push(vec![[p.x, p.y]]),
+        (PathEl::LineTo(p), Some(polygon)) => polygon.push([p.x, p.y]),
+        _ => {}
+    });
+    polygons
+}
+
+/// Pieces of the area of a straight mark.
+fn pieces([from, to]: [[f64; 2]; 2], width_mm: f64) -> Vec<Area> {
+    let length = distance(from, to);
+    let along = Affine::rotate(-(to[1] - from[1]).atan2(to[0] - from[0]))
+        * Affine::translate((-from[0], -from[1]));
+    let count = (length / PIECE_MM).ceil().max(1.0);
+    let piece = |n: usize| {
+        let [start, end] = [n, n + 1].map(|n| n as f64 / count * length);
+        Area { along, bounds: Rect::new(start, -width_mm / 2.0, end, width_mm / 2.0) }
     };
-    // A hairline lies between pixels: its ink is that of the darkest place across it.
-    let ink = |at: [f64; 2]| {
-        let [x, y] = page.px_from_page(at);
-        let offsets = [-1.0, -0.5, 0.0, 0.5, 1.0];
-        offsets
-            .map(|d| page.ink([x + d * across[0], y - d * across[1]]))
-            .into_iter()
-            .fold(0.0, f64::max)
-    };
-    let full = (line.width_mm * page.px_per_mm).min(1.0);
-    let inked = |[from, to]: &[[f64; 2]; 2]| {
-        // The ends blur over a pixel.
-        let length_px = distance(*from, *to) * page.px_per_mm;
-        let margin = (LINE_END_PX / length_px).min(0.5);
-        let steps = (length_px / 2.0).ceil().max(1.0) as usize;
-        (0..=steps).all(|n| {
-            let part = margin + (1.0 - 2.0 * margin) * n as f64 / steps as f64;
-            ink(between(*from, *to, part)) > LEAST_LINE_INK * full
+    (0..count as usize).map(piece).collect()
+}
+
+impl Area {
+    /// The rectangle of pixels around it.
+    fn pixels(&self, page: &Page) -> [usize; 4] {
+        let Rect { x0, y0, x1, y1 } = self.along.inverse().transform_rect_bbox(self.bounds);
+        pixels(page, [x0, y0, x1, y1], BLANK_PX)
+    }
+
+    /// Whether a pixel belongs to it, with `blank` around.
+    fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
+        let [x, y] = page.page_from_px([x as f64, y as f64]);
+        let blank = blank_px / page.px_per_mm;
+        self.bounds.inflate(blank, blank).contains(self.along * Point::new(x, y))
+    }
+
+    /// Marks its pixels.
+    fn cover(&self, page: &Page, known: &mut [bool]) {
+        let [x0, y0, x1, y1] = self.pixels(page);
+        for y in y0..y1 {
+            for x in x0..x1 {
+                known[y * page.image.width() + x] |= self.contains(page, x, y, BLANK_PX);
+            }
+        }
+    }
+}
+
+/// An outline in the picture, by the rectangle around it, and whether it is of a letter.
+type Outline = GeomWithData<Rectangle<[f64; 2]>, (Vec<[f64; 2]>, bool)>;
+
+/// What a page should show of marks.
+struct Drawn<'a> {
+    page: &'a Page,
+    outlines: RTree<Outline>,
+}
+
+impl<'a> Drawn<'a> {
+    fn new(page: &'a Page, marks: &[Mark]) -> Self {
+        let of_mark = |mark: &Mark| {
+            let is_text = matches!(mark.what, What::Text(_));
+            let of = move |polygon: &Vec<[f64; 2]>| {
+                let polygon: Vec<[f64; 2]> =
+                    polygon.iter().map(|&p| page.px_from_page(p)).collect();
+                let end = |of: fn(f64, f64) -> f64| {
+                    polygon.iter().copied().reduce(|a, b| [of(a[0], b[0]), of(a[1], b[1])])
+                };
+                let around = Rectangle::from_corners(end(f64::min)?, end(f64::max)?);
+                Some(GeomWithData::new(around, (polygon, is_text)))
+            };
+            mark.outlines.iter().filter_map(of).collect::<Vec<_>>()
+        };
+        Self { page, outlines: RTree::bulk_load(marks.iter().flat_map(of_mark).collect()) }
+    }
+
+    /// Whether an area has the ink of the marks, and no other, where it `is_own`.
+    fn is_in(&self, area: &Area, is_own: impl Fn(usize, usize) -> bool) -> bool {
+        let page = self.page;
+        let [x0, y0, x1, y1] = area.pixels(page);
+        let (width, height) = (x1 - x0, y1 - y0);
+        let stated = self.stated([x0, y0], [width, height]);
+        let found = Gray::from_fn(width, height, |x, y| {
+            1.0 - f32::from(page.image.at(x0 + x, y0 + y)) / 255.0
+        });
+        let mean = |image: &Gray<f32>, x: usize, y: usize| {
+            let rows = (y - 1..=y + 1).map(|y| image.row(y)[x - 1..=x + 1].iter().sum::<f32>());
+            f64::from(rows.sum::<f32>()) / 9.0
+        };
+        let inside = |n: usize| 1..n.saturating_sub(1);
+        inside(height).all(|y| {
+            inside(width).all(|x| {
+                (mean(&stated, x, y) - mean(&found, x, y)).abs() <= MAX_MARK_ERROR
+                    || !area.contains(page, x0 + x, y0 + y, BLANK_PX - 1.0)
+                    || !is_own(x0 + x, y0 + y)
+            })
         })
-    };
-    strokes.iter().all(inked)
-        && strokes.windows(2).all(|pair| {
-            let gap_px = distance(pair[0][1], pair[1][0]) * page.px_per_mm;
-            gap_px < 2.0 * LINE_END_PX
-                || ink(between(pair[0][1], pair[1][0], 0.5)) < LEAST_LINE_INK * full
-        })
+    }
+
+    /// The ink of the marks in a part of the picture.
+    fn stated(&self, [x0, y0]: [usize; 2], [width, height]: [usize; 2]) -> Gray<f32> {
+        let first = [x0 as f64 - 0.5, y0 as f64 - 0.5];
+        let part = AABB::from_corners(first, [first[0] + width as f64, first[1] + height as f64]);
+        let [mut letters, mut strokes] = [0, 1].map(|_| Coverage::new(width, height));
+        for outline in self.outlines.locate_in_envelope_intersecting(part) {
+            let (polygon, is_text) = &outline.data;
+            let polygon: Vec<[f64; 2]> =
+                polygon.iter().map(|[x, y]| [x - x0 as f64, y - y0 as f64]).collect();
+            // Which way outlines of letters run is the font's business; those of strokes cross each other.
+            match is_text {
+                true => letters.add(&polygon, 1.0),
+                false => strokes.add(&polygon, signed_area(&polygon).signum()),
+            }
+        }
+        let (letters, strokes) = (letters.finish(), strokes.finish());
+        Gray::from_fn(width, height, |x, y| (letters.at(x, y).abs() + strokes.at(x, y)).min(1.0))
+    }
+}
+
+/// Positive where a polygon runs clockwise on the screen.
+fn signed_area(polygon: &[[f64; 2]]) -> f64 {
+    let next = polygon.iter().cycle().skip(1);
+    polygon.iter().zip(next).map(|([x, y], [u, v])| x * v - y * u).sum()
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
-/// The point at a part of the way from a to b.
-fn between(a: [f64; 2], b: [f64; 2], part: f64) -> [f64; 2] {
-    [0, 1].map(|i| a[i] + (b[i] - a[i]) * part)
-}
-
-/// The rectangle that two points span: left, lower, right, upper.
-fn spanned(from: [f64; 2], to: [f64; 2]) -> [f64; 4] {
-    let [left, lower] = [0, 1].map(|i| from[i].min(to[i]));
-    let [right, upper] = [0, 1].map(|i| from[i].max(to[i]));
-    [left, lower, right, upper]
 }
 
 /// The pixels of a rectangle of the page (mm) with `blank` more on every side: first and
@@ -150,89 +298,6 @@ fn pixels(page: &Page, [x0, y0, x1, y1]: [f64; 4], blank: f64) -> [usize; 4] {
     [left.min(right), upper.min(lower), right, lower].map(|v| v as usize)
 }
 
-/// The outline of a text and the area that belongs to it: its bounds along its own base line, so
-/// that a slanted text claims no more than an upright one.
-struct Words {
-    path: BezPath,
-    /// From the page to a frame along the base line.
-    along: Affine,
-    /// Bounds in that frame, mm.
-    bounds: Rect,
-}
-
-impl Words {
-    /// `None` where the built-in font lacks a letter.
-    fn new(text: &SheetText) -> Option<Self> {
-        let path = artwork::text_outline(text).ok()?;
-        let along = Affine::rotate(-text.angle_rad);
-        let bounds = (along * &path).bounding_box();
-        Some(Self { path, along, bounds })
-    }
-
-    /// The rectangle of pixels around all of it.
-    fn pixels(&self, page: &Page) -> [usize; 4] {
-        let bounds = self.path.bounding_box();
-        pixels(page, [bounds.x0, bounds.y0, bounds.x1, bounds.y1], TEXT_BLANK_PX)
-    }
-
-    /// Whether a pixel belongs to it, with `blank` around.
-    fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
-        let [x, y] = page.page_from_px([x as f64, y as f64]);
-        let blank = blank_px / page.px_per_mm;
-        self.bounds.inflate(blank, blank).contains(self.along * Point::new(x, y))
-    }
-
-    /// Marks its pixels.
-    fn cover(&self, page: &Page, known: &mut [bool]) {
-        if self.path.is_empty() {
-            return;
-        }
-        let [x0, y0, x1, y1] = self.pixels(page);
-        for y in y0..y1 {
-            for x in x0..x1 {
-                known[y * page.image.width() + x] |= self.contains(page, x, y, TEXT_BLANK_PX);
-            }
-        }
-    }
-
-    /// Whether its area has the ink of its outline, and no other.
-    fn has_ink(&self, page: &Page) -> bool {
-        if self.path.is_empty() {
-            return true;
-        }
-        let [x0, y0, x1, y1] = self.pixels(page);
-        let (width, height) = (x1 - x0, y1 - y0);
-        let mut coverage = Coverage::new(width, height);
-        let mut polygon: Vec<[f64; 2]> = Vec::new();
-        kurbo::flatten(&self.path, FLATNESS_MM, |element| match element {
-            PathEl::MoveTo(p) | PathEl::LineTo(p) => {
-                let [x, y] = page.px_from_page([p.x, p.y]);
-                polygon.push([x - x0 as f64, y - y0 as f64]);
-            }
-            _ => {
-                coverage.add(&polygon, 1.0);
-                polygon.clear();
-            }
-        });
-        // Which way outlines run is the font's business.
-        let stated = coverage.finish().map(|v| v.abs().min(1.0));
-        let found = Gray::from_fn(width, height, |x, y| {
-            1.0 - f32::from(page.image.at(x0 + x, y0 + y)) / 255.0
-        });
-        let mean = |image: &Gray<f32>, x: usize, y: usize| {
-            let rows = (y - 1..=y + 1).map(|y| image.row(y)[x - 1..=x + 1].iter().sum::<f32>());
-            f64::from(rows.sum::<f32>()) / 9.0
-        };
-        let inside = |n: usize| 1..n.saturating_sub(1);
-        inside(height).all(|y| {
-            inside(width).all(|x| {
-                !self.contains(page, x0 + x, y0 + y, TEXT_BLANK_PX - 1.0)
-                    || (mean(&stated, x, y) - mean(&found, x, y)).abs() <= MAX_TEXT_ERROR
-            })
-        })
-    }
-}
-
 /// Names each connected spot of wrong pixels outside the tiles and the `known` marks.
 pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<Finding> {
     let (width, height) = (page.image.width(), page.image.height());
@@ -241,17 +306,20 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
     wrong.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, (wrong, &pixel)) in row.iter_mut().zip(page.image.row(y)).enumerate() {
             let ink = 1.0 - f64::from(pixel) / 255.0;
-            let at = [x as f64, y as f64];
             // White is right wherever no inverted panel is; most of the sheet is done here.
-            let plain =
-                ink <= page.max_ink_error && grounds.iter().all(|ground| !ground.inverted());
-            *wrong = !plain
-                && !known[y * width + x]
-                && grounds
-                    .iter()
-                    .find_map(|ground| ground.expected(page, at))
-                    .unwrap_or(Some(0.0))
-                    .is_some_and(|expected| (ink - expected).abs() > page.max_ink_error);
+            let plain = ink <= MAX_INK_ERROR && grounds.iter().all(|ground| !ground.inverted());
+            if plain || known[y * width + x] {
+                continue;
+            }
+            // Where this far from edges.
+            let is_off = |most: f64, near_px: f64| {
+                let expected =
+                    |ground: &Ground| ground.expected(page, [x as f64, y as f64], near_px);
+                let expected = grounds.iter().find_map(expected).unwrap_or(Some(0.0));
+                expected.is_some_and(|expected| (ink - expected).abs() > most)
+            };
+            *wrong = is_off(page.max_ink_error_at_edges(), EDGE_PX)
+                || page.smear_px > 0.0 && is_off(MAX_INK_ERROR, EDGE_PX + page.smear_px);
         }
     });
     let mut spots = Vec::new();
@@ -298,8 +366,9 @@ impl<'a> Ground<'a> {
         let [left, lower, right, upper] = field;
         let ends = [[left, lower], [right, lower], [right, upper], [left, upper]];
         let ends = ends.map(|p| placed.page.px_from_page(placed.page_from_panel(p)));
+        let reach_px = 2.0 * EDGE_PX + placed.page.smear_px;
         let most = |i: usize, sign: f64| {
-            ends.map(|p| sign * p[i]).into_iter().fold(f64::MIN, f64::max) + 2.0 * EDGE_PX
+            ends.map(|p| sign * p[i]).into_iter().fold(f64::MIN, f64::max) + reach_px
         };
         let around_px = [-most(0, -1.0), -most(1, -1.0), most(0, 1.0), most(1, 1.0)];
         Self { placed, tiles: panel.tiles(), field, around_px }
@@ -310,9 +379,9 @@ impl<'a> Ground<'a> {
     }
 
     /// What a pixel of the panel's area should be; `Some(None)` in and beside the tiles, which are
-    /// compared by themselves, and at the edge of the field. Between the tiles of a panel that is
-    /// not inverted there may be another one.
-    fn expected(&self, page: &Page, [x, y]: [f64; 2]) -> Option<Option<f64>> {
+    /// compared by themselves, and at the edge of the field, `near_px` to either side. Between the tiles of a panel
+    /// that is not inverted there may be another one.
+    fn expected(&self, page: &Page, [x, y]: [f64; 2], near_px: f64) -> Option<Option<f64>> {
         let [left, upper, right, lower] = self.around_px;
         if x < left || x > right || y < upper || y > lower {
             return None;
@@ -320,11 +389,11 @@ impl<'a> Ground<'a> {
         let [u, v] = self.placed.panel_from_page(page.page_from_px([x, y]));
         let [left, lower, right, upper] = self.field;
         let inside = (u - left).min(right - u).min(v - lower).min(upper - v) * page.px_per_mm;
-        if inside < -EDGE_PX {
+        if inside < -near_px {
             return None;
         }
         let edge_mm = self.placed.panel.edge_mm;
-        let near = EDGE_PX / page.px_per_mm;
+        let near = near_px / page.px_per_mm;
         let reaches = |[du, dv]: [f64; 2]| {
             let at = [(u + du) / edge_mm, (v + dv) / edge_mm];
             self.tiles.contains(&self.placed.panel.kind.tile_at(at))
@@ -333,7 +402,7 @@ impl<'a> Ground<'a> {
         let around = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
         let in_tile = reaches([0.0, 0.0])
             || around.into_iter().any(|angle| reaches([near * angle.cos(), near * angle.sin()]));
-        let undecided = in_tile || (self.inverted() && inside < EDGE_PX);
+        let undecided = in_tile || (self.inverted() && inside < near_px);
         if undecided { Some(None) } else { self.inverted().then_some(Some(1.0)) }
     }
 }

@@ -8,7 +8,8 @@
 //! - every corner is found, once, with its label, within [`TOLERANCE_MM`] of its stated position,
 //!   and no other corner is;
 //! - every tile, and every cell of every tag, has its colour over its whole area, also where
-//!   decoding would correct a wrong cell;
+//!   decoding would correct a wrong cell, and its edges lie within a quarter of a pixel of their places: 0.02 mm at
+//!   300 dpi;
 //! - the sheet has the words of the description, and no ink beside the tiles, words and bars.
 //!
 //! What is wrong is named by its cause where one cause explains it: a scale, a mirror image, a
@@ -44,6 +45,7 @@ mod body;
 mod construct;
 mod cutting;
 mod document;
+mod edges;
 mod face_page;
 mod finding;
 mod fit;
@@ -62,7 +64,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::artwork::CuttingError;
 use crate::detect::{Detector, DetectorConfig, Ink, Tone};
-use crate::export::sheet_file_name;
+use crate::export::{obj, sheet_file_name};
 use crate::family::Family;
 use crate::limits::Limits;
 use crate::target::{SheetLayout, SheetPage, Target};
@@ -117,6 +119,14 @@ pub enum VerifyError {
     OtherKind {
         /// The file.
         path: PathBuf,
+    },
+    /// The file is a part of another one.
+    #[error("{}: it is compared with {whole}: name that", path.display())]
+    PartOf {
+        /// The file.
+        path: PathBuf,
+        /// The file that it is a part of.
+        whole: String,
     },
     /// The file name does not tell which sheet is on it.
     #[error("{}: the target has {sheets} sheets; name the file {example} for the first", path.display())]
@@ -260,6 +270,12 @@ impl<'a> Verifier<'a> {
     /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
     /// that its name tells; for a page of a net all files of [`set_of`](Self::set_of) are read.
     pub fn verify(&self, path: &Path) -> Result<Verdict, VerifyError> {
+        let name = file_name(path);
+        let of_mesh = [".mtl", &obj::texture_name("")].map(|end| name.strip_suffix(end));
+        if let Some(mesh) = of_mesh.into_iter().flatten().next() {
+            let whole = format!("{mesh}.obj");
+            return Err(VerifyError::PartOf { path: path.to_owned(), whole });
+        }
         let Some(format) = Format::of(path) else {
             return Err(VerifyError::OtherKind { path: path.to_owned() });
         };

@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::board::wrong_tones;
 use super::face_page::face_page;
 use super::fit::AffineMap;
 use super::marks::spots;
@@ -202,6 +203,10 @@ fn check_print(
     let (page, placement) = face_page(model, panel, outline, area_mm, px_per_mm);
     let found_from_stated = AffineMap::IDENTITY;
     let placed = PlacedPanel { page: &page, panel, placement: &placement, found_from_stated };
+    if let Some(finding) = wrong_tones(&placed) {
+        verdict.findings.push(finding);
+        return;
+    }
     let report = placed.check_tiles(verifier.family);
     verdict.tags_exact = report.tags_exact;
     let known = vec![false; page.image.pixels().len()];
@@ -211,6 +216,9 @@ fn check_print(
         |finding| match finding {
             Finding::Blemish { row, col, at_mm, area_mm2 } => {
                 Finding::Blemish { row, col, at_mm: on_panel(at_mm), area_mm2 }
+            }
+            Finding::EdgeMoved { row, col, at_mm, by_mm } => {
+                Finding::EdgeMoved { row, col, at_mm: on_panel(at_mm), by_mm }
             }
             Finding::Spot { at_mm, area_mm2 } => Finding::Spot { at_mm: on_panel(at_mm), area_mm2 },
             other => other,

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
 use super::Finding;
-use super::document::Page;
+use super::document::{MAX_INK_ERROR, Page};
 use super::fit::AffineMap;
 use crate::family::{Decoder, Family};
 use crate::lattice::{GridKind, TagCells, Tile, Vertex};
@@ -28,6 +28,11 @@ const COARSE: usize = 3;
 /// Tiles of one colour are alike where the ink of nine in ten is so near to their median.
 const TONE_SPREAD: f64 = 0.1;
 
+/// Edges may lie so far beside their place, px: twice what rounding does to edges along pixels, on pages as they are
+/// drawn (0.02 mm at 300 dpi), and on those that are put together from pixels of others.
+const MOVED_EDGE_PX: f64 = 0.25;
+const SMEARED_MOVED_EDGE_PX: f64 = 0.5;
+
 /// Counted pixels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
@@ -44,7 +49,7 @@ impl Tally {
 }
 
 /// What a tile should look like.
-struct Expected<'a> {
+pub(super) struct Expected<'a> {
     /// Black, as a whole or around its tag.
     black: bool,
     /// Black and white are exchanged.
@@ -54,7 +59,7 @@ struct Expected<'a> {
 
 impl Expected<'_> {
     /// Whether the tile is black at tile coordinates.
-    fn is_black_at(&self, p: [f64; 2]) -> bool {
+    pub fn is_black_at(&self, p: [f64; 2]) -> bool {
         let Some(tag) = &self.tag else { return self.black };
         match tag.looks.region(p) {
             Region::Margin => self.black,
@@ -185,10 +190,13 @@ impl PlacedPanel<'_> {
 
     /// Picture positions of a tile's A, B and C.
     fn frame_px(&self, tile: Tile) -> [[f64; 2]; 3] {
-        tile.frame().map(|v| {
-            let stated = self.page_from_panel(self.panel.lattice_mm(v));
-            self.page.px_from_page(self.found_from_stated.apply(stated))
-        })
+        tile.frame().map(|vertex| self.px_of(vertex))
+    }
+
+    /// Picture position of a vertex.
+    pub fn px_of(&self, vertex: Vertex) -> [f64; 2] {
+        let stated = self.page_from_panel(self.panel.lattice_mm(vertex));
+        self.page.px_from_page(self.found_from_stated.apply(stated))
     }
 
     /// Compares all tiles of the panel.
@@ -199,16 +207,30 @@ impl PlacedPanel<'_> {
         // Needed only where something is wrong.
         let decoder = OnceCell::new();
         let mut report = TileReport::default();
-        for tile in self.panel.tiles() {
+        let expected = self.panel.tiles().into_iter().map(|tile| {
             let tag = tags.get(&tile).and_then(|&placement| {
                 let word = family?.code(placement.id)?;
                 Some(ExpectedTag { placement, word, looks: looks.as_ref()? })
             });
             let inverted = self.panel.inverted;
-            let expected = Expected { black: tile.is_dark() != inverted, inverted, tag };
-            let tally = self.compare(tile, &expected);
+            (tile, Expected { black: tile.is_dark() != inverted, inverted, tag })
+        });
+        let expected: BTreeMap<Tile, Expected> = expected.collect();
+        for (&tile, expected) in &expected {
+            let tally = self.compare(tile, expected);
             report.tiles += 1;
-            self.judge(tile, &expected, &tally, family, &decoder, &mut report);
+            self.judge(tile, expected, &tally, family, &decoder, &mut report);
+        }
+        if report.findings.is_empty() {
+            let is_smeared = self.page.smear_px > 0.0;
+            let tolerance_px = if is_smeared { SMEARED_MOVED_EDGE_PX } else { MOVED_EDGE_PX };
+            let moved = self.moved_edges(&expected, tolerance_px);
+            report.findings.extend(moved.into_iter().map(|moved| Finding::EdgeMoved {
+                row: moved.tile.anchor.row,
+                col: moved.tile.anchor.col,
+                at_mm: moved.at_mm,
+                by_mm: moved.by_mm,
+            }));
         }
         report
     }
@@ -219,10 +241,14 @@ impl PlacedPanel<'_> {
         let (ab, ac) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
         let det = ab[0] * ac[1] - ab[1] * ac[0];
         let uv = |[x, y]: [f64; 2]| [(x * ac[1] - y * ac[0]) / det, (y * ab[0] - x * ab[1]) / det];
-        let around: Vec<[f64; 2]> = (0..PROBES)
-            .map(|i| f64::from(i) * TAU / f64::from(PROBES))
-            .map(|angle| uv([EDGE_PX * angle.cos(), EDGE_PX * angle.sin()]))
-            .collect();
+        let circle = |radius_px: f64| -> Vec<[f64; 2]> {
+            (0..PROBES)
+                .map(|i| f64::from(i) * TAU / f64::from(PROBES))
+                .map(|angle| uv([radius_px * angle.cos(), radius_px * angle.sin()]))
+                .collect()
+        };
+        let (around, further) = (circle(EDGE_PX), circle(EDGE_PX + self.page.smear_px));
+        let most_at_edges = self.page.max_ink_error_at_edges();
         let bit = |p: [f64; 2]| expected.tag.as_ref().and_then(|tag| tag.looks.bit(p));
         let black_at = |p: [f64; 2]| expected.is_black_at(p);
         let inside = |[u, v]: [f64; 2]| match self.panel.kind {
@@ -250,14 +276,17 @@ impl PlacedPanel<'_> {
                 let here = bit(p);
                 let black = black_at(p);
                 let found = 1.0 - f64::from(image.at(x, y)) / 255.0;
-                let is_wrong = (found - f64::from(u8::from(black))).abs() > self.page.max_ink_error;
+                let error = (found - f64::from(u8::from(black))).abs();
+                let is_uniform = |around: &[[f64; 2]], step: usize| {
+                    around.iter().step_by(step).all(|d| {
+                        let q = [p[0] + d[0], p[1] + d[1]];
+                        inside(q) && black_at(q) == black
+                    })
+                };
+                let is_wrong = error > most_at_edges && is_uniform(&around, 1)
+                    || error > MAX_INK_ERROR && is_uniform(&further, 1);
                 // Most pixels are right, and those that are need not be looked at as closely.
-                let step = if is_wrong { 1 } else { COARSE };
-                let uniform = around.iter().step_by(step).all(|d| {
-                    let q = [p[0] + d[0], p[1] + d[1]];
-                    inside(q) && black_at(q) == black
-                });
-                if !uniform {
+                if !is_wrong && !is_uniform(&around, COARSE) {
                     continue;
                 }
                 let tally = tallies.entry(here).or_default();

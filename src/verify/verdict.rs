@@ -248,7 +248,7 @@ impl fmt::Display for Verdict {
             sheet.findings.iter().map(move |finding| format!("{page}{finding}"))
         });
         let on_faces = self.faces.iter().flat_map(|face| {
-            face.findings.iter().map(move |finding| format!("face {}: {finding}", face.panel))
+            face.findings.iter().map(move |finding| format!("on board {}: {finding}", face.panel))
         });
         let all: Vec<String> = everywhere.chain(on_sheets).chain(on_faces).collect();
         write!(f, "FAILED, {}", all[..all.len().min(NAMED)].join("; "))?;

@@ -172,6 +172,8 @@ pub fn texture() -> Vec<Case> {
             ("another title", "t-texture.png, byte 89: words", swap("\0t", "\0u")),
             ("a gamma", "t-texture.png, byte ", png::with_chunk(b"gAMA", &[0, 0, 0, 1])),
             ("a spot", "at row", png::square([0.33, 0.83], 30)),
+            ("grey for black", "contrast", png::pixels(|p| png::grey(p, |v| v.max(30)))),
+            ("a faint spot", "at row", png::level([0.33, 0.83], 30, 60)),
             (
                 "a file that is cut off",
                 "cut off",

@@ -4,7 +4,7 @@ use image::{DynamicImage, GrayImage, ImageFormat, Luma};
 
 use super::common::png::chunk;
 use super::edit::{append, find, swap};
-use super::{Case, Damage, cases};
+use super::{BOARD, Case, Damage, cases};
 
 /// Puts a chunk before the pixels.
 pub fn with_chunk(name: &'static [u8; 4], data: &'static [u8]) -> Damage {
@@ -48,7 +48,7 @@ pub fn square([across, down]: [f64; 2], side: u32) -> Damage {
 }
 
 /// Makes a square grey; its corner in parts of the picture, its side in pixels.
-fn level([across, down]: [f64; 2], side: u32, level: u8) -> Damage {
+pub fn level([across, down]: [f64; 2], side: u32, level: u8) -> Damage {
     pixels(move |mut picture| {
         let [x, y] = [across * f64::from(picture.width()), down * f64::from(picture.height())];
         for (dx, dy) in (0..side).flat_map(|dx| (0..side).map(move |dy| (dx, dy))) {
@@ -58,8 +58,30 @@ fn level([across, down]: [f64; 2], side: u32, level: u8) -> Damage {
     })
 }
 
+/// A rectangle so far from the first end of the first check bar, so long and so high, mm.
+fn on_bar(from_mm: f64, length_mm: f64, height_mm: f64, level: u8) -> Damage {
+    const PX_PER_MM: f64 = 300.0 / 25.4;
+    let sheet = &BOARD.target.sheets[0];
+    let [x, y] = sheet.check_bars[0].from_mm;
+    let along_x = (sheet.check_bars[0].to_mm[1] - y).abs() < 1e-9;
+    let ends = |along: f64, across: f64| {
+        if along_x { [x + along, y + across] } else { [x + across, y + along] }
+    };
+    let [a, b] = [ends(from_mm, -height_mm / 2.0), ends(from_mm + length_mm, height_mm / 2.0)];
+    let page_mm = sheet.height_mm;
+    let px = move |mm: f64| (mm * PX_PER_MM).round() as u32;
+    pixels(move |mut picture| {
+        for across in px(a[0].min(b[0]))..px(a[0].max(b[0])) {
+            for down in px(page_mm - a[1].max(b[1]))..px(page_mm - a[1].min(b[1])) {
+                picture.put_pixel(across, down, Luma([level]));
+            }
+        }
+        picture.into()
+    })
+}
+
 /// Changes all grey values.
-fn grey(mut picture: GrayImage, change: impl Fn(u8) -> u8) -> DynamicImage {
+pub fn grey(mut picture: GrayImage, change: impl Fn(u8) -> u8) -> DynamicImage {
     picture.pixels_mut().for_each(|Luma([grey])| *grey = change(*grey));
     picture.into()
 }
@@ -193,7 +215,7 @@ pub fn board() -> Vec<Case> {
                 Box::new(|bytes| [&bytes[..bytes.len() - 12], &chunk(b"IEND", b"a")].concat())
             }),
             ("a larger page", "page of", resolution(11_000, 11_000, 1)),
-            ("pixels that are not square", "no resolution", resolution(11_811, 11_000, 1)),
+            ("pixels that are not square", "not square", resolution(11_811, 11_000, 1)),
             ("a resolution without a unit", "no resolution", resolution(11_811, 11_811, 0)),
             ("a spot", "spot of", square([0.02, 0.02], 12)),
             ("a faint spot", "spot of", level([0.02, 0.02], 1, 240)),
@@ -201,6 +223,9 @@ pub fn board() -> Vec<Case> {
             ("grey for black", "contrast", pixels(|p| grey(p, |v| v.max(100)))),
             ("grey paper", "contrast", pixels(|p| grey(p, |v| v.min(250)))),
             ("noise", "spot of", pixels(noise)),
+            ("a check bar with a second end", "bar 1 differs", on_bar(5.0, 0.3, 2.0, 0)),
+            ("a check bar with a gap", "bar 1 differs", on_bar(40.0, 20.0, 0.4, 255)),
+            ("a check bar under a stroke", "bar 1 differs", on_bar(40.0, 20.0, 1.0, 0)),
             ("a hole in the board", "at row", square([0.5, 0.5], 40)),
             (
                 "black and white exchanged",

@@ -1,7 +1,7 @@
 //! Damaged SVG.
 
 use super::edit::{append, before, line, swap, text};
-use super::{Case, cases};
+use super::{Case, Damage, cases};
 
 /// Of a board.
 pub fn board() -> Vec<Case> {
@@ -162,6 +162,32 @@ pub fn board() -> Vec<Case> {
             ("another encoding", "instead of <?xml", swap("UTF-8", "UTF-16")),
             ("words on the page", "text between elements", over("words")),
             (
+                "an edge that bulges by 0.1 mm",
+                "beside its place, towards white",
+                on_tile(|d| {
+                    let [[ax, ay], [bx, by], [cx, cy]] = vertices(d);
+                    let bulge = [(ax + bx) / 2.0, (ay + by) / 2.0 + 0.1];
+                    format!("M{ax} {ay}L{} {}L{bx} {by}L{cx} {cy}Z", bulge[0], bulge[1])
+                }),
+            ),
+            (
+                "a tile grown by 0.06 mm on one side",
+                "beside its place, towards white",
+                on_tile(|d| {
+                    let [[ax, ay], [bx, by], [cx, cy]] = vertices(d);
+                    let (start, end) = (0.1 * (bx - ax), 0.9 * (bx - ax));
+                    format!(
+                        "M{ax} {ay}L{} {ay}L{} {}L{} {}L{} {by}L{bx} {by}L{cx} {cy}Z",
+                        ax + start,
+                        ax + start,
+                        ay + 0.06,
+                        ax + end,
+                        ay + 0.06,
+                        ax + end
+                    )
+                }),
+            ),
+            (
                 "a tile that is missing",
                 "tile missing at row 1 col 1",
                 text(|text| {
@@ -226,6 +252,33 @@ pub fn board() -> Vec<Case> {
     )
 }
 
+/// Draws another path for a plain tile.
+fn on_tile(edit: impl Fn(&str) -> String + 'static) -> Damage {
+    text(move |text| {
+        let tile = text.lines().find(|line| line.contains("tile-0-r1-c1\"")).unwrap();
+        let path = tile.split('"').nth(1).unwrap();
+        text.replacen(path, &edit(path), 1)
+    })
+}
+
+/// The vertices of a triangle's path.
+fn vertices(path: &str) -> [[f64; 2]; 3] {
+    let numbers = path.split(['M', 'L', 'Z', ' ']).filter(|part| !part.is_empty());
+    let numbers: Vec<f64> = numbers.map(|number| number.parse().unwrap()).collect();
+    let [ax, ay, bx, by, cx, cy] = numbers[..] else { panic!("{path} is no triangle") };
+    [[ax, ay], [bx, by], [cx, cy]]
+}
+
+/// A path whose ends are 0.2 mm further right and down.
+fn beside(path: &str) -> String {
+    let (before, rest) = path.split_once("d=\"").unwrap();
+    let (ends, after) = rest.split_once('"').unwrap();
+    let numbers = ends.split(['M', 'L', ' ']).filter(|part| !part.is_empty());
+    let moved: Vec<f64> = numbers.map(|number| number.parse::<f64>().unwrap() + 0.2).collect();
+    let [x0, y0, x1, y1] = moved[..] else { panic!("{ends} is no line") };
+    format!("{before}d=\"M{x0:.4} {y0:.4}L{x1:.4} {y1:.4}\"{after}")
+}
+
 /// Of a net, which has lines.
 pub fn net() -> Vec<Case> {
     cases(
@@ -246,6 +299,18 @@ pub fn net() -> Vec<Case> {
                 "attribute vector-effect",
                 swap("stroke=\"#000\"", "vector-effect=\"non-scaling-stroke\" stroke=\"#000\""),
             ),
+            ("wide lines", "to cut, differs", swap("stroke-width=\"0.15\"", "stroke-width=\"1\"")),
+            (
+                "narrow lines",
+                "to cut, differs",
+                swap("stroke-width=\"0.15\"", "stroke-width=\"0.04\""),
+            ),
+            ("a line beside its place", "to cut, differs", {
+                text(|text| {
+                    let cut = text.lines().find(|line| line.contains("id=\"cut-")).unwrap();
+                    text.replacen(cut, &beside(cut), 1)
+                })
+            }),
             (
                 "a line that is missing",
                 "line ",

@@ -78,7 +78,7 @@ pub fn drawn(name: &str, artwork: Artwork, formats: Formats, dpi: u32) -> Vec<Fi
                 Ok(png::write(&artwork.sheets[index], &artwork.title, path, dpi)?)
             };
             let name = sheet_file_name(name, index, count, "png");
-            files.push(File::new(name, Kind::own_png(), write));
+            files.push(File::new(name, Kind::own_printed_png(), write));
         }
     }
     files

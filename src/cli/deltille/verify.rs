@@ -19,6 +19,7 @@ use crate::family::Family;
 use crate::limits::Limits;
 use crate::target::Target;
 use crate::verify::{Verdict, Verifier};
+use crate::words::counted;
 
 /// Arguments of `deltille verify`.
 #[derive(clap::Args)]
@@ -153,7 +154,43 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
         }
         return meshes.collect();
     }
+    for path in pages_too_many(folder, target) {
+        tell!(
+            "{}: not compared, {name} has {}: remove it, or name it otherwise",
+            path.display(),
+            counted(count, "page")
+        );
+    }
     printed.into_iter().chain(meshes).collect()
+}
+
+/// Files with the names of pages that the target does not have, in order.
+fn pages_too_many(folder: &Path, target: &Target) -> Vec<PathBuf> {
+    let pages: BTreeSet<String> = ["svg", "png"]
+        .into_iter()
+        .flat_map(|extension| {
+            let count = target.page_count();
+            (0..count).map(move |page| sheet_file_name(&target.name, page, count, extension))
+        })
+        .collect();
+    let is_too_many = |path: &PathBuf| {
+        let [stem, extension] =
+            [path.file_stem(), path.extension()].map(|part| part.and_then(|p| p.to_str()));
+        let (Some(stem), Some("svg" | "png")) = (stem, extension) else { return false };
+        let number = stem.strip_prefix(&*target.name).and_then(|rest| rest.strip_prefix('-'));
+        let of_page = number.is_some_and(|number| number.parse::<usize>().is_ok());
+        let file = path.file_name().map(|name| name.to_string_lossy().into_owned());
+        // A target may have that name too.
+        of_page
+            && file.is_some_and(|file| !pages.contains(&file))
+            && !path.with_extension("json").is_file()
+    };
+    let listed = Some(folder).filter(|folder| !folder.as_os_str().is_empty());
+    let files = std::fs::read_dir(listed.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
+    let mut found: Vec<PathBuf> =
+        files.map(|entry| folder.join(entry.file_name())).filter(is_too_many).collect();
+    found.sort();
+    found
 }
 
 /// Schema and version of the file of `--report`.

@@ -17,10 +17,10 @@ pub(super) const MAX_PIXELS: f64 = 60.0e6;
 
 /// How far the ink of an area may be from 0 or 1 on a page that is drawn or read: what rounding leaves of 255 grey
 /// values.
-const DRAWN_INK_ERROR: f64 = 0.01;
+pub(super) const MAX_INK_ERROR: f64 = 0.01;
 
-/// The same on a page that is put together from pixels of others, over which edges reach further.
-pub(super) const RESAMPLED_INK_ERROR: f64 = 0.3;
+/// The same so near to an edge that its smear reaches there.
+pub(super) const SMEARED_INK_ERROR: f64 = 0.3;
 
 /// Which kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -133,8 +133,16 @@ pub struct Page {
     pub px_per_mm: f64,
     /// The picture.
     pub image: Gray<u8>,
-    /// How far the ink of a pixel in an area of one colour may be from 0 or 1.
-    pub max_ink_error: f64,
+    /// How much further edges reach than over the pixel that they cross, px: on a page that is put together from
+    /// pixels of others.
+    pub smear_px: f64,
+}
+
+impl Page {
+    /// How far ink may be from 0 or 1 beside an edge.
+    pub fn max_ink_error_at_edges(&self) -> f64 {
+        if self.smear_px > 0.0 { SMEARED_INK_ERROR } else { MAX_INK_ERROR }
+    }
 }
 
 impl Document {
@@ -229,7 +237,7 @@ impl Document {
                 })?
             }
         };
-        Ok(Page { width_mm, height_mm, px_per_mm, image, max_ink_error: DRAWN_INK_ERROR })
+        Ok(Page { width_mm, height_mm, px_per_mm, image, smear_px: 0.0 })
     }
 }
 

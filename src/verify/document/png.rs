@@ -25,6 +25,10 @@ impl Png {
             Some(dims) if dims.unit == png::Unit::Meter && dims.xppu == dims.yppu => {
                 f64::from(dims.xppu) / 1000.0
             }
+            Some(dims) if dims.unit == png::Unit::Meter => {
+                let (x, y) = (dims.xppu, dims.yppu);
+                return Err(format!("its pixels are not square: {x} and {y} in a metre"));
+            }
             _ => {
                 return Err(
                     "it states no resolution in pixels per metre: its size is unknown".into()
