@@ -571,3 +571,14 @@ fn a_pose_holds_with_two_fifths_of_wrong_corners() {
         }
     }
 }
+
+/// Where the lens is another one views do not agree, but none of them is to blame.
+#[test]
+fn no_view_is_left_out_for_a_lens_that_does_not_fit() {
+    for seed in 0..6 {
+        let views = views(FISHEYE, &board(), Wrong::Nothing, seed);
+        let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Eucm)).unwrap();
+        assert!(found.inlier_rms_px() > 1.1 * NOISE_PX, "seed {seed}: {}", found.inlier_rms_px());
+        assert!(found.excluded.is_empty(), "seed {seed}: {:?}", found.excluded);
+    }
+}

@@ -29,7 +29,7 @@ use super::pose::{estimate_pose, planar_pose};
 use super::problem::{Block, CameraUnknowns, Problem};
 use super::rig::middle;
 use super::settle::{Settled, deviations, residuals, scale, settle, with_gross_errors};
-use super::stranger::stranger;
+use super::stranger::Opinions;
 use super::view::{LEAST_CORNERS, Sighting, View};
 use super::weights::{Weights, Whitening, median};
 use super::wrong::{limit_px, median_px};
@@ -92,6 +92,9 @@ struct Walked {
     /// See [`Kept::some_stand_out`].
     some_stand_out: bool,
 }
+
+/// Of so many frames one may be of another camera; where more are it is not clear which.
+const FEW: usize = 10;
 
 /// Why a frame does not belong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,25 +170,52 @@ impl Gross {
         loss: Loss,
         prepare: impl Fn(&mut Kept),
     ) -> Result<(Self, Settled), CalibrationError> {
-        loop {
-            let mut kept = self.kept();
+        let settle = |gross: &Self| {
+            let mut kept = gross.kept();
             prepare(&mut kept);
-            let settled = settle(kept, weights, loss)?;
+            settle(kept, weights, loss)
+        };
+        loop {
+            let settled = settle(&self)?;
             let wrong = self.wrong_in(&settled);
-            if wrong != self.panels {
-                let walked = walked_without(self.problem, &wrong);
-                self = Self::without(walked.ok_or(CalibrationError::NoStart)?, wrong);
-                continue;
+            if wrong == self.panels {
+                return Ok(self.without_strangers(settled, loss, settle));
             }
-            // Where as many are strange as not, nothing tells which; where panels are displaced, the board is bent or
-            // the lens another one, views are strange by that.
-            let most_belong = 2 * (self.frames.len() + 1) < self.problem.frames.len();
-            let can_tell = most_belong && self.panels.is_empty() && has_no_pattern(&settled);
-            let stranger = if can_tell { stranger(&settled, loss) } else { None };
-            let Some((index, deviations)) = stranger else { return Ok((self, settled)) };
-            let frame = self.belonging().nth(index);
-            self.frames.extend(frame.map(|frame| (frame, WrongFrame::Stranger { deviations })));
+            let walked = walked_without(self.problem, &wrong).ok_or(CalibrationError::NoStart)?;
+            self = Self::without(walked, wrong);
         }
+    }
+
+    /// Without the few frames that speak for other cameras than the others do, if these then agree.
+    fn without_strangers(
+        mut self,
+        settled: Settled,
+        loss: Loss,
+        settle: impl Fn(&Self) -> Result<Settled, CalibrationError>,
+    ) -> (Self, Settled) {
+        let most = self.belonging().count().div_ceil(FEW);
+        let before = self.frames.clone();
+        let mut without = None;
+        for _ in 0..=most {
+            // Views are strange by panels that are displaced, a board that is bent, or another lens, too.
+            let now = without.as_ref().unwrap_or(&settled);
+            let can_tell = self.panels.is_empty() && has_no_pattern(now);
+            let Some(opinions) = can_tell.then(|| Opinions::of(now, loss)).flatten() else { break };
+            match opinions.stranger.and_then(|(index, by)| Some((self.belonging().nth(index)?, by)))
+            {
+                None if opinions.agree => return (self, without.unwrap_or(settled)),
+                None => break,
+                Some((frame, deviations)) => {
+                    self.frames.insert(frame, WrongFrame::Stranger { deviations });
+                    match settle(&self) {
+                        Ok(settled) => without = Some(settled),
+                        Err(_) => break,
+                    }
+                }
+            }
+        }
+        self.frames = before;
+        (self, settled)
     }
 
     /// The frames that belong.

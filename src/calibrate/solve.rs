@@ -262,8 +262,7 @@ impl Search<'_> {
                 Some(WrongFrame::Mirrored) => MIRRORED.to_owned(),
                 Some(WrongFrame::Stranger { deviations }) => format!(
                     "it speaks for another camera than the other views do, and would move theirs by \
-                     {deviations:.1} deviations: another zoom, focus or crop, a board that was bent, or a lens \
-                     that is not the model's"
+                     {deviations:.1} deviations: another zoom, focus or crop, or a board that was bent"
                 ),
                 Some(WrongFrame::OnlyWrongPanels) => ONLY_WRONG_PANELS.to_owned(),
                 None => "no pose explains its corners: wrong labels, another target, or corners \

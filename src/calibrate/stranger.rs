@@ -8,8 +8,8 @@
 //! ```
 //!
 //! is χ² of as many degrees of freedom as the view tells of the camera: whether the camera of this view
-//! and that of all others are the same (Chow 1960). What a model leaves makes it larger in all views, so
-//! that the median of all views is the unit in which one stands out.
+//! and that of all others are the same (Chow 1960). A stranger makes it larger in all views until it has gone; what a
+//! model leaves does so in any case, and then no view is to blame.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -28,6 +28,9 @@ const LEAST_VIEWS: usize = 4;
 /// best one is open, and of which a view tells less than this part is left to the others.
 const OPEN: f64 = 1e-9;
 const LEAST_PART: f64 = 1e-3;
+
+/// Views that mostly agree have a median of T, by its degrees of freedom, below this: 0.9 is usual.
+const AGREEING: f64 = 1.5;
 
 /// A view is a stranger from so many deviations on, as scattered as the views are: of a million hardly one by chance.
 const SIGNIFICANT: f64 = 5.0;
@@ -48,24 +51,38 @@ struct Pull {
     moves: f64,
 }
 
-/// The frame that speaks most for another camera than all others, if one does; and by how many deviations it
-/// moves the camera.
-pub(super) fn stranger(settled: &Settled, loss: Loss) -> Option<(usize, f64)> {
-    let pulls = pulls(settled, loss)?;
-    let told: Vec<Pull> = pulls.iter().flatten().copied().filter(|p| p.freedom > 0.0).collect();
-    if told.len() < LEAST_VIEWS {
-        return None;
+/// What frames say of the cameras.
+pub(super) struct Opinions {
+    /// Whether most say the same.
+    pub agree: bool,
+    /// The frame that speaks most for other cameras than all others, if one does; and by how many deviations it
+    /// moves them.
+    pub stranger: Option<(usize, f64)>,
+}
+
+impl Opinions {
+    /// `None` where cameras are known, or frames are few.
+    pub fn of(settled: &Settled, loss: Loss) -> Option<Self> {
+        let pulls = pulls(settled, loss)?;
+        let told = pulls.iter().flatten().filter(|pull| pull.freedom > 0.0);
+        let told: Vec<Pull> = told.copied().collect();
+        if told.len() < LEAST_VIEWS {
+            return None;
+        }
+        let usual = median(told.iter().map(|pull| pull.strange).collect());
+        let all: f64 = told.iter().map(|pull| pull.freedom).sum();
+        let deviations = |pull: &Pull| {
+            let others = EFFICIENCY * (all - pull.freedom);
+            deviate_of_f(pull.strange / usual.max(1.0), pull.freedom, others)
+        };
+        let of_frames =
+            pulls.iter().enumerate().filter_map(|(frame, pull)| Some((frame, (*pull)?)));
+        let strange =
+            of_frames.filter(|(_, pull)| pull.moves > HARMFUL && deviations(pull) > SIGNIFICANT);
+        let most = strange.max_by(|a, b| deviations(&a.1).total_cmp(&deviations(&b.1)));
+        let stranger = most.map(|(frame, pull)| (frame, pull.moves));
+        Some(Self { agree: usual <= AGREEING, stranger })
     }
-    let usual = median(told.iter().map(|pull| pull.strange).collect()).max(1.0);
-    let all: f64 = told.iter().map(|pull| pull.freedom).sum();
-    let deviations = |pull: &Pull| {
-        deviate_of_f(pull.strange / usual, pull.freedom, EFFICIENCY * (all - pull.freedom))
-    };
-    let of_frames = pulls.iter().enumerate().filter_map(|(frame, pull)| Some((frame, (*pull)?)));
-    let strange =
-        of_frames.filter(|(_, pull)| pull.moves > HARMFUL && deviations(pull) > SIGNIFICANT);
-    let most = strange.max_by(|a, b| deviations(&a.1).total_cmp(&deviations(&b.1)));
-    most.map(|(frame, pull)| (frame, pull.moves))
 }
 
 /// What each frame says; `None` where one says nothing by itself.

@@ -86,8 +86,15 @@ struct Found {
     is_there: bool,
 }
 
-/// An image that was looked at: its place among all, its file, and the stem of its results.
-type Seen = (usize, PathBuf, String, Option<InkEstimate>);
+/// An image that was looked at.
+struct Seen {
+    /// Its place among all.
+    index: usize,
+    image: PathBuf,
+    /// Of its results.
+    stem: String,
+    ink: Option<InkEstimate>,
+}
 
 /// Detects in all images; an image that cannot be read is reported, and the rest go on.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -125,12 +132,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         let result = image.and_then(|image| {
             let stem = images::stem(&image)?;
-            let outcome = one_image(&args, target.as_ref(), &detector, &image, &stem)?;
-            if let Outcome::Seen(found) = &outcome {
-                let ink = found.ink;
-                seen.lock().expect("no thread panics here").push((index, image, stem, ink));
+            args.check_results(&stem)?;
+            if args.skip_existing && args.results(&stem).iter().all(|(path, _)| path.exists()) {
+                return Ok(Outcome::Skipped);
             }
-            Ok(outcome)
+            let found = one_image(&args, target.as_ref(), &detector, &image, &stem)?;
+            let looked_at = Seen { index, image, stem, ink: found.ink };
+            seen.lock().expect("no thread panics here").push(looked_at);
+            Ok(Outcome::Seen(found))
         });
         bar.inc(1);
         bar.suspend(|| report.add(index, result));
@@ -138,32 +147,43 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     let mut seen = seen.into_inner().expect("no thread panics here");
     // In the order of the images, whichever was done first.
-    seen.sort_unstable_by_key(|(index, ..)| *index);
-    let found: Vec<InkEstimate> = seen.iter().filter_map(|(.., ink)| *ink).collect();
-    let ink = (!args.stream && args.finder.ink_is_open()).then(|| InkEstimate::of_all(&found));
-    if let Some(ink) = ink.flatten().filter(|ink| ink.used && !interrupt::is_raised()) {
-        // One print has one ink: pictures that say little of it are seen with what all say.
-        if seen.len() > 1 {
-            let detector = detector.with_ink(ink);
-            let bar = progress::bar(seen.len() as u64, "images, with the ink of all");
-            let images = seen.iter().map(|(_, image, ..)| Ok(image.clone()));
-            in_flight::for_each(&threads, &limits, images, |index, _| {
-                if interrupt::is_raised() {
-                    return;
-                }
-                let (_, image, stem, _) = &seen[index];
-                let again = one_image(&args, target.as_ref(), &detector, image, stem);
-                again.err().iter().for_each(|error| bar.suspend(|| run::report(error)));
-                bar.inc(1);
-            });
-            bar.finish_and_clear();
-        }
-        tell!("ink: {ink} ({})", counted(ink.pictures as usize, "picture"));
+    seen.sort_unstable_by_key(|seen| seen.index);
+    if !args.stream && args.finder.ink_is_open() && !interrupt::is_raised() {
+        see_again(&args, target.as_ref(), detector, &seen, &threads);
     }
     if interrupt::is_raised() {
         return Err(Interrupted(report.standing()).into());
     }
     report.end()
+}
+
+/// Looks once more at all images, with what they say together of the ink: pictures that say little of it are seen
+/// with what all say.
+fn see_again(
+    args: &Args,
+    target: Option<&Target>,
+    detector: Detector,
+    seen: &[Seen],
+    threads: &rayon::ThreadPool,
+) {
+    let found: Vec<InkEstimate> = seen.iter().filter_map(|seen| seen.ink).collect();
+    let Some(ink) = InkEstimate::of_all(&found).filter(|ink| ink.used) else { return };
+    if seen.len() > 1 {
+        let detector = detector.with_ink(ink);
+        let bar = progress::bar(seen.len() as u64, "images, with the ink of all");
+        let images = seen.iter().map(|seen| Ok(seen.image.clone()));
+        in_flight::for_each(threads, &args.finder.limits(), images, |index, _| {
+            if interrupt::is_raised() {
+                return;
+            }
+            let Seen { image, stem, .. } = &seen[index];
+            let again = one_image(args, target, &detector, image, stem);
+            again.err().iter().for_each(|error| bar.suspend(|| run::report(error)));
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+    }
+    tell!("ink: {ink} ({})", counted(ink.pictures as usize, "picture"));
 }
 
 /// Prints what came of the images, in their order, as soon as it is known.
@@ -313,11 +333,7 @@ fn one_image(
     detector: &Detector,
     path: &Path,
     stem: &str,
-) -> anyhow::Result<Outcome> {
-    args.check_results(stem)?;
-    if args.skip_existing && args.results(stem).iter().all(|(path, _)| path.exists()) {
-        return Ok(Outcome::Skipped);
-    }
+) -> anyhow::Result<Found> {
     let limits = args.finder.limits();
     let Photograph { image, notes } = raster::photograph(path, &limits, args.accept_damaged)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -342,7 +358,7 @@ fn one_image(
         Some(_) => found.grids.iter().any(|grid| grid.panel.is_some()),
         None => !found.grids.is_empty(),
     };
-    Ok(Outcome::Seen(Found { line, ink: found.ink, is_there }))
+    Ok(Found { line, ink: found.ink, is_there })
 }
 
 /// What was found in an image, in a line, and why there is no more.
