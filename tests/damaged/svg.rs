@@ -255,8 +255,9 @@ pub fn board() -> Vec<Case> {
 /// Draws another path for a plain tile.
 fn on_tile(edit: impl Fn(&str) -> String + 'static) -> Damage {
     text(move |text| {
-        let tile = text.lines().find(|line| line.contains("tile-0-r1-c1\"")).unwrap();
-        let path = tile.split('"').nth(1).unwrap();
+        let tiles = text.lines().filter(|line| line.contains("id=\"tile-"));
+        let mut paths = tiles.map(|tile| tile.split('"').nth(1).unwrap());
+        let path = paths.find(|path| path.matches('M').count() == 1).unwrap();
         text.replacen(path, &edit(path), 1)
     })
 }
