@@ -14,6 +14,7 @@ pub type Powers = (i32, i32);
 
 /// Numbers that the widest processors work on at once; rows of kernels are padded to so many.
 const LANES: usize = 16;
+const HALF: usize = LANES / 2;
 
 /// Kernels of the first N coefficients of a polynomial.
 #[derive(Clone, Debug)]
@@ -92,33 +93,56 @@ fn products<const N: usize, T: Intensity>(
 ) -> [f32; N] {
     // Taking the centre's level away first keeps single precision exact enough at 16 bits.
     let level = image.at(left + side / 2, top + side / 2).to_f32();
-    let groups = side.div_ceil(LANES);
     let mut sums = [[0.0f32; LANES]; N];
-    for group in 0..groups {
-        let column = left + group * LANES;
-        let mut upper = blended(image.row(top), column, fx, level);
-        for (i, kernels) in kernels.iter().skip(group).step_by(groups).enumerate() {
-            let lower = blended(image.row(top + i + 1), column, fx, level);
-            let mut samples = [0.0; LANES];
-            for j in 0..LANES {
-                samples[j] = upper[j] + fy * (lower[j] - upper[j]);
-            }
-            for k in 0..N {
-                for j in 0..LANES {
-                    sums[k][j] += kernels[k][j] * samples[j];
-                }
-            }
-            upper = lower;
+    for half in 0..2 {
+        let first = half * HALF;
+        let part = half_sums(kernels, (side, first), image, ([left + first, top], [fx, fy], level));
+        for k in 0..N {
+            sums[k][first..first + HALF].copy_from_slice(&part[k]);
         }
     }
     sums.map(|sums| sums.iter().sum())
 }
 
+/// The sums of half of the lanes, from one on: so many stay in registers.
+#[inline(always)]
+fn half_sums<const N: usize, T: Intensity>(
+    kernels: &[[[f32; LANES]; N]],
+    (side, first): (usize, usize),
+    image: &Gray<T>,
+    ([left, top], [fx, fy], level): ([usize; 2], [f32; 2], f32),
+) -> [[f32; HALF]; N] {
+    let groups = side.div_ceil(LANES);
+    let mut sums = [[0.0f32; HALF]; N];
+    for group in 0..groups {
+        if group * LANES + first >= side {
+            // No weights.
+            break;
+        }
+        let column = left + group * LANES;
+        let mut upper = blended(image.row(top), column, fx, level);
+        for (i, kernels) in kernels.iter().skip(group).step_by(groups).enumerate() {
+            let lower = blended(image.row(top + i + 1), column, fx, level);
+            let mut samples = [0.0; HALF];
+            for j in 0..HALF {
+                samples[j] = upper[j] + fy * (lower[j] - upper[j]);
+            }
+            for k in 0..N {
+                for j in 0..HALF {
+                    sums[k][j] += kernels[k][first + j] * samples[j];
+                }
+            }
+            upper = lower;
+        }
+    }
+    sums
+}
+
 /// Samples of a row between its pixels, from a column on, minus a level; behind the end of the row,
 /// where kernels have no weight, some number.
 #[inline(always)]
-fn blended<T: Intensity>(row: &[T], column: usize, fx: f32, level: f32) -> [f32; LANES] {
-    let mut padded = [T::default(); LANES + 1];
+fn blended<T: Intensity>(row: &[T], column: usize, fx: f32, level: f32) -> [f32; HALF] {
+    let mut padded = [T::default(); HALF + 1];
     let rest = &row[column..];
     let pixels = match rest.first_chunk() {
         Some(pixels) => pixels,
@@ -128,8 +152,8 @@ fn blended<T: Intensity>(row: &[T], column: usize, fx: f32, level: f32) -> [f32;
         }
     };
     // Plain loops: a closure handed to the standard library would not be compiled for the target.
-    let mut samples = [0.0; LANES];
-    for i in 0..LANES {
+    let mut samples = [0.0; HALF];
+    for i in 0..HALF {
         let (a, b) = (pixels[i].to_f32() - level, pixels[i + 1].to_f32() - level);
         samples[i] = a + fx * (b - a);
     }

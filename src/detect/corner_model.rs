@@ -28,7 +28,7 @@
 //! where the noise is white and the window shows nothing but the corner; JPEG's noise is not white.
 
 use multiversion::multiversion;
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use super::blurred_corner::{
     Deltille, FEW_NODES_RHO, Haloed, Inked, Orthant, Overlap, Pattern, Shade, SweptChecker,
@@ -306,15 +306,18 @@ pub(super) enum Common {
     Ink,
 }
 
+/// Parameters that are the corner's, and those of the optics behind them.
+pub(super) const OWN: usize = PARAMS;
+pub(super) const COMMON: usize = TONE_PARAMS + 4;
+const UNKNOWNS: usize = OWN + COMMON;
+
 /// The normal equations of a corner and the optics.
 #[derive(Clone, Debug)]
 pub(super) struct Joint {
-    /// How many of the parameters are the corner's.
-    pub own: usize,
-    /// JᵀJ with the prior on the slopes.
-    pub matrix: DMatrix<f64>,
+    /// JᵀJ with the prior on the slopes, and ones for parameters of the corner that are not there.
+    pub matrix: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     /// Jᵀr alike.
-    pub gradient: DVector<f64>,
+    pub gradient: SVector<f64, UNKNOWNS>,
     /// rᵀr.
     pub cost: f64,
     /// Standard deviation of the residuals.
@@ -689,9 +692,10 @@ impl CornerFitter {
         let piece = toned(optics);
         self.fill::<K, true>(window, &corner, (optics, piece));
         let columns = &mut *self.columns;
-        let mut rows: Vec<usize> = (0..params).collect();
-        for common in common {
-            rows.push(match common {
+        let mut rows = [None; UNKNOWNS];
+        (0..params).for_each(|i| rows[i] = Some(i));
+        for (row, common) in rows[OWN..].iter_mut().zip(common) {
+            *row = Some(match common {
                 Common::Tone { parameter, moved } => {
                     let there = toned(moved).terms;
                     let slopes = std::array::from_fn(|j| (there[j] - piece.terms[j]) / STEP as f32);
@@ -710,9 +714,18 @@ impl CornerFitter {
         }
         let products = products::<ALL>(columns, window.count);
         let product = |i: usize, j: usize| products[i.min(j)][i.max(j)];
-        let n = rows.len();
-        let mut matrix = DMatrix::from_fn(n, n, |i, j| product(rows[i], rows[j]));
-        let mut gradient = DVector::from_fn(n, |i, _| product(rows[i], PARAMS));
+        let (mut matrix, mut gradient) = (SMatrix::zeros(), SVector::zeros());
+        for (i, row) in rows.into_iter().enumerate() {
+            let Some(row) = row else {
+                matrix[(i, i)] = 1.0;
+                continue;
+            };
+            gradient[i] = product(row, PARAMS);
+            for (j, column) in rows.into_iter().enumerate().take(i + 1) {
+                let value = column.map_or(0.0, |column| product(row, column));
+                (matrix[(i, j)], matrix[(j, i)]) = (value, value);
+            }
+        }
         let cost = product(PARAMS, PARAMS);
         let noise = (cost / (window.count - params) as f64).sqrt();
         let noise = noise.max(MIN_NOISE * corner.amplitude.abs());
@@ -721,7 +734,7 @@ impl CornerFitter {
             matrix[(SLOPE + i, SLOPE + i)] += weight;
             gradient[SLOPE + i] -= weight * slope;
         }
-        Some(Joint { own: params, matrix, gradient, cost, noise })
+        Some(Joint { matrix, gradient, cost, noise })
     }
 
     /// What the pixels of a fitted corner do to its position, and what is left of them; the corner as for
@@ -846,10 +859,8 @@ impl<const K: usize> Corner<K> {
     }
 
     /// The corner after a step of its own parameters in the joint equations.
-    pub(super) fn stepped(&self, step: &[f64]) -> Option<Self> {
-        let mut whole = SVector::<f64, PARAMS>::zeros();
-        whole.iter_mut().zip(step).for_each(|(to, from)| *to = *from);
-        let mut moved = Self { position: [0.0; 2], ..*self }.moved(&whole, MAX_RADIUS)?;
+    pub(super) fn stepped(&self, step: &SVector<f64, OWN>) -> Option<Self> {
+        let mut moved = Self { position: [0.0; 2], ..*self }.moved(step, MAX_RADIUS)?;
         moved.position = [0, 1].map(|i| moved.position[i] + self.position[i]);
         Some(moved)
     }
@@ -1147,46 +1158,60 @@ fn products<const N: usize>(columns: &mut Columns, count: usize) -> [[f64; N]; N
     products
 }
 
-/// Products of two columns with four others: eight sums that do not wait for each other. They are named one by
-/// one so that each is a vector.
+/// Products of two columns with four others: eight sums that do not wait for each other.
 #[inline(always)]
 fn products_of_blocks(
     two: &[[f32; MAX_PIXELS]],
     four: &[[f32; MAX_PIXELS]],
     count: usize,
 ) -> [[f64; 4]; 2] {
+    let first = half_products(two, four, count, 0);
+    let second = half_products(two, four, count, LANES / 2);
+    let mut products = [[0.0; 4]; 2];
+    for (row, sums) in products.iter_mut().enumerate() {
+        let mut fours = [[0.0; LANES / 4]; 4];
+        for (column, four) in fours.iter_mut().enumerate() {
+            let (a, b) = (&first[4 * row + column], &second[4 * row + column]);
+            for k in 0..LANES / 4 {
+                four[k] = (a[k] + b[k]) + (a[k + LANES / 4] + b[k + LANES / 4]);
+            }
+        }
+        for (sum, [a, b, c, d]) in sums.iter_mut().zip(fours) {
+            *sum = f64::from(((a + b) + c) + d);
+        }
+    }
+    products
+}
+
+/// The sums of half of the lanes, from one on: so many stay in registers. They are named one by one so that each
+/// is a vector.
+#[inline(always)]
+fn half_products(
+    two: &[[f32; MAX_PIXELS]],
+    four: &[[f32; MAX_PIXELS]],
+    count: usize,
+    first: usize,
+) -> [[f32; LANES / 2]; 8] {
     let (a, _) = two[0][..count].as_chunks::<LANES>();
     let (b, _) = two[1][..count].as_chunks::<LANES>();
     let (c, _) = four[0][..count].as_chunks::<LANES>();
     let (d, _) = four[1][..count].as_chunks::<LANES>();
     let (e, _) = four[2][..count].as_chunks::<LANES>();
     let (f, _) = four[3][..count].as_chunks::<LANES>();
-    let [mut ac, mut ad, mut ae, mut af] = [[0.0; LANES]; 4];
-    let [mut bc, mut bd, mut be, mut bf] = [[0.0; LANES]; 4];
+    let [mut ac, mut ad, mut ae, mut af] = [[0.0; LANES / 2]; 4];
+    let [mut bc, mut bd, mut be, mut bf] = [[0.0; LANES / 2]; 4];
     for (((((a, b), c), d), e), f) in a.iter().zip(b).zip(c).zip(d).zip(e).zip(f) {
-        for k in 0..LANES {
-            ac[k] += a[k] * c[k];
-            ad[k] += a[k] * d[k];
-            ae[k] += a[k] * e[k];
-            af[k] += a[k] * f[k];
-            bc[k] += b[k] * c[k];
-            bd[k] += b[k] * d[k];
-            be[k] += b[k] * e[k];
-            bf[k] += b[k] * f[k];
+        for k in 0..LANES / 2 {
+            let i = first + k;
+            ac[k] += a[i] * c[i];
+            ad[k] += a[i] * d[i];
+            ae[k] += a[i] * e[i];
+            af[k] += a[i] * f[i];
+            bc[k] += b[i] * c[i];
+            bd[k] += b[i] * d[i];
+            be[k] += b[i] * e[i];
+            bf[k] += b[i] * f[i];
         }
     }
-    [[sum(&ac), sum(&ad), sum(&ae), sum(&af)], [sum(&bc), sum(&bd), sum(&be), sum(&bf)]]
-}
-
-/// The sum of a vector, in pairs.
-#[inline(always)]
-fn sum(lanes: &[f32; LANES]) -> f64 {
-    let (mut eight, mut four) = ([0.0; LANES / 2], [0.0; LANES / 4]);
-    for k in 0..LANES / 2 {
-        eight[k] = lanes[k] + lanes[k + LANES / 2];
-    }
-    for k in 0..LANES / 4 {
-        four[k] = eight[k] + eight[k + LANES / 4];
-    }
-    f64::from(four.iter().sum::<f32>())
+    [ac, ad, ae, af, bc, bd, be, bf]
 }

@@ -34,6 +34,9 @@ pub struct Influence {
     pub noise: f64,
 }
 
+/// Numbers that the widest processors work on at once.
+const LANES: usize = 16;
+
 /// Largest lags, px: of sensors and JPEG, and of enlarged pictures, whose grain is wider.
 const LAGS_PX: [i32; 2] = [2, 6];
 
@@ -83,7 +86,7 @@ impl Influence {
 
     /// Sum of the squares of the influence.
     fn strength(&self) -> f64 {
-        self.on_position.iter().map(|c| dot(c, c)).sum()
+        self.on_position.iter().flatten().map(|c| f64::from(c * c)).sum()
     }
 }
 
@@ -151,23 +154,20 @@ fn lagged(corners: &[Influence], reach: i32) -> (f64, f64) {
     let (mut square, mut count, mut white) = (0.0, 0.0, 0.0);
     for corner in corners {
         let field = Field::of(corner, reach);
-        let spread = |values: &[f32]| field.spread(values);
-        let mask = spread(&vec![1.0; corner.residuals.len()]);
-        let residual = spread(&corner.residuals);
-        let on_position = [0, 1].map(|i| spread(&corner.on_position[i]));
-        let hat: Vec<Vec<f32>> = corner.hat.iter().map(|q| spread(q)).collect();
+        let mask = field.spread([vec![1.0; corner.residuals.len()].as_slice()]);
+        let residual = field.spread([corner.residuals.as_slice()]);
+        let on_position = field.spread(corner.on_position.iter().map(Vec::as_slice));
+        let hat = field.spread(corner.hat.iter().map(Vec::as_slice));
         let variance = corner.noise.powi(2);
-        let all = hat.iter().map(|q| dot(q, q)).sum::<f64>();
-        square += dot(&residual, &residual) / variance + all;
-        count += dot(&mask, &mask);
-        white += on_position.iter().map(|c| dot(c, c)).sum::<f64>();
+        square += field.product(&residual, 0) / variance + field.product(&hat, 0);
+        count += field.product(&mask, 0);
+        white += field.product(&on_position, 0);
         for (k, lag) in lags.iter().enumerate() {
             let offset = field.offset(*lag);
-            let product = |a: &[f32]| dot(&a[..a.len() - offset], &a[offset..]);
-            let taken = hat.iter().map(|q| product(q)).sum::<f64>();
-            pairs[k] += product(&mask);
-            products[k] += product(&residual) / variance + taken;
-            influences[k] += on_position.iter().map(|c| product(c)).sum::<f64>();
+            pairs[k] += field.product(&mask, offset);
+            products[k] +=
+                field.product(&residual, offset) / variance + field.product(&hat, offset);
+            influences[k] += field.product(&on_position, offset);
         }
     }
     let scale = square / count;
@@ -184,7 +184,9 @@ fn lagged(corners: &[Influence], reach: i32) -> (f64, f64) {
 struct Field {
     first: [i32; 2],
     width: usize,
-    height: usize,
+    /// Pixels, in whole vectors, and with zeros behind them for the largest lag.
+    pixels: usize,
+    room: usize,
     places: Vec<usize>,
 }
 
@@ -196,8 +198,10 @@ impl Field {
         };
         let ((left, right), (top, bottom)) = (ends(0), ends(1));
         let width = (right - left + 1 + reach) as usize;
-        let height = (bottom - top + 1 + reach) as usize;
-        let mut field = Self { first: [left, top], width, height, places: Vec::new() };
+        let height = (bottom - top + 1) as usize;
+        let pixels = (width * height).next_multiple_of(LANES);
+        let mut field = Self { first: [left, top], width, pixels, room: 0, places: Vec::new() };
+        field.room = pixels + field.offset([reach, reach]);
         field.places = corner.places.iter().map(|&place| field.index(place)).collect();
         field
     }
@@ -210,24 +214,37 @@ impl Field {
         (v * self.width as i32 + u) as usize
     }
 
-    fn spread(&self, values: &[f32]) -> Vec<f32> {
-        let mut field = vec![0.0; self.width * self.height];
-        self.places.iter().zip(values).for_each(|(&place, &value)| field[place] = value);
-        field
+    /// Values of the corner's pixels, one rectangle behind the other.
+    fn spread<'a>(&self, all: impl IntoIterator<Item = &'a [f32]>) -> Vec<f32> {
+        let mut fields = Vec::new();
+        for values in all {
+            let first = fields.len();
+            fields.resize(first + self.room, 0.0);
+            let field = &mut fields[first..];
+            self.places.iter().zip(values).for_each(|(&place, &value)| field[place] = value);
+        }
+        fields
+    }
+
+    /// Sum over such rectangles of the products of all values with those `offset` further.
+    fn product(&self, fields: &[f32], offset: usize) -> f64 {
+        lagged_product(fields, [self.pixels, self.room], offset)
     }
 }
 
 #[multiversion(targets = "simd")]
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    const LANES: usize = 16;
+fn lagged_product(fields: &[f32], [pixels, room]: [usize; 2], offset: usize) -> f64 {
     let mut sums = [0.0f32; LANES];
-    let (a, a_rest) = a.as_chunks::<LANES>();
-    let (b, b_rest) = b.as_chunks::<LANES>();
-    for (a, b) in a.iter().zip(b) {
-        for k in 0..LANES {
-            sums[k] += a[k] * b[k];
+    let mut first = 0;
+    while first < fields.len() {
+        let (here, _) = fields[first..first + pixels].as_chunks::<LANES>();
+        let (there, _) = fields[first + offset..first + offset + pixels].as_chunks::<LANES>();
+        for (here, there) in here.iter().zip(there) {
+            for k in 0..LANES {
+                sums[k] += here[k] * there[k];
+            }
         }
+        first += room;
     }
-    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    f64::from(sums.iter().sum::<f32>() + rest)
+    f64::from(sums.iter().sum::<f32>())
 }

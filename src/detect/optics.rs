@@ -7,10 +7,10 @@
 //! chance explains is told by the scatter of the corners' gradients, so that pixels which depend on each
 //! other, or a model that holds only nearly, make no evidence.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::blurred_corner::PLACES_OF_FOUR;
-use super::corner_model::{Common, Corner, CornerFitter, Joint, Window};
+use super::corner_model::{COMMON, Common, Corner, CornerFitter, Joint, OWN, Window};
 use super::correlation::{self, Influence};
 use super::curve::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
 use super::detection::median;
@@ -40,7 +40,7 @@ const LEAST_CORE: f64 = 0.3;
 const PRIOR: [f64; PARAMS] = [2.0, 1.0, 1.0, 0.3, 0.3, 0.5, 2.0];
 
 /// The parameters: the curve's, the astigmatism's, the halo's, and the ink.
-const PARAMS: usize = TONE_PARAMS + 4;
+const PARAMS: usize = COMMON;
 const GROUPS: [&[usize]; 4] = [&[0, 1, 2], &[3, 4], &[HALO], &[INK]];
 const HALO: usize = PARAMS - 2;
 const INK: usize = PARAMS - 1;
@@ -69,8 +69,10 @@ const MAX_STEP: f64 = 2.0;
 /// Most iterations; four are usual.
 const MAX_ITERATIONS: usize = 10;
 
-/// Steps below this part of the parameters' deviations end the iteration.
+/// Steps below this part of the parameters' deviations end the iteration; those that are only to tell which groups
+/// there are end it earlier.
 const CONVERGED: f64 = 0.5;
+const ROUGHLY_CONVERGED: f64 = 1.0;
 
 /// Weights of corners end where their residuals are this many times the median: they show something else.
 const MAX_RESIDUAL_RATIO: f64 = 3.0;
@@ -535,8 +537,8 @@ struct Reduced {
     gradient: DVector<f64>,
     /// Scatter of the corners' gradients.
     scatter: DMatrix<f64>,
-    /// A⁻¹a and A⁻¹B of each corner.
-    own: Vec<Option<(DVector<f64>, DMatrix<f64>)>>,
+    /// A⁻¹a and A⁻¹B of each corner; columns of B beyond the parameters are zero.
+    own: Vec<Option<(SVector<f64, OWN>, SMatrix<f64, OWN, PARAMS>)>>,
 }
 
 impl Reduced {
@@ -547,7 +549,7 @@ impl Reduced {
         let mut sum = DMatrix::zeros(2, 2);
         let mut count = 0;
         for (_, slope) in counting.filter_map(|(own, _)| own.as_ref()) {
-            let position = slope.rows(0, 2);
+            let position = slope.view((0, 0), (2, cov.nrows()));
             sum += position * cov * position.transpose();
             count += 1;
         }
@@ -594,12 +596,13 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
         })
     }
 
-    /// The optics that fit the corners best, from those of which these are the equations, and the covariance of the
-    /// active parameters.
+    /// The optics that fit the corners best up to a part of their deviations, from those of which these are the
+    /// equations, and the covariance of the active parameters.
     fn adjusted(
         &mut self,
         first: &Optics,
         mut equations: Vec<Option<Joint>>,
+        converged: f64,
     ) -> (Optics, DMatrix<f64>) {
         let mut optics = first.clone();
         let mut damping = 0.0;
@@ -613,15 +616,18 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
             let mut vector = optics.vector();
             self.active.iter().zip(step.iter()).for_each(|(&p, s)| vector[p] += s);
             let there = optics.with(&vector);
-            let before = self.members.clone();
+            let before: Vec<Corner<K>> = self.members.iter().map(|member| member.corner).collect();
+            let mut common = SVector::<f64, PARAMS>::zeros();
+            common.iter_mut().zip(step.iter()).for_each(|(to, from)| *to = *from);
             for (member, own) in self.members.iter_mut().zip(&reduced.own) {
                 let Some((constant, slope)) = own else {
                     continue;
                 };
-                let own = constant - slope * &step;
-                member.corner = member.corner.stepped(own.as_slice()).unwrap_or(member.corner);
+                let own = constant - slope * common;
+                member.corner = member.corner.stepped(&own).unwrap_or(member.corner);
             }
-            if step.dot(&(&reduced.matrix * &step)) < CONVERGED * CONVERGED {
+            let length = step.dot(&(&reduced.matrix * &step)).max(0.0).sqrt();
+            if length < converged {
                 optics = there;
                 break;
             }
@@ -633,7 +639,11 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
                 reduced = self.reduced(&equations, &weights, &optics);
                 damping *= 0.1;
             } else {
-                self.members = before;
+                self.put_back(&before);
+                if length < ROUGHLY_CONVERGED {
+                    // What it would gain is no more than sums of single precision tell.
+                    break;
+                }
                 damping = (damping * 10.0).max(0.01);
             }
         }
@@ -645,14 +655,14 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
     /// The optics that fit the corners best, from those of which these are the equations, without the groups that
     /// then differ from nothing by no more than chance, and the covariance of the active parameters.
     fn settled(&mut self, start: &Optics, equations: Vec<Option<Joint>>) -> (Optics, DMatrix<f64>) {
-        let (mut optics, mut cov) = self.adjusted(start, equations);
+        let (mut optics, cov) = self.adjusted(start, equations, ROUGHLY_CONVERGED);
         let supported = self.estimate(&optics, optics.vector(), &cov).supported(1.0);
         if supported.active.len() < self.active.len() {
             optics = start.with(&supported.vector);
             self.active = supported.active;
-            let equations = self.equations(&optics);
-            (optics, cov) = self.adjusted(&optics, equations);
         }
+        let equations = self.equations(&optics);
+        let (mut optics, mut cov) = self.adjusted(&optics, equations, CONVERGED);
         if optics.stretch() > LEAST_MOTION
             && !optics.is_motion
             && let Some(moved) = self.moved(&optics)
@@ -665,18 +675,23 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
     /// The optics and the covariance of their active parameters if the picture moved along a line, where that
     /// fits the corners better than a Gaussian does.
     fn moved(&mut self, still: &Optics) -> Option<(Optics, DMatrix<f64>)> {
-        let before = self.members.clone();
+        let before: Vec<Corner<K>> = self.members.iter().map(|member| member.corner).collect();
         let equations = self.equations(still);
         let weights = weights_of(&equations);
         let cost_before = cost(&equations, &weights, still);
         let moved = Optics { is_motion: true, ..still.clone() };
         let equations = self.equations(&moved);
-        let (moved, cov) = self.adjusted(&moved, equations);
+        let (moved, cov) = self.adjusted(&moved, equations, CONVERGED);
         if cost(&self.equations(&moved), &weights, &moved) < cost_before {
             return Some((moved, cov));
         }
-        self.members = before;
+        self.put_back(&before);
         None
+    }
+
+    /// Gives the members these corners again.
+    fn put_back(&mut self, corners: &[Corner<K>]) {
+        self.members.iter_mut().zip(corners).for_each(|(member, corner)| member.corner = *corner);
     }
 
     /// The next step of the active parameters: none further than [`MAX_STEP`], and the halo not beyond its end.
@@ -736,10 +751,15 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
         let places = self.active.iter().filter_map(|p| all.iter().position(|a| a == p));
         let places: Vec<usize> = places.collect();
         let of = |joint: Joint| {
-            let rows: Vec<usize> =
-                (0..joint.own).chain(places.iter().map(|at| joint.own + at)).collect();
-            let matrix = joint.matrix.select_rows(&rows).select_columns(&rows);
-            Joint { matrix, gradient: joint.gradient.select_rows(&rows), ..joint }
+            let (mut matrix, mut gradient) = (SMatrix::identity(), SVector::zeros());
+            let from = |i: usize| if i < OWN { i } else { OWN + places[i - OWN] };
+            for i in 0..OWN + places.len() {
+                gradient[i] = joint.gradient[from(i)];
+                for j in 0..OWN + places.len() {
+                    matrix[(i, j)] = joint.matrix[(from(i), from(j))];
+                }
+            }
+            Joint { matrix, gradient, ..joint }
         };
         equations.into_iter().map(|joint| joint.map(of)).collect()
     }
@@ -747,28 +767,32 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
     fn reduced(&self, equations: &[Option<Joint>], weights: &[f64], optics: &Optics) -> Reduced {
         let count = self.active.len();
         let vector = optics.vector();
-        let mut reduced = Reduced {
-            matrix: DMatrix::zeros(count, count),
-            gradient: DVector::zeros(count),
-            scatter: DMatrix::zeros(count, count),
-            own: Vec::with_capacity(equations.len()),
-        };
+        let mut matrix = SMatrix::<f64, PARAMS, PARAMS>::zeros();
+        let mut scatter = SMatrix::<f64, PARAMS, PARAMS>::zeros();
+        let mut gradient = SVector::<f64, PARAMS>::zeros();
+        let mut own = Vec::with_capacity(equations.len());
         for (joint, weight) in equations.iter().zip(weights) {
-            let eliminated = joint.as_ref().and_then(|joint| {
-                let own = joint.own;
-                let a = joint.matrix.view((0, 0), (own, own)).into_owned().cholesky()?;
-                let b = joint.matrix.view((0, own), (own, count)).into_owned();
-                let constant = a.solve(&joint.gradient.rows(0, own).into_owned());
-                let slope = a.solve(&b);
-                let matrix = joint.matrix.view((own, own), (count, count)) - b.transpose() * &slope;
-                let gradient = joint.gradient.rows(own, count) - b.transpose() * &constant;
-                reduced.matrix += *weight * matrix;
-                reduced.scatter += *weight * weight * &gradient * gradient.transpose();
-                reduced.gradient += *weight * gradient;
+            own.push(joint.as_ref().and_then(|joint| {
+                let factor = joint.matrix.fixed_view::<OWN, OWN>(0, 0).into_owned().cholesky()?;
+                let shared = joint.matrix.fixed_view::<OWN, PARAMS>(0, OWN).into_owned();
+                let constant = factor.solve(&joint.gradient.fixed_rows::<OWN>(0).into_owned());
+                let slope = factor.solve(&shared);
+                let pull = joint.gradient.fixed_rows::<PARAMS>(OWN) - shared.tr_mul(&constant);
+                matrix += *weight
+                    * (joint.matrix.fixed_view::<PARAMS, PARAMS>(OWN, OWN) - shared.tr_mul(&slope));
+                scatter += *weight * weight * pull * pull.transpose();
+                gradient += *weight * pull;
                 Some((constant, slope))
-            });
-            reduced.own.push(eliminated);
+            }));
         }
+        let cut =
+            |all: &SMatrix<f64, PARAMS, PARAMS>| DMatrix::from_fn(count, count, |i, j| all[(i, j)]);
+        let mut reduced = Reduced {
+            matrix: cut(&matrix),
+            gradient: DVector::from_fn(count, |i, _| gradient[i]),
+            scatter: cut(&scatter),
+            own,
+        };
         for (i, &p) in self.active.iter().enumerate() {
             let weight = 1.0 / (PRIOR[p] * PRIOR[p]);
             reduced.matrix[(i, i)] += weight;
@@ -966,18 +990,18 @@ mod tests {
             fitter.joint(image, (&window, centre), corner, optics, &common).unwrap()
         };
         let here = joint(corner, optics);
-        for i in 0..here.own + PARAMS {
+        for i in 0..OWN + PARAMS {
             let scale = (here.matrix[(i, i)] * here.cost).sqrt();
             if scale == 0.0 {
                 continue;
             }
             let step = 2e-3 * here.cost / scale;
             let moved = |by: f64| {
-                let mut own = vec![0.0; here.own];
+                let mut own = SVector::zeros();
                 let mut vector = optics.vector();
-                match own.get_mut(i) {
-                    Some(own) => *own = by,
-                    None => vector[i - here.own] += by,
+                match i.checked_sub(OWN) {
+                    Some(i) => vector[i] += by,
+                    None => own[i] = by,
                 }
                 (corner.stepped(&own).unwrap(), optics.with(&vector))
             };
