@@ -357,7 +357,14 @@ impl Detector {
         if others >= LEAST_OTHER_CORNERS {
             return Reason::new(ReasonKind::OtherTiling, [("corners", others as f64)]);
         }
-        why::nothing_found(pyramid, corners)
+        let reason = why::nothing_found(pyramid, corners);
+        if matches!(reason.kind, ReasonKind::NoCorners | ReasonKind::NoGrid)
+            && let Some(edge_px) = edge_of_small_tiles::<N>(&pyramid.levels()[0])
+        {
+            let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+            return Reason::new(ReasonKind::TooSmall, figures);
+        }
+        reason
     }
 
     /// [`Self::detect`] for an image of either depth.
@@ -391,6 +398,45 @@ fn refuse_patterns(pyramid: &Pyramid, grids: &mut Vec<(Grid, Option<Reason>)>) {
             return;
         }
     }
+}
+
+/// The edge of the tiles, px, of a grid that shows in the part of a picture with the most contrast if that is enlarged to
+/// twice its size, and is too small as it is.
+fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
+    const PART: [usize; 2] = [400, 300];
+    const TIMES: f64 = 2.0;
+    let size = [level.width().min(PART[0]), level.height().min(PART[1])];
+    let [left, top] = busiest_part(level, size);
+    let to_one = 1.0 / PYRAMID_FULL_SCALE;
+    let enlarged = Gray::from_fn(2 * size[0], 2 * size[1], |x, y| {
+        let [u, v] = [(left, x), (top, y)].map(|(from, i)| from as f64 + i as f64 / TIMES);
+        level.bilinear(u, v) * to_one
+    });
+    let pyramid = Pyramid::new(&enlarged, 1, MIN_LEVEL_SIDE);
+    let finder = SaddleFinder::<N>::new();
+    let found = grids(&finder, &pyramid, &finder.find(&pyramid));
+    let largest = found.iter().max_by_key(|grid| grid.len())?;
+    let edge_px = why::edge_px(largest)? / TIMES;
+    (largest.len() >= LEAST_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
+}
+
+/// The first pixel of the part of so many columns and rows around the square with the most contrast.
+fn busiest_part(level: &Gray<i16>, size: [usize; 2]) -> [usize; 2] {
+    const SQUARE: usize = 64;
+    let contrast = |[x, y]: [usize; 2]| {
+        let [right, bottom] = [(x + SQUARE).min(level.width()), (y + SQUARE).min(level.height())];
+        let rows = (y..bottom).map(|v| &level.row(v)[x..right]);
+        rows.flat_map(|row| row.windows(2))
+            .map(|two| two[0].abs_diff(two[1]) as usize)
+            .sum::<usize>()
+    };
+    let columns = (0..level.width()).step_by(SQUARE);
+    let squares = columns.flat_map(|x| (0..level.height()).step_by(SQUARE).map(move |y| [x, y]));
+    let [x, y] = squares.max_by_key(|&square| contrast(square)).unwrap_or_default();
+    let around = |at: usize, part: usize, side: usize| {
+        (at + SQUARE / 2).saturating_sub(part / 2).min(side - part)
+    };
+    [around(x, size[0], level.width()), around(y, size[1], level.height())]
 }
 
 /// Corners of the largest grid of a tiling.

@@ -118,6 +118,8 @@ pub struct TagEvidence {
     pub foreign_ids: BTreeSet<u32>,
     /// Tiles whose cells are read without doubt and are no code of the family.
     pub no_codes: usize,
+    /// Tiles whose cells tell less than which code of the family they are.
+    pub unread: usize,
     /// Whether a placement has evidence enough, but another one nearly as much.
     pub is_ambiguous: bool,
     /// Tiles that agree and that disagree with a placement which would have evidence enough but for the latter.
@@ -335,7 +337,9 @@ impl TagLabeller {
         let plain = self.readers[reader].plain_word();
         let mut evidence = Vec::with_capacity(readings.len());
         let mut shown = Vec::with_capacity(readings.len());
+        let needed_bits = (self.family_words.max(1) as f64).log2();
         for reading in &readings {
+            noted.unread += usize::from(reading.bits_told() < needed_bits);
             let word = reading.word();
             let mut of_words = self.words.evidence(&reading.half_odds);
             if let Some(max_errors) = self.max_errors {

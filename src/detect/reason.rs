@@ -44,7 +44,8 @@ pub enum ReasonKind {
     TooSmall,
     /// The corners are those of the other tiling: `corners`.
     OtherTiling,
-    /// Cells of tags are too small or too blurred to be read: `bit_px`, `blur_px`, `needed_bit_px`.
+    /// Cells of tags are too small or too blurred to be read: `bit_px`, `blur_px`, `needed_bit_px`; without the
+    /// last they do not stand out of the noise.
     UnreadableTags,
     /// No tile is seen whole that could carry a tag: `corners`.
     NoTiles,
@@ -83,8 +84,16 @@ impl ReasonKind {
 impl Reason {
     /// A reason with what was measured.
     pub(super) fn new<const N: usize>(kind: ReasonKind, figures: [(&str, f64); N]) -> Self {
-        let figures = figures.map(|(name, figure)| (name.to_owned(), figure)).into();
-        Self { kind, grid: None, figures }
+        Self::of(kind, figures)
+    }
+
+    /// The same of any number of figures.
+    pub(super) fn of<'a>(
+        kind: ReasonKind,
+        figures: impl IntoIterator<Item = (&'a str, f64)>,
+    ) -> Self {
+        let owned = |(name, figure): (&str, f64)| (name.to_owned(), figure);
+        Self { kind, grid: None, figures: figures.into_iter().map(owned).collect() }
     }
 
     fn figure(&self, name: &str) -> f64 {
@@ -125,6 +134,13 @@ impl fmt::Display for Reason {
             ReasonKind::OtherTiling => {
                 write!(f, "the {} corners are those of the other tiling", figure("corners"))
             }
+            ReasonKind::UnreadableTags if !self.figures.contains_key("needed_bit_px") => write!(
+                f,
+                "a tag's cells have {:.1} px under a blur of {:.1} px, and do not stand out of the noise; more light \
+                 or contrast would help",
+                figure("bit_px"),
+                figure("blur_px")
+            ),
             ReasonKind::UnreadableTags => write!(
                 f,
                 "a tag's cells have {:.1} px under a blur of {:.1} px; they could be read from {:.1} px on, \

@@ -24,9 +24,9 @@ use crate::raster::{Gray, Pyramid};
 const EDGES_PX: [f64; 2] = [16.0, 28.0];
 
 /// Largest distance of a corner from where its neighbours predict it, as a part of an edge: where
-/// tiles shrink to a third from one to the next, rows continued evenly are off by so much, and still
-/// no other corner is as near.
-const MAX_WAY: f64 = 0.4;
+/// tiles shrink to a third from one to the next, rows continued evenly are off by as much, and still
+/// no other corner is nearer.
+const MAX_WAY: f64 = 0.5;
 
 /// Reach of the widest fit, px.
 const FIT_REACH_PX: f64 = 9.0;

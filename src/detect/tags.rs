@@ -43,6 +43,16 @@ impl Reading {
     pub fn word(&self) -> u64 {
         self.half_odds.iter().rev().fold(0, |word, odds| word << 1 | u64::from(*odds > 0.0))
     }
+
+    /// How much the cells tell, bits: one for each that is known, none for each that may be either.
+    pub fn bits_told(&self) -> f64 {
+        let told = |&half_odds: &f32| {
+            let wrong = 1.0 / (1.0 + (2.0 * f64::from(half_odds.abs())).exp());
+            let right = 1.0 - wrong;
+            1.0 + right * right.log2() + wrong * wrong.max(f64::MIN_POSITIVE).log2()
+        };
+        self.half_odds.iter().map(told).sum()
+    }
 }
 
 /// How the tags of a panel lie in their tiles.

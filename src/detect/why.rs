@@ -20,11 +20,14 @@ const SATURATED: f64 = 0.985;
 /// Blur that hides corners on all levels of the pyramid, px.
 const HIDING_BLUR_PX: f64 = 6.0;
 
-/// Cells are read from this length on, px, however sharp they are; a board of them, tag for tag at twice that.
+/// Cells of a board of tags are read from this length on, px, however sharp they are.
 const LEAST_BIT_PX: f64 = 1.25;
 
 /// And from this length on in deviations of the blur.
 const LEAST_BIT_BLURS: f64 = 1.0;
+
+/// Single tags are read where cells are so many times as long as a board of them needs.
+const TAG_FOR_TAG: f64 = 2.0;
 
 /// Why nothing was found in a picture with so many corners of its tiling.
 pub fn nothing_found(pyramid: &Pyramid, corners: usize) -> Reason {
@@ -76,6 +79,13 @@ pub fn no_labels(evidence: &TagEvidence, grid: &SaddleGrid, size: (usize, usize)
         let figures = [("bit_px", bit_px), ("blur_px", blur_px), ("needed_bit_px", needed_bit_px)];
         return Reason::new(ReasonKind::UnreadableTags, figures);
     }
+    if 2 * evidence.unread > evidence.tiles {
+        let mut figures = vec![("bit_px", bit_px), ("blur_px", blur_px)];
+        if bit_px < TAG_FOR_TAG * needed_bit_px {
+            figures.push(("needed_bit_px", TAG_FOR_TAG * needed_bit_px));
+        }
+        return Reason::of(ReasonKind::UnreadableTags, figures);
+    }
     if evidence.no_codes > 1 {
         return Reason::new(ReasonKind::OtherFamily, [("tiles", evidence.no_codes as f64)]);
     }
@@ -98,19 +108,23 @@ pub fn no_outline(grid: &SaddleGrid, expected: usize, size: (usize, usize)) -> R
 
 /// Whether some corner lies less than an edge's length from the border of the picture.
 fn ends_at_border(grid: &SaddleGrid, (width, height): (usize, usize)) -> bool {
-    let kind = GridKind::Checker;
-    let lengths = grid.iter().flat_map(|(&v, placed)| {
-        let [x, y] = placed.position;
-        let beside = kind.neighbours(v).filter_map(|n| grid.get(&n));
-        beside.map(move |other| (other.position[0] - x).hypot(other.position[1] - y))
-    });
-    let Some(edge_px) = median(lengths.collect()) else {
+    let Some(edge_px) = edge_px(grid) else {
         return false;
     };
     grid.values().any(|placed| {
         let [x, y] = placed.position;
         x.min(y).min(width as f64 - x).min(height as f64 - y) < edge_px
     })
+}
+
+/// The median distance of corners that follow each other in a row or column, px; `None` where there are none such.
+pub fn edge_px(grid: &SaddleGrid) -> Option<f64> {
+    let lengths = grid.iter().flat_map(|(&v, placed)| {
+        let [x, y] = placed.position;
+        let beside = GridKind::Checker.neighbours(v).filter_map(|n| grid.get(&n));
+        beside.map(move |other| (other.position[0] - x).hypot(other.position[1] - y))
+    });
+    median(lengths.collect())
 }
 
 /// Darkest and brightest pixels, but for one in a thousand.
