@@ -404,19 +404,19 @@ fn refuse_patterns(pyramid: &Pyramid, grids: &mut Vec<(Grid, Option<Reason>)>) {
 /// twice its size, and is too small as it is.
 fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
     const PART: [usize; 2] = [400, 300];
-    const TIMES: f64 = 2.0;
+    const TIMES: usize = 2;
     let size = [level.width().min(PART[0]), level.height().min(PART[1])];
     let [left, top] = busiest_part(level, size);
     let to_one = 1.0 / PYRAMID_FULL_SCALE;
-    let enlarged = Gray::from_fn(2 * size[0], 2 * size[1], |x, y| {
-        let [u, v] = [(left, x), (top, y)].map(|(from, i)| from as f64 + i as f64 / TIMES);
+    let enlarged = Gray::from_fn(TIMES * size[0], TIMES * size[1], |x, y| {
+        let [u, v] = [(left, x), (top, y)].map(|(from, i)| from as f64 + i as f64 / TIMES as f64);
         level.bilinear(u, v) * to_one
     });
     let pyramid = Pyramid::new(&enlarged, 1, MIN_LEVEL_SIDE);
     let finder = SaddleFinder::<N>::new();
     let found = grids(&finder, &pyramid, &finder.find(&pyramid));
     let largest = found.iter().max_by_key(|grid| grid.len())?;
-    let edge_px = why::edge_px(largest)? / TIMES;
+    let edge_px = why::edge_px(largest)? / TIMES as f64;
     (largest.len() >= LEAST_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
 }
 

@@ -118,7 +118,7 @@ pub struct TagEvidence {
     pub foreign_ids: BTreeSet<u32>,
     /// Tiles whose cells are read without doubt and are no code of the family.
     pub no_codes: usize,
-    /// Tiles whose cells tell less than which code of the family they are.
+    /// Tiles whose cells tell less than which code of the family they are, where nothing was found.
     pub unread: usize,
     /// Whether a placement has evidence enough, but another one nearly as much.
     pub is_ambiguous: bool,
@@ -314,6 +314,12 @@ impl TagLabeller {
         evidence.contradicted = placed.contradicted;
         let labelled = |placement: &Placement| self.labelled(&sights, grid, placement);
         evidence.found = placed.placements.iter().map(labelled).collect();
+        if evidence.found.is_empty() {
+            let needed_bits = (self.family_words.max(1) as f64).log2();
+            let is_unread = |reading: &&Reading| reading.bits_told() < needed_bits;
+            let as_seen = sights.iter().filter(|sight| !sight.mirrored);
+            evidence.unread = as_seen.flat_map(|sight| &sight.readings).filter(is_unread).count();
+        }
         let mut taken = BTreeSet::new();
         for found in &mut evidence.found {
             found.vertices.retain(|vertex, _| taken.insert(*vertex));
@@ -337,9 +343,7 @@ impl TagLabeller {
         let plain = self.readers[reader].plain_word();
         let mut evidence = Vec::with_capacity(readings.len());
         let mut shown = Vec::with_capacity(readings.len());
-        let needed_bits = (self.family_words.max(1) as f64).log2();
         for reading in &readings {
-            noted.unread += usize::from(reading.bits_told() < needed_bits);
             let word = reading.word();
             let mut of_words = self.words.evidence(&reading.half_odds);
             if let Some(max_errors) = self.max_errors {

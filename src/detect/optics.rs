@@ -616,7 +616,7 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
             let mut vector = optics.vector();
             self.active.iter().zip(step.iter()).for_each(|(&p, s)| vector[p] += s);
             let there = optics.with(&vector);
-            let before: Vec<Corner<K>> = self.members.iter().map(|member| member.corner).collect();
+            let before = self.corners();
             let mut common = SVector::<f64, PARAMS>::zeros();
             common.iter_mut().zip(step.iter()).for_each(|(to, from)| *to = *from);
             for (member, own) in self.members.iter_mut().zip(&reduced.own) {
@@ -675,7 +675,7 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
     /// The optics and the covariance of their active parameters if the picture moved along a line, where that
     /// fits the corners better than a Gaussian does.
     fn moved(&mut self, still: &Optics) -> Option<(Optics, DMatrix<f64>)> {
-        let before: Vec<Corner<K>> = self.members.iter().map(|member| member.corner).collect();
+        let before = self.corners();
         let equations = self.equations(still);
         let weights = weights_of(&equations);
         let cost_before = cost(&equations, &weights, still);
@@ -687,6 +687,11 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
         }
         self.put_back(&before);
         None
+    }
+
+    /// The members' corners.
+    fn corners(&self) -> Vec<Corner<K>> {
+        self.members.iter().map(|member| member.corner).collect()
     }
 
     /// Gives the members these corners again.
