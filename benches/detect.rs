@@ -8,16 +8,17 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use deltille::artwork;
 use deltille::camera::{Camera, Pose};
+use deltille::clock;
 use deltille::detect::{Detector, DetectorConfig, Refinement};
 use deltille::family::Family;
 use deltille::raster::Gray;
 use deltille::synth::{Light, scene_of_sheet};
-use deltille::target::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
 use glam::DVec3;
 
 /// A board of 10 × 11 corners with tags, seen at 35°.
 fn photograph() -> (Target, Family, Gray<u8>) {
-    let family = Family::resolve(&TagSpec::default().family).expect("a shipped family");
+    let family = Family::shipped(&TagSpec::default().family).expect("a shipped family");
     let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 10, 11, 20.0));
     let target = Target::build("board", &spec, Some(&family), Some(&PaperSpec::default()))
         .expect("a board that fits A3");
@@ -36,7 +37,7 @@ fn detect(criterion: &mut Criterion) {
     for (name, refinement) in [("polynomial", Refinement::Polynomial), ("model", Refinement::Model)]
     {
         let config = DetectorConfig { refinement, ..DetectorConfig::default() };
-        let detector = Detector::for_target(&target, Some(&family), config);
+        let detector = Detector::for_target(&target, Some(&family), config).with_clock(clock::now);
         let stages: Vec<String> = detector.detect(&image, "").timing_ms.into_keys().collect();
         let mut group = criterion.benchmark_group(format!("detect, {name}"));
         for stage in stages {

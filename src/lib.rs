@@ -7,44 +7,49 @@
 //!
 //! The modules form floors; each imports only from floors below it:
 //!
-//! | floor | module | its one job |
-//! |---|---|---|
-//! | 0 | [`limits`] | how much of a file is read, and panics of other code |
-//! | 1 | [`lattice`] | the triangular lattice: vertices, tiles, symmetries, the cells of a tag |
-//! | 1 | [`raster`] | grey images: storage, sampling, blur, files |
-//! | 1 | [`camera`] | camera models and poses |
-//! | 2 | [`family`] | DelTag code families: search, certificates, decoding, files |
-//! | 3 | [`target`] | what exists in the world: panels, corners and tags in millimetres |
-//! | 4 | [`artwork`] | what is drawn, in millimetres, independent of file type |
-//! | 4 | [`detect`] | from pixels to labelled corners |
-//! | 5 | [`synth`] | a target seen by a camera, as an image |
-//! | 5 | [`calibrate`] | from detections to calibrated cameras |
-//! | 6 | [`export`] | artwork, targets and results to files and back |
-//! | 6 | [`report`] | a calibration as a page to look at |
-//! | 7 | [`verify`] | an artifact read back from disk and compared with its target |
-//! | 8 | [`experiment`] | simulations that measure the library itself |
-//! | 9 | `cli` | the programs' arguments, progress and messages |
+//! | floor | module | its one job | crate |
+//! |---|---|---|---|
+//! | 1 | [`lattice`] | the triangular lattice: vertices, tiles, symmetries, the cells of a tag | `deltille-core` |
+//! | 1 | [`raster`] | grey images: storage, sampling, blur | |
+//! | 1 | [`camera`] | camera models and poses | |
+//! | 2 | [`family`] | DelTag code families: search, certificates, decoding | |
+//! | 3 | [`targets`] | what exists in the world: panels, corners and tags in millimetres | |
+//! | 4 | [`artwork`] | what is drawn, in millimetres, independent of file type | |
+//! | 4 | [`detect`] | from pixels to labelled corners | |
+//! | 5 | [`synth`] | a target seen by a camera, as an image | |
+//! | 5 | [`calibrate`] | from detections to calibrated cameras | |
+//! | 6 | [`limits`] | how much of a file is read, and panics of other code | `deltille-files` |
+//! | 6 | [`photograph`] | photographs of any common format | |
+//! | 6 | [`export`] | artwork, targets and results to files and back | |
+//! | 6 | [`report`] | a calibration as a page to look at | |
+//! | 7 | [`verify`] | an artifact read back from disk and compared with its target | `deltille-verify` |
+//! | 8 | [`experiment`] | simulations that measure the library itself | `deltille` |
+//! | 9 | `cli` | the programs' arguments, progress and messages | |
 //!
 //! Conventions: lengths in millimetres, angles in radians, pixel centres at integer coordinates,
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
-pub mod artwork;
-pub mod calibrate;
-pub mod camera;
+pub use deltille_core::{
+    Clock, Name, artwork, calibrate, camera, detect, json, lattice, name, quantity, raster, synth,
+    targets, words,
+};
+#[cfg(feature = "photographs")]
+pub use deltille_files::photograph;
+#[cfg(feature = "report")]
+pub use deltille_files::report;
+#[cfg(feature = "files")]
+pub use deltille_files::{clock, export, limits};
+#[cfg(feature = "verify")]
+pub use deltille_verify as verify;
+
+/// Code families: rules, search, certificates and decoding; families by name or from their files.
+pub mod family {
+    pub use deltille_core::family::*;
+    #[cfg(feature = "files")]
+    pub use deltille_files::family_file::{FamilyFileError, read, resolve};
+}
+
 #[cfg(feature = "cli")]
 pub mod cli;
-pub mod detect;
+#[cfg(feature = "experiment")]
 pub mod experiment;
-pub mod export;
-pub mod family;
-mod json;
-pub mod lattice;
-pub mod limits;
-mod name;
-mod quantity;
-pub mod raster;
-pub mod report;
-pub mod synth;
-pub mod target;
-pub mod verify;
-mod words;

@@ -18,7 +18,7 @@ use super::bound;
 use crate::detect::{RefineStatus, Refinement, Refiner, Tone};
 use crate::raster::Gray;
 use crate::synth::SimulatedCorner;
-use crate::target::GridKind;
+use crate::targets::GridKind;
 
 /// Side of the window that all methods read, px: the reference's 11×11 fit on smoothed pixels.
 pub const WINDOW_PX: usize = 21;

@@ -28,7 +28,7 @@ use crate::camera::{BrownConrady, Camera, Lens, Pose};
 use crate::detect::{Detection, Detector, DetectorConfig};
 use crate::family::{Family, FamilyError};
 use crate::synth::{Light, Scene, scene_of_target};
-use crate::target::{
+use crate::targets::{
     BoardSpec, GridKind, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, Target,
     TargetError, TargetSpec,
 };
@@ -256,8 +256,8 @@ fn target(object: Object) -> Result<(Target, Family), RigExperimentError> {
         }
     };
     let family = match &spec {
-        TargetSpec::Solid(spec) => Family::resolve(&spec.tags.family)?,
-        _ => Family::resolve("aprilTag36h11")?,
+        TargetSpec::Solid(spec) => Family::shipped(&spec.tags.family)?,
+        _ => Family::shipped("aprilTag36h11")?,
     };
     let target = Target::build(object.name(), &spec, Some(&family), None)?;
     if object == Object::Icosahedron {

@@ -10,8 +10,8 @@ use crate::calibrate::{
     poses, views,
 };
 use crate::detect::{Detector, DetectorConfig, Refinement};
-use crate::raster::{self, ImageError};
-use crate::target::GridKind;
+use crate::photograph::{self, ImageError};
+use crate::targets::GridKind;
 
 /// Rows and columns of the board of the paper's sequence, and its edges.
 const SIZE: [u32; 2] = [10, 11];
@@ -94,7 +94,7 @@ fn detect(
     let detector = Detector::for_grid(GridKind::Deltille, Some((SIZE[0], SIZE[1])), config);
     let found = images.par_iter().map(|path| {
         let name = path.as_ref().file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let image = raster::read(path.as_ref())?;
+        let image = photograph::read(path.as_ref())?;
         Ok((name.clone(), detector.detect_any(&image, &name)))
     });
     let found = found.collect::<Result<Vec<_>, ImageError>>()?;

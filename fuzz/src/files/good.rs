@@ -10,13 +10,16 @@ use deltille::export::mesh::TexturedMesh;
 use deltille::export::{detection, dxf, gltf, obj as obj_writer, pdf as pdf_writer};
 use deltille::export::{png, stl as stl_writer, svg as svg_writer};
 use deltille::family::Family;
-use deltille::raster::{self, AnyGray, Gray};
-use deltille::target::{BoardSpec, GridKind, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec};
+use deltille::photograph;
+use deltille::raster::{AnyGray, Gray};
+use deltille::targets::{
+    BoardSpec, GridKind, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec,
+};
 use image::{DynamicImage, GrayImage, ImageFormat};
 use tempfile::TempDir;
 
 /// The family of the tags.
-pub static FAMILY: LazyLock<Family> = LazyLock::new(|| Family::resolve("delTag16h5").unwrap());
+pub static FAMILY: LazyLock<Family> = LazyLock::new(|| Family::shipped("delTag16h5").unwrap());
 
 /// A board of which there are pages.
 pub static BOARD: LazyLock<Target> = LazyLock::new(|| {
@@ -149,7 +152,7 @@ fn photograph() -> Gray<u8> {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("b.png");
     std::fs::write(&path, page_png()).unwrap();
-    match raster::read(&path).unwrap() {
+    match photograph::read(&path).unwrap() {
         AnyGray::U8(image) => image,
         AnyGray::U16(_) => unreachable!("pages have 8 bits"),
     }

@@ -1,7 +1,7 @@
 //! The readers of files, one by one: a good file of each, ways of damaging it, and what must hold
 //! whatever is read.
 //!
-//! Used by the fuzz targets and by the test `tests/damaged_files.rs`.
+//! Used by the fuzz targets and by the test `tests/it/files/readers.rs`.
 
 mod good;
 mod json;

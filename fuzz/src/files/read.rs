@@ -8,8 +8,8 @@ use deltille::export::dsc::{self, Dialect};
 use deltille::export::{calibration, csv, detection as detections, obj, orpc};
 use deltille::family::Family;
 use deltille::limits::Limits;
-use deltille::raster;
-use deltille::target::{GridKind, Target};
+use deltille::photograph;
+use deltille::targets::{GridKind, Target};
 use deltille::verify::Verifier;
 use glam::DVec3;
 
@@ -119,7 +119,7 @@ pub fn mesh(file: File) -> bool {
 
 pub fn photograph(file: File) -> bool {
     let read = |accept_damaged| {
-        let photograph = raster::photograph(file.path, &limits(), accept_damaged).ok()?;
+        let photograph = photograph::read_with_notes(file.path, &limits(), accept_damaged).ok()?;
         let pixels = photograph.image.width() * photograph.image.height();
         assert!(pixels as u64 <= limits().max_pixels);
         assert!(accept_damaged || photograph.notes.damage.is_none());

@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 use super::parameters::Parameters;
 use crate::cli::output::say;
-use crate::family::{Construction, Family, bounds::bounds, shipped_names};
+use crate::family::{self, Construction, bounds::bounds, shipped_names};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -19,7 +19,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     say!("{:>12}  by sphere packing", bounds.sphere_packing);
     let least = bounds.linear_programming.min(bounds.sphere_packing);
     for name in shipped_names() {
-        let family = Family::resolve(name)?;
+        let family = family::resolve(name)?;
         if family.dimension() == dimension && family.distance() == distance {
             let share = 100.0 * family.len() as f64 / least as f64;
             say!("{:>12}  has {name}, {share:.1} % of the tighter bound", family.len());

@@ -5,7 +5,7 @@ use anyhow::Context;
 
 use super::values::whole;
 use crate::cli::output;
-use crate::family::{Construction, Family, Screen, TagWords};
+use crate::family::{self, Construction, Screen, TagWords};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -21,7 +21,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let family = super::deltags(Family::resolve(&args.family)?)?;
+    let family = super::deltags(family::resolve(&args.family)?)?;
     let Construction::Algebraic(construction) = family.construction() else {
         anyhow::bail!("{}: not an algebraic family, its codes have no rank", args.family);
     };

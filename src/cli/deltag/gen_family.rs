@@ -17,6 +17,7 @@ use crate::cli::interrupt;
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::progress::SearchProgress;
 use crate::cli::run::FAILED;
+use crate::clock;
 use crate::export::kind::Kind;
 use crate::family::best::{Best, Budget};
 use crate::family::lexicode::{self, Lexicode};
@@ -222,7 +223,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// The family that a file holds, if it holds one.
 fn there(path: &Path) -> Option<Family> {
-    path.exists().then(|| Family::read(path).ok()).flatten()
+    path.exists().then(|| family::read(path).ok()).flatten()
 }
 
 /// A name beside that of a file, with a number, that nothing has yet.
@@ -409,7 +410,9 @@ impl Args {
             rules,
             budget: match self.work {
                 Some(steps) => Budget::Work(steps),
-                None => Budget::Time(Duration::from_secs_f64(self.time.unwrap_or(60.0))),
+                None => {
+                    Budget::Time(Duration::from_secs_f64(self.time.unwrap_or(60.0)), clock::now)
+                }
             },
             seed: self.seed(),
             limit,

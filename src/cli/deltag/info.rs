@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 use crate::cli::output::say;
 use crate::family::{Family, TagWords, bounds::bounds};
-use crate::target::{BoardSpec, GridKind, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use crate::targets::{BoardSpec, GridKind, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -15,7 +15,7 @@ const BOARD: [u32; 2] = [10, 11];
 
 /// How many tags a target takes with the settings that `deltille` has by default.
 fn tags_of(spec: &TargetSpec) -> anyhow::Result<usize> {
-    let family = Family::resolve(&TagSpec::default().family)?;
+    let family = Family::shipped(&TagSpec::default().family)?;
     let target = Target::build("probe", spec, Some(&family), None)?;
     Ok(target.panels.iter().map(|panel| panel.tags.len()).sum())
 }

@@ -1,7 +1,7 @@
 use std::process::ExitCode;
 
 use crate::cli::output::say;
-use crate::family::{Family, shipped_names};
+use crate::family::{self, shipped_names};
 
 #[derive(clap::Args)]
 pub(super) struct Args {}
@@ -9,7 +9,7 @@ pub(super) struct Args {}
 pub(super) fn run(_: Args) -> anyhow::Result<ExitCode> {
     say!("{:<12} {:>4} {:>8} {:>8}  fingerprint", "family", "bits", "distance", "codes");
     for name in shipped_names() {
-        let family = Family::resolve(name)?;
+        let family = family::resolve(name)?;
         say!(
             "{:<12} {:>4} {:>8} {:>8}  {}",
             family.name(),

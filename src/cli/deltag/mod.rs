@@ -22,7 +22,7 @@ use anyhow::bail;
 use clap::{Parser, Subcommand};
 
 use crate::cli::output::tell;
-use crate::family::{Family, PAIRS_COUNTED, certify_codes, shipped_names};
+use crate::family::{self, Family, PAIRS_COUNTED, certify_codes, shipped_names};
 use crate::lattice::GridKind;
 
 /// Search, check, list and draw DelTag code families.
@@ -90,7 +90,7 @@ fn deltags(family: Family) -> anyhow::Result<Family> {
 /// A family to make something of. The codes of a file that comes from elsewhere are compared where
 /// that is a matter of a second, and a word is said where they are not what the file claims.
 fn resolve(name_or_path: &str) -> anyhow::Result<Family> {
-    let family = deltags(Family::resolve(name_or_path)?)?;
+    let family = deltags(family::resolve(name_or_path)?)?;
     if !shipped_names().contains(&name_or_path)
         && family.len() <= PAIRS_COUNTED
         && let Some(failure) = certify_codes(&family).failures.first()

@@ -26,7 +26,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let needed = u64::from(args.faces) * u64::from(args.tags_per_face);
-    let families = shipped_names().into_iter().map(Family::resolve);
+    let families = shipped_names().into_iter().map(Family::shipped);
     let mut families: Vec<Family> = families.collect::<Result<_, _>>()?;
     families.retain(|family| family.correctable() >= args.corrects);
     let largest = families.iter().max_by_key(|f| f.len());

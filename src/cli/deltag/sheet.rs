@@ -12,7 +12,7 @@ use crate::cli::interrupt;
 use crate::cli::output::{Overwrite, say};
 use crate::cli::run::{FAILED, Interrupted};
 use crate::limits::Limits;
-use crate::target::{
+use crate::targets::{
     DEFAULT_MARGIN_MM, PaperSpec, TagSheetSpec, Target, TargetSpec, parse_length_mm,
 };
 use crate::verify::{Verifier, VerifyError};

@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 use crate::cli::output::say;
 use crate::cli::run::{BAD_INPUT, FAILED, report};
-use crate::family::{Certificate, Family, FamilyError, certify};
+use crate::family::{self, Certificate, FamilyFileError, certify};
 use crate::words::counted;
 
 /// Told at the end of `--help`.
@@ -22,7 +22,7 @@ pub(super) struct Args {
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut all_hold, mut all_read) = (true, true);
     for name in &args.families {
-        let family = match Family::resolve(name) {
+        let family = match family::resolve(name) {
             Ok(family) => family,
             Err(error) if error.is_broken_claim() => {
                 say!("{name}: DOES NOT HOLD. {}", reason(&error));
@@ -79,9 +79,9 @@ pub(super) fn proof_of(certificate: &Certificate, claimed: u32) -> String {
 }
 
 /// What is wrong in a file that is named already.
-fn reason(error: &FamilyError) -> &FamilyError {
+fn reason(error: &FamilyFileError) -> &dyn std::fmt::Display {
     match error {
-        FamilyError::In { error, .. } => error,
+        FamilyFileError::In { error, .. } => error,
         other => other,
     }
 }

@@ -11,7 +11,8 @@ use super::images::Images;
 use crate::cli::interrupt;
 use crate::cli::output::say;
 use crate::cli::run::Interrupted;
-use crate::raster;
+use crate::clock;
+use crate::photograph;
 
 /// Arguments of `deltille bench`.
 #[derive(clap::Args)]
@@ -42,14 +43,14 @@ struct DetectArgs {
 /// Runs a benchmark.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Bench::Detect(args) = args.bench;
-    let (_, detector) = args.finder.detector()?;
+    let detector = args.finder.detector()?.1.with_clock(clock::now);
     // Milliseconds of each stage, one number an image.
     let mut stages = BTreeMap::<String, Vec<f64>>::new();
     let mut total = Vec::new();
     let (mut pixels, mut corners) = (0, 0);
     for path in Images::of(&args.images)?.iter() {
         let path = path?;
-        let image = raster::read_within(&path, &args.finder.limits())?;
+        let image = photograph::read_within(&path, &args.finder.limits())?;
         let mut best: Option<BTreeMap<String, f64>> = None;
         for _ in 0..args.repeat {
             if interrupt::is_raised() {

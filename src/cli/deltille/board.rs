@@ -12,8 +12,8 @@ use crate::artwork::{self, Artwork};
 use crate::cli::output::{self, tell};
 use crate::export::dsc;
 use crate::export::kind::Kind;
-use crate::family::{Family, FamilyError, square_names};
-use crate::target::{GridKind, Target, TargetSpec, id_range};
+use crate::family::{self, FamilyError, FamilyFileError, square_names};
+use crate::targets::{GridKind, Target, TargetSpec, id_range};
 
 /// Arguments of both.
 #[derive(clap::Args)]
@@ -37,9 +37,9 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         None => args.settings,
     };
     let plan = settings.plan(grid)?;
-    let family = plan.spec.tags.as_ref().map(|tags| Family::resolve(&tags.family)).transpose();
+    let family = plan.spec.tags.as_ref().map(|tags| family::resolve(&tags.family)).transpose();
     let family = match (family, grid) {
-        (Err(FamilyError::Unknown { name }), GridKind::Checker) => bail!(
+        (Err(FamilyFileError::Name(FamilyError::Unknown { name })), GridKind::Checker) => bail!(
             "--tags: no family of square tags is called `{name}`: give {}, or the path of a .json \
              family file",
             square_names()

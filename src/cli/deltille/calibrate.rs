@@ -18,7 +18,8 @@ use crate::cli::run::{FAILED, report};
 use crate::export::calibration::{self, Print};
 use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
 use crate::name::is_within;
-use crate::raster::{self, AnyGray};
+use crate::photograph;
+use crate::raster::AnyGray;
 use crate::report::{Given, Named, Report, cannot_tell_apart, causes, thumbnail};
 use crate::words::{counted, shown};
 
@@ -259,7 +260,7 @@ impl Args {
             let Some(folder) = &self.images else { break };
             // A picture that is not there leaves its place to the corners.
             let picture =
-                picture_of(&view.image, folder).and_then(|path| raster::io::read(&path).ok());
+                picture_of(&view.image, folder).and_then(|path| photograph::read(&path).ok());
             let picture = picture.and_then(|image| match image {
                 AnyGray::U8(image) => thumbnail(&image),
                 AnyGray::U16(image) => thumbnail(&image.map(|v| (v >> 8) as u8)),

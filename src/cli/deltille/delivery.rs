@@ -12,7 +12,7 @@ use crate::cli::output::{Overwrite, say};
 use crate::export::obj;
 use crate::family::Family;
 use crate::limits::Limits;
-use crate::target::Target;
+use crate::targets::Target;
 use crate::verify::Format;
 
 /// Where the files of a target go, and what is checked before and after.

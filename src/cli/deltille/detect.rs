@@ -15,11 +15,12 @@ use super::in_flight;
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::cli::{interrupt, progress};
+use crate::clock;
 use crate::detect::{Detection, Detector, InkEstimate};
 use crate::export::kind::Kind;
 use crate::export::{atomic, csv, detection, orpc, overlay};
-use crate::raster::{self, Photograph};
-use crate::target::Target;
+use crate::photograph::{self, Photograph};
+use crate::targets::Target;
 use crate::words::{counted, shown};
 
 /// Arguments of `deltille detect`.
@@ -99,6 +100,7 @@ struct Seen {
 /// Detects in all images; an image that cannot be read is reported, and the rest go on.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (target, detector) = args.finder.detector()?;
+    let detector = if args.timing { detector.with_clock(clock::now) } else { detector };
     let images = Images::of(&args.images)?;
     // Clashes among images that are named are found before any work is done.
     let mut named = Stems::default();
@@ -335,12 +337,10 @@ fn one_image(
     stem: &str,
 ) -> anyhow::Result<Found> {
     let limits = args.finder.limits();
-    let Photograph { image, notes } = raster::photograph(path, &limits, args.accept_damaged)?;
+    let Photograph { image, notes } =
+        photograph::read_with_notes(path, &limits, args.accept_damaged)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let mut found = Detection { file: notes, ..detector.detect_any(&image, &name) };
-    if !args.timing {
-        found.timing_ms.clear();
-    }
+    let found = Detection { file: notes, ..detector.detect_any(&image, &name) };
     if let Some(folder) = args.folder() {
         let save = |extension: &str, content: &[u8]| {
             let path = folder.join(format!("{stem}.{extension}"));

@@ -17,7 +17,7 @@ use crate::detect::Tone;
 use crate::experiment::photographs::axes::Axis;
 use crate::experiment::photographs::{self, Kind, Subject, table};
 use crate::experiment::{corners, plot, rig, table2};
-use crate::family::Family;
+use crate::family;
 use crate::limits::Limits;
 
 /// Arguments of `deltille experiment`.
@@ -251,7 +251,7 @@ impl PhotographsArgs {
             |kind: &Kind| self.kind.iter().any(|name| name == kind.name() || name == "all");
         let subject = |kind: Kind| {
             let tags = kind.spec().tags;
-            let family = tags.map(|tags| Family::resolve(&tags.family)).transpose()?;
+            let family = tags.map(|tags| family::resolve(&tags.family)).transpose()?;
             Ok(Subject::of_kind(kind, family.as_ref())?)
         };
         Kind::ALL.into_iter().filter(wanted).map(subject).collect()

@@ -13,7 +13,7 @@ use crate::cli::run::{Interrupted, message};
 use crate::export::kind::Kind;
 use crate::export::staging::{Staging, same_content};
 use crate::export::{atomic, pdf, png, sheet_file_name, svg};
-use crate::target;
+use crate::targets;
 
 /// Writes one file to a path.
 type Writer = dyn Fn(&Path) -> anyhow::Result<()>;
@@ -147,7 +147,7 @@ impl File {
     /// of that one may be left beside it.
     fn replaced(&self, folder: &Path, staged: &Path, written: &[&str]) -> Option<String> {
         let path = folder.join(&self.name);
-        let is_other = self.kind == Kind::of_schema(target::SCHEMA)
+        let is_other = self.kind == Kind::of_schema(targets::SCHEMA)
             && path.is_file()
             && !same_content(&path, &staged.join(&self.name));
         let stem = self.name.strip_suffix(".json").filter(|_| is_other)?;

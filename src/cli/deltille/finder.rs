@@ -10,7 +10,7 @@ use super::refine::Method;
 use super::target_file;
 use crate::detect::{Detector, DetectorConfig, Ink, Tone};
 use crate::limits::Limits;
-use crate::target::{GridKind, Target};
+use crate::targets::{GridKind, Target};
 
 /// Options that say what to look for.
 #[derive(clap::Args)]

@@ -6,7 +6,7 @@ use std::sync::{Condvar, Mutex, MutexGuard};
 use rayon::ThreadPool;
 
 use crate::limits::Limits;
-use crate::raster;
+use crate::photograph;
 
 /// Does some work on each of the images, whose number it is told, on the threads of a pool. Images
 /// that are in memory together have no more pixels than one may have.
@@ -26,7 +26,8 @@ pub fn for_each(
                 loop {
                     let next = images.lock().expect("no iterator panics").next();
                     let Some((index, image)) = next else { return };
-                    let pixels = image.as_ref().ok().and_then(|path| raster::pixels(path, limits));
+                    let pixels =
+                        image.as_ref().ok().and_then(|path| photograph::pixels(path, limits));
                     let _taken = memory.take(pixels.unwrap_or(limits.max_pixels));
                     pool.install(|| work(index, image));
                 }

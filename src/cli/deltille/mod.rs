@@ -26,7 +26,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::target::{GridKind, SolidShape};
+use crate::targets::{GridKind, SolidShape};
 
 /// Make, detect and verify deltille targets.
 #[derive(Parser)]

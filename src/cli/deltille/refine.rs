@@ -12,8 +12,9 @@ use crate::cli::output::{self, Overwrite};
 use crate::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
 use crate::export::csv;
 use crate::limits::Limits;
-use crate::raster::{self, AnyGray};
-use crate::target::GridKind;
+use crate::photograph;
+use crate::raster::AnyGray;
+use crate::targets::GridKind;
 
 /// Corners that are refined at a time: as many as of one picture.
 const MOST_SEEDS: usize = 20_000;
@@ -91,7 +92,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Kind::Checker => GridKind::Checker,
     };
     let refiner = Refiner::new(kind, args.method.into(), args.window).with_tone(args.tone);
-    let refined: Vec<Refined> = match raster::read_within(&args.image, &limits)? {
+    let refined: Vec<Refined> = match photograph::read_within(&args.image, &limits)? {
         AnyGray::U8(image) => refiner.refine_all(&image, &seeds),
         AnyGray::U16(image) => refiner.refine_all(&image, &seeds),
     };

@@ -16,7 +16,7 @@ use crate::export::kind::signed_png;
 use crate::export::truth;
 use crate::quantity::place_mm;
 use crate::synth::{Light, scene_of_target};
-use crate::target::TargetSpec;
+use crate::targets::TargetSpec;
 
 /// Arguments of `deltille render`.
 #[derive(clap::Args)]

@@ -20,7 +20,7 @@ use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
 use crate::export::camera::{colmap, colmap_rig, kalibr};
 use crate::export::rig;
 use crate::report::{Named, cannot_tell_apart, causes_of_rig};
-use crate::target::Name;
+use crate::targets::Name;
 use crate::words::{counted, shown};
 
 /// Arguments of `deltille rig`.

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::export::GENERATOR;
 use crate::export::dsc::Dialect;
 use crate::limits;
-use crate::target::{
+use crate::targets::{
     BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, GridKind, MOST_ROWS, PaperSpec, SIDES, TagSpec,
     TagsIn, largest_edge_mm, parse_length_mm,
 };

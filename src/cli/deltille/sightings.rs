@@ -15,7 +15,7 @@ use crate::export::calibration::{self, Print, Sheet};
 use crate::export::detection;
 use crate::limits::{Limits, ReadError};
 use crate::quantity::{edge_mm, print_scale};
-use crate::target::{GridKind, Target, TargetSpec, parse_length_mm};
+use crate::targets::{GridKind, Target, TargetSpec, parse_length_mm};
 use crate::words::counted;
 
 /// Detections and what they show.

@@ -13,9 +13,9 @@ use crate::cli::output::say;
 use crate::export::dsc::{self, Dialect};
 use crate::export::mesh::TexturedMesh;
 use crate::export::{dxf, gltf, obj, stl};
-use crate::family::Family;
+use crate::family::{self, Family};
 use crate::quantity::{dots_per_inch, unit_mm};
-use crate::target::{
+use crate::targets::{
     ClosedMesh, DEFAULT_MARGIN_MM, NEAR_EQUILATERAL, PaperSpec, Skeleton, SkeletonSpec, SolidShape,
     SolidSheets, SolidSpec, TagSpec, TagsIn, Target, TargetSpec, parse_length_mm,
 };
@@ -172,7 +172,7 @@ pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
     args.check_use()?;
     let spec = args.spec(shape)?;
     let paper = args.paper()?;
-    let family = Family::resolve(&spec.tags.family).context("--family")?;
+    let family = family::resolve(&spec.tags.family).context("--family")?;
     let name = args.name.clone().unwrap_or_else(|| spec.shape.name().to_owned());
     // What is cut is the net that is printed, or would be: the description has it in either case.
     let net = args.dxf && !args.per_face;

@@ -6,9 +6,9 @@ use anyhow::{Context, anyhow, bail};
 
 use crate::cli::output;
 use crate::export::dsc;
-use crate::family::Family;
+use crate::family::{self, Family};
 use crate::limits::Limits;
-use crate::target::{Target, TargetSpec};
+use crate::targets::{Target, TargetSpec};
 
 /// Reads a target: `.dsc` by its extension, JSON otherwise.
 pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Target> {
@@ -42,9 +42,9 @@ pub fn family(target: &Target, given: Option<&str>) -> anyhow::Result<Option<Fam
         TargetSpec::Listed(_) => None,
     };
     let family = match given {
-        Some(given) => Family::resolve(given).context("--family")?,
-        None => Family::resolve(&wanted.name)
-            .or_else(|error| in_spec.map_or(Err(error), Family::resolve))
+        Some(given) => family::resolve(given).context("--family")?,
+        None => family::resolve(&wanted.name)
+            .or_else(|error| in_spec.map_or(Err(error), family::resolve))
             .with_context(|| format!("{} carries tags of {}", target.name, wanted.name))
             .context("give the family's file with --family")?,
     };

@@ -17,7 +17,7 @@ use crate::export::kind::Kind;
 use crate::export::{sheet_file_name, stl};
 use crate::family::Family;
 use crate::limits::Limits;
-use crate::target::Target;
+use crate::targets::Target;
 use crate::verify::{Verdict, Verifier};
 use crate::words::counted;
 

@@ -42,10 +42,11 @@ use self::photograph::{Photograph, take};
 use self::score::{Score, score};
 use self::table::Row;
 use crate::artwork::ArtworkError;
+use crate::clock;
 use crate::detect::{Detector, DetectorConfig};
 use crate::export::{ExportError, atomic};
 use crate::family::Family;
-use crate::target::{BoardSpec, GridKind, PaperSpec, Target, TargetSpec};
+use crate::targets::{BoardSpec, GridKind, PaperSpec, Target, TargetSpec};
 use crate::verify::DocumentError;
 
 /// Why a page cannot be photographed.
@@ -141,7 +142,8 @@ impl Subject {
         family: Option<&Family>,
     ) -> Result<Self, PhotographError> {
         let page = PrintedPage::new(target, family)?;
-        let detector = Detector::for_target(target, family, DetectorConfig::default());
+        let detector =
+            Detector::for_target(target, family, DetectorConfig::default()).with_clock(clock::now);
         Ok(Self { name: name.to_owned(), page, detector })
     }
 
@@ -253,7 +255,7 @@ mod tests {
     use super::*;
 
     fn subject(kind: Kind) -> Subject {
-        let family = kind.spec().tags.map(|tags| Family::resolve(&tags.family).unwrap());
+        let family = kind.spec().tags.map(|tags| Family::shipped(&tags.family).unwrap());
         Subject::of_kind(kind, family.as_ref()).unwrap()
     }
 

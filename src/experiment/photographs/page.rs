@@ -9,7 +9,7 @@ use super::paths::Vertices;
 use crate::artwork;
 use crate::export::pdf;
 use crate::family::Family;
-use crate::target::{GridKind, Target};
+use crate::targets::{GridKind, Target};
 use crate::verify::Document;
 
 /// Resolution asked for, px/mm: 1200 dpi. Large pages come coarser.

@@ -1,0 +1,207 @@
+use std::collections::BTreeMap;
+
+use kurbo::{Affine, BezPath, Point, Rect};
+
+use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_mm, text, window};
+use crate::family::Family;
+use crate::lattice::{TagCells, Tile};
+use crate::targets::{
+    Panel, Placement, SheetLayout, SheetLine, SheetPage, SheetText, TagPlacement, TagsIn, Target,
+};
+
+/// The shapes of sheet `index` of a target.
+pub(super) fn sheet(
+    target: &Target,
+    family: Option<&Family>,
+    index: usize,
+) -> Result<Sheet, ArtworkError> {
+    let layout = &target.sheets[index];
+    let mut shapes = Vec::new();
+    for placement in &layout.placements {
+        let panel = target.panels.iter().find(|panel| panel.id == placement.panel);
+        let panel =
+            panel.ok_or(ArtworkError::NoSuchPanel { sheet: index + 1, panel: placement.panel })?;
+        shapes.extend(draw_panel(target, panel, placement, family)?);
+    }
+    shapes.extend(marks(layout)?);
+    Ok(Sheet { width_mm: layout.width_mm, height_mm: layout.height_mm, shapes })
+}
+
+/// A page that shows a part of a sheet.
+pub(super) fn page(
+    sheet: &Sheet,
+    layout: &SheetLayout,
+    page: &SheetPage,
+) -> Result<Sheet, ArtworkError> {
+    let [x, y] = page.sheet_at_mm;
+    let page_from_sheet = Affine::translate((x, y));
+    let [x0, y0, x1, y1] = page.window_mm;
+    let in_window = sheet.shapes.iter().filter_map(|shape| {
+        let path = page_from_sheet * &shape.path;
+        window::clip(Shape { path, ..shape.clone() }, Rect::new(x0, y0, x1, y1))
+    });
+    let mut shapes: Vec<Shape> = in_window.collect();
+    // The page's own lines and texts are counted on from those of the sheet.
+    let (lines, texts) = (layout.lines.len(), layout.texts.len());
+    shapes.extend(marks(&page.marks)?.into_iter().map(|shape| {
+        let part = match shape.part {
+            Part::Line { kind, index } => Part::Line { kind, index: index + lines },
+            Part::Label { index } => Part::Label { index: index + texts },
+            part => part,
+        };
+        Shape { part, ..shape }
+    }));
+    let SheetLayout { width_mm, height_mm, .. } = page.marks;
+    Ok(Sheet { width_mm, height_mm, shapes })
+}
+
+/// Check bars, lines and texts.
+fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
+    let mut shapes = Vec::new();
+    for (index, bar) in layout.check_bars.iter().enumerate() {
+        let path = check_bar::outline(bar);
+        shapes.push(Shape { part: Part::CheckBar { index }, paint: Paint::Fill, path });
+    }
+    for (index, line) in drawn_lines(layout) {
+        let mut path = BezPath::new();
+        for [from, to] in strokes_mm(line) {
+            path.move_to(Point::from((from[0], from[1])));
+            path.line_to(Point::from((to[0], to[1])));
+        }
+        let part = Part::Line { kind: line.kind, index };
+        shapes.push(Shape { part, paint: Paint::Stroke { width_mm: line.width_mm }, path });
+    }
+    for (index, label) in layout.texts.iter().enumerate() {
+        let path = draw_text(label)?;
+        shapes.push(Shape { part: Part::Label { index }, paint: Paint::Fill, path });
+    }
+    Ok(shapes)
+}
+
+/// The lines that are drawn, with their indices. Faces that touch without hanging together each have their line to
+/// cut, there and back; it is drawn once.
+pub fn drawn_lines(layout: &SheetLayout) -> impl Iterator<Item = (usize, &SheetLine)> {
+    let lines = layout.lines.iter().enumerate();
+    lines.filter(|(index, line)| !layout.lines[..*index].iter().any(|drawn| is_back(drawn, line)))
+}
+
+/// Whether a line runs where another does, from its end to its beginning.
+fn is_back(line: &SheetLine, other: &SheetLine) -> bool {
+    let near = |p: [f64; 2], q: [f64; 2]| {
+        (p[0] - q[0]).hypot(p[1] - q[1]) < line.width_mm.min(other.width_mm) / 2.0
+    };
+    line.kind == other.kind && near(line.from_mm, other.to_mm) && near(line.to_mm, other.from_mm)
+}
+
+/// The tiles of a panel on its page: one shape each, or one field on an inverted panel.
+pub(super) fn draw_panel(
+    target: &Target,
+    panel: &Panel,
+    placement: &Placement,
+    family: Option<&Family>,
+) -> Result<Vec<Shape>, ArtworkError> {
+    let page_from_panel = Affine::translate((placement.origin_mm[0], placement.origin_mm[1]))
+        * Affine::rotate(placement.angle_rad);
+    let mut drawn: BTreeMap<Tile, BezPath> =
+        panel.dark_tiles().into_iter().map(|tile| (tile, tile_outline(panel, tile, 0.0))).collect();
+    for tag in &panel.tags {
+        let (cells, word) = tag_word(target, tag, family)?;
+        let tile = panel.tag_tile(tag);
+        if panel.tags_in == TagsIn::White {
+            let margin = panel.tag_margin_bits() / cells.width(panel.tag_inset_bits());
+            drawn.insert(tile, tile_outline(panel, tile, margin));
+        }
+        let path = drawn.entry(tile).or_default();
+        tag_outlines(&cells, word, panel.tag_inset_bits())
+            .for_each(|outline| path.extend(in_tile(panel, tile, outline)));
+    }
+    let paths = drawn.into_iter().map(|(tile, path)| (tile, page_from_panel * path));
+    if panel.inverted {
+        let mut field = page_from_panel * rectangle(panel.field_mm());
+        paths.for_each(|(_, path)| field.extend(path));
+        let part = Part::Field { panel: panel.id };
+        return Ok(vec![Shape { part, paint: Paint::Fill, path: field }]);
+    }
+    let shapes = paths.map(|(tile, path)| {
+        let (row, col) = (tile.anchor.row, tile.anchor.col);
+        Shape { part: Part::Tile { panel: panel.id, row, col }, paint: Paint::Fill, path }
+    });
+    Ok(shapes.collect())
+}
+
+/// Cells and code of a tag.
+fn tag_word(
+    target: &Target,
+    tag: &TagPlacement,
+    family: Option<&Family>,
+) -> Result<(TagCells, u64), ArtworkError> {
+    let Some(family) = family else {
+        let name = target.family.as_ref().map_or_else(String::new, |f| f.name.clone());
+        return Err(ArtworkError::FamilyMissing(name));
+    };
+    let word = family.code(tag.id).ok_or_else(|| ArtworkError::NoSuchTag {
+        id: tag.id,
+        row: tag.row,
+        col: tag.col,
+        family: family.name().to_owned(),
+        len: family.len(),
+    })?;
+    Ok((family.cells(), word))
+}
+
+/// A polygon given in the coordinates of a tile, in the panel frame, mm.
+fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = [f64; 2]>) -> BezPath {
+    let (row, col) = (f64::from(tile.anchor.row), f64::from(tile.anchor.col));
+    polygon(outline.into_iter().map(|[u, v]| {
+        let [x, y] = panel.kind.position(row + v, col + u);
+        Point::new(x * panel.edge_mm, y * panel.edge_mm)
+    }))
+}
+
+/// The outline of a dark tile, or of a square, moved inside by a part of its edge.
+fn tile_outline(panel: &Panel, tile: Tile, inside: f64) -> BezPath {
+    let [u, v] = panel.kind.middle();
+    let left = 1.0 - panel.kind.insets() * inside;
+    let corners = tile.vertices().map(|vertex| vertex - tile.anchor);
+    let moved =
+        corners.map(|c| [u + left * (f64::from(c.col) - u), v + left * (f64::from(c.row) - v)]);
+    in_tile(panel, tile, moved)
+}
+
+/// The outlines of a tag's white areas in tile coordinates (u along the lower edge, v along the
+/// left edge, 0..1).
+pub(super) fn tag_outlines(
+    cells: &TagCells,
+    word: u64,
+    inset: f64,
+) -> impl Iterator<Item = Vec<[f64; 2]>> {
+    let width = cells.width(inset);
+    let at = move |cell: i32| (inset + f64::from(cell)) / width;
+    cells::white_outlines(cells, word)
+        .into_iter()
+        .map(move |outline| outline.into_iter().map(|v| [at(v.col), at(v.row)]).collect())
+}
+
+/// A text on its page, set smaller where it would be too long.
+pub(super) fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph> {
+    let size = label.cap_height_mm / text::CAP_HEIGHT;
+    let (path, width) = text::outline(&label.text, size)?;
+    let fit = (label.max_width_mm / width).min(1.0);
+    let [x, y] = label.at_mm;
+    let place = Affine::translate((x, y)) * Affine::rotate(label.angle_rad);
+    Ok(place * Affine::scale(fit) * path)
+}
+
+/// A closed polygon.
+pub(super) fn polygon(points: impl IntoIterator<Item = Point>) -> BezPath {
+    let mut path = BezPath::new();
+    for (i, point) in points.into_iter().enumerate() {
+        if i == 0 { path.move_to(point) } else { path.line_to(point) }
+    }
+    path.close_path();
+    path
+}
+
+fn rectangle([x0, y0, x1, y1]: [f64; 4]) -> BezPath {
+    polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(Point::from))
+}

@@ -1,0 +1,41 @@
+use kurbo::{Affine, BezPath};
+
+use crate::targets::{CHECK_BAR_STROKE_MM, CheckBar};
+
+/// Width of an end stroke, along the bar, mm: a hair wider than a ruler's line.
+pub const STROKE_WIDTH_MM: f64 = 0.3;
+
+/// Thickness of the line that joins the end strokes, mm.
+const LINE_MM: f64 = 0.2;
+
+/// A check bar: two end strokes, whose outer edges are `from` and `to`, joined by a thin line.
+///
+/// ```text
+///   from ┃━━━━━━━━━━━━━━━━━━━━━━━━━━━━┃ to
+/// ```
+pub fn outline(bar: &CheckBar) -> BezPath {
+    let [dx, dy] = [bar.to_mm[0] - bar.from_mm[0], bar.to_mm[1] - bar.from_mm[1]];
+    let (length, stroke, line) = (dx.hypot(dy), CHECK_BAR_STROKE_MM / 2.0, LINE_MM / 2.0);
+    let (inner, outer) = (STROKE_WIDTH_MM, length - STROKE_WIDTH_MM);
+    let corners = [
+        (0.0, -stroke),
+        (inner, -stroke),
+        (inner, -line),
+        (outer, -line),
+        (outer, -stroke),
+        (length, -stroke),
+        (length, stroke),
+        (outer, stroke),
+        (outer, line),
+        (inner, line),
+        (inner, stroke),
+        (0.0, stroke),
+    ];
+    let mut path = BezPath::new();
+    path.move_to(corners[0]);
+    corners[1..].iter().for_each(|&corner| path.line_to(corner));
+    path.close_path();
+    let [x, y] = bar.from_mm;
+    let (cos, sin) = (dx / length, dy / length);
+    Affine::new([cos, sin, -sin, cos, x, y]) * path
+}

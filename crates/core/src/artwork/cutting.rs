@@ -1,0 +1,239 @@
+//! What a cutter follows: closed outlines and lines by what is done along them.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::atlas::Packing;
+use super::text::MissingGlyph;
+use crate::targets::{
+    LineKind, Placement, SheetLayout, Target, TargetError, TargetSpec, edge_numbers, edge_text,
+    upright_number,
+};
+
+/// Blank between panels, mm: more than any cutter is wide.
+const GAP_MM: f64 = 4.0;
+
+/// Height of the number of a face, in inradii, and the most of it, mm.
+const FACE_CAP: (f64, f64) = (0.25, 8.0);
+
+/// Width of a capital with its blank, in its height.
+const ADVANCE_CAPS: f64 = 0.84;
+
+/// Distance of the number of an edge from it, mm.
+const EDGE_GAP_MM: f64 = 1.5;
+
+/// Letters are replaced by chords that leave them by less than this, mm.
+const FLATTENING_MM: f64 = 0.02;
+
+/// Lines of an outline that end and begin this near to each other are joined, mm: between a face
+/// and its tab pieces shorter than the width of a line are left out.
+const JOIN_MM: f64 = 0.2;
+
+/// What is done along a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum CutLayer {
+    /// Cut through.
+    Cut,
+    /// Fold away from the print, after scoring.
+    Fold,
+    /// Fold towards the print, after scoring from the back.
+    Valley,
+    /// Engrave.
+    Engrave,
+}
+
+/// A path of straight pieces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CutPath {
+    /// What is done along it.
+    pub layer: CutLayer,
+    /// Whether the last point is joined to the first.
+    pub closed: bool,
+    /// Points, mm, x right, y up.
+    pub points_mm: Vec<[f64; 2]>,
+}
+
+/// A drawing for a cutter.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CutDrawing {
+    /// Its paths.
+    pub paths: Vec<CutPath>,
+}
+
+/// Why there is nothing to cut.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CuttingError {
+    /// No solid.
+    #[error("{0} is no solid made by `deltille`: it has no panels to cut")]
+    NotSolid(String),
+    /// The sheets of the solid are not those of its net, or there are none.
+    #[error("{0} is not laid out as a net: there is no net to cut")]
+    NotNet(String),
+    /// The solid cannot be made.
+    #[error(transparent)]
+    Target(#[from] TargetError),
+    /// A number cannot be written.
+    #[error(transparent)]
+    Text(#[from] MissingGlyph),
+}
+
+/// The panels of a solid side by side, as seen from outside: outlines to cut in true size, with the
+/// numbers of the face and of its edges to engrave. Edges of the same number meet.
+///
+/// Panels are whole faces; with a skeleton in the spec they are what its seats take.
+pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
+    let TargetSpec::Solid(spec) = &target.spec else {
+        return Err(CuttingError::NotSolid(target.name.to_string()));
+    };
+    let panels = spec.panel_faces()?;
+    let solid = spec.polyhedron();
+    let edges = solid.edges();
+    let mut drawing = CutDrawing::default();
+    let packing = Packing::tightest(&panels, GAP_MM);
+    for (index, (panel, placement)) in panels.iter().zip(packing.placements()).enumerate() {
+        let outline = panel.outline_mm;
+        let points_mm = outline.map(|p| placement.page_from_panel(p)).to_vec();
+        drawing.paths.push(CutPath { layer: CutLayer::Cut, closed: true, points_mm });
+        let numbers = edge_numbers(&solid, &edges, index);
+        let mut texts = vec![face_number(&placement, outline, index)];
+        for (i, number) in numbers.into_iter().enumerate() {
+            let ends = [outline[i], outline[(i + 1) % 3]];
+            texts.push(edge_text(&placement, ends, upright_number(number), EDGE_GAP_MM));
+        }
+        for text in texts {
+            drawing.engrave(super::text_outline(&text)?);
+        }
+    }
+    Ok(drawing)
+}
+
+/// The net of a solid to cut, score and fold, as its sheets have it, however many pages these are
+/// printed on: the outline of each piece with its tabs, the lines to fold, and the numbers of faces
+/// and edges to engrave. Pieces lie side by side.
+pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
+    let no_net = || CuttingError::NotNet(target.name.to_string());
+    let mut drawing = CutDrawing::default();
+    let mut right_mm = 0.0;
+    for sheet in &target.sheets {
+        let mut piece = CutDrawing::default();
+        for points_mm in outlines(sheet).ok_or_else(no_net)? {
+            piece.paths.push(CutPath { layer: CutLayer::Cut, closed: true, points_mm });
+        }
+        for line in &sheet.lines {
+            let layer = match line.kind {
+                LineKind::Fold => CutLayer::Fold,
+                LineKind::Valley => CutLayer::Valley,
+                LineKind::Cut | LineKind::Flat | LineKind::Align => continue,
+            };
+            let points_mm = vec![line.from_mm, line.to_mm];
+            piece.paths.push(CutPath { layer, closed: false, points_mm });
+        }
+        // Instructions and the label stay on the paper.
+        let names = ["face ", "edge "];
+        for text in sheet.texts.iter().filter(|t| names.iter().any(|n| t.text.starts_with(n))) {
+            piece.engrave(super::text_outline(text)?);
+        }
+        let [left, lower, right, _] = piece.bounds_mm().ok_or_else(no_net)?;
+        let points = piece.paths.iter_mut().flat_map(|path| &mut path.points_mm);
+        points.for_each(|[x, y]| (*x, *y) = (*x - left + right_mm, *y - lower));
+        right_mm += right - left + GAP_MM;
+        drawing.paths.append(&mut piece.paths);
+    }
+    if drawing.paths.is_empty() { Err(no_net()) } else { Ok(drawing) }
+}
+
+/// The closed outlines that the lines to cut of a net's sheet make; `None` when they make none.
+///
+/// Every line runs with the paper on its left. Where an outline touches itself more than one line
+/// begins; it goes on with the one that leaves the least angle of paper between, which no other
+/// line can divide.
+fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<[f64; 2]>>> {
+    let cuts = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut);
+    let mut left: Vec<[[f64; 2]; 2]> = cuts.map(|line| [line.from_mm, line.to_mm]).collect();
+    let mut outlines = Vec::new();
+    while let Some(first) = left.pop() {
+        let mut outline = vec![first[0]];
+        let mut last = first;
+        loop {
+            let paper_rad = |[from, to]: [[f64; 2]; 2]| {
+                let back = (last[0][1] - last[1][1]).atan2(last[0][0] - last[1][0]);
+                let on = (to[1] - from[1]).atan2(to[0] - from[0]);
+                // Lines one on the other leave a whole turn, not none.
+                TAU - (on - back).rem_euclid(TAU)
+            };
+            let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < JOIN_MM;
+            let next = (0..left.len())
+                .filter(|&n| near(left[n][0], last[1]))
+                .min_by(|&a, &b| paper_rad(left[a]).total_cmp(&paper_rad(left[b])));
+            // The outline may also be back where it began.
+            let closing = near(first[0], last[1]).then(|| paper_rad(first));
+            let next = next.filter(|&n| closing.is_none_or(|angle| paper_rad(left[n]) < angle));
+            match next {
+                Some(next) => {
+                    last = left.swap_remove(next);
+                    outline.push(last[0]);
+                }
+                None if closing.is_some() => break,
+                None => return None,
+            }
+        }
+        outlines.push(outline);
+    }
+    Some(outlines)
+}
+
+/// The number of a face around the middle of its outline.
+fn face_number(
+    placement: &Placement,
+    outline: [[f64; 2]; 3],
+    index: usize,
+) -> crate::targets::SheetText {
+    let circle = crate::targets::Incircle::of(outline.map(|[x, y]| DVec3::new(x, y, 0.0)));
+    let text = upright_number(index);
+    let cap = (FACE_CAP.0 * circle.radius).min(FACE_CAP.1);
+    let width = text.len() as f64 * ADVANCE_CAPS * cap;
+    let at = [circle.centre.x - width / 2.0, circle.centre.y - cap / 2.0];
+    crate::targets::SheetText {
+        text,
+        at_mm: placement.page_from_panel(at),
+        angle_rad: placement.angle_rad,
+        cap_height_mm: cap,
+        max_width_mm: circle.radius,
+    }
+}
+
+impl CutDrawing {
+    /// Left, lower, right and upper end, mm; `None` when nothing is drawn.
+    pub fn bounds_mm(&self) -> Option<[f64; 4]> {
+        let points = || self.paths.iter().flat_map(|path| &path.points_mm);
+        points().next()?;
+        let end = |axis: usize, pick: fn(f64, f64) -> f64, start| {
+            points().map(|p| p[axis]).fold(start, pick)
+        };
+        let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
+        Some([
+            end(0, f64::min, low),
+            end(1, f64::min, low),
+            end(0, f64::max, high),
+            end(1, f64::max, high),
+        ])
+    }
+
+    /// Adds the outlines of letters.
+    fn engrave(&mut self, letters: kurbo::BezPath) {
+        kurbo::flatten(letters, FLATTENING_MM, |element| match element {
+            kurbo::PathEl::MoveTo(p) => self.paths.push(CutPath {
+                layer: CutLayer::Engrave,
+                closed: true,
+                points_mm: vec![[p.x, p.y]],
+            }),
+            kurbo::PathEl::LineTo(p) => {
+                if let Some(path) = self.paths.last_mut() {
+                    path.points_mm.push([p.x, p.y]);
+                }
+            }
+            _ => {}
+        });
+    }
+}

@@ -1,0 +1,205 @@
+//! What is drawn, in millimetres, independent of file type.
+//!
+//! [`draw`] turns a target and the codes of its tags into sheets of shapes; every exporter writes
+//! the same shapes, and text is part of them as glyph outlines, so that PDF, SVG and PNG show the
+//! same marks without any font on the reader's side.
+//!
+//! Nothing is drawn twice: a black tile is one path whose holes are the merged white cells of its
+//! tag, and white is paper left bare. Two tiles touch in a vertex only, so no renderer has a seam
+//! to show.
+//!
+//! Frame: the page frame of [`SheetLayout`](crate::targets::SheetLayout), origin at the lower-left
+//! corner of the page, x right, y up.
+
+mod atlas;
+mod board;
+mod cells;
+mod check_bar;
+mod cutting;
+mod gallery;
+mod line;
+pub mod text;
+mod window;
+
+use kurbo::BezPath;
+
+use crate::family::Family;
+use crate::targets::{GridKind, LineKind, Panel, Placement, SheetText, Target};
+
+pub use atlas::Atlas;
+pub use board::drawn_lines;
+pub use cells::white_outlines;
+pub use check_bar::{STROKE_WIDTH_MM, outline as check_bar_outline};
+pub use cutting::{CutDrawing, CutLayer, CutPath, CuttingError, net_to_cut, panels_to_cut};
+pub use gallery::{GalleryTile, tag_gallery};
+pub use line::strokes_mm;
+
+/// Everything that is drawn of one target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Artwork {
+    /// Title of the document: the target's name.
+    pub title: String,
+    /// One line on what it is.
+    pub subject: String,
+    /// The pages, in the order of the target's sheets and of the pages of each.
+    pub sheets: Vec<Sheet>,
+}
+
+/// One page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sheet {
+    /// Page width, mm.
+    pub width_mm: f64,
+    /// Page height, mm.
+    pub height_mm: f64,
+    /// Shapes, none of which overlaps another.
+    pub shapes: Vec<Shape>,
+}
+
+/// A mark in solid black.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// What it is, for files with names or layers.
+    pub part: Part,
+    /// How its path is painted.
+    pub paint: Paint,
+    /// The path in the page frame, mm.
+    pub path: BezPath,
+}
+
+/// How a path is painted; always black.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Paint {
+    /// Inside of all closed loops, by the even-odd rule.
+    Fill,
+    /// Along the path, with butt ends and mitred joins.
+    Stroke {
+        /// Width of the line, mm.
+        width_mm: f64,
+    },
+}
+
+/// What a shape is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Part {
+    /// A black tile of a panel with the holes of its tag, or a tag in a white square, named by panel
+    /// id and lower-left vertex.
+    Tile {
+        /// Panel id.
+        panel: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+    },
+    /// The black field of an inverted panel, with its white tiles as holes.
+    Field {
+        /// Panel id.
+        panel: u32,
+    },
+    /// A check bar of the sheet, by index.
+    CheckBar {
+        /// Position in [`SheetLayout::check_bars`](crate::targets::SheetLayout::check_bars).
+        index: usize,
+    },
+    /// A line to cut or to fold along, by index.
+    Line {
+        /// What it is for.
+        kind: LineKind,
+        /// Position in [`SheetLayout::lines`](crate::targets::SheetLayout::lines).
+        index: usize,
+    },
+    /// A line of text.
+    Label {
+        /// Position among the texts of the sheet.
+        index: usize,
+    },
+}
+
+/// Why a target cannot be drawn.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ArtworkError {
+    /// The target has tags and no family was given.
+    #[error("the target has tags of family {0}: the family is needed to draw them")]
+    FamilyMissing(String),
+    /// A tag id is not in the family.
+    #[error("tag {id} at row {row}, column {col} is beyond the {len} codes of family {family}")]
+    NoSuchTag {
+        /// The id asked for.
+        id: u32,
+        /// Lattice row of the tag.
+        row: i32,
+        /// Lattice column of the tag.
+        col: i32,
+        /// Name of the family.
+        family: String,
+        /// Number of its codes.
+        len: usize,
+    },
+    /// A sheet shows a panel that the target does not have.
+    #[error("sheet {sheet} shows panel {panel}, which the target does not have")]
+    NoSuchPanel {
+        /// Sheet, counted from 1.
+        sheet: usize,
+        /// Panel id.
+        panel: u32,
+    },
+    /// A text holds a character that the built-in font lacks.
+    #[error(transparent)]
+    Text(#[from] text::MissingGlyph),
+}
+
+/// Draws every sheet of a target.
+///
+/// `family` holds the codes of the tags; it may be `None` for an untagged target only.
+pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, ArtworkError> {
+    let mut sheets = Vec::with_capacity(target.page_count());
+    for (index, layout) in target.sheets.iter().enumerate() {
+        let sheet = board::sheet(target, family, index)?;
+        if layout.pages.is_empty() {
+            sheets.push(sheet);
+            continue;
+        }
+        for page in &layout.pages {
+            sheets.push(board::page(&sheet, layout, page)?);
+        }
+    }
+    Ok(Artwork { title: target.name.to_string(), subject: subject(target), sheets })
+}
+
+/// The tiles of one panel in its own frame.
+pub fn panel_shapes(
+    target: &Target,
+    panel: &Panel,
+    family: Option<&Family>,
+) -> Result<Vec<Shape>, ArtworkError> {
+    let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [0.0; 2] };
+    board::draw_panel(target, panel, &placement, family)
+}
+
+/// The outline of a text on its page, mm; filled by the even-odd rule.
+pub fn text_outline(text: &SheetText) -> Result<BezPath, text::MissingGlyph> {
+    board::draw_text(text)
+}
+
+/// One line on what a target is.
+pub fn subject(target: &Target) -> String {
+    let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
+    let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
+    let plural = if tags == 1 { "" } else { "s" };
+    let what = match corners {
+        0 => "single DelTags".to_owned(),
+        _ => {
+            let kind = match target.panels.first().map(|panel| panel.kind) {
+                Some(GridKind::Checker) => "checkerboard",
+                _ => "deltille",
+            };
+            format!("{kind} calibration target, {corners} corners")
+        }
+    };
+    let mut subject = format!("{what}, {tags} tag{plural}");
+    if let Some(family) = &target.family {
+        subject += &format!(", family {}, fingerprint {}", family.name, family.fingerprint);
+    }
+    subject
+}

@@ -1,0 +1,62 @@
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+
+use crate::detect::Grid;
+use crate::lattice::Vertex;
+use crate::targets::{GridKind, zigzag_vertices};
+
+/// An untagged board that no file describes. Its labels may differ between views by a motion of the
+/// lattice, which the pose of the view takes up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UntaggedGrid {
+    /// The tiling.
+    pub kind: GridKind,
+    /// Length of a tile's edge, mm.
+    pub edge_mm: f64,
+    /// Rows and columns of corners, where they are known.
+    pub size: Option<[u32; 2]>,
+}
+
+impl UntaggedGrid {
+    /// Where a corner is, mm.
+    pub(super) fn place(&self, row: i32, col: i32) -> DVec3 {
+        let [x, y] = match self.kind {
+            GridKind::Deltille => Vertex::new(row, col).position(),
+            GridKind::Checker => [f64::from(col), f64::from(row)],
+        };
+        self.edge_mm * DVec3::new(x, y, 0.0)
+    }
+
+    /// Whether a detected grid can be this board; what speaks against it.
+    pub(super) fn check(&self, grid: &Grid) -> Result<(), String> {
+        let Some([rows, cols]) = self.size else { return Ok(()) };
+        let found = grid.corners.len();
+        let most = rows as usize * cols as usize;
+        if found > most {
+            return Err(format!("{found} corners are more than {rows} × {cols}"));
+        }
+        if found < most {
+            return Ok(());
+        }
+        let labels: BTreeSet<_> = grid.corners.iter().map(|c| (c.row, c.col)).collect();
+        if labels == self.labels(rows, cols) {
+            return Ok(());
+        }
+        Err(if labels == self.labels(cols, rows) {
+            format!("it has {cols} rows × {rows} columns: --rows and --cols are exchanged")
+        } else {
+            format!("its rows and columns are not those of a board of {rows} × {cols} corners")
+        })
+    }
+
+    fn labels(&self, rows: u32, cols: u32) -> BTreeSet<(i32, i32)> {
+        match self.kind {
+            GridKind::Deltille => zigzag_vertices(rows, cols).map(|v| (v.row, v.col)).collect(),
+            GridKind::Checker => {
+                let all = 0..rows as i32;
+                all.flat_map(|row| (0..cols as i32).map(move |col| (row, col))).collect()
+            }
+        }
+    }
+}

@@ -1,0 +1,400 @@
+use std::collections::BTreeMap;
+
+use glam::{DQuat, DVec3};
+
+use super::error::CalibrationError;
+use super::excluded::Excluded;
+use super::grid::UntaggedGrid;
+use super::panel::PanelRef;
+use super::problem::Observation;
+use super::shape::Shape;
+use crate::camera::Pose;
+use crate::detect::{Detection, Grid};
+use crate::targets::{Panel, Target, TargetSpec};
+
+/// Corners that a panel needs in a view, so that a few wrong ones show.
+pub(super) const LEAST_CORNERS: usize = 6;
+
+/// What is wrong with labels that run the wrong way round.
+pub(super) const MIRRORED: &str =
+    "the labels are mirrored: rows and columns are exchanged, or the image was flipped";
+
+/// Corners of a mirrored picture turn the wrong way round, but for wrong ones: by so much, at least, of all of
+/// them more do than do not.
+const MIRRORED_MOST: f64 = 0.5;
+
+/// And by so many deviations: places anywhere turn either way, of a few all may turn the wrong one. By chance
+/// as many do once in a thousand pictures that show nothing else.
+const MIRRORED_SURE: f64 = 3.09;
+
+/// What is wrong with a board of the other tiling.
+const OTHER_KIND: &str = "the board in it has the other tiling: give --grid that of the board";
+
+/// What follows from labels that are not on the target.
+const OTHER_TARGET: &str = "; the target does not belong to this detection";
+
+/// Why labels of a grid without panel are not on the target.
+const CUT_OFF: &str = "its rows and columns are not those of the target: without tags they are known \
+                       only where the board is seen whole, and here a part of it is";
+
+/// What was photographed.
+#[derive(Clone, Copy, Debug)]
+pub enum Reference<'a> {
+    /// A target that its file describes.
+    Target(&'a Target),
+    /// An untagged board.
+    Grid(UntaggedGrid),
+}
+
+/// What one picture shows of one rigid target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// Name, such as that of the detection's file.
+    pub name: String,
+    /// File name of the picture.
+    pub image: String,
+    /// Width and height of the picture, px.
+    pub size_px: [u32; 2],
+    /// The panels that were found.
+    pub sightings: Vec<Sighting>,
+}
+
+/// A panel in a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sighting {
+    /// Which panel.
+    pub panel: PanelRef,
+    /// Its corners.
+    pub observations: Vec<Observation>,
+}
+
+impl View {
+    /// How many corners it shows.
+    pub fn corner_count(&self) -> usize {
+        self.sightings.iter().map(|sighting| sighting.observations.len()).sum()
+    }
+
+    /// The view as one that does not fit as a whole.
+    pub(super) fn excluded(&self, reason: String) -> Excluded {
+        Excluded {
+            camera: None,
+            view: self.name.clone(),
+            image: self.image.clone(),
+            panel: None,
+            corners: self.corner_count(),
+            reason,
+        }
+    }
+}
+
+impl Sighting {
+    /// Moves the corners to where a sheet of this shape has them.
+    pub fn bend(&mut self, shape: &Shape) {
+        for seen in &mut self.observations {
+            seen.panel_mm += shape.offset(seen.panel_mm);
+        }
+    }
+
+    /// Moves the corners to where a print has them that is stretched across and up its sheet;
+    /// the panel is turned by `angle_rad` on it.
+    pub fn stretch(&mut self, [across, up]: [f64; 2], angle_rad: f64) {
+        let turn = DQuat::from_rotation_z(angle_rad);
+        for seen in &mut self.observations {
+            let on_sheet = turn * seen.panel_mm * DVec3::new(across, up, 1.0);
+            seen.panel_mm = turn.conjugate() * on_sheet;
+        }
+    }
+}
+
+impl Reference<'_> {
+    /// target_from_panel of every panel.
+    pub fn panels(&self) -> Vec<Pose> {
+        match self {
+            Self::Grid(_) => vec![Pose::IDENTITY],
+            Self::Target(target) => target.panels.iter().map(|p| p.pose.to_pose()).collect(),
+        }
+    }
+
+    /// Whether its panels are boards that lie about, each for itself.
+    fn is_loose(&self) -> bool {
+        match self {
+            Self::Grid(_) => false,
+            Self::Target(target) => {
+                target.panels.len() > 1
+                    && !matches!(target.spec, TargetSpec::Solid(_) | TargetSpec::Listed(_))
+            }
+        }
+    }
+
+    /// Id of a panel; `None` on an untagged board.
+    fn panel_id(&self, panel: PanelRef) -> Option<u32> {
+        match self {
+            Self::Grid(_) => None,
+            Self::Target(_) => Some(panel.id()),
+        }
+    }
+
+    /// What a detection shows of the panels, or the panel that is wrong in it and why.
+    fn sightings(&self, detection: &Detection) -> Result<Vec<Sighting>, (Option<u32>, String)> {
+        match self {
+            Self::Grid(board) => {
+                let of_kind = detection.grids.iter().filter(|grid| grid.kind == board.kind);
+                let Some(grid) = of_kind.max_by_key(|grid| grid.corners.len()) else {
+                    return match detection.grids.first() {
+                        Some(_) => Err((None, OTHER_KIND.to_owned())),
+                        None => Ok(Vec::new()),
+                    };
+                };
+                board.check(grid).map_err(|problem| (None, problem))?;
+                let at = |row, col| board.place(row, col);
+                Ok(vec![Sighting { panel: PanelRef::ONLY, observations: observations(grid, at) }])
+            }
+            Self::Target(target) => {
+                let grids = detection.grids.iter();
+                let found = grids.filter_map(|grid| {
+                    on_target(target, grid).map_err(|problem| (grid.panel, problem)).transpose()
+                });
+                found.collect()
+            }
+        }
+    }
+}
+
+/// The views of detections.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// One for each picture, or for each board in it where several lie about.
+    pub views: Vec<View>,
+    /// Positions of the detections that show nothing.
+    pub empty: Vec<usize>,
+    /// Positions of the detections that do not belong to the target, and what is wrong with them.
+    pub left_out: Vec<(usize, Excluded)>,
+}
+
+/// The views of all detections, each with its name; an error where most of those that show
+/// something do not belong to the target.
+pub fn views(
+    detections: &[(String, Detection)],
+    reference: &Reference,
+) -> Result<Shown, CalibrationError> {
+    let mut views = Vec::new();
+    let mut empty = Vec::new();
+    let mut left_out = Vec::new();
+    let mut first_wrong = None;
+    for (index, (name, detection)) in detections.iter().enumerate() {
+        let size_px = [detection.width, detection.height];
+        if let Some((first, other)) = detections.first()
+            && size_px != [other.width, other.height]
+        {
+            return Err(CalibrationError::MixedSizes {
+                first: first.clone(),
+                first_px: [other.width, other.height],
+                other: name.clone(),
+                other_px: size_px,
+            });
+        }
+        match sightings(detection, reference) {
+            Err((panel, problem)) => {
+                let wrong = Excluded {
+                    camera: None,
+                    view: name.clone(),
+                    image: detection.image.clone(),
+                    panel,
+                    corners: detection.grids.iter().map(|grid| grid.corners.len()).sum(),
+                    reason: problem.clone(),
+                };
+                left_out.push((index, wrong));
+                let view = name.clone();
+                first_wrong.get_or_insert(CalibrationError::WrongDetection { view, problem });
+            }
+            Ok(sightings) if sightings.is_empty() => empty.push(index),
+            Ok(sightings) if reference.is_loose() => {
+                views.extend(sightings.into_iter().map(|sighting| View {
+                    name: format!("{name} board {}", sighting.panel),
+                    image: detection.image.clone(),
+                    size_px,
+                    sightings: vec![sighting],
+                }));
+            }
+            Ok(sightings) => {
+                let (name, image) = (name.clone(), detection.image.clone());
+                views.push(View { name, image, size_px, sightings });
+            }
+        }
+    }
+    let all = detections.len() - empty.len();
+    match first_wrong {
+        Some(first) if 2 * left_out.len() > all => Err(match all {
+            1 => first,
+            _ => CalibrationError::MostWrong { first: Box::new(first), wrong: left_out.len(), all },
+        }),
+        _ => Ok(Shown { views, empty, left_out }),
+    }
+}
+
+/// What a detection shows of the panels, or the panel that is wrong in it and why.
+fn sightings(
+    detection: &Detection,
+    reference: &Reference,
+) -> Result<Vec<Sighting>, (Option<u32>, String)> {
+    let mut sightings = reference.sightings(detection)?;
+    sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
+    match (is_mirrored(&sightings), sightings.as_slice()) {
+        (true, [only]) => Err((reference.panel_id(only.panel), MIRRORED.to_owned())),
+        (true, _) => Err((None, MIRRORED.to_owned())),
+        (false, _) => Ok(sightings),
+    }
+}
+
+/// The corners of a grid on its panel; `None` where it was not labelled and the target has several.
+fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
+    let index = match grid.panel {
+        Some(id) => target.panels.iter().position(|panel| panel.id == id),
+        None if target.panels.len() == 1 && target.panels[0].tags.is_empty() => Some(0),
+        None => return Ok(None),
+    };
+    let Some(index) = index else {
+        let id = grid.panel.unwrap_or_default();
+        return Err(format!("panel {id} is not on the target {}{OTHER_TARGET}", target.name));
+    };
+    let panel = &target.panels[index];
+    check_panel(target, panel, grid).map_err(|problem| problem + OTHER_TARGET)?;
+    let from_target = panel.pose.to_pose().inverse();
+    let places: BTreeMap<(i32, i32), DVec3> = panel
+        .corners
+        .iter()
+        .map(|corner| ((corner.row, corner.col), from_target.apply(corner.target_mm.into())))
+        .collect();
+    let mut found = Vec::new();
+    for corner in &grid.corners {
+        match places.get(&(corner.row, corner.col)) {
+            Some(&place) => found.push((corner.row, corner.col, place)),
+            None if grid.panel.is_none() && corner.id.is_none() => {
+                return Err(CUT_OFF.to_owned());
+            }
+            None => {
+                let swapped = places.contains_key(&(corner.col, corner.row));
+                let hint = if swapped { " (rows and columns exchanged?)" } else { "" };
+                return Err(format!(
+                    "{} has no corner in row {}, column {}{hint}{OTHER_TARGET}",
+                    target.name, corner.row, corner.col
+                ));
+            }
+        }
+    }
+    let at = |row, col| places[&(row, col)];
+    let panel = PanelRef::new(index, panel.id);
+    Ok(Some(Sighting { panel, observations: observations(grid, at) }))
+}
+
+/// Compares what a detection says of a panel with the target.
+fn check_panel(target: &Target, panel: &Panel, grid: &Grid) -> Result<(), String> {
+    if panel.kind != grid.kind {
+        return Err(format!("panel {} has another tiling on {}", panel.id, target.name));
+    }
+    for corner in &grid.corners {
+        let Some(id) = corner.id else { continue };
+        let of_target = panel.corners.iter().find(|of_target| of_target.id == id);
+        if let Some(of_target) = of_target
+            && (of_target.row, of_target.col) != (corner.row, corner.col)
+        {
+            let swapped = (of_target.col, of_target.row) == (corner.row, corner.col);
+            return Err(format!(
+                "corner {id} is in row {}, column {}, but on {} in row {}, column {}{}",
+                corner.row,
+                corner.col,
+                target.name,
+                of_target.row,
+                of_target.col,
+                if swapped { " (rows and columns exchanged?)" } else { "" }
+            ));
+        }
+        if of_target.is_none() {
+            return Err(format!("corner {id} is not on {}", target.name));
+        }
+    }
+    for tag in &grid.tags {
+        let same = panel.tags.iter().any(|t| (t.id, t.row, t.col) == (tag.id, tag.row, tag.col));
+        let family = target.family.as_ref().map(|family| family.name.as_str());
+        if !same || family != Some(tag.family.as_str()) {
+            return Err(format!(
+                "tag {} of {} in row {}, column {} is not on {}",
+                tag.id, tag.family, tag.row, tag.col, target.name
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn observations(grid: &Grid, at: impl Fn(i32, i32) -> DVec3) -> Vec<Observation> {
+    let seen = grid.corners.iter().map(|corner| Observation {
+        row: corner.row,
+        col: corner.col,
+        panel_mm: at(corner.row, corner.col),
+        pixel: [corner.x, corner.y],
+        cov: corner.cov,
+    });
+    seen.collect()
+}
+
+/// Whether the corners with two neighbours are mirrored, nearly all of the picture: of one in which two fifths
+/// of the corners are anywhere two fifths of these are mirrored too, and a panel of a few may be by chance.
+fn is_mirrored(sightings: &[Sighting]) -> bool {
+    let turns: Vec<f64> = sightings.iter().flat_map(turns).collect();
+    let (count, more) = (turns.len() as f64, turns.iter().sum::<f64>());
+    more > MIRRORED_MOST * count && more > MIRRORED_SURE * count.sqrt()
+}
+
+/// Which way corners turn to their neighbours in column and row: 1 where they are mirrored. In a picture, y
+/// down, rows and columns that run as on the print turn clockwise.
+fn turns(sighting: &Sighting) -> Vec<f64> {
+    let places: BTreeMap<(i32, i32), [f64; 2]> =
+        sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();
+    let turn = |(&(row, col), &[x, y]): (&(i32, i32), &[f64; 2])| {
+        let [ax, ay] = places.get(&(row, col + 1))?;
+        let [bx, by] = places.get(&(row + 1, col))?;
+        Some(((ax - x) * (by - y) - (ay - y) * (bx - x)).signum())
+    };
+    places.iter().filter_map(turn).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+
+    /// A board of `rows` × 8 corners from above, of which a part are anywhere in the picture.
+    fn board(rows: i32, part_anywhere: f64, is_flipped: bool, seed: u64) -> Sighting {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let places = (0..rows).flat_map(|row| (0..8).map(move |col| (row, col)));
+        let observations = places.map(|(row, col)| {
+            let [x, y] = [100.0 * f64::from(col), 800.0 - 100.0 * f64::from(row)];
+            let pixel = match random.random_bool(part_anywhere) {
+                true => [random.random_range(0.0..800.0), random.random_range(0.0..800.0)],
+                false if is_flipped => [800.0 - x, y],
+                false => [x, y],
+            };
+            Observation { row, col, panel_mm: DVec3::new(x, -y, 0.0), pixel, cov: None }
+        });
+        Sighting { panel: PanelRef::new(0, 0), observations: observations.collect() }
+    }
+
+    #[test]
+    fn a_mirror_is_told_from_wrong_places() {
+        for seed in 0..100 {
+            assert!(!is_mirrored(&[board(6, 0.4, false, seed)]), "seed {seed}");
+            assert!(is_mirrored(&[board(6, 0.05, true, seed)]), "seed {seed}");
+        }
+    }
+
+    /// A panel of a few corners, of which most are wrong, beside one that is not mirrored, and by itself.
+    #[test]
+    fn a_few_wrong_corners_are_no_mirror() {
+        for seed in 0..100 {
+            let few = board(2, 0.8, false, seed);
+            assert!(!is_mirrored(&[few.clone(), board(6, 0.2, false, seed)]), "seed {seed}");
+            assert!(!is_mirrored(&[few]), "seed {seed}");
+        }
+    }
+}

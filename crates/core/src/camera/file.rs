@@ -1,0 +1,335 @@
+//! Camera files: the project's own YAML (or JSON), which carries every model, and those of ROS and
+//! OpenCV, which are read.
+//!
+//! ```
+//! let text = "
+//! width: 1280
+//! height: 960
+//! focal_px: [1100, 1100]
+//! centre_px: [639.5, 479.5]
+//! model: pinhole
+//! distortion: [-0.1, 0.02]
+//! ";
+//! let camera = deltille_core::camera::Camera::from_yaml(text)?;
+//! assert_eq!(camera.width, 1280);
+//! assert_eq!(deltille_core::camera::Camera::from_yaml(&camera.to_yaml())?, camera);
+//! # Ok::<(), deltille_core::camera::CameraFileError>(())
+//! ```
+//!
+//! | `model` | `distortion` |
+//! |---|---|
+//! | `pinhole` | k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4; what is left out at the end is zero |
+//! | `fisheye` | k1 k2 k3 k4 or more; what is left out is zero |
+//! | `eucm` | α β |
+//! | `double-sphere` | ξ α |
+//! | `pupil` | k1 k2 k3 k4 k5 p1 p2 e1 e2 e3 |
+//!
+//! A ROS or OpenCV file has `image_width`, `image_height`, `camera_matrix`, `distortion_model`
+//! (`plumb_bob`, `rational_polynomial`, `equidistant`; OpenCV names none) and
+//! `distortion_coefficients` instead.
+//!
+//! Limits: the tilted sensor of OpenCV is refused unless its angles are zero.
+
+use serde::{Deserialize, Serialize};
+
+use crate::quantity;
+
+use super::{
+    BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
+    Pupil,
+};
+
+/// Most bytes of a camera file. A hundredth of it is more than most have, and readers of YAML take time with the square
+/// of it.
+const MAX_BYTES: usize = 50_000;
+
+/// Most lists and maps within each other; a camera has two.
+const MAX_DEPTH: usize = 16;
+
+/// Terms of a fisheye's polynomial that are there even when a file has fewer.
+const LEAST_TERMS: usize = 4;
+
+/// What is wrong with a camera file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CameraFileError {
+    /// Not YAML, or not with these keys.
+    #[error("not a camera file: {0}")]
+    Yaml(String),
+    /// A key holds what it must not.
+    #[error("key `{key}`: {problem}")]
+    Key {
+        /// The key.
+        key: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Own {
+    width: u32,
+    height: u32,
+    focal_px: [f64; 2],
+    centre_px: [f64; 2],
+    #[serde(default)]
+    model: Model,
+    #[serde(default)]
+    distortion: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Model {
+    #[default]
+    Pinhole,
+    Fisheye,
+    Eucm,
+    DoubleSphere,
+    Pupil,
+}
+
+#[derive(Deserialize)]
+struct Foreign {
+    image_width: u32,
+    image_height: u32,
+    camera_matrix: Matrix,
+    #[serde(default)]
+    distortion_model: Option<String>,
+    distortion_coefficients: Matrix,
+}
+
+#[derive(Deserialize)]
+struct Matrix {
+    #[serde(default)]
+    rows: Option<usize>,
+    #[serde(default)]
+    cols: Option<usize>,
+    data: Vec<f64>,
+}
+
+impl Matrix {
+    /// What is wrong with its size, as far as that is stated.
+    fn check(&self) -> Result<(), String> {
+        let stated = self.rows.zip(self.cols).map(|(rows, cols)| rows.saturating_mul(cols));
+        match (stated, self.data.len()) {
+            (Some(stated), found) if found != stated => {
+                Err(format!("it has {found} numbers, and {stated} by its rows and cols"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Model {
+    fn of(lens: &Lens) -> Self {
+        match lens {
+            Lens::BrownConrady(_) => Self::Pinhole,
+            Lens::KannalaBrandt(_) => Self::Fisheye,
+            Lens::ExtendedUnified(_) => Self::Eucm,
+            Lens::DoubleSphere(_) => Self::DoubleSphere,
+            Lens::Pupil(_) => Self::Pupil,
+        }
+    }
+
+    /// A lens of this model that has `count` parameters, or as many as it always has.
+    fn lens(self, count: usize) -> Lens {
+        match self {
+            Self::Pinhole => Lens::BrownConrady(BrownConrady::default()),
+            Self::Fisheye => {
+                let terms = count.clamp(LEAST_TERMS, MAX_LENS_PARAMETERS);
+                Lens::KannalaBrandt(KannalaBrandt { k: vec![0.0; terms] })
+            }
+            Self::Eucm => Lens::ExtendedUnified(ExtendedUnified::default()),
+            Self::DoubleSphere => Lens::DoubleSphere(DoubleSphere::default()),
+            Self::Pupil => Lens::Pupil(Pupil::default()),
+        }
+    }
+
+    /// The ranges of the parameters of its lens, from the first; those without one have that of coefficients.
+    fn ranges(self) -> &'static [quantity::Range] {
+        match self {
+            Self::Eucm => &[quantity::alpha::RANGE, quantity::beta::RANGE],
+            Self::DoubleSphere => &[quantity::xi::RANGE, quantity::alpha::RANGE],
+            Self::Pinhole | Self::Fisheye | Self::Pupil => &[],
+        }
+    }
+
+    /// Whether coefficients that are left out at the end of the list are zero.
+    fn ends_early(self) -> bool {
+        matches!(self, Self::Pinhole | Self::Fisheye)
+    }
+}
+
+impl Camera {
+    /// Reads the text of a camera file.
+    pub fn from_yaml(text: &str) -> Result<Camera, CameraFileError> {
+        check_size(text).map_err(CameraFileError::Yaml)?;
+        // OpenCV writes a version directive and a tag that no other reader of YAML knows.
+        let foreign = text.contains("camera_matrix");
+        let own = if foreign { from_foreign(text)? } else { parse(text)? };
+        let Own { width, height, focal_px, centre_px, model, mut distortion } = own;
+        let key = |key, problem: String| CameraFileError::Key { key, problem };
+        let numbers = [
+            ("width", vec![f64::from(width)], quantity::side_px::RANGE),
+            ("height", vec![f64::from(height)], quantity::side_px::RANGE),
+            ("focal_px", focal_px.to_vec(), quantity::focal_px::RANGE),
+            ("centre_px", centre_px.to_vec(), quantity::place_px::RANGE),
+            ("distortion", distortion.clone(), quantity::coefficient::RANGE),
+        ];
+        for (name, numbers, range) in numbers {
+            for number in numbers {
+                range.check(number).map_err(|problem| key(name, problem.to_string()))?;
+            }
+        }
+        let lens = model.lens(distortion.len());
+        let count = lens.names().len();
+        while distortion.len() > count && distortion.last() == Some(&0.0) {
+            distortion.pop();
+        }
+        if distortion.len() > count || distortion.len() < count && !model.ends_early() {
+            let names = lens.names().join(" ");
+            let problem = format!("there are {} numbers, the model has {names}", distortion.len());
+            return Err(key("distortion", problem));
+        }
+        distortion.resize(count, 0.0);
+        for ((name, &number), range) in lens.names().iter().zip(&distortion).zip(model.ranges()) {
+            let in_range = range.check(number);
+            in_range.map_err(|what| key("distortion", format!("{name}: {what}")))?;
+        }
+        let lens = lens.with_parameters(&distortion);
+        Ok(Camera { width, height, focal_px, centre_px, lens })
+    }
+
+    /// The text of the project's own camera file, with every digit.
+    pub fn to_yaml(&self) -> String {
+        let model = Model::of(&self.lens);
+        let mut distortion = self.lens.parameters();
+        let least = if model == Model::Fisheye { LEAST_TERMS } else { 0 };
+        while model.ends_early() && distortion.len() > least && distortion.last() == Some(&0.0) {
+            distortion.pop();
+        }
+        let Camera { width, height, focal_px, centre_px, .. } = *self;
+        let own = Own { width, height, focal_px, centre_px, model, distortion };
+        let yaml = serde_yaml_ng::to_string(&own).expect("plain data has a YAML form");
+        format!("# deltille {}, camera\n{yaml}", env!("CARGO_PKG_VERSION"))
+    }
+}
+
+/// Refuses what no camera file has, and what takes a reader of YAML time with its square.
+fn check_size(text: &str) -> Result<(), String> {
+    if text.len() > MAX_BYTES {
+        return Err(format!("more than {MAX_BYTES} bytes, which no camera has"));
+    }
+    let mut depth = 0usize;
+    for byte in text.bytes() {
+        match byte {
+            b'[' | b'{' => depth += 1,
+            b']' | b'}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        if depth > MAX_DEPTH {
+            return Err(format!("lists more than {MAX_DEPTH} deep, which no camera has"));
+        }
+    }
+    Ok(())
+}
+
+fn parse<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, CameraFileError> {
+    serde_yaml_ng::from_str(text).map_err(|error| CameraFileError::Yaml(error.to_string()))
+}
+
+fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
+    let plain: Vec<&str> = text.lines().filter(|line| !line.starts_with('%')).collect();
+    let file: Foreign = parse(&plain.join("\n").replace("!!opencv-matrix", ""))?;
+    let key = |key, problem: String| CameraFileError::Key { key, problem };
+    file.camera_matrix.check().map_err(|problem| key("camera_matrix", problem))?;
+    let coefficients = file.distortion_coefficients;
+    coefficients.check().map_err(|problem| key("distortion_coefficients", problem))?;
+    let m: [f64; 9] = file.camera_matrix.data.try_into().map_err(|data: Vec<f64>| {
+        key("camera_matrix", format!("it has {} numbers instead of 9", data.len()))
+    })?;
+    if [m[1], m[3], m[6], m[7], m[8]] != [0.0, 0.0, 0.0, 0.0, 1.0] {
+        let problem = "it is not `fx, 0, cx, 0, fy, cy, 0, 0, 1`, row by row".to_owned();
+        return Err(key("camera_matrix", problem));
+    }
+    let model = match file.distortion_model.as_deref() {
+        None | Some("plumb_bob" | "rational_polynomial") => Model::Pinhole,
+        Some("equidistant" | "fisheye") => Model::Fisheye,
+        Some(other) => return Err(key("distortion_model", format!("`{other}` is not known"))),
+    };
+    Ok(Own {
+        width: file.image_width,
+        height: file.image_height,
+        focal_px: [m[0], m[4]],
+        centre_px: [m[2], m[5]],
+        model,
+        distortion: coefficients.data,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_model_is_written_and_read() {
+        for (model, values) in [
+            (Model::Pinhole, vec![-0.1, 0.02, 1e-4, -2e-4, 0.1, 0.2, 0.0, 0.3]),
+            (Model::Fisheye, vec![0.1, -0.02, 0.0, 0.0]),
+            (Model::Fisheye, vec![0.1, -0.02, 0.0, 0.0, 1.0 / 3.0]),
+            (Model::Eucm, vec![0.6, 1.1]),
+            (Model::DoubleSphere, vec![-0.2, 0.6]),
+            (Model::Pupil, (1..=10).map(|i| f64::from(i) / 7.0).collect()),
+        ] {
+            let lens = model.lens(values.len());
+            let mut all = values.clone();
+            all.resize(lens.names().len(), 0.0);
+            let camera = Camera::centred(640, 480, 321.0, lens.with_parameters(&all));
+            let text = camera.to_yaml();
+            assert_eq!(Camera::from_yaml(&text).unwrap(), camera, "{text}");
+            let short = format!("{text}- 1.0\n").replace("- 1.0\n", "- .nan\n");
+            assert!(Camera::from_yaml(&short).is_err());
+        }
+        let tilted = "image_width: 640\nimage_height: 480\n\
+                      camera_matrix: {data: [500, 0, 320, 0, 501, 240, 0, 0, 1]}\n\
+                      distortion_coefficients: {data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 2, TAU, 0]}\n";
+        let camera = Camera::from_yaml(&tilted.replace("TAU", "0")).unwrap();
+        assert_eq!(camera.lens.parameters()[11], 2.0);
+        let said = Camera::from_yaml(&tilted.replace("TAU", "0.1")).unwrap_err().to_string();
+        assert!(said.contains("s3 s4"), "{said}");
+    }
+
+    #[test]
+    fn three_ways_to_say_the_same() {
+        let own = "width: 640\nheight: 480\nfocal_px: [500, 501]\ncentre_px: [320, 240]\n\
+                   distortion: [-0.1, 0.01, 0.001, 0.002, 0]\n";
+        let ros = "image_width: 640\nimage_height: 480\ncamera_name: left\n\
+                   camera_matrix:\n  rows: 3\n  cols: 3\n  data: [500, 0, 320, 0, 501, 240, 0, 0, 1]\n\
+                   distortion_model: plumb_bob\n\
+                   distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.1, 0.01, 0.001, 0.002, 0]\n";
+        let opencv = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n\
+                      camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   \
+                      data: [ 500., 0., 320., 0., 501., 240., 0., 0., 1. ]\n\
+                      distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   \
+                      data: [ -0.1, 0.01, 0.001, 0.002, 0. ]\n";
+        let camera = Camera::from_yaml(own).unwrap();
+        assert_eq!(Camera::from_yaml(ros).unwrap(), camera);
+        assert_eq!(Camera::from_yaml(opencv).unwrap(), camera);
+        let said = Camera::from_yaml(&own.replace("500, 501", "0, 501")).unwrap_err().to_string();
+        assert!(said.contains("focal_px"), "{said}");
+        assert!(Camera::from_yaml(&own.replace("width", "wdith")).is_err());
+        // Transposed, skewed, scaled, and of another size.
+        for (from, to) in [
+            ("500, 0, 320, 0, 501, 240, 0, 0, 1", "500, 0, 0, 0, 501, 0, 320, 240, 1"),
+            ("500, 0, 320", "500, 5, 320"),
+            ("240, 0, 0, 1", "240, 0, 0, 2"),
+            ("240, 0, 0, 1", "240, 0, .nan, 1"),
+            ("cols: 3", "cols: 4"),
+        ] {
+            let said = Camera::from_yaml(&ros.replace(from, to)).unwrap_err().to_string();
+            assert!(said.contains("camera_matrix"), "{said}");
+        }
+    }
+}

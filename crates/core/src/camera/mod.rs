@@ -1,0 +1,145 @@
+//! Camera models and poses: where a point of the world appears in an image, and along which ray a
+//! pixel looks.
+//!
+//! The camera frame is right-handed: x right, y down, z forward, the origin at the centre of
+//! projection (of a lens that is not central, where its pupil is on the axis). Pixel centres lie at
+//! integer coordinates. Each model has a file of its own with its formula and its derivatives.
+
+mod brown_conrady;
+mod double_sphere;
+mod equidistant;
+mod extended_unified;
+#[cfg(feature = "yaml")]
+pub mod file;
+mod kannala_brandt;
+mod lens;
+mod pose;
+mod pupil;
+mod reach;
+
+use glam::DVec3;
+
+pub use brown_conrady::BrownConrady;
+pub use double_sphere::DoubleSphere;
+pub use extended_unified::ExtendedUnified;
+#[cfg(feature = "yaml")]
+pub use file::CameraFileError;
+pub use kannala_brandt::KannalaBrandt;
+pub use lens::{Imaged, Lens, MAX_LENS_PARAMETERS, Ray};
+pub use pose::Pose;
+pub use pupil::Pupil;
+
+/// The parameters that every camera has, before those of its lens.
+pub const PROJECTION_PARAMETERS: [&str; 4] = ["fx", "fy", "cx", "cy"];
+
+/// Most parameters of a camera.
+pub const MAX_PARAMETERS: usize = PROJECTION_PARAMETERS.len() + MAX_LENS_PARAMETERS;
+
+/// A camera: image size, focal lengths, principal point, and the law of its lens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Image width, px.
+    pub width: u32,
+    /// Image height, px.
+    pub height: u32,
+    /// Focal lengths fx, fy, px.
+    pub focal_px: [f64; 2],
+    /// Principal point cx, cy, px.
+    pub centre_px: [f64; 2],
+    /// The lens.
+    pub lens: Lens,
+}
+
+/// A pixel position with all its derivatives: rows are the pixel's x, y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projection {
+    /// Position, px.
+    pub pixel: [f64; 2],
+    /// By the point of the camera frame, px/mm.
+    pub by_point: [[f64; 3]; 2],
+    /// By each parameter of the camera, a pair each; only as many as it has are filled.
+    pub by_parameters: [[f64; 2]; MAX_PARAMETERS],
+}
+
+impl Camera {
+    /// An ideal pinhole camera with the principal point in the middle and a horizontal field of
+    /// view of `hfov_rad`.
+    pub fn pinhole(width: u32, height: u32, hfov_rad: f64) -> Self {
+        let focal = f64::from(width) / 2.0 / (hfov_rad / 2.0).tan();
+        Self::centred(width, height, focal, Lens::BrownConrady(BrownConrady::default()))
+    }
+
+    /// A camera with square pixels and the principal point in the middle.
+    pub fn centred(width: u32, height: u32, focal_px: f64, lens: Lens) -> Self {
+        Self {
+            width,
+            height,
+            focal_px: [focal_px; 2],
+            centre_px: [f64::from(width) / 2.0 - 0.5, f64::from(height) / 2.0 - 0.5],
+            lens,
+        }
+    }
+
+    /// The names of all parameters: fx, fy, cx, cy, then those of the lens.
+    pub fn parameter_names(&self) -> Vec<String> {
+        let projection = PROJECTION_PARAMETERS.map(str::to_owned).into_iter();
+        projection.chain(self.lens.names()).collect()
+    }
+
+    /// The values of all parameters, in the order of [`Self::parameter_names`].
+    pub fn parameters(&self) -> Vec<f64> {
+        let [[fx, fy], [cx, cy]] = [self.focal_px, self.centre_px];
+        let mut values = vec![fx, fy, cx, cy];
+        values.extend(self.lens.parameters());
+        values
+    }
+
+    /// The same camera with other values of its parameters; `values` are as many as it has.
+    pub fn with_parameters(&self, values: &[f64]) -> Self {
+        Self {
+            width: self.width,
+            height: self.height,
+            focal_px: [values[0], values[1]],
+            centre_px: [values[2], values[3]],
+            lens: self.lens.with_parameters(&values[4..]),
+        }
+    }
+
+    /// Pixel position of a point of the camera frame; `None` where the model does not reach.
+    /// The position may lie outside the image.
+    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+        let projection = self.project_with_derivatives(point)?;
+        self.lens.covers(point).then_some(projection.pixel)
+    }
+
+    /// Pixel position with the derivatives by the point and by every parameter. Unlike
+    /// [`Self::project`] it passes the gaps in the domain of a rational lens, as a search must.
+    pub fn project_with_derivatives(&self, point: DVec3) -> Option<Projection> {
+        let ([fx, fy], [cx, cy]) = (self.focal_px, self.centre_px);
+        let mut by_parameters = [[0.0; 2]; MAX_PARAMETERS];
+        let Imaged { at: [x, y], by_point } = self.lens.image(point, &mut by_parameters[4..])?;
+        for [by_x, by_y] in &mut by_parameters[4..] {
+            (*by_x, *by_y) = (fx * *by_x, fy * *by_y);
+        }
+        by_parameters[..4].copy_from_slice(&[[x, 0.0], [0.0, y], [1.0, 0.0], [0.0, 1.0]]);
+        let pixel = [fx * x + cx, fy * y + cy];
+        let by_point = [by_point[0].map(|v| fx * v), by_point[1].map(|v| fy * v)];
+        let finite = pixel.iter().all(|v| v.is_finite());
+        finite.then_some(Projection { pixel, by_point, by_parameters })
+    }
+
+    /// The ray along which a pixel looks; `None` where the model does not reach.
+    pub fn unproject(&self, [x, y]: [f64; 2]) -> Option<Ray> {
+        let ([fx, fy], [cx, cy]) = (self.focal_px, self.centre_px);
+        self.lens.ray([(x - cx) / fx, (y - cy) / fy])
+    }
+
+    /// Whether a pixel position lies in the image, `margin` pixels inside its border.
+    pub fn sees(&self, [x, y]: [f64; 2], margin: f64) -> bool {
+        let low = margin - 0.5;
+        x >= low
+            && y >= low
+            && x <= f64::from(self.width) - 1.0 - low
+            && y <= f64::from(self.height) - 1.0 - low
+    }
+}

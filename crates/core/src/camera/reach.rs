@@ -1,0 +1,129 @@
+//! How far from the axis a lens is what its formula promises: up to the radius at which its curve
+//! turns back (a fold) or runs away (a pole).
+
+use super::Camera;
+
+/// Halvings of an interval; they reach the last bit.
+const HALVINGS: usize = 100;
+
+impl Camera {
+    /// Radius from the principal point, px, up to which the image grows steadily with the angle;
+    /// `None` where it does so as far as the model sees. Tangential terms, which move it by little,
+    /// are left out.
+    ///
+    /// ```
+    /// use deltille_core::camera::{BrownConrady, Camera, Lens};
+    ///
+    /// // r (1 − r²/3) turns back at r = 1, where it is 2/3.
+    /// let lens = BrownConrady { radial: [-1.0 / 3.0, 0.0, 0.0], ..BrownConrady::default() };
+    /// let camera = Camera::centred(1600, 1200, 900.0, Lens::BrownConrady(lens));
+    /// assert!((camera.steady_px().unwrap() - 600.0).abs() < 1e-6);
+    /// ```
+    pub fn steady_px(&self) -> Option<f64> {
+        let [fx, fy] = self.focal_px;
+        self.lens.steady_radius().map(|radius| radius * fx.min(fy))
+    }
+
+    /// Distance of a pixel position from the principal point, px.
+    pub fn radius_px(&self, [x, y]: [f64; 2]) -> f64 {
+        (x - self.centre_px[0]).hypot(y - self.centre_px[1])
+    }
+
+    /// Distance of the image's farthest corner from the principal point, px.
+    pub fn farthest_px(&self) -> f64 {
+        self.corners_px().map(|corner| self.radius_px(corner)).into_iter().fold(0.0, f64::max)
+    }
+
+    /// The corners of the image.
+    pub fn corners_px(&self) -> [[f64; 2]; 4] {
+        let [right, low] = [self.width, self.height].map(|side| f64::from(side) - 0.5);
+        [[-0.5, -0.5], [right, -0.5], [-0.5, low], [right, low]]
+    }
+}
+
+/// c₀ + c₁ q + c₂ q² + …
+pub(super) fn value(polynomial: &[f64], q: f64) -> f64 {
+    polynomial.iter().rev().fold(0.0, |sum, c| sum * q + c)
+}
+
+/// The product of two polynomials.
+pub(super) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let mut product = vec![0.0; a.len() + b.len() - 1];
+    for (i, a) in a.iter().enumerate() {
+        for (j, b) in b.iter().enumerate() {
+            product[i + j] += a * b;
+        }
+    }
+    product
+}
+
+/// q times the derivative of a polynomial.
+pub(super) fn slope_times_q(polynomial: &[f64]) -> Vec<f64> {
+    polynomial.iter().enumerate().map(|(power, c)| power as f64 * c).collect()
+}
+
+/// The places between 0 and `end` where a polynomial changes its sign, in their order: between two of
+/// its extrema, which are those places of the derivative, there is at most one.
+pub(super) fn sign_changes(polynomial: &[f64], end: f64) -> Vec<f64> {
+    if polynomial.len() < 2 {
+        return Vec::new();
+    }
+    let derivative: Vec<f64> = slope_times_q(polynomial).split_off(1);
+    let mut bounds = vec![0.0];
+    bounds.extend(sign_changes(&derivative, end));
+    bounds.push(end);
+    let changes = bounds.windows(2).filter_map(|bounds| {
+        let (mut low, mut high) = (bounds[0], bounds[1]);
+        let sign = |q: f64| value(polynomial, q) > 0.0;
+        let before = sign(low);
+        if before == sign(high) {
+            return None;
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            *(if sign(middle) == before { &mut low } else { &mut high }) = middle;
+        }
+        Some(low)
+    });
+    changes.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{BrownConrady, KannalaBrandt, Lens};
+
+    fn steady(lens: Lens) -> Option<f64> {
+        Camera::centred(1600, 1200, 1000.0, lens).steady_px()
+    }
+
+    #[test]
+    fn sign_changes_are_all_found() {
+        // (q − 1)(q − 2)(q − 4)
+        let found = sign_changes(&[-8.0, 14.0, -7.0, 1.0], 10.0);
+        assert_eq!(found.len(), 3, "{found:?}");
+        for (found, root) in found.iter().zip([1.0, 2.0, 4.0]) {
+            assert!((found - root).abs() < 1e-12);
+        }
+        assert_eq!(sign_changes(&[-8.0, 14.0, -7.0, 1.0], 3.0).len(), 2);
+    }
+
+    #[test]
+    fn folds_and_narrow_poles_are_found_and_harmless_lenses_left_alone() {
+        let lens = |radial, denominator| {
+            Lens::BrownConrady(BrownConrady { radial, denominator, ..BrownConrady::default() })
+        };
+        // A pole at r² = 0.25 with a zero of the numerator beside it, on either side.
+        for zero in [0.25 + 1e-7, 0.25 - 1e-7] {
+            let found = steady(lens([-1.0 / zero, 0.0, 0.0], [-4.0, 0.0, 0.0])).unwrap();
+            assert!((found - 500.0).abs() < 2.0, "{found}");
+        }
+        assert_eq!(steady(lens([-0.1, 0.02, 0.0], [0.0; 3])), None);
+        assert_eq!(steady(lens([0.3, 0.1, 0.2], [0.0; 3])), None);
+        assert_eq!(steady(lens([0.4, 0.1, 0.0], [0.7, 0.05, 0.0])), None);
+        // r = θ (1 − θ²/3) turns back at 1 rad.
+        let fisheye = |k: f64| Lens::KannalaBrandt(KannalaBrandt { k: vec![k, 0.0, 0.0, 0.0] });
+        assert!((steady(fisheye(-1.0 / 3.0)).unwrap() - 2000.0 / 3.0).abs() < 1e-6);
+        assert_eq!(steady(fisheye(-0.02)), None);
+    }
+}

@@ -1,0 +1,449 @@
+//! How much of the surroundings of a corner shows nothing but that corner.
+//!
+//! ```text
+//!        2 ╱╲ 1        the tiles around a corner end at their far sides; in tiles with a tag the
+//!       ╱▒▒▒▒────╲      cells of the tag (▒) are cut out, and what lies between them and the edges
+//!    3 ╱ ▒▒ ·     ╲ 0   stays. From all of them the blur keeps its distance.
+//!      ╲    ▒▒    ╱
+//!     4 ╲──▒▒▒▒──╱ 5
+//! ```
+
+use std::cell::LazyCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
+
+use glam::{DMat2, DVec2};
+
+use super::detection::{Grid, GridCorner};
+use super::local_map::{Bend, LocalMap};
+use super::tiling::{CHECKER, DELTILLE};
+use crate::family::Family;
+use crate::lattice::{Tile, Vertex};
+use crate::targets::{GridKind, Panel, TagsIn, Target};
+
+/// Blur of the next edges reaches this many standard deviations into the clear: beyond, an edge
+/// changes what is seen by less than 2.5 % of its contrast.
+const BLUR_MARGIN_SIGMAS: f64 = 2.0;
+
+/// Corners lie beside the chords of their neighbours by less than this part of the way to them: lenses
+/// turn an edge by less than 0.3 rad from one corner to the next.
+const MOST_SAG: f64 = 0.15;
+
+/// Where the tags of a target lie.
+#[derive(Clone, Debug, Default)]
+pub struct TagAreas {
+    /// Distance from the edges of a tile to what it shows of a tag, in edges along the other
+    /// edges; the smallest of all panels.
+    inset: f64,
+    /// Tiles with a tag, by panel id.
+    tiles: BTreeMap<u32, BTreeSet<Tile>>,
+}
+
+impl TagAreas {
+    /// The tags of `target`, of this family.
+    pub fn of(target: &Target, family: &Family) -> Self {
+        let tagged = || target.panels.iter().filter(|panel| !panel.tags.is_empty());
+        let inset = |panel: &Panel| {
+            let at = match panel.tags_in {
+                TagsIn::Black => panel.tag_inset_bits(),
+                TagsIn::White => panel.tag_margin_bits(),
+            };
+            at / family.cells().width(panel.tag_inset_bits())
+        };
+        let tiles = |panel: &Panel| panel.tags.iter().map(|tag| panel.tag_tile(tag)).collect();
+        Self {
+            inset: tagged().map(inset).fold(f64::INFINITY, f64::min),
+            tiles: tagged().map(|panel| (panel.id, tiles(panel))).collect(),
+        }
+    }
+
+    /// Whether no tile shows a tag.
+    pub fn is_empty(&self) -> bool {
+        self.tiles.is_empty()
+    }
+
+    /// Whether a tile of a grid may show a tag: as its panel has them, or any that could where the
+    /// panel is not known.
+    fn has(&self, panel: Option<u32>, tile: Tile) -> bool {
+        match panel {
+            Some(panel) => self.tiles.get(&panel).is_some_and(|tiles| tiles.contains(&tile)),
+            None => !self.tiles.is_empty() && tile == tile.kind().tag_tile(tile.anchor),
+        }
+    }
+}
+
+/// A span without any place.
+pub const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+/// Signed distance from a line, px: a·u + b·v + c.
+type Line = [f64; 3];
+
+/// What lies around a corner, in px from it.
+#[derive(Clone, Debug, Default)]
+pub struct Surroundings {
+    /// Far sides of the tiles, positive towards the corner.
+    sides: Vec<Line>,
+    /// Tags: their sides, positive outside.
+    tags: Vec<Vec<Line>>,
+    /// The edges through the corner by rising angle; empty where nothing is known.
+    pub edges: Vec<Edge>,
+    /// Whether all its neighbours are in the grid.
+    pub is_inner: bool,
+}
+
+/// An edge through a corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// Direction within a half-turn, radians.
+    pub angle_rad: f64,
+    /// Curvature to the left of that direction (to greater v of u), 1/px.
+    pub bend: f64,
+    /// How far from it something lies that is an edge of a tile away on the print, px.
+    pub across_px: f64,
+}
+
+impl Surroundings {
+    /// First and last place of a row, px from the corner, before which and behind which the far sides are seen under a
+    /// blur of this deviation.
+    pub fn span(&self, v: f64, blur_px: f64) -> [f64; 2] {
+        if self.sides.is_empty() {
+            return NOTHING;
+        }
+        let margin = BLUR_MARGIN_SIGMAS * blur_px;
+        let [mut first, mut last] = [f64::NEG_INFINITY, f64::INFINITY];
+        for [a, b, c] in &self.sides {
+            let rest = margin - b * v - c;
+            if *a > 0.0 {
+                first = first.max(rest / a);
+            } else if *a < 0.0 {
+                last = last.min(rest / a);
+            } else if rest > 0.0 {
+                return NOTHING;
+            }
+        }
+        [first, last]
+    }
+
+    /// Tells whether no tag is seen at a place, px from the corner, under a blur of this deviation.
+    pub fn off_tags(&self, blur_px: f64) -> impl Fn([f64; 2]) -> bool {
+        let margin = BLUR_MARGIN_SIGMAS * blur_px;
+        let circle2 = (self.distance_of_tags([0.0; 2]) - margin).max(0.0).powi(2);
+        move |[u, v]| u * u + v * v < circle2 || self.distance_of_tags([u, v]) >= margin
+    }
+
+    /// Half the side of the largest clear square around the corner, px.
+    pub fn clear_square_px(&self, blur_px: f64) -> f64 {
+        let clear = self.distance([0.0; 2]) - BLUR_MARGIN_SIGMAS * blur_px;
+        clear.max(0.0) * std::f64::consts::FRAC_1_SQRT_2
+    }
+
+    /// Distance from a point to the nearest thing that is not the corner, or less, px.
+    fn distance(&self, [u, v]: [f64; 2]) -> f64 {
+        let sides = self.sides.iter().map(|[a, b, c]| a * u + b * v + c);
+        let nearest = sides.reduce(f64::min).unwrap_or(0.0);
+        nearest.min(self.distance_of_tags([u, v]))
+    }
+
+    /// Distance from a point to the nearest tag, or less, px.
+    fn distance_of_tags(&self, [u, v]: [f64; 2]) -> f64 {
+        let from = |[a, b, c]: &Line| a * u + b * v + c;
+        let outside = |tag: &Vec<Line>| tag.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
+        self.tags.iter().map(outside).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// What lies around every corner of a grid, in their order, in pixels `scale` times as large as the
+/// grid's. Of a corner whose neighbours lie in one line nothing is known, and nothing is clear.
+pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
+    surroundings_of(grid, tags, scale, 0..grid.corners.len())
+}
+
+/// The same of some of the corners, by their index.
+pub fn surroundings_of(
+    grid: &Grid,
+    tags: &TagAreas,
+    scale: f64,
+    corners: impl Iterator<Item = usize>,
+) -> Vec<Surroundings> {
+    let places = Places::of(grid, scale);
+    let bend = LazyCell::new(|| places.bend(grid));
+    let around = |corner: &GridCorner| {
+        let vertex = Vertex::new(corner.row, corner.col);
+        let [x, y] = places.get(vertex)?;
+        let seen = |step: Vertex| places.get(vertex + step).map(|p| [p[0] - x, p[1] - y]);
+        let near = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))));
+        // Of a corner by itself those beyond its neighbours tell where these would be.
+        let map = match &near {
+            Some(_) => None,
+            None => Some(places.map_about(grid.kind, vertex, *bend)?),
+        };
+        let usual = |step| match &near {
+            Some(near) => near(step),
+            None => map.map_or([0.0; 2], |map| map.along(step)),
+        };
+        let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
+        let edges = edges(grid, &places, vertex, place);
+        let is_inner = grid.kind.steps().iter().all(|&step| seen(step).is_some());
+        let mut found = Surroundings { edges, is_inner, ..Default::default() };
+        for tile in grid.kind.tiles_around(vertex) {
+            let corners: Vec<Vertex> = tile.vertices().map(|v| v - vertex).collect();
+            let polygon: Vec<[f64; 2]> = corners.iter().map(|&step| place(step)).collect();
+            let n = corners.len();
+            for (i, j) in (0..n).map(|i| (i, (i + 1) % n)) {
+                if corners[i] != Vertex::new(0, 0) && corners[j] != Vertex::new(0, 0) {
+                    found.sides.push(line(polygon[i], polygon[j], [0.0; 2]));
+                }
+            }
+            if tags.has(grid.panel, tile) {
+                found.tags.push(outline(&polygon, tags.inset));
+            }
+        }
+        Some(found)
+    };
+    corners.map(|i| around(&grid.corners[i]).unwrap_or_default()).collect()
+}
+
+/// Where a corner should be that lies beside the lines of its neighbours: where they cross, px. `None`
+/// where it lies as near to them as any lens lets it, and of fewer than two lines.
+pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<[f64; 2]> {
+    let places = Places::of(grid, 1.0);
+    let vertex = Vertex::new(corner.row, corner.col);
+    let here = DVec2::new(corner.x, corner.y);
+    let (mut normal, mut right, mut lines) = (DMat2::ZERO, DVec2::ZERO, 0);
+    let mut nearest_px = f64::INFINITY;
+    let steps = grid.kind.steps();
+    for &s in &steps[..steps.len() / 2] {
+        let ends =
+            [(vertex + s, vertex - s), (vertex + s, vertex + s + s), (vertex - s, vertex - s - s)];
+        let ends = ends.into_iter().find_map(|(a, b)| Some((places.get(a)?, places.get(b)?)));
+        let Some((a, b)) = ends else { continue };
+        nearest_px = nearest_px.min(here.distance(a.into())).min(here.distance(b.into()));
+        let [a, b, c] = line(a, b, [0.0; 2]);
+        let n = DVec2::new(a, b);
+        normal += DMat2::from_cols(n.x * n, n.y * n);
+        right -= c * n;
+        lines += 1;
+    }
+    let crossing = (lines > 1).then(|| normal.inverse() * right)?;
+    (here.distance(crossing) > MOST_SAG * nearest_px).then_some(crossing.to_array())
+}
+
+/// The places of corners in the rectangle of rows and columns that they span.
+struct Places {
+    first: Vertex,
+    cols: usize,
+    places: Vec<Option<[f64; 2]>>,
+}
+
+impl Places {
+    fn of(grid: &Grid, scale: f64) -> Self {
+        let range = |of: fn(&GridCorner) -> i32| {
+            let values = || grid.corners.iter().map(of);
+            let first = values().min().unwrap_or(0);
+            (first, values().max().map_or(0, |last| (last - first) as usize + 1))
+        };
+        let ((row, rows), (col, cols)) = (range(|c| c.row), range(|c| c.col));
+        let mut found =
+            Self { first: Vertex::new(row, col), cols, places: vec![None; rows * cols] };
+        for corner in &grid.corners {
+            if let Some(at) = found.index(Vertex::new(corner.row, corner.col)) {
+                found.places[at] = Some([corner.x / scale, corner.y / scale]);
+            }
+        }
+        found
+    }
+
+    fn index(&self, vertex: Vertex) -> Option<usize> {
+        let Vertex { row, col } = vertex - self.first;
+        let (row, col) = (usize::try_from(row).ok()?, usize::try_from(col).ok()?);
+        (col < self.cols).then_some(row * self.cols + col)
+    }
+
+    fn get(&self, vertex: Vertex) -> Option<[f64; 2]> {
+        *self.places.get(self.index(vertex)?)?
+    }
+
+    fn bend(&self, grid: &Grid) -> Bend {
+        let vertices = grid.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
+        match grid.kind {
+            GridKind::Deltille => Bend::of::<DELTILLE>(vertices, |v| self.get(v), 0),
+            GridKind::Checker => Bend::of::<CHECKER>(vertices, |v| self.get(v), 0),
+        }
+    }
+
+    fn map_about(&self, kind: GridKind, vertex: Vertex, bend: Bend) -> Option<LocalMap> {
+        match kind {
+            GridKind::Deltille => LocalMap::about::<DELTILLE>(vertex, |v| self.get(v), bend),
+            GridKind::Checker => LocalMap::about::<CHECKER>(vertex, |v| self.get(v), bend),
+        }
+    }
+}
+
+/// Where a vertex lies that is not seen, if the two opposite are: as far as the first of them, or
+/// nearer by as much as that is nearer than the second.
+fn beyond(step: Vertex, seen: impl Fn(Vertex) -> Option<[f64; 2]>) -> Option<[f64; 2]> {
+    let back = Vertex::new(-step.row, -step.col);
+    let first = DVec2::from(seen(back)?);
+    let second = DVec2::from(seen(back + back)?);
+    let shrinks = first.length() / (second - first).length();
+    Some((-first * shrinks.min(1.0)).to_array())
+}
+
+/// The affine map of lattice steps that fits these best; `None` where they lie in one line.
+fn affine(known: impl Iterator<Item = (Vertex, [f64; 2])>) -> Option<impl Fn(Vertex) -> [f64; 2]> {
+    let (mut normal, mut right) = (DMat2::ZERO, [DVec2::ZERO; 2]);
+    for (step, place) in known {
+        let step = DVec2::new(step.row.into(), step.col.into());
+        normal += DMat2::from_cols(step.x * step, step.y * step);
+        right = [0, 1].map(|i| right[i] + place[i] * step);
+    }
+    let rows = (normal.determinant() > 0.5).then(|| right.map(|r| normal.inverse() * r))?;
+    Some(move |v: Vertex| rows.map(|row| row.dot(DVec2::new(v.row.into(), v.col.into()))))
+}
+
+/// The edges through the corner at `vertex`, along the chords between its neighbours.
+fn edges(
+    grid: &Grid,
+    places: &Places,
+    vertex: Vertex,
+    place: impl Fn(Vertex) -> [f64; 2],
+) -> Vec<Edge> {
+    let steps = grid.kind.steps();
+    let at = |v: Vertex| places.get(v).map(DVec2::from);
+    let bend_at = |v: Vertex, step: Vertex| Some(bend([at(v - step)?, at(v)?, at(v + step)?]));
+    let edge = |&step: &Vertex| {
+        let chord = DVec2::from(place(step)) - DVec2::from(place(Vertex::new(0, 0) - step));
+        // Bends change slowly: three along a line tell more than one, and where the line is too short
+        // the next ones are bent like it.
+        let along = [vertex, vertex + step, vertex - step].into_iter();
+        let bend = mean(along.filter_map(|v| bend_at(v, step)))
+            .or_else(|| mean(grid.kind.neighbours(vertex).filter_map(|v| bend_at(v, step))))
+            .unwrap_or(0.0);
+        let along = chord.normalize_or_zero();
+        let off = steps.iter().map(|&other| along.perp_dot(place(other).into()).abs());
+        let across_px = off.sum::<f64>() / rows_apart(grid.kind);
+        let angle_rad = chord.to_angle();
+        // Turned by half, left is right.
+        match angle_rad {
+            ..0.0 => Edge { angle_rad: angle_rad + PI, bend: -bend, across_px },
+            PI.. => Edge { angle_rad: angle_rad - PI, bend: -bend, across_px },
+            _ => Edge { angle_rad, bend, across_px },
+        }
+    };
+    let mut edges: Vec<Edge> = steps[..steps.len() / 2].iter().map(edge).collect();
+    edges.sort_by(|a, b| a.angle_rad.total_cmp(&b.angle_rad));
+    edges
+}
+
+/// The sum of the distances of all neighbours from the line along one of them, in edges.
+fn rows_apart(kind: GridKind) -> f64 {
+    match kind {
+        GridKind::Deltille => 4.0 * 3f64.sqrt() / 2.0,
+        GridKind::Checker => 2.0,
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (count, sum) = values.fold((0, 0.0), |(count, sum), value| (count + 1, sum + value));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+/// Curvature of the parabola through three points in the second, to the left of the way, 1/px.
+fn bend([a, b, c]: [DVec2; 3]) -> f64 {
+    let along = (c - a).normalize_or_zero();
+    let (before, after) = (b - a, c - b);
+    let (t0, t1) = (along.dot(before), along.dot(after));
+    let slopes = along.perp_dot(after) / t1 - along.perp_dot(before) / t0;
+    let bend = 2.0 * slopes / (t0 + t1);
+    if bend.is_finite() { bend } else { 0.0 }
+}
+
+/// The sides of what a tile shows of a tag, positive outside.
+fn outline(tile: &[[f64; 2]], inset: f64) -> Vec<Line> {
+    let n = tile.len();
+    // Every corner moves along both edges that meet there.
+    let corner = |i: usize| {
+        let (here, next, last) = (tile[i], tile[(i + 1) % n], tile[(i + n - 1) % n]);
+        [0, 1].map(|k| here[k] + inset * (next[k] + last[k] - 2.0 * here[k]))
+    };
+    let corners: Vec<[f64; 2]> = (0..n).map(corner).collect();
+    let middle = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / n as f64);
+    let sides = (0..n).map(|i| line(corners[i], corners[(i + 1) % n], middle));
+    sides.map(|side| side.map(|c| -c)).collect()
+}
+
+/// The line through two points, positive on the side of a third.
+fn line(a: [f64; 2], b: [f64; 2], inside: [f64; 2]) -> Line {
+    let [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+    let length = dx.hypot(dy).max(f64::MIN_POSITIVE);
+    let [nx, ny] = [-dy / length, dx / length];
+    let offset = -(nx * a[0] + ny * a[1]);
+    let sign = (nx * inside[0] + ny * inside[1] + offset).signum();
+    [sign * nx, sign * ny, sign * offset]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grid of 5 × 5 corners in the picture.
+    fn grid(kind: GridKind, image: impl Fn([f64; 2]) -> [f64; 2]) -> Grid {
+        let corners = (0..25).map(|i| {
+            let (row, col) = (i / 5, i % 5);
+            let [x, y] = image(kind.position(row.into(), col.into()));
+            GridCorner { row, col, id: None, x, y, cov: None }
+        });
+        Grid { kind, panel: None, mirrored: false, corners: corners.collect(), tags: Vec::new() }
+    }
+
+    #[test]
+    fn lines_cross_in_the_corner_under_perspective_and_are_not_bent() {
+        let image = |[x, y]: [f64; 2]| {
+            let depth = 1.0 + 0.1 * x - 0.05 * y;
+            [300.0 + 30.0 * (x - 0.2 * y) / depth, 200.0 - 25.0 * y / depth]
+        };
+        for kind in [GridKind::Deltille, GridKind::Checker] {
+            let grid = grid(kind, image);
+            for around in surroundings(&grid, &TagAreas::default(), 1.0) {
+                assert!(around.edges.iter().all(|edge| edge.bend.abs() < 1e-9));
+            }
+            for corner in &grid.corners {
+                assert_eq!(crossing(&grid, corner), None);
+                let mistaken = GridCorner { x: corner.x + 4.0, y: corner.y - 6.0, ..*corner };
+                let [x, y] = crossing(&grid, &mistaken).unwrap();
+                assert!((x - corner.x).hypot(y - corner.y) < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn lines_on_a_cylinder_are_bent_to_the_left_of_their_direction() {
+        // Rows are arcs of radius 400 px that curve towards greater v.
+        let image = |[x, y]: [f64; 2]| {
+            let angle = 0.05 * (x - 2.0);
+            [300.0 + 400.0 * angle.sin(), 200.0 - 20.0 * y + 400.0 * (1.0 - angle.cos())]
+        };
+        let grid = grid(GridKind::Checker, image);
+        let around = surroundings(&grid, &TagAreas::default(), 1.0);
+        let along_row = around[12].edges[0];
+        assert!(along_row.angle_rad.abs() < 1e-9, "{along_row:?}");
+        assert!((400.0 * along_row.bend - 1.0).abs() < 0.01, "{along_row:?}");
+    }
+
+    #[test]
+    fn tags_and_far_sides_are_not_clear_and_what_lies_between_is() {
+        let grid = grid(GridKind::Checker, |[x, y]| [100.0 + 40.0 * x, 300.0 - 40.0 * y]);
+        let tags = TagAreas { inset: 0.25, tiles: BTreeMap::from([(0, BTreeSet::new())]) };
+        let around = &surroundings(&grid, &tags, 1.0)[12];
+        // Cells begin 10 px from both edges; the blur reaches 2 px.
+        let off_tags = around.off_tags(1.0);
+        let clear = |[u, v]: [f64; 2]| {
+            let [first, last] = around.span(v, 1.0);
+            (first..=last).contains(&u) && off_tags([u, v])
+        };
+        assert!(clear([7.0, 7.0]) && clear([35.0, 6.0]) && clear([-6.0, 35.0]));
+        assert!(!clear([12.0, 12.0]) && !clear([9.0, 20.0]) && !clear([39.0, 0.0]));
+        let square_px = (10.0 - 2.0) * std::f64::consts::FRAC_1_SQRT_2;
+        assert!((around.clear_square_px(1.0) - square_px).abs() < 1e-9);
+    }
+}

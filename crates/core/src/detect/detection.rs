@@ -1,0 +1,133 @@
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::curve::ToneEstimate;
+use super::ink::InkEstimate;
+use super::reason::Reason;
+use crate::quantity;
+use crate::raster::{FileNotes, Pyramid};
+use crate::targets::GridKind;
+
+/// What was found in one image.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Detection {
+    /// File name of the image, or a name given by the caller.
+    pub image: String,
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// What the image's file says beside its pixels.
+    #[serde(default, skip_serializing_if = "FileNotes::is_empty")]
+    pub file: FileNotes,
+    /// Grids: labelled ones by panel id, then the others, largest first.
+    pub grids: Vec<Grid>,
+    /// What was found of the camera's tone curve, where it was looked for.
+    pub tone: Option<ToneEstimate>,
+    /// What was found of the spread of ink, where it was looked for.
+    pub ink: Option<InkEstimate>,
+    /// Why there are no labels, where labels were looked for and no grid has any; and why there are no grids.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<Reason>,
+    /// Milliseconds per stage; written only where it is asked for, as no two runs take the same.
+    #[serde(default)]
+    pub timing_ms: BTreeMap<String, f64>,
+}
+
+/// A connected piece of a tiling.
+///
+/// On a grid with `panel: None` rows and columns are relative: a right-handed lattice with its
+/// own origin, correct up to a motion of the lattice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grid {
+    /// The tiling.
+    pub kind: GridKind,
+    /// Panel of the target, once known.
+    pub panel: Option<u32>,
+    /// Whether it is seen as in a mirror. Its labels, if any, are those of the print.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub mirrored: bool,
+    /// Corners, ordered by row, then column.
+    pub corners: Vec<GridCorner>,
+    /// Tags that were decoded and agree with the labelling.
+    pub tags: Vec<DecodedTag>,
+}
+
+impl Grid {
+    /// Median distance of corners that follow each other in a row or column, px; `None` where there
+    /// are none such.
+    pub fn edge_px(&self) -> Option<f64> {
+        let places: BTreeMap<(i32, i32), [f64; 2]> =
+            self.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+        let edges = self.corners.iter().flat_map(|c| {
+            let next = [(c.row, c.col + 1), (c.row + 1, c.col)];
+            next.into_iter().filter_map(|v| places.get(&v)).map(|[x, y]| (c.x - x).hypot(c.y - y))
+        });
+        median(edges.collect())
+    }
+
+    /// Expresses positions in px of a level of the pyramid.
+    pub(super) fn moved_to_level(&mut self, level: usize) {
+        for corner in &mut self.corners {
+            [corner.x, corner.y] = Pyramid::from_level_0(level, [corner.x, corner.y]);
+        }
+    }
+
+    /// Undoes [`Self::moved_to_level`], for covariances too.
+    pub(super) fn moved_from_level(&mut self, level: usize) {
+        let area = 4f64.powi(level as i32);
+        for corner in &mut self.corners {
+            [corner.x, corner.y] = Pyramid::to_level_0(level, [corner.x, corner.y]);
+            corner.cov = corner.cov.map(|cov| cov.map(|entry| area * entry));
+        }
+    }
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// The middle value.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// A corner in the image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GridCorner {
+    /// Lattice row.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub row: i32,
+    /// Lattice column.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub col: i32,
+    /// Corner id in the target, once known.
+    pub id: Option<u32>,
+    /// Position, px; pixel centres at integers.
+    #[serde(deserialize_with = "quantity::place_px::de")]
+    pub x: f64,
+    /// Position, px, downwards.
+    #[serde(deserialize_with = "quantity::place_px::de")]
+    pub y: f64,
+    /// Covariance xx, xy, yy, px²; `None` where the method gives none.
+    pub cov: Option<[f64; 3]>,
+}
+
+/// A tag read in the image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DecodedTag {
+    /// Index of the code in its family.
+    pub id: u32,
+    /// Name of the family.
+    pub family: String,
+    /// Row of the tile's lower-left vertex, in the grid's rows.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub row: i32,
+    /// Column of the tile's lower-left vertex.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub col: i32,
+    /// Corrected bits.
+    pub errors: u32,
+}

@@ -1,0 +1,494 @@
+//! The stages in their order.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use super::beyond::go_on;
+use super::clearance::TagAreas;
+use super::corner_model::CornerFitter;
+use super::curve::Tone;
+use super::detection::{Detection, Grid};
+use super::foreshortened::foreshortened_grids;
+use super::grow::{SaddleGrid, grids};
+use super::ink::{Ink, InkEstimate};
+use super::label::Budget;
+use super::labels::{Labels, MOST_CORNERS, report_once};
+use super::optics::Optics;
+use super::pixel::Pixel;
+use super::reason::{Reason, ReasonKind};
+use super::refine::{Refinement, Refiner};
+use super::refine_grid::{is_sampled, sharp_level};
+use super::saddles::{SaddleFinder, too_many};
+use super::tile_shape::is_of_squares;
+use super::tiling::{CHECKER, DELTILLE, kind};
+use super::why;
+use crate::Clock;
+use crate::family::Family;
+use crate::lattice::GridKind;
+use crate::raster::{AnyGray, FileNotes, Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
+use crate::targets::{Target, least_untagged_corners};
+
+/// Most levels of the pyramid that every image has: the coarsest sees four times the blur that the finest can.
+const PYRAMID_LEVELS: usize = 3;
+
+/// Larger images have more, as long as a level is no narrower than this: an enlarged or blurred image
+/// shows no less than a small one, where a dozen corners in line are ten pixels apart.
+const MIN_FURTHER_SIDE: usize = 150;
+
+/// A level narrower than this shows no grid.
+pub(super) const MIN_LEVEL_SIDE: usize = 24;
+
+/// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
+/// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
+const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;
+
+/// Nor is its blur a larger part of the edge. It leaves less than a tenth of the next wave, and in the
+/// wave by itself the model reads a blur of 0.25 of the edge, of three waves 0.155.
+const fn max_untagged_blur(kind: GridKind) -> f64 {
+    match kind {
+        GridKind::Deltille => 0.14,
+        GridKind::Checker => 0.2,
+    }
+}
+
+/// Grids that are told why they have no labels: the largest ones.
+const MOST_REASONS: usize = 3;
+
+/// A grid of the other tiling with fewer corners is no reason to ask whether that was meant.
+const LEAST_OTHER_CORNERS: usize = 20;
+
+/// Options of a detector.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DetectorConfig {
+    /// Most bits of a tag that may be corrected; `None` for ⌊(h − 1)/2⌋ of its family.
+    pub max_bit_errors: Option<u32>,
+    /// Whether grids seen as in a mirror get labels too. They are those of the print, and belong to no
+    /// camera that looks at it: use them only to find out what was mirrored.
+    pub allow_mirrored: bool,
+    /// How the positions of corners are refined.
+    pub refinement: Refinement,
+    /// The camera's tone curve.
+    pub tone: Tone,
+    /// Growth of what is dark on the print.
+    pub ink: Ink,
+}
+
+/// Radius of the polynomial that refines, px: the reference detector's.
+const POLYNOMIAL_RADIUS: usize = 3;
+
+/// Largest radius of the model that refines, px: beyond, lenses bend edges more than a wider
+/// window gains.
+const MODEL_RADIUS: usize = 10;
+
+/// Finds grids in images and labels their corners.
+///
+/// ```
+/// use deltille_core::detect::{Detector, DetectorConfig};
+/// use deltille_core::raster::Gray;
+/// use deltille_core::targets::GridKind;
+///
+/// let detector = Detector::for_grid(GridKind::Deltille, Some((10, 11)), DetectorConfig::default());
+/// let detection = detector.detect(&Gray::<u8>::new(640, 480), "black.png");
+/// assert!(detection.grids.is_empty());
+/// ```
+#[derive(Clone, Debug)]
+pub struct Detector {
+    finder: Finder,
+    refiner: Refiner,
+    /// Where tiles show something else than their colour.
+    tag_areas: TagAreas,
+    labels: Labels,
+    /// Edge of the tiles, mm, where all panels have the same.
+    edge_mm: Option<f64>,
+    /// What is known of the ink from other pictures.
+    ink: Option<InkEstimate>,
+    /// What the stages are timed with, if at all.
+    clock: Option<Clock>,
+}
+
+/// Finds the corners of a tiling.
+#[derive(Clone, Debug)]
+enum Finder {
+    Deltille(SaddleFinder<DELTILLE>),
+    Checker(SaddleFinder<CHECKER>),
+}
+
+impl Finder {
+    fn of(kind: GridKind) -> Self {
+        match kind {
+            GridKind::Deltille => Self::Deltille(SaddleFinder::new()),
+            GridKind::Checker => Self::Checker(SaddleFinder::new()),
+        }
+    }
+}
+
+impl Detector {
+    /// A detector of grids whatever they belong to.
+    ///
+    /// With `size`, the rows and columns of corners of a zigzag board or of a checkerboard, a grid
+    /// that shows the whole board is labelled from its lower left corner; all other grids have
+    /// relative labels. On a checkerboard that is the corner whose upper right square is dark when
+    /// the print is turned so that it is the lower left one. A board whose rows + columns is even
+    /// looks the same after half a turn; the lowest such corner in the image is then taken.
+    pub fn for_grid(kind: GridKind, size: Option<(u32, u32)>, config: DetectorConfig) -> Self {
+        let labels = Labels::of_size(kind, size, &config);
+        let refiner = refiner(kind, config, None);
+        let tag_areas = TagAreas::default();
+        let finder = Finder::of(kind);
+        Self { finder, refiner, tag_areas, labels, edge_mm: None, ink: None, clock: None }
+    }
+
+    /// A detector of a target, whose panels are of one kind; `family` is the family that the target
+    /// names.
+    ///
+    /// An untagged panel is labelled where it is seen whole and nothing else of the target looks so;
+    /// see [`Self::for_grid`] for which corner of a checkerboard is the first then.
+    pub fn for_target(target: &Target, family: Option<&Family>, config: DetectorConfig) -> Self {
+        let labels = Labels::of_target(target, family, &config);
+        let tag_areas = family.map(|family| TagAreas::of(target, family)).unwrap_or_default();
+        let kind = target.panels.first().map_or(GridKind::Deltille, |panel| panel.kind);
+        let edges = || target.panels.iter().map(|panel| panel.edge_mm);
+        let edge_mm = edges().next().filter(|first| edges().all(|edge| edge == *first));
+        let refiner = refiner(kind, config, edge_mm);
+        let finder = Finder::of(kind);
+        Self { finder, refiner, tag_areas, labels, edge_mm, ink: None, clock: None }
+    }
+
+    /// The same detector, which tells how long its stages took by a clock.
+    pub fn with_clock(self, clock: Clock) -> Self {
+        Self { clock: Some(clock), ..self }
+    }
+
+    /// The same detector of a print of which this is known.
+    pub fn with_ink(self, ink: InkEstimate) -> Self {
+        Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), ..self }
+    }
+
+    /// Finds grids in one image; `name` is only noted in the result.
+    pub fn detect<T: Pixel>(&self, image: &Gray<T>, name: &str) -> Detection {
+        T::detect(self, image, name)
+    }
+
+    pub(super) fn detect_in<T: Intensity>(&self, image: &Gray<T>, name: &str) -> Detection {
+        match &self.finder {
+            Finder::Deltille(finder) => self.detect_with(finder, image, name),
+            Finder::Checker(finder) => self.detect_with(finder, image, name),
+        }
+    }
+
+    fn detect_with<const N: usize, T: Intensity>(
+        &self,
+        finder: &SaddleFinder<N>,
+        image: &Gray<T>,
+        name: &str,
+    ) -> Detection {
+        let mut timing = Timing::start(self.clock);
+        let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
+        timing.lap("pyramid");
+        let saddles = finder.find(&pyramid);
+        timing.lap("saddles");
+        let found = grids(finder, &pyramid, &saddles);
+        let mut left_out = Vec::new();
+        if too_many(&pyramid, saddles.len()) {
+            let edge_px = (image.pixels().len() as f64 / saddles.len() as f64).sqrt();
+            let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+            left_out.push(match edge_px < MIN_UNTAGGED_EDGE_PX {
+                true => Reason::new(ReasonKind::TooSmall, figures),
+                false => Reason::new(ReasonKind::TooManyGrids, []),
+            });
+        }
+        timing.lap("grids");
+        let least = least_untagged_corners(kind::<N>()) as usize;
+        let mut grids = self.plausible::<N, T>(image, &pyramid, &found, &mut left_out);
+        timing.lap("labels");
+        if grids.is_empty() && self.labels.are_wanted() {
+            let found = foreshortened_grids(finder, &pyramid);
+            grids = self.plausible::<N, T>(image, &pyramid, &found, &mut left_out);
+            // Compressed patterns of all kinds have triangles and squares too.
+            grids.retain(|(grid, _)| is_labelled(grid));
+            timing.lap("foreshortened");
+        }
+        let mut fitter = CornerFitter::default();
+        let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
+        let (optics, are_waves) = self.refine(&mut fitter, (image, &pyramid), &mut refined);
+        let refined = refined.into_iter().zip(reasons).zip(are_waves);
+        let mut grids: Vec<(Grid, Option<Reason>)> = refined
+            .filter(|((grid, _), is_wave)| {
+                is_vouched_for(grid) || grid.corners.len() >= least && !is_wave
+            })
+            .map(|(grid, _)| grid)
+            .collect();
+        let may_have_tags = !self.tag_areas.is_empty();
+        grids.retain(|(grid, _)| is_labelled(grid) || is_of_squares(image, grid, may_have_tags));
+        // Of what was no corner, some is gone.
+        refuse_patterns(&pyramid, &mut grids);
+        timing.lap("refine");
+        let mut reasons = if grids.is_empty() {
+            let nothing = || self.nothing_found::<N>(&pyramid, saddles.len());
+            vec![left_out.first().cloned().unwrap_or_else(nothing)]
+        } else if self.labels.are_wanted() && grids.iter().all(|(_, reason)| reason.is_some()) {
+            let of_grid = |(i, (_, reason)): (usize, &(Grid, Option<Reason>))| {
+                Some(Reason { grid: Some(i), ..reason.clone()? })
+            };
+            grids.iter().enumerate().filter_map(of_grid).take(MOST_REASONS).collect()
+        } else {
+            Vec::new()
+        };
+        let is_of_others = |reason: &Reason| {
+            matches!(reason.kind, ReasonKind::SeenTwice | ReasonKind::TooManyGrids)
+        };
+        reasons.extend(
+            left_out.into_iter().filter(|reason| !grids.is_empty() && is_of_others(reason)),
+        );
+        Detection {
+            image: name.to_owned(),
+            width: image.width() as u32,
+            height: image.height() as u32,
+            file: FileNotes::default(),
+            grids: grids.into_iter().map(|(grid, _)| grid).collect(),
+            tone: optics.tone,
+            ink: self.ink.or_else(|| {
+                let ink = optics.ink_found?;
+                Some(self.edge_mm.map_or(ink, |edge_mm| ink.on_print(edge_mm)))
+            }),
+            reasons,
+            timing_ms: timing.laps,
+        }
+    }
+
+    /// The grids with their labels that may be what is looked for, and why others are left out.
+    fn plausible<const N: usize, T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        pyramid: &Pyramid,
+        found: &[SaddleGrid],
+        left_out: &mut Vec<Reason>,
+    ) -> Vec<(Grid, Option<Reason>)> {
+        let mut budget = Budget::default();
+        let mut grids: Vec<(Grid, Option<Reason>)> =
+            found.iter().flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
+        grids.iter_mut().for_each(|(grid, _)| grid.kind = kind::<N>());
+        let least = least_untagged_corners(kind::<N>()) as usize;
+        let most = self.labels.most_corners();
+        let mut refused = None;
+        grids.retain(|(grid, no_labels)| {
+            let (corners, edge_px) = (grid.corners.len(), grid.edge_px().unwrap_or(0.0));
+            let is_large = corners >= least;
+            let why = if edge_px < MIN_UNTAGGED_EDGE_PX {
+                let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+                Some(Reason::new(ReasonKind::TooSmall, figures))
+            } else if corners > most {
+                let figures = [("corners", corners as f64), ("expected", most as f64)];
+                // Tags that were read tell more.
+                let by_tags = no_labels.clone().filter(|reason| reason.kind.is_of_tags_read());
+                let kind = match self.labels.are_wanted() {
+                    true => ReasonKind::NotWhole,
+                    false => ReasonKind::TooManyCorners,
+                };
+                by_tags.or_else(|| Some(Reason::new(kind, figures)))
+            } else {
+                None
+            };
+            let is_plausible = is_large && why.is_none();
+            refused = refused.take().or(why.filter(|_| is_large && !is_vouched_for(grid)));
+            is_vouched_for(grid) || is_plausible
+        });
+        left_out.extend(refused);
+        refuse_patterns(pyramid, &mut grids);
+        left_out.extend(report_once(&mut grids));
+        let (count, mut corners) = (grids.len(), 0);
+        grids.retain(|(grid, _)| {
+            corners += grid.corners.len();
+            is_vouched_for(grid) || corners <= MOST_CORNERS
+        });
+        left_out.extend((grids.len() < count).then(|| Reason::new(ReasonKind::TooManyGrids, [])));
+        // Labelled grids by panel, then the others; a stable sort keeps the largest first.
+        grids.sort_by_key(|(grid, _)| grid.panel.unwrap_or(u32::MAX));
+        grids
+    }
+
+    /// Refines all grids on the level of the pyramid that suits their blur; what they have in common, and for
+    /// each grid whether the blur leaves of it but a wave.
+    fn refine<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        (image, pyramid): (&Gray<T>, &Pyramid),
+        grids: &mut [Grid],
+    ) -> (Optics, Vec<bool>) {
+        let levels = pyramid.levels();
+        let blurs = self.refiner.blurs(fitter, (image, levels), grids, &self.tag_areas);
+        for level in (1..=sharp_level(&blurs, levels.len())).rev() {
+            let image = &levels[level];
+            grids.iter_mut().for_each(|grid| grid.moved_to_level(level));
+            let blurs =
+                self.refiner.blurs(fitter, (image, &levels[level..]), grids, &self.tag_areas);
+            let optics =
+                self.refiner.optics(fitter, (image, level), (grids, &blurs), &self.tag_areas);
+            // A picture that moved is as sharp as ever across its way.
+            let found = is_sampled(&blurs, optics.narrowest())
+                .then(|| self.refine_under(fitter, image, grids, (&optics, &blurs)));
+            grids.iter_mut().for_each(|grid| grid.moved_from_level(level));
+            if let Some(are_waves) = found {
+                return (optics, are_waves);
+            }
+        }
+        let optics = self.refiner.optics(fitter, (image, 0), (grids, &blurs), &self.tag_areas);
+        let are_waves = self.refine_under(fitter, image, grids, (&optics, &blurs));
+        (optics, are_waves)
+    }
+
+    /// [`Self::refine`] in an image that shows the grids under these optics and blurs, px.
+    fn refine_under<T: Intensity>(
+        &self,
+        fitter: &mut CornerFitter,
+        image: &Gray<T>,
+        grids: &mut [Grid],
+        (optics, blurs): (&Optics, &[Option<f64>]),
+    ) -> Vec<bool> {
+        let refine = |(grid, &blur_px): (&mut Grid, &Option<f64>)| {
+            let edge_px = grid.edge_px().unwrap_or(0.0);
+            self.refiner.refine_grid(fitter, image, grid, &self.tag_areas, (optics, blur_px));
+            blur_px.is_some_and(|blur_px| blur_px > max_untagged_blur(grid.kind) * edge_px)
+        };
+        grids.iter_mut().zip(blurs).map(refine).collect()
+    }
+
+    /// Why there are no grids in a picture with so many corners.
+    fn nothing_found<const N: usize>(&self, pyramid: &Pyramid, corners: usize) -> Reason {
+        // At half the size, which takes a quarter of the time.
+        let half = pyramid.levels().get(1).map(|level| {
+            let to_one = 1.0 / PYRAMID_FULL_SCALE;
+            Pyramid::new(&level.map(|v| f32::from(v) * to_one), PYRAMID_LEVELS - 1, MIN_LEVEL_SIDE)
+        });
+        let others = half.map_or(0, |half| match kind::<N>() {
+            GridKind::Deltille => most_corners(&SaddleFinder::<CHECKER>::new(), &half),
+            GridKind::Checker => most_corners(&SaddleFinder::<DELTILLE>::new(), &half),
+        });
+        if others >= LEAST_OTHER_CORNERS {
+            return Reason::new(ReasonKind::OtherTiling, [("corners", others as f64)]);
+        }
+        let reason = why::nothing_found(pyramid, corners);
+        if matches!(reason.kind, ReasonKind::NoCorners | ReasonKind::NoGrid)
+            && let Some(edge_px) = edge_of_small_tiles::<N>(&pyramid.levels()[0])
+        {
+            let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+            return Reason::new(ReasonKind::TooSmall, figures);
+        }
+        reason
+    }
+
+    /// [`Self::detect`] for an image of either depth.
+    pub fn detect_any(&self, image: &AnyGray, name: &str) -> Detection {
+        match image {
+            AnyGray::U8(image) => self.detect(image, name),
+            AnyGray::U16(image) => self.detect(image, name),
+        }
+    }
+}
+
+/// Whether tags, or the outline of a mirrored board, tell that a grid is one.
+fn is_vouched_for(grid: &Grid) -> bool {
+    !grid.tags.is_empty() || grid.mirrored
+}
+
+/// Whether a grid is known to be one, by tags or as a whole.
+fn is_labelled(grid: &Grid) -> bool {
+    is_vouched_for(grid) || grid.panel.is_some()
+}
+
+/// Leaves out grids that go on where they end, unless they are known.
+fn refuse_patterns(pyramid: &Pyramid, grids: &mut Vec<(Grid, Option<Reason>)>) {
+    loop {
+        let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
+        let mut goes_on = go_on(&pyramid.levels()[0], &all).into_iter();
+        let count = grids.len();
+        grids.retain(|(grid, _)| goes_on.next() != Some(true) || is_labelled(grid));
+        // What is refused is part of the pattern that others end at.
+        if grids.len() == count {
+            return;
+        }
+    }
+}
+
+/// The edge of the tiles, px, of a grid that shows in the part of a picture with the most contrast if that is enlarged to
+/// twice its size, and is too small as it is.
+fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
+    const PART: [usize; 2] = [400, 300];
+    const TIMES: usize = 2;
+    let size = [level.width().min(PART[0]), level.height().min(PART[1])];
+    let [left, top] = busiest_part(level, size);
+    let to_one = 1.0 / PYRAMID_FULL_SCALE;
+    let enlarged = Gray::from_fn(TIMES * size[0], TIMES * size[1], |x, y| {
+        let [u, v] = [(left, x), (top, y)].map(|(from, i)| from as f64 + i as f64 / TIMES as f64);
+        level.bilinear(u, v) * to_one
+    });
+    let pyramid = Pyramid::new(&enlarged, 1, MIN_LEVEL_SIDE);
+    let finder = SaddleFinder::<N>::new();
+    let found = grids(&finder, &pyramid, &finder.find(&pyramid));
+    let largest = found.iter().max_by_key(|grid| grid.len())?;
+    let edge_px = why::edge_px(largest)? / TIMES as f64;
+    (largest.len() >= LEAST_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
+}
+
+/// The first pixel of the part of so many columns and rows around the square with the most contrast.
+fn busiest_part(level: &Gray<i16>, size: [usize; 2]) -> [usize; 2] {
+    const SQUARE: usize = 64;
+    let contrast = |[x, y]: [usize; 2]| {
+        let [right, bottom] = [(x + SQUARE).min(level.width()), (y + SQUARE).min(level.height())];
+        let rows = (y..bottom).map(|v| &level.row(v)[x..right]);
+        rows.flat_map(|row| row.windows(2))
+            .map(|two| two[0].abs_diff(two[1]) as usize)
+            .sum::<usize>()
+    };
+    let columns = (0..level.width()).step_by(SQUARE);
+    let squares = columns.flat_map(|x| (0..level.height()).step_by(SQUARE).map(move |y| [x, y]));
+    let [x, y] = squares.max_by_key(|&square| contrast(square)).unwrap_or_default();
+    let around = |at: usize, part: usize, side: usize| {
+        (at + SQUARE / 2).saturating_sub(part / 2).min(side - part)
+    };
+    [around(x, size[0], level.width()), around(y, size[1], level.height())]
+}
+
+/// Corners of the largest grid of a tiling.
+fn most_corners<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid) -> usize {
+    let saddles = finder.find(pyramid);
+    grids(finder, pyramid, &saddles).iter().map(|grid| grid.len()).max().unwrap_or(0)
+}
+
+fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refiner {
+    let ink = match config.ink {
+        Ink::Auto => None,
+        Ink::Um(um) => Some(edge_mm.map_or(0.0, |edge_mm| um / 1e3 / edge_mm)),
+    };
+    Refiner::with_radii(kind, config.refinement, POLYNOMIAL_RADIUS, MODEL_RADIUS)
+        .with_tone(config.tone)
+        .with_ink(ink)
+}
+
+/// Number of levels of an image's pyramid.
+fn levels_of<T: Intensity>(image: &Gray<T>) -> usize {
+    let side = image.width().min(image.height());
+    let fitting = (side / MIN_FURTHER_SIDE).checked_ilog2().unwrap_or(0) as usize + 1;
+    fitting.max(PYRAMID_LEVELS)
+}
+
+/// Stopwatch of the stages.
+struct Timing {
+    /// The clock, and when the last stage ended.
+    last: Option<(Clock, Duration)>,
+    laps: BTreeMap<String, f64>,
+}
+
+impl Timing {
+    fn start(clock: Option<Clock>) -> Self {
+        Self { last: clock.map(|clock| (clock, clock())), laps: BTreeMap::new() }
+    }
+
+    fn lap(&mut self, stage: &str) {
+        if let Some((clock, last)) = &mut self.last {
+            let now = clock();
+            self.laps.insert(stage.to_owned(), now.saturating_sub(*last).as_secs_f64() * 1e3);
+            *last = now;
+        }
+    }
+}

@@ -1,0 +1,499 @@
+//! From linked corners to grids: initial quads, then breadth-first growth, then the gaps.
+//!
+//! Every corner of a grid has a lattice vertex and a *turn*: ray k of the corner points along step
+//! `k + turn` of the lattice ([`step`]). Even rays begin dark sectors. On a deltille grid turns are
+//! even, and the upright tiles are the dark ones, whatever the board's colours. On a checkerboard
+//! the turn is even where row + column is, and there the square up and right is dark.
+
+use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
+
+use super::buckets::Buckets;
+use super::edge::{MAX_CHORD_RAD, is_clean_somehow};
+use super::effort::Effort;
+use super::links::{Link, Links, facing_ray, links};
+use super::local_map::{Bend, LocalMap};
+use super::parts::distance;
+use super::parts::join;
+use super::rectified::Rectified;
+use super::saddles::{Saddle, SaddleFinder, merge_px, too_many};
+use super::sectors::turn;
+use super::tiling::{kind, neighbours, step, tiles_at};
+use crate::lattice::Vertex;
+use crate::raster::Pyramid;
+use crate::targets::GridKind;
+
+/// Largest distance of a corner from where its neighbours predict it, over the edge length.
+const MAX_SURPRISE: f64 = 0.2;
+
+/// Corners nearer to each other than this part of an edge are the same: under blur and motion one may be
+/// found twice.
+const SAME_PART: f64 = 0.2;
+
+/// A corner that is missing is looked for in several views.
+const LOOKS_FOR_CORNER: usize = 20;
+
+/// A corner's place in a grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Place {
+    vertex: Vertex,
+    turn: usize,
+}
+
+/// What the later stages know of a corner of either tiling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedSaddle {
+    /// Position, px.
+    pub position: [f64; 2],
+    /// Half the contrast around it.
+    pub amplitude: f64,
+}
+
+/// Corners by lattice vertex.
+pub type SaddleGrid = BTreeMap<Vertex, PlacedSaddle>;
+
+/// A corner in a grid while it grows.
+#[derive(Clone, Copy, Debug)]
+pub struct GrownSaddle<const N: usize> {
+    /// The corner.
+    pub saddle: Saddle<N>,
+    /// Ray k points along step `k + turn` (mod N) of the lattice.
+    pub turn: usize,
+}
+
+impl<const N: usize> GrownSaddle<N> {
+    /// The ray along step `k` of the lattice.
+    pub fn ray(&self, k: usize) -> usize {
+        (k + N - self.turn) % N
+    }
+}
+
+/// A grid while it grows.
+pub type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
+
+/// All grids among the saddles, largest first; none where there are more saddles than any board has.
+pub fn grids<const N: usize>(
+    finder: &SaddleFinder<N>,
+    pyramid: &Pyramid,
+    saddles: &[Saddle<N>],
+) -> Vec<SaddleGrid> {
+    if too_many(pyramid, saddles.len()) {
+        return Vec::new();
+    }
+    let links = links(pyramid, saddles);
+    let mut growth = Growth::new(&links);
+    let mut effort = Effort::default();
+    let finest = &pyramid.levels()[0];
+    let no_places = Buckets::new(finest.width(), finest.height());
+    let mut index = no_places.clone();
+    saddles.iter().for_each(|saddle| index.insert(saddle.position));
+    let (mut growing, mut members) = (Vec::new(), Vec::new());
+    for seed in seeds(&links) {
+        if seed.iter().any(|&(corner, _)| growth.taken[corner]) {
+            continue;
+        }
+        let places = growth.grow(&seed);
+        let mut own: BTreeMap<usize, Vertex> =
+            places.iter().map(|&(corner, place)| (corner, place.vertex)).collect();
+        let placed = places.into_iter().map(|(corner, Place { vertex, turn })| {
+            (vertex, GrownSaddle { saddle: saddles[corner], turn })
+        });
+        let mut grid: Growing<N> = placed.collect();
+        fill_gaps(finder, pyramid, &mut grid, &mut effort);
+        // What is found in a gap may have been found before, without its links.
+        grid.retain(|&vertex, grown| match same(&index, &grown.saddle) {
+            Some(corner) if growth.taken[corner] => false,
+            Some(corner) => *own.entry(corner).or_insert(vertex) == vertex,
+            None => true,
+        });
+        own.keys().for_each(|&corner| growth.taken[corner] = true);
+        growing.push(grid);
+        members.push(own);
+    }
+    let mut grids: Vec<SaddleGrid> =
+        join(pyramid, (saddles, &index), growing, members, &mut effort)
+            .into_iter()
+            .map(|(mut grid, has_grown)| {
+                if has_grown {
+                    fill_gaps(finder, pyramid, &mut grid, &mut effort);
+                }
+                grid.into_iter().map(|(v, grown)| (v, plain(&grown))).collect()
+            })
+            .collect();
+    grids.sort_by_key(|grid: &SaddleGrid| std::cmp::Reverse(grid.len()));
+    let mut grids = without_tag_cells::<N>(grids);
+    each_once(&mut grids, no_places);
+    grids
+}
+
+fn plain<const N: usize>(grown: &GrownSaddle<N>) -> PlacedSaddle {
+    PlacedSaddle { position: grown.saddle.position, amplitude: grown.saddle.sectors.amplitude }
+}
+
+/// The known saddle that is the same as another one.
+fn same<const N: usize>(places: &Buckets, saddle: &Saddle<N>) -> Option<usize> {
+    let near = places.within(saddle.position, merge_px(saddle.level));
+    near.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(i, _)| i)
+}
+
+/// Leaves out of grids the corners that are in a larger one, or under another vertex of the same; no
+/// `places` are known at first.
+fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
+    for grid in grids.iter_mut() {
+        let whole = grid.clone();
+        grid.retain(|&vertex, placed| {
+            let [x, y] = placed.position;
+            let neighbours = Vertex::STEPS.iter().filter_map(|&step| whole.get(&(vertex + step)));
+            let nearest_px = neighbours
+                .map(|p| (p.position[0] - x).hypot(p.position[1] - y))
+                .reduce(f64::min)
+                .unwrap_or(0.0);
+            let is_new = places.within([x, y], SAME_PART * nearest_px).next().is_none();
+            if is_new {
+                places.insert([x, y]);
+            }
+            is_new
+        });
+    }
+    grids.retain(|grid| !grid.is_empty());
+}
+
+/// Drops grids that lie within one tile of a larger grid: the cells of a tag are a tiling too. The largest
+/// grid comes first.
+fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGrid> {
+    if grids.len() < 2 {
+        return grids;
+    }
+    let tiles = grids
+        .iter()
+        .enumerate()
+        .flat_map(|(i, grid)| tiles_of::<N>(grid).map(move |tile| (i, tile)));
+    let tiles: Vec<(usize, Vec<[f64; 2]>)> = tiles.collect();
+    let middle = |tile: &[[f64; 2]]| {
+        [0, 1].map(|axis| tile.iter().map(|p| p[axis]).sum::<f64>() / tile.len() as f64)
+    };
+    let middles: Vec<[f64; 2]> = tiles.iter().map(|(_, tile)| middle(tile)).collect();
+    let from_middle = tiles
+        .iter()
+        .zip(&middles)
+        .flat_map(|((_, tile), &m)| tile.iter().map(move |&p| distance(p, m)));
+    let reach_px = from_middle.fold(0.0, f64::max);
+    let middles = Buckets::of(&middles);
+    let mut index = 0..;
+    grids.retain(|grid| {
+        let own = index.next();
+        let Some(first) = grid.values().next() else {
+            return false;
+        };
+        // What lies in a tile of a grid that is dropped itself lies in the tile around that.
+        !middles.within(first.position, reach_px).any(|(index, _)| {
+            let (i, tile) = &tiles[index];
+            Some(*i) < own && grid.values().all(|placed| is_inside(tile, placed.position))
+        })
+    });
+    grids
+}
+
+/// The tiles of which all vertices are in a grid.
+fn tiles_of<const N: usize>(grid: &SaddleGrid) -> impl Iterator<Item = Vec<[f64; 2]>> {
+    let place = |v: &Vertex| grid.get(v).map(|p| p.position);
+    let tiles = grid.keys().flat_map(|&v| tiles_at::<N>(v));
+    tiles.filter_map(move |tile| tile.iter().map(place).collect())
+}
+
+/// Whether a point lies in a tile. Counter-clockwise on the print is clockwise in the image's axes.
+fn is_inside(tile: &[[f64; 2]], p: [f64; 2]) -> bool {
+    (0..tile.len()).all(|i| {
+        let (a, b) = (tile[i], tile[(i + 1) % tile.len()]);
+        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) < 0.0
+    })
+}
+
+/// A corner with its place.
+type Placed = (usize, Place);
+
+/// The four corners from which a grid grows.
+type Seed = [Placed; 4];
+
+/// The seeds, those with the most complete surroundings first.
+///
+/// ```text
+///     D ───── C          A at (0,0), B at (0,1), C at (1,0), D at (1,−1): the two tiles A B C and
+///      ╲ ░░░ ╱█╲         A C D share an edge
+///       ╲ ░ ╱███╲
+///        A ───── B       on a checkerboard C at (1,1) and D at (1,0): the one dark square A B C D
+/// ```
+///
+/// All five edges, or four, are linked both ways.
+fn seeds<const N: usize>(links: &[Links<N>]) -> Vec<Seed> {
+    let root = Place { vertex: Vertex::new(0, 0), turn: 0 };
+    let mut seeds: Vec<(usize, Seed)> = Vec::new();
+    for a in 0..links.len() {
+        let a = (a, root);
+        let seed = match kind::<N>() {
+            GridKind::Deltille => (|| {
+                let [b, c, d] = [0, 1, 2].map(|k| follow(links, a, k));
+                let (b, c, d) = (b?, c?, d?);
+                let closed = follow(links, b, 2) == Some(c) && follow(links, c, 3) == Some(d);
+                closed.then_some([a, b, c, d])
+            })(),
+            GridKind::Checker => square(links, a, 0, 1),
+        };
+        let Some(seed) = seed else { continue };
+        let complete = seed.iter().map(|&(i, _)| links[i].iter().flatten().count()).sum();
+        seeds.push((complete, seed));
+    }
+    seeds.sort_by_key(|(complete, seed)| (std::cmp::Reverse(*complete), seed[0].0));
+    seeds.into_iter().map(|(_, seed)| seed).collect()
+}
+
+/// The corner that is linked to `from` along step `k` of the lattice.
+fn follow<const N: usize>(links: &[Links<N>], (corner, place): Placed, k: usize) -> Option<Placed> {
+    let link = links[corner][(k + N - place.turn) % N]?;
+    Some((link.corner, across::<N>(place, k, link)))
+}
+
+/// The corners of the square that steps `k` and `l` span at `a`, when all four edges are linked.
+fn square<const N: usize>(links: &[Links<N>], a: Placed, k: usize, l: usize) -> Option<Seed> {
+    let (b, d) = (follow(links, a, k)?, follow(links, a, l)?);
+    let c = follow(links, b, l)?;
+    (follow(links, d, k) == Some(c)).then_some([a, b, c, d])
+}
+
+/// The place at the far end of the link that leaves `from` along step `k` of the lattice.
+fn across<const N: usize>(from: Place, k: usize, link: Link) -> Place {
+    // The ray that looks back points along the opposite step.
+    Place { vertex: from.vertex + step::<N>(k), turn: (k + N / 2 + N - link.ray) % N }
+}
+
+/// Grids that grow along links, one after the other.
+struct Growth<'a, const N: usize> {
+    links: &'a [Links<N>],
+    /// By corner, whether another grid has it.
+    taken: Vec<bool>,
+    /// By corner, its place in the grid that grows.
+    places: Vec<Option<Place>>,
+    /// The corners of the grid that grows, as they came.
+    members: Vec<usize>,
+    occupied: HashSet<Vertex>,
+    queue: VecDeque<usize>,
+}
+
+impl<'a, const N: usize> Growth<'a, N> {
+    fn new(links: &'a [Links<N>]) -> Self {
+        let count = links.len();
+        let (members, occupied, queue) = (Vec::new(), HashSet::new(), VecDeque::new());
+        Self {
+            links,
+            taken: vec![false; count],
+            places: vec![None; count],
+            members,
+            occupied,
+            queue,
+        }
+    }
+
+    /// Breadth-first growth: corners join when they close a tile with the grid.
+    ///
+    /// A corner closes a triangle, or a corner that a row bends around closes a square, when two of the
+    /// grid agree on its place. A square on a straight side is closed by two new corners at once.
+    fn grow(&mut self, seed: &Seed) -> Vec<Placed> {
+        self.occupied.clear();
+        seed.iter().for_each(|&placed| self.add(placed));
+        while let Some(corner) = self.queue.pop_front() {
+            let Some(place) = self.places[corner] else {
+                continue;
+            };
+            let at = (corner, place);
+            for k in 0..N {
+                let Some(next) = follow(self.links, at, k).filter(|&next| self.is_free(next))
+                else {
+                    continue;
+                };
+                match self.votes(next) {
+                    Some(2..) => self.join(next),
+                    Some(1) if kind::<N>() == GridKind::Checker => self.join_by_square(at, k),
+                    _ => {}
+                }
+            }
+        }
+        let members = std::mem::take(&mut self.members).into_iter();
+        members.filter_map(|corner| Some((corner, self.places[corner].take()?))).collect()
+    }
+
+    fn add(&mut self, (corner, place): Placed) {
+        self.places[corner] = Some(place);
+        self.members.push(corner);
+        self.occupied.insert(place.vertex);
+        self.queue.push_back(corner);
+    }
+
+    /// Whether neither the corner nor its vertex belongs to a grid.
+    fn is_free(&self, (corner, place): Placed) -> bool {
+        !self.taken[corner]
+            && self.places[corner].is_none()
+            && !self.occupied.contains(&place.vertex)
+    }
+
+    /// Number of corners of the grid that link to `next` at its place; `None` when one links to it
+    /// as if it were elsewhere.
+    fn votes(&self, next: Placed) -> Option<usize> {
+        let linked = (0..N).filter_map(|k| follow(self.links, next, k));
+        let mut known = linked.filter_map(|(corner, place)| Some(self.places[corner]? == place));
+        known.try_fold(0, |votes, agrees| agrees.then_some(votes + 1))
+    }
+
+    fn join(&mut self, next: Placed) {
+        self.add(next);
+        // Corners that were one vote short may now have it.
+        let linked = (0..N).filter_map(|k| follow(self.links, next, k)).map(|(corner, _)| corner);
+        self.queue.extend(linked.filter(|&corner| self.places[corner].is_some()));
+    }
+
+    /// The corner that follows `at` along step `k` joins together with the next one beside it.
+    fn join_by_square(&mut self, at: Placed, k: usize) {
+        for side in [k + 1, k + N - 1] {
+            let Some([_, next, beside, known]) = square(self.links, at, k, side % N) else {
+                continue;
+            };
+            let in_grid = self.places[known.0] == Some(known.1);
+            if in_grid && self.is_free(beside) && self.votes(beside) == Some(1) {
+                self.join(next);
+                self.join(beside);
+                return;
+            }
+        }
+    }
+}
+
+/// Looks for missing corners where their neighbours predict them, until none is found.
+fn fill_gaps<const N: usize>(
+    finder: &SaddleFinder<N>,
+    pyramid: &Pyramid,
+    grid: &mut Growing<N>,
+    effort: &mut Effort,
+) {
+    let mut tried = BTreeSet::new();
+    loop {
+        let empty: BTreeSet<Vertex> = grid
+            .keys()
+            .flat_map(|&v| neighbours::<N>(v))
+            .filter(|v| !grid.contains_key(v) && !tried.contains(v))
+            .collect();
+        let mut grown = false;
+        for vertex in empty {
+            let Some((position, edge)) = predict(grid, vertex) else {
+                continue;
+            };
+            if let Some(placed) =
+                corner_near(finder, pyramid, grid, (vertex, position, edge), effort)
+            {
+                grid.insert(vertex, placed);
+                grown = true;
+                // What this corner's surroundings predict has changed.
+                tried.retain(|v: &Vertex| !neighbours::<N>(vertex).contains(v));
+            } else {
+                tried.insert(vertex);
+            }
+        }
+        if !grown {
+            return;
+        }
+    }
+}
+
+/// Where the straight (or evenly bent) rows through `vertex` continue to, and the length of an
+/// edge there; `None` unless two rows predict it, or two neighbours and those around them.
+fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<([f64; 2], f64)> {
+    let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
+    let mut sum = [0.0; 2];
+    let (mut count, mut edge) = (0.0, 0.0);
+    for step in (0..N).map(step::<N>) {
+        let first = vertex + step;
+        let second = first + step;
+        let (Some(p), Some(q)) = (at(first), at(second)) else {
+            continue;
+        };
+        let predicted: [f64; 2] = std::array::from_fn(|k| match at(second + step) {
+            Some(r) => 3.0 * p[k] - 3.0 * q[k] + r[k],
+            None => 2.0 * p[k] - q[k],
+        });
+        sum = [sum[0] + predicted[0], sum[1] + predicted[1]];
+        edge += (p[0] - q[0]).hypot(p[1] - q[1]);
+        count += 1.0;
+    }
+    if count >= 2.0 {
+        return Some(([sum[0] / count, sum[1] / count], edge / count));
+    }
+    // The first quad of a grid has no rows, but two of its corners beside the vertex.
+    let beside: Vec<[f64; 2]> = neighbours::<N>(vertex).into_iter().filter_map(at).collect();
+    let map = (beside.len() >= 2).then(|| LocalMap::about::<N>(vertex, at, Bend::usual()))??;
+    let px = |p: &[f64; 2]| (p[0] - map.place[0]).hypot(p[1] - map.place[1]);
+    Some((map.place, beside.iter().map(px).sum::<f64>() / beside.len() as f64))
+}
+
+/// The corner at `vertex`, if one is found near `position`, as the image shows it or in the frame of
+/// its neighbours.
+fn corner_near<const N: usize>(
+    finder: &SaddleFinder<N>,
+    pyramid: &Pyramid,
+    grid: &Growing<N>,
+    (vertex, position, edge_px): (Vertex, [f64; 2], f64),
+    effort: &mut Effort,
+) -> Option<GrownSaddle<N>> {
+    if !effort.spend(LOOKS_FOR_CORNER) {
+        return None;
+    }
+    let reach = (MAX_SURPRISE * edge_px).max(1.0);
+    let neighbours = neighbours::<N>(vertex);
+    // What is blurred around it is best looked for where its neighbours were found.
+    let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
+    let level = levels.max().unwrap_or(0);
+    let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);
+    finder.near(pyramid, level, position, reach, at_place).or_else(|| {
+        let seen = |k: usize| grid.get(&(vertex + step::<N>(k))).map(|g| g.saddle.position);
+        let edge = |k: usize| seen(k).map(|p| [p[0] - position[0], p[1] - position[1]]);
+        (0..N).find_map(|k| {
+            let edges = [edge(k)?, edge(k + 1)?];
+            Rectified::views::<N>(position, k, edges)
+                .into_iter()
+                .find_map(|view| view?.find(finder, pyramid, level, at_place))
+        })
+    })
+}
+
+/// A corner at `vertex` of a grid, if it has clean edges to two neighbours that agree on its turn.
+fn placed_at<const N: usize>(
+    pyramid: &Pyramid,
+    grid: &Growing<N>,
+    vertex: Vertex,
+    saddle: Saddle<N>,
+) -> Option<GrownSaddle<N>> {
+    // The turn that the neighbours agree on.
+    let mut votes = [0usize; N];
+    for (k, neighbour) in neighbours::<N>(vertex).into_iter().enumerate() {
+        let Some(other) = grid.get(&neighbour) else {
+            continue;
+        };
+        let back = other.ray(k + N / 2);
+        if let Some(ray) = facing_ray(&other.saddle, back, &saddle)
+            && is_clean_somehow(pyramid, &other.saddle, back, &saddle, ray)
+        {
+            votes[(k + N - ray) % N] += 1;
+        }
+    }
+    let turn = (0..N).max_by_key(|&t| votes[t])?;
+    let grown = GrownSaddle { saddle, turn };
+    (votes[turn] >= 2 && parallel_to_neighbours(grid, vertex, &grown)).then_some(grown)
+}
+
+/// Whether all rays point where those of each neighbour do, within what one tile may bend.
+fn parallel_to_neighbours<const N: usize>(
+    grid: &Growing<N>,
+    vertex: Vertex,
+    grown: &GrownSaddle<N>,
+) -> bool {
+    let along = |corner: &GrownSaddle<N>, k: usize| corner.saddle.sectors.rays[corner.ray(k)];
+    neighbours::<N>(vertex).iter().filter_map(|v| grid.get(v)).all(|other| {
+        (0..N).all(|k| turn(along(grown, k), along(other, k)).abs() <= 2.0 * MAX_CHORD_RAD)
+    })
+}

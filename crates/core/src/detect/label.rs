@@ -1,0 +1,1037 @@
+//! From readings of tags to panels, rows and columns, by the evidence of the whole board.
+//!
+//! A *placement* says how a grid lies on a panel: a motion of the lattice, as seen on the print or in a mirror. It
+//! predicts a code in every tile with a tag. With l half the logarithm of the odds that a cell is white, and s = ±1 the
+//! cells of the code predicted, a tile speaks for the placement by
+//!
+//! ```text
+//!     Λ = Σ ( l s − ln( p e^l + (1 − p) e^−l ) )
+//! ```
+//!
+//! where p is how often the cell is white in the codes of the target and its family. Over codes drawn so, e^Λ has the
+//! mean 1 whatever the tile shows, and so has the product over tiles; hence by Markov's inequality a placement has
+//! more evidence than E by chance less often than e^−E (the value is an *e-value*). Nothing needs to be known of the
+//! picture for that, and cells of which little is known still add up.
+//!
+//! Tiles without tags are predicted too: they are plain. A tile may be hidden, and then shows cells as drawn, so that
+//! e^Λ gives way to h + (1 − h) e^Λ; what is clearly a code, or plain, is not hidden. A placement must
+//! explain the tiles better than each of two boards that are not the target:
+//!
+//! - one with tags in the same tiles, but other codes, of the target or not;
+//! - one whose tiles are plain, or show any code, as they like, whatever part of them is plain.
+//!
+//! The first asks the codes alone, so that no pattern of plain tiles labels a board whose tags are not read; the second
+//! counts tags where none are predicted, plain tiles where tags are, and tiles beyond the end of the panel. Being held
+//! against the better of the two, and that with its best codes, the evidence only becomes less.
+//!
+//! Limits: codes are taken as drawn from their family; placements of parts of the same board by
+//! other lattices are not thought of. Faces of a solid may lie in one grid, so there nothing counts beyond a panel; but
+//! all that is placed in a grid must explain its codes better together than a board does that has the same codes
+//! elsewhere.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use super::detection::DecodedTag;
+use super::grow::SaddleGrid;
+use super::labels::mirrored;
+use super::tag_words::TargetWords;
+use super::tags::{Read, Reading, TagPlace, TagReader};
+use crate::family::{Decoder, Family};
+use crate::lattice::{LatticeMap, Orientation, Tile, Vertex};
+use crate::raster::{Gray, Intensity};
+use crate::targets::{Panel, TagsIn, Target};
+
+/// The chance that a tag is hidden or spoiled, so that its tile tells nothing of it.
+const SPOILT: f64 = 1.0 / 16.0;
+
+/// Chances that a tile without a tag is dirty, or misread, so that its cells tell nothing: what goes wrong in one goes
+/// wrong in all, as where the blur is none, and the picture decides which of these it is.
+const DIRTY: [f64; 3] = [SPOILT, 1.0 / 2.0, 1.0 - SPOILT];
+
+/// Evidence that must remain when the number of placements is taken into account, nats: 6 bits, and a
+/// picture without the target is labelled less than once in 64 times. Markov's inequality leaves a
+/// factor of about ten on top of that, a board of other tags, all of which must be taken for hidden, much more.
+const MIN_EVIDENCE: f64 = 6.0 * std::f64::consts::LN_2;
+
+/// How much more evidence a placement has than any other that puts the same corners elsewhere, nats.
+const MIN_LEAD: f64 = 6.0 * std::f64::consts::LN_2;
+
+/// With so much evidence, nats, nobody asks what a mirror would show.
+const BEYOND_DOUBT: f64 = 40.0;
+
+/// A code that the target does not have is named where it has so much evidence, nats.
+const CLEARLY_OTHER: f64 = 7.0;
+
+/// Parts of a board's tiles that may be plain: from tags in nearly all tiles to one in a corner of the board.
+const PLAIN_PARTS: [f64; 5] = [1.0 / 16.0, 1.0 / 4.0, 1.0 / 2.0, 3.0 / 4.0, 15.0 / 16.0];
+
+/// Evidence of a tile for a placement to be proposed by it, nats.
+const PROPOSING: f64 = 1.0;
+
+/// Placements that are judged, best proposals first.
+const MOST_PROPOSALS: usize = 64;
+
+/// Tiles read in a grid: more would tell no more.
+const MOST_TILES: usize = 2000;
+
+/// What one picture may cost: a tile's reading, in tiles compared with a code.
+const READING_COST: usize = 1000;
+
+/// A budget that takes some hundredths of a second.
+const BUDGET: usize = 4_000_000;
+
+/// What is left to spend on a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget(usize);
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self(BUDGET)
+    }
+}
+
+/// A grid, or a part of one, on a panel of the target.
+#[derive(Clone, Debug)]
+pub struct Labelled {
+    /// Index of the panel in the target.
+    pub panel: usize,
+    /// Whether it is seen as in a mirror.
+    pub mirrored: bool,
+    /// Panel vertex of every grid vertex that belongs to it.
+    pub vertices: BTreeMap<Vertex, Vertex>,
+    /// Tags that agree, in panel vertices.
+    pub tags: Vec<DecodedTag>,
+}
+
+/// What the tags of a grid told.
+#[derive(Clone, Debug, Default)]
+pub struct TagEvidence {
+    /// The panels found.
+    pub found: Vec<Labelled>,
+    /// Tiles that may carry a tag.
+    pub tiles: usize,
+    /// The median length of a bit, px.
+    pub bit_px: f64,
+    /// Deviation of the blur, px.
+    pub blur_px: f64,
+    /// Ids of the family that were read and are none of the target's.
+    pub foreign_ids: BTreeSet<u32>,
+    /// Tiles whose cells are read without doubt and are no code of the family.
+    pub no_codes: usize,
+    /// Tiles whose cells tell less than which code of the family they are, where nothing was found.
+    pub unread: usize,
+    /// Whether a placement has evidence enough, but another one nearly as much.
+    pub is_ambiguous: bool,
+    /// Tiles that agree and that disagree with a placement which would have evidence enough but for the latter.
+    pub contradicted: Option<[usize; 2]>,
+    /// Whether the budget ended before the grid was read.
+    pub is_cut_short: bool,
+}
+
+/// Labels grids with the panels of a tagged target.
+#[derive(Clone, Debug)]
+pub struct TagLabeller {
+    readers: Vec<TagReader>,
+    family: String,
+    decoder: Decoder,
+    /// Errors at which a word is read as a code without doubt.
+    sure_errors: u32,
+    /// The number of words of the family.
+    family_words: usize,
+    max_errors: Option<u32>,
+    words: TargetWords,
+    panels: Vec<LabelPanel>,
+    /// Whether panels may lie in one grid, as the faces of a solid.
+    panels_abut: bool,
+    /// Panels and tiles of each code of the target.
+    places: Vec<Vec<(usize, Tile)>>,
+}
+
+#[derive(Clone, Debug)]
+struct LabelPanel {
+    /// Index into the readers, by where tags lie in their tiles.
+    reader: usize,
+    inverted: bool,
+    corners: BTreeSet<Vertex>,
+    /// Index of the code in each tile.
+    tags: BTreeMap<Tile, usize>,
+    /// All tiles of the colour that tags are in.
+    tiles: BTreeSet<Tile>,
+}
+
+/// What the tiles of a grid say, all read alike and seen from the same side.
+struct Sight {
+    reader: usize,
+    inverted: bool,
+    mirrored: bool,
+    index: BTreeMap<Tile, usize>,
+    readings: Vec<Reading>,
+    /// Λ of each reading and word of the target.
+    evidence: Vec<Vec<f32>>,
+    shown: Vec<Shown>,
+}
+
+/// What a tile shows, whatever a placement predicts: logarithms of likelihoods, over that of drawn cells.
+#[derive(Clone, Copy, Debug)]
+struct Shown {
+    /// If it should be plain, by how many such tiles are dirty.
+    if_plain: [f64; DIRTY.len()],
+    /// The word of the target that fits best.
+    word: usize,
+    /// If it shows drawn cells or one of all codes, whichever fits better; with `word`, and without it.
+    code: [f64; 2],
+    /// If it belongs to a board of which these parts are plain.
+    of_board: [[f64; PLAIN_PARTS.len()]; 2],
+}
+
+/// A tile under a placement: logarithms of likelihoods, over that of drawn cells.
+#[derive(Clone, Copy, Debug)]
+struct Judged {
+    /// As the placement predicts it, by how many plain tiles are dirty.
+    predicted: [f64; DIRTY.len()],
+    /// The same on a board with another code in this tile.
+    other_code: [f64; DIRTY.len()],
+    /// On a board that shows what it likes, as far as the tile is of the panel.
+    of_board: Option<[f64; PLAIN_PARTS.len()]>,
+}
+
+/// How a grid lies on a panel: `map` takes the grid, in a mirror if `sight` is mirrored, to the panel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Placement {
+    sight: usize,
+    panel: usize,
+    map: LatticeMap,
+    evidence: f64,
+}
+
+/// Placements with evidence enough.
+#[derive(Default)]
+struct Placed {
+    placements: Vec<Placement>,
+    is_ambiguous: bool,
+    contradicted: Option<[usize; 2]>,
+}
+
+impl TagLabeller {
+    /// A labeller for the tags of `target`; `None` when it has no tags. Tags with more than `max_errors` misread
+    /// cells do not count, where that is given.
+    pub fn new(target: &Target, family: &Family, max_errors: Option<u32>) -> Option<Self> {
+        let ids: BTreeSet<u32> =
+            target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
+        let ids: Vec<u32> = ids.into_iter().filter(|&id| family.code(id).is_some()).collect();
+        let mut tag_places: Vec<TagPlace> = Vec::new();
+        let mut places = vec![Vec::new(); ids.len()];
+        let mut panels = Vec::new();
+        for (index, panel) in target.panels.iter().enumerate() {
+            let place = TagPlace::of(panel);
+            let reader = tag_places.iter().position(|&p| p == place).unwrap_or_else(|| {
+                tag_places.push(place);
+                tag_places.len() - 1
+            });
+            let of_id = |id: u32| ids.binary_search(&id).ok();
+            let tags: BTreeMap<Tile, usize> = panel
+                .tags
+                .iter()
+                .filter_map(|tag| Some((panel.tag_tile(tag), of_id(tag.id)?)))
+                .collect();
+            for (&tile, &code) in &tags {
+                places[code].push((index, tile));
+            }
+            let corners = panel_vertices(panel);
+            let in_dark = panel.tags_in == TagsIn::Black;
+            let tiles = panel.tiles().into_iter().filter(|t| t.is_dark() == in_dark).collect();
+            panels.push(LabelPanel { reader, inverted: panel.inverted, corners, tags, tiles });
+        }
+        let panels_abut = target.panels.windows(2).any(|pair| pair[0].pose != pair[1].pose);
+        let readers = tag_places.iter().map(|&place| TagReader::new(family, place)).collect();
+        (!ids.is_empty()).then(|| Self {
+            readers,
+            family: family.name().to_owned(),
+            decoder: Decoder::new(family),
+            sure_errors: family.correctable() / 2,
+            family_words: family.len() * usize::from(family.kind().turns()),
+            max_errors,
+            words: TargetWords::new(family, ids),
+            panels,
+            panels_abut,
+            places,
+        })
+    }
+
+    /// The panels in a grid, by the tags read in `image`.
+    pub fn label<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        grid: &SaddleGrid,
+        budget: &mut Budget,
+    ) -> TagEvidence {
+        let mut evidence = TagEvidence::default();
+        let mut sights = Vec::new();
+        for (reader, inverted) in self.ways_to_read() {
+            let cost = READING_COST + 2 * self.words.len();
+            let most = (budget.0 / cost).min(MOST_TILES);
+            if most == 0 {
+                evidence.is_cut_short = true;
+                return evidence;
+            }
+            let read = self.readers[reader].read(image, grid, inverted, most);
+            let Read { readings, bit_px, blur_px } = read;
+            budget.0 -= readings.len() * cost;
+            evidence.tiles += readings.len();
+            evidence.bit_px = evidence.bit_px.max(bit_px);
+            evidence.blur_px = evidence.blur_px.max(blur_px);
+            sights.push(self.sight((reader, inverted, false), readings, &mut evidence));
+        }
+        self.decide(sights, grid, evidence)
+    }
+
+    /// What the sights of a grid, and the same in a mirror, are evidence for.
+    fn decide(
+        &self,
+        mut sights: Vec<Sight>,
+        grid: &SaddleGrid,
+        mut evidence: TagEvidence,
+    ) -> TagEvidence {
+        let mut placed = self.place(&sights, grid);
+        let beyond_doubt = |placed: &Placed| {
+            !placed.placements.is_empty()
+                && placed.placements.iter().all(|placement| placement.evidence > BEYOND_DOUBT)
+        };
+        if !beyond_doubt(&placed) {
+            let in_mirror: Vec<Sight> = sights
+                .iter()
+                .map(|sight| {
+                    let reader = &self.readers[sight.reader];
+                    let readings = sight.readings.iter().map(|r| reader.mirrored(r)).collect();
+                    let way = (sight.reader, sight.inverted, true);
+                    self.sight(way, readings, &mut TagEvidence::default())
+                })
+                .collect();
+            sights.extend(in_mirror);
+            placed = self.place(&sights, grid);
+        }
+        evidence.is_ambiguous = placed.is_ambiguous;
+        evidence.contradicted = placed.contradicted;
+        let labelled = |placement: &Placement| self.labelled(&sights, grid, placement);
+        evidence.found = placed.placements.iter().map(labelled).collect();
+        if evidence.found.is_empty() {
+            let needed_bits = (self.family_words.max(1) as f64).log2();
+            let is_unread = |reading: &&Reading| reading.bits_told() < needed_bits;
+            let as_seen = sights.iter().filter(|sight| !sight.mirrored);
+            evidence.unread = as_seen.flat_map(|sight| &sight.readings).filter(is_unread).count();
+        }
+        let mut taken = BTreeSet::new();
+        for found in &mut evidence.found {
+            found.vertices.retain(|vertex, _| taken.insert(*vertex));
+        }
+        evidence
+    }
+
+    /// Readers, and whether for inverted boards, that the target's panels need.
+    fn ways_to_read(&self) -> BTreeSet<(usize, bool)> {
+        let tagged = self.panels.iter().filter(|panel| !panel.tags.is_empty());
+        tagged.map(|panel| (panel.reader, panel.inverted)).collect()
+    }
+
+    /// Compares readings with all words.
+    fn sight(
+        &self,
+        (reader, inverted, mirrored): (usize, bool, bool),
+        readings: Vec<Reading>,
+        noted: &mut TagEvidence,
+    ) -> Sight {
+        let plain = self.readers[reader].plain_word();
+        let mut evidence = Vec::with_capacity(readings.len());
+        let mut shown = Vec::with_capacity(readings.len());
+        for reading in &readings {
+            let word = reading.word();
+            let mut of_words = self.words.evidence(&reading.half_odds);
+            if let Some(max_errors) = self.max_errors {
+                for (index, evidence) in of_words.iter_mut().enumerate() {
+                    if (self.words.word(index) ^ word).count_ones() > max_errors {
+                        *evidence = f32::NEG_INFINITY;
+                    }
+                }
+            }
+            shown.push(self.shown((reading, plain), &of_words, noted));
+            evidence.push(of_words);
+        }
+        let index = readings.iter().enumerate().map(|(i, reading)| (reading.tile, i)).collect();
+        Sight { reader, inverted, mirrored, index, readings, evidence, shown }
+    }
+
+    /// What a tile shows, by its evidence for all words; `plain` is what it shows without a tag.
+    fn shown(
+        &self,
+        (reading, plain): (&Reading, u64),
+        of_words: &[f32],
+        noted: &mut TagEvidence,
+    ) -> Shown {
+        let among = |words: usize| (words.max(1) as f64).ln();
+        let (mut word, mut most, mut second) = (0, f32::NEG_INFINITY, f32::NEG_INFINITY);
+        for (index, &evidence) in of_words.iter().enumerate() {
+            if evidence > most {
+                (word, second, most) = (index, most, evidence);
+            } else {
+                second = second.max(evidence);
+            }
+        }
+        let of_target = |evidence: f32| f64::from(evidence) - among(of_words.len());
+        let mut code = [most, second].map(|evidence| of_target(evidence).max(0.0));
+        // Another code of the family, where none of the target's fits.
+        if let Some(decoded) = self.decoder.decode(reading.word(), self.sure_errors)
+            && self.words.code_of(decoded.id).is_none()
+        {
+            let evidence = self.words.evidence_of(self.decoder.word(decoded), &reading.half_odds);
+            let clear = f64::from(evidence) - among(self.family_words);
+            if evidence > most {
+                code = code.map(|code| code.max(clear));
+                if clear > CLEARLY_OTHER {
+                    noted.foreign_ids.insert(decoded.id);
+                }
+            }
+        } else if is_word(reading) && most < 0.0 {
+            noted.no_codes += 1;
+        }
+        let plain = f64::from(self.words.evidence_of(plain, &reading.half_odds));
+        let of_board = code.map(|code| {
+            PLAIN_PARTS.map(|part| (part * plain.exp() + (1.0 - part) * code.exp()).ln())
+        });
+        let if_plain = DIRTY.map(|chance| or_spoilt(plain, chance));
+        Shown { if_plain, word, code, of_board }
+    }
+
+    /// The placements that the sights of a grid are evidence for, those with the most first.
+    fn place(&self, sights: &[Sight], grid: &SaddleGrid) -> Placed {
+        let proposals = self.proposals(sights);
+        let tiles: usize = sights.iter().map(|sight| sight.readings.len()).sum();
+        let ways = ((tiles * self.words.len()).max(1) as f64).ln();
+        let mut placed = Placed::default();
+        let mut taken = BTreeSet::new();
+        loop {
+            let mut judged: Vec<Placement> = proposals
+                .iter()
+                .map(|placement| {
+                    let sight = &sights[placement.sight];
+                    let evidence = self.evidence(sight, placement, &taken) - ways;
+                    Placement { evidence, ..*placement }
+                })
+                .filter(|placement| placement.evidence >= MIN_EVIDENCE)
+                .collect();
+            judged.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+            let Some((best, others)) = judged.split_first() else {
+                if placed.placements.is_empty()
+                    && let Some(first) = proposals.first()
+                    && first.evidence - ways >= MIN_EVIDENCE
+                {
+                    placed.contradicted = Some(self.agreement(&sights[first.sight], first));
+                }
+                break;
+            };
+            let vertices = self.on_panel(sights, grid, best);
+            let rivals =
+                others.iter().take_while(|other| other.evidence > best.evidence - MIN_LEAD);
+            let is_ambiguous = rivals.into_iter().any(|rival| {
+                self.on_panel(sights, grid, rival).keys().any(|v| vertices.contains_key(v))
+            });
+            let before = taken.len();
+            taken.extend(vertices.into_keys());
+            if is_ambiguous {
+                placed.is_ambiguous = true;
+            } else {
+                placed.placements.push(*best);
+            }
+            if taken.len() == before {
+                break;
+            }
+        }
+        if self.panels_abut && !placed.placements.is_empty() {
+            let (surplus, counts) = self.together(sights, &placed.placements);
+            if surplus < 0.0 {
+                placed.contradicted = Some(counts);
+                placed.placements.clear();
+            }
+        }
+        placed
+    }
+
+    /// The placements that tiles speak for, with the sum of their evidence, which grows with what is for
+    /// a placement and leaves out what is against it.
+    fn proposals(&self, sights: &[Sight]) -> Vec<Placement> {
+        let turns = self.words.turns();
+        let mut sums: HashMap<(usize, usize, LatticeMap), f64> = HashMap::new();
+        for (index, sight) in sights.iter().enumerate() {
+            for (reading, evidence) in sight.readings.iter().zip(&sight.evidence) {
+                for (word, &evidence) in evidence.iter().enumerate() {
+                    if f64::from(evidence) < PROPOSING {
+                        continue;
+                    }
+                    for &(panel, tile) in &self.places[word / turns] {
+                        let LabelPanel { reader, inverted, .. } = self.panels[panel];
+                        if (reader, inverted) == (sight.reader, sight.inverted) {
+                            let map = panel_from_grid(reading.tile, tile, (word % turns) as u8);
+                            *sums.entry((index, panel, map)).or_default() += f64::from(evidence);
+                        }
+                    }
+                }
+            }
+        }
+        let mut proposals: Vec<Placement> = sums
+            .into_iter()
+            .map(|((sight, panel, map), evidence)| Placement { sight, panel, map, evidence })
+            .collect();
+        let key = |p: &Placement| (p.sight, p.panel, p.map);
+        proposals
+            .sort_unstable_by(|a, b| b.evidence.total_cmp(&a.evidence).then(key(a).cmp(&key(b))));
+        proposals.truncate(MOST_PROPOSALS);
+        proposals
+    }
+
+    /// Evidence for a placement in nats, from tiles none of whose corners is taken.
+    fn evidence(&self, sight: &Sight, placement: &Placement, taken: &BTreeSet<Vertex>) -> f64 {
+        let mut predicted = [0.0; DIRTY.len()];
+        let mut other_codes = [0.0; DIRTY.len()];
+        let mut of_board = [0.0; PLAIN_PARTS.len()];
+        for tile in self.judged(sight, placement, taken) {
+            add(&mut predicted, tile.predicted);
+            add(&mut other_codes, tile.other_code);
+            add(&mut of_board, tile.of_board.unwrap_or_default());
+        }
+        mean(predicted) - greatest(of_board).max(mean(other_codes))
+    }
+
+    /// How many tiles agree with a placement, and how many do not.
+    fn agreement(&self, sight: &Sight, placement: &Placement) -> [usize; 2] {
+        let against = |tile: &Judged| {
+            greatest(tile.predicted) < tile.of_board.map_or(0.0, greatest) - PROPOSING
+        };
+        let (against, agreeing): (Vec<Judged>, Vec<Judged>) =
+            self.judged(sight, placement, &BTreeSet::new()).partition(against);
+        [agreeing.len(), against.len()]
+    }
+
+    /// The tiles of a grid under a placement, but for those of whose corners some is taken.
+    fn judged(
+        &self,
+        sight: &Sight,
+        placement: &Placement,
+        taken: &BTreeSet<Vertex>,
+    ) -> impl Iterator<Item = Judged> {
+        let free = |tile: Tile| {
+            let side = |v: Vertex| if sight.mirrored { mirrored(v) } else { v };
+            taken.is_empty() || tile.vertices().all(|v| !taken.contains(&side(v)))
+        };
+        let tiles = (0..sight.readings.len()).filter(move |&i| free(sight.readings[i].tile));
+        tiles.filter_map(move |index| self.judge(sight, placement, index))
+    }
+
+    /// What all tiles of a grid that show codes say of all that is placed in it together, each panel but once: how much
+    /// better it explains them than a board that has the same codes wherever it likes, nats, and how many agree and
+    /// disagree.
+    fn together(&self, sights: &[Sight], placements: &[Placement]) -> (f64, [usize; 2]) {
+        let mut panels = BTreeSet::new();
+        let once: Vec<&Placement> = placements.iter().filter(|p| panels.insert(p.panel)).collect();
+        let mut surplus = 0.0;
+        let mut counts = [0; 2];
+        for at in once.iter().map(|placement| placement.sight).collect::<BTreeSet<usize>>() {
+            let sight = &sights[at];
+            let codes = sight.shown.iter().map(|shown| shown.code[0]).enumerate();
+            for (index, code) in codes.filter(|&(_, code)| code > PROPOSING) {
+                let mut here = once.iter().filter(|placement| placement.sight == at);
+                let judged = here.find_map(|placement| self.judge(sight, placement, index));
+                let predicted = judged.map_or(SPOILT.ln(), |tile| greatest(tile.predicted));
+                surplus += predicted - code;
+                counts[usize::from(predicted < code)] += 1;
+            }
+        }
+        (surplus, counts)
+    }
+
+    /// A tile under a placement that says something of it.
+    fn judge(&self, sight: &Sight, placement: &Placement, index: usize) -> Option<Judged> {
+        let panel = &self.panels[placement.panel];
+        let (tile, shown) = (sight.readings[index].tile, &sight.shown[index]);
+        let on_panel = placement.map.apply_tile(tile);
+        if let Some(code) = panel.tags.get(&on_panel) {
+            let word = self.words.turns() * code + turns_of(placement.map, tile);
+            // Other codes than that.
+            let but = usize::from(shown.word == word);
+            let evidence = sight.evidence[index][word].into();
+            let predicted = [or_spoilt(evidence, SPOILT); DIRTY.len()];
+            let other_code = [shown.code[but]; DIRTY.len()];
+            let of_board = Some(shown.of_board[but]);
+            Some(Judged { predicted, other_code, of_board })
+        } else if panel.tiles.contains(&on_panel) {
+            let predicted = shown.if_plain;
+            let of_board = Some(shown.of_board[0]);
+            Some(Judged { predicted, other_code: predicted, of_board })
+        } else if self.panels_abut {
+            None
+        } else {
+            let predicted = [SPOILT.ln(); DIRTY.len()];
+            Some(Judged { predicted, other_code: predicted, of_board: None })
+        }
+    }
+
+    /// Grid tile, in the mirror if need be, code and turns of every tag of a panel under a placement.
+    fn expected(&self, placement: &Placement) -> impl Iterator<Item = (Tile, usize, usize)> {
+        let grid_from_panel = placement.map.inverse();
+        self.panels[placement.panel].tags.iter().map(move |(&tile, &code)| {
+            let on_grid = grid_from_panel.apply_tile(tile);
+            let a = grid_from_panel.apply(tile.frame()[0]);
+            let turns = on_grid.vertices().position(|v| v == a).unwrap_or(0);
+            (on_grid, code, turns)
+        })
+    }
+
+    /// Panel vertex of every grid vertex that a placement puts on a corner of its panel.
+    fn on_panel(
+        &self,
+        sights: &[Sight],
+        grid: &SaddleGrid,
+        placement: &Placement,
+    ) -> BTreeMap<Vertex, Vertex> {
+        let is_mirrored = sights[placement.sight].mirrored;
+        let side = |v: Vertex| if is_mirrored { mirrored(v) } else { v };
+        let corners = &self.panels[placement.panel].corners;
+        grid.keys()
+            .map(|&vertex| (vertex, placement.map.apply(side(vertex))))
+            .filter(|(_, on_panel)| corners.contains(on_panel))
+            .collect()
+    }
+
+    fn labelled(&self, sights: &[Sight], grid: &SaddleGrid, placement: &Placement) -> Labelled {
+        let sight = &sights[placement.sight];
+        let mut tags: Vec<DecodedTag> = self
+            .expected(placement)
+            .filter_map(|(tile, code, turns)| {
+                let reading = *sight.index.get(&tile)?;
+                let word = self.words.turns() * code + turns;
+                let errors = (self.words.word(word) ^ sight.readings[reading].word()).count_ones();
+                let Vertex { row, col } = placement.map.apply_tile(tile).anchor;
+                let (id, family) = (self.words.id(code), self.family.clone());
+                (sight.evidence[reading][word] > 0.0).then_some(DecodedTag {
+                    id,
+                    family,
+                    row,
+                    col,
+                    errors,
+                })
+            })
+            .collect();
+        tags.sort_by_key(|tag| (tag.row, tag.col));
+        Labelled {
+            panel: placement.panel,
+            mirrored: sight.mirrored,
+            vertices: self.on_panel(sights, grid, placement),
+            tags,
+        }
+    }
+}
+
+/// Logarithm of the likelihood of a tile, over that of drawn cells, that shows what is predicted or, by a chance, such
+/// cells.
+fn or_spoilt(evidence: f64, chance: f64) -> f64 {
+    (chance + (1.0 - chance) * evidence.exp()).ln()
+}
+
+fn add<const N: usize>(sums: &mut [f64; N], logs: [f64; N]) {
+    sums.iter_mut().zip(logs).for_each(|(sum, log)| *sum += log);
+}
+
+fn greatest<const N: usize>(logs: [f64; N]) -> f64 {
+    logs.into_iter().fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Logarithm of the mean of likelihoods, from their logarithms.
+fn mean<const N: usize>(logs: [f64; N]) -> f64 {
+    let most = greatest(logs);
+    most + (logs.iter().map(|log| (log - most).exp()).sum::<f64>() / N as f64).ln()
+}
+
+/// How often a tag is turned counter-clockwise, by 120° or 90°, in a grid tile that this map puts on a panel.
+fn turns_of(panel_from_grid: LatticeMap, on_grid: Tile) -> usize {
+    let a = panel_from_grid.inverse().apply(panel_from_grid.apply_tile(on_grid).frame()[0]);
+    on_grid.vertices().position(|v| v == a).unwrap_or(0)
+}
+
+/// Whether the cells of a tile are told without doubt, and are not all the same.
+fn is_word(reading: &Reading) -> bool {
+    /// Half odds of a cell that is read right 19 times of 20.
+    const SURE: f32 = 1.5;
+    let n = reading.half_odds.len();
+    let sure = |sign: f32| reading.half_odds.iter().filter(|&&odds| sign * odds > SURE).count();
+    10 * (sure(1.0) + sure(-1.0)) >= 9 * n && sure(1.0).min(sure(-1.0)) * 6 >= n
+}
+
+/// The vertices of a panel's corners.
+pub fn panel_vertices(panel: &Panel) -> BTreeSet<Vertex> {
+    panel.corners.iter().map(|corner| Vertex::new(corner.row, corner.col)).collect()
+}
+
+/// The motion that takes the grid tile to the panel's `tile` when the tag in it is turned
+/// counter-clockwise `turns` times, by 120° or 90°, against the grid.
+fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
+    // The tag's lower-left vertex lies on vertex `turns` of the grid tile, and its lower edge
+    // points along step 2·turns, on an inverted tile half a turn further; on a square along step
+    // `turns`.
+    let kind = tile.kind();
+    let steps = kind.steps().len() as i32 / i32::from(kind.turns());
+    let half_turn = if on_grid.orientation == Orientation::Inverted { 3 } else { 0 };
+    let from = on_grid.vertices().nth(usize::from(turns)).unwrap_or(on_grid.anchor);
+    LatticeMap::taking(kind, from, tile.anchor, -(steps * i32::from(turns) + half_turn))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::grow::PlacedSaddle;
+    use super::*;
+    use crate::family::{shipped_names, square_names};
+    use crate::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, TagSpec, TargetSpec};
+
+    /// Noise, of full scale, at which more than a tenth of the cells of four pixels a bit are taken for the other.
+    const NOISE_OF_A_TENTH: f64 = 0.335;
+
+    /// Half odds of a cell that is read without doubt.
+    const SURE: f32 = 2.6;
+
+    /// What is found of `asked` where the tiles of another target, or of the same, are read without doubt, in the grid
+    /// that a picture of it or of its mirror image gives.
+    fn found_in(family: &Family, asked: &Target, shown: &Target, flopped: bool) -> TagEvidence {
+        let labeller = TagLabeller::new(asked, family, None).unwrap();
+        let side = |v: Vertex| if flopped { mirrored(v) } else { v };
+        let panel = &shown.panels[0];
+        let placed = PlacedSaddle { position: [0.0; 2], amplitude: 1.0 };
+        let grid: SaddleGrid =
+            panel_vertices(panel).into_iter().map(|v| (side(v), placed)).collect();
+        let reader = &labeller.readers[0];
+        let codes: BTreeMap<Tile, u64> = panel
+            .tags
+            .iter()
+            .map(|tag| (panel.tag_tile(tag), family.code(tag.id).unwrap()))
+            .collect();
+        let reading = |tile: Tile| {
+            // Without a tag it is black all over.
+            let code = codes.get(&tile).copied().unwrap_or(0);
+            let odds = |bit: u32| if code >> bit & 1 == 1 { SURE } else { -SURE };
+            let half_odds = (0..family.dimension().bits()).map(odds).collect();
+            let upright = Reading { tile, half_odds };
+            if flopped { reader.mirrored(&upright) } else { upright }
+        };
+        let whole = |reading: &Reading| reading.tile.vertices().all(|v| grid.contains_key(&v));
+        let dark = panel.tiles().into_iter().filter(|tile| tile.is_dark());
+        let readings = dark.map(reading).filter(whole).collect();
+        let mut evidence = TagEvidence::default();
+        let sight = labeller.sight((0, panel.inverted, false), readings, &mut evidence);
+        labeller.decide(vec![sight], &grid, evidence)
+    }
+
+    fn board(family: &Family, first_id: u32) -> Option<Target> {
+        board_of(family, (8, 9), TagSpec { first_id, ..TagSpec::default() })
+    }
+
+    fn board_of(family: &Family, (rows, cols): (u32, u32), tags: TagSpec) -> Option<Target> {
+        let mut spec = BoardSpec::new(family.kind(), rows, cols, 20.0);
+        spec.tags = Some(TagSpec { family: family.name().to_owned(), ..tags });
+        let paper = PaperSpec::default();
+        Target::build("board", &TargetSpec::Board(spec), Some(family), Some(&paper)).ok()
+    }
+
+    /// Boards of every family with about so many first ids, as they are and flopped.
+    fn labels_are_those_of_the_print(first_ids: usize) {
+        for name in shipped_names().into_iter().chain(square_names()) {
+            let family = Family::shipped(name).unwrap();
+            for first_id in (0..family.len()).step_by(family.len().div_ceil(first_ids)) {
+                let Some(target) = board(&family, first_id as u32) else {
+                    continue;
+                };
+                for flopped in [false, true] {
+                    let found = found_in(&family, &target, &target, flopped).found;
+                    let of = format!("{name}, first id {first_id}, flopped: {flopped}");
+                    assert_eq!(found.len(), 1, "{of}");
+                    assert_eq!(found[0].mirrored, flopped, "{of}");
+                    let right = |(from, to): (&Vertex, &Vertex)| {
+                        *to == if flopped { mirrored(*from) } else { *from }
+                    };
+                    assert!(found[0].vertices.iter().all(right), "{of}");
+                    assert_eq!(found[0].vertices.len(), target.panels[0].corners.len(), "{of}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn flopped_boards_are_told_from_boards() {
+        labels_are_those_of_the_print(5);
+    }
+
+    #[test]
+    #[ignore = "some minutes"]
+    fn flopped_boards_of_every_first_id_are_told_from_boards() {
+        labels_are_those_of_the_print(usize::MAX);
+    }
+
+    /// Boards of the same family and the same ids, but with other distances between the tags or of another size: where
+    /// they agree in some tags, other tiles tell.
+    #[test]
+    fn boards_of_the_same_ids_in_other_places_get_no_labels() {
+        let mut told = 0;
+        for name in shipped_names().into_iter().chain(square_names()) {
+            let family = Family::shipped(name).unwrap();
+            let asked = board(&family, 0).unwrap();
+            for (size, spacing) in
+                [((8, 9), 2), ((8, 9), 4), ((8, 9), 5), ((9, 12), 3), ((6, 7), 3)]
+            {
+                let tags = TagSpec { spacing, ..TagSpec::default() };
+                let Some(shown) = board_of(&family, size, tags) else {
+                    continue;
+                };
+                for flopped in [false, true] {
+                    let evidence = found_in(&family, &asked, &shown, flopped);
+                    let of = format!("{name}, {size:?}, spacing {spacing}, flopped: {flopped}");
+                    assert!(evidence.found.is_empty(), "{of}: {:?}", evidence.found);
+                    told += usize::from(evidence.contradicted.is_some());
+                }
+            }
+        }
+        assert!(told > 20, "{told} times only it is said that other tiles contradict");
+    }
+
+    /// A board has the tags of some faces, but not as they lie on a solid: around each face that fits, and between
+    /// them, are others.
+    #[test]
+    fn boards_are_no_faces_of_solids_with_the_same_ids() {
+        for name in shipped_names() {
+            let family = Family::shipped(name).unwrap();
+            let tags = TagSpec { family: name.to_owned(), ..TagSpec::default() };
+            for tiles in [7, 10] {
+                let tags = tags.clone();
+                let spec = SolidSpec { tiles, tags, ..SolidSpec::new(SolidShape::Octahedron) };
+                let Ok(solid) = Target::build("o", &TargetSpec::Solid(spec), Some(&family), None)
+                else {
+                    continue;
+                };
+                // Smaller boards have just the tags of a face, or one more.
+                for size in [(10, 11), (12, 16)] {
+                    let Some(shown) = board_of(&family, size, TagSpec::default()) else {
+                        continue;
+                    };
+                    let evidence = found_in(&family, &solid, &shown, false);
+                    let of = format!("{name}, {tiles} tiles a side, {size:?}");
+                    assert!(evidence.found.is_empty(), "{of}: {:?}", evidence.found);
+                    assert!(evidence.contradicted.is_some(), "{of}");
+                }
+            }
+        }
+    }
+
+    /// A part of the board with one tag, as a photograph of nothing else shows it, is labelled; not so if just one other
+    /// tile says clearly that it belongs to another board.
+    #[test]
+    fn one_tag_labels_where_nothing_contradicts_it() {
+        let family = Family::shipped("delTag25h7").unwrap();
+        let target = board(&family, 0).unwrap();
+        let labeller = TagLabeller::new(&target, &family, None).unwrap();
+        let panel = &target.panels[0];
+        let tag = &panel.tags[panel.tags.len() / 2];
+        let of_code = |tile: Tile, code: u64, sure: f32| {
+            let odds = |bit: u32| if code >> bit & 1 == 1 { sure } else { -sure };
+            Reading { tile, half_odds: (0..25).map(odds).collect() }
+        };
+        let tile = panel.tag_tile(tag);
+        let beside = Tile { anchor: tile.anchor + Vertex::new(0, 1), ..tile };
+        let foreign = family.code(200).unwrap();
+        let placed = PlacedSaddle { position: [0.0; 2], amplitude: 1.0 };
+        for (what, other, labelled) in [
+            ("a plain tile", of_code(beside, 0, SURE), true),
+            ("nothing clear", of_code(beside, foreign, 0.1), true),
+            ("dirt", of_code(beside, 0b1_0110_1001, SURE), true),
+            ("a tag of the target", of_code(beside, family.code(0).unwrap(), SURE), false),
+            ("another tag", of_code(beside, foreign, SURE), false),
+        ] {
+            let readings = vec![of_code(tile, family.code(tag.id).unwrap(), SURE), other];
+            let vertices = readings.iter().flat_map(|reading| reading.tile.vertices());
+            let grid: SaddleGrid = vertices.map(|v| (v, placed)).collect();
+            let mut evidence = TagEvidence::default();
+            let sight = labeller.sight((0, false, false), readings, &mut evidence);
+            let found = labeller.decide(vec![sight], &grid, evidence).found;
+            assert_eq!(found.len(), usize::from(labelled), "{what}");
+            for (from, to) in found.iter().flat_map(|found| &found.vertices) {
+                assert_eq!(from, to, "{what}");
+            }
+        }
+    }
+
+    /// How single tags of d36h11, four pixels a bit, are read under noise.
+    #[derive(Debug, Default)]
+    struct NoisyTags {
+        tags: usize,
+        /// Cells that are more likely the other than the one printed.
+        cell_errors: usize,
+        /// And as many as there should be by the odds.
+        expected_errors: f32,
+        /// Tags with no more wrong cells than the family corrects.
+        by_decisions: usize,
+        /// Tags that label the corners around them.
+        by_evidence: usize,
+        /// Other words under the same noise, and how often they were taken for a tag either way.
+        words: usize,
+        false_decisions: usize,
+        false_evidence: usize,
+        /// Λ of each tag where no other word has more, and the greatest of each of the other words.
+        of_tags: Vec<f32>,
+        of_words: Vec<f32>,
+    }
+
+    impl NoisyTags {
+        /// The part of the tags that have more evidence than other words have as seldom as they pass for a tag by
+        /// decisions.
+        fn read_at_the_rate_of_decisions(&self) -> f64 {
+            let mut of_words = self.of_words.clone();
+            of_words.sort_by(|a, b| b.total_cmp(a));
+            let least = of_words[self.false_decisions];
+            let read = self.of_tags.iter().filter(|&&evidence| evidence > least).count();
+            read as f64 / self.tags as f64
+        }
+    }
+
+    fn most(evidence: &[f32]) -> f32 {
+        evidence.iter().copied().fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    fn noisy_tags(noise: f64, views: u64, words_a_view: usize) -> NoisyTags {
+        use rand::{Rng, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let family = Family::shipped("d36h11").unwrap();
+        let target = board(&family, 0).unwrap();
+        let labeller = TagLabeller::new(&target, &family, None).unwrap();
+        let sheet = &crate::artwork::draw(&target, Some(&family)).unwrap().sheets[0];
+        let scene = crate::synth::scene_of_sheet(&target, sheet, 0);
+        let panel = &target.panels[0];
+        let camera = crate::camera::Camera::pinhole(160, 160, 0.3);
+        let bits_across = 6.0 + 3.0 * panel.border_bits.unwrap();
+        let distance_mm = camera.focal_px[0] * panel.edge_mm / bits_across / 4.0;
+        let mut seen = NoisyTags::default();
+        for seed in 0..views {
+            let tag = &panel.tags[seed as usize % panel.tags.len()];
+            let tile = panel.tag_tile(tag);
+            // Only the corners of the tag's tile and of those that touch it are seen.
+            let near: BTreeSet<Vertex> = tile
+                .vertices()
+                .chain(tile.vertices().flat_map(|v| family.kind().neighbours(v)))
+                .collect();
+            let places: Vec<glam::DVec3> = tile
+                .vertices()
+                .filter_map(|v| Some(panel.corner_at(v)?.target_mm.into()))
+                .collect();
+            let centre = places.iter().sum::<glam::DVec3>() / places.len() as f64;
+            let roll: f64 = rng.random_range(0.0..std::f64::consts::TAU);
+            let up = glam::DVec3::new(roll.cos(), roll.sin(), 0.0);
+            let eye = centre + distance_mm * glam::DVec3::new(0.1, 0.05, 1.0);
+            let pose = crate::camera::Pose::looking_at(eye, centre, up);
+            let light = crate::synth::Light { noise, seed, ..Default::default() };
+            let image = scene.render(&camera, &pose, &light);
+            let grid: SaddleGrid = scene
+                .truth(&camera, &pose, 0.0)
+                .corners
+                .iter()
+                .filter(|corner| near.contains(&Vertex::new(corner.row, corner.col)))
+                .map(|corner| {
+                    let placed = PlacedSaddle { position: [corner.x, corner.y], amplitude: 1.0 };
+                    (Vertex::new(corner.row, corner.col), placed)
+                })
+                .collect();
+            let readings = labeller.readers[0].read(&image, &grid, false, MOST_TILES).readings;
+            let Some(at) = readings.iter().position(|r| r.tile == tile) else {
+                continue;
+            };
+            let code = family.code(tag.id).unwrap();
+            let found = |readings: Vec<Reading>| {
+                let mut evidence = TagEvidence::default();
+                let sight = labeller.sight((0, false, false), readings, &mut evidence);
+                let found = labeller.decide(vec![sight], &grid, evidence).found;
+                found.into_iter().find(|found| !found.mirrored)
+            };
+            let errors = (readings[at].word() ^ code).count_ones();
+            seen.tags += 1;
+            seen.cell_errors += errors as usize;
+            let wrong = |odds: &f32| 1.0 / (1.0 + (2.0 * odds.abs()).exp());
+            seen.expected_errors += readings[at].half_odds.iter().map(wrong).sum::<f32>();
+            seen.by_decisions += usize::from(errors <= family.correctable());
+            let evidence = labeller.words.evidence(&readings[at].half_odds);
+            let of_tag = labeller.words.evidence_of(code, &readings[at].half_odds);
+            if of_tag > most(&evidence) - 1e-3 {
+                seen.of_tags.push(of_tag);
+            }
+            let right = |found: Labelled| found.vertices.iter().all(|(from, to)| from == to);
+            seen.by_evidence += usize::from(found(readings.clone()).is_some_and(right));
+            for _ in 0..words_a_view {
+                // Cells turned over at random show a drawn word, under this noise.
+                let mut other = readings.clone();
+                for odds in &mut other[at].half_odds {
+                    *odds *= if rng.random() { 1.0 } else { -1.0 };
+                }
+                seen.of_words.push(most(&labeller.words.evidence(&other[at].half_odds)));
+                let word = other[at].word();
+                let is_near = |index: usize| {
+                    (labeller.words.word(index) ^ word).count_ones() <= family.correctable()
+                };
+                seen.words += 1;
+                seen.false_decisions += usize::from((0..labeller.words.len()).any(is_near));
+                seen.false_evidence += usize::from(found(other).is_some());
+            }
+        }
+        seen
+    }
+
+    /// With noise that misleads some 10.5 % of cells, decisions cell by cell read 83 % of the tags.
+    #[test]
+    #[ignore = "a minute; prints the rates"]
+    fn noisy_tags_are_read_by_evidence_no_more_often_wrong_than_by_decisions() {
+        let seen = noisy_tags(NOISE_OF_A_TENTH, 4000, 50);
+        let [tags, words] = [seen.tags, seen.words].map(|n| n as f64);
+        let cell_errors = seen.cell_errors as f64 / (36.0 * tags);
+        let read = seen.read_at_the_rate_of_decisions();
+        println!(
+            "{cell_errors:.4} of cells wrong, {:.4} by the odds; by decisions {:.4} read and {:.6} of other words; by evidence {read:.4} \
+             at the same rate; labelled {:.4} and {:.6} of other words",
+            f64::from(seen.expected_errors) / (36.0 * tags),
+            seen.by_decisions as f64 / tags,
+            seen.false_decisions as f64 / words,
+            seen.by_evidence as f64 / tags,
+            seen.false_evidence as f64 / words,
+        );
+        assert!((0.103..0.113).contains(&cell_errors));
+        assert!(read >= 0.95);
+        assert!(seen.false_evidence <= seen.false_decisions);
+        assert!(seen.by_evidence > seen.by_decisions);
+    }
+
+    /// Whatever is seen in a board's tiles is taken for tags of another board less often than allowed for.
+    #[test]
+    fn boards_of_random_words_get_no_labels() {
+        use rand::{Rng, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let family = Family::shipped("d16h5").unwrap();
+        let target = board(&family, 0).unwrap();
+        let labeller = TagLabeller::new(&target, &family, None).unwrap();
+        let panel = &target.panels[0];
+        let placed = PlacedSaddle { position: [0.0; 2], amplitude: 1.0 };
+        let grid: SaddleGrid = panel_vertices(panel).into_iter().map(|v| (v, placed)).collect();
+        let wrong = (0..1000).filter(|trial| {
+            // From a single tile, the hardest to refuse, to many; cells sure, or hardly told.
+            let tiles = grid.keys().map(|&v| Tile::upright(v)).take(1 + trial % 40);
+            let strength = [2.6, 1.0, 0.3][trial % 3];
+            let readings = tiles
+                .map(|tile| {
+                    let odds = |_| if rng.random() { strength } else { -strength };
+                    Reading { tile, half_odds: (0..16).map(odds).collect() }
+                })
+                .collect();
+            let mut evidence = TagEvidence::default();
+            let sight = labeller.sight((0, false, false), readings, &mut evidence);
+            !labeller.decide(vec![sight], &grid, evidence).found.is_empty()
+        });
+        assert_eq!(wrong.count(), 0);
+    }
+}

@@ -1,0 +1,271 @@
+//! How the corners of a grid get absolute labels: by tags, by an outline, or not at all.
+//!
+//! A picture may show a board as in a mirror, flopped by a scanner, a projector or the camera's driver. Its grid
+//! is a right-handed lattice like any other, but lies on the panel with rows and columns exchanged. Labels
+//! of such a grid belong to no view of the print, so they are given only where they are asked for.
+
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::detection::{DecodedTag, Grid, GridCorner};
+use super::detector::DetectorConfig;
+use super::grow::SaddleGrid;
+use super::label::{Budget, Labelled, TagLabeller};
+use super::outline::{fit_outline, fit_rectangle};
+use super::reason::{Reason, ReasonKind};
+use super::why;
+use crate::family::Family;
+use crate::lattice::{GridKind, LatticeMap, Vertex};
+use crate::raster::{Gray, Intensity};
+use crate::targets::{Target, zigzag_vertices};
+
+/// How corners get absolute labels.
+#[derive(Clone, Debug)]
+pub struct Labels {
+    source: Source,
+    allow_mirrored: bool,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    /// They do not.
+    None,
+    /// By the outline of a board that is seen whole.
+    Outline(BTreeSet<Vertex>),
+    /// By the rows and columns of a checkerboard that is seen whole.
+    Rectangle((u32, u32)),
+    /// By the tags of a target, or by the outlines of its untagged panels.
+    Target { tags: Option<Box<TagLabeller>>, panels: Vec<TargetPanel> },
+}
+
+/// What the detector must know of a panel.
+#[derive(Clone, Debug)]
+struct TargetPanel {
+    id: u32,
+    kind: GridKind,
+    /// Rows and columns.
+    size: (u32, u32),
+    inverted: bool,
+    tagged: bool,
+    corner_ids: BTreeMap<Vertex, u32>,
+}
+
+/// More corners than any board has: of 140 × 140 every one would have 14 px in a picture of 4 megapixels. Fabrics and
+/// grids on screens have more, and made-up pictures so many that to refine them takes minutes.
+pub(super) const MOST_CORNERS: usize = 20_000;
+
+impl Labels {
+    /// By the rows and columns of an untagged board, where they are known.
+    pub fn of_size(kind: GridKind, size: Option<(u32, u32)>, config: &DetectorConfig) -> Self {
+        let source = match (size, kind) {
+            (Some((rows, cols)), GridKind::Deltille) => {
+                Source::Outline(zigzag_vertices(rows, cols).collect())
+            }
+            (Some(size), GridKind::Checker) => Source::Rectangle(size),
+            (None, _) => Source::None,
+        };
+        Self { source, allow_mirrored: config.allow_mirrored }
+    }
+
+    /// By the tags of a target, and the outlines of its untagged panels.
+    pub fn of_target(target: &Target, family: Option<&Family>, config: &DetectorConfig) -> Self {
+        let tags =
+            family.and_then(|family| TagLabeller::new(target, family, config.max_bit_errors));
+        let panels = target.panels.iter().map(|panel| TargetPanel {
+            id: panel.id,
+            kind: panel.kind,
+            size: (panel.matrix[1], panel.matrix[0]),
+            inverted: panel.inverted,
+            tagged: !panel.tags.is_empty(),
+            corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
+        });
+        let source = Source::Target { tags: tags.map(Box::new), panels: panels.collect() };
+        Self { source, allow_mirrored: config.allow_mirrored }
+    }
+
+    /// The panels in a grid; the grid itself with relative labels where there are none, and why there are
+    /// none.
+    pub fn label<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        grid: &SaddleGrid,
+        budget: &mut Budget,
+    ) -> Vec<(Grid, Option<Reason>)> {
+        let size = (image.width(), image.height());
+        match &self.source {
+            Source::None => vec![(unlabelled(grid), None)],
+            Source::Outline(outline) => {
+                let fit = |grid: &SaddleGrid| fit_outline(grid, outline, false);
+                vec![self.on_outline(grid, outline.len(), size, fit)]
+            }
+            Source::Rectangle(rectangle) => {
+                let fit = |grid: &SaddleGrid| fit_rectangle(grid, *rectangle, false);
+                let expected = rectangle.0 as usize * rectangle.1 as usize;
+                vec![self.on_outline(grid, expected, size, fit)]
+            }
+            Source::Target { tags, panels } => {
+                let evidence = tags.as_ref().map(|tags| tags.label(image, grid, budget));
+                let found = evidence.as_ref().map_or(&[][..], |evidence| &evidence.found);
+                if found.is_empty() {
+                    if let Some(by_outline) = on_untagged_panel(grid, panels, false) {
+                        return vec![(by_outline, None)];
+                    }
+                    if let Some(in_a_mirror) = on_untagged_panel(grid, panels, true) {
+                        let allowed = self.allow_mirrored;
+                        return vec![if allowed { (in_a_mirror, None) } else { in_mirror(grid) }];
+                    }
+                    let why = match &evidence {
+                        Some(evidence) => why::no_labels(evidence, grid, size),
+                        None => why::no_outline(grid, self.most_corners(), size),
+                    };
+                    return vec![(unlabelled(grid), Some(why))];
+                }
+                if !self.allow_mirrored && found.iter().any(|labelled| labelled.mirrored) {
+                    return vec![in_mirror(grid)];
+                }
+                // What hangs on to labelled panels without being part of one is not reported.
+                found.iter().map(|l| (on_panel(grid, &panels[l.panel], l), None)).collect()
+            }
+        }
+    }
+
+    /// Whether labels are looked for.
+    pub fn are_wanted(&self) -> bool {
+        !matches!(self.source, Source::None)
+    }
+
+    /// Corners of the largest thing that is looked for. What has more, and no tag that vouches for it, is another
+    /// thing: a halftone, a fabric or a tiled floor is as regular as a board, but seldom as small.
+    pub fn most_corners(&self) -> usize {
+        match &self.source {
+            Source::None => MOST_CORNERS,
+            Source::Outline(outline) => outline.len(),
+            Source::Rectangle((rows, cols)) => *rows as usize * *cols as usize,
+            Source::Target { panels, .. } => {
+                panels.iter().map(|panel| panel.corner_ids.len()).max().unwrap_or(0)
+            }
+        }
+    }
+
+    /// A grid on the outline of an untagged board, which a mirror image may fit as well.
+    fn on_outline(
+        &self,
+        grid: &SaddleGrid,
+        expected: usize,
+        size: (usize, usize),
+        fit: impl Fn(&SaddleGrid) -> Option<LatticeMap>,
+    ) -> (Grid, Option<Reason>) {
+        if let Some(map) = fit(grid) {
+            let label = |v| Some((map.apply(v), None));
+            return (relabelled(grid, label, None, Vec::new()), None);
+        }
+        let Some(map) = fit(&mirror_image(grid)) else {
+            return (unlabelled(grid), Some(why::no_outline(grid, expected, size)));
+        };
+        if !self.allow_mirrored {
+            return in_mirror(grid);
+        }
+        let label = |v| Some((map.apply(mirrored(v)), None));
+        (Grid { mirrored: true, ..relabelled(grid, label, None, Vec::new()) }, None)
+    }
+}
+
+/// A grid seen as in a mirror, which gets no labels.
+fn in_mirror(grid: &SaddleGrid) -> (Grid, Option<Reason>) {
+    let why = Reason::new(ReasonKind::Mirrored, [("corners", grid.len() as f64)]);
+    (Grid { mirrored: true, ..unlabelled(grid) }, Some(why))
+}
+
+/// Where a vertex lies in the mirror: rows and columns are exchanged, which leaves upright tiles upright and
+/// dark squares dark.
+pub(super) fn mirrored(vertex: Vertex) -> Vertex {
+    Vertex::new(vertex.col, vertex.row)
+}
+
+/// A grid with the vertices that it has in a mirror: that of a flopped picture, turned the right way.
+pub(super) fn mirror_image(grid: &SaddleGrid) -> SaddleGrid {
+    grid.iter().map(|(&vertex, &placed)| (mirrored(vertex), placed)).collect()
+}
+
+/// Leaves out of grids of one panel what a larger one, which comes before, has already: beside a tag of
+/// few pixels corners may be found twice, a pixel apart. What is a whole edge apart is told.
+pub(super) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) -> Option<Reason> {
+    let (mut corners, mut tags) = (BTreeMap::new(), BTreeSet::new());
+    let mut elsewhere = 0;
+    grids.retain_mut(|(grid, _)| {
+        if let Some(panel) = grid.panel {
+            let edge_px = grid.edge_px().unwrap_or(f64::INFINITY);
+            grid.corners.retain(|&GridCorner { row, col, x, y, .. }| {
+                let [x0, y0] = match corners.entry((panel, row, col)) {
+                    Entry::Vacant(entry) => {
+                        entry.insert([x, y]);
+                        return true;
+                    }
+                    Entry::Occupied(entry) => *entry.get(),
+                };
+                elsewhere += usize::from((x - x0).hypot(y - y0) > edge_px);
+                false
+            });
+            grid.tags.retain(|tag| tags.insert((panel, tag.row, tag.col)));
+        }
+        !grid.corners.is_empty()
+    });
+    (elsewhere > 0).then(|| Reason::new(ReasonKind::SeenTwice, [("corners", elsewhere as f64)]))
+}
+
+fn unlabelled(grid: &SaddleGrid) -> Grid {
+    relabelled(grid, |v| Some((v, None)), None, Vec::new())
+}
+
+fn on_panel(grid: &SaddleGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid {
+    let label = |v: Vertex| {
+        let vertex = *labelled.vertices.get(&v)?;
+        Some((vertex, panel.corner_ids.get(&vertex).copied()))
+    };
+    let labels = relabelled(grid, label, Some(panel.id), labelled.tags.clone());
+    Grid { mirrored: labelled.mirrored, ..labels }
+}
+
+/// The grid, as it is seen or in a mirror, on the one untagged panel whose outline it fills.
+fn on_untagged_panel(grid: &SaddleGrid, panels: &[TargetPanel], is_mirrored: bool) -> Option<Grid> {
+    let turned = if is_mirrored { mirror_image(grid) } else { grid.clone() };
+    let mut fitting = panels.iter().filter(|panel| !panel.tagged).filter_map(|panel| {
+        let map = match panel.kind {
+            GridKind::Deltille => {
+                let outline = panel.corner_ids.keys().copied().collect();
+                fit_outline(&turned, &outline, panel.inverted)
+            }
+            GridKind::Checker => fit_rectangle(&turned, panel.size, panel.inverted),
+        };
+        Some((panel, map?))
+    });
+    let (panel, map) = fitting.next()?;
+    if fitting.next().is_some() {
+        return None;
+    }
+    let label = |v| {
+        let vertex = map.apply(if is_mirrored { mirrored(v) } else { v });
+        Some((vertex, panel.corner_ids.get(&vertex).copied()))
+    };
+    let labels = relabelled(grid, label, Some(panel.id), Vec::new());
+    Some(Grid { mirrored: is_mirrored, ..labels })
+}
+
+/// A grid with new labels, ordered by them; corners without a label are left out.
+fn relabelled(
+    grid: &SaddleGrid,
+    label: impl Fn(Vertex) -> Option<(Vertex, Option<u32>)>,
+    panel: Option<u32>,
+    tags: Vec<DecodedTag>,
+) -> Grid {
+    let mut corners: Vec<GridCorner> = grid
+        .iter()
+        .filter_map(|(&vertex, placed)| {
+            let (Vertex { row, col }, id) = label(vertex)?;
+            let [x, y] = placed.position;
+            Some(GridCorner { row, col, id, x, y, cov: None })
+        })
+        .collect();
+    corners.sort_by_key(|corner| (corner.row, corner.col));
+    Grid { kind: GridKind::Deltille, panel, mirrored: false, corners, tags }
+}

@@ -1,0 +1,295 @@
+//! Parts of a board that something covers the links between, joined by where the map of one says that the
+//! corners of the other are.
+//!
+//! A finger over a board leaves grids that no link joins, and single corners at which no tile is
+//! seen whole. The map of a grid ([`LocalMap`]) tells where its lattice goes on behind the finger. A
+//! corner there is one of the board's when it lies at a vertex and all its edges leave it as the map
+//! says, each with its dark side on the right hand; a grid belongs to the same board when all its corners
+//! near enough do.
+
+use std::collections::BTreeMap;
+
+use super::buckets::Buckets;
+use super::edge::{MAX_CHORD_RAD, is_clean};
+use super::effort::Effort;
+use super::grow::{Growing, GrownSaddle};
+use super::links::MAX_CONTRAST_RATIO;
+use super::local_map::{Bend, LocalMap};
+use super::saddles::Saddle;
+use super::sectors::turn;
+use super::tiling::{kind, neighbours, step};
+use crate::lattice::{GridKind, LatticeMap, Vertex};
+use crate::raster::Pyramid;
+
+/// Vertices farther than this from all corners of a grid are not looked for, in edges of the map at the
+/// nearest: the map says next to nothing there.
+const MAX_REACH: f64 = 4.0;
+
+/// Beyond a grid, where it comes nearer, edges are on the average at most so many times as long as its longest.
+const NEARER: f64 = 2.0;
+
+/// Largest deviations of a predicted place, in edges, in the order of trial: what is surer makes the rest
+/// surer. Within three of the largest a place is nearer to its vertex than anything else that a tile
+/// shows.
+const SIGMAS: [f64; 3] = [0.02, 0.04, 0.08];
+
+/// A corner lies within so many deviations of its predicted place.
+const MAX_SIGMAS: f64 = 3.0;
+
+/// One of so many edges to neighbours, at least, is not covered.
+const MOST_COVERED: usize = 3;
+
+/// A grid of fewer corners predicts nothing: four are where it began.
+const LEAST: usize = 5;
+
+/// So many corners are compared in the time of a look.
+const CORNERS_IN_A_LOOK: usize = 100;
+
+/// Where a saddle is in a set of grids.
+type Owners = BTreeMap<usize, (usize, Vertex)>;
+
+/// Joins grids that are parts of one board, and lets them adopt single corners. `places` are those of
+/// all saddles, `members` the indices of those in the grids. Tells which grids have grown.
+pub fn join<const N: usize>(
+    pyramid: &Pyramid,
+    (saddles, places): (&[Saddle<N>], &Buckets),
+    mut grids: Vec<Growing<N>>,
+    members: Vec<BTreeMap<usize, Vertex>>,
+    effort: &mut Effort,
+) -> Vec<(Growing<N>, bool)> {
+    let mut owners: Owners = BTreeMap::new();
+    for (grid, members) in members.into_iter().enumerate() {
+        owners.extend(members.into_iter().map(|(saddle, vertex)| (saddle, (grid, vertex))));
+    }
+    let mut order: Vec<usize> = (0..grids.len()).collect();
+    order.sort_by_key(|&i| std::cmp::Reverse(grids[i].len()));
+    let mut has_grown = vec![false; grids.len()];
+    for base in order {
+        while grids[base].len() >= LEAST {
+            let bend = bend(&grids[base]);
+            let candidates = candidates((saddles, places), &grids[base], &owners, base, bend);
+            if !effort.spend(grids[base].len() + candidates.len()) {
+                break;
+            }
+            // Nothing changes before something is adopted.
+            let mut adopt = |sigma| {
+                let given = (&candidates[..], bend, sigma);
+                adopt((pyramid, saddles), &mut grids, &mut owners, base, given, effort)
+            };
+            if !SIGMAS.into_iter().any(&mut adopt) {
+                break;
+            }
+            has_grown[base] = true;
+        }
+    }
+    grids.into_iter().zip(has_grown).filter(|(grid, _)| !grid.is_empty()).collect()
+}
+
+/// Adds to a grid those candidates of which its map says that they belong to it, where it says so with a
+/// deviation of at most `sigma`; whether anything did.
+fn adopt<const N: usize>(
+    (pyramid, saddles): (&Pyramid, &[Saddle<N>]),
+    grids: &mut [Growing<N>],
+    owners: &mut Owners,
+    base: usize,
+    (candidates, bend, sigma): (&[(usize, Vertex)], Bend, f64),
+    effort: &mut Effort,
+) -> bool {
+    let mut adopted = false;
+    for &(index, vertex) in candidates {
+        // The nearest corner of the grid is sought among all.
+        if !effort.spend(1 + grids[base].len() / CORNERS_IN_A_LOOK) {
+            break;
+        }
+        if grids[base].contains_key(&vertex) {
+            continue;
+        }
+        let Some(grown) = belongs(&grids[base], vertex, &saddles[index], bend, sigma) else {
+            continue;
+        };
+        if !is_joined(pyramid, &grids[base], vertex, &grown) {
+            continue;
+        }
+        match owners.get(&index).copied() {
+            Some((part, _)) if part == base => {}
+            Some((part, from)) => {
+                let turned = (grown.turn + N - grids[part][&from].turn) % N;
+                let map = LatticeMap::taking(kind::<N>(), from, vertex, turned as i32);
+                let is_worth = effort.spend(grids[part].len() + owners.len() / CORNERS_IN_A_LOOK);
+                if is_worth && is_part(&grids[base], &grids[part], map, bend, sigma) {
+                    for (from, corner) in std::mem::take(&mut grids[part]) {
+                        let turn = (corner.turn + turned) % N;
+                        grids[base].insert(map.apply(from), GrownSaddle { turn, ..corner });
+                    }
+                    for owner in owners.values_mut().filter(|owner| owner.0 == part) {
+                        *owner = (base, map.apply(owner.1));
+                    }
+                    adopted = true;
+                }
+            }
+            None => {
+                grids[base].insert(vertex, grown);
+                owners.insert(index, (base, vertex));
+                adopted = true;
+            }
+        }
+    }
+    adopted
+}
+
+fn at<const N: usize>(grid: &Growing<N>) -> impl Fn(Vertex) -> Option<[f64; 2]> + Copy {
+    |v| grid.get(&v).map(|grown| grown.saddle.position)
+}
+
+fn bend<const N: usize>(grid: &Growing<N>) -> Bend {
+    let level = grid.values().map(|grown| grown.saddle.level).max().unwrap_or(0);
+    Bend::of::<N>(grid.keys().copied(), at(grid), level)
+}
+
+/// Saddles that lie near a vertex without a corner, with that vertex, the nearest to the grid first.
+fn candidates<const N: usize>(
+    (saddles, places): (&[Saddle<N>], &Buckets),
+    grid: &Growing<N>,
+    owners: &Owners,
+    base: usize,
+    bend: Bend,
+) -> Vec<(usize, Vertex)> {
+    let Some((middle, reach_px)) = surroundings(grid) else {
+        return Vec::new();
+    };
+    let corners: Vec<[f64; 2]> = grid.values().map(|grown| grown.saddle.position).collect();
+    let (vertices, corners): (Vec<Vertex>, _) =
+        (grid.keys().copied().collect(), Buckets::of(&corners));
+    let mut maps: BTreeMap<Vertex, Option<LocalMap>> = BTreeMap::new();
+    let mut found: Vec<(f64, usize, Vertex)> = Vec::new();
+    for (index, _) in places.within(middle, reach_px) {
+        let saddle = &saddles[index];
+        if owners.get(&index).is_some_and(|&(grid, _)| grid == base) {
+            continue;
+        }
+        let Some(nearest) = corners.nearest(saddle.position).map(|index| vertices[index]) else {
+            continue;
+        };
+        let map =
+            maps.entry(nearest).or_insert_with(|| LocalMap::about::<N>(nearest, at(grid), bend));
+        let Some([col, row]) = map.and_then(|map| map.steps_to(saddle.position)) else {
+            continue;
+        };
+        let [x, y] = kind::<N>().position(row, col);
+        let step = Vertex::new(row.round() as i32, col.round() as i32);
+        let vertex = nearest + step;
+        if x.hypot(y) <= MAX_REACH && !grid.contains_key(&vertex) {
+            found.push((x.hypot(y), index, vertex));
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    found.into_iter().map(|(_, index, vertex)| (index, vertex)).collect()
+}
+
+/// A circle around all places that a grid says anything of.
+fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<([f64; 2], f64)> {
+    let places: Vec<[f64; 2]> = grid.values().map(|grown| grown.saddle.position).collect();
+    let edges_px = grid.iter().flat_map(|(&v, grown)| {
+        let neighbours = neighbours::<N>(v).into_iter().filter_map(at(grid));
+        neighbours.map(|p| distance(p, grown.saddle.position))
+    });
+    let longest_px = edges_px.reduce(f64::max)?;
+    let [lower, upper] = [f64::min, f64::max].map(|end: fn(f64, f64) -> f64| {
+        places.iter().copied().reduce(|a, b| [end(a[0], b[0]), end(a[1], b[1])])
+    });
+    let (lower, upper) = (lower?, upper?);
+    let middle = [0, 1].map(|axis| f64::midpoint(lower[axis], upper[axis]));
+    Some((middle, distance(lower, upper) / 2.0 + NEARER * MAX_REACH * longest_px))
+}
+
+pub(super) fn distance(p: [f64; 2], q: [f64; 2]) -> f64 {
+    (p[0] - q[0]).hypot(p[1] - q[1])
+}
+
+/// The saddle as a corner of a grid, if it lies at a vertex and looks as the map of the grid says.
+fn belongs<const N: usize>(
+    grid: &Growing<N>,
+    vertex: Vertex,
+    saddle: &Saddle<N>,
+    bend: Bend,
+    sigma: f64,
+) -> Option<GrownSaddle<N>> {
+    let map = LocalMap::about::<N>(vertex, at(grid), bend).filter(|map| map.sigma <= sigma)?;
+    if map.distance::<N>(saddle.position)? > MAX_SIGMAS * map.sigma {
+        return None;
+    }
+    let colours = contrast_near(grid, vertex)?;
+    let ours = saddle.sectors.amplitude;
+    if ours.max(colours) > MAX_CONTRAST_RATIO * ours.min(colours) {
+        return None;
+    }
+    // Even rays have the dark side on their left everywhere.
+    let parity = match kind::<N>() {
+        GridKind::Deltille => 0,
+        GridKind::Checker => (vertex.row + vertex.col).rem_euclid(2) as usize,
+    };
+    let direction = |k: usize| {
+        let [x, y] = map.along(step::<N>(k));
+        y.atan2(x)
+    };
+    let off = |shift: usize| {
+        let turns = (0..N).map(|k| turn(saddle.sectors.rays[k], direction(k + shift)).abs());
+        turns.fold(0.0, f64::max)
+    };
+    let turn = (parity..N).step_by(2).min_by(|&a, &b| off(a).total_cmp(&off(b)))?;
+    (off(turn) <= MAX_CHORD_RAD).then_some(GrownSaddle { saddle: *saddle, turn })
+}
+
+/// Whether nothing but covers lies between a corner and its neighbours in a grid: some of the edges are clean,
+/// if there are neighbours. Between dots that do not meet none is.
+fn is_joined<const N: usize>(
+    pyramid: &Pyramid,
+    grid: &Growing<N>,
+    vertex: Vertex,
+    corner: &GrownSaddle<N>,
+) -> bool {
+    let (mut beside, mut clean) = (0, 0);
+    for k in 0..N {
+        let Some(other) = grid.get(&(vertex + step::<N>(k))) else {
+            continue;
+        };
+        let (ray, back) = (corner.ray(k), other.ray(k + N / 2));
+        beside += 1;
+        clean += usize::from(is_clean(pyramid, &corner.saddle, ray, &other.saddle, back));
+    }
+    MOST_COVERED * clean >= beside
+}
+
+/// The contrast of the corner of a grid that is nearest to a vertex on the lattice.
+fn contrast_near<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<f64> {
+    let far = |v: &Vertex| {
+        let step = *v - vertex;
+        let [x, y] = kind::<N>().position(step.row.into(), step.col.into());
+        x.hypot(y)
+    };
+    let nearest = grid.iter().min_by(|a, b| far(a.0).total_cmp(&far(b.0)))?;
+    Some(nearest.1.saddle.sectors.amplitude)
+}
+
+/// Whether a part, moved by a lattice map, goes on where a grid ends: no vertex is in both, and each of its
+/// corners is where the grid says, as far as that says anything.
+fn is_part<const N: usize>(
+    grid: &Growing<N>,
+    part: &Growing<N>,
+    map: LatticeMap,
+    bend: Bend,
+    sigma: f64,
+) -> bool {
+    part.iter().all(|(&from, corner)| {
+        let vertex = map.apply(from);
+        if grid.contains_key(&vertex) {
+            return false;
+        }
+        let predicted =
+            LocalMap::about::<N>(vertex, at(grid), bend).filter(|map| map.sigma <= sigma);
+        predicted.is_none_or(|map| {
+            let distance = map.distance::<N>(corner.saddle.position);
+            distance.is_some_and(|distance| distance <= MAX_SIGMAS * map.sigma)
+        })
+    })
+}

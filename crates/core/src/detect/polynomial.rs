@@ -1,0 +1,145 @@
+//! The paper's fit for either tiling: a cubic surface ([`super::cubic`]) or a quadric
+//! ([`super::quadric`]), and the form of its highest degree, whose zeros are the edges.
+
+use super::cubic::{CubicFit, Umbilic};
+use super::quadric::{QuadricFit, QuadricSaddle};
+use crate::raster::{Gray, Intensity};
+use crate::targets::GridKind;
+
+/// Most iterations of the fits; the reference detector's.
+const CUBIC_ITERATIONS: usize = 5;
+const QUADRIC_ITERATIONS: usize = 20;
+
+/// Most iterations of a first look; the paper's.
+const FIND_ITERATIONS: usize = 5;
+
+/// A first look ends with a step shorter than this, px: what is left is far less, and corners are told
+/// apart, and from where they should be, by tenths of a pixel.
+const FOUND_PX: f64 = 0.03;
+
+/// A fit of one degree in one window.
+#[derive(Clone, Debug)]
+pub enum Polynomial {
+    /// Of deltille corners.
+    Cubic(CubicFit),
+    /// Of checkerboard corners.
+    Quadric(QuadricFit),
+}
+
+/// The terms of the highest degree of a fitted surface, from u³ or u² to v³ or v².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// Of u³, u²v, uv², v³.
+    Cubic([f64; 4]),
+    /// Of u², uv, v².
+    Quadratic([f64; 3]),
+}
+
+/// A corner that a fit has found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedCorner {
+    /// Position, px.
+    pub position: [f64; 2],
+    /// The form there.
+    pub form: Form,
+}
+
+impl From<Umbilic> for FittedCorner {
+    fn from(found: Umbilic) -> Self {
+        Self { position: found.position, form: Form::Cubic(found.surface.form()) }
+    }
+}
+
+impl From<QuadricSaddle> for FittedCorner {
+    fn from(found: QuadricSaddle) -> Self {
+        Self { position: found.position, form: Form::Quadratic(found.form) }
+    }
+}
+
+impl Form {
+    /// The form along a unit vector: large where the image is bright. That of degree three is zero
+    /// along the edges, that of degree two about there.
+    pub fn towards(&self, [u, v]: [f64; 2]) -> f64 {
+        match *self {
+            Form::Cubic([a, b, c, d]) => {
+                a * u * u * u + b * u * u * v + c * u * v * v + d * v * v * v
+            }
+            Form::Quadratic([a, b, c]) => a * u * u + b * u * v + c * v * v,
+        }
+    }
+}
+
+impl Polynomial {
+    /// The fit for corners of a kind over offsets within `radius` + 1 px.
+    pub fn new(kind: GridKind, radius: usize) -> Self {
+        match kind {
+            GridKind::Deltille => Self::Cubic(CubicFit::new(radius)),
+            GridKind::Checker => Self::Quadric(QuadricFit::new(radius)),
+        }
+    }
+
+    /// The reference detector's number of iterations.
+    pub fn usual_iterations(&self) -> usize {
+        match self {
+            Self::Cubic(_) => CUBIC_ITERATIONS,
+            Self::Quadric(_) => QUADRIC_ITERATIONS,
+        }
+    }
+
+    /// The corner that the fit reaches from `start` in at most so many iterations.
+    pub fn refine<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        start: [f64; 2],
+        iterations: usize,
+    ) -> Option<FittedCorner> {
+        match self {
+            Self::Cubic(fit) => fit.refine(image, start, iterations).map(FittedCorner::from),
+            Self::Quadric(fit) => fit.refine(image, start, iterations).map(FittedCorner::from),
+        }
+    }
+
+    /// [`Self::refine`] as closely as a first look needs.
+    pub fn find<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<FittedCorner> {
+        let (most, found_px) = (FIND_ITERATIONS, FOUND_PX);
+        match self {
+            Self::Cubic(fit) => fit.walk(image, start, most, found_px).map(FittedCorner::from),
+            Self::Quadric(fit) => fit.walk(image, start, most, found_px).map(FittedCorner::from),
+        }
+    }
+
+    /// The first step of that fit, px; `None` where it sees no corner.
+    pub fn step<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<[f64; 2]> {
+        match self {
+            Self::Cubic(fit) => fit.step(image, start),
+            Self::Quadric(fit) => fit.step(image, start),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forms_are_bright_where_the_image_is() {
+        let monkey = Gray::from_fn(64, 64, |x, y| {
+            let (u, v) = (x as f32 - 32.0, y as f32 - 32.0);
+            0.001 * (u * u * u - 3.0 * u * v * v)
+        });
+        let fit = Polynomial::new(GridKind::Deltille, 3);
+        let form = fit.refine(&monkey, [32.0, 32.0], 5).unwrap().form;
+        assert!(form.towards([1.0, 0.0]) > 0.0 && form.towards([-1.0, 0.0]) < 0.0);
+        let saddle = Gray::from_fn(64, 64, |x, y| {
+            let (u, v) = (x as f32 - 32.0, y as f32 - 32.0);
+            0.01 * (u * u - v * v)
+        });
+        let fit = Polynomial::new(GridKind::Checker, 3);
+        let form = fit.refine(&saddle, [32.0, 32.0], 5).unwrap().form;
+        assert!(
+            form.towards([1.0, 0.0]) > 0.0
+                && form.towards([0.0, 1.0]) < 0.0
+                && form.towards([-1.0, 0.0]) > 0.0
+        );
+    }
+}

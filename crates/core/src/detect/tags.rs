@@ -1,0 +1,247 @@
+//! Reading tags out of tiles: for every cell the odds that it is white.
+
+use std::collections::BTreeMap;
+
+use super::grid_light::{ClearDepth, GridLight};
+use super::grow::SaddleGrid;
+use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
+use super::tile_map::TileMap;
+use crate::family::Family;
+use crate::lattice::{GridKind, TagCells, Tile, Vertex};
+use crate::raster::{Gray, Intensity};
+use crate::targets::{Panel, TagsIn};
+
+/// The contrast at the edges of a tile must be this part of that at its corners.
+const MIN_CONTRAST: f64 = 0.4;
+
+/// Samples this much brighter than the white around are no paper, in contrasts, and by so many deviations of the noise
+/// more: without these, noise would take away white cells alone.
+const GLARE: f64 = 0.35;
+const GLARE_NOISE: f64 = 3.0;
+
+/// The part of the image's full scale from which a pixel may be saturated.
+const SATURATED: f64 = 0.985;
+
+/// Depth to which bright tiles without tags are looked into, and dark ones, in tile coordinates.
+const PLAIN_DEPTH: f64 = 0.2;
+
+/// The least depth, where a tag leaves no more.
+const LEAST_DEPTH: f64 = 0.06;
+
+/// The cells of a tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// The tile, in the grid's vertices.
+    pub tile: Tile,
+    /// Half the logarithm of the odds that a cell is of the colour around the border, by bit in the
+    /// coordinates of [`Tile::frame`].
+    pub half_odds: Vec<f32>,
+}
+
+impl Reading {
+    /// The most likely word.
+    pub fn word(&self) -> u64 {
+        self.half_odds.iter().rev().fold(0, |word, odds| word << 1 | u64::from(*odds > 0.0))
+    }
+
+    /// How much the cells tell, bits: one for each that is known, none for each that may be either.
+    pub fn bits_told(&self) -> f64 {
+        let told = |&half_odds: &f32| {
+            let wrong = 1.0 / (1.0 + (2.0 * f64::from(half_odds.abs())).exp());
+            let right = 1.0 - wrong;
+            1.0 + right * right.log2() + wrong * wrong.max(f64::MIN_POSITIVE).log2()
+        };
+        self.half_odds.iter().map(told).sum()
+    }
+}
+
+/// How the tags of a panel lie in their tiles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TagPlace {
+    /// Width of the border, bit-widths along the edge.
+    border_bits: f64,
+    /// Blank between the edges of the tile and the border.
+    margin_bits: f64,
+    tags_in: TagsIn,
+}
+
+impl TagPlace {
+    /// That of the tags of `panel`.
+    pub fn of(panel: &Panel) -> Self {
+        let border_bits = panel.border_bits.unwrap_or(1.0);
+        Self { border_bits, margin_bits: panel.tag_margin_bits(), tags_in: panel.tags_in }
+    }
+}
+
+/// Black and white beside edges of tiles that were looked at, by their vertex and direction.
+type EdgeLevels = BTreeMap<(Vertex, usize), Option<[f64; 2]>>;
+
+/// Reads the tags of one family that lie alike in their tiles.
+#[derive(Clone, Debug)]
+pub struct TagReader {
+    kind: GridKind,
+    tags_in: TagsIn,
+    model: CellModel,
+    clear: ClearDepth,
+    /// For each bit the one whose cell takes its place in a mirror.
+    mirror: Vec<usize>,
+}
+
+/// What was read in a grid.
+#[derive(Clone, Debug, Default)]
+pub struct Read {
+    /// Tiles that may carry a tag.
+    pub readings: Vec<Reading>,
+    /// The median length of a bit, px.
+    pub bit_px: f64,
+    /// Deviation of the blur, px.
+    pub blur_px: f64,
+}
+
+impl TagReader {
+    /// A reader for tags that lie so in their tiles.
+    pub fn new(family: &Family, place: TagPlace) -> Self {
+        let TagPlace { border_bits, margin_bits, tags_in } = place;
+        let cells = family.cells();
+        let inset_bits = margin_bits + border_bits;
+        let width = cells.width(inset_bits);
+        let depth = |bits: f64| (bits / width).clamp(LEAST_DEPTH, PLAIN_DEPTH);
+        let clear = match tags_in {
+            TagsIn::Black => ClearDepth { dark: depth(border_bits), bright: PLAIN_DEPTH },
+            TagsIn::White => ClearDepth { dark: PLAIN_DEPTH, bright: depth(margin_bits) },
+        };
+        let model = CellModel::new(&cells, inset_bits, margin_bits);
+        Self { kind: family.kind(), tags_in, model, clear, mirror: mirror(&cells) }
+    }
+
+    /// Reads tiles of a grid whose corners are known: those that may carry a tag of a board that is not
+    /// inverted, or of one that is; no more than `most` of them, spread over the grid.
+    pub fn read<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        grid: &SaddleGrid,
+        inverted: bool,
+        most: usize,
+    ) -> Read {
+        let ClearDepth { dark, bright } = self.clear;
+        let clear = if inverted { ClearDepth { dark: bright, bright: dark } } else { self.clear };
+        let Some(light) = GridLight::of(image, grid, self.kind, clear) else {
+            return Read::default();
+        };
+        let dark = (self.tags_in == TagsIn::Black) != inverted;
+        let tiles: Vec<Tile> = grid
+            .keys()
+            .flat_map(|&v| self.kind.tiles_at(v))
+            .filter(|tile| tile.is_dark() == dark)
+            .filter(|tile| tile.vertices().all(|v| grid.contains_key(&v)))
+            .collect();
+        let every = tiles.len().div_ceil(most.max(1)).max(1);
+        let (mut mixings, mut levels) = (Mixings::new(), BTreeMap::new());
+        let mut bits_px = Vec::new();
+        let mut readings = Vec::new();
+        for &tile in tiles.iter().step_by(every) {
+            if let Some((reading, bit_px)) =
+                self.read_tile(image, grid, tile, &light, (&mut mixings, &mut levels))
+            {
+                readings.push(reading);
+                bits_px.push(bit_px);
+            }
+        }
+        let bit_px = super::detection::median(bits_px).unwrap_or(0.0);
+        Read { readings, bit_px, blur_px: light.blur_px() }
+    }
+
+    /// What a tile without a tag shows: it is of one colour all over.
+    pub fn plain_word(&self) -> u64 {
+        match self.tags_in {
+            TagsIn::Black => 0,
+            TagsIn::White => u64::MAX,
+        }
+    }
+
+    /// A reading as it would be in a mirror.
+    pub fn mirrored(&self, reading: &Reading) -> Reading {
+        let tile = reading.tile;
+        Reading {
+            tile: Tile { anchor: Vertex::new(tile.anchor.col, tile.anchor.row), ..tile },
+            half_odds: self.mirror.iter().map(|&bit| reading.half_odds[bit]).collect(),
+        }
+    }
+
+    fn read_tile<T: Intensity>(
+        &self,
+        image: &Gray<T>,
+        grid: &SaddleGrid,
+        tile: Tile,
+        light: &GridLight,
+        (mixings, edges): (&mut Mixings, &mut EdgeLevels),
+    ) -> Option<(Reading, f64)> {
+        let map = TileMap::new(grid, tile)?;
+        let levels = light.levels(image, grid, tile, edges)?;
+        let middle = self.kind.middle();
+        let [_, contrast] = levels.at(middle);
+        if contrast < MIN_CONTRAST * corner_contrast::<T>(grid, tile) {
+            return None;
+        }
+        let width = self.model.width();
+        let at = |u: f64, v: f64| map.image_from_tile([middle[0] + u, middle[1] + v]);
+        let step = |p: [f64; 2], q: [f64; 2]| [0, 1].map(|i| (p[i] - q[i]) / (0.5 * width));
+        let along = [step(at(0.25, 0.0), at(-0.25, 0.0)), step(at(0.0, 0.25), at(0.0, -0.25))];
+        let (covariance, area_px2) = in_tile(light.blur_px2, along)?;
+        let noise = light.noise;
+        let mixing = self.model.mixing(TileBlur { covariance, area_px2, noise }, mixings)?;
+        let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
+        // Cells of the colour around the border are 1, on inverted boards dark ones.
+        let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);
+        let full = SATURATED * f64::from(T::FULL_SCALE);
+        let brightest = 1.0 + GLARE + GLARE_NOISE * light.noise;
+        let mut samples = Vec::with_capacity(self.model.points().len());
+        for &point in self.model.points() {
+            let [x, y] = map.image_from_tile(point);
+            if !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
+                samples.push(Sample::Erased);
+                continue;
+            }
+            let value = f64::from(image.bilinear(x, y));
+            let [dark, contrast] = levels.at(point);
+            let brightness = (value - dark) / contrast;
+            let share = light.share(brightness).clamp(-0.5, 1.5) as f32;
+            let saturated = value >= full;
+            samples.push(if contrast <= 0.0 || contrast.is_nan() || brightness > brightest {
+                Sample::Erased
+            } else if saturated && light.clipped_share < 1.0 {
+                Sample::AtLeast(light.clipped_share as f32)
+            } else {
+                Sample::Share(share)
+            });
+        }
+        if inverted {
+            for sample in &mut samples {
+                *sample = match *sample {
+                    Sample::Share(share) => Sample::Share(1.0 - share),
+                    Sample::AtLeast(share) => Sample::Share(1.0 - share),
+                    Sample::Erased => Sample::Erased,
+                };
+            }
+        }
+        let half_odds = mixing.half_odds(&samples);
+        let length = |[x, y]: [f64; 2]| x.hypot(y);
+        Some((Reading { tile, half_odds }, length(along[0]).max(length(along[1]))))
+    }
+}
+
+/// For each bit the one whose cell takes its place when rows and columns are exchanged.
+fn mirror(cells: &TagCells) -> Vec<usize> {
+    let of = |cell: &crate::lattice::Cell| {
+        let mirrored = crate::lattice::Cell { row: cell.col, col: cell.row, upright: cell.upright };
+        cells.cells().iter().position(|&other| other == mirrored)
+    };
+    cells.cells().iter().enumerate().map(|(bit, cell)| of(cell).unwrap_or(bit)).collect()
+}
+
+/// Contrast between dark and bright around the corners of a tile, in units of the image.
+fn corner_contrast<T: Intensity>(grid: &SaddleGrid, tile: Tile) -> f64 {
+    let amplitudes = tile.vertices().filter_map(|v| grid.get(&v));
+    let least = amplitudes.map(|p| p.amplitude).fold(f64::INFINITY, f64::min);
+    2.0 * least * f64::from(T::FULL_SCALE / crate::raster::PYRAMID_FULL_SCALE)
+}

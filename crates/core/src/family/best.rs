@@ -1,0 +1,608 @@
+//! The best of all methods within a time limit: the best construction on record, and sources of invariant
+//! codes, arranged on the tag so that as many words as possible satisfy the rules, then repaired and
+//! extended by local search.
+//!
+//! How far it gets depends on the time, so what it found is recorded in full
+//! ([`AlgebraicConstruction`]) and gives the same codes again without any search. With an amount of work
+//! instead of a time the same seed gives the same codes on every machine.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use rand::seq::{IndexedRandom, SliceRandom};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::algebra::arrange::Arranger;
+use super::algebra::cosets::{CosetGraph, CosetUnion, MAX_SYNDROME_BITS};
+use super::algebra::quasicyclic::{Symmetry, random_code};
+use super::algebra::record::has_free_centre;
+use super::algebra::{AlgebraicConstruction, Arrangement, CycleSpace, Span, residue};
+use super::bounds::bounds;
+use super::file::parse_word;
+use super::polish::{Effort, polish};
+use super::search::Search;
+use super::shipped::shipped_names;
+use super::{Construction, Control, Family, FamilyError, Progress, Rules, Screen, TagWords};
+use crate::Clock;
+use crate::lattice::Dimension;
+
+/// What to search and for how long.
+#[derive(Clone, Debug)]
+pub struct Best {
+    /// Dimension of the tags.
+    pub dimension: Dimension,
+    /// Distance h.
+    pub distance: u32,
+    /// Rules for single codes.
+    pub rules: Rules,
+    /// How much of it.
+    pub budget: Budget,
+    /// Seed of all random choices.
+    pub seed: u64,
+    /// Number of codes at most.
+    pub limit: Option<u64>,
+    /// Whether local search may exchange codes at the end; without it the family is algebraic.
+    pub exchange: bool,
+}
+
+/// How long a search goes on.
+#[derive(Clone, Copy, Debug)]
+pub enum Budget {
+    /// So long by a clock; how much is found depends on the machine.
+    Time(Duration, Clock),
+    /// So many steps: in each [`DRAWS`] batches of codes are drawn, the best are arranged once more, and codes are
+    /// exchanged in one round of local search. What is found depends on the seed alone.
+    Work(u32),
+}
+
+/// Batches of codes that are drawn in a step of work.
+pub const DRAWS: u64 = 4;
+
+/// What a search starts from.
+#[derive(Clone, Debug)]
+pub struct Start {
+    /// The family on record.
+    pub family: String,
+    /// Its codes, as far as they satisfy the rules.
+    pub codes: Vec<u64>,
+    construction: AlgebraicConstruction,
+}
+
+/// How far a search has come.
+struct Spent {
+    /// When the search began, by the clock of its budget; zero where work is counted.
+    start: Duration,
+    budget: Budget,
+    /// Share of the budget that is spent before the first share is asked for.
+    first: f64,
+    /// Steps done of a search by work, and in all.
+    done: AtomicU64,
+    total: u64,
+}
+
+impl Spent {
+    fn new(budget: Budget, first: f64) -> Self {
+        // Drawing, arranging and exchanging, and exchanging what is on record.
+        let parts = if first > 0.0 { 4 } else { 3 };
+        let total = match budget {
+            Budget::Time(..) => 1,
+            Budget::Work(steps) => parts * u64::from(steps.max(1)),
+        };
+        let start = match budget {
+            Budget::Time(_, clock) => clock(),
+            Budget::Work(_) => Duration::ZERO,
+        };
+        Self { start, budget, first, done: AtomicU64::new(0), total }
+    }
+
+    /// When a share of what follows the first share is spent; `None` where work is counted.
+    fn until(&self, share: f64) -> Option<End> {
+        match self.budget {
+            Budget::Time(time, clock) => {
+                let at = self.start + time.mul_f64(self.first + (1.0 - self.first) * share);
+                Some(End { clock, at })
+            }
+            Budget::Work(_) => None,
+        }
+    }
+
+    /// Rounds of a kind: as many as are worked, or as the time gives.
+    fn rounds(&self, most: u64) -> u64 {
+        match self.budget {
+            Budget::Time(..) => most,
+            Budget::Work(steps) => u64::from(steps.max(1)),
+        }
+    }
+
+    fn step(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn thousandths(&self) -> u64 {
+        let share = match self.budget {
+            Budget::Time(time, clock) => {
+                clock().saturating_sub(self.start).as_secs_f64() / time.as_secs_f64().max(1e-3)
+            }
+            Budget::Work(_) => self.done.load(Ordering::Relaxed) as f64 / self.total as f64,
+        };
+        (1000.0 * share.min(1.0)) as u64
+    }
+}
+
+/// When something ends.
+#[derive(Clone, Copy)]
+struct End {
+    clock: Clock,
+    at: Duration,
+}
+
+impl End {
+    /// An end that leaves so much of what is left.
+    fn after(self, share: f64) -> Self {
+        let now = (self.clock)();
+        Self { at: now + self.at.saturating_sub(now).mul_f64(share), ..self }
+    }
+}
+
+/// Whether an end has come; without one it never does.
+fn is_past(end: Option<End>) -> bool {
+    end.is_some_and(|end| (end.clock)() >= end.at)
+}
+
+/// A union, how it is arranged, and how many words pass.
+#[derive(Clone, Debug)]
+struct Candidate {
+    source: String,
+    union: CosetUnion,
+    arrangement: Arrangement,
+    worth: f64,
+}
+
+/// What a random linear code is drawn by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Shape {
+    symmetry: Symmetry,
+    /// Dimensions at most.
+    most: u32,
+}
+
+/// One draw: how many orbits it has, how it was drawn, and an arrangement when it is worth one.
+struct Draw {
+    orbits: usize,
+    shape: Option<Shape>,
+    candidate: Option<Candidate>,
+}
+
+impl Best {
+    /// The best construction on record for such tags: of a shipped family with these bits and this distance or a
+    /// greater one, as far as its codes satisfy the rules.
+    pub fn start(&self) -> Option<Start> {
+        let screen = self.screen();
+        let on_record = |name: &str| {
+            let family = Family::shipped(name).ok()?;
+            let Construction::Algebraic(construction) = family.construction() else { return None };
+            let fits = family.dimension() == self.dimension && family.distance() >= self.distance;
+            let construction = AlgebraicConstruction { limit: self.limit, ..construction.clone() };
+            // Exchanged words are listed whatever the rules.
+            let admitted = |word: &String| parse_word(word).is_some_and(|w| screen.admits(w));
+            let all_admitted = construction.exchanged.iter().all(admitted);
+            let construction = match all_admitted && self.exchange {
+                true => construction,
+                false => AlgebraicConstruction { exchanged: Vec::new(), ..construction },
+            };
+            let codes = fits.then(|| construction.codes(&screen).ok()).flatten()?;
+            Some(Start { family: name.to_owned(), codes, construction })
+        };
+        let all = shipped_names().into_iter().filter_map(on_record);
+        all.filter(|start| !start.codes.is_empty()).max_by_key(|start| start.codes.len())
+    }
+
+    /// The family that a search starts from.
+    pub fn family_of(&self, name: &str, start: &Start) -> Result<Family, FamilyError> {
+        let construction = Construction::Algebraic(start.construction.clone());
+        let (codes, rules) = (start.codes.clone(), self.rules.clone());
+        Family::new(name, self.dimension, self.distance, codes, rules, construction)
+    }
+
+    fn screen(&self) -> Screen {
+        Screen::new(TagWords::new(self.dimension), self.distance, &self.rules)
+    }
+
+    /// Searches and makes a family of what was found, at least as large as what it starts from. Progress is
+    /// reported in thousandths. When it is cancelled, the search is over: the family is the best so far,
+    /// and only where nothing was found yet there is none.
+    pub fn family(
+        &self,
+        name: &str,
+        start: Option<Start>,
+        control: Control,
+    ) -> Result<Family, FamilyError> {
+        /// Share of the time in which codes on record are exchanged.
+        const FOR_RECORD: f64 = 0.4;
+        self.rules.check(self.dimension.bits())?;
+        let screen = self.screen();
+        // Most of the gain comes from good sources and arrangements, at 25 bits and fewer also
+        // from exchanging codes, where there is time for it.
+        let small = self.exchange && self.dimension.bits() <= super::polish::MAX_BITS;
+        let [sources, arrangements] = match (small, self.exchange_pays()) {
+            (false, _) => [0.6, 1.0],
+            (true, false) => [0.6, 0.9],
+            (true, true) => [0.3, 0.5],
+        };
+        let spent =
+            Spent::new(self.budget, if small && start.is_some() { FOR_RECORD } else { 0.0 });
+        let most = self.most();
+        let mut best: Option<(Vec<u64>, Construction)> = None;
+        if let Some(Start { codes, construction, .. }) = start {
+            control.report(0, 1000, codes.len());
+            let found =
+                self.exchanged(&screen, construction, codes, spent.until(0.0), &spent, control)?;
+            best = Some(found);
+        }
+        let found =
+            |best: &Option<(Vec<u64>, Construction)>| best.as_ref().map_or(0, |b| b.0.len());
+        let mut candidates = self.sources(&spent, sources, found(&best), control);
+        self.rearrange(&mut candidates, &spent, arrangements, found(&best), control);
+
+        let mut is_first = true;
+        for candidate in candidates {
+            let end = spent.until(1.0);
+            let over = match self.budget {
+                Budget::Time(..) => is_past(end),
+                Budget::Work(_) => !is_first,
+            };
+            let over = over || !small || control.is_cancelled();
+            // What may be large is not written down only to be compared when time is short.
+            let over = over && (!is_first || control.is_cancelled());
+            if best.as_ref().is_some_and(|(codes, _)| over || codes.len() >= most) {
+                break;
+            }
+            is_first = false;
+            let end = end.map(|end| end.after(0.7));
+            let construction = self.construction(&screen, candidate);
+            let codes = construction.codes(&screen)?;
+            let found = self.exchanged(&screen, construction, codes, end, &spent, control)?;
+            if best.as_ref().is_none_or(|(codes, _)| found.0.len() > codes.len()) {
+                best = Some(found);
+            }
+            control.report(spent.thousandths(), 1000, best.as_ref().map_or(0, |b| b.0.len()));
+        }
+        let (codes, construction) = match best {
+            Some(found) if !found.0.is_empty() => found,
+            _ => self.search_alone(&screen, control)?,
+        };
+        let rules = self.rules.clone();
+        Family::new(name, self.dimension, self.distance, codes, rules, construction)
+    }
+
+    /// Whether there is time to gain more by exchanging codes than better sources gain: in a few
+    /// seconds not even the conflicts are counted.
+    fn exchange_pays(&self) -> bool {
+        const LEAST: Duration = Duration::from_secs(20);
+        let is_long = match self.budget {
+            Budget::Time(time, _) => time >= LEAST,
+            Budget::Work(_) => true,
+        };
+        self.exchange && is_long
+    }
+
+    /// No family is larger; once there are so many codes, the search is over.
+    fn most(&self) -> usize {
+        let bounds = bounds(self.dimension, self.distance);
+        bounds.linear_programming.min(bounds.sphere_packing) as usize
+    }
+
+    /// Draws unions of cosets until a share of the time is over; the most promising first. So many codes are
+    /// `known` already.
+    fn sources(&self, spent: &Spent, share: f64, known: usize, control: Control) -> Vec<Candidate> {
+        /// Draws between two looks at the clock.
+        const BATCH: u64 = 16;
+        /// Candidates kept for a thorough arrangement.
+        const KEPT: usize = 6;
+        /// Shapes of random codes to draw more of.
+        const PROMISING: usize = 4;
+        let mut kept: Vec<Candidate> = Vec::new();
+        let mut promising: Vec<(usize, Shape)> = Vec::new();
+        let mut most_orbits = 0;
+        let enough = self.most();
+        let until = spent.until(share);
+        let halt = || is_past(until) || control.is_cancelled();
+        let steps = spent.rounds(u64::MAX / BATCH / DRAWS);
+        let mut draw = 0;
+        loop {
+            let most = most_orbits;
+            let batch: Vec<Draw> = (draw..draw + BATCH)
+                .into_par_iter()
+                // However short the time is, there are some draws.
+                .filter(|&i| !control.is_cancelled() && (i < BATCH || !halt()))
+                .map(|i| self.candidate(self.seed.wrapping_add(i), i, most, &promising, &halt))
+                .collect();
+            draw += BATCH;
+            for Draw { orbits, shape, candidate } in batch {
+                most_orbits = most_orbits.max(orbits);
+                if let Some(shape) = shape {
+                    match promising.iter_mut().find(|(_, s)| *s == shape) {
+                        Some((best, _)) => *best = orbits.max(*best),
+                        None => promising.push((orbits, shape)),
+                    }
+                }
+                let Some(candidate) = candidate else { continue };
+                let same = |c: &Candidate| {
+                    c.union.code == candidate.union.code && c.worth == candidate.worth
+                };
+                if !kept.iter().any(same) {
+                    kept.push(candidate);
+                }
+            }
+            kept.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+            kept.truncate(KEPT);
+            promising.sort_by_key(|&(best, shape)| (std::cmp::Reverse(best), shape));
+            promising.truncate(PROMISING);
+            if draw.is_multiple_of(BATCH * DRAWS) {
+                spent.step();
+            }
+            let best = kept.first().map_or(0, |c| c.worth as usize);
+            control.report(spent.thousandths(), 1000, best.max(known));
+            if halt() || best >= enough || draw >= steps * BATCH * DRAWS {
+                return kept;
+            }
+        }
+    }
+
+    /// One draw, with a quick arrangement when it has nearly the most orbits seen.
+    fn candidate(
+        &self,
+        seed: u64,
+        draw: u64,
+        most_orbits: usize,
+        promising: &[(usize, Shape)],
+        halt: &(dyn Fn() -> bool + Sync),
+    ) -> Draw {
+        /// Share of the most orbits seen from which on an arrangement is tried. Small codes differ
+        /// more in how many of their words pass, and are arranged quickly.
+        const WORTH_A_TRY: [f64; 2] = [0.75, 0.93];
+        const MANY_ORBITS: usize = 1_000;
+        /// Steps of the quick arrangement.
+        const STEPS: u32 = 3_000;
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let Some((source, code, shape)) = self.linear_code(draw, promising, &mut random) else {
+            return Draw { orbits: 0, shape: None, candidate: None };
+        };
+        let union = self.with_cosets(code, &mut random, halt);
+        let orbits = union.orbits();
+        let count = orbits.len();
+        let share = WORTH_A_TRY[usize::from(most_orbits > MANY_ORBITS)];
+        if count == 0 || (count as f64) < share * most_orbits as f64 {
+            return Draw { orbits: count, shape, candidate: None };
+        }
+        let arranger = self.arranger(&union, orbits);
+        let (worth, arrangement) = arranger.anneal(random.random(), STEPS, halt);
+        let candidate = Some(Candidate { source, union, arrangement, worth });
+        Draw { orbits: count, shape, candidate }
+    }
+
+    fn arranger(&self, union: &CosetUnion, orbits: Vec<u64>) -> Arranger {
+        /// A changed cell makes up to three pairs differ, and about this share of such words can
+        /// be had without conflict.
+        const REPAIR: (u32, f64) = (3, 0.45);
+        /// Words by which an arrangement is judged, at most.
+        const JUDGED_WORDS: usize = 30_000;
+        let free_centre = has_free_centre(union);
+        // Of very many words a part tells which arrangement is good.
+        let step = orbits.len().div_ceil(JUDGED_WORDS);
+        let orbits = orbits.into_iter().step_by(step.max(1)).collect();
+        let arranger =
+            Arranger::new(self.dimension, self.distance, &self.rules, orbits, free_centre);
+        if self.exchange_pays()
+            && self.rules.min_complexity > 0.0
+            && self.dimension.bits() <= super::polish::MAX_BITS
+            && min_distance(union) > self.distance
+        {
+            arranger.with_nearly(REPAIR.0, REPAIR.1)
+        } else {
+            arranger
+        }
+    }
+
+    /// A linear code: a shortened quadratic-residue code or a random quasi-cyclic one, by turns.
+    fn linear_code(
+        &self,
+        draw: u64,
+        promising: &[(usize, Shape)],
+        random: &mut ChaCha8Rng,
+    ) -> Option<(String, Span, Option<Shape>)> {
+        let space = CycleSpace::of(self.dimension);
+        let primes: Vec<u32> = residue::PRIMES
+            .into_iter()
+            .filter(|&q| residue::min_distance(q) >= self.distance)
+            .filter(|&q| residue::space(q).cycles >= space.cycles)
+            .collect();
+        // A random code of 49 bits takes long to check and is far smaller.
+        let only_residue = self.dimension.bits() > 36;
+        if (draw.is_multiple_of(4) || only_residue) && !primes.is_empty() {
+            let q = *primes.choose(random).expect("not empty");
+            let whole = residue::space(q);
+            let mut keep: Vec<u32> = (0..whole.cycles).collect();
+            keep.shuffle(random);
+            keep.truncate(space.cycles as usize);
+            keep.sort_unstable();
+            let source = format!("extended quadratic-residue code of length {}", q + 1);
+            let source = if keep.len() < whole.cycles as usize {
+                format!("{source}, shortened to the cycles {keep:?}")
+            } else {
+                source
+            };
+            let code = residue::shortened(&residue::extended(q), whole, &keep);
+            return Some((source, code, None));
+        }
+        let symmetries = Symmetry::all(space);
+        let drawn = symmetries[random.random_range(0..symmetries.len())];
+        /// Beyond this even the list of words of a linear code is long.
+        const MOST_DIMENSIONS: u32 = 20;
+        let bits = space.bits();
+        // Small codes leave room for many cosets, as long as syndromes can be tabulated.
+        let least = bits.saturating_sub(SYNDROME_BITS).max(1);
+        let most = if random.random_bool(0.5) || bits > 25 {
+            MOST_DIMENSIONS
+        } else {
+            least + random.random_range(2..=6)
+        };
+        // Half of the draws follow the shapes that did best so far.
+        let shape = match promising.choose(random) {
+            Some(&(_, shape)) if random.random_bool(0.5) => shape,
+            _ => Shape { symmetry: drawn, most },
+        };
+        let Shape { symmetry, most } = shape;
+        let code = random_code(space, symmetry, self.distance, most, 60, random);
+        let source = format!(
+            "quasi-cyclic code of dimension {}, cycles shifted in blocks of {}{}",
+            code.dimension(),
+            symmetry.block,
+            if symmetry.twisted { ", twisted" } else { "" }
+        );
+        (code.dimension() > 0).then_some((source, code, Some(shape)))
+    }
+
+    fn with_cosets(
+        &self,
+        code: Span,
+        random: &mut ChaCha8Rng,
+        halt: &(dyn Fn() -> bool + Sync),
+    ) -> CosetUnion {
+        /// Random starts of the clique search; in small spaces they cost next to nothing.
+        const STARTS: [u64; 2] = [40, 8];
+        let space = CycleSpace::of(self.dimension);
+        let alone = CosetUnion { space, code: code.clone(), cosets: vec![0] };
+        if space.bits() - code.dimension() > SYNDROME_BITS {
+            return alone;
+        }
+        let Some(graph) = CosetGraph::new(space, code, self.distance, halt) else { return alone };
+        if graph.vertices() == 0 {
+            return alone;
+        }
+        let first: u64 = random.random();
+        (0..STARTS[usize::from(space.bits() > 16)])
+            .take_while(|&i| i == 0 || !halt())
+            .map(|i| graph.grow(first.wrapping_add(i), halt))
+            .max_by_key(|union| union.orbits().len())
+            .unwrap_or(alone)
+    }
+
+    /// Arranges the candidates thoroughly; the best first.
+    fn rearrange(
+        &self,
+        candidates: &mut [Candidate],
+        spent: &Spent,
+        share: f64,
+        known: usize,
+        control: Control,
+    ) {
+        let until = spent.until(share);
+        let over = || is_past(until) || control.is_cancelled();
+        let arrangers: Vec<Arranger> =
+            candidates.iter().map(|c| self.arranger(&c.union, c.union.orbits())).collect();
+        let enough = self.most();
+        let mut steps = 4_000;
+        for round in 0..spent.rounds(u64::MAX) {
+            candidates.par_iter_mut().zip(&arrangers).for_each(|(candidate, arranger)| {
+                if !over() {
+                    let seed = self.seed.wrapping_add(1_000_003 * (round + 1));
+                    let (worth, arrangement) = arranger.anneal(seed, steps, over);
+                    if worth > candidate.worth {
+                        (candidate.worth, candidate.arrangement) = (worth, arrangement);
+                    }
+                }
+            });
+            let best = candidates.iter().map(|c| c.worth as usize).max().unwrap_or(0);
+            spent.step();
+            control.report(spent.thousandths(), 1000, best.max(known));
+            if over() || candidates.is_empty() || best >= enough {
+                break;
+            }
+            steps = (steps * 3 / 2).min(200_000);
+        }
+        candidates.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+    }
+
+    /// The record of a candidate.
+    fn construction(&self, screen: &Screen, candidate: Candidate) -> AlgebraicConstruction {
+        let words = screen.words();
+        let hex = |list: &[u64]| list.iter().map(|&w| words.hex(w)).collect();
+        AlgebraicConstruction {
+            source: candidate.source,
+            basis: hex(candidate.union.code.rows()),
+            cosets: hex(&candidate.union.cosets),
+            arrangement: candidate.arrangement,
+            exchanged: Vec::new(),
+            limit: self.limit,
+            seed: self.seed,
+        }
+    }
+
+    /// The codes of a construction, some of them exchanged where that gains more.
+    fn exchanged(
+        &self,
+        screen: &Screen,
+        construction: AlgebraicConstruction,
+        codes: Vec<u64>,
+        end: Option<End>,
+        spent: &Spent,
+        control: Control,
+    ) -> Result<(Vec<u64>, Construction), FamilyError> {
+        if !self.exchange || self.dimension.bits() > super::polish::MAX_BITS {
+            return Ok((codes, Construction::Algebraic(construction)));
+        }
+        let rounds = spent.rounds(50) as u32;
+        let effort = Effort { seed: self.seed, rounds, steps: 400_000, most: self.most() };
+        let known = codes.len();
+        let report = |progress: Progress| {
+            spent.step();
+            control.report(spent.thousandths(), 1000, progress.codes.max(known));
+        };
+        let within = Control { report: Some(&report), ..control };
+        let polished = polish(screen, codes.clone(), effort, within, || is_past(end));
+        if polished.len() <= codes.len() {
+            return Ok((codes, Construction::Algebraic(construction)));
+        }
+        let plain = AlgebraicConstruction { exchanged: Vec::new(), ..construction };
+        let own = plain.codes(screen)?;
+        let exchanged = polished.into_iter().filter(|code| !own.contains(code));
+        let exchanged = exchanged.map(|word| screen.words().hex(word)).collect();
+        let construction = AlgebraicConstruction { exchanged, seed: self.seed, ..plain };
+        Ok((construction.codes(screen)?, Construction::Algebraic(construction)))
+    }
+
+    /// Local search alone, for distances that leave no room for a linear code.
+    fn search_alone(
+        &self,
+        screen: &Screen,
+        control: Control,
+    ) -> Result<(Vec<u64>, Construction), FamilyError> {
+        if self.dimension.bits() > super::polish::MAX_BITS {
+            control.check()?;
+            return Err(FamilyError::field("codes", "none was found"));
+        }
+        let search = Search { seed: self.seed, rounds: 3, steps: Search::STEPS };
+        let codes = search.codes(screen, control)?;
+        Ok((codes, search.construction(search.rounds)))
+    }
+}
+
+/// Syndromes of up to this many bits are tabulated in a search that draws many codes.
+const SYNDROME_BITS: u32 = if MAX_SYNDROME_BITS < 24 { MAX_SYNDROME_BITS } else { 24 };
+
+/// Minimum distance of a union of cosets.
+fn min_distance(union: &CosetUnion) -> u32 {
+    let differences = union
+        .cosets
+        .iter()
+        .enumerate()
+        .flat_map(|(i, a)| union.cosets[..=i].iter().map(move |b| a ^ b));
+    differences
+        .flat_map(|shift| union.code.words().map(move |w| (w ^ shift).count_ones()))
+        .filter(|&weight| weight > 0)
+        .min()
+        .unwrap_or(u32::MAX)
+}

@@ -1,0 +1,72 @@
+/// What is wrong with a family, its text or its name.
+#[derive(Debug, thiserror::Error)]
+pub enum FamilyError {
+    /// No shipped family and no file of this name.
+    #[error(
+        "no family is called `{name}`: give one of {}, or the path of a .json family file",
+        [super::shipped_names(), super::square_names()].concat().join(", ")
+    )]
+    Unknown {
+        /// The name asked for.
+        name: String,
+    },
+    /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
+    #[error("not a family file ({}); generate it anew with `deltag gen-family`", plain(.0))]
+    Json(#[from] serde_json::Error),
+    /// Another schema, or another version of it.
+    #[error(
+        "field `schema` is `{found}`, this version reads `{}`: generate the file anew with \
+         `deltag gen-family`",
+        super::SCHEMA
+    )]
+    Schema {
+        /// The schema that the file names.
+        found: String,
+    },
+    /// A field holds what it must not.
+    #[error("field `{field}`: {problem}")]
+    Field {
+        /// The field.
+        field: String,
+        /// What is wrong and what to do.
+        problem: String,
+    },
+    /// The file is well formed, and contradicts itself.
+    #[error("field `{field}`: {problem}")]
+    Claim {
+        /// The field.
+        field: String,
+        /// What does not hold.
+        problem: String,
+    },
+    /// The search was stopped from outside.
+    #[error("interrupted; nothing was written")]
+    Cancelled,
+}
+
+impl FamilyError {
+    pub(super) fn field(field: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::Field { field: field.into(), problem: problem.into() }
+    }
+
+    /// Whether a file was read whole, and what it claims does not hold.
+    pub fn is_broken_claim(&self) -> bool {
+        matches!(self, Self::Claim { .. })
+    }
+}
+
+/// Where a text is no family file, and why, in words that are not Rust's.
+fn plain(error: &serde_json::Error) -> String {
+    use serde_json::error::Category;
+    let text = error.to_string();
+    let named = ["unknown field", "missing field", "duplicate field"];
+    let problem = match error.classify() {
+        Category::Data if named.iter().any(|start| text.starts_with(start)) => {
+            text.split([',', ' ']).take(3).collect::<Vec<_>>().join(" ")
+        }
+        Category::Data => "there is a value of the wrong kind".to_owned(),
+        Category::Eof => "the text ends too early".to_owned(),
+        Category::Syntax | Category::Io => "the text is not JSON".to_owned(),
+    };
+    format!("line {}, column {}: {problem}", error.line(), error.column())
+}

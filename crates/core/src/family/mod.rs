@@ -1,0 +1,217 @@
+//! Code families: what a family is, how one is searched, checked, stored and decoded.
+//!
+//! A *family* of bits b and distance h is a list of b-bit codes such that any two of the words a
+//! camera may read off the tags, the codes and their turns by 120° and 240°, differ in at least h
+//! cells. So up to ⌊(h−1)/2⌋ cells may be misread and the tag, and how it is turned, is still known.
+//!
+//! ```
+//! use deltille_core::family::{Decoder, Family};
+//!
+//! let family = Family::shipped("delTag25h7")?;
+//! let decoder = Decoder::new(&family);
+//! let read = family.code(12).unwrap() ^ 0b1000_0010_0000_0001; // three cells misread
+//! let decoded = decoder.decode(read, 3).unwrap();
+//! assert_eq!((decoded.id, decoded.turns, decoded.errors), (12, 0, 3));
+//! # Ok::<(), deltille_core::family::FamilyError>(())
+//! ```
+//!
+//! Families of square tags, the AprilTags of checkerboards, are read, decoded and drawn like the
+//! others, with their four turns by 90°; they are neither searched nor certified here.
+//!
+//! Limits: codes have 9, 16, 25, 36 or 49 bits ([`crate::lattice::Dimension`]). Loading a family
+//! checks its form and fingerprint; the distance between its codes is proved by [`certify`], which
+//! costs the square of their number.
+
+pub mod algebra;
+pub mod best;
+pub mod bounds;
+mod certificate;
+mod control;
+mod decoder;
+mod error;
+mod export;
+mod file;
+mod independent;
+mod kernels;
+pub mod lexicode;
+mod polish;
+mod rules;
+pub mod search;
+mod shipped;
+mod statistics;
+mod tagwords;
+
+use std::collections::BTreeMap;
+
+pub use certificate::{Certificate, certify, certify_codes};
+pub use control::{Control, Progress};
+pub use decoder::{Decoded, Decoder};
+pub use error::FamilyError;
+pub use export::{ExportFormat, export};
+pub use file::check_name;
+pub use file::{Construction, SCHEMA};
+pub use rules::{Rules, Screen};
+pub use shipped::{shipped_names, smallest_shipped, square_names};
+pub use statistics::{ball, distance_histogram, false_positive_rates};
+pub use tagwords::TagWords;
+
+use crate::lattice::{Dimension, GridKind, TagCells};
+
+/// The pairs of larger families are too many to count one by one.
+pub const PAIRS_COUNTED: usize = 100_000;
+
+/// A family: its codes, and how they came about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Family {
+    name: String,
+    kind: GridKind,
+    dimension: Dimension,
+    distance: u32,
+    codes: Vec<u64>,
+    rules: Rules,
+    construction: Construction,
+    histogram: BTreeMap<u32, u64>,
+    fingerprint: String,
+}
+
+impl Family {
+    /// A family of triangular tags with these `codes`, in the order of their ids.
+    ///
+    /// Checks the form (name, code width, no code twice in any turn) but not the distance, which
+    /// [`certify`] proves. The distance histogram is counted here. A name that speaks of bits and a
+    /// distance, such as d25h7 or delTag25h7, must speak of these.
+    pub fn new(
+        name: &str,
+        dimension: Dimension,
+        distance: u32,
+        codes: Vec<u64>,
+        rules: Rules,
+        construction: Construction,
+    ) -> Result<Self, FamilyError> {
+        let kind = GridKind::Deltille;
+        file::check_form(name, kind, dimension, distance, &codes, &rules)?;
+        let histogram = if codes.len() <= PAIRS_COUNTED {
+            distance_histogram(dimension, &codes)
+        } else {
+            BTreeMap::new()
+        };
+        let fingerprint = file::fingerprint(kind, dimension, distance, &codes);
+        let name = name.to_owned();
+        Ok(Self {
+            name,
+            kind,
+            dimension,
+            distance,
+            codes,
+            rules,
+            construction,
+            histogram,
+            fingerprint,
+        })
+    }
+
+    /// A family that comes with the crate, by its name.
+    pub fn shipped(name: &str) -> Result<Self, FamilyError> {
+        let unknown = || FamilyError::Unknown { name: name.to_owned() };
+        Self::from_json(shipped::json(name).ok_or_else(unknown)?)
+    }
+
+    /// Reads the text of a family file (FORMATS §9, schema [`SCHEMA`]).
+    pub fn from_json(json: &str) -> Result<Self, FamilyError> {
+        file::from_json(json)
+    }
+
+    /// The text of the family file.
+    pub fn to_json(&self) -> String {
+        file::to_json(self)
+    }
+
+    /// The name, usable as the stem of a file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The tiling whose tiles its tags fill: triangular or square tags.
+    pub fn kind(&self) -> GridKind {
+        self.kind
+    }
+
+    /// The cells of its tags.
+    pub fn cells(&self) -> TagCells {
+        TagCells::of(self.kind, self.dimension)
+    }
+
+    /// The dimension of its tags.
+    pub fn dimension(&self) -> Dimension {
+        self.dimension
+    }
+
+    /// The claimed minimum distance h between any two words read off different tags or turns.
+    pub fn distance(&self) -> u32 {
+        self.distance
+    }
+
+    /// The number of misread cells that never hide which tag was read, ⌊(h−1)/2⌋.
+    pub fn correctable(&self) -> u32 {
+        (self.distance - 1) / 2
+    }
+
+    /// The codes; an id is a position in this list.
+    pub fn codes(&self) -> &[u64] {
+        &self.codes
+    }
+
+    /// The code of a tag.
+    pub fn code(&self, id: u32) -> Option<u64> {
+        self.codes.get(id as usize).copied()
+    }
+
+    /// Number of codes.
+    pub fn len(&self) -> usize {
+        self.codes.len()
+    }
+
+    /// Whether there is no code; never so for a family that was checked.
+    pub fn is_empty(&self) -> bool {
+        self.codes.is_empty()
+    }
+
+    /// What every single code satisfies.
+    pub fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    /// How the codes were found, in enough detail to find them again.
+    pub fn construction(&self) -> &Construction {
+        &self.construction
+    }
+
+    /// Number of unordered pairs, among the codes and their turns, at each distance; empty for
+    /// families of more than 100,000 codes.
+    pub fn histogram(&self) -> &BTreeMap<u32, u64> {
+        &self.histogram
+    }
+
+    /// Probability that a word of fair coin tosses is taken for a tag, for 0, 1, …,
+    /// [`Self::correctable`] corrected bits.
+    pub fn false_positive_rates(&self) -> Vec<f64> {
+        false_positive_rates(self.kind, self.dimension, self.distance, self.codes.len())
+    }
+
+    /// 16 hexadecimal digits that stand for bits, distance and codes: the first half of the first
+    /// half of the SHA-256 of the text
+    ///
+    /// ```text
+    /// deltille/family
+    /// bits 25
+    /// distance 7
+    /// 0x08f50a7
+    /// …
+    /// ```
+    ///
+    /// one code a line in id order, lower case, ⌈b/4⌉ digits, every line ended by a line feed. That
+    /// of square tags has a second line `kind checker`.
+    pub fn fingerprint(&self) -> &str {
+        &self.fingerprint
+    }
+}

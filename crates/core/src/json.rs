@@ -1,0 +1,175 @@
+//! JSON text that people can read: one record per line.
+
+use std::io;
+
+use serde::{Deserialize, Serialize};
+use serde_json::ser::{CompactFormatter, Formatter, PrettyFormatter};
+
+/// Serialises plain data, indented down to `depth` levels; what lies deeper stays on one line.
+pub fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
+    let mut text = Vec::new();
+    let layout = Layout { pretty: PrettyFormatter::new(), depth, level: 0 };
+    let mut serializer = serde_json::Serializer::with_formatter(&mut text, layout);
+    value.serialize(&mut serializer).expect("plain data has a JSON form");
+    text.push(b'\n');
+    String::from_utf8(text).expect("JSON is UTF-8")
+}
+
+/// Why a JSON text is not what it should be.
+pub enum ReadError {
+    /// Not JSON, or not an object of this kind at all.
+    Json(serde_json::Error),
+    /// A field is missing, unknown, or holds what it must not.
+    Field {
+        /// Where: `panels[2].corners`.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+/// Parses JSON; an error that is not one of JSON's grammar names the field.
+pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> {
+    let mut deserializer = serde_json::Deserializer::from_str(json);
+    let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+        let field = error.path().to_string();
+        let inner = error.into_inner();
+        if inner.is_data() && field != "." {
+            ReadError::Field { field, problem: inner.to_string() }
+        } else {
+            ReadError::Json(inner)
+        }
+    })?;
+    deserializer.end().map_err(ReadError::Json)?;
+    Ok(value)
+}
+
+/// The schema that a JSON text names, such as `deltille/target/1`; `None` where it names none, an
+/// error where it is no JSON object.
+pub fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {
+    #[derive(Deserialize)]
+    struct Head {
+        schema: Option<String>,
+    }
+    serde_json::from_slice::<Head>(text).map(|head| head.schema)
+}
+
+/// What a schema describes: all but its version.
+pub fn kind(schema: &str) -> &str {
+    schema.rsplit_once('/').map_or(schema, |(kind, _)| kind)
+}
+
+/// The pretty layout above `depth`, the compact one below.
+struct Layout {
+    pretty: PrettyFormatter<'static>,
+    depth: usize,
+    /// Number of arrays and objects around the current position.
+    level: usize,
+}
+
+impl Layout {
+    fn open(&mut self) -> bool {
+        self.level += 1;
+        self.level <= self.depth
+    }
+
+    fn close(&mut self) -> bool {
+        self.level -= 1;
+        self.level < self.depth
+    }
+
+    fn indents(&self) -> bool {
+        self.level <= self.depth
+    }
+}
+
+/// A separator inside a line is followed by a space.
+fn comma<W: ?Sized + io::Write>(writer: &mut W, first: bool) -> io::Result<()> {
+    if first { Ok(()) } else { writer.write_all(b", ") }
+}
+
+impl Formatter for Layout {
+    fn begin_array<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.open() {
+            self.pretty.begin_array(writer)
+        } else {
+            CompactFormatter.begin_array(writer)
+        }
+    }
+
+    fn end_array<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.close() {
+            self.pretty.end_array(writer)
+        } else {
+            CompactFormatter.end_array(writer)
+        }
+    }
+
+    fn begin_array_value<W: ?Sized + io::Write>(
+        &mut self,
+        writer: &mut W,
+        first: bool,
+    ) -> io::Result<()> {
+        if self.indents() {
+            self.pretty.begin_array_value(writer, first)
+        } else {
+            comma(writer, first)
+        }
+    }
+
+    fn end_array_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.indents() { self.pretty.end_array_value(writer) } else { Ok(()) }
+    }
+
+    fn begin_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.open() {
+            self.pretty.begin_object(writer)
+        } else {
+            CompactFormatter.begin_object(writer)
+        }
+    }
+
+    fn end_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.close() {
+            self.pretty.end_object(writer)
+        } else {
+            CompactFormatter.end_object(writer)
+        }
+    }
+
+    fn begin_object_key<W: ?Sized + io::Write>(
+        &mut self,
+        writer: &mut W,
+        first: bool,
+    ) -> io::Result<()> {
+        if self.indents() {
+            self.pretty.begin_object_key(writer, first)
+        } else {
+            comma(writer, first)
+        }
+    }
+
+    fn begin_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        writer.write_all(b": ")
+    }
+
+    fn end_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.indents() { self.pretty.end_object_value(writer) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deep_records_stay_on_their_line() {
+        let value = serde_json::json!({"a": [{"x": 1, "y": [2, 3]}, {}], "b": []});
+        let text = to_text(&value, 2);
+        assert_eq!(
+            text,
+            "{\n  \"a\": [\n    {\"x\": 1, \"y\": [2, 3]},\n    {}\n  ],\n  \"b\": []\n}\n"
+        );
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&text).unwrap(), value);
+    }
+}

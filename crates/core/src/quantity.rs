@@ -1,0 +1,235 @@
+//! Numbers from files: each is of a quantity, and within its range.
+//!
+//! A number that is finite may still be none: 1e308 mm overflows as soon as it is squared, a variance of
+//! 1e-308 px² as soon as it is inverted. The ranges here hold whatever is made or measured with room to
+//! spare, and no arithmetic on what lies in them leaves the finite numbers.
+//!
+//! Fields of files name theirs, so that a number outside it is refused with the name of the field:
+//!
+//! ```ignore
+//! #[serde(deserialize_with = "quantity::place_mm::de")]
+//! pub target_mm: [f64; 3],
+//! ```
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::{Deserialize, Deserializer, de::Error};
+
+/// The range of a quantity, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The smallest number it may be.
+    pub least: f64,
+    /// The largest.
+    pub most: f64,
+    /// Its unit; empty where it has none.
+    pub unit: &'static str,
+}
+
+/// A number that is not in its range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutOfRange {
+    value: f64,
+    range: Range,
+}
+
+impl fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { value, range } = self;
+        write!(f, "{} is not {range}", Short(*value))
+    }
+}
+
+impl std::error::Error for OutOfRange {}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { least, most, unit } = *self;
+        let blank = if unit.is_empty() { "" } else { " " };
+        write!(f, "between {} and {}{blank}{unit}", Short(least), Short(most))
+    }
+}
+
+/// A number in few characters.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0.abs() {
+            size if size != 0.0 && !(1e-4..1e7).contains(&size) => write!(f, "{:e}", self.0),
+            _ => write!(f, "{}", self.0),
+        }
+    }
+}
+
+impl Range {
+    /// This number, if it is in the range; one that is no number is not.
+    pub fn check(self, value: f64) -> Result<f64, OutOfRange> {
+        let inside = (self.least..=self.most).contains(&value);
+        inside.then_some(value).ok_or(OutOfRange { value, range: self })
+    }
+
+    /// Reads a number of this range.
+    pub fn parse(self, text: &str) -> Result<f64, String> {
+        let value: Option<f64> = text.trim().parse().ok();
+        value.and_then(|value| self.check(value).ok()).ok_or_else(|| format!("it must be {self}"))
+    }
+
+    fn deserialize<'de, D, T>(self, deserializer: D) -> Result<T, D::Error>
+    where
+        D: Deserializer<'de>,
+        T: Deserialize<'de> + Numbers,
+    {
+        let value = T::deserialize(deserializer)?;
+        value.all(&mut |number| self.check(number).map(|_| ())).map_err(D::Error::custom)?;
+        Ok(value)
+    }
+}
+
+/// What is made of numbers.
+pub trait Numbers {
+    /// Goes through them until one does not pass.
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange>;
+}
+
+impl Numbers for f64 {
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+        pass(*self)
+    }
+}
+
+impl Numbers for i32 {
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+        pass(f64::from(*self))
+    }
+}
+
+impl Numbers for u32 {
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+        pass(f64::from(*self))
+    }
+}
+
+impl<T: Numbers, const N: usize> Numbers for [T; N] {
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+        self.iter().try_for_each(|number| number.all(pass))
+    }
+}
+
+impl<T: Numbers> Numbers for Vec<T> {
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+        self.iter().try_for_each(|number| number.all(pass))
+    }
+}
+
+impl<T: Numbers> Numbers for Option<T> {
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+        self.iter().try_for_each(|number| number.all(pass))
+    }
+}
+
+impl<K, T: Numbers> Numbers for BTreeMap<K, T> {
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+        self.values().try_for_each(|number| number.all(pass))
+    }
+}
+
+macro_rules! quantities {
+    ($($(#[$doc:meta])* $name:ident: $least:literal to $most:literal $unit:literal;)*) => {$(
+        $(#[$doc])*
+        pub mod $name {
+            use super::{Deserialize, Deserializer, Numbers};
+
+            #[allow(dead_code, reason = "one of the two is used where the file is no JSON")]
+            /// Its range.
+            pub const RANGE: super::Range =
+                super::Range { least: $least, most: $most, unit: $unit };
+
+            #[allow(dead_code, reason = "one of the two is used where the file is no JSON")]
+            /// Reads a number, or lists of them, within the range.
+            pub fn de<'de, D, T>(deserializer: D) -> Result<T, D::Error>
+            where
+                D: Deserializer<'de>,
+                T: Deserialize<'de> + Numbers,
+            {
+                RANGE.deserialize(deserializer)
+            }
+        }
+    )*};
+}
+
+quantities! {
+    /// A coordinate in space or on paper.
+    place_mm: -1e6 to 1e6 "mm";
+    /// A length that may be nothing.
+    length_mm: 0.0 to 1e6 "mm";
+    /// An edge of a tile.
+    edge_mm: 1e-3 to 1e5 "mm";
+    /// A turn, of some rounds at most.
+    angle_rad: -100.0 to 100.0 "rad";
+    /// An entry of a rotation matrix.
+    cosine: -1.001 to 1.001 "";
+    /// An entry of the covariance of a pose, rad² to mm².
+    pose_covariance: -1e12 to 1e12 "";
+    /// A variance of a pose: from a billionth of a radian or millimetre on.
+    pose_variance: 1e-18 to 1e12 "";
+    /// A coordinate in an image. That of a corner may lie outside of it.
+    place_px: -1e6 to 1e6 "px";
+    /// A side of an image.
+    side_px: 1.0 to 50_000.0 "";
+    /// A variance of a place in an image: pictures without noise leave next to nothing.
+    variance_px2: 1e-20 to 1e8 "px²";
+    /// A focal length.
+    focal_px: 0.1 to 1e8 "px";
+    /// A coefficient of a lens.
+    coefficient: -1e9 to 1e9 "";
+    /// α of the models eucm and double-sphere.
+    alpha: 0.0 to 1.0 "";
+    /// β of eucm.
+    beta: 1e-6 to 1e6 "";
+    /// ξ of double-sphere, whose size is less than 1.
+    xi: -0.999999 to 0.999999 "";
+    /// A row or column of a lattice; both may be negative where the origin is anywhere.
+    place_in_lattice: -100_000.0 to 100_000.0 "";
+    /// The columns or rows of a matrix of corners.
+    side_of_matrix: 0.0 to 10_000.0 "";
+    /// A border of a tag.
+    border_bits: 0.0 to 100.0 "bit-widths";
+    /// A measured length over the stated one.
+    print_scale: 0.5 to 2.0 "";
+    /// A resolution.
+    dots_per_inch: 1.0 to 1e6 "dpi";
+    /// Millimetres in the unit of a mesh.
+    unit_mm: 1e-6 to 1e6 "mm";
+    /// Anything else that was measured.
+    figure: -1e15 to 1e15 "";
+    /// A standard deviation of that.
+    deviation: 0.0 to 1e15 "";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, Deserialize)]
+    struct File {
+        #[serde(default, deserialize_with = "variance_px2::de")]
+        cov: Option<[f64; 2]>,
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_named_with_the_range() {
+        let read = |text: &str| serde_json::from_str::<File>(text);
+        assert_eq!(read(r#"{"cov": [1, 2e-20]}"#).unwrap().cov, Some([1.0, 2e-20]));
+        assert!(read("{}").unwrap().cov.is_none());
+        let said = read(r#"{"cov": [1, 1e308]}"#).unwrap_err().to_string();
+        assert!(said.starts_with("1e308 is not between 1e-20 and 1e8 px²"), "{said}");
+        for bad in ["nan", "inf", "-1e308", "x", ""] {
+            assert_eq!(
+                place_mm::RANGE.parse(bad).unwrap_err(),
+                "it must be between -1000000 and 1000000 mm"
+            );
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! Grey images: storage, sampling, blur, reading and writing.
+//!
+//! Row-major, y down, pixel centres at integer coordinates.
+
+mod any_gray;
+mod bands;
+mod blur;
+mod coverage;
+mod gray;
+
+mod pyramid;
+
+pub use any_gray::{AnyGray, FileNotes};
+pub use bands::{bands, fill_bands};
+pub use blur::gaussian;
+pub use coverage::Coverage;
+pub use gray::{Gray, Intensity};
+pub use pyramid::{PYRAMID_FULL_SCALE, Pyramid};

@@ -1,0 +1,72 @@
+use glam::{DQuat, DVec3};
+use kurbo::{BezPath, PathEl};
+
+use super::{Scene, Surface};
+use crate::artwork::{Paint, Shape, Sheet};
+use crate::camera::Pose;
+use crate::targets::{Placement, Target};
+
+/// Curves of letters are replaced by chords that leave them by less than this, mm.
+const FLATTENING_MM: f64 = 0.005;
+
+/// A printed page lying in the world where its first panel says.
+///
+/// All panels of the page must lie in one plane of the target, as those of boards do; the page is
+/// one surface, labelled with the id of its first panel, that holds the corners of all.
+pub fn scene_of_sheet(target: &Target, sheet: &Sheet, index: usize) -> Scene {
+    let placements = target.sheets.get(index).map_or(&[][..], |layout| &layout.placements);
+    let panels = placements.iter().filter_map(|placement| {
+        let panel = target.panels.iter().find(|panel| panel.id == placement.panel)?;
+        Some((placement, panel))
+    });
+    let mut surface: Option<Surface> = None;
+    for (placement, panel) in panels {
+        let surface = surface.get_or_insert_with(|| Surface {
+            panel: panel.id,
+            target_from_surface: target_from_page(placement, panel),
+            paper_mm: rectangle(sheet.width_mm, sheet.height_mm),
+            black_mm: black_areas(&sheet.shapes),
+            corners: Vec::new(),
+        });
+        surface.corners.extend(panel.corners.iter().map(|corner| {
+            (corner.id, corner.row, corner.col, placement.page_from_panel(corner.panel_mm))
+        }));
+    }
+    Scene { surfaces: surface.into_iter().collect() }
+}
+
+fn rectangle(width: f64, height: f64) -> Vec<[f64; 2]> {
+    vec![[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]
+}
+
+fn target_from_page(placement: &Placement, panel: &crate::targets::Panel) -> Pose {
+    let [ox, oy] = placement.origin_mm;
+    let page_from_panel = Pose {
+        rotation: DQuat::from_rotation_z(placement.angle_rad),
+        translation: DVec3::new(ox, oy, 0.0),
+    };
+    panel.pose.to_pose().after(&page_from_panel.inverse())
+}
+
+/// The filled ones of some shapes as polygons.
+pub(super) fn black_areas(shapes: &[Shape]) -> Vec<Vec<Vec<[f64; 2]>>> {
+    shapes
+        .iter()
+        .filter(|shape| shape.paint == Paint::Fill)
+        .map(|shape| polygons(&shape.path))
+        .collect()
+}
+
+fn polygons(path: &BezPath) -> Vec<Vec<[f64; 2]>> {
+    let mut polygons: Vec<Vec<[f64; 2]>> = Vec::new();
+    kurbo::flatten(path, FLATTENING_MM, |element| match element {
+        PathEl::MoveTo(p) => polygons.push(vec![[p.x, p.y]]),
+        PathEl::LineTo(p) => {
+            if let Some(polygon) = polygons.last_mut() {
+                polygon.push([p.x, p.y]);
+            }
+        }
+        _ => {}
+    });
+    polygons
+}

@@ -1,0 +1,35 @@
+use super::sheet::black_areas;
+use super::{Scene, Surface};
+use crate::artwork::{self, ArtworkError};
+use crate::family::Family;
+use crate::targets::{Panel, Target, TargetSpec};
+
+/// The panels of a target where they are in space: the faces of a solid, or boards cut out along
+/// their quiet zone.
+///
+/// Boards of one target are loose sheets that all lie in its origin; only a single one makes sense.
+pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene, ArtworkError> {
+    let faces = match &target.spec {
+        TargetSpec::Solid(spec) => spec.faces().ok(),
+        TargetSpec::Board(_) | TargetSpec::Tags(_) | TargetSpec::Listed(_) => None,
+    };
+    let surface = |(index, panel): (usize, &Panel)| -> Result<Surface, ArtworkError> {
+        let paper_mm = match faces.as_ref().and_then(|faces| faces.get(index)) {
+            Some(face) => face.outline_mm.to_vec(),
+            None => {
+                let [x0, y0, x1, y1] = panel.field_mm();
+                vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+            }
+        };
+        let corners = panel.corners.iter().map(|c| (c.id, c.row, c.col, c.panel_mm));
+        Ok(Surface {
+            panel: panel.id,
+            target_from_surface: panel.pose.to_pose(),
+            paper_mm,
+            black_mm: black_areas(&artwork::panel_shapes(target, panel, family)?),
+            corners: corners.collect(),
+        })
+    };
+    let surfaces = target.panels.iter().enumerate().map(surface);
+    Ok(Scene { surfaces: surfaces.collect::<Result<_, _>>()? })
+}

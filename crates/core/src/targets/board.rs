@@ -1,0 +1,245 @@
+//! Boards: where their corners and tags are.
+
+use std::collections::BTreeMap;
+
+use super::capacity::{check_family, wider_spacing};
+use super::{
+    BoardSpec, Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagSpec,
+    TagsIn, TargetError,
+};
+use crate::family::Family;
+use crate::lattice::{ROW_HEIGHT, Vertex};
+
+/// The corners of a zigzag board of `rows × cols` corners, by row, then column: every second row
+/// starts one column further left, so that odd rows lie half an edge to the right of even ones;
+/// the smallest column is 0.
+///
+/// ```text
+///   row 3     ·   ·   ·        columns 0 1 2
+///   row 2   ·   ·   ·          columns 0 1 2
+///   row 1     ·   ·   ·        columns 1 2 3
+///   row 0   ·   ·   ·          columns 1 2 3
+/// ```
+pub fn zigzag_vertices(rows: u32, cols: u32) -> impl Iterator<Item = Vertex> {
+    let (rows, cols) = (rows as i32, cols as i32);
+    (0..rows).flat_map(move |row| {
+        let first = (rows - 1) / 2 - row / 2;
+        (first..first + cols).map(move |col| Vertex::new(row, col))
+    })
+}
+
+/// The corners of a checkerboard, by row, then column.
+///
+/// Row 0, column 0 is the lower left one; the square up and right of it is black, as are all whose
+/// lower left vertex has an even sum of row and column.
+fn rectangle_vertices(rows: u32, cols: u32) -> impl Iterator<Item = Vertex> {
+    let (rows, cols) = (rows as i32, cols as i32);
+    (0..rows).flat_map(move |row| (0..cols).map(move |col| Vertex::new(row, col)))
+}
+
+/// The corners of a board.
+fn vertices(spec: &BoardSpec) -> Vec<Vertex> {
+    match spec.grid {
+        GridKind::Deltille => zigzag_vertices(spec.rows, spec.cols).collect(),
+        GridKind::Checker => rectangle_vertices(spec.rows, spec.cols).collect(),
+    }
+}
+
+/// Width and height of the drawn tiles, mm; what [`Panel::bounds_mm`] finds without a panel at hand.
+pub(super) fn size_mm(spec: &BoardSpec) -> [f64; 2] {
+    let (rows, cols) = (f64::from(spec.rows), f64::from(spec.cols));
+    let [width, height] = match spec.grid {
+        GridKind::Deltille => [cols + 1.5, (rows + 1.0) * ROW_HEIGHT],
+        GridKind::Checker => [cols + 1.0, rows + 1.0],
+    };
+    [width * spec.edge_mm, height * spec.edge_mm]
+}
+
+/// The tiles that carry tags, ordered by row, then column.
+///
+/// A tag needs the corners of its tile to be read, so these are corners of the board, in every
+/// `spacing`-th row and column; on a checkerboard in the squares among them that have the right
+/// colour. Of the possible starts the one with most tags is taken, and of those the one whose tags
+/// lie most evenly about the centre of the board.
+pub(super) fn tagged_tiles(
+    kind: GridKind,
+    corners: &[Vertex],
+    spacing: u32,
+    tags_in: TagsIn,
+) -> Vec<Vertex> {
+    let corners: std::collections::BTreeSet<Vertex> = corners.iter().copied().collect();
+    let carries = |&v: &Vertex| {
+        let tile = kind.tag_tile(v);
+        tile.is_dark() == (tags_in == TagsIn::Black)
+            && tile.vertices().all(|v| corners.contains(&v))
+    };
+    let spacing = spacing as i32;
+    let mut by_start = BTreeMap::<(i32, i32), Vec<Vertex>>::new();
+    for tile in corners.iter().copied().filter(carries) {
+        by_start.entry((tile.row % spacing, tile.col % spacing)).or_default().push(tile);
+    }
+    let position = |v: Vertex| kind.position(v.row.into(), v.col.into());
+    let centre = mean(&corners.iter().map(|&v| position(v)).collect::<Vec<_>>());
+    let off_centre = |tiles: &[Vertex]| {
+        let vertices = tiles.iter().flat_map(|&v| kind.tag_tile(v).vertices()).map(position);
+        let at = mean(&vertices.collect::<Vec<_>>());
+        let [dx, dy] = [at[0] - centre[0], at[1] - centre[1]];
+        // Rounded, so that noise in the last digit does not decide between equal starts.
+        (dx.hypot(dy) * 1e6).round() as i64
+    };
+    by_start
+        .into_values()
+        .min_by_key(|tiles| (std::cmp::Reverse(tiles.len()), off_centre(tiles)))
+        .unwrap_or_default()
+}
+
+fn mean(points: &[[f64; 2]]) -> [f64; 2] {
+    let n = points.len() as f64;
+    [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / n)
+}
+
+/// The panels of a checked spec, and the family of its tags.
+pub(super) fn panels(
+    spec: &BoardSpec,
+    family: Option<&Family>,
+) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
+    spec.check()?;
+    let panels = untied_panels(spec);
+    let Some(tags) = &spec.tags else { return Ok((panels, None)) };
+    let vertices = vertices(spec);
+    let on_each = |spacing| tagged_tiles(spec.grid, &vertices, spacing, tags.tags_in).len() as u64;
+    let boards = u64::from(spec.boards);
+    let instead = |available: u64| {
+        let wider = wider_spacing(tags, available, |spacing| boards * on_each(spacing));
+        let fewer = available / on_each(tags.spacing).max(1);
+        let fewer = (fewer > 0).then(|| format!("make at most {fewer} --boards"));
+        wider.into_iter().chain(fewer).collect()
+    };
+    let needed = boards * on_each(tags.spacing);
+    let family = check_family(spec.grid, tags, family, needed, instead)?;
+    Ok((panels, Some(family)))
+}
+
+/// The panels of a checked spec, whether or not its family has so many tags.
+pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
+    let first_tag = spec.tags.as_ref().map_or(0, |tags| tags.first_id);
+    let vertices = vertices(spec);
+    let tagged = |tags: &TagSpec| tagged_tiles(spec.grid, &vertices, tags.spacing, tags.tags_in);
+    let tiles = spec.tags.as_ref().map_or_else(Vec::new, tagged);
+    let matrix = [vertices.iter().map(|v| v.col as u32 + 1).max().unwrap_or(0), spec.rows];
+    let panel = |board: u32| Panel {
+        id: spec.board_id + board,
+        kind: spec.grid,
+        edge_mm: spec.edge_mm,
+        border_bits: spec.tags.as_ref().map(|tags| tags.border_bits),
+        tags_in: spec.tags.as_ref().map_or_else(TagsIn::default, |tags| tags.tags_in),
+        inverted: spec.inverted,
+        outline: match spec.grid {
+            GridKind::Deltille => Outline::Zigzag,
+            GridKind::Checker => Outline::Touching,
+        },
+        matrix,
+        pose: PanelPose::IDENTITY,
+        corners: vertices
+            .iter()
+            .zip(board * vertices.len() as u32..)
+            .map(|(v, id)| {
+                let place = spec.grid.position(v.row.into(), v.col.into());
+                let [x, y] = place.map(|p| p * spec.edge_mm);
+                let (panel_mm, target_mm) = ([x, y], [x, y, 0.0]);
+                Corner { id, row: v.row, col: v.col, panel_mm, target_mm }
+            })
+            .collect(),
+        tags: tiles
+            .iter()
+            .enumerate()
+            // No family has so many codes that ids overflow; a spec may ask for them.
+            .map(|(i, tile)| TagPlacement {
+                id: first_tag.saturating_add(board * tiles.len() as u32 + i as u32),
+                row: tile.row,
+                col: tile.col,
+            })
+            .collect(),
+    };
+    (0..spec.boards).map(panel).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::targets::TagSpec;
+
+    fn spec(rows: u32, cols: u32, spacing: u32) -> BoardSpec {
+        let tags = Some(TagSpec { spacing, ..TagSpec::default() });
+        BoardSpec { tags, ..BoardSpec::new(GridKind::Deltille, rows, cols, 20.0) }
+    }
+
+    fn panel(spec: &BoardSpec) -> Panel {
+        let untagged = BoardSpec { tags: None, ..spec.clone() };
+        panels(&untagged, None).unwrap().0.remove(0)
+    }
+
+    /// The published print has 11 rows of 12 tiles, 250 mm × 11 · 10√3 mm.
+    #[test]
+    fn the_board_of_the_paper() {
+        let panel = panel(&spec(10, 11, 3));
+        assert_eq!(panel.corners.len(), 110);
+        assert_eq!(panel.dark_tiles().len(), 11 * 12);
+        let [left, lower, right, upper] = panel.bounds_mm();
+        assert!((right - left - 250.0).abs() < 1e-9);
+        assert!((upper - lower - 110.0 * 3f64.sqrt()).abs() < 1e-9);
+        assert_eq!(panel.matrix, [15, 10]);
+    }
+
+    #[test]
+    fn tags_of_the_default_board_lie_in_three_rows_about_the_centre() {
+        let board = spec(10, 11, 3);
+        let corners: Vec<Vertex> = zigzag_vertices(board.rows, board.cols).collect();
+        let tiles = tagged_tiles(GridKind::Deltille, &corners, 3, TagsIn::Black);
+        let rows: std::collections::BTreeSet<i32> = tiles.iter().map(|v| v.row).collect();
+        assert_eq!(rows.into_iter().collect::<Vec<_>>(), [1, 4, 7]);
+        assert!(tiles.len() >= 10, "{}", tiles.len());
+    }
+
+    proptest! {
+        #[test]
+        fn every_board_is_a_zigzag_rectangle(rows in 3u32..30, cols in 3u32..30) {
+            let panel = panel(&spec(rows, cols, 1));
+            prop_assert_eq!(panel.corners.len() as u32, rows * cols);
+            prop_assert_eq!(panel.dark_tiles().len() as u32, (rows + 1) * (cols + 1));
+            prop_assert_eq!(panel.corners.iter().map(|c| c.col).min(), Some(0));
+            let [left, _, right, _] = panel.bounds_mm();
+            prop_assert!((right - left - 20.0 * (f64::from(cols) + 1.5)).abs() < 1e-9);
+            let row_ends = |row: i32| panel.corners.iter().filter(move |c| c.row == row);
+            for row in 0..rows as i32 {
+                let x = row_ends(row).map(|c| c.panel_mm[0]).fold(f64::INFINITY, f64::min);
+                let first = if row % 2 == 0 { 20.0 } else { 30.0 };
+                prop_assert!((x - left - first).abs() < 1e-9);
+            }
+        }
+
+        #[test]
+        fn tags_keep_their_spacing_and_lie_between_corners(
+            rows in 2u32..20, cols in 2u32..20, spacing in 1u32..8, checker: bool, white: bool,
+        ) {
+            let board = spec(rows, cols, spacing);
+            let tags_in = if white { TagsIn::White } else { TagsIn::Black };
+            let grid = if checker { GridKind::Checker } else { GridKind::Deltille };
+            let board = BoardSpec { grid, ..board };
+            let corners = vertices(&board);
+            let tags_in = if checker { tags_in } else { TagsIn::Black };
+            let tiles = tagged_tiles(grid, &corners, spacing, tags_in);
+            // A board of 2 × 2 corners has one square, a black one.
+            prop_assert!(!tiles.is_empty() || (rows, cols, tags_in) == (2, 2, TagsIn::White));
+            prop_assert!(tiles.is_sorted());
+            for tile in &tiles {
+                prop_assert!(grid.tag_tile(*tile).vertices().all(|v| corners.contains(&v)));
+                prop_assert_eq!(grid.tag_tile(*tile).is_dark(), tags_in == TagsIn::Black);
+                let d = *tile - tiles[0];
+                prop_assert!(d.row % spacing as i32 == 0 && d.col % spacing as i32 == 0);
+            }
+        }
+    }
+}

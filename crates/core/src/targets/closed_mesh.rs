@@ -1,0 +1,395 @@
+//! Solids given as lists of triangles: what makes them solids, and how far they are from regular.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Largest deviation of an edge from the mean of its face for a face that counts as
+/// near-equilateral. The faces of geodesic spheres, made of equal triangles as nearly as a sphere
+/// allows, deviate by up to 11 %; at 15 % the board still has two thirds of the mean edge.
+pub const NEAR_EQUILATERAL: f64 = 0.15;
+
+/// Vertices nearer than this are one, in parts of the mesh's extent: what six written digits leave.
+const WELD: f64 = 1e-6;
+
+/// A face whose height is less than this part of its longest edge has no area.
+const LEAST_HEIGHT: f64 = 1e-4;
+
+/// A mesh that encloses less than this part of the cube of its extent is flat.
+const LEAST_VOLUME: f64 = 1e-6;
+
+/// Largest coordinate, in the unit of the list.
+const FARTHEST: f64 = 1e9;
+
+/// Whether a number can be a coordinate of a mesh.
+pub fn is_coordinate(value: f64) -> bool {
+    value.abs() <= FARTHEST
+}
+
+/// Why a list of triangles is not a closed solid. Triangles and vertices are counted from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ClosedMeshError {
+    /// Nothing there.
+    #[error("it has no triangles")]
+    Empty,
+    /// A coordinate is not finite, or too large to be squared in single precision.
+    #[error("vertex {0}: its coordinates must be finite numbers of at most {FARTHEST:e}")]
+    NotFinite(usize),
+    /// An index beyond the vertices.
+    #[error("triangle {0} names a vertex that is not there")]
+    NoSuchVertex(usize),
+    /// A triangle without area.
+    #[error("triangle {0} has no area")]
+    NoArea(usize),
+    /// An edge with a face on one side only.
+    #[error("it is open: triangle {0} has no neighbour along an edge")]
+    Open(usize),
+    /// More than two faces at an edge.
+    #[error("it is not manifold: an edge of triangle {0} belongs to {1} triangles")]
+    CrowdedEdge(usize, usize),
+    /// Two neighbours that turn different sides outwards.
+    #[error("triangles {0} and {1} are neighbours but wound against each other")]
+    Winding(usize, usize),
+    /// Solids that touch in a vertex, at these coordinates.
+    #[error("it is not manifold: parts of it touch only in the vertex at {0}")]
+    Pinched(DVec3),
+    /// More than one solid.
+    #[error(
+        "it has {0} separate pieces: make a target of each, with --first-id and --board-id so that \
+         no id is used twice"
+    )]
+    Pieces(usize),
+    /// Nothing inside.
+    #[error("it encloses no volume")]
+    Flat,
+    /// Faces that go through each other.
+    #[error("triangles {0} and {1} cut through each other")]
+    CutsItself(usize, usize),
+}
+
+/// A closed solid of triangles in one piece, its faces counter-clockwise as seen from outside.
+///
+/// It may be concave, but does not cut through itself. The order of faces, and which vertex of a
+/// face comes first, are those of the list that it was made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Lists", into = "Lists")]
+pub struct ClosedMesh {
+    vertices: Vec<DVec3>,
+    faces: Vec<[usize; 3]>,
+}
+
+/// A closed mesh as it is written.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Lists {
+    vertices: Vec<[f64; 3]>,
+    faces: Vec<[usize; 3]>,
+}
+
+impl TryFrom<Lists> for ClosedMesh {
+    type Error = ClosedMeshError;
+
+    fn try_from(lists: Lists) -> Result<Self, ClosedMeshError> {
+        let vertices: Vec<DVec3> = lists.vertices.into_iter().map(DVec3::from).collect();
+        Ok(Self::new(&vertices, &lists.faces)?.0)
+    }
+}
+
+impl From<ClosedMesh> for Lists {
+    fn from(mesh: ClosedMesh) -> Self {
+        let vertices = mesh.vertices.iter().map(DVec3::to_array).collect();
+        Self { vertices, faces: mesh.faces }
+    }
+}
+
+impl ClosedMesh {
+    /// Checks a list of triangles. Vertices in the same place become one, those that no triangle
+    /// names are left out; a mesh that is wound inside out is turned, and the second value says so.
+    pub fn new(vertices: &[DVec3], faces: &[[usize; 3]]) -> Result<(Self, bool), ClosedMeshError> {
+        use ClosedMeshError::*;
+        if faces.is_empty() {
+            return Err(Empty);
+        }
+        if let Some(bad) =
+            vertices.iter().position(|v| !v.to_array().into_iter().all(is_coordinate))
+        {
+            return Err(NotFinite(bad + 1));
+        }
+        if let Some(bad) = faces.iter().position(|f| f.iter().any(|&v| v >= vertices.len())) {
+            return Err(NoSuchVertex(bad + 1));
+        }
+        let mut mesh = welded(vertices, faces);
+        if let Some(bad) = (0..mesh.faces.len()).find(|&face| !mesh.has_area(face)) {
+            return Err(NoArea(bad + 1));
+        }
+        mesh.check_edges()?;
+        mesh.check_vertices()?;
+        let volume = mesh.volume();
+        if volume.abs() < LEAST_VOLUME * mesh.extent().powi(3) {
+            return Err(Flat);
+        }
+        if volume < 0.0 {
+            mesh.faces.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+        }
+        mesh.check_self()?;
+        Ok((mesh, volume < 0.0))
+    }
+
+    /// The vertices, in the unit of the list.
+    pub fn vertices(&self) -> &[DVec3] {
+        &self.vertices
+    }
+
+    /// Indices of the vertices of each face.
+    pub fn faces(&self) -> &[[usize; 3]] {
+        &self.faces
+    }
+
+    /// Mean length of all edges.
+    pub fn mean_edge(&self) -> f64 {
+        // Every edge belongs to two faces.
+        let lengths = (0..self.faces.len()).flat_map(|face| self.lengths(face));
+        lengths.sum::<f64>() / (3 * self.faces.len()) as f64
+    }
+
+    /// The face that is farthest from equilateral, and by how much its edges deviate from their
+    /// mean at most, relative.
+    pub fn most_skewed(&self) -> (usize, f64) {
+        let deviation = |face: usize| {
+            let lengths = self.lengths(face);
+            let mean = lengths.iter().sum::<f64>() / 3.0;
+            lengths.iter().map(|length| (length / mean - 1.0).abs()).fold(0.0, f64::max)
+        };
+        let faces = (0..self.faces.len()).map(|face| (face, deviation(face)));
+        faces.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
+    }
+
+    fn corners(&self, face: usize) -> [DVec3; 3] {
+        self.faces[face].map(|vertex| self.vertices[vertex])
+    }
+
+    fn lengths(&self, face: usize) -> [f64; 3] {
+        let [a, b, c] = self.corners(face);
+        [a.distance(b), b.distance(c), c.distance(a)]
+    }
+
+    fn extent(&self) -> f64 {
+        extent(&self.vertices)
+    }
+
+    fn has_area(&self, face: usize) -> bool {
+        let [a, b, c] = self.corners(face);
+        let longest = self.lengths(face).into_iter().fold(0.0, f64::max);
+        (b - a).cross(c - a).length() > LEAST_HEIGHT * longest * longest
+    }
+
+    /// Sum of the signed volumes of the tetrahedra over a vertex.
+    fn volume(&self) -> f64 {
+        let o = self.vertices[0];
+        let signed = |face: usize| {
+            let [a, b, c] = self.corners(face).map(|v| v - o);
+            a.dot(b.cross(c)) / 6.0
+        };
+        (0..self.faces.len()).map(signed).sum()
+    }
+
+    /// The faces at each edge, each with whether it runs along the edge from the lower vertex to
+    /// the higher.
+    fn faces_at_edges(&self) -> BTreeMap<[usize; 2], Vec<(usize, bool)>> {
+        let mut edges = BTreeMap::<_, Vec<_>>::new();
+        for (face, vertices) in self.faces.iter().enumerate() {
+            for i in 0..3 {
+                let (from, to) = (vertices[i], vertices[(i + 1) % 3]);
+                let edge = [from.min(to), from.max(to)];
+                edges.entry(edge).or_default().push((face, from < to));
+            }
+        }
+        edges
+    }
+
+    fn check_edges(&self) -> Result<(), ClosedMeshError> {
+        for faces in self.faces_at_edges().values() {
+            match faces.as_slice() {
+                [(a, along), (b, other)] if along == other => {
+                    return Err(ClosedMeshError::Winding(a + 1, b + 1));
+                }
+                [_, _] => {}
+                [(face, _)] => return Err(ClosedMeshError::Open(face + 1)),
+                many => return Err(ClosedMeshError::CrowdedEdge(many[0].0 + 1, many.len())),
+            }
+        }
+        Ok(())
+    }
+
+    /// The faces around a vertex form one ring, and all faces hang together.
+    fn check_vertices(&self) -> Result<(), ClosedMeshError> {
+        let mut next = vec![BTreeMap::new(); self.vertices.len()];
+        for &[a, b, c] in &self.faces {
+            next[a].insert(b, c);
+            next[b].insert(c, a);
+            next[c].insert(a, b);
+        }
+        for (vertex, ring) in next.iter().enumerate() {
+            let Some((&first, _)) = ring.first_key_value() else { continue };
+            let (mut at, mut steps) = (ring[&first], 1);
+            while at != first {
+                (at, steps) = (ring[&at], steps + 1);
+            }
+            if steps < ring.len() {
+                return Err(ClosedMeshError::Pinched(self.vertices[vertex]));
+            }
+        }
+        let mut pieces = 0;
+        let mut seen = vec![false; self.vertices.len()];
+        for start in 0..seen.len() {
+            pieces += usize::from(!seen[start]);
+            let mut open = vec![start];
+            while let Some(vertex) = open.pop() {
+                if !std::mem::replace(&mut seen[vertex], true) {
+                    open.extend(next[vertex].keys());
+                }
+            }
+        }
+        if pieces > 1 { Err(ClosedMeshError::Pieces(pieces)) } else { Ok(()) }
+    }
+
+    /// No edge goes through a face with which it has no vertex in common.
+    fn check_self(&self) -> Result<(), ClosedMeshError> {
+        let boxes: Vec<[DVec3; 2]> = (0..self.faces.len())
+            .map(|face| {
+                let [a, b, c] = self.corners(face);
+                [a.min(b).min(c), a.max(b).max(c)]
+            })
+            .collect();
+        for (&[from, to], faces) in &self.faces_at_edges() {
+            let (p, q) = (self.vertices[from], self.vertices[to]);
+            let (low, high) = (p.min(q), p.max(q));
+            for (other, [least, most]) in boxes.iter().enumerate() {
+                let apart = low.cmpgt(*most).any() || high.cmplt(*least).any();
+                let touching = self.faces[other].iter().any(|&v| v == from || v == to);
+                if !apart && !touching && pierces([p, q], self.corners(other)) {
+                    return Err(ClosedMeshError::CutsItself(faces[0].0 + 1, other + 1));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether a segment goes through a triangle.
+fn pierces([p, q]: [DVec3; 2], [a, b, c]: [DVec3; 3]) -> bool {
+    let normal = (b - a).cross(c - a);
+    let (before, behind) = (normal.dot(p - a), normal.dot(q - a));
+    if (before > 0.0) == (behind > 0.0) || before == behind {
+        return false;
+    }
+    let at = p + (q - p) * (before / (before - behind));
+    [(a, b), (b, c), (c, a)].iter().all(|(from, to)| (to - from).cross(at - from).dot(normal) > 0.0)
+}
+
+fn extent(vertices: &[DVec3]) -> f64 {
+    let least = vertices.iter().copied().reduce(DVec3::min).unwrap_or_default();
+    let most = vertices.iter().copied().reduce(DVec3::max).unwrap_or_default();
+    (most - least).max_element()
+}
+
+/// The mesh with one vertex for all in the same place, in the order in which the faces name them.
+fn welded(vertices: &[DVec3], faces: &[[usize; 3]]) -> ClosedMesh {
+    let used: Vec<DVec3> = faces.iter().flatten().map(|&v| vertices[v]).collect();
+    let near = WELD * extent(&used);
+    let mut by_x: Vec<usize> = (0..vertices.len()).collect();
+    by_x.sort_by(|&a, &b| vertices[a].x.total_cmp(&vertices[b].x));
+    // The first of all vertices in a place stands for them.
+    let mut stands_for: Vec<usize> = (0..vertices.len()).collect();
+    for (i, &a) in by_x.iter().enumerate() {
+        let here = by_x[i + 1..].iter().take_while(|&&b| vertices[b].x - vertices[a].x <= near);
+        for &b in here.filter(|&&b| vertices[b].distance(vertices[a]) <= near) {
+            let first = stands_for[a].min(stands_for[b]);
+            (stands_for[a], stands_for[b]) = (first, first);
+        }
+    }
+    let mut mesh = ClosedMesh { vertices: Vec::new(), faces: Vec::with_capacity(faces.len()) };
+    let mut index = BTreeMap::new();
+    for face in faces {
+        mesh.faces.push(face.map(|vertex| {
+            let first = stands_for[vertex];
+            *index.entry(first).or_insert_with(|| {
+                mesh.vertices.push(vertices[first]);
+                mesh.vertices.len() - 1
+            })
+        }));
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ClosedMeshError::*;
+    use super::*;
+    use crate::targets::Polyhedron;
+
+    fn octahedron() -> (Vec<DVec3>, Vec<[usize; 3]>) {
+        let solid = Polyhedron::octahedron(100.0);
+        (solid.vertices_mm, solid.faces)
+    }
+
+    fn refused(vertices: &[DVec3], faces: &[[usize; 3]]) -> ClosedMeshError {
+        ClosedMesh::new(vertices, faces).unwrap_err()
+    }
+
+    #[test]
+    fn triangles_of_their_own_vertices_are_welded_and_inner_sides_turned() {
+        let solid = Polyhedron::icosahedron(100.0);
+        let vertices: Vec<DVec3> =
+            (0..20).flat_map(|face| solid.triangle_mm(face)).map(|v| v + 1e-5).collect();
+        let faces: Vec<[usize; 3]> = (0..20).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let (mesh, turned) = ClosedMesh::new(&vertices, &faces).unwrap();
+        assert!(mesh.vertices().len() == 12 && !turned);
+        assert!((mesh.mean_edge() - 100.0).abs() < 1e-9 && mesh.most_skewed().1 < 1e-9);
+        let inside_out: Vec<[usize; 3]> = faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        let (again, turned) = ClosedMesh::new(&vertices, &inside_out).unwrap();
+        assert!(turned && again.faces().len() == 20);
+        assert!(again.volume() > 0.0 && (again.volume() - mesh.volume()).abs() < 1e-6);
+        let text = serde_json::to_string(&mesh).unwrap();
+        assert_eq!(serde_json::from_str::<ClosedMesh>(&text).unwrap(), mesh);
+    }
+
+    #[test]
+    fn what_is_no_closed_solid_is_refused() {
+        let (vertices, faces) = octahedron();
+        assert_eq!(refused(&vertices, &[]), Empty);
+        assert_eq!(refused(&vertices, &faces[1..]), Open(1));
+        assert_eq!(refused(&vertices, &[&faces[..], &[[0, 1, 9]]].concat()), NoSuchVertex(9));
+        let mut bad = vertices.clone();
+        bad[2].y = f64::NAN;
+        assert_eq!(refused(&bad, &faces), NotFinite(3));
+        bad[2] = bad[1];
+        assert_eq!(refused(&bad, &faces), NoArea(2));
+        let mut wound = faces.clone();
+        wound[3].swap(0, 1);
+        assert!(matches!(refused(&vertices, &wound), Winding(_, _)));
+        let twice = [&faces[..], &faces[..]].concat();
+        assert!(matches!(refused(&vertices, &twice), CrowdedEdge(1, 4)));
+        // A second solid: apart, in a vertex of the first, and through it.
+        let beside = |by: DVec3| {
+            let more: Vec<DVec3> = vertices.iter().map(|v| v + by).collect();
+            let indices: Vec<[usize; 3]> = faces.iter().map(|f| f.map(|v| v + 6)).collect();
+            refused(&[&vertices[..], &more[..]].concat(), &[&faces[..], &indices[..]].concat())
+        };
+        assert_eq!(beside(DVec3::X * 500.0), Pieces(2));
+        assert!(matches!(beside(DVec3::X * 100.0 * 2f64.sqrt()), Pinched(_)));
+        let flat = [[0, 1, 2], [2, 1, 0]];
+        assert_eq!(refused(&vertices, &flat), Flat);
+    }
+
+    /// A vertex pushed through a face on the other side.
+    #[test]
+    fn a_solid_that_cuts_itself_is_refused() {
+        let (mut vertices, faces) = octahedron();
+        vertices[4] = DVec3::new(40.0, 30.0, -40.0);
+        let result = ClosedMesh::new(&vertices, &faces);
+        assert!(matches!(result, Err(CutsItself(_, _))), "{result:?}");
+    }
+}

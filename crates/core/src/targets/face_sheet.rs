@@ -1,0 +1,269 @@
+//! Sheets of single faces, to be glued on a rigid skeleton: the panel with the marks to cut it out
+//! and to put it in its place. With a skeleton in the spec the panel is as large as its seat takes.
+//!
+//! ```text
+//!            +
+//!          \   /           Cutting marks extend the edges of the panel beyond its vertices, so that
+//!     7     ╲ ╱            a ruler laid on them leaves no line on it. Outside each edge its number
+//!           ╱ ╲            and the face beyond it are printed: edges of the same number meet. The
+//!        4 ╱   ╲ 9         number of the face is printed beside it and, small, in its lower left end.
+//!         ╱7    ╲
+//!    ── ─╱───────╲─ ──     Registration crosses lie on the bisectors beyond the vertices, each as
+//!  +         3         +   far from its vertex: a plotter, a jig or a second print is laid on them.
+//! ```
+//!
+//! The margin of a face is white, and so is its bleed: for [`BLEED_MM`] beyond the cut nothing is
+//! printed, so that a cut which is off by less leaves neither a line nor a letter on the panel, and
+//! a panel cut with its bleed can be trimmed after it was glued.
+
+use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit};
+use super::length::format_mm;
+use super::net::{Side, Sides};
+use super::paper::PaperSpec;
+use super::polyhedron::Face;
+use super::{
+    FamilyRef, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine, SheetText,
+    SolidSpec, TargetError,
+};
+
+/// White beyond the edges of a face, mm: what cutting and gluing by hand are off, and some more.
+pub const BLEED_MM: f64 = 3.0;
+/// Cutting marks start this far from a vertex and end that far, mm.
+const MARK_MM: [f64; 2] = [BLEED_MM, 9.0];
+/// Distance of a registration cross from its vertex, and length of its arms, mm: it stays clear of
+/// the cutting marks of a face with angles of 60°.
+const CROSS_MM: [f64; 2] = [13.0, 2.5];
+/// Width of a cutting mark, mm: a hairline that every printer holds.
+const MARK_WIDTH_MM: f64 = 0.15;
+/// Capital height of the number of a face beside it, mm.
+const FACE_CAP_MM: f64 = 5.0;
+/// Capital height of the numbers of edges, mm.
+const EDGE_CAP_MM: f64 = 2.2;
+/// Capital height and line spacing of the instructions, mm.
+const WORDS_MM: [f64; 2] = [2.0, 3.4];
+/// How to use a sheet, below the number of its face.
+const WORDS: [&str; 3] = ["Cut from mark to mark.", "Edges of the same", "number meet."];
+/// Blank between what a face prints and the marks along the margins of the page, mm.
+const MARK_BLANK_MM: f64 = 1.5;
+/// Capital height of the number on a face, in widths of its margin, and the most of it, mm.
+const INNER_CAP: (f64, f64) = (0.35, 2.0);
+/// Place of the number on a face, along the bisector of its lower left end, in margins.
+const INNER_PLACE: f64 = 0.9;
+
+/// The sheets of a solid's faces, one each.
+pub(super) fn sheets(
+    name: &str,
+    spec: &SolidSpec,
+    panels: &[Panel],
+    family: Option<&FamilyRef>,
+    paper: &PaperSpec,
+) -> Result<Vec<SheetLayout>, TargetError> {
+    let solid = spec.polyhedron();
+    let (edges, sides) = (solid.edges(), Sides::new(&solid));
+    let margin_mm = spec.margin_mm - spec.panel_inset_mm()?;
+    let numbered = spec.panel_faces()?.into_iter().zip(panels).enumerate();
+    numbered
+        .map(|(index, (face, panel))| {
+            let ink = bounds(&face);
+            let arrangement = arrange(spec, ink, paper)?;
+            let words = label(name, spec, index, panel, family);
+            let mut sheet = arrangement.sheet(panel.id, ink, words);
+            let numbers = edge_numbers(&solid, &edges, index);
+            let edge_words = [0, 1, 2].map(|side| {
+                let beyond = sides.partner(Side { face: index, side }).map(|other| other.face);
+                let beyond = beyond.map_or(String::new(), |face| format!(" · face {face}"));
+                format!("edge {}{beyond}", numbers[side])
+            });
+            mark(&mut sheet, spec, &face, index, edge_words);
+            sheet.texts.extend(inner_number(&sheet.placements[0], margin_mm, &face, index));
+            Ok(sheet)
+        })
+        .collect()
+}
+
+/// Numbers of the edges of a face, in the order of its outline.
+pub fn edge_numbers(solid: &Polyhedron, edges: &[[usize; 2]], face: usize) -> [usize; 3] {
+    let vertices = solid.faces[face];
+    [0, 1, 2].map(|i| {
+        let (from, to) = (vertices[i], vertices[(i + 1) % 3]);
+        edges.iter().position(|&edge| edge == [from.min(to), from.max(to)]).unwrap_or_default()
+    })
+}
+
+/// Bounding box of what is printed of a face, with its marks, in the panel frame, mm.
+fn bounds(face: &Face) -> [f64; 4] {
+    let over = |axis: usize, pick: fn(f64, f64) -> f64, start| {
+        face.outline_mm.iter().map(|p| p[axis]).fold(start, pick)
+    };
+    let reach = CROSS_MM[0] + CROSS_MM[1];
+    [
+        over(0, f64::min, f64::INFINITY) - reach,
+        over(1, f64::min, f64::INFINITY) - reach,
+        over(0, f64::max, f64::NEG_INFINITY) + reach,
+        over(1, f64::max, f64::NEG_INFINITY) + reach,
+    ]
+}
+
+fn arrange(
+    spec: &SolidSpec,
+    [left, lower, right, upper]: [f64; 4],
+    paper: &PaperSpec,
+) -> Result<Arrangement, TargetError> {
+    // The marks keep their size when the face shrinks.
+    let marks = 2.0 * MARK_MM[1];
+    let footprint = |shrink: f64| Footprint {
+        width: (right - left) - (right - left - marks) * shrink,
+        height: (upper - lower) - (upper - lower - marks) * shrink,
+        edge_blank: paper.margin_mm,
+        mark_blank: MARK_BLANK_MM,
+    };
+    if let Some(arrangement) = fit(&footprint(0.0), paper)? {
+        return Ok(arrangement);
+    }
+    let least = SolidSpec::LEAST_EDGE_MM as u32;
+    let mut fitting = None;
+    for mm in (least..spec.edge_mm.ceil() as u32).rev() {
+        if fit(&footprint(1.0 - f64::from(mm) / spec.edge_mm), paper)?.is_some() {
+            fitting = Some(mm);
+            break;
+        }
+    }
+    let paper = paper.size.as_ref().map_or("even A0".to_owned(), ToString::to_string);
+    let instead = fitting.map_or("larger paper".to_owned(), |mm| {
+        format!("larger paper, or an --edge of at most {mm} mm")
+    });
+    let edge = format_mm(spec.edge_mm);
+    let problem =
+        format!("a face with {edge} edges and its marks do not fit {paper}: take {instead}");
+    Err(TargetError::invalid("--paper", problem))
+}
+
+/// Adds cutting marks, numbers and instructions.
+fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, edges: [String; 3]) {
+    let placement = sheet.placements[0];
+    for (i, text) in edges.into_iter().enumerate() {
+        let (a, b) = (face.outline_mm[i], face.outline_mm[(i + 1) % 3]);
+        for (end, outwards) in [(a, -1.0), (b, 1.0)] {
+            let [from_mm, to_mm] =
+                MARK_MM.map(|mm| placement.page_from_panel(along(a, b, end, outwards * mm)));
+            let kind = LineKind::Cut;
+            sheet.lines.push(SheetLine { kind, from_mm, to_mm, width_mm: MARK_WIDTH_MM });
+        }
+        sheet.texts.push(edge_text(&placement, [a, b], text, -(BLEED_MM + EDGE_CAP_MM)));
+    }
+    for vertex in 0..3 {
+        let [a, b, c] = [0, 1, 2].map(|i| face.outline_mm[(vertex + i) % 3]);
+        let (to_b, to_c) = (along(a, b, [0.0; 2], 1.0), along(a, c, [0.0; 2], 1.0));
+        let inwards = [to_b[0] + to_c[0], to_b[1] + to_c[1]];
+        let middle = along([0.0; 2], inwards, a, -CROSS_MM[0]);
+        for [x, y] in [[CROSS_MM[1], 0.0], [0.0, CROSS_MM[1]]] {
+            let ends = [[middle[0] - x, middle[1] - y], [middle[0] + x, middle[1] + y]];
+            let [from_mm, to_mm] = ends.map(|end| placement.page_from_panel(end));
+            let kind = LineKind::Align;
+            sheet.lines.push(SheetLine { kind, from_mm, to_mm, width_mm: MARK_WIDTH_MM });
+        }
+    }
+    let [left, _, _, upper] = bounds(face);
+    let max_width_mm = spec.edge_mm / 4.0;
+    let mut add = |text: String, y: f64, cap_height_mm: f64| {
+        let at_mm = placement.page_from_panel([left, y]);
+        let angle_rad = placement.angle_rad;
+        sheet.texts.push(SheetText { text, at_mm, angle_rad, cap_height_mm, max_width_mm });
+    };
+    let mut y = upper - FACE_CAP_MM;
+    add(format!("face {index}"), y, FACE_CAP_MM);
+    y -= WORDS_MM[0] / 2.0;
+    for words in WORDS {
+        y -= WORDS_MM[1];
+        add(words.to_owned(), y, WORDS_MM[0]);
+    }
+}
+
+/// The number of a face in its lower left end; none where the margin leaves no room for it.
+fn inner_number(
+    placement: &Placement,
+    margin_mm: f64,
+    face: &Face,
+    index: usize,
+) -> Option<SheetText> {
+    let cap = (INNER_CAP.0 * margin_mm).min(INNER_CAP.1);
+    if cap < 0.8 {
+        return None;
+    }
+    let text = upright_number(index);
+    let [[ax, ay], b, c] = face.outline_mm;
+    let unit = |[x, y]: [f64; 2]| {
+        let length = (x - ax).hypot(y - ay);
+        [(x - ax) / length, (y - ay) / length]
+    };
+    let (b, c) = (unit(b), unit(c));
+    let sum = [b[0] + c[0], b[1] + c[1]];
+    let length = sum[0].hypot(sum[1]);
+    let width = text.len() as f64 * ADVANCE_CAPS * cap;
+    let reach = INNER_PLACE * margin_mm / length;
+    let at = [ax + sum[0] * reach - width / 2.0, ay + sum[1] * reach - cap / 2.0];
+    Some(SheetText {
+        text,
+        at_mm: placement.page_from_panel(at),
+        angle_rad: placement.angle_rad,
+        cap_height_mm: cap,
+        max_width_mm: 2.0 * width,
+    })
+}
+
+/// A number that stands alone: with a point after it where it reads as another upside down.
+pub fn upright_number(number: usize) -> String {
+    let text = number.to_string();
+    let turns = text.chars().all(|c| "01689".contains(c)) && text.contains(['6', '9']);
+    if turns { text + "." } else { text }
+}
+
+/// A text along the middle of an edge, its base line `inwards` from it.
+pub fn edge_text(
+    placement: &Placement,
+    [a, b]: [[f64; 2]; 2],
+    text: String,
+    inwards: f64,
+) -> SheetText {
+    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+    let length = dx.hypot(dy);
+    let width = (text.chars().count() as f64 * ADVANCE_CAPS * EDGE_CAP_MM).min(length);
+    let middle = along(a, b, a, (length - width) / 2.0);
+    let at = [middle[0] - dy / length * inwards, middle[1] + dx / length * inwards];
+    SheetText {
+        text,
+        at_mm: placement.page_from_panel(at),
+        angle_rad: placement.angle_rad + dy.atan2(dx),
+        cap_height_mm: EDGE_CAP_MM,
+        max_width_mm: length,
+    }
+}
+
+/// The point `mm` from `start` in the direction from a to b.
+fn along(a: [f64; 2], b: [f64; 2], start: [f64; 2], mm: f64) -> [f64; 2] {
+    let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+    [0, 1].map(|i| start[i] + (b[i] - a[i]) / length * mm)
+}
+
+/// The label of a face: all that is needed to make it again.
+fn label(
+    name: &str,
+    spec: &SolidSpec,
+    index: usize,
+    panel: &Panel,
+    family: Option<&FamilyRef>,
+) -> String {
+    let mut parts = vec![
+        name.to_owned(),
+        format!("{} edge {}", spec.shape.name(), format_mm(spec.edge_mm)),
+        format!("face {index}"),
+        format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)),
+    ];
+    if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
+        parts.push(format!("{} ids {}–{}", family.name, first.id, last.id));
+        parts.push(format!("fingerprint {}", family.fingerprint));
+    }
+    parts.push(format!("board {}", panel.id));
+    parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
+    parts.join(" · ")
+}

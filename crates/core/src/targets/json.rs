@@ -1,0 +1,461 @@
+//! The target file (FORMATS §9): reading with every field checked, and writing.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Corner, FamilyRef, GridKind, Name, Panel, SheetLayout, TagPlacement, Target, TargetSpec, board,
+    solid, tag_sheet,
+};
+use crate::json::{self, ReadError};
+use crate::lattice::Vertex;
+use crate::quantity;
+
+/// Schema and version that this crate writes and reads.
+pub const SCHEMA: &str = "deltille/target/1";
+
+/// How far a corner may lie from its place in the lattice, in edges. Measured positions differ by far
+/// less; another unit or another corner's position differs by more.
+const SLACK_EDGES: f64 = 0.01;
+
+/// How far its target position may be from that by its panel's pose, in edges: what six written digits of a
+/// rotation leave on a panel of a thousand edges.
+const POSE_SLACK_EDGES: f64 = 0.001;
+
+/// How far an edge may be from that of the spec, mm: what written digits leave.
+const SPEC_SLACK_MM: f64 = 1e-6;
+
+/// Longest side of a sheet, mm: more than any paper, and than the net of any solid that is made.
+const LONGEST_SHEET_MM: f64 = 20_000.0;
+
+/// How far the rotation of a pose may be from orthonormal: what six written digits leave.
+const ROTATION_SLACK: f64 = 1e-5;
+
+/// How far the correlations of a covariance may be from symmetric, and from positive semidefinite: what
+/// rounding leaves.
+const COVARIANCE_SLACK: f64 = 1e-6;
+
+/// What is wrong with a target file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TargetFileError {
+    /// Not JSON, or cut off.
+    #[error("not a target file: {0}; make it anew with `deltille board`")]
+    Json(serde_json::Error),
+    /// A file of something else.
+    #[error(
+        "this is a {found} file, not a target: give the .json that was written with the target"
+    )]
+    Kind {
+        /// The schema that the file names.
+        found: String,
+    },
+    /// Another schema, or another version of it.
+    #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
+    Schema {
+        /// The schema that the file names.
+        found: String,
+    },
+    /// A field is missing, unknown, or holds what it must not.
+    #[error("field `{field}`: {problem}")]
+    Field {
+        /// The field, such as `panels[0].corners[3].row`.
+        field: String,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TargetFile {
+    schema: String,
+    name: Name,
+    spec: TargetSpec,
+    family: Option<FamilyRef>,
+    panels: Vec<Panel>,
+    #[serde(default)]
+    sheets: Vec<SheetLayout>,
+}
+
+impl Target {
+    /// Reads the text of a target file.
+    pub fn from_json(text: &str) -> Result<Target, TargetFileError> {
+        // The schema is looked at first, so that a file of another version is called just that.
+        #[derive(Deserialize)]
+        struct Head {
+            schema: String,
+        }
+        let head: Head = json::read(text)?;
+        if json::kind(&head.schema) != json::kind(SCHEMA) {
+            return Err(TargetFileError::Kind { found: head.schema });
+        }
+        if head.schema != SCHEMA {
+            return Err(TargetFileError::Schema { found: head.schema });
+        }
+        let TargetFile { schema: _, name, spec, family, panels, sheets } = json::read(text)?;
+        let target = Target { name, spec, family, panels, sheets };
+        check(&target).map_err(|(field, problem)| TargetFileError::Field { field, problem })?;
+        Ok(target)
+    }
+
+    /// The text of the target file, a corner a line.
+    pub fn to_json(&self) -> String {
+        let Target { name, spec, family, panels, sheets } = self.clone();
+        let file = TargetFile { schema: SCHEMA.to_owned(), name, spec, family, panels, sheets };
+        json::to_text(&file, 4)
+    }
+}
+
+impl From<ReadError> for TargetFileError {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Json(error) => Self::Json(error),
+            ReadError::Field { field, problem } => Self::Field { field, problem },
+        }
+    }
+}
+
+/// A field, and what is wrong with it.
+pub type Problem = (String, String);
+
+fn problem<T>(field: impl Into<String>, problem: impl Into<String>) -> Result<T, Problem> {
+    Err((field.into(), problem.into()))
+}
+
+/// Checks what the types do not say; returns the field at fault and what is wrong with it.
+pub fn check(target: &Target) -> Result<(), Problem> {
+    if target.panels.is_empty() {
+        return problem("panels", "there is none");
+    }
+    // A family is looked for by its name, which must not lead to a file.
+    let family = target.family.as_ref().map_or(Ok(()), |f| Name::new(&f.name).map(|_| ()));
+    family.or_else(|wrong| problem("family.name", wrong))?;
+    let (mut panels, mut corners, mut tags) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
+    for (p, panel) in target.panels.iter().enumerate() {
+        let field = format!("panels[{p}]");
+        if panels.last().is_some_and(|&last| last >= panel.id) {
+            return problem(format!("{field}.id"), "ids must ascend from panel to panel");
+        }
+        panels.insert(panel.id);
+        if panel.kind != target.panels[0].kind {
+            return problem(format!("{field}.kind"), "all panels must be of one kind");
+        }
+        check_panel(panel, &field)?;
+        for (i, corner) in panel.corners.iter().enumerate() {
+            if !corners.insert(corner.id) {
+                let what = format!("{} is the id of another corner too", corner.id);
+                return problem(format!("{field}.corners[{i}].id"), what);
+            }
+        }
+        for (i, tag) in panel.tags.iter().enumerate() {
+            if !tags.insert(tag.id) {
+                let what = format!("{} is the id of another tag too", tag.id);
+                return problem(format!("{field}.tags[{i}].id"), what);
+            }
+        }
+        if !panel.tags.is_empty() && target.family.is_none() {
+            return problem("family", "there are tags, so there must be a family");
+        }
+    }
+    check_against_spec(target)?;
+    for (s, sheet) in target.sheets.iter().enumerate() {
+        check_sheet(sheet, &format!("sheets[{s}]"))?;
+        for (p, page) in sheet.pages.iter().enumerate() {
+            let field = format!("sheets[{s}].pages[{p}]");
+            check_sheet(&page.marks, &format!("{field}.marks"))?;
+            if !page.marks.placements.is_empty() || !page.marks.pages.is_empty() {
+                let what = "a page has no panels and no pages of its own, its sheet has them";
+                return problem(format!("{field}.marks"), what);
+            }
+            let [left, lower, right, upper] = page.window_mm;
+            let [width, height] = [page.marks.width_mm, page.marks.height_mm];
+            let on_page = 0.0 <= left && left < right && right <= width;
+            if !(on_page && 0.0 <= lower && lower < upper && upper <= height) {
+                return problem(format!("{field}.window_mm"), "it does not lie on the page");
+            }
+        }
+        if let Some(placed) = sheet.placements.iter().find(|p| !panels.contains(&p.panel)) {
+            let what = format!("there is no panel {}", placed.panel);
+            return problem(format!("sheets[{s}].placements"), what);
+        }
+    }
+    Ok(())
+}
+
+/// Checks the size of a sheet, and that its lines lie on it.
+fn check_sheet(sheet: &SheetLayout, field: &str) -> Result<(), Problem> {
+    let sides = [("width_mm", sheet.width_mm), ("height_mm", sheet.height_mm)];
+    if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm <= 0.0) {
+        return problem(format!("{field}.{side}"), "it must be positive");
+    }
+    if let Some((side, _)) = sides.iter().find(|(_, mm)| *mm > LONGEST_SHEET_MM) {
+        let what = format!("it is more than {LONGEST_SHEET_MM} mm");
+        return problem(format!("{field}.{side}"), what);
+    }
+    let on_sheet = |[x, y]: [f64; 2]| {
+        (0.0..=sheet.width_mm).contains(&x) && (0.0..=sheet.height_mm).contains(&y)
+    };
+    match sheet.lines.iter().position(|l| !on_sheet(l.from_mm) || !on_sheet(l.to_mm)) {
+        Some(line) => problem(format!("{field}.lines[{line}]"), "it does not lie on the sheet"),
+        None => Ok(()),
+    }
+}
+
+/// Compares the panels with those that the spec makes: a file in which one of them was changed
+/// contradicts itself. Poses and measured positions may differ.
+fn check_against_spec(target: &Target) -> Result<(), Problem> {
+    let (made, tagged) = match &target.spec {
+        TargetSpec::Board(spec) => {
+            (spec.check().map(|()| board::untied_panels(spec)), spec.tags.is_some())
+        }
+        TargetSpec::Solid(spec) => (solid::untied_panels(spec), true),
+        TargetSpec::Tags(spec) => (Ok(tag_sheet::panels(spec)), true),
+        TargetSpec::Listed(_) => return Ok(()),
+    };
+    let made = made.or_else(|error| problem("spec", error.to_string()))?;
+    let differs = |field: String, found: &dyn std::fmt::Display, made: &dyn std::fmt::Display| {
+        problem(field, format!("it is {found}, but that of `spec` has {made}"))
+    };
+    if target.panels.len() != made.len() {
+        return differs("panels.length".to_owned(), &target.panels.len(), &made.len());
+    }
+    if target.family.is_some() != tagged {
+        return problem("family", "it must be there if, and only if, `spec.tags` is");
+    }
+    for (p, (panel, made)) in target.panels.iter().zip(&made).enumerate() {
+        let field = |key: &str| format!("panels[{p}].{key}");
+        if panel.id != made.id {
+            return differs(field("id"), &panel.id, &made.id);
+        }
+        if (panel.edge_mm - made.edge_mm).abs() > SPEC_SLACK_MM {
+            return differs(field("edge_mm"), &panel.edge_mm, &made.edge_mm);
+        }
+        let plain = [
+            ("kind", panel.kind == made.kind),
+            ("border_bits", panel.border_bits == made.border_bits),
+            ("tags_in", panel.tags_in == made.tags_in),
+            ("inverted", panel.inverted == made.inverted),
+            ("outline", panel.outline == made.outline),
+            ("matrix", panel.matrix == made.matrix),
+        ];
+        if let Some((key, _)) = plain.iter().find(|(_, same)| !same) {
+            return problem(field(key), "it is not that of `spec`");
+        }
+        if panel.corners.len() != made.corners.len() {
+            let (found, made) = (panel.corners.len(), made.corners.len());
+            return differs(field("corners.length"), &found, &made);
+        }
+        for (i, (corner, made)) in panel.corners.iter().zip(&made.corners).enumerate() {
+            if (corner.id, corner.row, corner.col) != (made.id, made.row, made.col) {
+                let place = |c: &Corner| format!("corner {} at row {} col {}", c.id, c.row, c.col);
+                return differs(field(&format!("corners[{i}]")), &place(corner), &place(made));
+            }
+        }
+        if panel.tags.len() != made.tags.len() {
+            return differs(field("tags.length"), &panel.tags.len(), &made.tags.len());
+        }
+        for (i, (tag, made)) in panel.tags.iter().zip(&made.tags).enumerate() {
+            if tag != made {
+                let place =
+                    |t: &TagPlacement| format!("tag {} at row {} col {}", t.id, t.row, t.col);
+                return differs(field(&format!("tags[{i}]")), &place(tag), &place(made));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
+    if panel.border_bits.is_none() && !panel.tags.is_empty() {
+        return problem(format!("{field}.border_bits"), "there are tags, so there must be one");
+    }
+    if panel.corners.is_empty() {
+        return problem(format!("{field}.corners"), "there is none");
+    }
+    check_rotation(&panel.pose.rotation, field)?;
+    if let Some(covariance) = &panel.pose.covariance {
+        check_covariance(covariance)
+            .or_else(|what| problem(format!("{field}.pose.covariance"), what))?;
+    }
+    let slack = SLACK_EDGES * panel.edge_mm;
+    let mut previous = None;
+    for (i, corner) in panel.corners.iter().enumerate() {
+        let field = |key: &str| format!("{field}.corners[{i}].{key}");
+        let vertex = Vertex::new(corner.row, corner.col);
+        if previous.is_some_and(|previous| previous >= vertex) {
+            return problem(field("row"), "corners must be ordered by row, then column");
+        }
+        previous = Some(vertex);
+        let [cols, rows] = panel.matrix.map(i64::from);
+        let inside = |index: i32, size: i64| (0..size).contains(&i64::from(index));
+        if !inside(corner.row, rows) || !inside(corner.col, cols) {
+            let Vertex { row, col } = vertex;
+            let what = format!(
+                "row {row}, column {col} is outside the matrix of {rows} rows, {cols} columns"
+            );
+            return problem(field("row"), what);
+        }
+        if distance(&corner.panel_mm, &panel.lattice_mm(vertex)) > slack {
+            let what = "it is more than 1 % of an edge away from its place in the lattice";
+            return problem(field("panel_mm"), what);
+        }
+        let expected = panel.pose.target_from_panel(corner.panel_mm);
+        if distance(&corner.target_mm, &expected) > POSE_SLACK_EDGES * panel.edge_mm {
+            let what = "it is more than 0.1 % of an edge away from rotation · panel + translation";
+            return problem(field("target_mm"), what);
+        }
+    }
+    let mut previous = None;
+    for (i, tag) in panel.tags.iter().enumerate() {
+        let vertex = Vertex::new(tag.row, tag.col);
+        if previous.is_some_and(|previous| previous >= vertex) {
+            let what = "tags must be ordered by row, then column";
+            return problem(format!("{field}.tags[{i}].row"), what);
+        }
+        previous = Some(vertex);
+        let corner = |v: &Vertex| panel.corner_at(*v).is_some();
+        // Other programs put tags into the outermost squares as well.
+        let complete =
+            panel.kind == GridKind::Checker || panel.tag_tile(tag).vertices().all(|v| corner(&v));
+        if !complete {
+            let what = "its tile does not lie between three corners";
+            return problem(format!("{field}.tags[{i}].row"), what);
+        }
+    }
+    Ok(())
+}
+
+fn check_rotation(rotation: &[f64; 9], field: &str) -> Result<(), Problem> {
+    let r = nalgebra::Matrix3::from_row_slice(rotation);
+    let off = (r * r.transpose() - nalgebra::Matrix3::identity()).amax();
+    if off > ROTATION_SLACK || r.determinant() < 0.0 {
+        return problem(format!("{field}.pose.rotation"), "it is not a rotation");
+    }
+    Ok(())
+}
+
+/// Checks that it is the covariance of something.
+fn check_covariance(covariance: &[[f64; 6]; 6]) -> Result<(), String> {
+    let c = nalgebra::Matrix6::from_fn(|i, j| covariance[i][j]);
+    for i in 0..6 {
+        let in_range = quantity::pose_variance::RANGE.check(c[(i, i)]);
+        in_range.map_err(|what| format!("a variance, {what}"))?;
+    }
+    // Turns and moves have different units.
+    let correlations =
+        nalgebra::Matrix6::from_fn(|i, j| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt());
+    let uneven = (correlations - correlations.transpose()).amax();
+    if uneven > COVARIANCE_SLACK {
+        return Err("it is not symmetric".to_owned());
+    }
+    let least = correlations.symmetric_eigenvalues().min();
+    if least < -COVARIANCE_SLACK {
+        return Err("it is no covariance: some variance in it is negative".to_owned());
+    }
+    Ok(())
+}
+
+fn distance<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::family::Family;
+    use crate::targets::{BoardSpec, PaperSpec, TagSpec};
+
+    fn board(rows: u32, cols: u32, edge_mm: f64, tagged: bool, boards: u32) -> Target {
+        let tags = tagged.then(TagSpec::default);
+        let inverted = rows % 2 == 1;
+        let plain = BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm);
+        let spec = BoardSpec { boards, board_id: 3, tags, inverted, ..plain };
+        let family = Family::shipped("delTag25h7").unwrap();
+        let paper = PaperSpec::default();
+        Target::build("board", &TargetSpec::Board(spec), Some(&family), Some(&paper)).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn writing_and_reading_changes_nothing(
+            rows in 3u32..12, cols in 3u32..12, edge_mm in 5.0f64..30.0,
+            tagged: bool, boards in 1u32..3,
+        ) {
+            let target = board(rows, cols, edge_mm, tagged, if tagged { boards } else { 1 });
+            let json = target.to_json();
+            prop_assert_eq!(&Target::from_json(&json).unwrap(), &target);
+        }
+
+        #[test]
+        fn truncated_files_are_refused(cut in 0.0f64..1.0) {
+            let json = board(3, 3, 20.0, true, 1).to_json();
+            let end = (cut * (json.len() - 2) as f64) as usize;
+            if let Some(part) = json.get(..end) {
+                prop_assert!(matches!(Target::from_json(part), Err(TargetFileError::Json(_))));
+            }
+        }
+    }
+
+    /// What is said about a file in which `from` is replaced by `to`.
+    fn complaint(from: &str, to: &str) -> String {
+        let json = board(4, 4, 20.0, true, 1).to_json();
+        assert!(json.contains(from), "{from} is not in {json}");
+        Target::from_json(&json.replacen(from, to, 1)).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_error_names_its_field() {
+        assert!(complaint("target/1", "target/9").contains("`schema` is `deltille/target/9`"));
+        let cases = [
+            (r#""edge_mm": 20.0"#, r#""edge_mm": "wide""#, "spec"),
+            (r#""id": 3"#, r#""id": -3"#, "panels[0].id"),
+            (r#""kind": "deltille""#, r#""kind": "hexagons""#, "panels[0].kind"),
+            (r#""panel_mm": [20.0"#, r#""panel_mm": [21.0"#, "panels[0].corners[0].panel_mm"),
+            (r#""target_mm": [20.0"#, r#""target_mm": [21.0"#, "panels[0].corners[0].target_mm"),
+            (r#""col": 2"#, r#""col": 1"#, "panels[0].corners[1].row"),
+            (r#""id": 1, "row""#, r#""id": 0, "row""#, "panels[0].corners[1].id"),
+            (r#""rotation": [1.0"#, r#""rotation": [0.9"#, "panels[0].pose.rotation"),
+            (r#""width_mm": "#, r#""width_mm": -"#, "sheets[0].width_mm"),
+            (r#""panel": 3"#, r#""panel": 4"#, "sheets[0].placements"),
+            (r#""matrix""#, r#""matrices""#, "panels[0].matrices"),
+        ];
+        for (from, to, field) in cases {
+            let said = complaint(from, to);
+            assert!(said.starts_with(&format!("field `{field}")), "{from}: {said}");
+        }
+    }
+
+    #[test]
+    fn a_file_that_contradicts_its_spec_is_refused() {
+        let edit = |change: fn(&mut Target)| {
+            let mut target = board(4, 4, 20.0, true, 1);
+            change(&mut target);
+            Target::from_json(&target.to_json()).unwrap_err().to_string()
+        };
+        fn spec(target: &mut Target) -> &mut BoardSpec {
+            let TargetSpec::Board(spec) = &mut target.spec else { panic!("a board") };
+            spec
+        }
+        type Edit = fn(&mut Target);
+        let cases: [(Edit, &str); 5] = [
+            (
+                |t| {
+                    t.panels[0].corners.pop();
+                },
+                "panels[0].corners.length",
+            ),
+            (|t| spec(t).rows = 11, "panels[0].matrix"),
+            (|t| spec(t).edge_mm = 21.0, "panels[0].edge_mm"),
+            (|t| t.panels[0].tags[0].id += 100, "panels[0].tags[0]"),
+            (|t| spec(t).cols = 0, "spec"),
+        ];
+        for (change, field) in cases {
+            let said = edit(change);
+            assert!(said.starts_with(&format!("field `{field}`")), "{said}");
+        }
+    }
+}

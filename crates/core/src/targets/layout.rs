@@ -1,0 +1,477 @@
+//! Where a board, its label and its check bars lie on paper.
+//!
+//! ```text
+//!   ┌────────────────────────────────┐
+//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      ┬  │   the board lies in the middle of the page unless that
+//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   would bring a mark into its quiet zone;
+//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   the bars lie along the lower and the right margin, the
+//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   words between their ends; the label below the lower
+//!   │  ├────── 180 mm ──────┤     ┴  │   bar, or beside the right one where that saves the board
+//!   │  name · 10 × 11 corners · …    │
+//!   └────────────────────────────────┘
+//! ```
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::length::format_mm;
+use super::paper::{Orientation, PaperSize, PaperSpec};
+use super::{
+    BoardSpec, CheckBar, FamilyRef, GridKind, Panel, Placement, SheetLayout, SheetText, TagsIn,
+    TargetError, board,
+};
+
+/// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
+const BAR_CAP_MM: f64 = 1.8;
+/// Capital height of the label, mm.
+const LABEL_CAP_MM: f64 = 2.2;
+/// Length of a bar's end strokes, across the bar, mm: enough to lay a ruler on, short enough to
+/// leave room for the words.
+pub const CHECK_BAR_STROKE_MM: f64 = 2.0;
+/// What letters such as g reach below the base line, in capital heights.
+const DESCENT_CAPS: f64 = 0.33;
+/// Blanks between a bar, its words and the label, mm: the first that leaves room for the board. The
+/// last is what 10 × 11 corners with 20 mm edges leave on A4.
+const GAPS_MM: [f64; 2] = [1.5, 0.8];
+/// Blank between the ends of a bar and its words, mm.
+const BAR_INDENT_MM: f64 = 3.0;
+/// Check bars are a multiple of this long, mm: a round number is read off a ruler without error.
+const BAR_STEP_MM: f64 = 10.0;
+/// Average advance of a character in the built-in font, in capital heights; a long text is set
+/// only where it fits by this estimate.
+pub(super) const ADVANCE_CAPS: f64 = 0.76;
+/// Blank between the black field of an inverted board and the marks, mm.
+const FIELD_GAP_MM: f64 = 1.0;
+/// Blank that is left along the edges of the paper whatever the margin, mm: a pixel at 200 dpi has
+/// 0.13 mm, and the stroke of a bar that touches the edge can neither be measured nor trimmed.
+const LEAST_MARGIN_MM: f64 = 0.5;
+/// Finest edge proposed to make a board fit, mm: what office printers resolve in a tag.
+const LEAST_PROPOSED_MM: u32 = 5;
+
+/// The rectangle that a panel's ink takes, and the blanks it needs, mm.
+pub(super) struct Footprint {
+    pub width: f64,
+    pub height: f64,
+    /// Distance to the edges of the paper.
+    pub edge_blank: f64,
+    /// Distance to the marks.
+    pub mark_blank: f64,
+}
+
+impl Footprint {
+    fn new(spec: &BoardSpec, margin_mm: f64) -> Self {
+        let [width, height] = board::size_mm(spec);
+        let quiet = Panel::quiet_zone_at_mm(spec.edge_mm);
+        if spec.inverted {
+            let (width, height) = (width + 2.0 * quiet, height + 2.0 * quiet);
+            return Self { width, height, edge_blank: margin_mm, mark_blank: FIELD_GAP_MM };
+        }
+        Self { width, height, edge_blank: margin_mm.max(quiet), mark_blank: quiet }
+    }
+}
+
+/// A sheet before its panel is named: which paper, and where things are.
+#[derive(Clone, Copy)]
+pub(super) struct Arrangement {
+    page: [f64; 2],
+    margin: f64,
+    /// Whether the board is turned by 90° counter-clockwise.
+    turned: bool,
+    /// Lower-left corner of the footprint.
+    board_at: [f64; 2],
+    /// What lies along the lower and the right margin.
+    marks: [Marks; 2],
+}
+
+/// A check bar and perhaps the label, along a margin: distances from the margin inwards, mm.
+#[derive(Clone, Copy)]
+struct Marks {
+    label: bool,
+    gap: f64,
+}
+
+impl Marks {
+    /// Base line of the label.
+    const LABEL: f64 = LABEL_CAP_MM * DESCENT_CAPS;
+
+    /// Base line of the words on the bar.
+    fn words(self) -> f64 {
+        let label = if self.label { Self::LABEL + LABEL_CAP_MM + self.gap } else { 0.0 };
+        label + BAR_CAP_MM * DESCENT_CAPS
+    }
+
+    /// The line of the bar.
+    fn line(self) -> f64 {
+        self.words() + BAR_CAP_MM + self.gap
+    }
+
+    /// All of it.
+    fn depth(self) -> f64 {
+        self.line() + CHECK_BAR_STROKE_MM / 2.0
+    }
+}
+
+/// Fits a board on paper, in this order of preference: the smallest paper (where it is free), the
+/// orientation of the board's longer side, the board not turned, the label below.
+pub(super) fn arrange(spec: &BoardSpec, paper: &PaperSpec) -> Result<Arrangement, TargetError> {
+    let fitting = |spec: &BoardSpec| fit(&Footprint::new(spec, paper.margin_mm), paper);
+    fitting(spec)?.ok_or_else(|| TargetError::DoesNotFit {
+        rows: spec.rows,
+        cols: spec.cols,
+        edge: format_mm(spec.edge_mm),
+        paper: match (&paper.size, paper.orientation) {
+            (None, _) => "even A0".to_owned(),
+            (Some(size), Orientation::Auto) => size.to_string(),
+            (Some(size), Orientation::Portrait) => format!("{size} portrait"),
+            (Some(size), Orientation::Landscape) => format!("{size} landscape"),
+        },
+        fitting_edge_mm: (LEAST_PROPOSED_MM..=spec.edge_mm.ceil() as u32).rev().find(|&mm| {
+            let smaller = BoardSpec { edge_mm: f64::from(mm), ..spec.clone() };
+            fitting(&smaller).is_ok_and(|found| found.is_some())
+        }),
+    })
+}
+
+/// Fits a footprint on paper; `None` where it does not fit.
+pub(super) fn fit(
+    footprint: &Footprint,
+    paper: &PaperSpec,
+) -> Result<Option<Arrangement>, TargetError> {
+    fit_turned(footprint, paper, &[false, true])
+}
+
+/// Fits a footprint on paper as it stands; `None` where it does not fit.
+pub(super) fn fit_upright(
+    footprint: &Footprint,
+    paper: &PaperSpec,
+) -> Result<Option<Arrangement>, TargetError> {
+    fit_turned(footprint, paper, &[false])
+}
+
+fn fit_turned(
+    footprint: &Footprint,
+    paper: &PaperSpec,
+    turns: &[bool],
+) -> Result<Option<Arrangement>, TargetError> {
+    let margin = check_margin(paper)?;
+    let sizes: Vec<PaperSize> = match &paper.size {
+        Some(size) => vec![size.clone()],
+        None => PaperSize::automatic().collect(),
+    };
+    let fitting = |size| on_size(footprint, size, paper.orientation, margin, turns);
+    Ok(sizes.iter().find_map(fitting))
+}
+
+/// The margin asked for, mm, and never less than what must stay blank.
+pub(super) fn check_margin(paper: &PaperSpec) -> Result<f64, TargetError> {
+    let margin = paper.margin_mm;
+    if !(0.0..=100.0).contains(&margin) {
+        let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
+        return Err(TargetError::invalid("--margin", problem));
+    }
+    Ok(margin.max(LEAST_MARGIN_MM))
+}
+
+/// Fits a board on one size of paper.
+fn on_size(
+    footprint: &Footprint,
+    size: &PaperSize,
+    orientation: Orientation,
+    margin: f64,
+    turns: &[bool],
+) -> Option<Arrangement> {
+    let (portrait, landscape) = (size.portrait_mm(), size.landscape_mm());
+    let pages = match orientation {
+        Orientation::Portrait => vec![portrait],
+        Orientation::Landscape => vec![landscape],
+        Orientation::Auto if footprint.width < footprint.height => vec![portrait, landscape],
+        Orientation::Auto => vec![landscape, portrait],
+    };
+    turns
+        .iter()
+        .find_map(|&turned| pages.iter().find_map(|&page| on_page(footprint, page, margin, turned)))
+}
+
+/// Fits a board on one page.
+pub(super) fn on_page(
+    footprint: &Footprint,
+    page: [f64; 2],
+    margin: f64,
+    turned: bool,
+) -> Option<Arrangement> {
+    let Footprint { width, height, edge_blank, mark_blank } = *footprint;
+    let board = if turned { [height, width] } else { [width, height] };
+    // The widest gaps that leave room along one axis, with or without the label there.
+    let widest = |axis: usize, label: bool| {
+        let outside = edge_blank + margin + mark_blank;
+        let room = page[axis] - outside - board[axis];
+        GAPS_MM.into_iter().map(|gap| Marks { label, gap }).find(|marks| marks.depth() <= room)
+    };
+    [true, false].into_iter().find_map(|label_below| {
+        let (lower, right) = (widest(1, label_below)?, widest(0, !label_below)?);
+        let middle = [(page[0] - board[0]) / 2.0, (page[1] - board[1]) / 2.0];
+        let right_end = page[0] - margin - right.depth() - mark_blank - board[0];
+        let lower_end = margin + lower.depth() + mark_blank;
+        let board_at = [middle[0].min(right_end), middle[1].max(lower_end)];
+        Some(Arrangement { page, margin, turned, board_at, marks: [lower, right] })
+    })
+}
+
+impl Arrangement {
+    /// The sheet of one panel, whose `ink` is a rectangle of its frame.
+    pub(super) fn sheet(&self, panel: u32, ink: [f64; 4], label: String) -> SheetLayout {
+        let [width_mm, height_mm] = self.page;
+        let [lower_marks, right_marks] = self.marks;
+        let corner = right_marks.depth() + right_marks.gap;
+        let lower = Strip {
+            start: [self.margin, self.margin],
+            turned: false,
+            length: width_mm - 2.0 * self.margin - corner,
+        };
+        let right = Strip {
+            start: [width_mm - self.margin, self.margin],
+            turned: true,
+            length: height_mm - 2.0 * self.margin,
+        };
+        let strips = [(lower, lower_marks), (right, right_marks)];
+        let label = strips.iter().filter(|(_, marks)| marks.label).map(|(strip, _)| SheetText {
+            text: label.clone(),
+            at_mm: strip.at(0.0, Marks::LABEL),
+            angle_rad: strip.angle(),
+            cap_height_mm: LABEL_CAP_MM,
+            max_width_mm: strip.length,
+        });
+        let words = strips.iter().map(|(strip, marks)| SheetText {
+            text: bar_words(strip.bar_mm()),
+            at_mm: strip.at(BAR_INDENT_MM, marks.words()),
+            angle_rad: strip.angle(),
+            cap_height_mm: BAR_CAP_MM,
+            max_width_mm: strip.bar_mm() - 2.0 * BAR_INDENT_MM,
+        });
+        let bars = strips.iter().map(|(strip, marks)| CheckBar {
+            from_mm: strip.at(0.0, marks.line()),
+            to_mm: strip.at(strip.bar_mm(), marks.line()),
+        });
+        let (texts, check_bars) = (label.chain(words).collect(), bars.collect());
+        SheetLayout {
+            width_mm,
+            height_mm,
+            placements: vec![self.placement(panel, ink)],
+            lines: Vec::new(),
+            check_bars,
+            texts,
+            pages: Vec::new(),
+        }
+    }
+
+    /// Width and height of the page, mm.
+    pub(super) fn page_mm(&self) -> [f64; 2] {
+        self.page
+    }
+
+    /// Lower-left corner of the footprint on the page, mm.
+    pub(super) fn footprint_at_mm(&self) -> [f64; 2] {
+        self.board_at
+    }
+
+    /// What the margins and the marks leave free: left, lower, right, upper end, mm.
+    pub(super) fn clear_mm(&self) -> [f64; 4] {
+        let [lower, right] = self.marks.map(Marks::depth);
+        let [width, height] = self.page;
+        let margin = self.margin;
+        [margin, margin + lower, width - margin - right, height - margin]
+    }
+
+    fn placement(&self, panel: u32, [left, lower, _, upper]: [f64; 4]) -> Placement {
+        let [x, y] = self.board_at;
+        if self.turned {
+            // (u, v) of the panel goes to (−v, u): its upper end lies left.
+            let origin_mm = [x + upper, y - left];
+            return Placement { panel, angle_rad: FRAC_PI_2, origin_mm };
+        }
+        Placement { panel, angle_rad: 0.0, origin_mm: [x - left, y - lower] }
+    }
+}
+
+/// A strip along the lower or, turned counter-clockwise, the right margin.
+struct Strip {
+    /// Its outer corner: lower left, or lower right.
+    start: [f64; 2],
+    turned: bool,
+    length: f64,
+}
+
+impl Strip {
+    /// The page position `along` the strip and `inwards` from the margin.
+    fn at(&self, along: f64, inwards: f64) -> [f64; 2] {
+        let [x, y] = self.start;
+        if self.turned { [x - inwards, y + along] } else { [x + along, y + inwards] }
+    }
+
+    /// Length of the bar along it, mm.
+    fn bar_mm(&self) -> f64 {
+        (self.length / BAR_STEP_MM).floor() * BAR_STEP_MM
+    }
+
+    fn angle(&self) -> f64 {
+        if self.turned { FRAC_PI_2 } else { 0.0 }
+    }
+}
+
+/// How to measure a check bar and what to do when it is off, as fully as its length allows.
+fn bar_words(length_mm: f64) -> String {
+    let texts = [
+        format!(
+            "Measure between the outer ends of this line: {length_mm} mm. If not, print again at \
+             100 % without \"fit to page\", or multiply all lengths by measured / {length_mm}."
+        ),
+        format!(
+            "{length_mm} mm between the outer ends. If not: print at 100 %, no \"fit to page\", \
+             or scale by measured / {length_mm}."
+        ),
+        format!("{length_mm} mm end to end. If not: print at 100 %."),
+    ];
+    let room = length_mm - 2.0 * BAR_INDENT_MM;
+    let width = |text: &str| text.chars().count() as f64 * ADVANCE_CAPS * BAR_CAP_MM;
+    let fitting = texts.into_iter().find(|text| width(text) <= room);
+    fitting.unwrap_or_else(|| format!("{length_mm} mm"))
+}
+
+/// The label of one board: all that is needed to make it again.
+pub(super) fn label(
+    name: &str,
+    spec: &BoardSpec,
+    panel: &Panel,
+    family: Option<&FamilyRef>,
+) -> String {
+    let corners = format!("{} × {} corners", spec.rows, spec.cols);
+    let mut parts = vec![
+        name.to_owned(),
+        match spec.grid {
+            GridKind::Deltille => corners,
+            GridKind::Checker => format!("checkerboard {corners}"),
+        },
+        format!("edge {}", format_mm(spec.edge_mm)),
+    ];
+    if let (Some(family), [first, .., last] | [first @ last]) = (family, panel.tags.as_slice()) {
+        parts.push(format!("{} {}", family.name, id_range(first.id, last.id)));
+        parts.push(format!("fingerprint {}", family.fingerprint));
+        if panel.tags_in == TagsIn::White {
+            parts.push("tags in white squares".to_owned());
+        }
+    }
+    parts.push(format!("board {}", panel.id));
+    parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
+    parts.join(" · ")
+}
+
+/// Ids in words: `id 3`, `ids 3–7`.
+pub fn id_range(first: u32, last: u32) -> String {
+    if first == last { format!("id {first}") } else { format!("ids {first}–{last}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::targets::{Target, TargetSpec};
+
+    fn spec(rows: u32, cols: u32, edge_mm: f64) -> BoardSpec {
+        BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm) }
+    }
+
+    fn build(spec: &BoardSpec, paper: &PaperSpec) -> Result<Target, TargetError> {
+        Target::build("board", &TargetSpec::Board(spec.clone()), None, Some(paper))
+    }
+
+    fn on(size: &str, orientation: Orientation) -> PaperSpec {
+        PaperSpec { size: Some(size.parse().unwrap()), orientation, ..PaperSpec::default() }
+    }
+
+    /// Page rectangle of a placed panel's ink.
+    fn ink(target: &Target) -> [f64; 4] {
+        let (panel, placement) = (&target.panels[0], &target.sheets[0].placements[0]);
+        let [left, lower, right, upper] =
+            if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
+        let (sin, cos) = placement.angle_rad.sin_cos();
+        let corners = [[left, lower], [right, upper]].map(|[u, v]| {
+            let [x, y] = placement.origin_mm;
+            [x + cos * u - sin * v, y + sin * u + cos * v]
+        });
+        let [[x0, y0], [x1, y1]] = corners;
+        [x0.min(x1), y0.min(y1), x0.max(x1), y0.max(y1)]
+    }
+
+    #[test]
+    fn the_board_of_the_paper_fits_a4_and_letter_at_20_mm() {
+        for size in ["A4", "letter"] {
+            let target = build(&spec(10, 11, 20.0), &on(size, Orientation::Auto)).unwrap();
+            let sheet = &target.sheets[0];
+            assert!(sheet.width_mm > sheet.height_mm);
+            let lengths = sheet.check_bars.iter().map(CheckBar::length_mm);
+            assert!(lengths.into_iter().all(|mm| mm >= 190.0), "{:?}", sheet.check_bars);
+        }
+        let automatic = build(&spec(10, 11, 20.0), &PaperSpec::default()).unwrap();
+        assert_eq!((automatic.sheets[0].width_mm, automatic.sheets[0].height_mm), (297.0, 210.0));
+    }
+
+    #[test]
+    fn orientation_is_obeyed_by_turning_the_board() {
+        let target = build(&spec(10, 11, 20.0), &on("A4", Orientation::Portrait)).unwrap();
+        assert_eq!((target.sheets[0].width_mm, target.sheets[0].height_mm), (210.0, 297.0));
+        assert_eq!(target.sheets[0].placements[0].angle_rad, FRAC_PI_2);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_with_an_edge_that_does() {
+        let paper = on("A4", Orientation::Auto);
+        let error = build(&spec(10, 11, 30.0), &paper).unwrap_err();
+        assert!(error.to_string().contains("an --edge of at most 20 mm"), "{error}");
+        assert!(build(&spec(10, 11, 20.0), &paper).is_ok());
+        let error = build(&spec(200, 300, 30.0), &PaperSpec::default()).unwrap_err();
+        assert!(error.to_string().contains("even A0"), "{error}");
+    }
+
+    #[test]
+    fn bars_on_a4_say_how_to_measure_and_what_to_do() {
+        for length in [150.0, 190.0, 270.0] {
+            let words = bar_words(length);
+            assert!(words.contains("outer ends") && words.contains("measured / "), "{words}");
+        }
+    }
+
+    proptest! {
+        /// Ink stays off the margin, marks off the quiet zone and off each other.
+        #[test]
+        fn nothing_overlaps(
+            rows in 2u32..20, cols in 2u32..20, edge in 5.0f64..40.0, margin in 0.0f64..20.0,
+            inverted: bool, orientation in 0usize..3, checker: bool,
+        ) {
+            use Orientation::{Auto, Landscape, Portrait};
+            let grid = if checker { GridKind::Checker } else { GridKind::Deltille };
+            let spec = BoardSpec { grid, inverted, ..spec(rows, cols, edge) };
+            let orientation = [Auto, Landscape, Portrait][orientation];
+            let paper = PaperSpec { orientation, margin_mm: margin, ..PaperSpec::default() };
+            let Ok(target) = build(&spec, &paper) else { return Ok(()) };
+            let sheet = &target.sheets[0];
+            let [left, lower, right, upper] = ink(&target);
+            let margin = margin.max(LEAST_MARGIN_MM);
+            let edge_blank = if inverted { margin } else { margin.max(target.panels[0].quiet_zone_mm()) };
+            let mark_blank = if inverted { FIELD_GAP_MM } else { target.panels[0].quiet_zone_mm() };
+            let slack = 1e-9;
+            prop_assert!(left >= edge_blank - slack && upper <= sheet.height_mm - edge_blank + slack);
+            let [below, beside] = &sheet.check_bars[..] else { panic!("two bars") };
+            prop_assert!(below.from_mm[1] + (CHECK_BAR_STROKE_MM / 2.0) + mark_blank <= lower + slack);
+            prop_assert!(beside.from_mm[0] - (CHECK_BAR_STROKE_MM / 2.0) - mark_blank >= right - slack);
+            prop_assert!(below.to_mm[0] < beside.to_mm[0] - (CHECK_BAR_STROKE_MM / 2.0));
+            for (bar, axis) in [(below, 0), (beside, 1)] {
+                let size = [sheet.width_mm, sheet.height_mm][axis];
+                prop_assert!(bar.from_mm[axis] >= margin - slack && bar.to_mm[axis] <= size - margin + slack);
+                prop_assert!(bar.length_mm() % BAR_STEP_MM < 1e-9 || bar.length_mm() % BAR_STEP_MM > BAR_STEP_MM - 1e-9);
+            }
+            for text in &sheet.texts {
+                prop_assert!(text.at_mm.iter().all(|&v| v >= margin));
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+/// Units and their millimetres; longer names first, so that `m` does not take the end of `mm`.
+const UNITS: [(&str, f64); 5] =
+    [("mm", 1.0), ("cm", 10.0), ("in", 25.4), ("pt", 25.4 / 72.0), ("m", 1000.0)];
+
+/// A text that is no length.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not a length such as 20mm, 2cm, 0.02m, 0.79in or 57pt")]
+pub struct LengthError(pub String);
+
+/// Reads a length with its unit, such as `20mm`, `2 cm`, `0.02m`, `0.79in`, `57pt`; a bare number
+/// is millimetres. The result is finite, and may be zero or negative.
+///
+/// ```
+/// assert_eq!(deltille_core::targets::parse_length_mm("2.5 cm"), Ok(25.0));
+/// assert!(deltille_core::targets::parse_length_mm("20 parsec").is_err());
+/// ```
+pub fn parse_length_mm(text: &str) -> Result<f64, LengthError> {
+    let trimmed = text.trim();
+    let (number, unit_mm) = UNITS
+        .iter()
+        .find_map(|&(unit, mm)| Some((trimmed.strip_suffix(unit)?, mm)))
+        .unwrap_or((trimmed, 1.0));
+    match number.trim_end().parse::<f64>() {
+        Ok(value) if (value * unit_mm).is_finite() => Ok(value * unit_mm),
+        _ => Err(LengthError(text.to_owned())),
+    }
+}
+
+/// The shortest way to write a length in millimetres, with its unit: `20 mm`, `12.5 mm`.
+pub(super) fn format_mm(mm: f64) -> String {
+    if mm.abs() > 1e9 {
+        return format!("{mm:e} mm");
+    }
+    // A nanometre is finer than any print; rounding there hides the noise of unit conversion.
+    format!("{} mm", (mm * 1e6).round() / 1e6)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn every_unit_is_understood() {
+        for text in ["25.4mm", "2.54cm", "0.0254 m", "1in", "72pt", " 25.4 ", "2.54e1mm"] {
+            assert!((parse_length_mm(text).unwrap() - 25.4).abs() < 1e-9, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_finite_number_is_refused() {
+        for text in ["", "mm", "NaN", "nanmm", "inf", "1e999mm", "20 km", "2,5cm", "20mm mm"] {
+            assert_eq!(parse_length_mm(text), Err(LengthError(text.to_owned())));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn formatting_reads_back(mm in 0.01f64..5000.0) {
+            let back = parse_length_mm(&format_mm(mm)).unwrap();
+            prop_assert!((back - mm).abs() < 1e-6);
+        }
+
+        #[test]
+        fn no_text_panics(text in ".*") {
+            let _ = parse_length_mm(&text);
+        }
+    }
+}

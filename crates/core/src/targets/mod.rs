@@ -1,0 +1,392 @@
+//! What exists in the world: panels with a pose, their corners and tags, in millimetres.
+//!
+//! A [`TargetSpec`] says what was asked for; a [`Target`] says what that is, corner by corner. The
+//! JSON file of a target (FORMAT `deltille/target/1`) holds both, so that a sheet printed today can
+//! be detected, verified and made again from that one file.
+//!
+//! Frames: a *panel* frame has its origin on the panel's lattice vertex (0,0), x along the rows, y
+//! up on the print, z towards the viewer; `target = rotation · panel + translation`.
+
+mod board;
+mod build;
+mod capacity;
+mod closed_mesh;
+mod error;
+mod face_sheet;
+pub mod json;
+mod layout;
+mod length;
+mod net;
+mod panel;
+mod paper;
+mod polyhedron;
+mod pose;
+mod skeleton;
+mod solid;
+mod spec;
+mod tag_sheet;
+
+use serde::{Deserialize, Serialize};
+
+pub use crate::Name;
+pub use crate::lattice::GridKind;
+use crate::quantity;
+pub use board::zigzag_vertices;
+pub use build::largest_edge_mm;
+pub use closed_mesh::is_coordinate;
+pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
+pub use error::TargetError;
+pub use face_sheet::{edge_numbers, edge_text, upright_number};
+pub use json::{SCHEMA, TargetFileError};
+pub use layout::CHECK_BAR_STROKE_MM;
+pub use layout::id_range;
+pub use length::{LengthError, parse_length_mm};
+pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
+pub use polyhedron::{Face, Polyhedron};
+pub use skeleton::Incircle;
+pub use skeleton::{Skeleton, SkeletonSpec};
+pub use spec::{BORDER_BITS, MOST_ROWS, SIDES, least_untagged_corners};
+pub use spec::{
+    BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSheetSpec, TagSpec, TargetSpec,
+};
+
+/// A target: its panels, and the sheets they are printed on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    /// Name; the stem of the files made from it.
+    pub name: Name,
+    /// What was asked for.
+    pub spec: TargetSpec,
+    /// The family of its tags; `None` on an untagged target.
+    pub family: Option<FamilyRef>,
+    /// Planar pieces, by ascending id.
+    pub panels: Vec<Panel>,
+    /// Where the panels lie on paper; empty when the target came from a file without sheets.
+    pub sheets: Vec<SheetLayout>,
+}
+
+/// Names a family so that a changed code table cannot go unnoticed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FamilyRef {
+    /// The family's name, such as `delTag25h7`.
+    pub name: String,
+    /// Its fingerprint, see [`crate::family::Family::fingerprint`]; empty where a file from
+    /// elsewhere names a family whose codes this crate does not have.
+    pub fingerprint: String,
+}
+
+/// How far the tiles of a panel reach beyond its corners.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Outline {
+    /// The black tiles that touch a corner.
+    #[default]
+    Touching,
+    /// The same and one tile more at the right end of the lowest row, so that every row of a
+    /// zigzag board has as many tiles as the next.
+    Zigzag,
+    /// The same and one tile more at each end of a triangle of corners, so that the tiles fill a
+    /// triangle.
+    Triangle,
+}
+
+/// Which tiles carry tags, by their colour on a board that is not inverted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TagsIn {
+    /// Black tiles: the tile itself is the tag's border.
+    #[default]
+    Black,
+    /// White squares of a checkerboard: the tag has a border of its own, and white around it.
+    White,
+}
+
+impl TagsIn {
+    /// Whether it is what goes without saying in files.
+    pub fn is_black(&self) -> bool {
+        *self == Self::Black
+    }
+}
+
+/// A planar piece of a target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Panel {
+    /// Board id, unique within the target.
+    pub id: u32,
+    /// The tiling.
+    pub kind: GridKind,
+    /// Length of a tile's edge, mm.
+    #[serde(deserialize_with = "quantity::edge_mm::de")]
+    pub edge_mm: f64,
+    /// Border of its tags in bit-widths along the edge; `None` without tags.
+    #[serde(default, deserialize_with = "quantity::border_bits::de")]
+    pub border_bits: Option<f64>,
+    /// Which squares of a checkerboard carry its tags.
+    #[serde(default, skip_serializing_if = "TagsIn::is_black")]
+    pub tags_in: TagsIn,
+    /// Whether the colours are exchanged: white upright tiles, or squares, on a black field.
+    pub inverted: bool,
+    /// Which tiles are drawn around the corners.
+    #[serde(default)]
+    pub outline: Outline,
+    /// Columns and rows of the matrix in which `.dsc` and `.orpc` files number the corners
+    /// (FORMATS §5); it holds every corner.
+    #[serde(deserialize_with = "quantity::side_of_matrix::de")]
+    pub matrix: [u32; 2],
+    /// Pose of the panel frame in the target frame.
+    pub pose: PanelPose,
+    /// Saddle points, ordered by row, then column.
+    pub corners: Vec<Corner>,
+    /// Tags, ordered like the corners.
+    pub tags: Vec<TagPlacement>,
+}
+
+/// `target = rotation · panel + translation`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PanelPose {
+    /// Rotation matrix, row-major.
+    #[serde(deserialize_with = "quantity::cosine::de")]
+    pub rotation: [f64; 9],
+    /// Translation, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub translation_mm: [f64; 3],
+    /// Covariance of a small turn (rad) and move (mm) along the target's axes, where the pose was
+    /// measured.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "quantity::pose_covariance::de"
+    )]
+    pub covariance: Option<[[f64; 6]; 6]>,
+}
+
+/// A vertex of a panel where all tiles meet (six of a deltille, four of a checkerboard).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Corner {
+    /// Unique within the target.
+    pub id: u32,
+    /// Lattice row.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub row: i32,
+    /// Lattice column.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub col: i32,
+    /// Position in the panel frame, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub panel_mm: [f64; 2],
+    /// Position in the target frame, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub target_mm: [f64; 3],
+}
+
+/// A tag in the upright tile, or the square, whose lower-left vertex is (row, col).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TagPlacement {
+    /// Index of the code in the family.
+    pub id: u32,
+    /// Row of the tile's lower-left vertex.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub row: i32,
+    /// Column of the tile's lower-left vertex.
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    pub col: i32,
+}
+
+/// One printed page: its size, where panels lie on it, and its check bars.
+///
+/// The page frame has its origin at the lower-left corner of the page, x right, y up, mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheetLayout {
+    /// Page width, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub width_mm: f64,
+    /// Page height, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub height_mm: f64,
+    /// Panels on the page.
+    pub placements: Vec<Placement>,
+    /// Lines of stated length, to be measured with a ruler.
+    pub check_bars: Vec<CheckBar>,
+    /// Marks to cut and fold along.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<SheetLine>,
+    /// The label and the words on the check bars.
+    pub texts: Vec<SheetText>,
+    /// The pages that show this sheet in parts, where it is larger than the paper; it is then
+    /// printed on none of its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pages: Vec<SheetPage>,
+}
+
+/// A page that shows a window onto a sheet that is larger than the paper.
+///
+/// ```text
+///    ┌──────────────┐
+///    │┌────────────┐│   in the window the sheet, cut off at its rim: the same
+///    ││            ││   paper position, `sheet_at_mm` less, is that on the sheet;
+///    ││            ││   around it the marks of the page
+///    │└────────────┘│
+///    │ ├──────────┤ │
+///    └──────────────┘
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheetPage {
+    /// Its place among the pages: rows are letters from the top, columns numbers from the left.
+    pub label: String,
+    /// Left, lower, right and upper end of the window on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub window_mm: [f64; 4],
+    /// Position of the sheet's lower-left corner on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub sheet_at_mm: [f64; 2],
+    /// Size of the page, and what is printed around the window.
+    pub marks: SheetLayout,
+}
+
+impl SheetLayout {
+    /// On how many pages it is printed.
+    pub fn page_count(&self) -> usize {
+        self.pages.len().max(1)
+    }
+}
+
+impl Target {
+    /// The same target with its panels in other places, as they were measured; `poses` are as many
+    /// as it has panels.
+    pub fn with_poses(&self, poses: &[PanelPose]) -> Self {
+        let mut target = self.clone();
+        for (panel, pose) in target.panels.iter_mut().zip(poses) {
+            panel.pose = *pose;
+            for corner in &mut panel.corners {
+                corner.target_mm = pose.target_from_panel(corner.panel_mm);
+            }
+        }
+        target
+    }
+
+    /// On how many pages all its sheets are printed.
+    pub fn page_count(&self) -> usize {
+        self.sheets.iter().map(SheetLayout::page_count).sum()
+    }
+}
+
+/// `page = turn(angle) · panel + origin`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Placement {
+    /// Which panel.
+    pub panel: u32,
+    /// Counter-clockwise turn of the panel on the page, radians.
+    #[serde(deserialize_with = "quantity::angle_rad::de")]
+    pub angle_rad: f64,
+    /// Page position of the panel's origin, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub origin_mm: [f64; 2],
+}
+
+impl Placement {
+    /// Page position of a point of the panel, mm.
+    pub fn page_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (sin, cos) = self.angle_rad.sin_cos();
+        let [ox, oy] = self.origin_mm;
+        [ox + cos * x - sin * y, oy + sin * x + cos * y]
+    }
+}
+
+/// A straight line of a page.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheetLine {
+    /// What it is for.
+    pub kind: LineKind,
+    /// One end on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub from_mm: [f64; 2],
+    /// The other end on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub to_mm: [f64; 2],
+    /// Its width, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub width_mm: f64,
+}
+
+/// What a line of a page is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LineKind {
+    /// To cut along; drawn through.
+    Cut,
+    /// To fold along, away from the print; dashed.
+    Fold,
+    /// To fold along, towards the print; dash-dotted.
+    Valley,
+    /// Between two faces in one plane, not to be folded; dotted.
+    Flat,
+    /// A stroke of a registration cross: pages that share it are laid on one another, single faces
+    /// on their seats; or of the overview of such pages. Drawn through.
+    Align,
+}
+
+impl LineKind {
+    /// Whether paper goes on beyond it, to another face or to a tab.
+    pub fn joins_faces(self) -> bool {
+        matches!(self, Self::Fold | Self::Valley | Self::Flat)
+    }
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cut => "cut",
+            Self::Fold => "fold",
+            Self::Valley => "valley",
+            Self::Flat => "flat",
+            Self::Align => "align",
+        }
+    }
+}
+
+/// A check bar: the distance between the outer edges of its two end strokes is its length.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CheckBar {
+    /// One end on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub from_mm: [f64; 2],
+    /// The other end on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub to_mm: [f64; 2],
+}
+
+impl CheckBar {
+    /// The length that it states and has, mm.
+    pub fn length_mm(&self) -> f64 {
+        (self.to_mm[0] - self.from_mm[0]).hypot(self.to_mm[1] - self.from_mm[1])
+    }
+}
+
+/// One line of text on a page, set in the built-in font.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheetText {
+    /// The words: ASCII and `° ± · × – −`.
+    pub text: String,
+    /// Left end of the base line on the page, mm.
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    pub at_mm: [f64; 2],
+    /// Counter-clockwise turn of the base line, radians.
+    #[serde(deserialize_with = "quantity::angle_rad::de")]
+    pub angle_rad: f64,
+    /// Height of a capital letter, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub cap_height_mm: f64,
+    /// The line is set smaller where it would be longer than this, mm.
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    pub max_width_mm: f64,
+}

@@ -1,0 +1,526 @@
+//! A net on paper: which of its unfoldings, how it lies, and what is drawn of it.
+
+use std::f64::consts::PI;
+
+use glam::DVec2;
+
+use super::plane::{Motion, bounds};
+use super::tabs::{self, Tab};
+use super::tiling;
+use super::unfold::{self, Piece, Side, Sides};
+use crate::lattice::Vertex;
+use crate::targets::face_sheet::edge_numbers;
+use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
+use crate::targets::length::format_mm;
+use crate::targets::paper::{PaperSize, PaperSpec};
+use crate::targets::{
+    Face, FamilyRef, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine, SheetText,
+    SolidSpec, TargetError,
+};
+
+/// Faces that rise or fall from one plane by less than this are not folded, radians (a tenth of a
+/// degree): no hand makes so slight a fold, and the neighbours hold the paper in its place.
+const FLAT_RAD: f64 = 0.1 / 180.0 * PI;
+
+/// Width of lines to cut and to fold along, mm: a hairline that every printer holds.
+pub const LINE_WIDTH_MM: f64 = 0.15;
+
+/// Least margin of a face that takes its numbers, mm.
+const LEAST_MARGIN_MM: f64 = 2.5;
+
+/// Capital height of the numbers in the margin of a face, in widths of the margin, and the most of
+/// it, mm.
+const NUMBER_CAP: (f64, f64) = (0.35, 2.0);
+
+/// Capital height of the words on a tab, in depths of the tab, and the most of it, mm.
+const TAB_CAP: (f64, f64) = (0.35, 2.2);
+
+/// Blank on either side of the words on a tab, mm.
+const TAB_INDENT_MM: f64 = 1.0;
+
+/// Smallest capital height of words on a tab before they are cut short, mm.
+const LEGIBLE_CAP_MM: f64 = 1.2;
+
+/// Capital height and line spacing of the instructions, mm.
+const WORDS_CAP_MM: f64 = 2.2;
+const WORDS_STEP_MM: f64 = 3.6;
+
+/// Blank between the net, the instructions and the marks along the margins, mm.
+const BLANK_MM: f64 = 2.5;
+
+/// A net in its own frame: faces, and the tabs of each piece.
+struct Net {
+    pieces: Vec<Piece>,
+    tabs: Vec<Vec<Tab>>,
+}
+
+/// A piece of a net on a sheet.
+struct Laid<'a> {
+    piece: &'a Piece,
+    tabs: &'a [Tab],
+    arrangement: Arrangement,
+    page_from_net: Motion,
+}
+
+/// The sheets of a solid's net, one for each piece.
+pub fn sheets(
+    name: &str,
+    spec: &SolidSpec,
+    panels: &[Panel],
+    family: Option<&FamilyRef>,
+    paper: &PaperSpec,
+) -> Result<Vec<SheetLayout>, TargetError> {
+    if spec.margin_mm < LEAST_MARGIN_MM {
+        let problem = format!(
+            "a net has its numbers in the margins of the faces: take at least {} instead of {}, \
+             or --per-face",
+            format_mm(LEAST_MARGIN_MM),
+            format_mm(spec.margin_mm)
+        );
+        return Err(TargetError::invalid("--face-margin", problem));
+    }
+    let (solid, faces) = (spec.polyhedron(), spec.faces()?);
+    let sides = Sides::new(&solid);
+    let nets = nets(&solid, spec, &faces, &sides);
+    let drawing = Drawing::new(name, spec, &solid, &faces, panels, family, &sides);
+
+    let mut best: Option<(f64, Vec<SheetLayout>)> = None;
+    for net in &nets {
+        let count = net.pieces.len();
+        let mut laid = Vec::with_capacity(count);
+        for (piece, tabs) in net.pieces.iter().zip(&net.tabs) {
+            let Some(piece) = lay(piece, tabs, paper)? else { break };
+            laid.push(piece);
+        }
+        let area: f64 = laid.iter().map(|l| l.arrangement.page_mm().iter().product::<f64>()).sum();
+        if laid.len() == count && best.as_ref().is_none_or(|(least, _)| area < *least) {
+            let sheets = laid.iter().enumerate();
+            let sheets = sheets.map(|(index, laid)| drawing.sheet(laid, [index, count]));
+            best = Some((area, sheets.collect()));
+        }
+    }
+    if let Some((_, sheets)) = best {
+        return Ok(sheets);
+    }
+    let [net, ..] = &nets[..] else {
+        let problem = "the faces leave no room for glue tabs: take --per-face".to_owned();
+        return Err(TargetError::invalid("--edge", problem));
+    };
+    let tiles: Vec<(u32, [[f64; 2]; 3])> =
+        panels.iter().map(|panel| (panel.id, tiles_outline(panel))).collect();
+    let count = net.pieces.len();
+    let pieces = net.pieces.iter().zip(&net.tabs).enumerate();
+    pieces
+        .map(|(index, (piece, tabs))| {
+            let points = points(piece, tabs);
+            let tiling = tiling::Tiling::new(spec, &points, paper)?;
+            let mut sheet = tiling.sheet();
+            drawing.draw(&mut sheet, piece, tabs, &tiling.sheet_from_net());
+            tiling.add_pages(&mut sheet, &tiles, &drawing.label([index, count]));
+            Ok(sheet)
+        })
+        .collect()
+}
+
+/// The unfoldings that have room for tabs, best liked first.
+fn nets(solid: &Polyhedron, spec: &SolidSpec, faces: &[Face], sides: &Sides) -> Vec<Net> {
+    let flat: Vec<[DVec2; 3]> = faces.iter().map(|face| face.outline_mm.map(DVec2::from)).collect();
+    let with_tabs = |pieces: Vec<Piece>| {
+        let tabs = tabs::place(&pieces, sides)?;
+        Some(Net { pieces, tabs })
+    };
+    let unfoldings = unfold::unfoldings(solid, &spec.shape, &flat);
+    let nets: Vec<Net> = unfoldings.into_iter().filter_map(with_tabs).collect();
+    if !nets.is_empty() {
+        return nets;
+    }
+    // A single face has room for all of its tabs.
+    let sizes = std::iter::successors(Some(flat.len()), |most| Some(most * 3 / 4));
+    let mut fewest = sizes.take_while(|&most| most > 0).filter_map(|most| {
+        let small = unfold::in_small_pieces(solid, &flat, most).filter_map(with_tabs);
+        small.min_by_key(|net| net.pieces.len())
+    });
+    fewest.next().into_iter().collect()
+}
+
+/// The triangle that the tiles of a face fill, in the panel frame, mm.
+fn tiles_outline(panel: &Panel) -> [[f64; 2]; 3] {
+    let top = panel.corners.iter().map(|corner| corner.row).max().unwrap_or_default();
+    let ends = [(-1, -1), (-1, top + 2), (top + 2, -1)];
+    ends.map(|(row, col)| panel.lattice_mm(Vertex::new(row, col)))
+}
+
+/// All corners of a piece and its tabs.
+fn points(piece: &Piece, tabs: &[Tab]) -> Vec<DVec2> {
+    let faces = piece.iter().flat_map(|face| face.corners);
+    faces.chain(tabs.iter().flat_map(|tab| tab.corners)).collect()
+}
+
+/// Height of the instructions with the blank above them, mm.
+const WORDS_MM: f64 = 2.0 * WORDS_STEP_MM + BLANK_MM;
+
+/// Lays a piece on the smallest paper that takes it, turned no more than that needs.
+fn lay<'a>(
+    piece: &'a Piece,
+    tabs: &'a [Tab],
+    paper: &PaperSpec,
+) -> Result<Option<Laid<'a>>, TargetError> {
+    let sizes: Vec<PaperSize> = match &paper.size {
+        Some(size) => vec![size.clone()],
+        None => PaperSize::automatic().collect(),
+    };
+    let points = points(piece, tabs);
+    // As the net stands, upright, then slanted as little as will do.
+    let slanted = (1..18).flat_map(|n| [5 * n, -5 * n]).filter(|n| n % 90 != 0);
+    let turns: Vec<f64> =
+        [0, 90].into_iter().chain(slanted).map(|n| f64::from(n).to_radians()).collect();
+    for size in sizes {
+        let paper = PaperSpec { size: Some(size), ..paper.clone() };
+        for &angle in &turns {
+            let turn = Motion::turning(angle);
+            let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
+            let [left, lower, right, upper] = bounds(&turned);
+            let footprint = Footprint {
+                width: right - left,
+                height: upper - lower + WORDS_MM,
+                edge_blank: paper.margin_mm,
+                mark_blank: BLANK_MM,
+            };
+            if let Some(arrangement) = fit_upright(&footprint, &paper)? {
+                let [x, y] = arrangement.footprint_at_mm();
+                let shift = DVec2::new(x - left, y + WORDS_MM - lower);
+                let page_from_net = Motion { shift, ..turn };
+                return Ok(Some(Laid { piece, tabs, arrangement, page_from_net }));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// What it takes to draw any piece of a solid's net.
+struct Drawing<'a> {
+    name: &'a str,
+    spec: &'a SolidSpec,
+    faces: &'a [Face],
+    panels: &'a [Panel],
+    family: Option<&'a FamilyRef>,
+    sides: &'a Sides,
+    /// Numbers of the edges of each face.
+    numbers: Vec<[usize; 3]>,
+    /// Which way each side of each face is folded.
+    folds: Vec<[LineKind; 3]>,
+}
+
+impl<'a> Drawing<'a> {
+    fn new(
+        name: &'a str,
+        spec: &'a SolidSpec,
+        solid: &Polyhedron,
+        faces: &'a [Face],
+        panels: &'a [Panel],
+        family: Option<&'a FamilyRef>,
+        sides: &'a Sides,
+    ) -> Self {
+        let edges = solid.edges();
+        let numbers: Vec<[usize; 3]> =
+            (0..faces.len()).map(|face| edge_numbers(solid, &edges, face)).collect();
+        let angles_rad = solid.dihedral_angles_rad();
+        let fold = |edge: usize| match angles_rad[edge] - PI {
+            angle if angle.abs() < FLAT_RAD => LineKind::Flat,
+            // The next face rises out of this one's plane.
+            angle if angle > 0.0 => LineKind::Valley,
+            _ => LineKind::Fold,
+        };
+        let folds = numbers.iter().map(|edges| edges.map(fold)).collect();
+        Self { name, spec, faces, panels, family, sides, numbers, folds }
+    }
+
+    /// The sheet of a piece that fits its paper.
+    fn sheet(&self, laid: &Laid, of: [usize; 2]) -> SheetLayout {
+        let mut sheet = laid.arrangement.sheet(0, [0.0; 4], self.label(of));
+        sheet.placements.clear();
+        self.draw(&mut sheet, laid.piece, laid.tabs, &laid.page_from_net);
+        let [left, lower, right, _] = laid.arrangement.clear_mm();
+        let at = [left, lower + BLANK_MM];
+        let words = instructions(&sheet.lines, at, right - left - BLANK_MM);
+        sheet.texts.extend(words);
+        sheet
+    }
+
+    /// Adds the panels, lines and numbers of a piece to a sheet.
+    fn draw(&self, sheet: &mut SheetLayout, piece: &Piece, tabs: &[Tab], sheet_from_net: &Motion) {
+        let hinges: Vec<(Side, Side)> = piece.iter().filter_map(|face| face.hinge).collect();
+        for flat in piece {
+            let (face, index) = (&self.faces[flat.face], flat.face);
+            let corners = flat.corners.map(|corner| sheet_from_net.apply(corner));
+            let [a, b, _] = face.outline_mm.map(DVec2::from);
+            let motion = Motion::carrying([a, b], [corners[0], corners[1]]);
+            let placement = Placement {
+                panel: self.panels[index].id,
+                angle_rad: motion.turn.to_angle(),
+                origin_mm: motion.shift.to_array(),
+            };
+            sheet.placements.push(placement);
+            let mut named = false;
+            for side in 0..3 {
+                let ends = [corners[side], corners[(side + 1) % 3]];
+                let at = Side { face: index, side };
+                let hinge = hinges.iter().find(|(on, own)| *on == at || *own == at);
+                let tab = tabs.iter().find(|tab| tab.side == at);
+                let number = self.numbers[index][side];
+                match (hinge, tab) {
+                    // A fold is drawn once, with the face that hangs on the other.
+                    (Some((_, own)), _) => {
+                        if *own == at {
+                            sheet.lines.push(line(self.folds[index][side], ends));
+                        }
+                    }
+                    (None, Some(tab)) => {
+                        sheet.lines.extend(self.tab_lines(tab, ends, sheet_from_net));
+                        sheet.texts.extend(self.tab_words(tab, number, sheet_from_net));
+                    }
+                    (None, None) => {
+                        sheet.lines.push(line(LineKind::Cut, ends));
+                        sheet.texts.push(self.margin_words(ends, format!("edge {number}"), 0.5));
+                    }
+                }
+                // The name of the face stands where no number of an edge does.
+                if !named && (hinge.is_some() || tab.is_some()) {
+                    named = true;
+                    sheet.texts.push(self.margin_words(ends, format!("face {index}"), 0.5));
+                }
+            }
+            if !named {
+                let ends = [corners[0], corners[1]];
+                sheet.texts.push(self.margin_words(ends, format!("face {index}"), 0.25));
+            }
+        }
+    }
+
+    fn tab_lines(&self, tab: &Tab, [from, to]: [DVec2; 2], motion: &Motion) -> Vec<SheetLine> {
+        let [b, a, far_a, far_b] = tab.corners.map(|corner| motion.apply(corner));
+        let fold = self.folds[tab.side.face][tab.side.side];
+        let mut lines = vec![line(fold, [a, b])];
+        lines.extend([[a, far_a], [far_a, far_b], [far_b, b]].map(|e| line(LineKind::Cut, e)));
+        let free = [[from, a], [b, to]].into_iter().filter(|[p, q]| p.distance(*q) > LINE_WIDTH_MM);
+        lines.extend(free.map(|ends| line(LineKind::Cut, ends)));
+        lines
+    }
+
+    /// The words on a tab: its edge, and the face it goes under where there is room for that.
+    fn tab_words(&self, tab: &Tab, number: usize, motion: &Motion) -> Option<SheetText> {
+        let [_, _, far_a, far_b] = tab.corners.map(|corner| motion.apply(corner));
+        let under = self.sides.partner(tab.side)?.face;
+        let room = far_a.distance(far_b) - 2.0 * TAB_INDENT_MM;
+        let cap = (TAB_CAP.0 * tab.depth_mm).min(TAB_CAP.1);
+        let long = format!("edge {number} · under face {under}");
+        let text = if width(&long, LEGIBLE_CAP_MM.min(cap)) <= room {
+            long
+        } else {
+            format!("edge {number}")
+        };
+        let cap = cap.min(cap * room / width(&text, cap));
+        Some(words([far_a, far_b], text, cap, 0.5, (tab.depth_mm - cap) / 2.0, room))
+    }
+
+    /// Words in the margin of a face along one of its sides, centred at a part of its length.
+    fn margin_words(&self, ends: [DVec2; 2], text: String, part: f64) -> SheetText {
+        let margin = self.spec.margin_mm;
+        let cap = (NUMBER_CAP.0 * margin).min(NUMBER_CAP.1);
+        let room = (ends[0].distance(ends[1]) - 4.0 * margin).max(cap);
+        let cap = cap.min(cap * room / width(&text, cap));
+        // Wide margins keep the words near the edge that they name.
+        let inwards = ((margin - cap) / 2.0).min(2.0 * cap);
+        words(ends, text, cap, part, inwards, room)
+    }
+
+    /// All that is needed to make the net again.
+    fn label(&self, [index, count]: [usize; 2]) -> String {
+        let (spec, name) = (self.spec, self.name);
+        let mut parts = vec![
+            name.to_owned(),
+            format!("{} edge {}", spec.shape.name(), format_mm(spec.edge_mm)),
+        ];
+        parts.push(match count {
+            1 => "net".to_owned(),
+            _ => format!("net, piece {} of {count}", index + 1),
+        });
+        parts.push(format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)));
+        let tags = || self.panels.iter().flat_map(|panel| &panel.tags);
+        if let (Some(family), Some(first), Some(last)) = (self.family, tags().next(), tags().last())
+        {
+            parts.push(format!("{} ids {}–{}", family.name, first.id, last.id));
+            parts.push(format!("fingerprint {}", family.fingerprint));
+        }
+        let last = self.panels.last().map_or(0, |panel| panel.id);
+        parts.push(format!("boards {}–{last}", spec.board_id));
+        parts.push(format!("deltille {}", env!("CARGO_PKG_VERSION")));
+        parts.join(" · ")
+    }
+}
+
+/// How to make the solid from a print of these lines, two lines of text; the lower one stands at
+/// `at`.
+pub(super) fn instructions(lines: &[SheetLine], at: [f64; 2], room: f64) -> [SheetText; 2] {
+    let has = |kind| lines.iter().any(|line| line.kind == kind);
+    let mut folds = if has(LineKind::Valley) {
+        "Cut along solid lines. Score and fold dashed lines away from the print, dash-dotted ones \
+         towards it."
+    } else {
+        "Cut along solid lines. Score dashed lines and fold them away from the print."
+    }
+    .to_owned();
+    if has(LineKind::Flat) {
+        folds += " Do not fold dotted lines.";
+    }
+    let glue = "Glue each tab under the face that it names, where the face has the same number: \
+                edge 1 to edge 1, and so on."
+        .to_owned();
+    let mut y = at[1] + 2.0 * WORDS_STEP_MM;
+    [folds, glue].map(|text| {
+        y -= WORDS_STEP_MM;
+        SheetText {
+            text,
+            at_mm: [at[0], y],
+            angle_rad: 0.0,
+            cap_height_mm: WORDS_CAP_MM,
+            max_width_mm: room,
+        }
+    })
+}
+
+fn line(kind: LineKind, [from, to]: [DVec2; 2]) -> SheetLine {
+    let (from_mm, to_mm) = (from.to_array(), to.to_array());
+    SheetLine { kind, from_mm, to_mm, width_mm: LINE_WIDTH_MM }
+}
+
+/// Estimated width of a text, mm.
+fn width(text: &str, cap: f64) -> f64 {
+    text.chars().count() as f64 * ADVANCE_CAPS * cap
+}
+
+/// Words along the line between two points, centred at a part of it, their base line `inwards`
+/// (to the left) of it.
+fn words(
+    [from, to]: [DVec2; 2],
+    text: String,
+    cap: f64,
+    part: f64,
+    inwards: f64,
+    room: f64,
+) -> SheetText {
+    let along = (to - from).normalize_or_zero();
+    let start = from + (to - from) * part - along * width(&text, cap) / 2.0;
+    SheetText {
+        text,
+        at_mm: (start + along.perp() * inwards).to_array(),
+        angle_rad: along.to_angle(),
+        cap_height_mm: cap,
+        max_width_mm: room,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::plane::gap_mm;
+    use super::*;
+    use crate::family::Family;
+    use crate::targets::{SolidShape, Target, TargetSpec};
+
+    /// The rectangle that a text takes, by estimate.
+    fn text_box(text: &SheetText) -> [DVec2; 4] {
+        let width = width(&text.text, text.cap_height_mm).min(text.max_width_mm);
+        let (at, along) = (DVec2::from(text.at_mm), DVec2::from_angle(text.angle_rad));
+        let up = along.perp() * text.cap_height_mm;
+        [at, at + along * width, at + along * width + up, at + up]
+    }
+
+    /// Page positions of a placed panel's outline.
+    fn triangle(target: &Target, placement: &Placement) -> [DVec2; 3] {
+        let TargetSpec::Solid(spec) = &target.spec else { panic!("a solid") };
+        let index = target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
+        let outline = spec.faces().unwrap()[index].outline_mm;
+        outline.map(|p| DVec2::from(placement.page_from_panel(p)))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        /// Every face once, none on another, all on the sheet; no words on lines, tiles or words;
+        /// on several pages every line is shown, and every cross on two.
+        #[test]
+        fn nothing_on_a_net_meets_anything_else(
+            shape in 0usize..3, edge_mm in 60.0f64..200.0, tiles in 6u32..12, margin_mm in 2.5f64..7.0,
+            paper in 0usize..3,
+        ) {
+            use SolidShape::{Icosahedron, Octahedron, Tetrahedron};
+            let shape = [Tetrahedron, Octahedron, Icosahedron][shape].clone();
+            let mut spec = SolidSpec { edge_mm, tiles, margin_mm, ..SolidSpec::new(shape) };
+            spec.tags.family = "delTag36h11".to_owned();
+            let family = Family::shipped("delTag36h11").unwrap();
+            let size = [None, Some("A4".parse().unwrap()), Some("A2".parse().unwrap())];
+            let paper = PaperSpec { size: size[paper].clone(), ..PaperSpec::default() };
+            let target =
+                Target::build("net", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
+            prop_assert_eq!(&Target::from_json(&target.to_json()).unwrap(), &target);
+            prop_assert_eq!(target.sheets.len(), 1);
+            let sheet = &target.sheets[0];
+            let mut faces: Vec<u32> = sheet.placements.iter().map(|p| p.panel).collect();
+            faces.sort_unstable();
+            prop_assert_eq!(faces, target.panels.iter().map(|p| p.id).collect::<Vec<_>>());
+
+            let triangles: Vec<_> =
+                sheet.placements.iter().map(|p| triangle(&target, p)).collect();
+            for (n, a) in triangles.iter().enumerate() {
+                prop_assert!(a.iter().all(|p| p.x > 0.0 && p.y > 0.0));
+                prop_assert!(a.iter().all(|p| p.x < sheet.width_mm && p.y < sheet.height_mm));
+                prop_assert!(triangles[n + 1..].iter().all(|b| gap_mm(a, b) > -1e-6));
+            }
+            let tiles = sheet.placements.iter().map(|placement| {
+                let panel = target.panels.iter().find(|p| p.id == placement.panel).unwrap();
+                tiles_outline(panel).map(|p| DVec2::from(placement.page_from_panel(p))).to_vec()
+            });
+            let lines =
+                sheet.lines.iter().map(|l| [l.from_mm, l.to_mm].map(DVec2::from).to_vec());
+            let marks: Vec<Vec<DVec2>> = tiles.chain(lines).collect();
+            let boxes: Vec<_> = sheet.texts.iter().map(text_box).collect();
+            for (n, text) in boxes.iter().enumerate() {
+                let words = &sheet.texts[n].text;
+                prop_assert!(marks.iter().all(|mark| gap_mm(text, mark) > 0.2), "{}", words);
+                prop_assert!(boxes[n + 1..].iter().all(|other| gap_mm(text, other) > 0.2), "{}", words);
+            }
+            for line in sheet.lines.iter().filter(|_| !sheet.pages.is_empty()) {
+                let shown = |at: [f64; 2]| {
+                    let on = |page: &&crate::targets::SheetPage| {
+                        let [left, lower, right, upper] = page.window_mm;
+                        let [x, y] = [0, 1].map(|i| at[i] + page.sheet_at_mm[i]);
+                        left <= x && x <= right && lower <= y && y <= upper
+                    };
+                    sheet.pages.iter().filter(on).count()
+                };
+                let least = if line.kind == LineKind::Align { 2 } else { 1 };
+                for part in 0..=10 {
+                    let part = f64::from(part) / 10.0;
+                    let at = [0, 1].map(|i| line.from_mm[i] * (1.0 - part) + line.to_mm[i] * part);
+                    prop_assert!(shown(at) >= least, "{:?}", line);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_paper_is_the_smallest_that_takes_the_net() {
+        let family = Family::shipped("delTag25h7").unwrap();
+        let size = |shape| {
+            let spec = TargetSpec::Solid(SolidSpec::new(shape));
+            let paper = PaperSpec::default();
+            let target = Target::build("net", &spec, Some(&family), Some(&paper)).unwrap();
+            [target.sheets[0].width_mm, target.sheets[0].height_mm]
+        };
+        assert_eq!(size(SolidShape::Tetrahedron), [420.0, 297.0]);
+        assert_eq!(size(SolidShape::Octahedron), [420.0, 594.0]);
+        assert_eq!(size(SolidShape::Icosahedron), [841.0, 594.0]);
+    }
+}

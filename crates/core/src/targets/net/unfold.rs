@@ -1,0 +1,398 @@
+//! Unfolding: faces laid side by side in the plane, joined along edges of the solid.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::plane::{Motion, TOUCHING_MM, bounds, gap_mm};
+use crate::targets::{Polyhedron, SolidShape};
+
+/// Seed of the search for nets of meshes: any will do, a fixed one makes results repeatable.
+const SEED: u64 = 20;
+
+/// Grown nets that are looked at further.
+const MOST_GROWN: usize = 8;
+
+/// Orders of growth tried for a mesh: fewer for many faces, since each takes a time that grows
+/// with their square.
+fn tries(faces: usize) -> u64 {
+    (400_000 / (faces * faces).max(1)).clamp(4, 64) as u64
+}
+
+/// A side of a face: from its vertex of that index to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Side {
+    /// Index of the face.
+    pub face: usize,
+    /// 0 is the lower edge, 1 and 2 follow counter-clockwise.
+    pub side: usize,
+}
+
+/// A face laid into the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlatFace {
+    /// Index of the face.
+    pub face: usize,
+    /// Its vertices, counter-clockwise, mm.
+    pub corners: [DVec2; 3],
+    /// The side of an earlier face that it hangs on, and its own there; `None` for the first.
+    pub hinge: Option<(Side, Side)>,
+}
+
+impl FlatFace {
+    /// Ends of a side, mm.
+    pub fn ends(&self, side: usize) -> [DVec2; 2] {
+        [self.corners[side], self.corners[(side + 1) % 3]]
+    }
+}
+
+/// Faces joined in one piece, none of which overlaps another; the first hangs on nothing, every
+/// other on one before it.
+pub type Piece = Vec<FlatFace>;
+
+/// The sides of a solid's faces, matched.
+pub struct Sides {
+    partner: Vec<[Option<Side>; 3]>,
+}
+
+impl Sides {
+    /// Matches the sides that run along the same edge in opposite directions.
+    pub fn new(solid: &Polyhedron) -> Self {
+        let mut along = BTreeMap::new();
+        for (face, vertices) in solid.faces.iter().enumerate() {
+            for side in 0..3 {
+                along.insert((vertices[side], vertices[(side + 1) % 3]), Side { face, side });
+            }
+        }
+        let partner = solid.faces.iter().map(|vertices| {
+            [0, 1, 2].map(|side| along.get(&(vertices[(side + 1) % 3], vertices[side])).copied())
+        });
+        Self { partner: partner.collect() }
+    }
+
+    /// The other side of the same edge; `None` on the rim of an open mesh.
+    pub fn partner(&self, side: Side) -> Option<Side> {
+        self.partner[side.face][side.side]
+    }
+}
+
+/// Ways to unfold a solid, best liked first: each a list of pieces that together hold every face
+/// once. `flat` holds the outlines of the faces, each in a frame of its own, mm.
+///
+/// A named solid has its usual nets, any other solid those that are [`grown`].
+pub fn unfoldings(solid: &Polyhedron, shape: &SolidShape, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
+    let usual = usual(solid, shape, flat);
+    if usual.is_empty() { grown(solid, flat) } else { usual }
+}
+
+/// The usual nets of a named solid.
+fn usual(solid: &Polyhedron, shape: &SolidShape, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
+    let sides = Sides::new(solid);
+    let nets = usual_hinges(shape).into_iter().filter_map(|(root, hinges)| {
+        let piece = hang(flat, &sides, root, &hinges)?;
+        (piece.len() == flat.len()).then(|| vec![piece])
+    });
+    nets.collect()
+}
+
+/// Nets grown from many beginnings in many orders: a face is laid on the first free side where it
+/// overlaps nothing, and what finds no place begins another piece, so that every result is a valid
+/// one. Fewer pieces are better, then a smaller bounding box.
+fn grown(solid: &Polyhedron, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
+    let sides = Sides::new(solid);
+    let mut grown: Vec<Vec<Piece>> =
+        (0..tries(flat.len())).map(|n| grow_all(flat, &sides, n, flat.len())).collect();
+    grown.sort_by(|a, b| a.len().cmp(&b.len()).then(area(a).total_cmp(&area(b))));
+    grown.truncate(MOST_GROWN);
+    grown
+}
+
+/// A last resort: nets of pieces of at most `most` faces.
+pub fn in_small_pieces(
+    solid: &Polyhedron,
+    flat: &[[DVec2; 3]],
+    most: usize,
+) -> impl Iterator<Item = Vec<Piece>> {
+    let sides = Sides::new(solid);
+    (0..tries(flat.len())).map(move |seed| grow_all(flat, &sides, seed, most))
+}
+
+fn area(pieces: &[Piece]) -> f64 {
+    let area = |piece: &Piece| {
+        let [x0, y0, x1, y1] = bounds(piece.iter().flat_map(|face| &face.corners));
+        (x1 - x0) * (y1 - y0)
+    };
+    pieces.iter().map(area).sum()
+}
+
+/// Root and (parent, child) pairs of the nets that a named solid usually has.
+fn usual_hinges(shape: &SolidShape) -> Vec<(usize, Vec<(usize, usize)>)> {
+    match shape {
+        // A large triangle around the base, or a strip.
+        SolidShape::Tetrahedron => {
+            vec![(3, vec![(3, 0), (3, 1), (3, 2)]), (0, vec![(0, 1), (1, 2), (2, 3)])]
+        }
+        // Four rows in two columns: a zigzag of the upper faces, the lower ones at its sides.
+        SolidShape::Octahedron => {
+            vec![(0, vec![(0, 1), (1, 2), (2, 3), (0, 4), (1, 5), (2, 6), (3, 7)])]
+        }
+        // A belt of ten, with five teeth above and five below; see `Polyhedron`.
+        SolidShape::Icosahedron => {
+            let belt = (0..5).flat_map(|k| {
+                let next = (k < 4).then_some((10 + k, 5 + k + 1));
+                [(5 + k, 10 + k)].into_iter().chain(next)
+            });
+            let belt = belt.map(|(a, b)| if (a, b) == (5, 10) { (b, a) } else { (a, b) });
+            let teeth = (0..5).flat_map(|k| [(5 + k, k), (10 + k, 15 + k)]);
+            vec![(10, belt.chain(teeth).collect())]
+        }
+        SolidShape::Mesh(_) => Vec::new(),
+    }
+}
+
+/// Lays the faces out as the pairs of parent and child say; `None` where two overlap.
+fn hang(
+    flat: &[[DVec2; 3]],
+    sides: &Sides,
+    root: usize,
+    hinges: &[(usize, usize)],
+) -> Option<Piece> {
+    let mut piece = vec![FlatFace { face: root, corners: flat[root], hinge: None }];
+    let mut left = hinges.to_vec();
+    while !left.is_empty() {
+        let before = left.len();
+        for (parent, child) in std::mem::take(&mut left) {
+            let Some(on) = piece.iter().find(|face| face.face == parent) else {
+                left.push((parent, child));
+                continue;
+            };
+            let joins = |side: &usize| {
+                let side = Side { face: parent, side: *side };
+                sides.partner(side).is_some_and(|partner| partner.face == child)
+            };
+            let side = Side { face: parent, side: (0..3).find(joins)? };
+            let face = beside(flat, on, side, sides.partner(side)?);
+            if !is_free(&piece, &face.corners) {
+                return None;
+            }
+            piece.push(face);
+        }
+        if left.len() == before {
+            return None;
+        }
+    }
+    Some(piece)
+}
+
+/// A face laid beside another, across a side of it.
+fn beside(flat: &[[DVec2; 3]], on: &FlatFace, side: Side, own: Side) -> FlatFace {
+    let outline = flat[own.face];
+    let [p, q] = on.ends(side.side);
+    let motion = Motion::carrying([outline[own.side], outline[(own.side + 1) % 3]], [q, p]);
+    let mut corners = outline.map(|corner| motion.apply(corner));
+    // The shared ends are the same numbers, not only the same to rounding.
+    corners[own.side] = q;
+    corners[(own.side + 1) % 3] = p;
+    FlatFace { face: own.face, corners, hinge: Some((side, own)) }
+}
+
+/// Whether a triangle overlaps none of a piece.
+fn is_free(piece: &[FlatFace], corners: &[DVec2; 3]) -> bool {
+    let [x0, y0, x1, y1] = bounds(corners);
+    piece.iter().all(|face| {
+        let [left, lower, right, upper] = bounds(&face.corners);
+        left > x1
+            || right < x0
+            || lower > y1
+            || upper < y0
+            || gap_mm(&face.corners, corners) >= -TOUCHING_MM
+    })
+}
+
+/// Grows pieces of at most `most` faces until every face is in one.
+fn grow_all(flat: &[[DVec2; 3]], sides: &Sides, seed: u64, most: usize) -> Vec<Piece> {
+    let mut random = ChaCha8Rng::seed_from_u64(SEED + seed);
+    let mut placed = vec![false; flat.len()];
+    let mut pieces = Vec::new();
+    while let Some(first) = (0..flat.len()).find(|&face| !placed[face]) {
+        let free: Vec<usize> = (first..flat.len()).filter(|&face| !placed[face]).collect();
+        let root = if seed == 0 { first } else { free[random.random_range(0..free.len())] };
+        // Half of the orders keep the piece round, the others are free.
+        let round = seed.is_multiple_of(2);
+        pieces.push(grow(flat, sides, root, round, most, &mut placed, &mut random));
+    }
+    pieces
+}
+
+/// Grows one piece; `placed` tells the faces that are taken.
+fn grow(
+    flat: &[[DVec2; 3]],
+    sides: &Sides,
+    root: usize,
+    round: bool,
+    most: usize,
+    placed: &mut [bool],
+    random: &mut ChaCha8Rng,
+) -> Piece {
+    let centre = flat[root].iter().sum::<DVec2>() / 3.0;
+    placed[root] = true;
+    let mut piece = vec![FlatFace { face: root, corners: flat[root], hinge: None }];
+    let mut open: Vec<(usize, usize)> = (0..3).map(|side| (0, side)).collect();
+    while !open.is_empty() && piece.len() < most {
+        let distance = |&(at, side): &(usize, usize)| {
+            let [p, q] = piece[at].ends(side);
+            ((p + q) / 2.0).distance_squared(centre)
+        };
+        let next = if round {
+            let nearest =
+                open.iter().enumerate().min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));
+            nearest.map_or(0, |(index, _)| index)
+        } else {
+            random.random_range(0..open.len())
+        };
+        let (at, side) = open.remove(next);
+        let side = Side { face: piece[at].face, side };
+        let Some(own) = sides.partner(side).filter(|own| !placed[own.face]) else { continue };
+        let face = beside(flat, &piece[at], side, own);
+        if is_free(&piece, &face.corners) {
+            placed[own.face] = true;
+            open.extend((0..3).filter(|&s| s != own.side).map(|s| (piece.len(), s)));
+            piece.push(face);
+        }
+    }
+    piece
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::targets::net::tabs;
+
+    /// A named solid with its vertices moved; a face keeps its lengths, not its angles.
+    fn dented(shape: &SolidShape, moves: &[[f64; 3]]) -> Polyhedron {
+        let mut solid = match shape {
+            SolidShape::Tetrahedron => Polyhedron::tetrahedron(100.0),
+            SolidShape::Octahedron => Polyhedron::octahedron(100.0),
+            _ => Polyhedron::icosahedron(100.0),
+        };
+        for (vertex, by) in solid.vertices_mm.iter_mut().zip(moves) {
+            *vertex += DVec3::from(*by);
+        }
+        solid
+    }
+
+    fn outlines(solid: &Polyhedron) -> Vec<[DVec2; 3]> {
+        let outline = |face| solid.face(face, 6, 1.0).unwrap().outline_mm.map(DVec2::from);
+        (0..solid.faces.len()).map(outline).collect()
+    }
+
+    /// What makes an unfolding foldable: every face once and with its own lengths, the right side
+    /// up, hinges joined; and printable: nothing overlaps, every cut edge has a tab.
+    fn check(solid: &Polyhedron, pieces: &[Piece]) -> Result<(), TestCaseError> {
+        let mut faces: Vec<usize> = pieces.iter().flatten().map(|face| face.face).collect();
+        faces.sort_unstable();
+        prop_assert_eq!(faces, (0..solid.faces.len()).collect::<Vec<_>>());
+        let sides = Sides::new(solid);
+        let tabs = tabs::place(pieces, &sides).expect("there is room for every tab");
+        let tabbed = tabs.iter().flatten().count();
+        prop_assert_eq!(tabbed, tabs::cut_edges(pieces, &sides).len());
+        for (piece, tabs) in pieces.iter().zip(&tabs) {
+            prop_assert_eq!(piece.iter().filter(|face| face.hinge.is_none()).count(), 1);
+            for face in piece {
+                let space = solid.triangle_mm(face.face);
+                for side in 0..3 {
+                    let [p, q] = face.ends(side);
+                    let length = space[side].distance(space[(side + 1) % 3]);
+                    prop_assert!((p.distance(q) - length).abs() < 1e-9);
+                }
+                let [a, b, c] = face.corners;
+                prop_assert!((b - a).perp_dot(c - a) > 0.0);
+                if let Some((on, own)) = face.hinge {
+                    let on_face = piece.iter().find(|other| other.face == on.face).unwrap();
+                    let [p, q] = on_face.ends(on.side);
+                    prop_assert_eq!(face.ends(own.side), [q, p]);
+                    prop_assert_eq!(sides.partner(on), Some(own));
+                }
+            }
+            let polygons = piece.iter().map(|face| &face.corners[..]);
+            let polygons: Vec<&[DVec2]> =
+                polygons.chain(tabs.iter().map(|tab| &tab.corners[..])).collect();
+            for (n, a) in polygons.iter().enumerate() {
+                for b in &polygons[n + 1..] {
+                    prop_assert!(gap_mm(a, b) >= -2.0 * TOUCHING_MM);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn every_unfolding_can_be_printed_and_folded(
+            shape in 0usize..3,
+            moves in prop::collection::vec(prop::array::uniform3(-12.0f64..12.0), 12),
+        ) {
+            use SolidShape::{Icosahedron, Octahedron, Tetrahedron};
+            let shape = [Tetrahedron, Octahedron, Icosahedron][shape].clone();
+            let solid = dented(&shape, &moves);
+            let flat = outlines(&solid);
+            for net in usual(&solid, &shape, &flat).iter().chain(&grown(&solid, &flat)[..2]) {
+                check(&solid, net)?;
+            }
+            for pieces in in_small_pieces(&solid, &flat, 3).take(2) {
+                check(&solid, &pieces)?;
+            }
+        }
+    }
+
+    /// A ball of 80 triangles: each face of an icosahedron in four, moved out to the sphere.
+    fn ball() -> Polyhedron {
+        let core = Polyhedron::icosahedron(100.0);
+        let radius = core.vertices_mm[0].length();
+        let mut vertices_mm = core.vertices_mm.clone();
+        let edges = core.edges();
+        vertices_mm.extend(
+            edges
+                .iter()
+                .map(|&[a, b]| (core.vertices_mm[a] + core.vertices_mm[b]).normalize() * radius),
+        );
+        let middle = |a: usize, b: usize| {
+            let edge = [a.min(b), a.max(b)];
+            core.vertices_mm.len() + edges.iter().position(|e| *e == edge).unwrap()
+        };
+        let faces = core.faces.iter().flat_map(|&[a, b, c]| {
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        });
+        Polyhedron { vertices_mm, faces: faces.collect() }
+    }
+
+    #[test]
+    fn a_ball_of_many_faces_is_one_net() {
+        let ball = ball();
+        let flat = outlines(&ball);
+        let nets = grown(&ball, &flat);
+        check(&ball, &nets[0]).unwrap();
+        assert_eq!(nets[0].len(), 1);
+    }
+
+    #[test]
+    fn regular_solids_have_their_usual_nets_in_one_piece() {
+        for shape in [SolidShape::Tetrahedron, SolidShape::Octahedron, SolidShape::Icosahedron] {
+            let solid = dented(&shape, &[]);
+            let flat = outlines(&solid);
+            for net in usual(&solid, &shape, &flat).iter().chain(&grown(&solid, &flat)) {
+                assert_eq!(net.len(), 1);
+                check(&solid, net).unwrap();
+            }
+            assert!(!usual(&solid, &shape, &flat).is_empty());
+        }
+    }
+}

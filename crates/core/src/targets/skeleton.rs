@@ -1,0 +1,267 @@
+//! A frame to print, with a seat for a panel on every face.
+//!
+//! ```text
+//!   the face's plane    ──╮rib╭── panel ────────╮   ╭─   The panel lies in its seat, so that its
+//!                         │   │╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌│   │    outer side is on the face of the solid.
+//!   thickness below it    │   ╰───╮         ╭───╯   │    The seat is a ledge around a window; the
+//!                         │ ledge │ window  │       │    ribs between the seats reach out to the
+//!   and wall below that   ╰───────╯         ╰───────╯    edges of the solid.
+//! ```
+//!
+//! Every boundary on a face is its triangle moved inwards in its own plane, so that a seat is exact
+//! whatever the angles between faces are. Panels are cut straight: nothing is mitred.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use super::length::format_mm;
+use super::{ClosedMesh, Polyhedron, TargetError};
+
+/// Material left at the foot of a rib on either side of the edge, mm: two lines of a 0.4 mm nozzle.
+const FOOT_MM: f64 = 0.8;
+
+/// Least inradius of a window, mm: for fingers and for what a printer must get out.
+const LEAST_WINDOW_MM: f64 = 3.0;
+
+/// Room around a panel in its seat, mm: what printers and cutters are off.
+const PLAY_MM: f64 = 0.15;
+
+/// Directions in which the faces at a vertex spread less than this count as flat, relative: there
+/// the inner side follows the mean of the faces.
+const FLAT: f64 = 0.05;
+
+/// Ranges of thicknesses, mm.
+const THICKNESS_MM: std::ops::RangeInclusive<f64> = 0.2..=50.0;
+
+/// A printable frame with seats for panels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SkeletonSpec {
+    /// Thickness of the panels, with what is glued on them, mm.
+    pub panel_thickness_mm: f64,
+    /// Thickness of the frame below the panels, and least width of a ledge, mm.
+    pub wall_mm: f64,
+    /// Distance of a seat from the edges of its face, mm; `None` for as little as stays solid.
+    pub rib_mm: Option<f64>,
+}
+
+impl Default for SkeletonSpec {
+    /// Panels of 3 mm on a frame of 4 mm.
+    fn default() -> Self {
+        Self { panel_thickness_mm: 3.0, wall_mm: 4.0, rib_mm: None }
+    }
+}
+
+/// The frame of a solid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skeleton {
+    /// Its surface, mm.
+    pub triangles_mm: Vec<[DVec3; 3]>,
+    /// Distance of the panels from the edges of their faces, mm.
+    pub panel_inset_mm: f64,
+    /// Distance of the seats from the edges of their faces, mm.
+    pub rib_mm: f64,
+    /// Distance of the windows from the edges of their faces, mm.
+    pub window_mm: f64,
+}
+
+impl Skeleton {
+    /// The frame of a solid; refused where seats, ledges and windows find no room.
+    pub fn new(solid: &Polyhedron, spec: &SkeletonSpec) -> Result<Self, TargetError> {
+        let SkeletonSpec { panel_thickness_mm: thickness, wall_mm: wall, rib_mm } = *spec;
+        for (option, mm) in [("--panel-thickness", thickness), ("--wall", wall)] {
+            if !THICKNESS_MM.contains(&mm) {
+                let problem = format!("{} is not between 0.2 mm and 50 mm", format_mm(mm));
+                return Err(TargetError::invalid(option, problem));
+            }
+        }
+        // What lies h below two faces that meet at θ is h cot(θ/2) inside their edge.
+        let sharpest = solid.dihedral_angles_rad().into_iter().fold(PI, f64::min);
+        let inside = |below: f64| below / (sharpest / 2.0).tan();
+        let least_rib = inside(thickness) + FOOT_MM;
+        let rib = rib_mm.unwrap_or(least_rib);
+        if !(rib >= least_rib - 1e-9 && rib.is_finite()) {
+            let problem = format!(
+                "{} leaves no foot where faces meet at {:.1}°: take at least {:.1} mm, or thinner \
+                 panels",
+                format_mm(rib),
+                sharpest.to_degrees(),
+                (least_rib * 10.0).ceil() / 10.0
+            );
+            return Err(TargetError::invalid("--rib", problem));
+        }
+        let window = (rib + wall).max(inside(thickness + wall) + wall);
+        let faces = || (0..solid.faces.len()).map(|face| solid.triangle_mm(face));
+        let inradius = faces().map(|corners| Incircle::of(corners).radius).fold(f64::MAX, f64::min);
+        if window + LEAST_WINDOW_MM > inradius {
+            let problem = format!(
+                "seats and ledges take {:.1} mm from the edges, but the smallest face has its \
+                 middle {inradius:.1} mm from them: take thinner --wall or panels, or a larger \
+                 --edge",
+                window + LEAST_WINDOW_MM
+            );
+            return Err(TargetError::invalid("--skeleton", problem));
+        }
+        let inner = inner_vertices(solid, thickness + wall);
+        let mut triangles_mm = Vec::new();
+        for (face, corners) in faces().enumerate() {
+            let circle = Incircle::of(corners);
+            let at = |inset, below| circle.inset(corners, inset, below);
+            let loops = [
+                corners,
+                at(rib, 0.0),
+                at(rib, thickness),
+                at(window, thickness),
+                at(window, thickness + wall),
+                solid.faces[face].map(|vertex| inner[vertex]),
+            ];
+            for (outer, next) in loops.iter().zip(&loops[1..]) {
+                for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+                    triangles_mm.push([outer[i], outer[j], next[j]]);
+                    triangles_mm.push([outer[i], next[j], next[i]]);
+                }
+            }
+        }
+        let vertices: Vec<DVec3> = triangles_mm.iter().flatten().copied().collect();
+        let indices: Vec<[usize; 3]> =
+            (0..triangles_mm.len()).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        match ClosedMesh::new(&vertices, &indices) {
+            Ok((_, false)) => {}
+            _ => {
+                let problem = "the frame would cut through itself: take thinner --wall or panels";
+                return Err(TargetError::invalid("--skeleton", problem));
+            }
+        }
+        Ok(Self { triangles_mm, panel_inset_mm: rib + PLAY_MM, rib_mm: rib, window_mm: window })
+    }
+}
+
+/// The circle that touches the sides of a triangle in space.
+pub struct Incircle {
+    /// Its middle.
+    pub centre: DVec3,
+    /// Its radius, in the unit of the corners.
+    pub radius: f64,
+    /// What stands upright on the triangle, of length 1.
+    pub normal: DVec3,
+}
+
+impl Incircle {
+    /// The circle in the triangle of these corners.
+    pub fn of([a, b, c]: [DVec3; 3]) -> Self {
+        let lengths = [b.distance(c), c.distance(a), a.distance(b)];
+        let around: f64 = lengths.iter().sum();
+        let centre = (a * lengths[0] + b * lengths[1] + c * lengths[2]) / around;
+        let normal = (b - a).cross(c - a);
+        Self { centre, radius: normal.length() / around, normal: normal.normalize_or_zero() }
+    }
+
+    /// The triangle with its sides moved inwards, and below its plane.
+    pub fn inset(&self, corners: [DVec3; 3], inset: f64, below: f64) -> [DVec3; 3] {
+        let scale = (self.radius - inset) / self.radius;
+        corners.map(|v| self.centre + (v - self.centre) * scale - self.normal * below)
+    }
+}
+
+/// The vertices of the inner side: `below` the planes of all faces around a vertex, exactly where
+/// three faces meet or the faces lie evenly, else in the least-squares sense.
+fn inner_vertices(solid: &Polyhedron, below: f64) -> Vec<DVec3> {
+    let mut normals = vec![Vec::new(); solid.vertices_mm.len()];
+    for (index, face) in solid.faces.iter().enumerate() {
+        let normal = Incircle::of(solid.triangle_mm(index)).normal;
+        face.iter().for_each(|&vertex| normals[vertex].push(normal));
+    }
+    let moved = |(vertex, normals): (&DVec3, &Vec<DVec3>)| {
+        let n = normals.len();
+        let rows = DMatrix::from_fn(n, 3, |row, column| normals[row][column]);
+        let svd = rows.svd(true, true);
+        let most = svd.singular_values.max();
+        let step = svd.solve(&DVector::from_element(n, -below), FLAT * most);
+        step.map_or(*vertex, |step| *vertex + DVec3::new(step[0], step[1], step[2]))
+    };
+    solid.vertices_mm.iter().zip(&normals).map(moved).collect()
+}
+
+impl Polyhedron {
+    /// The angles between the two faces at each edge, measured inside, radians: below π on convex
+    /// edges. In the order of [`Self::edges`].
+    pub fn dihedral_angles_rad(&self) -> Vec<f64> {
+        let mut sides = std::collections::BTreeMap::<[usize; 2], Vec<(usize, DVec3)>>::new();
+        for (index, face) in self.faces.iter().enumerate() {
+            let normal = Incircle::of(self.triangle_mm(index)).normal;
+            for i in 0..3 {
+                let (from, to) = (face[i], face[(i + 1) % 3]);
+                let apex = face[(i + 2) % 3];
+                sides.entry([from.min(to), from.max(to)]).or_default().push((apex, normal));
+            }
+        }
+        let angle = |edge: [usize; 2]| {
+            let [(_, one), (apex, other), ..] = sides[&edge].as_slice() else { return PI };
+            let between = one.cross(*other).length().atan2(one.dot(*other));
+            // Beyond the plane of the first face the second one closes a hollow.
+            let hollow = one.dot(self.vertices_mm[*apex] - self.vertices_mm[edge[0]]) > 0.0;
+            if hollow { PI + between } else { PI - between }
+        };
+        self.edges().into_iter().map(angle).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat3;
+
+    use super::*;
+
+    /// Volume below the surface, by the divergence theorem.
+    fn volume(triangles: &[[DVec3; 3]]) -> f64 {
+        triangles.iter().map(|[a, b, c]| DMat3::from_cols(*a, *b, *c).determinant() / 6.0).sum()
+    }
+
+    #[test]
+    fn dihedral_angles_are_those_of_the_books() {
+        for (solid, cosine) in [
+            (Polyhedron::tetrahedron(50.0), 1.0 / 3.0),
+            (Polyhedron::octahedron(50.0), -1.0 / 3.0),
+            (Polyhedron::icosahedron(50.0), -(5f64.sqrt()) / 3.0),
+        ] {
+            for angle in solid.dihedral_angles_rad() {
+                assert!((angle.cos() - cosine).abs() < 1e-12);
+            }
+        }
+    }
+
+    /// The frame is the solid without its inside, its seats and its windows.
+    #[test]
+    fn the_volume_is_that_of_its_parts() {
+        for solid in [Polyhedron::icosahedron(150.0), Polyhedron::octahedron(150.0)] {
+            let spec = SkeletonSpec::default();
+            let frame = Skeleton::new(&solid, &spec).unwrap();
+            let outer = (0..solid.faces.len()).map(|face| solid.triangle_mm(face));
+            let whole = volume(&outer.clone().collect::<Vec<_>>());
+            let circle = Incircle::of(solid.triangle_mm(0));
+            let depth = circle.centre.dot(circle.normal);
+            let hollow = (1.0 - 7.0 / depth).powi(3) * whole;
+            let area = |inset: f64| 3.0 * 3f64.sqrt() * (circle.radius - inset).powi(2);
+            let cut = area(frame.rib_mm) * 3.0 + area(frame.window_mm) * 4.0;
+            let expected = whole - hollow - cut * solid.faces.len() as f64;
+            let found = volume(&frame.triangles_mm);
+            assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn frames_without_room_are_refused_with_what_would_do() {
+        let said = |solid: Polyhedron, spec: SkeletonSpec| {
+            Skeleton::new(&solid, &spec).unwrap_err().to_string()
+        };
+        let spec = SkeletonSpec::default();
+        let thin = SkeletonSpec { rib_mm: Some(1.0), ..spec };
+        assert!(said(Polyhedron::icosahedron(150.0), thin).contains("--rib: 1 mm leaves no foot"));
+        assert!(said(Polyhedron::tetrahedron(50.0), spec).contains("a larger --edge"));
+        let none = SkeletonSpec { wall_mm: 0.0, ..spec };
+        assert!(said(Polyhedron::icosahedron(150.0), none).contains("--wall"));
+    }
+}

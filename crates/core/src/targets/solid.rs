@@ -1,0 +1,268 @@
+//! Solids with a board of tiles on each face.
+
+use glam::DVec3;
+
+use super::board::tagged_tiles;
+use super::capacity::{check_family, wider_spacing};
+use super::length::format_mm;
+use super::polyhedron::{Face, Polyhedron};
+use super::{
+    Corner, FamilyRef, GridKind, Incircle, Outline, Panel, Skeleton, SolidShape, SolidSpec,
+    TagPlacement, TagsIn, TargetError,
+};
+use crate::family::Family;
+use crate::lattice::Vertex;
+
+/// Least blank along the edges of a panel in a skeleton, mm: room for the number of its face, and
+/// for a cut that is off.
+const LEAST_PANEL_MARGIN_MM: f64 = 3.0;
+
+impl SolidSpec {
+    /// The solid.
+    pub fn polyhedron(&self) -> Polyhedron {
+        match &self.shape {
+            SolidShape::Tetrahedron => Polyhedron::tetrahedron(self.edge_mm),
+            SolidShape::Octahedron => Polyhedron::octahedron(self.edge_mm),
+            SolidShape::Icosahedron => Polyhedron::icosahedron(self.edge_mm),
+            SolidShape::Mesh(mesh) => {
+                let scale = self.edge_mm / mesh.mean_edge();
+                let vertices_mm = mesh.vertices().iter().map(|&v| v * scale).collect();
+                Polyhedron { vertices_mm, faces: mesh.faces().to_vec() }
+            }
+        }
+    }
+
+    /// Its faces with their boards, in the order of the panels; refused where the margin leaves
+    /// no room for tiles.
+    pub fn faces(&self) -> Result<Vec<Face>, TargetError> {
+        self.check()?;
+        let solid = self.polyhedron();
+        (0..solid.faces.len())
+            .map(|index| {
+                solid
+                    .face(index, self.tiles, self.margin_mm)
+                    .filter(|face| face.tile_edge_mm >= Self::FINEST_TILE_MM)
+                    .ok_or_else(|| self.too_fine(&solid))
+            })
+            .collect()
+    }
+
+    /// The faces as they are cut to panels: whole, or as much as the seats of the skeleton take.
+    pub fn panel_faces(&self) -> Result<Vec<Face>, TargetError> {
+        let (mut faces, inset_mm) = (self.faces()?, self.panel_inset_mm()?);
+        for face in &mut faces {
+            let corners = face.outline_mm.map(|[x, y]| DVec3::new(x, y, 0.0));
+            let inner = Incircle::of(corners).inset(corners, inset_mm, 0.0);
+            face.outline_mm = inner.map(|v| [v.x, v.y]);
+        }
+        Ok(faces)
+    }
+
+    /// A margin with room for numbers and glue: that of [`Self::new`], or more where the panels of
+    /// the skeleton need it, in whole millimetres.
+    pub fn comfortable_margin_mm(&self) -> Result<f64, TargetError> {
+        let usual = Self::new(self.shape.clone()).margin_mm;
+        let Some(skeleton) = &self.skeleton else { return Ok(usual) };
+        let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;
+        Ok(usual.max((inset_mm + LEAST_PANEL_MARGIN_MM).ceil()))
+    }
+
+    /// Distance of the edges of panels from those of their faces, mm: 0 without a skeleton. Refused
+    /// where it is more than the margin.
+    pub fn panel_inset_mm(&self) -> Result<f64, TargetError> {
+        let Some(skeleton) = &self.skeleton else { return Ok(0.0) };
+        let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;
+        if inset_mm > self.margin_mm {
+            let problem = format!(
+                "tiles {} from the edges would lie on the ribs: take at least {:.1} mm, or thinner \
+                 panels",
+                format_mm(self.margin_mm),
+                (inset_mm * 10.0).ceil() / 10.0
+            );
+            return Err(TargetError::invalid("--face-margin", problem));
+        }
+        Ok(inset_mm)
+    }
+
+    /// Refuses faces without room for their tiles; says with which edge all have it.
+    ///
+    /// Tiles of a bare face grow with the face's edge; a margin takes the same from faces of all
+    /// sizes. So tiles of edge t within a margin need a face (t + taken) / bare times as large.
+    fn too_fine(&self, solid: &Polyhedron) -> TargetError {
+        let edge_of = |margin_mm: f64| {
+            (0..solid.faces.len())
+                .filter_map(move |face| solid.face(face, self.tiles, margin_mm))
+                .map(|face| face.tile_edge_mm)
+        };
+        // What a margin takes is in proportion to it; any face has room for this one.
+        let small = 1e-6 * self.edge_mm;
+        let needed = edge_of(0.0).zip(edge_of(small)).map(|(bare, less)| {
+            let taken = (bare - less) / small * self.margin_mm;
+            (Self::FINEST_TILE_MM + taken) / bare * self.edge_mm
+        });
+        let least = needed.fold(Self::LEAST_EDGE_MM, f64::max).ceil();
+        let problem = format!(
+            "{} leaves no room for {} tiles of at least {} a side within margins of {}: take an \
+             --edge of at least {least} mm, fewer --tiles, or a smaller --face-margin",
+            format_mm(self.edge_mm),
+            self.tiles,
+            format_mm(Self::FINEST_TILE_MM),
+            format_mm(self.margin_mm),
+        );
+        TargetError::invalid("--edge", problem)
+    }
+}
+
+/// The corners of a face: a triangle of vertices, two fewer a side than there are tiles, so that
+/// all of them have six tiles around.
+///
+/// ```text
+///            ▲               tiles = 4: the vertices of the outline are no corners,
+///           ▲ ▲              two remain in the lowest row, one above
+///          ▲ · ▲
+///         ▲ · · ▲
+/// ```
+pub(super) fn triangle_vertices(tiles: u32) -> Vec<Vertex> {
+    let side = tiles as i32 - 2;
+    (0..side).flat_map(|row| (0..side - row).map(move |col| Vertex::new(row, col))).collect()
+}
+
+/// The panels of a checked spec, a face each, and the family of their tags.
+pub(super) fn panels(
+    spec: &SolidSpec,
+    family: Option<&Family>,
+) -> Result<(Vec<Panel>, Option<FamilyRef>), TargetError> {
+    let panels = untied_panels(spec)?;
+    let faces = panels.len() as u64;
+    let needed = |tiles, spacing| {
+        let vertices = triangle_vertices(tiles);
+        faces * tagged_tiles(GridKind::Deltille, &vertices, spacing, TagsIn::Black).len() as u64
+    };
+    let instead = |available: u64| {
+        let wider = wider_spacing(&spec.tags, available, |spacing| needed(spec.tiles, spacing));
+        let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)
+            .rev()
+            .find(|&tiles| needed(tiles, spec.tags.spacing) <= available)
+            .map(|tiles| format!("take at most {tiles} --tiles"));
+        wider.into_iter().chain(fewer).collect()
+    };
+    let tags = needed(spec.tiles, spec.tags.spacing);
+    let family = check_family(GridKind::Deltille, &spec.tags, family, tags, instead)?;
+    Ok((panels, Some(family)))
+}
+
+/// The panels of a checked spec, whether or not its family has so many tags.
+pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError> {
+    let faces = spec.faces()?;
+    let vertices = triangle_vertices(spec.tiles);
+    let tiles = tagged_tiles(GridKind::Deltille, &vertices, spec.tags.spacing, TagsIn::Black);
+    let panel = |(index, face): (u32, &Face)| Panel {
+        id: spec.board_id + index,
+        kind: GridKind::Deltille,
+        edge_mm: face.tile_edge_mm,
+        border_bits: Some(spec.tags.border_bits),
+        tags_in: TagsIn::Black,
+        inverted: false,
+        outline: Outline::Triangle,
+        matrix: [spec.tiles - 2; 2],
+        pose: face.pose,
+        corners: vertices
+            .iter()
+            .zip(index * vertices.len() as u32..)
+            .map(|(v, id)| {
+                let panel_mm = v.position().map(|p| p * face.tile_edge_mm);
+                let target_mm = face.pose.target_from_panel(panel_mm);
+                Corner { id, row: v.row, col: v.col, panel_mm, target_mm }
+            })
+            .collect(),
+        tags: tiles
+            .iter()
+            .zip(index * tiles.len() as u32..)
+            // No family has so many codes that ids overflow; a spec may ask for them.
+            .map(|(tile, id)| TagPlacement {
+                id: spec.tags.first_id.saturating_add(id),
+                row: tile.row,
+                col: tile.col,
+            })
+            .collect(),
+    };
+    Ok((0..).zip(&faces).map(panel).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::targets::{Target, TargetSpec};
+
+    const SHAPES: [SolidShape; 3] =
+        [SolidShape::Tetrahedron, SolidShape::Octahedron, SolidShape::Icosahedron];
+
+    fn build(spec: &SolidSpec) -> Result<Target, TargetError> {
+        let family = Family::shipped(&spec.tags.family).unwrap();
+        Target::build("solid", &TargetSpec::Solid(spec.clone()), Some(&family), None)
+    }
+
+    /// The published icosahedron has 13 tiles a side, 66 corners and 10 tags on a face.
+    #[test]
+    fn faces_of_13_tiles_are_those_of_the_published_icosahedron() {
+        let spec = SolidSpec { tiles: 13, ..SolidSpec::new(SolidShape::Icosahedron) };
+        let target = build(&spec).unwrap();
+        assert_eq!(target.panels.len(), 20);
+        for panel in &target.panels {
+            assert_eq!((panel.corners.len(), panel.tags.len()), (66, 10));
+            assert_eq!(panel.dark_tiles().len(), 13 * 14 / 2);
+        }
+    }
+
+    #[test]
+    fn ids_that_run_out_are_refused_with_what_would_do() {
+        let mut spec = SolidSpec { tiles: 13, ..SolidSpec::new(SolidShape::Icosahedron) };
+        spec.tags.first_id = 200;
+        let said = build(&spec).unwrap_err().to_string();
+        assert!(said.contains("lower it to at most 143"), "{said}");
+        spec.tags.family = "delTag16h5".to_owned();
+        let said = build(&spec).unwrap_err().to_string();
+        // Twenty faces with a tag each are more than are left of the family.
+        assert!(said.contains("take --family d25h7 with its"), "{said}");
+        spec.tags.first_id = 0;
+        let said = build(&spec).unwrap_err().to_string();
+        assert!(
+            said.contains("raise --tag-spacing to at least 10, or take at most 6 --tiles"),
+            "{said}"
+        );
+        let small = SolidSpec { edge_mm: 20.0, ..SolidSpec::new(SolidShape::Icosahedron) };
+        let said = build(&small).unwrap_err().to_string();
+        assert!(said.contains("an --edge of at least "), "{said}");
+    }
+
+    proptest! {
+        /// Every tag once, every corner on its face's plane at its distance from the centre, and
+        /// the file says the same.
+        #[test]
+        fn every_solid_is_consistent(
+            shape in 0usize..3, tiles in 6u32..16, edge_mm in 100.0f64..400.0, spacing in 3u32..5,
+        ) {
+            let mut spec = SolidSpec { tiles, edge_mm, ..SolidSpec::new(SHAPES[shape].clone()) };
+            spec.tags.spacing = spacing;
+            spec.tags.family = "delTag36h11".to_owned();
+            let target = build(&spec).unwrap();
+            let ids: BTreeSet<u32> =
+                target.panels.iter().flat_map(|p| &p.tags).map(|tag| tag.id).collect();
+            prop_assert_eq!(ids.len(), target.panels.iter().map(|p| p.tags.len()).sum::<usize>());
+            prop_assert_eq!(Target::from_json(&target.to_json()).unwrap(), target.clone());
+            for panel in &target.panels {
+                let r = panel.pose.rotation;
+                let height = |p: [f64; 3]| r[2] * p[0] + r[5] * p[1] + r[8] * p[2];
+                let plane = height(panel.pose.translation_mm);
+                prop_assert!(plane > 0.0);
+                for corner in &panel.corners {
+                    prop_assert!((height(corner.target_mm) - plane).abs() < 1e-9);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,386 @@
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::length::format_mm;
+use super::{ClosedMesh, GridKind, SkeletonSpec, TagsIn, TargetError};
+
+/// Most rows or columns of a board: more than the largest paper holds at the finest edge that
+/// anybody prints, and few enough that no number overflows.
+pub const MOST_ROWS: u32 = 500;
+
+/// Range of rows and of columns: two rows of two corners have a tile between them.
+pub const SIDES: std::ops::RangeInclusive<u32> = 2..=MOST_ROWS;
+
+/// Most corners of all boards together: their description takes 100 MB of text.
+const MOST_CORNERS: u64 = 1_000_000;
+
+/// Fewest corners of an untagged board: what the detector asks for where no tag vouches for a grid.
+/// A hexagon of triangles, or four squares: a quad or two of random texture may pass for tiles,
+/// twelve clean edges between so few corners do not.
+pub const fn least_untagged_corners(kind: GridKind) -> u32 {
+    match kind {
+        GridKind::Deltille => 7,
+        GridKind::Checker => 9,
+    }
+}
+
+/// Least border of a square tag, bit-widths: that of an AprilTag.
+const LEAST_SQUARE_BORDER_BITS: f64 = 1.0;
+
+/// Range of a tile's edge, mm.
+const EDGE_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
+
+/// Range of a solid's edge, mm.
+const SOLID_EDGE_MM: std::ops::RangeInclusive<f64> = 10.0..=5000.0;
+
+/// Range of tiles along a side of a face: with fewer than six a face has at most six corners,
+/// and the detector takes so few for no grid.
+const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
+
+/// Farthest a mesh may lie from its origin, mm: meshes and bodies are written in single precision,
+/// which at 100 m leaves 0.01 mm.
+const FARTHEST_MM: f64 = 1e5;
+
+/// Most faces of a solid.
+const MOST_FACES: u32 = 10_000;
+
+/// Range of a tag's border, bit-widths. The border separates the code from the white around the
+/// tile; with half a bit of it the detector no longer finds every corner of a clean print, from 0.6
+/// on it does.
+pub const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.6..=10.0;
+
+/// What was asked for: enough to make the target again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum TargetSpec {
+    /// Flat boards: deltille zigzags, or checkerboards.
+    Board(BoardSpec),
+    /// A solid with a board on each face.
+    Solid(SolidSpec),
+    /// Single tags, in rows.
+    Tags(TagSheetSpec),
+    /// Known only by its corners and tags, as another program listed them.
+    Listed(ListedSpec),
+}
+
+/// Boards of `rows × cols` corners, all alike but for their ids.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoardSpec {
+    /// The tiling.
+    #[serde(default, skip_serializing_if = "is_deltille")]
+    pub grid: GridKind,
+    /// Rows of corners.
+    pub rows: u32,
+    /// Corners in each row.
+    pub cols: u32,
+    /// Length of a tile's edge, mm.
+    pub edge_mm: f64,
+    /// Number of boards. Each has a sheet of its own; they are loose, so that each lies in the
+    /// origin of the target frame.
+    #[serde(default = "one")]
+    pub boards: u32,
+    /// Id of the first board; the others follow.
+    pub board_id: u32,
+    /// Tags; `None` for an untagged board.
+    pub tags: Option<TagSpec>,
+    /// Exchange black and white.
+    pub inverted: bool,
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn is_deltille(kind: &GridKind) -> bool {
+    *kind == GridKind::Deltille
+}
+
+/// Which tags a board carries, and where.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TagSpec {
+    /// Family name, or path of a family file.
+    pub family: String,
+    /// Id of the first tag; the others follow, by row, then column, board after board.
+    pub first_id: u32,
+    /// A tag in every n-th row and column.
+    pub spacing: u32,
+    /// Border in bit-widths along the edge.
+    pub border_bits: f64,
+    /// Which squares of a checkerboard carry them.
+    #[serde(default, skip_serializing_if = "TagsIn::is_black")]
+    pub tags_in: TagsIn,
+}
+
+/// Single tags on sheets: a panel of one tile without corners for each, whose id is the tag's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TagSheetSpec {
+    /// Family name, or path of a family file.
+    pub family: String,
+    /// Tags in the order of printing, each once.
+    pub ids: Vec<u32>,
+    /// Length of a tag's edge, mm.
+    pub edge_mm: f64,
+    /// Border in bit-widths along the edge.
+    pub border_bits: f64,
+}
+
+/// A solid whose faces carry triangular boards with tags.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolidSpec {
+    /// Which solid.
+    pub shape: SolidShape,
+    /// Length of the solid's edges, mm; on a mesh their mean, to which it is scaled.
+    pub edge_mm: f64,
+    /// Black tiles along each side of a face.
+    pub tiles: u32,
+    /// Blank between a face's edges and its tiles, mm.
+    pub margin_mm: f64,
+    /// Id of the first face's board; the others follow in the order of the faces.
+    pub board_id: u32,
+    /// Tags: faces could not be told apart without.
+    pub tags: TagSpec,
+    /// A frame that holds the faces as panels, if one is to be printed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skeleton: Option<SkeletonSpec>,
+}
+
+/// The solids; see [`Polyhedron`](super::Polyhedron) for the order of the faces of regular ones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SolidShape {
+    /// Four faces.
+    Tetrahedron,
+    /// Eight faces.
+    Octahedron,
+    /// Twenty faces.
+    Icosahedron,
+    /// Any other, by its triangles.
+    Mesh(ClosedMesh),
+}
+
+/// Where a listed target comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListedSpec {
+    /// The format of the list.
+    pub format: ListFormat,
+}
+
+/// Formats that list a target's corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ListFormat {
+    /// `.dsc` in the dialect of the reference detector (FORMATS §5).
+    DscOriginal,
+    /// `.dsc` in the dialect of its fork.
+    DscFork,
+}
+
+impl Default for TagSpec {
+    /// delTag25h7 from id 0, a tag in every third row and column, a border of 1.5 bits: a tag has
+    /// six plain tiles around each of its corners, and the border is that of published targets.
+    fn default() -> Self {
+        let family = "delTag25h7".to_owned();
+        Self { family, first_id: 0, spacing: 3, border_bits: 1.5, tags_in: TagsIn::Black }
+    }
+}
+
+impl TagSpec {
+    /// Tags for a checkerboard: aprilTag36h11 in every second row and column, so that each corner
+    /// touches one tag at most.
+    ///
+    /// In black squares the border has two bits: with one, cells come so near to the corners that
+    /// these are found half as precisely (docs/measurements.md). In white squares it has the one bit
+    /// that every reader of AprilTags knows.
+    pub fn for_squares(tags_in: TagsIn) -> Self {
+        Self {
+            family: "aprilTag36h11".to_owned(),
+            spacing: 2,
+            border_bits: match tags_in {
+                TagsIn::Black => 2.0,
+                TagsIn::White => LEAST_SQUARE_BORDER_BITS,
+            },
+            tags_in,
+            ..Self::default()
+        }
+    }
+}
+
+impl SolidShape {
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Tetrahedron => "tetrahedron",
+            Self::Octahedron => "octahedron",
+            Self::Icosahedron => "icosahedron",
+            Self::Mesh(_) => "mesh",
+        }
+    }
+}
+
+impl SolidSpec {
+    /// Shortest edge, mm.
+    pub const LEAST_EDGE_MM: f64 = *SOLID_EDGE_MM.start();
+
+    /// Fewest tiles along a side of a face.
+    pub const FEWEST_TILES: u32 = *FACE_TILES.start();
+
+    /// Finest edge of a tile, mm: what [`BoardSpec`] allows.
+    pub const FINEST_TILE_MM: f64 = *EDGE_MM.start();
+
+    /// A solid of 150 mm edges, or a mesh in its own size, with ten tiles a side (the tags of a
+    /// face then lie symmetrically) and 5 mm of blank along its edges, which leaves room to fold
+    /// and glue.
+    pub fn new(shape: SolidShape) -> Self {
+        let tags = TagSpec::default();
+        let edge_mm = match &shape {
+            SolidShape::Mesh(mesh) => mesh.mean_edge(),
+            _ => 150.0,
+        };
+        Self { shape, edge_mm, tiles: 10, margin_mm: 5.0, board_id: 0, tags, skeleton: None }
+    }
+
+    /// Checks every number by itself.
+    pub(super) fn check(&self) -> Result<(), TargetError> {
+        if !SOLID_EDGE_MM.contains(&self.edge_mm) {
+            let edge = format_mm(self.edge_mm);
+            let problem = match &self.shape {
+                SolidShape::Mesh(_) => {
+                    format!("the mean is {edge}, not between 10 mm and 5000 mm: is --scale right?")
+                }
+                _ => format!("{edge} is not between 10 mm and 5000 mm"),
+            };
+            return Err(TargetError::invalid("--edge", problem));
+        }
+        if let SolidShape::Mesh(mesh) = &self.shape
+            && mesh.faces().len() > MOST_FACES as usize
+        {
+            let problem = format!("{} faces are more than {MOST_FACES}", mesh.faces().len());
+            return Err(TargetError::invalid("--mesh", problem));
+        }
+        if let SolidShape::Mesh(mesh) = &self.shape {
+            let scale = self.edge_mm / mesh.mean_edge();
+            let far = |v: &DVec3| v.abs().max_element() * scale;
+            let farthest = mesh.vertices().iter().map(far).fold(0.0, f64::max);
+            if farthest > FARTHEST_MM {
+                let problem = format!(
+                    "it reaches {} from the origin, more than {}: move it nearer",
+                    format_mm(farthest),
+                    format_mm(FARTHEST_MM)
+                );
+                return Err(TargetError::invalid("--mesh", problem));
+            }
+        }
+        if !FACE_TILES.contains(&self.tiles) {
+            let problem = format!("{} is not between 6 and 200", self.tiles);
+            return Err(TargetError::invalid("--tiles", problem));
+        }
+        if !(0.0..=SOLID_EDGE_MM.end() / 4.0).contains(&self.margin_mm) {
+            let problem = format!("{} is no margin of a face", format_mm(self.margin_mm));
+            return Err(TargetError::invalid("--face-margin", problem));
+        }
+        if self.board_id.checked_add(MOST_FACES).is_none() {
+            let problem = format!("{} leaves no ids for the faces after it", self.board_id);
+            return Err(TargetError::invalid("--board-id", problem));
+        }
+        self.tags.check()
+    }
+}
+
+impl BoardSpec {
+    /// One board with tags.
+    pub fn new(grid: GridKind, rows: u32, cols: u32, edge_mm: f64) -> Self {
+        let tags = Some(match grid {
+            GridKind::Deltille => TagSpec::default(),
+            GridKind::Checker => TagSpec::for_squares(TagsIn::Black),
+        });
+        Self { grid, rows, cols, edge_mm, boards: 1, board_id: 0, tags, inverted: false }
+    }
+
+    /// Checks every number by itself.
+    pub(super) fn check(&self) -> Result<(), TargetError> {
+        for (option, value) in [("--rows", self.rows), ("--cols", self.cols)] {
+            if !SIDES.contains(&value) {
+                let problem = format!("{value} is not between 2 and {MOST_ROWS}");
+                return Err(TargetError::invalid(option, problem));
+            }
+        }
+        if !EDGE_MM.contains(&self.edge_mm) {
+            let problem = format!("{} is not between 1 mm and 1000 mm", format_mm(self.edge_mm));
+            return Err(TargetError::invalid("--edge", problem));
+        }
+        if !(1..=MOST_ROWS).contains(&self.boards) {
+            let problem = format!("{} is not between 1 and {MOST_ROWS}", self.boards);
+            return Err(TargetError::invalid("--boards", problem));
+        }
+        let corners =
+            [self.rows, self.cols, self.boards].into_iter().map(u64::from).product::<u64>();
+        if corners > MOST_CORNERS {
+            let problem = format!("{corners} corners are more than {MOST_CORNERS} in one target");
+            return Err(TargetError::invalid("--boards", problem));
+        }
+        if self.board_id.checked_add(self.boards).is_none() {
+            let problem = format!("{} leaves no ids for the boards after it", self.board_id);
+            return Err(TargetError::invalid("--board-id", problem));
+        }
+        let least = least_untagged_corners(self.grid);
+        if self.tags.is_none() && self.rows * self.cols < least {
+            let problem = format!(
+                "{} × {} corners without tags are too few to be told from texture: take at least \
+                 {least} corners, or tags",
+                self.rows, self.cols
+            );
+            let option = match self.grid {
+                GridKind::Deltille => "--untagged",
+                GridKind::Checker => "--rows",
+            };
+            return Err(TargetError::invalid(option, problem));
+        }
+        match &self.tags {
+            Some(tags) => {
+                if self.grid == GridKind::Deltille && tags.tags_in == TagsIn::White {
+                    let problem = "the tags of a deltille board are in its black tiles";
+                    return Err(TargetError::invalid("--tags-in", problem));
+                }
+                let least = LEAST_SQUARE_BORDER_BITS;
+                if self.grid == GridKind::Checker && tags.border_bits < least {
+                    let problem = format!(
+                        "{} is too narrow, a square tag has a border of at least {least} bit-width",
+                        tags.border_bits
+                    );
+                    return Err(TargetError::invalid("--tag-border", problem));
+                }
+                if (self.grid, self.rows, self.cols, tags.tags_in)
+                    == (GridKind::Checker, 2, 2, TagsIn::White)
+                {
+                    let problem = "the one square between 2 × 2 corners is black";
+                    return Err(TargetError::invalid("--tags-in", problem));
+                }
+                tags.check()
+            }
+            None if self.boards > 1 => {
+                let problem = "untagged boards cannot be told apart: give them tags, or make one";
+                Err(TargetError::invalid("--boards", problem))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+impl TagSpec {
+    fn check(&self) -> Result<(), TargetError> {
+        if !(1..=MOST_ROWS).contains(&self.spacing) {
+            let problem = format!("{} is not between 1 and {MOST_ROWS}", self.spacing);
+            return Err(TargetError::invalid("--tag-spacing", problem));
+        }
+        if !BORDER_BITS.contains(&self.border_bits) {
+            let problem = format!("{} is not between 0.6 and 10 bit-widths", self.border_bits);
+            return Err(TargetError::invalid("--tag-border", problem));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,35 @@
+//! Numbers in sentences, and texts of others on a terminal.
+
+use std::borrow::Cow;
+
+/// A number of things, in the right number: `1 view`, `2 views`.
+pub fn counted(count: usize, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
+}
+
+/// A line with words that may come from a file or its name, as it is shown: what would end the line, move the cursor,
+/// change colours or turn the direction of writing is escaped; tabs stay.
+pub fn shown(text: &str) -> Cow<'_, str> {
+    let is_harmful = |c: char| {
+        let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+        turns || c.is_control() && c != '\t'
+    };
+    if !text.contains(is_harmful) {
+        return Cow::Borrowed(text);
+    }
+    let escaped = |c: char| -> String {
+        if is_harmful(c) { c.escape_default().collect() } else { c.to_string() }
+    };
+    Cow::Owned(text.chars().map(escaped).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shown;
+
+    #[test]
+    fn texts_of_others_do_nothing_to_a_terminal() {
+        assert_eq!(shown("a\tb µ Ω 板"), "a\tb µ Ω 板");
+        assert_eq!(shown("\u{1b}[2Jx\r\n\u{202e}"), r"\u{1b}[2Jx\r\n\u{202e}");
+    }
+}

@@ -1,0 +1,367 @@
+//! Cameras in the files of other programs.
+//!
+//! Pixel centres at integers become what the program has: COLMAP and nerfstudio put the centre of the
+//! first pixel at (½, ½).
+
+use std::fmt::Write as _;
+
+use glam::{DMat3, DMat4};
+use serde_json::json;
+
+use super::GENERATOR;
+use deltille_core::camera::{Camera, Lens, Pose};
+use deltille_core::name;
+
+/// A format that cannot say what a camera is.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{format} cannot carry {lens}; its models: {models}")]
+pub struct FormatError {
+    /// The format.
+    format: &'static str,
+    /// What the camera has.
+    lens: String,
+    /// What the format has.
+    models: &'static str,
+}
+
+/// The lenses that other programs share, with their coefficients.
+enum Shared<'a> {
+    /// k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, of which so many are needed.
+    Perspective(&'a [f64], usize),
+    /// k1 k2 k3 k4.
+    Equidistant(&'a [f64]),
+    /// Another.
+    Other,
+}
+
+impl<'a> Shared<'a> {
+    fn of(camera: &Camera, parameters: &'a [f64]) -> Self {
+        let needed = parameters.iter().rposition(|&k| k != 0.0).map_or(0, |last| last + 1);
+        match camera.lens {
+            Lens::BrownConrady(_) => Self::Perspective(parameters, needed),
+            Lens::KannalaBrandt(_) if needed <= 4 => Self::Equidistant(&parameters[..4]),
+            _ => Self::Other,
+        }
+    }
+}
+
+/// Says what a camera has that a format has not.
+fn refuse<T>(
+    camera: &Camera,
+    format: &'static str,
+    models: &'static str,
+) -> Result<T, FormatError> {
+    let names = camera.lens.names();
+    let values = camera.lens.parameters();
+    let used = values.iter().rposition(|&k| k != 0.0).map_or(0, |last| last + 1);
+    let lens = match camera.lens {
+        Lens::BrownConrady(_) => "a perspective lens",
+        Lens::KannalaBrandt(_) => "a fisheye polynomial",
+        Lens::ExtendedUnified(_) => "an EUCM lens",
+        Lens::DoubleSphere(_) => "a double sphere lens",
+        Lens::Pupil(_) => "a fisheye with a moving pupil",
+    };
+    Err(FormatError { format, lens: format!("{lens} with {}", names[..used].join(" ")), models })
+}
+
+/// OpenCV's FileStorage YAML.
+pub fn opencv(camera: &Camera) -> Result<String, FormatError> {
+    let parameters = camera.lens.parameters();
+    let (model, coefficients) = match Shared::of(camera, &parameters) {
+        Shared::Perspective(k, needed) => {
+            let count = [4, 5, 8, 12].into_iter().find(|&count| count >= needed).unwrap_or(12);
+            ("pinhole", &k[..count])
+        }
+        Shared::Equidistant(k) => ("fisheye", k),
+        Shared::Other => {
+            return refuse(camera, "opencv", "radtan, rational, thin-prism, kannala-brandt");
+        }
+    };
+    let model = if model == "fisheye" { "distortion_model: fisheye\n" } else { "" };
+    Ok(format!(
+        "%YAML:1.0\n---\n# {GENERATOR}\nimage_width: {}\nimage_height: {}\ncamera_matrix: {}{model}\
+         distortion_coefficients: {}",
+        camera.width,
+        camera.height,
+        opencv_matrix(3, 3, &matrix(camera)),
+        opencv_matrix(1, coefficients.len(), coefficients),
+    ))
+}
+
+fn opencv_matrix(rows: usize, cols: usize, data: &[f64]) -> String {
+    format!(
+        "!!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: [ {} ]\n",
+        list(data)
+    )
+}
+
+/// The camera file of ROS.
+pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
+    let parameters = camera.lens.parameters();
+    let (model, coefficients) = match Shared::of(camera, &parameters) {
+        Shared::Perspective(k, 0..=5) => ("plumb_bob", &k[..5]),
+        Shared::Perspective(k, 6..=8) => ("rational_polynomial", &k[..8]),
+        Shared::Equidistant(k) => ("equidistant", k),
+        _ => return refuse(camera, "ros", "radtan, rational, kannala-brandt"),
+    };
+    let [fx, _, cx, _, fy, cy, ..] = matrix(camera);
+    let matrix_of = |rows: usize, cols: usize, data: &[f64]| {
+        format!("\n  rows: {rows}\n  cols: {cols}\n  data: [{}]\n", list(data))
+    };
+    let one = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let projection = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
+    Ok(format!(
+        "# {GENERATOR}\nimage_width: {}\nimage_height: {}\ncamera_name: {}\ncamera_matrix:{}distortion_model: \
+         {model}\ndistortion_coefficients:{}rectification_matrix:{}projection_matrix:{}",
+        camera.width,
+        camera.height,
+        serde_json::Value::from(name),
+        matrix_of(3, 3, &matrix(camera)),
+        matrix_of(1, coefficients.len(), coefficients),
+        matrix_of(3, 3, &one),
+        matrix_of(3, 4, &projection),
+    ))
+}
+
+/// Kalibr's camera chain: cameras, each with its camera_from_rig.
+pub fn kalibr(cameras: &[(&Camera, Pose)]) -> Result<String, FormatError> {
+    let mut text = format!("# {GENERATOR}\n");
+    for (n, (camera, camera_from_rig)) in cameras.iter().enumerate() {
+        // Writing to a String cannot fail.
+        let _ = write!(text, "cam{n}:\n{}", kalibr_camera(camera)?);
+        if let Some((_, before_from_rig)) = n.checked_sub(1).map(|before| cameras[before]) {
+            let motion = camera_from_rig.after(&before_from_rig.inverse());
+            text += "  T_cn_cnm1:\n";
+            let rotation = DMat3::from_quat(motion.rotation);
+            // Kalibr's lengths are metres.
+            let shift = motion.translation / 1000.0;
+            for i in 0..3 {
+                let row = rotation.row(i).to_array();
+                let _ = writeln!(text, "  - [{}]", list(&[&row[..], &[shift[i]]].concat()));
+            }
+            text += "  - [0.0, 0.0, 0.0, 1.0]\n";
+        }
+    }
+    Ok(text)
+}
+
+fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
+    let parameters = camera.lens.parameters();
+    let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.centre_px);
+    let ends = [fx, fy, cx, cy];
+    let plain = |model| (model, [&parameters[..], &ends[..]].concat(), "none", Vec::new());
+    let (model, intrinsics, distortion, coefficients) = match &camera.lens {
+        Lens::ExtendedUnified(_) => plain("eucm"),
+        Lens::DoubleSphere(_) => plain("ds"),
+        _ => match Shared::of(camera, &parameters) {
+            Shared::Perspective(k, 0..=4) => ("pinhole", ends.to_vec(), "radtan", k[..4].to_vec()),
+            Shared::Equidistant(k) => ("pinhole", ends.to_vec(), "equidistant", k.to_vec()),
+            _ => return refuse(camera, "kalibr", "radtan, kannala-brandt, eucm, double-sphere"),
+        },
+    };
+    Ok(format!(
+        "  camera_model: {model}\n  intrinsics: [{}]\n  distortion_model: {distortion}\n  \
+         distortion_coeffs: [{}]\n  resolution: [{}, {}]\n",
+        list(&intrinsics),
+        list(&coefficients),
+        camera.width,
+        camera.height,
+    ))
+}
+
+/// COLMAP's cameras.txt, of cameras numbered from 1.
+pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
+    let mut text = format!("# {GENERATOR}\n# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n");
+    for (n, camera) in (1..).zip(cameras) {
+        let (model, parameters) = colmap_camera(camera)?;
+        let _ = write!(text, "{n} {model} {} {}", camera.width, camera.height);
+        for value in parameters {
+            let _ = write!(text, " {value:?}");
+        }
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+/// COLMAP's rig_config.json: cameras by name, each with its camera_from_rig; pictures lie in a folder
+/// of the camera's name. The first camera is the rig.
+pub fn colmap_rig(cameras: &[(&str, &Camera, Pose)]) -> Result<String, FormatError> {
+    let mut entries = Vec::with_capacity(cameras.len());
+    for (n, (name, camera, camera_from_rig)) in cameras.iter().enumerate() {
+        let (model, parameters) = colmap_camera(camera)?;
+        let mut entry = json!({
+            "image_prefix": format!("{name}/"),
+            "camera_model_name": model,
+            "camera_params": parameters,
+        });
+        if n == 0 {
+            entry["ref_sensor"] = json!(true);
+        } else {
+            let [x, y, z, w] = camera_from_rig.rotation.to_array();
+            entry["cam_from_rig_rotation"] = json!([w, x, y, z]);
+            entry["cam_from_rig_translation"] = json!(camera_from_rig.translation.to_array());
+        }
+        entries.push(entry);
+    }
+    Ok(deltille_core::json::to_text(&json!([{ "cameras": entries }]), 3))
+}
+
+/// Name and parameters of a COLMAP camera.
+fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatError> {
+    let parameters = camera.lens.parameters();
+    let (model, coefficients) = match Shared::of(camera, &parameters) {
+        Shared::Perspective(k, 0..=4) => ("OPENCV", &k[..4]),
+        Shared::Perspective(k, 5..=8) => ("FULL_OPENCV", &k[..8]),
+        Shared::Equidistant(k) => ("OPENCV_FISHEYE", k),
+        _ => return refuse(camera, "colmap", "radtan, rational, kannala-brandt"),
+    };
+    let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.centre_px.map(|c| c + 0.5));
+    Ok((model, [&[fx, fy, cx, cy], coefficients].concat()))
+}
+
+/// nerfstudio's transforms.json: the camera, and for each image its camera_from_target, with lengths
+/// in mm and axes as OpenGL has them. An image whose name leads out of its folder is called by the end of it.
+pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, FormatError> {
+    let parameters = camera.lens.parameters();
+    let (model, names, coefficients) = match Shared::of(camera, &parameters) {
+        Shared::Perspective(k, 0..=5) => {
+            ("OPENCV", ["k1", "k2", "p1", "p2", "k3"].as_slice(), &k[..5])
+        }
+        Shared::Equidistant(k) => ("OPENCV_FISHEYE", ["k1", "k2", "k3", "k4"].as_slice(), k),
+        _ => return refuse(camera, "nerfstudio", "radtan, radtan5, kannala-brandt"),
+    };
+    let frames = views.iter().map(|(image, camera_from_target)| {
+        let back = camera_from_target.inverse();
+        let flip = DMat3::from_diagonal(glam::DVec3::new(1.0, -1.0, -1.0));
+        let rotation = DMat3::from_quat(back.rotation) * flip;
+        let mut matrix = DMat4::from_mat3(rotation);
+        matrix.w_axis = back.translation.extend(1.0);
+        let rows = matrix.transpose().to_cols_array_2d();
+        json!({ "file_path": name::within(image), "transform_matrix": rows })
+    });
+    let mut file = json!({
+        "camera_model": model,
+        "w": camera.width, "h": camera.height,
+        "fl_x": camera.focal_px[0], "fl_y": camera.focal_px[1],
+        "cx": camera.centre_px[0] + 0.5, "cy": camera.centre_px[1] + 0.5,
+        "frames": frames.collect::<Vec<_>>(),
+    });
+    for (name, value) in names.iter().zip(coefficients) {
+        file[*name] = json!(value);
+    }
+    Ok(deltille_core::json::to_text(&file, 3))
+}
+
+/// Row-major.
+fn matrix(camera: &Camera) -> [f64; 9] {
+    let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.centre_px);
+    [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
+}
+
+/// Numbers as every reader of YAML takes them for floating-point ones: `600.0`, `1e-05`.
+fn list(values: &[f64]) -> String {
+    let words = values.iter().map(|value| match format!("{value:?}") {
+        word if word.contains('.') => word,
+        // YAML 1.1 wants a point in the mantissa.
+        word => word.replacen('e', ".0e", 1),
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deltille_core::calibrate::Model;
+
+    fn camera(model: Model, count: usize) -> Camera {
+        let lens = model.lens();
+        let mut values = lens.parameters();
+        for (i, value) in values.iter_mut().take(count).enumerate() {
+            *value = [0.25, 1e-5, -1e-7, 0.125][i % 4];
+        }
+        Camera::centred(640, 480, 500.0, lens.with_parameters(&values))
+    }
+
+    #[test]
+    fn what_ros_and_opencv_read_is_the_camera() {
+        for (model, count) in [
+            (Model::Radtan, 4),
+            (Model::Radtan5, 5),
+            (Model::Rational, 8),
+            (Model::ThinPrism, 12),
+            (Model::KannalaBrandt(4), 4),
+        ] {
+            let camera = camera(model, count);
+            assert_eq!(Camera::from_yaml(&opencv(&camera).unwrap()).unwrap(), camera, "{model}");
+            if model != Model::ThinPrism {
+                let text = ros(&camera, "left: \"1\"").unwrap();
+                assert_eq!(Camera::from_yaml(&text).unwrap(), camera, "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_format_that_cannot_carry_a_model_says_so() {
+        for (model, count, carried) in [
+            (Model::Radtan, 4, [true, true, true, true, true]),
+            (Model::Radtan5, 5, [true, true, false, true, true]),
+            (Model::Rational, 8, [true, true, false, true, false]),
+            (Model::ThinPrism, 12, [true, false, false, false, false]),
+            (Model::KannalaBrandt(4), 4, [true, true, true, true, true]),
+            (Model::KannalaBrandt(5), 5, [false; 5]),
+            (Model::Eucm, 0, [false, false, true, false, false]),
+            (Model::DoubleSphere, 0, [false, false, true, false, false]),
+            (Model::Pupil, 10, [false; 5]),
+        ] {
+            let camera = camera(model, count);
+            let texts = [
+                opencv(&camera),
+                ros(&camera, "camera"),
+                kalibr(&[(&camera, Pose::IDENTITY)]),
+                colmap(&[&camera]),
+                nerfstudio(&camera, &[("a.png", Pose::IDENTITY)]),
+            ];
+            assert_eq!(texts.map(|text| text.is_ok()), carried, "{model}");
+        }
+        let said = kalibr(&[(&camera(Model::Radtan5, 5), Pose::IDENTITY)]).unwrap_err().to_string();
+        assert!(said.starts_with("kalibr cannot carry a perspective lens with k1 k2 p1 p2 k3"));
+    }
+
+    #[test]
+    fn a_rig_says_where_its_cameras_are() {
+        let radtan = camera(Model::Radtan, 4);
+        let turn = glam::DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2);
+        let beside = Pose { rotation: turn, translation: glam::DVec3::new(-120.0, 0.0, 0.0) };
+        let text = kalibr(&[(&radtan, Pose::IDENTITY), (&radtan, beside)]).unwrap();
+        assert!(text.contains("\ncam1:\n") && text.contains("  T_cn_cnm1:\n  - ["), "{text}");
+        let last = text.lines().nth_back(3).unwrap();
+        assert!(last.ends_with(", -0.12]"), "{text}");
+        let text = colmap_rig(&[("l", &radtan, Pose::IDENTITY), ("r", &radtan, beside)]).unwrap();
+        let file: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let right = &file[0]["cameras"][1];
+        assert_eq!(file[0]["cameras"][0]["ref_sensor"], json!(true));
+        assert_eq!(right["image_prefix"], json!("r/"));
+        assert_eq!(right["cam_from_rig_translation"], json!([-120.0, 0.0, 0.0]));
+        assert_eq!(right["cam_from_rig_rotation"][0], json!(turn.w));
+        assert_eq!(colmap(&[&radtan, &radtan]).unwrap().lines().count(), 4);
+    }
+
+    #[test]
+    fn texts_are_those_that_the_programs_document() {
+        let radtan = camera(Model::Radtan, 4);
+        assert_eq!(
+            kalibr(&[(&radtan, Pose::IDENTITY)]).unwrap(),
+            format!("# {GENERATOR}\n")
+                + "cam0:\n  camera_model: pinhole\n  intrinsics: [500.0, 500.0, 319.5, 239.5]\n  \
+             distortion_model: radtan\n  distortion_coeffs: [0.25, 1.0e-5, -1.0e-7, 0.125]\n  \
+             resolution: [640, 480]\n"
+        );
+        let text = colmap(&[&radtan]).unwrap();
+        let last = text.lines().last().unwrap();
+        assert_eq!(last, "1 OPENCV 640 480 500.0 500.0 320.0 240.0 0.25 1e-5 -1e-7 0.125");
+        let text = nerfstudio(&radtan, &[("a.png", Pose::IDENTITY)]).unwrap();
+        let file: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(file["frames"][0]["transform_matrix"][1], json!([0.0, -1.0, 0.0, 0.0]));
+        assert_eq!(file["p1"], json!(-1e-7));
+    }
+}

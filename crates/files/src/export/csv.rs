@@ -1,0 +1,54 @@
+//! Detections as comma-separated values, one corner a line, for spreadsheets and data frames; and
+//! lists of points, which are read.
+//!
+//! Columns: `grid` (counted from 0 in the image), `kind`, `panel`, `row`, `col`, `id`, `x`, `y`
+//! (px, pixel centres at integers, y down), `cov_xx`, `cov_xy`, `cov_yy` (px²). A cell is empty
+//! where nothing is known.
+
+use std::fmt::Write;
+
+use deltille_core::detect::Detection;
+use deltille_core::targets::GridKind;
+
+/// The header line.
+pub const HEADER: &str = "grid,kind,panel,row,col,id,x,y,cov_xx,cov_xy,cov_yy";
+
+/// The text of the CSV file of one image.
+pub fn write(detection: &Detection) -> String {
+    let mut text = format!("{HEADER}\n");
+    for (index, grid) in detection.grids.iter().enumerate() {
+        let kind = match grid.kind {
+            GridKind::Deltille => "deltille",
+            GridKind::Checker => "checker",
+        };
+        let panel = grid.panel.map_or_else(String::new, |id| id.to_string());
+        for corner in &grid.corners {
+            let (row, col, x, y) = (corner.row, corner.col, corner.x, corner.y);
+            let id = corner.id.map_or_else(String::new, |id| id.to_string());
+            let cov = corner
+                .cov
+                .map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{index},{kind},{panel},{row},{col},{id},{x},{y},{cov}");
+        }
+    }
+    text
+}
+
+/// Reads points, `x,y` a line, in px; a header line and empty lines are skipped. The error names the
+/// line.
+pub fn read_points(text: &str) -> Result<Vec<[f64; 2]>, String> {
+    let mut points = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+        let numbers: Option<Vec<f64>> =
+            fields.iter().map(|f| f.parse().ok().filter(|n: &f64| n.is_finite())).collect();
+        match numbers.as_deref() {
+            Some(&[x, y]) => points.push([x, y]),
+            _ if line.trim().is_empty() => {}
+            _ if i == 0 && fields == ["x", "y"] => {}
+            _ => return Err(format!("line {}: write x,y in px, not {line:?}", i + 1)),
+        }
+    }
+    Ok(points)
+}

@@ -1,0 +1,179 @@
+//! Detections as JSON (FORMATS §9, schema `deltille/detection/1`), and back.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use deltille_core::detect::{Detection, Grid, InkEstimate, Reason, ToneEstimate};
+use deltille_core::json::{self, ReadError};
+use deltille_core::quantity;
+use deltille_core::raster::FileNotes;
+
+/// Schema and version that this crate writes and reads.
+pub const SCHEMA: &str = "deltille/detection/1";
+
+/// What is wrong with a detection file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DetectionFileError {
+    /// Not JSON, or cut off.
+    #[error("not a detection file: {0}; make it anew with `deltille detect`")]
+    Json(serde_json::Error),
+    /// Another schema, or another version of it.
+    #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
+    Schema {
+        /// The schema that the file names.
+        found: String,
+    },
+    /// A file of something else.
+    #[error("this is a {found} file, not a detection: give what `deltille detect` wrote")]
+    Kind {
+        /// The schema that the file names.
+        found: String,
+    },
+    /// A field is missing, unknown, or holds what it must not.
+    #[error("field `{field}`: {problem}; make the file anew with `deltille detect`")]
+    Field {
+        /// The field, such as `grids[0].corners[3].x`.
+        field: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A grid that is there already.
+    #[error("grids[{grid}] is grids[{first}] again")]
+    Again {
+        /// Index of the second.
+        grid: usize,
+        /// Index of the first.
+        first: usize,
+    },
+    /// A corner that cannot be one.
+    #[error("grids[{grid}].corners[{corner}]: {problem}")]
+    Corner {
+        /// Index of the grid.
+        grid: usize,
+        /// Index of the corner.
+        corner: usize,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl From<ReadError> for DetectionFileError {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Json(error) => Self::Json(error),
+            ReadError::Field { field, problem } => Self::Field { field, problem },
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DetectionFile {
+    schema: String,
+    image: String,
+    #[serde(deserialize_with = "quantity::side_px::de")]
+    width: u32,
+    #[serde(deserialize_with = "quantity::side_px::de")]
+    height: u32,
+    #[serde(default, skip_serializing_if = "FileNotes::is_empty")]
+    file: FileNotes,
+    grids: Vec<Grid>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    tone: Option<ToneEstimate>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    ink: Option<InkEstimate>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    reasons: Vec<Reason>,
+    #[serde(
+        default,
+        skip_serializing_if = "BTreeMap::is_empty",
+        deserialize_with = "quantity::figure::de"
+    )]
+    timing_ms: BTreeMap<String, f64>,
+}
+
+/// The text of the JSON file of one image, a corner a line.
+pub fn write(detection: &Detection) -> String {
+    deltille_core::json::to_text(&DetectionFile::of(detection), 4)
+}
+
+/// The same as a single line, which it ends, for streams of detections.
+pub fn write_line(detection: &Detection) -> String {
+    deltille_core::json::to_text(&DetectionFile::of(detection), 0)
+}
+
+impl DetectionFile {
+    fn of(detection: &Detection) -> Self {
+        let Detection { image, width, height, file, grids, tone, ink, reasons, timing_ms } =
+            detection.clone();
+        Self {
+            schema: SCHEMA.to_owned(),
+            image,
+            width,
+            height,
+            file,
+            grids,
+            tone,
+            ink,
+            reasons,
+            timing_ms,
+        }
+    }
+}
+
+/// Whether a text is JSON, but of something else than a detection.
+pub fn is_foreign(text: &str) -> bool {
+    json::schema(text.as_bytes())
+        .is_ok_and(|schema| schema.as_deref().map(json::kind) != Some(json::kind(SCHEMA)))
+}
+
+/// Reads the text of a detection file.
+pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
+    #[derive(Deserialize)]
+    struct Head {
+        schema: String,
+    }
+    let Head { schema } = json::read(text)?;
+    if json::kind(&schema) != json::kind(SCHEMA) {
+        return Err(DetectionFileError::Kind { found: schema });
+    }
+    if schema != SCHEMA {
+        return Err(DetectionFileError::Schema { found: schema });
+    }
+    let DetectionFile { image, width, height, file, grids, tone, ink, reasons, timing_ms, .. } =
+        json::read(text)?;
+    // Corners that are there twice would count twice. A panel may be seen in pieces.
+    let (mut places, mut firsts) = (BTreeSet::new(), BTreeMap::new());
+    for (grid, of_grid) in grids.iter().enumerate() {
+        let corners = serde_json::to_string(&of_grid.corners).map_err(DetectionFileError::Json)?;
+        let first = *firsts.entry(corners).or_insert(grid);
+        if first != grid && !of_grid.corners.is_empty() {
+            return Err(DetectionFileError::Again { grid, first });
+        }
+        // Labels without a panel are those of their grid alone.
+        let labels = of_grid.panel.map_or((None, grid), |panel| (Some(panel), 0));
+        for (corner, found) in of_grid.corners.iter().enumerate() {
+            if let Some(problem) = found.cov.and_then(|cov| check_covariance(cov).err()) {
+                return Err(DetectionFileError::Corner { grid, corner, problem });
+            }
+            if !places.insert((labels, found.row, found.col)) {
+                let problem = "another corner has this row and column already".to_owned();
+                return Err(DetectionFileError::Corner { grid, corner, problem });
+            }
+        }
+    }
+    Ok(Detection { image, width, height, file, grids, tone, ink, reasons, timing_ms })
+}
+
+/// Checks the covariance of a corner.
+fn check_covariance([xx, xy, yy]: [f64; 3]) -> Result<(), String> {
+    for variance in [xx, yy] {
+        let in_range = quantity::variance_px2::RANGE.check(variance);
+        in_range.map_err(|what| format!("`cov`: a variance, {what}"))?;
+    }
+    // So that what is no number is refused too.
+    let usable = xx * yy > xy * xy;
+    usable.then_some(()).ok_or_else(|| "`cov` is no covariance xx, xy, yy".to_owned())
+}

@@ -1,0 +1,130 @@
+//! `.dsc` target descriptions, as the reference detector and its fork read them (FORMATS §5).
+//!
+//! ```text
+//! 0,15,10,20.0                      board id, A, B, edge
+//! delTag25h7,1.5                    family, border in bit-widths
+//! -1,4,0,80,0,0                     tag (−1 = none), column, row, x, y, z: a line per corner
+//! 0,5,1,110,17.32,0
+//! …                                 and so on, board after board
+//! ```
+//!
+//! Two dialects differ in what A and B count, in the names of families and in units:
+//!
+//! | | original | fork |
+//! |---|---|---|
+//! | squares | A × B squares, corners (A−1) × (B−1), all listed | A × B corners |
+//! | triangles | B = 0: a triangular outline of A tiles a side, n(n+1)/2 corners, n = A−2 | a matrix of A columns, B rows; any outline |
+//! | triangular when | B = 0 | the family is a `delTag` |
+//! | families | `t25h7`, … | `delTag25h7`, `aprilTag25h7`, … |
+//!
+//! ```
+//! use deltille_files::export::dsc::{self, Dialect};
+//!
+//! let text = "0,2,2,10\ndelTag16h5,2\n0,0,0,0,0,0\n-1,1,0,10,0,0\n-1,0,1,5,8.66,0\n";
+//! let target = dsc::read(text, "small")?;
+//! assert_eq!(target.panels[0].corners.len(), 3);
+//! assert_eq!(dsc::write(&target, Dialect::Fork)?.lines().nth(2), Some("0,0,0,0,0,0"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The reader takes either dialect, spaces around commas, CRLF, a missing final newline, and
+//! coordinates in the unit of the edge, in cm with the edge in mm, or in m with the edge in cm or
+//! mm; the distance of neighbouring corners tells which.
+//!
+//! Limits: the original dialect has no word for outlines other than the triangle, and neither for
+//! untagged or inverted boards, or tags in white squares. Of square tags this crate has aprilTag16h5,
+//! 25h9 and 36h11; another family has no fingerprint here. The original program reads triangular tags with square code tables, so it
+//! indexes such boards by its own codes only.
+
+mod read;
+mod write;
+
+use std::fmt;
+use std::str::FromStr;
+
+pub use read::{read, read_in_mm};
+pub use write::write;
+
+use deltille_core::lattice::Vertex;
+use deltille_core::targets::{GridKind, ListFormat, ListedSpec, Panel, Target, TargetSpec};
+
+/// Who reads the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Dialect {
+    /// The reference detector.
+    Original,
+    /// Its fork, with real DelTag families.
+    #[default]
+    Fork,
+}
+
+impl Dialect {
+    /// The dialect that a target was read in; that of the fork for all others.
+    pub fn of(target: &Target) -> Self {
+        let original = ListedSpec { format: ListFormat::DscOriginal };
+        if target.spec == TargetSpec::Listed(original) { Dialect::Original } else { Dialect::Fork }
+    }
+}
+
+impl fmt::Display for Dialect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Dialect::Original => "original",
+            Dialect::Fork => "fork",
+        })
+    }
+}
+
+impl FromStr for Dialect {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "original" => Ok(Dialect::Original),
+            "fork" => Ok(Dialect::Fork),
+            _ => Err(format!("`{text}` is neither `fork` nor `original`")),
+        }
+    }
+}
+
+/// Why a `.dsc` cannot be read or written.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DscError {
+    /// A line is not what it should be.
+    #[error("line {line}: {problem}")]
+    Line {
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The boards together make no target.
+    #[error("{0}")]
+    Target(String),
+    /// The dialect cannot say this.
+    #[error("the {dialect} .dsc dialect cannot describe `{name}`: {reason}")]
+    Refused {
+        /// The dialect.
+        dialect: Dialect,
+        /// Name of the target.
+        name: String,
+        /// Why not, and what to do.
+        reason: String,
+    },
+}
+
+/// Family names after the prefix; all programs know these and no others.
+const FAMILIES: [&str; 5] = ["16h5", "25h7", "25h9", "36h9", "36h11"];
+
+/// The number under which a corner goes in `.orpc` files: its place in the matrix of the panel.
+///
+/// Rectangular boards are counted from the top in the original dialect.
+pub fn point_id(panel: &Panel, dialect: Dialect, corner: Vertex) -> i64 {
+    let [cols, rows] = panel.matrix.map(i64::from);
+    let (row, col) = (i64::from(corner.row), i64::from(corner.col));
+    match (panel.kind, dialect) {
+        (GridKind::Checker, Dialect::Original) => (rows - 1 - row) * cols + col,
+        _ => row * cols + col,
+    }
+}

@@ -1,0 +1,80 @@
+use std::fmt::Write;
+
+use super::{Dialect, DscError, FAMILIES};
+use deltille_core::lattice::Vertex;
+use deltille_core::targets::{GridKind, Panel, TagsIn, Target};
+
+/// The text of the `.dsc` of a target; positions are those in the target frame, mm.
+pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
+    let refused = |reason: &str| DscError::Refused {
+        dialect,
+        name: target.name.to_string(),
+        reason: reason.to_owned(),
+    };
+    let name = target.family.as_ref().map(|family| family.name.as_str());
+    let name = name.ok_or_else(|| refused("the format needs tags, and the board has none"))?;
+    let known = FAMILIES.iter().find(|&known| {
+        name.strip_prefix("delTag") == Some(known) || name.strip_prefix("aprilTag") == Some(known)
+    });
+    let known = known.ok_or_else(|| {
+        let names = FAMILIES.map(|f| format!("delTag{f}"));
+        refused(&format!(
+            "its readers have the codes of {} only, not those of {name}: choose one of them with \
+             --family, or leave --dsc out",
+            names.join(", ")
+        ))
+    })?;
+    let family = match dialect {
+        Dialect::Fork => name.to_owned(),
+        Dialect::Original => format!("t{known}"),
+    };
+    let mut text = String::new();
+    for panel in &target.panels {
+        if panel.inverted {
+            return Err(refused("its readers look for black tags, and the board is inverted"));
+        }
+        if panel.tags_in == TagsIn::White {
+            return Err(refused(
+                "its readers look for tags in black squares: take --tags-in black, or leave --dsc out",
+            ));
+        }
+        let [a, b] = header(panel, dialect).map_err(|reason| refused(&reason))?;
+        let border = panel.border_bits.unwrap_or_default();
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{},{a},{b},{}", panel.id, panel.edge_mm);
+        let _ = writeln!(text, "{family},{border}");
+        for corner in &panel.corners {
+            let tag = panel.tags.iter().find(|tag| (tag.row, tag.col) == (corner.row, corner.col));
+            let tag = tag.map_or(-1, |tag| i64::from(tag.id));
+            let [x, y, z] = corner.target_mm;
+            let _ = writeln!(text, "{tag},{},{},{x},{y},{z}", corner.col, corner.row);
+        }
+    }
+    Ok(text)
+}
+
+/// A and B of a panel.
+fn header(panel: &Panel, dialect: Dialect) -> Result<[u32; 2], String> {
+    let [cols, rows] = panel.matrix;
+    match (dialect, panel.kind) {
+        (Dialect::Fork, _) => Ok([cols, rows]),
+        (Dialect::Original, GridKind::Checker) => {
+            let complete = panel.corners.len() as u64 == u64::from(cols) * u64::from(rows);
+            let holes = || "a rectangular board must list every corner".to_owned();
+            complete.then_some([cols + 1, rows + 1]).ok_or_else(holes)
+        }
+        (Dialect::Original, GridKind::Deltille) => {
+            let side = panel.corners.iter().map(|corner| corner.row + 1).max().unwrap_or(0);
+            let triangle =
+                (0..side).flat_map(|row| (0..side - row).map(move |col| Vertex::new(row, col)));
+            let listed = panel.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
+            if triangle.eq(listed) {
+                Ok([side as u32 + 2, 0])
+            } else {
+                let reason = "it knows triangular boards with an equilateral outline only; use \
+                              --dsc-dialect fork";
+                Err(reason.to_owned())
+            }
+        }
+    }
+}

@@ -1,0 +1,81 @@
+use serde::Serialize;
+
+use deltille_core::calibrate::{Finding, PanelRef, Shared};
+
+/// What outliers share, as files have it; `panel` is an id, `camera` a name.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct FindingRecord {
+    kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    panel: Option<PanelRef>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    view: Option<String>,
+    /// Left, top, right, bottom.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    region_px: Option<[f64; 4]>,
+    outliers: usize,
+    corners: usize,
+    left_out: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    off_px: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    moved_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turned_rad: Option<f64>,
+}
+
+/// The records of findings, with the names of a rig's cameras.
+pub(super) fn records(findings: &[Finding], cameras: &[&str]) -> Vec<FindingRecord> {
+    let record = |finding: &Finding| {
+        let name = |camera: usize| cameras.get(camera).map(|name| (*name).to_owned());
+        let counts = FindingRecord {
+            outliers: finding.outliers,
+            corners: finding.corners,
+            left_out: finding.left_out,
+            ..FindingRecord::default()
+        };
+        match &finding.shared {
+            Shared::Beyond { camera, view } => FindingRecord {
+                kind: "outside_picture",
+                camera: name(*camera),
+                view: Some(view.clone()),
+                ..counts
+            },
+            Shared::Panel { panel, moved } => FindingRecord {
+                kind: "panel",
+                panel: Some(*panel),
+                moved_mm: moved.map(|moved| moved.by_mm),
+                turned_rad: moved.map(|moved| moved.turned_rad),
+                ..counts
+            },
+            Shared::PanelInView { panel, camera, view, off_px } => FindingRecord {
+                kind: "panel_in_view",
+                panel: Some(*panel),
+                camera: name(*camera),
+                view: Some(view.clone()),
+                off_px: Some(*off_px),
+                ..counts
+            },
+            Shared::View { camera, view } => FindingRecord {
+                kind: "view",
+                camera: name(*camera),
+                view: Some(view.clone()),
+                ..counts
+            },
+            Shared::Region { camera, from_px: [left, top], to_px: [right, bottom] } => {
+                FindingRecord {
+                    kind: "region",
+                    camera: name(*camera),
+                    region_px: Some([*left, *top, *right, *bottom]),
+                    ..counts
+                }
+            }
+            Shared::Camera { camera } => {
+                FindingRecord { kind: "camera", camera: name(*camera), ..counts }
+            }
+        }
+    };
+    findings.iter().map(record).collect()
+}

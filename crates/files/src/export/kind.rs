@@ -1,0 +1,240 @@
+//! What a file is, by its content: so that none takes the place of one of another kind, or of one
+//! that something else wrote.
+//!
+//! Files with a place for it name what wrote them: the schema of a JSON, the creator of a PDF, the
+//! software of a PNG, the generator of a glTF, the words before the triangles of an STL, and a comment
+//! in the first lines of a text. The others are known by what they begin with, such as the header of a
+//! CSV, or the keys of a JSON.
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
+use std::fmt;
+
+use super::dsc;
+use deltille_core::json;
+
+/// Lines of a text within which its comment is looked for.
+const HEAD_LINES: usize = 3;
+
+/// Bytes of a text within which its first lines are looked for.
+const HEAD: usize = 4096;
+
+/// How a PDF written here names its creator.
+const PDF_CREATOR: &[u8] = b"/Creator(deltille ";
+
+/// What a list of corners for another detector is called here; it has no place for its writer.
+const DSC: &str = "a .dsc";
+
+/// The kind of a file. Two files of one kind have the same format and, where that can be told, the
+/// same writer.
+#[derive(Clone, Debug)]
+pub struct Kind(Is);
+
+#[derive(Clone, Debug)]
+enum Is {
+    /// A JSON with this schema.
+    Schema(String),
+    /// What these words say.
+    Words(String),
+}
+
+impl PartialEq for Kind {
+    /// Versions of a schema are of one kind.
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Is::Schema(one), Is::Schema(other)) => json::kind(one) == json::kind(other),
+            (Is::Words(one), Is::Words(other)) => one == other,
+            _ => false,
+        }
+    }
+}
+
+impl Kind {
+    /// That of a file with this content.
+    pub fn of(content: &[u8]) -> Self {
+        let signed = |format: &str, is_own: bool| {
+            Self::words(if is_own {
+                format!("a {format} of deltille")
+            } else {
+                format!("a {format}")
+            })
+        };
+        if content.starts_with(b"%PDF-") {
+            signed("PDF", contains(content, PDF_CREATOR))
+        } else if content.starts_with(PNG_SIGNATURE) {
+            let Png { software, is_to_scale } = Png::of(content);
+            let is_own = software.is_some_and(|by| by.starts_with(b"deltille "));
+            signed(if is_to_scale && is_own { "PNG to scale" } else { "PNG" }, is_own)
+        } else if content.starts_with(b"glTF") {
+            signed("glTF", contains(glb_json(content), b"\"generator\":\"deltille "))
+        } else if content.starts_with(b"deltille ") && content.get(80..84).is_some() {
+            signed("STL", true)
+        } else {
+            Self::of_json(content).unwrap_or_else(|| Self::of_text(content))
+        }
+    }
+
+    /// That of a JSON with this schema, of whatever version.
+    pub fn of_schema(schema: &str) -> Self {
+        Self(Is::Schema(schema.to_owned()))
+    }
+
+    fn words(words: impl Into<String>) -> Self {
+        Self(Is::Words(words.into()))
+    }
+
+    /// That of the PDF files written here.
+    pub fn own_pdf() -> Self {
+        Self::of(&[b"%PDF-", PDF_CREATOR].concat())
+    }
+
+    /// That of the PNG files written here to be looked at: overlays, renderings, plots.
+    pub fn own_png() -> Self {
+        Self::words("a PNG of deltille")
+    }
+
+    /// That of the PNG files written here to be printed.
+    pub fn own_printed_png() -> Self {
+        Self::words("a PNG to scale of deltille")
+    }
+
+    /// Whether it is known to have been written here.
+    pub fn is_own(&self) -> bool {
+        let (Is::Schema(words) | Is::Words(words)) = &self.0;
+        words.contains("deltille") || words.contains("DelTag") || words == DSC
+    }
+
+    /// The first value is looked at: of JSON by lines there are more.
+    fn of_json(content: &[u8]) -> Option<Self> {
+        #[derive(Deserialize)]
+        struct Head {
+            schema: Option<String>,
+        }
+        let first = || serde_json::Deserializer::from_slice(content);
+        if let Some(schema) = first().into_iter::<Head>().next()?.ok()?.schema {
+            return Some(Self::of_schema(&schema));
+        }
+        let object = first().into_iter::<BTreeMap<String, IgnoredAny>>().next()?.ok()?;
+        let keys: Vec<&str> = object.keys().map(String::as_str).collect();
+        Some(Self::words(match keys.as_slice() {
+            [] => "an empty JSON object".to_owned(),
+            keys => format!("a JSON of {}", keys.join(", ")),
+        }))
+    }
+
+    /// By the first line without its values, and the one that names the writer.
+    fn of_text(content: &[u8]) -> Self {
+        let head = &content[..content.len().min(HEAD)];
+        // The end of the head may be within a character.
+        let whole = match std::str::from_utf8(head) {
+            Err(error) if error.error_len().is_none() => &head[..error.valid_up_to()],
+            _ => head,
+        };
+        let Some(text) = std::str::from_utf8(whole).ok().filter(|text| !text.contains('\0')) else {
+            return Self::words("a binary file");
+        };
+        let first = text.lines().next().unwrap_or_default();
+        if first.starts_with("0x") {
+            return Self::words("a list of codes");
+        }
+        if std::str::from_utf8(content).is_ok_and(|text| dsc::read(text, "board").is_ok()) {
+            return Self::words(DSC);
+        }
+        let marked = text.lines().take(HEAD_LINES).find_map(marked);
+        let words = plain(first);
+        Self::words(match marked.filter(|marked| *marked != words) {
+            Some(marked) => format!("a text that begins `{words}`, by {marked}"),
+            None => format!("a text that begins `{words}`"),
+        })
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let (Is::Schema(words) | Is::Words(words)) = &self.0;
+        f.write_str(words)
+    }
+}
+
+/// What a line says of the writer.
+fn marked(line: &str) -> Option<String> {
+    // The name and numbers of a family follow.
+    let family = line.find("DelTag family").map(|at| line[..at].to_owned() + "DelTag family");
+    family.or_else(|| line.contains("deltille ").then(|| plain(line)))
+}
+
+/// A line up to its first value, without numbers.
+fn plain(line: &str) -> String {
+    let key = line.split([':', '=']).next().unwrap_or_default();
+    let words = key.chars().filter(|c| !c.is_ascii_digit() && *c != '.');
+    words.collect::<String>().trim().to_owned()
+}
+
+/// What every PNG begins with.
+const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// The keyword under which a PNG names what wrote it.
+pub const SOFTWARE: &str = "Software";
+
+/// What the chunks before the pixels of a PNG say.
+#[derive(Default)]
+struct Png<'a> {
+    /// What wrote it.
+    software: Option<&'a [u8]>,
+    /// Whether they state a resolution.
+    is_to_scale: bool,
+}
+
+impl<'a> Png<'a> {
+    fn of(content: &'a [u8]) -> Self {
+        let (mut png, mut rest) = (Self::default(), &content[PNG_SIGNATURE.len()..]);
+        while let Some((name, data, after)) = next_chunk(rest).filter(|(name, ..)| name != b"IDAT")
+        {
+            let words = data.strip_prefix(SOFTWARE.as_bytes());
+            let software = words.and_then(|words| words.strip_prefix(b"\0"));
+            png.software = png.software.or(software.filter(|_| name == b"tEXt"));
+            png.is_to_scale |= name == b"pHYs";
+            rest = after;
+        }
+        png
+    }
+}
+
+/// The name and the data of the first chunk of a PNG, and what follows it.
+fn next_chunk(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
+    let (length, after) = bytes.split_first_chunk::<4>()?;
+    let (name, after) = after.split_at_checked(4)?;
+    let (data, after) = after.split_at_checked(u32::from_be_bytes(*length) as usize)?;
+    Some((name, data, after.get(4..)?))
+}
+
+/// A PNG with the name of its writer, which goes before all but the head.
+pub fn signed_png(mut png: Vec<u8>) -> Vec<u8> {
+    const HEAD_END: usize = 33;
+    let mut chunk = b"tEXt".to_vec();
+    chunk.extend(SOFTWARE.bytes());
+    chunk.push(0);
+    chunk.extend(super::GENERATOR.bytes());
+    let mut sum = flate2::Crc::new();
+    sum.update(&chunk);
+    let length = (chunk.len() as u32 - 4).to_be_bytes();
+    let chunk = [&length[..], &chunk, &sum.sum().to_be_bytes()].concat();
+    if png.len() >= HEAD_END {
+        png.splice(HEAD_END..HEAD_END, chunk);
+    }
+    png
+}
+
+/// The JSON of a binary glTF: after header, length and type, 20 bytes in all.
+fn glb_json(content: &[u8]) -> &[u8] {
+    let length = content.get(12..16).and_then(|bytes| bytes.first_chunk::<4>());
+    let length = length.map_or(0, |bytes| u32::from_le_bytes(*bytes) as usize);
+    let json = content.get(20..).unwrap_or_default();
+    &json[..length.min(json.len())]
+}
+
+/// Whether some bytes are within others.
+fn contains(content: &[u8], wanted: &[u8]) -> bool {
+    content.windows(wanted.len()).any(|window| window == wanted)
+}

@@ -1,0 +1,107 @@
+//! Wavefront OBJ with its material and texture, in millimetres; closed meshes from OBJ.
+
+use std::fmt::Write;
+
+use glam::DVec3;
+
+use super::GENERATOR;
+use super::mesh::TexturedMesh;
+use crate::limits;
+use deltille_core::targets::{ClosedMesh, ClosedMeshError, is_coordinate};
+
+/// Why an OBJ is not taken for a solid.
+#[derive(Debug, thiserror::Error)]
+pub enum ObjError {
+    /// Not an OBJ.
+    #[error("not a readable OBJ: {0}")]
+    Grammar(#[from] tobj::LoadError),
+    /// Its reader fails within.
+    #[error(transparent)]
+    Broken(#[from] limits::Broken),
+    /// A face of more than three corners.
+    #[error("face {face} has {corners} corners: triangles are needed")]
+    NotTriangle {
+        /// The face, counted from 1.
+        face: usize,
+        /// Its corners.
+        corners: u32,
+    },
+    /// Not a closed solid.
+    #[error(transparent)]
+    Mesh(#[from] ClosedMeshError),
+}
+
+/// Reads the triangles of all objects and groups of an OBJ as one solid; lines, points, materials
+/// and texture coordinates do not matter. The second value says whether it was inside out.
+pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
+    let options =
+        tobj::LoadOptions { ignore_lines: true, ignore_points: true, ..Default::default() };
+    let no_materials = |_: &std::path::Path| Ok(Default::default());
+    let load = || tobj::load_obj_buf(&mut &text[..], &options, no_materials);
+    let (models, _) = limits::caught(load)??;
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for mesh in models.iter().map(|model| &model.mesh) {
+        let corners = mesh.face_arities.iter().position(|&n| n != 3);
+        if let Some(face) = corners {
+            let (corners, face) = (mesh.face_arities[face], faces.len() + face + 1);
+            return Err(ObjError::NotTriangle { face, corners });
+        }
+        let first = vertices.len();
+        vertices.extend(mesh.positions.as_chunks::<3>().0.iter().copied().map(DVec3::from));
+        let indices = mesh.indices.as_chunks::<3>().0;
+        faces.extend(indices.iter().map(|face| face.map(|index| first + index as usize)));
+    }
+    ClosedMesh::new(&vertices, &faces).map_err(|error| match error {
+        // The reader numbers vertices as faces name them, the user as the file lists them.
+        ClosedMeshError::NotFinite(used) => {
+            ClosedMeshError::NotFinite(first_not_finite(text).unwrap_or(used)).into()
+        }
+        other => other.into(),
+    })
+}
+
+/// Number of the first `v` line with a number that is no coordinate.
+fn first_not_finite(text: &[u8]) -> Option<usize> {
+    let text = String::from_utf8_lossy(text);
+    let finite = |word: &str| word.parse().is_ok_and(is_coordinate);
+    let mut lines = text.lines().filter_map(|line| line.trim_start().strip_prefix("v "));
+    lines.position(|line| !line.split_whitespace().all(finite)).map(|index| index + 1)
+}
+
+/// The text of `<name>.obj`; it names `<name>.mtl`.
+pub fn text(mesh: &TexturedMesh) -> String {
+    let name = &mesh.name;
+    let generator = mesh.extras["generator"].as_str().unwrap_or("deltille");
+    let mut text = format!("# {generator}, millimetres\n# {}\n", mesh.extras);
+    // Writing to a string does not fail.
+    let _ = writeln!(text, "mtllib {name}.mtl\no {name}");
+    for face in &mesh.faces {
+        for v in face.vertices_mm {
+            let _ = writeln!(text, "v {:.6} {:.6} {:.6}", v.x, v.y, v.z);
+        }
+        for [u, v] in face.uv {
+            let _ = writeln!(text, "vt {u:.9} {:.9}", 1.0 - v);
+        }
+        let n = face.normal;
+        let _ = writeln!(text, "vn {:.9} {:.9} {:.9}", n.x, n.y, n.z);
+    }
+    let _ = writeln!(text, "usemtl print");
+    for index in 0..mesh.faces.len() {
+        let corner = |i: usize| format!("{0}/{0}/{1}", 3 * index + i + 1, index + 1);
+        let _ = writeln!(text, "f {} {} {}", corner(0), corner(1), corner(2));
+    }
+    text
+}
+
+/// The text of `<name>.mtl`; it names the texture `<name>-texture.png`.
+pub fn material(mesh: &TexturedMesh) -> String {
+    let texture = texture_name(&mesh.name);
+    format!(
+        "# {GENERATOR}, material\nnewmtl print\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {texture}\n"
+    )
+}
+
+/// File name of the texture.
+pub fn texture_name(name: &str) -> String {
+    format!("{name}-texture.png")
+}

@@ -1,0 +1,195 @@
+//! A picture of what was detected, drawn over the photograph.
+//!
+//! Grid edges as lines, corners as rings around the unmarked point, corner ids (or, on a grid that
+//! is not labelled, row and column) beside them, tag ids in their tiles. Every grid has its colour.
+//! Line widths and text follow the size of the tiles, and a small photograph is enlarged, so that
+//! all of it can be read.
+
+use tiny_skia::{
+    Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, PixmapPaint, Stroke,
+    Transform,
+};
+
+use super::kind::signed_png;
+use deltille_core::artwork::text;
+use deltille_core::detect::{Detection, Grid};
+use deltille_core::lattice::Vertex;
+use deltille_core::raster::{AnyGray, Gray, Intensity};
+use deltille_core::targets::GridKind;
+
+/// Colours of successive grids: far apart in hue, bright enough on black.
+const COLOURS: [[u8; 3]; 6] =
+    [[255, 80, 60], [60, 170, 255], [80, 220, 80], [255, 180, 0], [230, 90, 255], [0, 220, 210]];
+
+/// A tile edge is at least this long in the picture, px, where enlarging allows: so that ids of
+/// three digits stay legible beside their corners.
+const READABLE_EDGE_PX: f64 = 52.0;
+/// Photographs are enlarged at most so many times, and only to this many pixels a side.
+const MOST_ENLARGED: u32 = 8;
+const LARGEST_SIDE_PX: u32 = 4096;
+/// Text height, line width and ring radius in tile edges.
+const TEXT_EDGES: f64 = 0.17;
+const TAG_TEXT_EDGES: f64 = 0.3;
+const LINE_EDGES: f64 = 0.03;
+const RING_EDGES: f64 = 0.09;
+
+/// A picture that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum OverlayError {
+    /// More pixels than there is memory.
+    #[error("an image of {0} × {1} pixels is too large to draw on")]
+    TooLarge(u32, u32),
+    /// The PNG encoder failed.
+    #[error("the picture cannot be encoded: {0}")]
+    Encode(String),
+}
+
+/// The PNG file of a photograph with its detection drawn over it.
+pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayError> {
+    let scale = enlargement(image.width() as u32, image.height() as u32, detection);
+    let mut canvas = match image {
+        AnyGray::U8(image) => background(image, scale)?,
+        AnyGray::U16(image) => background(image, scale)?,
+    };
+    for (index, grid) in detection.grids.iter().enumerate() {
+        let [r, g, b] = COLOURS[index % COLOURS.len()];
+        draw_grid(&mut canvas, grid, Color::from_rgba8(r, g, b, 255), f64::from(scale));
+    }
+    let png = canvas.encode_png().map_err(|error| OverlayError::Encode(error.to_string()))?;
+    Ok(signed_png(png))
+}
+
+/// How many times the photograph is enlarged.
+fn enlargement(width: u32, height: u32, detection: &Detection) -> u32 {
+    let edges = detection.grids.iter().filter_map(Grid::edge_px);
+    let shortest = edges.fold(READABLE_EDGE_PX, f64::min);
+    let wanted = (READABLE_EDGE_PX / shortest.max(1.0)).ceil() as u32;
+    let possible = (LARGEST_SIDE_PX / width.max(height).max(1)).max(1);
+    wanted.clamp(1, possible.min(MOST_ENLARGED))
+}
+
+fn background<T: Intensity>(image: &Gray<T>, scale: u32) -> Result<Pixmap, OverlayError> {
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    let too_large = || OverlayError::TooLarge(width, height);
+    let mut canvas = Pixmap::new(width, height).ok_or_else(too_large)?;
+    for (pixel, value) in canvas.pixels_mut().iter_mut().zip(image.pixels()) {
+        let grey = (value.to_f32() / T::FULL_SCALE * 255.0).round() as u8;
+        *pixel = tiny_skia::ColorU8::from_rgba(grey, grey, grey, 255).premultiply();
+    }
+    if scale == 1 {
+        return Ok(canvas);
+    }
+    let mut large = Pixmap::new(width * scale, height * scale).ok_or_else(too_large)?;
+    let enlarge = Transform::from_scale(scale as f32, scale as f32);
+    large.draw_pixmap(0, 0, canvas.as_ref(), &PixmapPaint::default(), enlarge, None);
+    Ok(large)
+}
+
+/// The steps along which corners of a tiling are joined, each edge once.
+fn steps(kind: GridKind) -> &'static [Vertex] {
+    const STEPS: [Vertex; 3] = [Vertex::new(0, 1), Vertex::new(1, 0), Vertex::new(1, -1)];
+    match kind {
+        GridKind::Deltille => &STEPS,
+        GridKind::Checker => &STEPS[..2],
+    }
+}
+
+/// Image positions of both ends of every edge between two corners, px.
+fn edges(grid: &Grid) -> Vec<[[f64; 2]; 2]> {
+    let at: std::collections::BTreeMap<Vertex, [f64; 2]> =
+        grid.corners.iter().map(|c| (Vertex::new(c.row, c.col), [c.x, c.y])).collect();
+    let joined = |(&from, &p): (&Vertex, &[f64; 2])| {
+        let ends = steps(grid.kind).iter().filter_map(|&step| at.get(&(from + step)));
+        ends.map(|&q| [p, q]).collect::<Vec<_>>()
+    };
+    at.iter().flat_map(joined).collect()
+}
+
+fn draw_grid(canvas: &mut Pixmap, grid: &Grid, colour: Color, scale: f64) {
+    let Some(edge) = grid.edge_px().map(|px| px * scale) else { return };
+    // Pixel centres are at integers here, at halves in tiny-skia.
+    let at = |[x, y]: [f64; 2]| [(x + 0.5) * scale, (y + 0.5) * scale];
+    let line = (LINE_EDGES * edge).clamp(1.0, 12.0);
+    let mut lines = PathBuilder::new();
+    for [p, q] in edges(grid).into_iter().map(|ends| ends.map(at)) {
+        lines.move_to(p[0] as f32, p[1] as f32);
+        lines.line_to(q[0] as f32, q[1] as f32);
+    }
+    let mut rings = PathBuilder::new();
+    for corner in &grid.corners {
+        let [x, y] = at([corner.x, corner.y]);
+        rings.push_circle(x as f32, y as f32, (RING_EDGES * edge).max(2.5) as f32);
+    }
+    let mut faint = colour;
+    faint.set_alpha(0.7);
+    stroke(canvas, lines.finish(), faint, line);
+    stroke(canvas, rings.finish(), colour, line);
+
+    let place: std::collections::BTreeMap<Vertex, [f64; 2]> =
+        grid.corners.iter().map(|c| (Vertex::new(c.row, c.col), at([c.x, c.y]))).collect();
+    for corner in &grid.corners {
+        let [x, y] = at([corner.x, corner.y]);
+        let words = match corner.id {
+            Some(id) => id.to_string(),
+            None => format!("{},{}", corner.row, corner.col),
+        };
+        let offset = 1.4 * RING_EDGES * edge;
+        write(canvas, &words, [x + offset, y - offset], TEXT_EDGES * edge, false, Color::WHITE);
+    }
+    for tag in &grid.tags {
+        let anchor = Vertex::new(tag.row, tag.col);
+        let tile = grid.kind.tag_tile(anchor).vertices();
+        let ends: Option<Vec<[f64; 2]>> = tile.map(|v| place.get(&v).copied()).collect();
+        if let Some(ends) = ends {
+            let centre = [0, 1].map(|i| ends.iter().map(|p| p[i]).sum::<f64>() / ends.len() as f64);
+            write(canvas, &tag.id.to_string(), centre, TAG_TEXT_EDGES * edge, true, colour);
+        }
+    }
+}
+
+fn solid(colour: Color) -> Paint<'static> {
+    let mut paint = Paint::default();
+    paint.set_color(colour);
+    paint.anti_alias = true;
+    paint
+}
+
+fn stroke(canvas: &mut Pixmap, path: Option<Path>, colour: Color, width: f64) {
+    let Some(path) = path else { return };
+    let stroke = Stroke {
+        width: width as f32,
+        line_cap: LineCap::Round,
+        line_join: LineJoin::Round,
+        ..Stroke::default()
+    };
+    canvas.stroke_path(&path, &solid(colour), &stroke, Transform::identity(), None);
+}
+
+/// Writes text with a dark rim, so that it can be read on black, white and grey alike: from the
+/// lower left, or centred.
+fn write(canvas: &mut Pixmap, words: &str, at: [f64; 2], size: f64, centred: bool, colour: Color) {
+    let size = size.clamp(7.0, 160.0);
+    // Digits, commas and minus signs, which the font has.
+    let Ok((outline, width)) = text::outline(words, size) else { return };
+    let [mut x, mut y] = at;
+    if centred {
+        x -= width / 2.0;
+        y += 0.36 * size;
+    }
+    let mut path = PathBuilder::new();
+    for element in outline.elements() {
+        let p = |point: kurbo::Point| ((x + point.x) as f32, (y - point.y) as f32);
+        match *element {
+            kurbo::PathEl::MoveTo(a) => path.move_to(p(a).0, p(a).1),
+            kurbo::PathEl::LineTo(a) => path.line_to(p(a).0, p(a).1),
+            kurbo::PathEl::QuadTo(a, b) => path.quad_to(p(a).0, p(a).1, p(b).0, p(b).1),
+            kurbo::PathEl::CurveTo(a, b, c) => {
+                path.cubic_to(p(a).0, p(a).1, p(b).0, p(b).1, p(c).0, p(c).1);
+            }
+            kurbo::PathEl::ClosePath => path.close(),
+        }
+    }
+    let Some(path) = path.finish() else { return };
+    stroke(canvas, Some(path.clone()), Color::from_rgba8(0, 0, 0, 200), 0.25 * size);
+    canvas.fill_path(&path, &solid(colour), FillRule::Winding, Transform::identity(), None);
+}

@@ -1,0 +1,160 @@
+//! PDF: all sheets in one file, a page each.
+//!
+//! Black is pure K. The page boxes are the page's size in points, and viewers are asked to print
+//! without scaling. The same artwork gives the same bytes: no dates, and the file's identifier is
+//! a digest of its content.
+
+use std::path::Path;
+
+use kurbo::{BezPath, PathEl, Point};
+use lopdf::content::{Content, Operation};
+use lopdf::xref::XrefType;
+use lopdf::{Dictionary, Document, Object, Stream, StringFormat, dictionary};
+use sha2::{Digest, Sha256};
+
+use super::{ExportError, GENERATOR, atomic};
+use deltille_core::artwork::{Artwork, Paint, Sheet};
+
+/// Version of the format.
+pub const VERSION: &str = "1.6";
+
+/// Points per millimetre.
+const PT_PER_MM: f64 = 72.0 / 25.4;
+
+/// Longest side of a page that readers must accept, mm: 14400 points.
+const MAX_PAGE_MM: f64 = 5080.0;
+
+/// Writes all sheets as one PDF.
+pub fn write(artwork: &Artwork, path: &Path) -> Result<(), ExportError> {
+    let long = |sheet: &&Sheet| sheet.width_mm.max(sheet.height_mm) > MAX_PAGE_MM;
+    if let Some(sheet) = artwork.sheets.iter().find(long) {
+        return Err(ExportError::TooLarge {
+            path: path.to_owned(),
+            width_mm: sheet.width_mm,
+            height_mm: sheet.height_mm,
+            limit: format!("PDF allows {MAX_PAGE_MM} mm: choose smaller paper"),
+        });
+    }
+    let bytes = to_bytes(artwork);
+    Ok(atomic::write(path, |file| file.write_all(&bytes))?)
+}
+
+/// All sheets as one PDF.
+pub fn to_bytes(artwork: &Artwork) -> Vec<u8> {
+    let mut document = document(artwork);
+    document.compress();
+    let identifier = identifier(&mut document);
+    document.trailer.set("ID", identifier);
+    saved(&mut document)
+}
+
+/// The document without its identifier: objects in the order in which they are numbered.
+fn document(artwork: &Artwork) -> Document {
+    let mut document = Document::with_version(VERSION);
+    document.reference_table.cross_reference_type = XrefType::CrossReferenceTable;
+    let pages = document.new_object_id();
+    let [font, xobject, state, shading] = [(); 4].map(|()| document.add_object(Dictionary::new()));
+    let kids: Vec<_> = artwork.sheets.iter().map(|_| document.new_object_id()).collect();
+    for (sheet, &kid) in artwork.sheets.iter().zip(&kids) {
+        let resources = document.add_object(dictionary! {
+            "Font" => font, "XObject" => xobject, "ExtGState" => state, "Shading" => shading,
+        });
+        let content = Content { operations: operations(sheet) }.encode();
+        let content = content.expect("writing to memory does not fail");
+        let content = document.add_object(Stream::new(Dictionary::new(), content));
+        let size = vec![0f32.into(), 0f32.into(), pt(sheet.width_mm), pt(sheet.height_mm)];
+        let page = dictionary! {
+            "Type" => "Page", "MediaBox" => size.clone(), "TrimBox" => size.clone(), "CropBox" => size,
+            "Parent" => pages, "Resources" => resources, "Contents" => content,
+            "Annots" => Vec::<Object>::new(),
+        };
+        document.set_object(kid, page);
+    }
+    let count = kids.len() as i64;
+    let kids: Vec<Object> = kids.into_iter().map(Object::from).collect();
+    document.set_object(pages, dictionary! { "Type" => "Pages", "Count" => count, "Kids" => kids });
+    let catalog = document.add_object(dictionary! {
+        "Type" => "Catalog", "PageLayout" => "SinglePage", "PageMode" => "UseNone", "Pages" => pages,
+        "ViewerPreferences" => dictionary! { "PrintScaling" => "None" },
+    });
+    let info = document.add_object(dictionary! {
+        "Title" => lopdf::text_string(&artwork.title),
+        "Subject" => lopdf::text_string(&artwork.subject),
+        "Creator" => lopdf::text_string(GENERATOR),
+    });
+    document.trailer.set("Root", catalog);
+    document.trailer.set("Info", info);
+    document
+}
+
+/// A digest of the content in place of a random identifier, so that the same artwork is the same file.
+fn identifier(document: &mut Document) -> Vec<Object> {
+    let digest = Sha256::digest(saved(document))[..16].to_vec();
+    vec![Object::String(digest, StringFormat::Hexadecimal); 2]
+}
+
+fn saved(document: &mut Document) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    document.save_to(&mut bytes).expect("writing to memory does not fail");
+    bytes
+}
+
+/// What draws a sheet, all in black.
+fn operations(sheet: &Sheet) -> Vec<Operation> {
+    let black: Vec<Object> = [0f32, 0.0, 0.0, 1.0].map(Object::from).to_vec();
+    let mut operations = vec![Operation::new("k", black.clone()), Operation::new("K", black)];
+    for shape in &sheet.shapes {
+        match shape.paint {
+            Paint::Fill => {
+                operations
+                    .extend(contours(&shape.path).into_iter().flat_map(|contour| contour.drawn));
+                operations.extend([Operation::new("h", vec![]), Operation::new("f*", vec![])]);
+            }
+            Paint::Stroke { width_mm } => {
+                operations.push(Operation::new("w", vec![pt(width_mm)]));
+                for Contour { drawn, is_closed } in contours(&shape.path) {
+                    operations.extend(drawn);
+                    operations.extend(is_closed.then(|| Operation::new("h", vec![])));
+                    operations.push(Operation::new("S", vec![]));
+                }
+            }
+        }
+    }
+    operations
+}
+
+/// One piece of a path.
+struct Contour {
+    drawn: Vec<Operation>,
+    is_closed: bool,
+}
+
+/// The contours of a path; PDF knows cubic curves only.
+fn contours(path: &BezPath) -> Vec<Contour> {
+    let mut contours = Vec::<Contour>::new();
+    let mut at = Point::ZERO;
+    for element in path.elements() {
+        let (operator, points): (&str, &[Point]) = match *element {
+            PathEl::MoveTo(p) => {
+                contours.push(Contour { drawn: Vec::new(), is_closed: false });
+                ("m", &[p])
+            }
+            PathEl::LineTo(p) => ("l", &[p]),
+            PathEl::QuadTo(c, p) => ("c", &[at.lerp(c, 2.0 / 3.0), p.lerp(c, 2.0 / 3.0), p]),
+            PathEl::CurveTo(a, b, p) => ("c", &[a, b, p]),
+            PathEl::ClosePath => {
+                contours.last_mut().expect("a path starts with a move").is_closed = true;
+                continue;
+            }
+        };
+        let operands = points.iter().flat_map(|p| [pt(p.x), pt(p.y)]).collect();
+        let contour = contours.last_mut().expect("a path starts with a move");
+        contour.drawn.push(Operation::new(operator, operands));
+        at = points.last().copied().unwrap_or(at);
+    }
+    contours
+}
+
+fn pt(mm: f64) -> Object {
+    Object::Real((mm * PT_PER_MM) as f32)
+}

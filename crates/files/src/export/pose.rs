@@ -1,0 +1,36 @@
+//! Poses of a target in single images, schema `deltille/pose/1`, a line each.
+
+use serde::Serialize;
+
+use super::motion::Motion;
+use deltille_core::calibrate::ViewSolution;
+
+/// Schema and version that this crate writes.
+pub const SCHEMA: &str = "deltille/pose/1";
+
+#[derive(Serialize)]
+struct PoseLine<'a> {
+    schema: &'static str,
+    view: &'a str,
+    image: &'a str,
+    target: &'a str,
+    corners: usize,
+    outliers: usize,
+    rms_px: f64,
+    camera_from_target: Motion,
+}
+
+/// The line of a view, without its end.
+pub fn write_line(view: &ViewSolution, target: &str) -> String {
+    let line = PoseLine {
+        schema: SCHEMA,
+        view: &view.name,
+        image: &view.image,
+        target,
+        corners: view.corners.len(),
+        outliers: view.outlier_count(),
+        rms_px: view.rms_px,
+        camera_from_target: Motion::new(&view.pose, Some(view.pose_sd)),
+    };
+    serde_json::to_string(&line).expect("plain data has a JSON form")
+}

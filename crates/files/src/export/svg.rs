@@ -1,0 +1,98 @@
+//! SVG: one file per sheet, user units are millimetres.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use ::svg::Document;
+use ::svg::node::element::{Description, Group, Path as PathElement, Rectangle, Title};
+use kurbo::{Affine, BezPath, PathEl, Point};
+
+use super::{ExportError, atomic};
+use deltille_core::artwork::{Artwork, Paint, Part, Shape};
+
+/// Decimals of a coordinate: a tenth of a micrometre.
+const DECIMALS: usize = 4;
+
+/// What a file begins with.
+pub const HEAD: &str = concat!(
+    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- deltille ",
+    env!("CARGO_PKG_VERSION"),
+    " -->\n"
+);
+
+/// Writes one sheet (counted from 0) as SVG.
+pub fn write(artwork: &Artwork, sheet: usize, path: &Path) -> Result<(), ExportError> {
+    let text = to_string(artwork, sheet);
+    Ok(atomic::write(path, |file| file.write_all(text.as_bytes()))?)
+}
+
+/// One sheet as SVG: a path per shape, named after what it is.
+pub fn to_string(artwork: &Artwork, sheet: usize) -> String {
+    let sheet = &artwork.sheets[sheet];
+    let (width, height) = (number(sheet.width_mm), number(sheet.height_mm));
+    let svg_from_page = Affine::new([1.0, 0.0, 0.0, -1.0, 0.0, sheet.height_mm]);
+    let marks = sheet
+        .shapes
+        .iter()
+        .fold(Group::new().set("fill", "#000").set("fill-rule", "evenodd"), |group, shape| {
+            group.add(element(shape, svg_from_page))
+        });
+    // Without it the page is transparent, and black on a dark viewer's background.
+    let paper = Rectangle::new().set("width", "100%").set("height", "100%").set("fill", "#fff");
+    let document = Document::new()
+        .set("width", format!("{width}mm"))
+        .set("height", format!("{height}mm"))
+        .set("viewBox", format!("0 0 {width} {height}"))
+        .add(Title::new(&artwork.title))
+        .add(Description::new().add(::svg::node::Text::new(&artwork.subject)))
+        .add(paper)
+        .add(marks);
+    format!("{HEAD}{document}\n")
+}
+
+fn element(shape: &Shape, svg_from_page: Affine) -> PathElement {
+    let path = PathElement::new()
+        .set("id", name(shape.part))
+        .set("d", data(&(svg_from_page * &shape.path)));
+    match shape.paint {
+        Paint::Fill => path,
+        Paint::Stroke { width_mm } => {
+            path.set("fill", "none").set("stroke", "#000").set("stroke-width", number(width_mm))
+        }
+    }
+}
+
+fn name(part: Part) -> String {
+    match part {
+        Part::Tile { panel, row, col } => format!("tile-{panel}-r{row}-c{col}"),
+        Part::Field { panel } => format!("field-{panel}"),
+        Part::CheckBar { index } => format!("check-bar-{index}"),
+        Part::Line { kind, index } => format!("{}-{index}", kind.name()),
+        Part::Label { index } => format!("label-{index}"),
+    }
+}
+
+fn data(path: &BezPath) -> String {
+    let mut data = String::new();
+    let p = |p: Point| format!("{} {}", number(p.x), number(p.y));
+    for element in path.elements() {
+        // Writing to a string does not fail.
+        let _ = match *element {
+            PathEl::MoveTo(to) => write!(data, "M{}", p(to)),
+            PathEl::LineTo(to) => write!(data, "L{}", p(to)),
+            PathEl::QuadTo(c, to) => write!(data, "Q{} {}", p(c), p(to)),
+            PathEl::CurveTo(a, b, to) => write!(data, "C{} {} {}", p(a), p(b), p(to)),
+            PathEl::ClosePath => write!(data, "Z"),
+        };
+    }
+    data
+}
+
+/// A number without trailing zeros.
+fn number(value: f64) -> String {
+    let fixed = format!("{value:.DECIMALS$}");
+    match fixed.trim_end_matches('0').trim_end_matches('.') {
+        "-0" => "0".to_owned(),
+        short => short.to_owned(),
+    }
+}

@@ -1,0 +1,62 @@
+//! Families from files.
+
+use std::path::{Path, PathBuf};
+
+use deltille_core::family::{Family, FamilyError};
+
+use crate::limits::{self, MAX_FAMILY_BYTES, ReadError};
+
+/// A family that is not there, or whose file is not read.
+#[derive(Debug, thiserror::Error)]
+pub enum FamilyFileError {
+    /// No shipped family has this name.
+    #[error(transparent)]
+    Name(FamilyError),
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(ReadError),
+    /// The file is not even text.
+    #[error("{}: not a family file (it is not UTF-8 text); name a .json family file", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Something is wrong inside the file.
+    #[error("{}: {error}", path.display())]
+    In {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        error: FamilyError,
+    },
+}
+
+impl FamilyFileError {
+    /// Whether a file was read whole, and what it claims does not hold.
+    pub fn is_broken_claim(&self) -> bool {
+        matches!(self, Self::In { error, .. } if error.is_broken_claim())
+    }
+}
+
+/// A shipped family by its name, or a family file by its path.
+pub fn resolve(name_or_path: &str) -> Result<Family, FamilyFileError> {
+    match Family::shipped(name_or_path) {
+        Err(FamilyError::Unknown { name }) => {
+            let path = Path::new(name_or_path);
+            if path.extension().is_some_and(|e| e == "json") || path.exists() {
+                return read(path);
+            }
+            Err(FamilyFileError::Name(FamilyError::Unknown { name }))
+        }
+        shipped => shipped.map_err(FamilyFileError::Name),
+    }
+}
+
+/// Reads a family file.
+pub fn read(path: &Path) -> Result<Family, FamilyFileError> {
+    let json = match limits::read_short_text(path, MAX_FAMILY_BYTES) {
+        Err(ReadError::NotText { path }) => return Err(FamilyFileError::NotText { path }),
+        json => json.map_err(FamilyFileError::Read)?,
+    };
+    Family::from_json(&json).map_err(|error| FamilyFileError::In { path: path.to_owned(), error })
+}

@@ -1,0 +1,447 @@
+//! Reading photographs of any common format as grey images.
+//!
+//! What a file says beside its pixels does not change them:
+//!
+//! - pixels stay where the sensor had them, whatever orientation EXIF asks a viewer for, as they do for COLMAP and for
+//!   OpenCV with `IMREAD_IGNORE_ORIENTATION`; the orientation is noted;
+//! - colour profiles and gamma chunks are not applied: corners come with an estimate of the tone curve of their own;
+//! - of a TIFF there must be one page, thumbnails (reduced images) aside, and of an animation the first picture is taken;
+//! - a JPEG that holds fewer pixels than it says, or more, is damaged, and not read unless that is asked for; all other
+//!   formats are read whole or not at all. Neither JPEG nor WebP has check sums: of changed bytes nothing tells that make
+//!   as many pixels, nor of those of a WebP that make more.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
+use std::path::{Path, PathBuf};
+
+use image::ImageError::Decoding;
+use image::error::DecodingError;
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
+use tiff::tags::Tag;
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::errors::DecodeErrors;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+use crate::limits::{self, Exceeded, Limits};
+use deltille_core::raster::{AnyGray, FileNotes, Gray};
+
+/// What a PNG may hold beside its pixels, unpacked: profiles and words.
+const MAX_BESIDE_BYTES: u64 = 32 << 20;
+
+/// Pages of a TIFF that are counted.
+const MAX_PAGES: usize = 1000;
+
+/// Bytes from which a format is told.
+const HEAD_BYTES: u64 = 64;
+
+/// What strict readers of JPEG refuse although no pixel depends on it.
+const PADDING: &str = "Extra bytes between headers";
+
+/// The marker that ends a JPEG.
+const END_OF_IMAGE: &[u8] = &[0xFF, 0xD9];
+
+/// Bytes of noise: more than any block of pixels has.
+const NOISE_BYTES: u32 = 1000;
+
+/// What makes noise, whose first bits differ.
+const NOISES: [u32; 3] = [0x9E37_79B9, 0x45EB_CA6B, 0xF1BB_CDCB];
+
+/// The last bytes of a picture cannot be replaced by noise, as many as these, without that it shows: the last byte alone
+/// may hold but a bit of it, and some noise may say the same.
+const SURPLUS_BYTES: usize = 3;
+
+/// A photograph, and what its file says beside its pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Photograph {
+    /// The pixels, where the sensor had them.
+    pub image: AnyGray,
+    /// What else there is to say.
+    pub notes: FileNotes,
+}
+
+/// An image file that cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file cannot be opened.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is not an image that can be decoded.
+    #[error(
+        "{}: not a readable PNG, JPEG, TIFF, BMP, PGM or WebP image ({source})",
+        path.display()
+    )]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: image::ImageError,
+    },
+    /// The image is larger than what is read.
+    #[error("{}: {exceeded}", path.display())]
+    Exceeded {
+        /// The file.
+        path: PathBuf,
+        /// The limit.
+        exceeded: Exceeded,
+    },
+    /// Not all pixels are in the file.
+    #[error("{}: a damaged JPEG ({problem}): take it anew, or give --accept-damaged", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The file holds several pictures.
+    #[error("{}: {pages} pages in one TIFF: save each as a file of its own", path.display())]
+    Pages {
+        /// The file.
+        path: PathBuf,
+        /// How many there are.
+        pages: usize,
+    },
+    /// Its pixels are deep, so that they take more memory than those of a larger image may.
+    #[error(
+        "{}: takes more than {bytes} bytes of memory; --max-pixels sets how many, 4 for each",
+        path.display()
+    )]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// How many it may take.
+        bytes: u64,
+    },
+    /// The decoder fails within.
+    #[error("{}: {source}", path.display())]
+    Broken {
+        /// The file.
+        path: PathBuf,
+        /// How.
+        source: limits::Broken,
+    },
+}
+
+/// Reads a PNG, JPEG, TIFF, BMP, PGM/PPM or WebP file; colour becomes luma (Rec. 709 weights),
+/// transparency is ignored, depth beyond 8 bits is kept as 16 bits.
+///
+/// The format is told from the content, not from the name.
+pub fn read(path: &Path) -> Result<AnyGray, ImageError> {
+    read_within(path, &Limits::default())
+}
+
+/// The same within other limits than the default.
+pub fn read_within(path: &Path, limits: &Limits) -> Result<AnyGray, ImageError> {
+    Ok(read_with_notes(path, limits, false)?.image)
+}
+
+/// Reads a photograph with what its file says of it. A damaged JPEG is refused unless it is accepted; the pixels that
+/// it does not have are grey then.
+pub fn read_with_notes(
+    path: &Path,
+    limits: &Limits,
+    accept_damaged: bool,
+) -> Result<Photograph, ImageError> {
+    let broken = |source| ImageError::Broken { path: path.to_owned(), source };
+    limits::caught(|| {
+        let decode = |source| ImageError::Decode { path: path.to_owned(), source };
+        let file = ImageFile::open(path, limits)?;
+        file.check_pages()?;
+        let mut decoder = file.decoder(limits)?;
+        let orientation = decoder.orientation().map_or(1, Orientation::to_exif);
+        let (image, damage) = match file.jpeg() {
+            Ok(Some(image)) => (image, None),
+            Ok(None) => (DynamicImage::from_decoder(decoder).map_err(decode)?, None),
+            Err(problem) if !accept_damaged => {
+                return Err(ImageError::Damaged { path: path.to_owned(), problem });
+            }
+            Err(problem) => (DynamicImage::from_decoder(decoder).map_err(decode)?, Some(problem)),
+        };
+        let exif_orientation = (orientation != 1).then_some(orientation);
+        let notes = FileNotes { exif_orientation, damage };
+        Ok(Photograph { image: from_dynamic(image), notes })
+    })
+    .map_err(broken)?
+}
+
+/// How many pixels an image has by its head, as far as that can be told without using up a pipe.
+pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
+    limits::check_file(path).ok()?;
+    let dimensions =
+        || Some(ImageFile::open(path, limits).ok()?.decoder(limits).ok()?.dimensions());
+    let (width, height) = limits::caught(dimensions).ok()??;
+    Some(u64::from(width) * u64::from(height))
+}
+
+/// Where decoders read.
+trait Source: BufRead + Seek {}
+
+impl<T: BufRead + Seek> Source for T {}
+
+/// An image file, opened.
+struct ImageFile<'a> {
+    path: &'a Path,
+    /// What is read as a whole: a JPEG, as its decoders take it so, and what comes through a pipe.
+    bytes: Option<Vec<u8>>,
+    /// How many bytes the file has.
+    length: u64,
+    format: Option<ImageFormat>,
+}
+
+impl<'a> ImageFile<'a> {
+    fn open(path: &'a Path, limits: &Limits) -> Result<Self, ImageError> {
+        let most = limits.picture_bytes();
+        let too_many = || ImageError::Memory { path: path.to_owned(), bytes: most };
+        let io = |source| ImageError::Io { path: path.to_owned(), source };
+        let mut file = File::open(path).map_err(io)?;
+        let metadata = file.metadata().map_err(io)?;
+        if metadata.is_file() && metadata.len() > most {
+            return Err(too_many());
+        }
+        let mut bytes = Vec::new();
+        (&mut file).take(HEAD_BYTES).read_to_end(&mut bytes).map_err(io)?;
+        let format = image::guess_format(&bytes).ok();
+        let is_whole = format == Some(ImageFormat::Jpeg) || !metadata.is_file();
+        // What is no image is not read on: it may never end.
+        if is_whole && format.is_some() {
+            file.take(most).read_to_end(&mut bytes).map_err(io)?;
+            if bytes.len() as u64 > most {
+                return Err(too_many());
+            }
+        }
+        let length = if metadata.is_file() { metadata.len() } else { bytes.len() as u64 };
+        if format == Some(ImageFormat::WebP)
+            && riff_bytes(&bytes).is_none_or(|whole| length < whole)
+        {
+            let source = DecodingError::new(ImageFormat::WebP.into(), "it is cut off");
+            return Err(ImageError::Decode { path: path.to_owned(), source: Decoding(source) });
+        }
+        Ok(Self { path, bytes: is_whole.then_some(bytes), length, format })
+    }
+
+    fn source(&self) -> Result<Box<dyn Source + '_>, ImageError> {
+        let io = |source| ImageError::Io { path: self.path.to_owned(), source };
+        Ok(match &self.bytes {
+            Some(bytes) => Box::new(Cursor::new(bytes)),
+            None => Box::new(BufReader::new(File::open(self.path).map_err(io)?)),
+        })
+    }
+
+    /// A decoder that has read the head of the file, whose picture is within the limits.
+    fn decoder(&self, limits: &Limits) -> Result<impl ImageDecoder, ImageError> {
+        let path = || self.path.to_owned();
+        let decode = |source| ImageError::Decode { path: path(), source };
+        let exceeded = |exceeded| ImageError::Exceeded { path: path(), exceeded };
+        let mut reader = ImageReader::new(self.source()?);
+        if let Some(format) = self.format {
+            reader.set_format(format);
+        }
+        let mut most = image::Limits::no_limits();
+        most.max_alloc = Some(match self.format {
+            Some(ImageFormat::Png) => MAX_BESIDE_BYTES,
+            _ => limits.picture_bytes(),
+        });
+        reader.limits(most);
+        let decoder = reader.into_decoder().map_err(decode)?;
+        let (width, height) = decoder.dimensions();
+        limits.check_photograph(width, height, self.length).map_err(exceeded)?;
+        let bytes = limits.picture_bytes();
+        if decoder.total_bytes() > bytes {
+            return Err(ImageError::Memory { path: path(), bytes });
+        }
+        Ok(decoder)
+    }
+
+    /// Refuses a TIFF of which nobody knows which page is meant.
+    fn check_pages(&self) -> Result<(), ImageError> {
+        if self.format != Some(ImageFormat::Tiff) {
+            return Ok(());
+        }
+        match pages(self.source()?) {
+            // What is wrong with it the decoder tells.
+            Ok(0 | 1) | Err(_) => Ok(()),
+            Ok(pages) => Err(ImageError::Pages { path: self.path.to_owned(), pages }),
+        }
+    }
+
+    /// The pixels of a whole JPEG, or what is missing; `None` for other files, and for colours that need their
+    /// profile.
+    fn jpeg(&self) -> Result<Option<DynamicImage>, String> {
+        let (Some(ImageFormat::Jpeg), Some(bytes)) = (self.format, &self.bytes) else {
+            return Ok(None);
+        };
+        let problem = |error: DecodeErrors| told(&error.to_string());
+        let mut decoder = jpeg_decoder(bytes, true);
+        let mut pixels = decoder.decode().map_err(problem);
+        if pixels.as_ref().is_err_and(|problem| problem.contains(PADDING)) {
+            decoder = jpeg_decoder(bytes, false);
+            pixels = decoder.decode().map_err(problem);
+        }
+        let pixels = pixels?;
+        check_scans(bytes, &pixels)?;
+        let (width, height) = decoder.dimensions().unwrap_or_default();
+        let as_seen = matches!(
+            decoder.input_colorspace(),
+            Some(ColorSpace::Luma | ColorSpace::RGB | ColorSpace::YCbCr)
+        );
+        let image = RgbImage::from_raw(width as u32, height as u32, pixels);
+        Ok(image.filter(|_| as_seen).map(DynamicImage::ImageRgb8))
+    }
+}
+
+fn jpeg_decoder(bytes: &[u8], strict: bool) -> JpegDecoder<ZCursor<&[u8]>> {
+    let options = DecoderOptions::default()
+        .set_strict_mode(strict)
+        .set_max_width(usize::MAX)
+        .set_max_height(usize::MAX);
+    JpegDecoder::new_with_options(ZCursor::new(bytes), options)
+}
+
+/// Refuses a JPEG of which some pixels are not in the file, or that makes more than it has. Its decoder says neither, so
+/// it is asked again: noise behind the last byte must not show, and noise for the last bytes must.
+fn check_scans(bytes: &[u8], pixels: &[u8]) -> Result<(), String> {
+    let Scans { end, is_one_run } = Scans::of(bytes);
+    // Without 0xFF, with which markers begin; in a scan it is followed by 0.
+    let scans = trimmed(&bytes[..end.unwrap_or(bytes.len())], |byte| byte == 0xFF);
+    let noises = NOISES.map(|factor: u32| -> Vec<u8> {
+        (1..NOISE_BYTES).map(|i| (i.wrapping_mul(factor) >> 24) as u8 & 0xFE).collect()
+    });
+    let is_shown_by = |scans: &[u8], noise: &Vec<u8>, strict: bool| {
+        let found = jpeg_decoder(&[scans, noise, END_OF_IMAGE].concat(), strict).decode();
+        found.is_ok_and(|found| found == pixels)
+    };
+    if !is_shown_by(scans, &noises[0], false) {
+        return Err("not all pixels are in it".to_owned());
+    }
+    // Some cameras fill up the last words.
+    let used = trimmed(scans, |byte| matches!(byte, 0 | 0xFF));
+    let used = &used[..used.len().saturating_sub(SURPLUS_BYTES)];
+    if is_one_run && noises.iter().all(|noise| is_shown_by(used, noise, true)) {
+        return Err("its data go on after the last pixel".to_owned());
+    }
+    Ok(())
+}
+
+/// The bytes without the last of these.
+fn trimmed(bytes: &[u8], of: impl Fn(u8) -> bool) -> &[u8] {
+    let end = bytes.iter().rposition(|&byte| !of(byte)).map_or(0, |last| last + 1);
+    &bytes[..end]
+}
+
+/// How long a RIFF file says that it is, from its first bytes.
+fn riff_bytes(head: &[u8]) -> Option<u64> {
+    let beyond = head.get(4..)?.first_chunk::<4>()?;
+    Some(8 + u64::from(u32::from_le_bytes(*beyond)))
+}
+
+/// Where the pixels of a JPEG are.
+struct Scans {
+    /// Where the marker is that ends the picture, if there is one.
+    end: Option<usize>,
+    /// Whether they are one run of codes in which each begins where the last ends: not refined step by step, nor begun
+    /// anew on the way.
+    is_one_run: bool,
+}
+
+impl Scans {
+    fn of(bytes: &[u8]) -> Self {
+        let (mut at, mut is_one_run) = (2, true);
+        // In a scan 0xFF is followed by 0 or a restart.
+        let is_marker =
+            |pair: &[u8]| pair[0] == 0xFF && !matches!(pair[1], 0 | 1 | 0xD0..=0xD8 | 0xFF);
+        while let Some(next) = bytes.get(at..).and_then(|rest| rest.windows(2).position(is_marker))
+        {
+            at += next;
+            if bytes[at..].starts_with(END_OF_IMAGE) {
+                return Self { end: Some(at), is_one_run };
+            }
+            // Progressive frames of both kinds, and restarts.
+            is_one_run &= !matches!(bytes[at + 1], 0xC2 | 0xCA | 0xDD);
+            let length = bytes.get(at + 2..).and_then(|rest| rest.first_chunk::<2>());
+            at += 2 + length.map_or(0, |length| usize::from(u16::from_be_bytes(*length)));
+        }
+        Self { end: None, is_one_run }
+    }
+}
+
+/// The decoder's words without their quotation marks, in one line.
+fn told(problem: &str) -> String {
+    let words: Vec<&str> = problem.trim_matches('"').split_whitespace().collect();
+    words.join(" ")
+}
+
+/// Pages of a TIFF, smaller copies of another one aside.
+fn pages(source: impl BufRead + Seek) -> tiff::TiffResult<usize> {
+    let mut file = tiff::decoder::Decoder::new(source)?;
+    let mut pages = 0;
+    for _ in 0..MAX_PAGES {
+        let kind: u32 = file.find_tag_unsigned(Tag::NewSubfileType)?.unwrap_or(0);
+        pages += usize::from(kind & 1 == 0);
+        if !file.more_images() {
+            break;
+        }
+        file.next_image()?;
+    }
+    Ok(pages)
+}
+
+fn from_dynamic(image: DynamicImage) -> AnyGray {
+    use DynamicImage::{
+        ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgb32F, ImageRgba16, ImageRgba32F,
+    };
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let deep = matches!(
+        image,
+        ImageLuma16(_)
+            | ImageLumaA16(_)
+            | ImageRgb16(_)
+            | ImageRgba16(_)
+            | ImageRgb32F(_)
+            | ImageRgba32F(_)
+    );
+    let wrong_size = "the decoder returns width · height pixels";
+    if deep {
+        AnyGray::U16(
+            Gray::from_vec(width, height, image.into_luma16().into_raw()).expect(wrong_size),
+        )
+    } else {
+        AnyGray::U8(Gray::from_vec(width, height, image.into_luma8().into_raw()).expect(wrong_size))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_is_kept_and_colour_becomes_luma() {
+        let dir = tempfile::tempdir().unwrap();
+        let deep = dir.path().join("deep.png");
+        image::ImageBuffer::from_pixel(3, 2, image::Luma([40_000u16])).save(&deep).unwrap();
+        assert_eq!(
+            read(&deep).unwrap(),
+            AnyGray::U16(Gray::from_vec(3, 2, vec![40_000; 6]).unwrap())
+        );
+
+        let colour = dir.path().join("colour.bmp");
+        image::ImageBuffer::from_pixel(2, 2, image::Rgb([90u8, 90, 90])).save(&colour).unwrap();
+        assert_eq!(read(&colour).unwrap(), AnyGray::U8(Gray::from_vec(2, 2, vec![90; 4]).unwrap()));
+    }
+
+    #[test]
+    fn other_files_are_named_in_the_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let text = dir.path().join("notes.png");
+        std::fs::write(&text, "no image").unwrap();
+        let message = read(&text).unwrap_err().to_string();
+        assert!(message.contains("notes.png") && message.contains("not a readable"), "{message}");
+        assert!(read(&dir.path().join("absent.png")).is_err());
+    }
+}

@@ -1,0 +1,338 @@
+//! Plain words on what a calibration lacks. Every rule has its reason; none depends on a camera.
+
+use super::{Given, Named, Report, Survey, cannot_tell_apart, causes};
+use deltille_core::calibrate::{Model, Parameter};
+use deltille_core::words::counted;
+
+/// How much a piece of advice matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Weight {
+    /// Something is as it should be.
+    Good,
+    /// Better results are to be had.
+    Hint,
+    /// Figures are not to be relied on before this is mended.
+    Warning,
+}
+
+/// A piece of advice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Advice {
+    /// How much it matters.
+    pub weight: Weight,
+    /// What is the case, and what to do about it.
+    pub text: String,
+}
+
+/// A view tilted by more than this tells focal length from distance: the near side of the board is
+/// then seen larger than the far side by a tenth and more at usual distances.
+const TILTED_RAD: f64 = 0.35;
+/// Tilted views to have: two axes, both ways.
+const TILTED_VIEWS: usize = 4;
+
+/// Views to have: below, a wrong one can hardly be told from the others.
+const VIEWS: usize = 10;
+
+/// Of the image's cells so many should hold corners: distortion between them is interpolated.
+const COVERED: f64 = 0.75;
+/// Beyond the outermost corner distortion is extrapolated; polynomials run away there.
+const REACH: f64 = 0.85;
+
+/// A distortion parameter below so many standard deviations may as well be zero.
+const SIGNIFICANT: f64 = 2.0;
+
+/// Parameters correlated more than this cannot be told apart in practice.
+const CORRELATED: f64 = 0.99;
+
+/// A pattern of residuals so many times as large as chance makes is the model's.
+const PATTERN: f64 = 3.0;
+/// Against it stands the noise of a single corner: a pattern smaller than this part of it does not
+/// matter, however sure it is.
+const PATTERN_PART: f64 = 0.2;
+
+/// A view so many times worse than the median is to be looked at.
+const BAD_VIEW: f64 = 2.5;
+
+/// Held-out views worse by more than this part show that the model fits noise, or views that differ.
+const HOLDOUT: f64 = 1.25;
+
+/// What would make a calibration better, what matters most first.
+pub fn advice(report: &Report, survey: &Survey) -> Vec<Advice> {
+    let mut found = Vec::new();
+    let mut add = |weight, text: String| found.push(Advice { weight, text });
+    views(report, survey, &mut add);
+    coverage(report, survey, &mut add);
+    parameters(report, &mut add);
+    residuals(report, survey, &mut add);
+    if report.print.scale.is_none() {
+        let text =
+            "Distances are as true as the print: measure both check bars of the sheet and give \
+                    --print-scale. Focal lengths and distortion do not depend on it."
+                .to_owned();
+        add(Weight::Hint, text);
+    }
+    found.sort_by_key(|advice| std::cmp::Reverse(advice.weight));
+    found
+}
+
+fn views(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
+    let count = report.solution.views.len();
+    if count < VIEWS {
+        add(
+            Weight::Warning,
+            format!("Only {}: take at least {VIEWS}, better 20 to 50.", counted(count, "view")),
+        );
+    }
+    if survey.planar {
+        let tilted = survey.views.iter().filter_map(|view| view.tilt_rad);
+        let tilted = tilted.filter(|&tilt| tilt > TILTED_RAD).count();
+        if tilted < TILTED_VIEWS {
+            add(
+                Weight::Warning,
+                format!(
+                    "Only {tilted} of {count} views tilted by more than 20°: focal length and distance are \
+                     hardly told apart. Tilt the board by 30° to 50°, to all four sides."
+                ),
+            );
+        } else {
+            add(Weight::Good, format!("{tilted} of {count} views are tilted by more than 20°."));
+        }
+    }
+    let named = |names: Vec<&str>| match names.as_slice() {
+        [a, b, c, rest @ ..] if !rest.is_empty() => {
+            format!("{a}, {b}, {c} and {} more", rest.len())
+        }
+        few => few.join(", "),
+    };
+    let excluded: Vec<&str> =
+        report.solution.excluded.iter().map(|out| out.view.as_str()).collect();
+    if !excluded.is_empty() {
+        let text = format!(
+            "Left out, because they do not fit the others or the target: {}.",
+            named(excluded)
+        );
+        add(Weight::Warning, text);
+    }
+    let mut rms: Vec<f64> = report.solution.views.iter().map(|view| view.rms_px).collect();
+    rms.sort_by(f64::total_cmp);
+    let median = rms.get(rms.len() / 2).copied().unwrap_or_default();
+    let bad = report.solution.views.iter().filter(|view| view.rms_px > BAD_VIEW * median);
+    let bad: Vec<&str> = bad.map(|view| view.name.as_str()).collect();
+    if !bad.is_empty() {
+        let text = format!(
+            "Much worse than the others: {}. Look for motion blur, a bent board, or reflections.",
+            named(bad)
+        );
+        add(Weight::Hint, text);
+    }
+}
+
+fn coverage(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
+    let (covered, reach) = (survey.covered(), survey.reach(report.solution));
+    let of_what = if survey.circle.is_some() { "image circle" } else { "image" };
+    if covered < COVERED {
+        let text = format!(
+            "Corners cover {:.0} % of the {of_what}: bring the board to the empty cells of the map, \
+             its rim may be cut off.",
+            100.0 * covered
+        );
+        add(Weight::Hint, text);
+    } else {
+        add(Weight::Good, format!("Corners cover {:.0} % of the {of_what}.", 100.0 * covered));
+    }
+    if reach < REACH {
+        let (place, length) = match survey.circle {
+            Some(_) => ("near the rim of the image circle", "radius"),
+            None => ("in the corners of the image", "half diagonal"),
+        };
+        let text = format!(
+            "No corner lies {place}: beyond {:.0} % of its {length} the distortion is extrapolated.",
+            100.0 * reach
+        );
+        add(Weight::Hint, text);
+    }
+    if let Some(end) = report.solution.lens_end() {
+        add(Weight::Warning, sentence(&end.to_string()));
+    }
+}
+
+/// With a capital and a full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|letter| letter.to_ascii_uppercase());
+    first.into_iter().chain(letters).chain(['.']).collect()
+}
+
+fn parameters(report: &Report, add: &mut impl FnMut(Weight, String)) {
+    let solution = report.solution;
+    let model: Option<Model> = report.model.parse().ok();
+    if let Some(model) = model
+        && let Some(smaller) = model.smaller()
+    {
+        // What the smaller model does without.
+        let there = smaller.free().into_iter().chain(std::iter::repeat(false));
+        let more = model.free().into_iter().zip(there).zip(&solution.parameters);
+        let more: Vec<_> =
+            more.filter(|((here, there), _)| *here && !there).map(|(_, p)| p).collect();
+        let weak = |p: &&Parameter| p.sd.is_some_and(|sd| p.value.abs() < SIGNIFICANT * sd);
+        if more.iter().all(weak) {
+            let names: Vec<&str> = more.iter().map(|p| p.name.as_str()).collect();
+            let text = format!(
+                "Not told from zero: {}. The model {smaller} does without, and is safer where there \
+                 are no corners.",
+                names.join(", ")
+            );
+            add(Weight::Hint, text);
+        }
+    }
+    let is_loose = |name: &str| solution.loose.iter().any(|loose| loose == name);
+    if !solution.loose.is_empty() {
+        let text = cannot_tell_apart(&solution.loose, report.sufficient);
+        add(Weight::Warning, sentence(&text));
+    }
+    let names: Vec<&str> = solution.found().collect();
+    let mut pairs = Vec::new();
+    for i in 0..names.len() {
+        for j in 0..i {
+            let correlation = solution.correlation(i, j);
+            // Square pixels tie the two focal lengths to each other; that is no loss.
+            let focal = [names[j], names[i]] == ["fx", "fy"];
+            let told = is_loose(names[i]) && is_loose(names[j]);
+            if correlation.abs() > CORRELATED && !focal && !told {
+                pairs.push(format!("{} with {}", names[j], names[i]));
+            }
+        }
+    }
+    if !pairs.is_empty() {
+        let more =
+            if pairs.len() > 3 { format!(" and {} more", pairs.len() - 3) } else { String::new() };
+        pairs.truncate(3);
+        let text = format!(
+            "Correlated beyond ±{CORRELATED}: {}{more}. They are known together, neither of them \
+             alone.",
+            pairs.join(", ")
+        );
+        add(Weight::Hint, text);
+    }
+}
+
+fn residuals(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
+    let solution = report.solution;
+    let means = survey.means_px.iter().flatten().map(|cell| cell.mean_px);
+    let count = means.clone().count().max(1) as f64;
+    let size = (means.map(|[x, y]| (x * x + y * y) / 2.0).sum::<f64>() / count).sqrt();
+    let model = report.model.parse().ok();
+    let given = Given { model, print_scale: report.print.scale, remedy: report.remedy };
+    let causes = causes(solution, given);
+    let named = Named { cameras: &[] };
+    for finding in &solution.findings {
+        add(Weight::Warning, sentence(&named.sentence(finding)));
+    }
+    for cause in &causes {
+        add(Weight::Warning, sentence(cause));
+    }
+    match survey.pattern().filter(|_| causes.is_empty()) {
+        Some(pattern) if pattern > PATTERN && size > PATTERN_PART * solution.rms_px => add(
+            Weight::Hint,
+            format!(
+                "Residuals leave a pattern over the image, {pattern:.1} times what chance makes and \
+                 {size:.3} px strong: less than noise, but the model does not describe this lens \
+                 wholly, or the board is not flat. Try a richer model, or --board-shape."
+            ),
+        ),
+        Some(_) => {
+            add(Weight::Good, "Residuals leave no strong pattern over the image.".to_owned())
+        }
+        None => {}
+    }
+    if let Some(shape) = solution.shape.filter(|shape| shape.is_significant()) {
+        let text = format!(
+            "The sheet is bent by {:.2} mm and its corners lie up to {:.2} mm beside their places; that \
+             is allowed for. Glue it on something flat.",
+            shape.bent_mm, shape.stretched_mm
+        );
+        add(Weight::Hint, text);
+    }
+    let outliers: usize = solution.views.iter().map(|view| view.outlier_count()).sum();
+    if outliers > 0 {
+        let text = format!(
+            "{outliers} of {} corners lie farther off than chance allows; they are drawn in red.",
+            solution.corner_count()
+        );
+        add(Weight::Hint, text);
+    }
+    if let Some(holdout) = report.holdout {
+        let (test, own) = (holdout.rms_px, solution.rms_px);
+        let figures = format!("{test:.4} px on views that took no part, {own:.4} px on its own");
+        if test > HOLDOUT * own {
+            let text = format!("{figures}: the model fits noise, or the views differ in kind.");
+            add(Weight::Warning, text);
+        } else {
+            add(Weight::Good, format!("{figures}."));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::export::calibration::Print;
+    use deltille_core::calibrate::Solution;
+    use deltille_core::camera::Camera;
+
+    /// What is advised where no parameter of the lens is told from zero.
+    fn advised(model: Model) -> String {
+        let camera = Camera::centred(640, 480, 500.0, model.lens());
+        let values = camera.parameter_names().into_iter().zip(camera.parameters());
+        let parameters = values.zip(model.free());
+        let parameters: Vec<Parameter> = parameters
+            .map(|((name, value), free)| Parameter { name, value, sd: free.then_some(1.0) })
+            .collect();
+        let count = model.free().into_iter().filter(|free| *free).count();
+        let solution = Solution {
+            camera,
+            parameters,
+            covariance: DMatrix::identity(count, count),
+            views: Vec::new(),
+            excluded: Vec::new(),
+            rms_px: 0.1,
+            common_px: None,
+            sigma: 1.0,
+            loose: Vec::new(),
+            shape: None,
+            misfits: Vec::new(),
+            findings: Vec::new(),
+            steps: 1,
+        };
+        let report = Report {
+            title: "camera",
+            model: &model.to_string(),
+            solution: &solution,
+            holdout: None,
+            print: Print { scale: Some([1.0; 2]), ink: None },
+            sufficient: None,
+            remedy: None,
+            thumbnails: BTreeMap::new(),
+        };
+        let advice = advice(&report, &Survey::new(&solution));
+        advice.into_iter().map(|advice| advice.text + "\n").collect()
+    }
+
+    #[test]
+    fn a_smaller_model_is_advised_where_there_is_one() {
+        for (model, text) in [
+            (Model::Radtan5, "Not told from zero: k3. The model radtan does without"),
+            (Model::Rational, "Not told from zero: k4, k5, k6. The model radtan5 does without"),
+            (Model::KannalaBrandt(5), "Not told from zero: k5. The model kannala-brandt does"),
+        ] {
+            assert!(advised(model).contains(text), "{}", advised(model));
+        }
+        for model in [Model::Pupil, Model::Radtan, Model::KannalaBrandt(4)] {
+            assert!(!advised(model).contains("Not told from zero"), "{}", advised(model));
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The plots of a page, each an SVG.
+
+use super::axes::Axes;
+use super::survey::Survey;
+use deltille_core::calibrate::{Corner, Solution};
+
+/// Size of the small plots, user units.
+const SMALL: [f64; 2] = [330.0, 250.0];
+
+/// Width of the maps of the image, user units.
+const MAP: f64 = 430.0;
+
+/// Most dots of a scatter plot: more only make the page heavy.
+const MOST_DOTS: usize = 6000;
+
+/// Radius of the ring that marks a corner beyond the rim of a plot, user units.
+const BEYOND: f64 = 3.0;
+
+/// Bins of the histogram on either side of zero.
+const BINS: usize = 20;
+
+/// Bins of the radial curve.
+const RINGS: usize = 12;
+
+/// Length of the longest arrow of the residual map, cells.
+const ARROW_CELLS: f64 = 1.2;
+
+fn corners(solution: &Solution) -> impl Iterator<Item = &Corner> {
+    solution.views.iter().flat_map(|view| &view.corners)
+}
+
+/// A range for residuals: four standard deviations, so that the bulk fills the plot.
+fn range_px(solution: &Solution) -> f64 {
+    let inliers = || corners(solution).filter(|corner| !corner.outlier);
+    let sum: f64 = inliers().flat_map(|corner| corner.residual).map(|r| r * r).sum();
+    let rms = (sum / (2 * inliers().count()).max(1) as f64).sqrt();
+    (4.0 * rms).max(1e-6)
+}
+
+/// Every n-th corner, so that few enough are left.
+fn thinned(solution: &Solution) -> impl Iterator<Item = &Corner> {
+    let step = solution.corner_count().div_ceil(MOST_DOTS).max(1);
+    corners(solution).step_by(step)
+}
+
+/// Residuals as a cloud.
+pub(super) fn scatter(solution: &Solution) -> String {
+    let range = range_px(solution);
+    let side = SMALL[1];
+    let mut axes = Axes::new([side, side], [-range, range], [-range, range]);
+    axes.line(&[[-range, 0.0], [range, 0.0]], "guide");
+    axes.line(&[[0.0, -range], [0.0, range]], "guide");
+    for corner in thinned(solution) {
+        let [dx, dy] = corner.residual;
+        if dx.abs() <= range && dy.abs() <= range {
+            axes.dot(dx, -dy, 1.3, if corner.outlier { "dot out" } else { "dot" });
+        }
+    }
+    for corner in corners(solution) {
+        // On the way from the middle, where it leaves the plot.
+        let [dx, dy] = corner.residual;
+        let beyond = dx.abs().max(dy.abs()) / range;
+        if beyond > 1.0 {
+            axes.dot(dx / beyond, -dy / beyond, BEYOND, "beyond");
+        }
+    }
+    axes.svg(["right, px", "up, px"], "Residuals of all corners")
+}
+
+/// Residuals of both coordinates, with the normal distribution of the same deviation.
+pub(super) fn histogram(solution: &Solution) -> String {
+    let range = range_px(solution);
+    let width = range / BINS as f64;
+    let mut counts = vec![0usize; 2 * BINS];
+    let mut total = 0;
+    for value in corners(solution).flat_map(|corner| corner.residual) {
+        total += 1;
+        let bin = ((value + range) / width).floor();
+        if (0.0..counts.len() as f64).contains(&bin) {
+            counts[bin as usize] += 1;
+        }
+    }
+    let part = |count: usize| 100.0 * count as f64 / f64::from(total.max(1));
+    let sigma = range / 4.0;
+    let normal = |x: f64| {
+        let density =
+            (-x * x / (2.0 * sigma * sigma)).exp() / (sigma * (2.0 * std::f64::consts::PI).sqrt());
+        100.0 * density * width
+    };
+    let highest = counts.iter().map(|&count| part(count)).fold(normal(0.0), f64::max);
+    let mut axes = Axes::new(SMALL, [-range, range], [0.0, 1.08 * highest]);
+    for (bin, &count) in counts.iter().enumerate() {
+        let x = bin as f64 * width - range;
+        axes.bar([x, 0.0], [x + width, part(count)], "bar", "");
+    }
+    let curve: Vec<[f64; 2]> =
+        (0..=100).map(|i| f64::from(i) / 50.0 * range - range).map(|x| [x, normal(x)]).collect();
+    axes.line(&curve, "curve");
+    axes.svg(["residual of a coordinate, px", "% of coordinates"], "Histogram of residuals")
+}
+
+/// The image from its upper left corner; y runs downwards.
+fn map(survey: &Survey) -> Axes {
+    let [w, h] = survey.size_px;
+    Axes::new([MAP, MAP * h / w], [-0.5, w - 0.5], [h - 0.5, -0.5])
+}
+
+/// Middle of a cell, px.
+fn middle(survey: &Survey, index: usize) -> [f64; 2] {
+    let at = [index % survey.cells[0], index / survey.cells[0]];
+    [0, 1].map(|i| (at[i] as f64 + 0.5) / survey.cells[i] as f64 * survey.size_px[i] - 0.5)
+}
+
+/// As much of an arrow as the image has room for.
+fn within(survey: &Survey, from: [f64; 2], arrow: [f64; 2]) -> [f64; 2] {
+    let room = |i: usize| match arrow[i] {
+        v if v > 0.0 => (survey.size_px[i] - 0.5 - from[i]) / v,
+        v if v < 0.0 => (-0.5 - from[i]) / v,
+        _ => 1.0,
+    };
+    let part = room(0).min(room(1)).min(1.0);
+    arrow.map(|v| part * v)
+}
+
+/// Mean residuals over the image, and by how much the arrows are enlarged.
+pub(super) fn residual_map(survey: &Survey) -> (String, f64) {
+    let cell = survey.size_px[0] / survey.cells[0] as f64;
+    let length = |[x, y]: [f64; 2]| x.hypot(y);
+    let means = || survey.means_px.iter().flatten();
+    let longest = means().map(|cell| length(cell.mean_px)).fold(0.0, f64::max);
+    let scale = if longest > 0.0 { ARROW_CELLS * cell / longest } else { 1.0 };
+    // A round number, to be read in the caption.
+    let decade = 10f64.powf(scale.log10().floor());
+    let scale = (scale / decade).floor() * decade;
+    let mut axes = map(survey);
+    for (index, mean) in survey.means_px.iter().enumerate() {
+        let Some(mean) = mean else { continue };
+        let [x, y] = middle(survey, index);
+        let [dx, dy] = within(survey, [x, y], mean.mean_px.map(|v| v * scale));
+        // Means that chance explains are pale.
+        let chance = length(mean.mean_px) < 3.0 * mean.sd_px;
+        axes.line(&[[x, y], [x + dx, y + dy]], if chance { "arrow pale" } else { "arrow" });
+        axes.dot(x, y, 1.6, "foot");
+    }
+    (axes.svg(["x, px", "y, px"], "Mean residuals over the image"), scale)
+}
+
+/// Corners in each part of the image.
+pub(super) fn coverage(survey: &Survey) -> String {
+    let most = survey.counts.iter().copied().max().unwrap_or(0).max(1) as f64;
+    let mut axes = map(survey);
+    for (index, &count) in survey.counts.iter().enumerate() {
+        let [x, y] = middle(survey, index);
+        let half = [0, 1].map(|i| survey.size_px[i] / survey.cells[i] as f64 / 2.0);
+        let (low, high) = ([x - half[0], y + half[1]], [x + half[0], y - half[1]]);
+        let class = if count == 0 { "empty" } else { "cell" };
+        let strength = (count as f64 / most).sqrt();
+        axes.bar(low, high, class, &format!("fill-opacity=\"{:.2}\"", 0.1 + 0.9 * strength));
+        if count > 0 {
+            let [px, py] = axes.at(x, y);
+            let text = if strength > 0.55 { "count light" } else { "count" };
+            axes.add(&format!(
+                "<text class=\"{text}\" x=\"{px:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{count}\
+                 </text>",
+                py + 3.0
+            ));
+        }
+    }
+    axes.svg(["x, px", "y, px"], "Number of corners over the image")
+}
+
+/// Error against the distance from the principal point: every corner, and the rms of rings.
+pub(super) fn against_radius(solution: &Solution) -> String {
+    let [cx, cy] = solution.camera.centre_px;
+    let radius = |corner: &Corner| (corner.pixel[0] - cx).hypot(corner.pixel[1] - cy);
+    let farthest = corners(solution).map(radius).fold(1.0, f64::max);
+    let top = range_px(solution);
+    let mut axes = Axes::new(SMALL, [0.0, farthest], [0.0, top]);
+    for corner in thinned(solution) {
+        let error = corner.residual[0].hypot(corner.residual[1]);
+        if error <= top {
+            axes.dot(radius(corner), error, 1.1, if corner.outlier { "dot out" } else { "dot" });
+        }
+    }
+    for corner in corners(solution) {
+        if corner.residual[0].hypot(corner.residual[1]) > top {
+            axes.dot(radius(corner), top, BEYOND, "beyond");
+        }
+    }
+    let mut rings = [(0.0, 0usize); RINGS];
+    for corner in corners(solution).filter(|corner| !corner.outlier) {
+        let ring = (radius(corner) / farthest * RINGS as f64) as usize;
+        let (sum, count) = &mut rings[ring.min(RINGS - 1)];
+        *sum += corner.residual.iter().map(|r| r * r).sum::<f64>() / 2.0;
+        *count += 1;
+    }
+    let curve = rings.iter().enumerate().filter(|(_, (_, count))| *count > 3);
+    let curve: Vec<[f64; 2]> = curve
+        .map(|(i, (sum, count))| {
+            [(i as f64 + 0.5) / RINGS as f64 * farthest, (sum / *count as f64).sqrt()]
+        })
+        .collect();
+    axes.line(&curve, "curve");
+    axes.svg(["distance from the principal point, px", "error, px"], "Error against radius")
+}
+
+/// Error of each view against its tilt; `None` for solids.
+pub(super) fn against_tilt(solution: &Solution, survey: &Survey) -> Option<String> {
+    let tilts: Vec<f64> = survey
+        .views
+        .iter()
+        .map(|view| view.tilt_rad.map(f64::to_degrees))
+        .collect::<Option<_>>()?;
+    let steepest = tilts.iter().copied().fold(10.0, f64::max);
+    let worst = solution.views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
+    let mut axes = Axes::new(SMALL, [0.0, 1.05 * steepest], [0.0, 1.1 * worst]);
+    for (view, tilt) in solution.views.iter().zip(&tilts) {
+        axes.dot(*tilt, view.rms_px, 3.0, "view");
+    }
+    Some(axes.svg(["tilt of the board, °", "rms of the view, px"], "Error against tilt"))
+}

@@ -1,0 +1,145 @@
+use glam::DVec3;
+
+use deltille_core::calibrate::{ImageCircle, Solution, ViewSolution};
+use deltille_core::camera::Camera;
+
+/// Cells of the maps along the longer side of the image.
+const CELLS: usize = 16;
+
+/// What the views of a calibration cover and show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Survey {
+    /// Width and height of the image, px.
+    pub size_px: [f64; 2],
+    /// Columns and rows of the maps.
+    pub cells: [usize; 2],
+    /// Corners in each cell, row by row from the top.
+    pub counts: Vec<usize>,
+    /// Mean residual of each cell and its standard deviation, px; `None` in cells with fewer than
+    /// four corners.
+    pub means_px: Vec<Option<CellMean>>,
+    /// The views.
+    pub views: Vec<SurveyedView>,
+    /// Whether the target is a plane.
+    pub planar: bool,
+    /// What the lens shows, where that is not all of the image.
+    pub circle: Option<ImageCircle>,
+}
+
+/// The mean residual of a cell, outliers left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellMean {
+    /// Mean, px.
+    pub mean_px: [f64; 2],
+    /// Standard deviation of each coordinate of the mean, px.
+    pub sd_px: f64,
+}
+
+/// How a view stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurveyedView {
+    /// Angle between the board's normal and the line of sight to the middle of its corners, rad;
+    /// `None` for solids.
+    pub tilt_rad: Option<f64>,
+    /// Distance of the target's origin, mm.
+    pub distance_mm: f64,
+}
+
+/// Fewest corners whose mean says something.
+const LEAST_IN_CELL: usize = 4;
+
+impl Survey {
+    /// Surveys a calibration.
+    pub fn new(solution: &Solution) -> Self {
+        let size_px = [solution.camera.width, solution.camera.height].map(f64::from);
+        let cell = size_px[0].max(size_px[1]) / CELLS as f64;
+        let cells = size_px.map(|side| ((side / cell).round() as usize).max(1));
+        let mut inside: Vec<Vec<[f64; 2]>> = vec![Vec::new(); cells[0] * cells[1]];
+        let mut counts = vec![0; inside.len()];
+        for corner in solution.views.iter().flat_map(|view| &view.corners) {
+            let at = |axis: usize| {
+                let part = (corner.pixel[axis] + 0.5) / size_px[axis];
+                ((part * cells[axis] as f64).max(0.0) as usize).min(cells[axis] - 1)
+            };
+            let index = at(1) * cells[0] + at(0);
+            counts[index] += 1;
+            if !corner.outlier {
+                inside[index].push(corner.residual);
+            }
+        }
+        let corners = || solution.views.iter().flat_map(|view| &view.corners);
+        let planar = corners().all(|corner| corner.panel.index() == 0);
+        let views =
+            solution.views.iter().map(|view| surveyed(&solution.camera, view, planar)).collect();
+        let means_px = inside.iter().map(|residuals| cell_mean(residuals)).collect();
+        let seen: Vec<[f64; 2]> = corners().map(|corner| corner.pixel).collect();
+        let circle = ImageCircle::of(&solution.camera, &seen);
+        Self { size_px, cells, counts, means_px, views, planar, circle }
+    }
+
+    /// Part of the cells of the image, or of its circle, in which there are corners.
+    pub fn covered(&self) -> f64 {
+        let [columns, rows] = self.cells;
+        let is_shown = |index: usize| {
+            let [column, row] = [index % columns, index / columns].map(|v| v as f64 + 0.5);
+            let x = column * self.size_px[0] / columns as f64 - 0.5;
+            let y = row * self.size_px[1] / rows as f64 - 0.5;
+            self.circle.is_none_or(|circle| circle.radius_of([x, y]) <= circle.radius_px)
+        };
+        let shown: Vec<usize> = (0..self.counts.len()).filter(|&index| is_shown(index)).collect();
+        let covered = shown.iter().filter(|&&index| self.counts[index] > 0).count();
+        covered as f64 / shown.len().max(1) as f64
+    }
+
+    /// Distance of the outermost corner from the middle of the image, as a part of half its
+    /// diagonal; or from the middle of its circle, as a part of its radius.
+    pub fn reach(&self, solution: &Solution) -> f64 {
+        let [w, h] = self.size_px;
+        let whole =
+            ImageCircle { centre_px: [w / 2.0 - 0.5, h / 2.0 - 0.5], radius_px: w.hypot(h) / 2.0 };
+        let circle = self.circle.unwrap_or(whole);
+        let corners = solution.views.iter().flat_map(|view| &view.corners);
+        let radii = corners.map(|corner| circle.radius_of(corner.pixel));
+        radii.fold(0.0, f64::max) / circle.radius_px
+    }
+
+    /// Root mean square of the cells' mean residuals in their standard deviations: 1 where
+    /// residuals are by chance, more where the model leaves a pattern.
+    pub fn pattern(&self) -> Option<f64> {
+        let seen: Vec<f64> = self
+            .means_px
+            .iter()
+            .flatten()
+            .map(|cell| {
+                let [x, y] = cell.mean_px.map(|mean| mean / cell.sd_px);
+                (x * x + y * y) / 2.0
+            })
+            .collect();
+        let mean = seen.iter().sum::<f64>() / seen.len() as f64;
+        (!seen.is_empty()).then_some(mean.sqrt())
+    }
+}
+
+fn cell_mean(residuals: &[[f64; 2]]) -> Option<CellMean> {
+    if residuals.len() < LEAST_IN_CELL {
+        return None;
+    }
+    let n = residuals.len() as f64;
+    let mean_px = [0, 1].map(|axis| residuals.iter().map(|r| r[axis]).sum::<f64>() / n);
+    let off =
+        |r: &[f64; 2]| [0, 1].map(|axis| (r[axis] - mean_px[axis]).powi(2)).iter().sum::<f64>();
+    let variance = residuals.iter().map(off).sum::<f64>() / (2.0 * (n - 1.0));
+    let sd_px = (variance / n).sqrt();
+    (sd_px > 0.0).then_some(CellMean { mean_px, sd_px })
+}
+
+fn surveyed(camera: &Camera, view: &ViewSolution, planar: bool) -> SurveyedView {
+    let normal = view.pose.rotation * DVec3::Z;
+    let count = view.corners.len().max(1) as f64;
+    let middle = [0, 1].map(|i| view.corners.iter().map(|c| c.pixel[i]).sum::<f64>() / count);
+    let sight = camera.unproject(middle).map(|ray| ray.direction).filter(|_| planar);
+    SurveyedView {
+        tilt_rad: sight.map(|sight| normal.angle_between(-sight)),
+        distance_mm: view.pose.translation.length(),
+    }
+}

@@ -1,0 +1,311 @@
+//! The panels of a page: detection against statement.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::document::Page;
+use super::fit::AffineMap;
+use super::fold::Seen;
+use super::tiles::PlacedPanel;
+use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
+use deltille_core::detect::{Detection, Detector, DetectorConfig, GridCorner, Ink, Tone};
+use deltille_core::targets::{Corner, Panel, SheetLayout};
+
+/// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
+/// way to the next.
+const MATCH_EDGES: f64 = 0.25;
+
+/// With a larger share of tiles of the wrong colour the picture does not show the panel, and to
+/// name them one by one would say nothing.
+const MAX_WRONG_TILES: f64 = 0.25;
+
+/// With a larger share of corners missing, or more than stated, it is another board.
+const MAX_MISSING: f64 = 0.25;
+
+/// How far the ink in the middle of a tile may be from 0 or 1: what rounding leaves of 255 grey values.
+const MAX_TONE_ERROR: f64 = 0.01;
+
+/// Difference of ink below which a sheet is called blank rather than faint.
+const MIN_CONTRAST: f64 = 0.03;
+
+/// Compares all panels of a page; tells where on the page the first of them lies, and where the
+/// corners of each were found.
+pub(super) fn check(
+    verifier: &Verifier,
+    page: &Page,
+    layout: &SheetLayout,
+    verdict: &mut SheetVerdict,
+) -> (AffineMap, Seen) {
+    let detection = verifier.detector.detect(&page.blurred(), "page");
+    // Looked at in a mirror only if need be.
+    let mut mirrored: Option<Detection> = None;
+    let mut mirror = None;
+    let mut placed = Vec::new();
+    for placement in &layout.placements {
+        let id = placement.panel;
+        let Some(panel) = verifier.target.panels.iter().find(|panel| panel.id == id) else {
+            verdict.findings.push(Finding::PanelMissing { panel: id });
+            continue;
+        };
+        verdict.corners += panel.corners.len();
+        verdict.tags += panel.tags.len();
+        if !detection.grids.iter().any(|grid| grid.panel == Some(id)) {
+            let mirrored = mirrored.get_or_insert_with(|| {
+                verifier.detector.detect(&page.mirrored().blurred(), "mirror")
+            });
+            if mirrored.grids.iter().any(|grid| grid.panel == Some(id)) {
+                verdict.findings.push(Finding::Mirrored { panel: id });
+                let linear = [[-1.0, 0.0], [0.0, 1.0]];
+                mirror = Some(AffineMap { linear, shift: [page.width_mm, 0.0] });
+                continue;
+            }
+        }
+        let found_from_stated = AffineMap::IDENTITY;
+        let panel = PlacedPanel { page, panel, placement, found_from_stated };
+        match wrong_tones(&panel) {
+            Some(finding) => verdict.findings.push(finding),
+            None => placed.push(panel),
+        }
+    }
+    let mut seen = Seen::new();
+    for panel in &mut placed {
+        let found = check_panel(verifier, &detection, panel, verdict);
+        if !found.is_empty() {
+            seen.insert(panel.panel.id, found);
+        }
+    }
+    let here: BTreeSet<u32> = layout.placements.iter().map(|p| p.panel).collect();
+    let foreign: BTreeSet<u32> =
+        detection.grids.iter().filter_map(|g| g.panel).filter(|id| !here.contains(id)).collect();
+    verdict.findings.extend(foreign.into_iter().map(|panel| Finding::PanelForeign { panel }));
+    if verdict.corners_found > 0 {
+        extra_corners(&detection, &placed, verdict);
+    }
+    another_board(verifier, page, verdict);
+    let first = placed.first().map(|panel| panel.found_from_stated);
+    (mirror.or(first).unwrap_or(AffineMap::IDENTITY), seen)
+}
+
+/// Whether the tiles lie where they should, but are too grey, or black for white.
+pub(super) fn wrong_tones(placed: &PlacedPanel) -> Option<Finding> {
+    let panel = placed.panel.id;
+    let ink @ [white, black] = placed.tones()?;
+    if white - black > 0.5 {
+        return Some(Finding::Inverted { panel });
+    }
+    let faint = black < 1.0 - MAX_TONE_ERROR || white > MAX_TONE_ERROR;
+    (faint && black - white > MIN_CONTRAST).then_some(Finding::Contrast { panel, ink })
+}
+
+/// Says first that the corners found are those of another board, where too few are the stated ones
+/// and their number differs. All corners count, whether or not they are on the stated board.
+fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
+    let unknown = verdict.findings.iter().any(|finding| {
+        matches!(finding, Finding::PanelMissing { .. } | Finding::CornerExtra { .. })
+    });
+    let Some(kind) = verifier.target.panels.first().map(|panel| panel.kind).filter(|_| unknown)
+    else {
+        return;
+    };
+    let any_grid = Detector::for_grid(
+        kind,
+        None,
+        DetectorConfig { tone: Tone::Linear, ink: Ink::Um(0.0), ..DetectorConfig::default() },
+    );
+    let grids = any_grid.detect(&page.blurred(), "page").grids;
+    let found: usize = grids.iter().map(|grid| grid.corners.len()).sum();
+    let stated = verdict.corners;
+    let few = (verdict.corners_found as f64) < (1.0 - MAX_MISSING) * stated as f64;
+    let more = found as f64 > (1.0 + MAX_MISSING) * stated as f64;
+    if found > 0 && found != stated && (few || more) {
+        verdict.findings.insert(0, Finding::AnotherBoard { found, stated });
+    }
+}
+
+/// Compares one panel: corners, then tiles and tags where the corners say they are. Returns where
+/// the corners were found.
+fn check_panel(
+    verifier: &Verifier,
+    detection: &Detection,
+    placed: &mut PlacedPanel,
+    verdict: &mut SheetVerdict,
+) -> BTreeMap<u32, [f64; 2]> {
+    let panel = placed.panel;
+    let found = found_corners(detection, placed);
+    if found.is_empty() {
+        verdict.findings.push(Finding::PanelMissing { panel: panel.id });
+    } else {
+        verdict.corners_found += found.len();
+        let missing = panel.corners.iter().filter(|corner| !found.contains_key(&corner.id));
+        let missing: Vec<Finding> = missing
+            .map(|&Corner { id, row, col, .. }| Finding::CornerMissing { id, row, col })
+            .collect();
+        check_positions(placed, &found, verdict);
+        verdict.findings.extend(missing);
+    }
+    let report = placed.check_tiles(verifier.family);
+    verdict.tags_exact += report.tags_exact;
+    if report.wrong_tiles as f64 <= MAX_WRONG_TILES * report.tiles as f64 {
+        verdict.findings.extend(report.findings);
+        extra_tags(detection, panel, verdict);
+    } else if !found.is_empty() {
+        verdict.findings.push(Finding::PanelMissing { panel: panel.id });
+    }
+    found
+}
+
+/// Page positions of the stated corners that were found, by corner id.
+///
+/// Corners of a tagged panel must be labelled by its tags. An untagged panel has nothing but its
+/// outline, which tells nothing once a corner is missing; then position decides.
+fn found_corners(detection: &Detection, placed: &PlacedPanel) -> BTreeMap<u32, [f64; 2]> {
+    let (page, panel) = (placed.page, placed.panel);
+    let position = |corner: &GridCorner| page.page_from_px([corner.x, corner.y]);
+    let ids: BTreeMap<(i32, i32), u32> =
+        panel.corners.iter().map(|c| ((c.row, c.col), c.id)).collect();
+    let labelled = detection.grids.iter().filter(|grid| grid.panel == Some(panel.id));
+    let mut found: BTreeMap<u32, [f64; 2]> = labelled
+        .flat_map(|grid| &grid.corners)
+        .filter_map(|corner| {
+            let id = *ids.get(&(corner.row, corner.col))?;
+            (corner.id == Some(id)).then(|| (id, position(corner)))
+        })
+        .collect();
+    if panel.tags.is_empty() && found.is_empty() {
+        let unlabelled = detection.grids.iter().filter(|grid| grid.panel.is_none());
+        for at in unlabelled.flat_map(|grid| &grid.corners).map(position) {
+            if let Some((corner, distance)) = nearest(placed, at)
+                && distance < MATCH_EDGES * panel.edge_mm
+            {
+                found.insert(corner.id, at);
+            }
+        }
+    }
+    found
+}
+
+/// The stated corner nearest to a page position, and its distance, mm.
+fn nearest<'a>(placed: &PlacedPanel<'a>, at: [f64; 2]) -> Option<(&'a Corner, f64)> {
+    let distance = |corner: &Corner| {
+        let stated = placed.found_from_stated.apply(placed.page_from_panel(corner.panel_mm));
+        (stated[0] - at[0]).hypot(stated[1] - at[1])
+    };
+    let corners = placed.panel.corners.iter();
+    corners.map(|corner| (corner, distance(corner))).min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Compares positions; where they differ, looks for one cause.
+fn check_positions(
+    placed: &mut PlacedPanel,
+    found: &BTreeMap<u32, [f64; 2]>,
+    verdict: &mut SheetVerdict,
+) {
+    let panel = placed.panel;
+    let corners: Vec<(&Corner, [f64; 2], [f64; 2])> = panel
+        .corners
+        .iter()
+        .filter_map(|c| Some((c, placed.page_from_panel(c.panel_mm), *found.get(&c.id)?)))
+        .collect();
+    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let largest = |map: &AffineMap| {
+        let deviations =
+            corners.iter().map(|(_, stated, found)| distance(map.apply(*stated), *found));
+        deviations.fold(0.0, f64::max)
+    };
+    let raw = largest(&AffineMap::IDENTITY);
+    verdict.max_deviation_mm = verdict.max_deviation_mm.max(raw);
+    if raw <= TOLERANCE_MM {
+        return;
+    }
+    let pairs: Vec<_> = corners.iter().map(|(_, stated, found)| (*stated, *found)).collect();
+    let map = AffineMap::fit(&pairs).unwrap_or(AffineMap::IDENTITY);
+    let causes = causes(panel, &map, &pairs);
+    if !causes.is_empty() {
+        verdict.findings.extend(causes);
+        placed.found_from_stated = map;
+    }
+    let map = placed.found_from_stated;
+    for (corner, stated, found) in corners {
+        let expected = map.apply(stated);
+        if distance(expected, found) > TOLERANCE_MM {
+            let Corner { id, row, col, .. } = *corner;
+            let by_mm = [found[0] - expected[0], found[1] - expected[1]];
+            verdict.findings.push(Finding::CornerOff { id, row, col, by_mm });
+        }
+    }
+}
+
+/// Scale, turn and shift of a whole panel, each where it alone moves a corner by more than the
+/// tolerance.
+fn causes(panel: &Panel, map: &AffineMap, pairs: &[([f64; 2], [f64; 2])]) -> Vec<Finding> {
+    let id = panel.id;
+    let mean = |at: fn(&([f64; 2], [f64; 2])) -> f64| {
+        pairs.iter().map(at).sum::<f64>() / pairs.len() as f64
+    };
+    let centre = [mean(|p| p.0[0]), mean(|p| p.0[1])];
+    let by_mm = [mean(|p| p.1[0]) - centre[0], mean(|p| p.1[1]) - centre[1]];
+    let radius =
+        pairs.iter().map(|(p, _)| (p[0] - centre[0]).hypot(p[1] - centre[1])).fold(0.0, f64::max);
+
+    let mut causes = Vec::new();
+    let [x, y] = map.scales();
+    let scale = (x + y) / 2.0;
+    if (x - y).abs() / 2.0 * radius > TOLERANCE_MM {
+        causes.push(Finding::Stretched { panel: id, scale: [x, y] });
+    } else if (scale - 1.0).abs() * radius > TOLERANCE_MM {
+        causes.push(Finding::Scale { panel: id, scale });
+    }
+    let turn = map.turn_rad();
+    if turn.abs() * radius > TOLERANCE_MM {
+        causes.push(Finding::Turned { panel: id, angle_deg: turn.to_degrees() });
+    }
+    // A scaled or turned page has its middle elsewhere too.
+    if causes.is_empty() && by_mm[0].hypot(by_mm[1]) > TOLERANCE_MM {
+        causes.push(Finding::Shifted { panel: id, by_mm });
+    }
+    causes
+}
+
+/// Tags that the detector reads where the panel has none, or another.
+fn extra_tags(detection: &Detection, panel: &Panel, verdict: &mut SheetVerdict) {
+    let stated: BTreeSet<(u32, i32, i32)> =
+        panel.tags.iter().map(|tag| (tag.id, tag.row, tag.col)).collect();
+    let grids = detection.grids.iter().filter(|grid| grid.panel == Some(panel.id));
+    let extra = grids
+        .flat_map(|grid| &grid.tags)
+        .filter(|tag| !stated.contains(&(tag.id, tag.row, tag.col)))
+        .map(|tag| Finding::TagExtra { id: tag.id, row: tag.row, col: tag.col });
+    verdict.findings.extend(extra);
+}
+
+/// Corners that belong to no panel of the page. The cells of a tag meet like small tiles; what is
+/// inside a tag's tile is judged cell by cell instead.
+fn extra_corners(detection: &Detection, placed: &[PlacedPanel], verdict: &mut SheetVerdict) {
+    for corner in detection.grids.iter().flat_map(|grid| &grid.corners) {
+        let Some(page) = placed.first().map(|p| p.page) else { return };
+        let at_mm = page.page_from_px([corner.x, corner.y]);
+        let known = placed.iter().any(|panel| {
+            let near = nearest(panel, at_mm)
+                .is_some_and(|(_, distance)| distance < MATCH_EDGES * panel.panel.edge_mm);
+            near || in_tag(panel, at_mm)
+        });
+        if !known {
+            verdict.findings.push(Finding::CornerExtra { at_mm });
+        }
+    }
+}
+
+/// Whether a page position lies in a tile that carries a tag.
+fn in_tag(placed: &PlacedPanel, at_mm: [f64; 2]) -> bool {
+    let panel = placed.panel;
+    panel.tags.iter().any(|tag| {
+        let vertices = panel.tag_tile(tag).vertices().map(|v| {
+            let stated = placed.page_from_panel(panel.lattice_mm(v));
+            placed.found_from_stated.apply(stated)
+        });
+        let left = |p: [f64; 2], q: [f64; 2]| {
+            (q[0] - p[0]) * (at_mm[1] - p[1]) - (q[1] - p[1]) * (at_mm[0] - p[0]) > 0.0
+        };
+        let next = vertices.clone().cycle().skip(1);
+        vertices.zip(next).all(|(p, q)| left(p, q))
+    })
+}

@@ -1,0 +1,226 @@
+//! Bodies to print, as STL: closed, outside out, of the stated shape.
+//!
+//! A skeleton is felt from outside with rays: on the ribs they meet the planes of the faces, in the
+//! seats they stop at the thickness of a panel below, and in the windows they pass. Then it is compared
+//! triangle by triangle, as the bare solid is.
+
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use super::model::{Facet, load_stl};
+use super::solid::{is_other_mesh, other_count};
+use super::{BodyVerdict, DocumentError, Finding, Format, MESH_TOLERANCE_MM, Verdict, Verifier};
+use deltille_core::targets::{
+    ClosedMesh, Incircle, Polyhedron, Skeleton, SkeletonSpec, TargetSpec,
+};
+use deltille_files::export::stl::skeleton_name;
+
+/// How far a unit normal may be from that of its triangle: single precision on small triangles.
+const NORMAL_SLACK: f64 = 1e-3;
+
+/// Relative difference of volumes: single precision.
+const VOLUME_SLACK: f64 = 1e-4;
+
+/// Rays start this far above a face, mm, and are sent down this far beside the line where ribs,
+/// seats and windows meet.
+const ABOVE_MM: f64 = 0.5;
+const BESIDE_MM: f64 = 0.02;
+
+/// Triangles that may have one middle.
+const SAME_MIDDLE: usize = 4;
+
+/// Places along a side of a face at which it is felt.
+const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
+
+/// Reads an STL from disk and compares it with the target.
+pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
+    let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
+    let target = verifier.target;
+    let TargetSpec::Solid(spec) = &target.spec else {
+        return Err(unreadable("the target is no solid"));
+    };
+    let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let facets = load_stl(path, &verifier.limits)?;
+    let solid = spec.polyhedron();
+    let mut body = BodyVerdict {
+        triangles: facets.len(),
+        volume_mm3: volume(facets.iter().map(|facet| facet.vertices_mm)),
+        seats: 0,
+        max_deviation_mm: 0.0,
+    };
+    let is_skeleton = artifact.ends_with(&skeleton_name(""));
+    let skeleton = match spec.skeleton.as_ref().filter(|_| is_skeleton) {
+        Some(skeleton) => Some((
+            Skeleton::new(&solid, skeleton).map_err(|error| unreadable(&error.to_string()))?,
+            skeleton,
+        )),
+        None if is_skeleton => return Err(unreadable("the target has no skeleton")),
+        None => None,
+    };
+    let stated = match &skeleton {
+        Some((skeleton, _)) => skeleton.triangles_mm.clone(),
+        None => solid.triangles_mm(),
+    };
+    let mut findings = Vec::new();
+    if is_other_mesh(facets.len(), stated.len()) {
+        findings.extend(other_count(facets.len(), stated.len()));
+    } else {
+        findings = check_surface(&facets);
+        let wrong_seats = skeleton.map_or_else(Vec::new, |(skeleton, spec)| {
+            check_seats(&facets, &solid, (&skeleton, spec), &mut body)
+        });
+        // Where a seat is wrong, its triangles would only repeat that.
+        if wrong_seats.is_empty() {
+            check_triangles(&facets, &stated, &mut body, &mut findings);
+        }
+        findings.extend(wrong_seats);
+    }
+    Ok(Verdict { body: Some(body), ..Verdict::new(path, Format::Stl, findings) })
+}
+
+/// Closed, one piece, outside out, normals those of the triangles.
+fn check_surface(facets: &[Facet]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let vertices: Vec<DVec3> = facets.iter().flat_map(|facet| facet.vertices_mm).collect();
+    let indices: Vec<[usize; 3]> =
+        (0..facets.len()).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let problem = match ClosedMesh::new(&vertices, &indices) {
+        Ok((_, false)) => None,
+        Ok((_, true)) => Some("it is inside out".to_owned()),
+        Err(error) => Some(error.to_string()),
+    };
+    findings.extend(problem.map(|problem| Finding::Body { problem }));
+    // A normal that is no number is wrong too.
+    let wrong = facets.iter().filter(|facet| {
+        let [a, b, c] = facet.vertices_mm;
+        let off = facet.normal.distance((b - a).cross(c - a).normalize_or_zero());
+        off.is_nan() || off > NORMAL_SLACK
+    });
+    let triangles = wrong.count();
+    if triangles > 0 {
+        findings.push(Finding::Normals { triangles });
+    }
+    findings
+}
+
+/// Every stated triangle is there once, and nothing else.
+fn check_triangles(
+    facets: &[Facet],
+    stated: &[[DVec3; 3]],
+    body: &mut BodyVerdict,
+    findings: &mut Vec<Finding>,
+) {
+    let volume_mm3 = volume(stated.iter().copied());
+    if (body.volume_mm3 / volume_mm3 - 1.0).abs() > VOLUME_SLACK {
+        let [found, stated] = [body.volume_mm3, volume_mm3].map(|mm3| mm3 / 1e3);
+        let scale = (found / stated).cbrt();
+        let problem =
+            format!("volume of {found:.1} cm³ instead of {stated:.1} cm³, as of scale {scale:.4}");
+        findings.push(Finding::Body { problem });
+        return;
+    }
+    findings.extend(other_count(facets.len(), stated.len()));
+    let middle = |corners: &[DVec3; 3]| (corners.iter().sum::<DVec3>() / 3.0).to_array();
+    let places = facets.iter().map(|facet| GeomWithData::new(middle(&facet.vertices_mm), facet));
+    let places = RTree::bulk_load(places.collect());
+    let deviation = |facet: &Facet, triangle: &[DVec3; 3]| {
+        let turned = |turn: usize| {
+            let apart = (0..3).map(|i| facet.vertices_mm[(i + turn) % 3].distance(triangle[i]));
+            apart.fold(0.0, f64::max)
+        };
+        (0..3).map(turned).fold(f64::INFINITY, f64::min)
+    };
+    for (index, triangle) in stated.iter().enumerate() {
+        let near = places.nearest_neighbor_iter(middle(triangle)).take(SAME_MIDDLE);
+        let nearest = near.map(|near| deviation(near.data, triangle)).fold(f64::INFINITY, f64::min);
+        if nearest > MESH_TOLERANCE_MM {
+            let [x, y, z] = middle(triangle);
+            let problem = format!(
+                "triangle {index}, around ({x:.2}, {y:.2}, {z:.2}) mm, is not there; the nearest is off by \
+                 {nearest:.3} mm"
+            );
+            findings.push(Finding::Body { problem });
+        } else {
+            body.max_deviation_mm = body.max_deviation_mm.max(nearest);
+        }
+    }
+}
+
+/// Every seat has its depth and its outline.
+fn check_seats(
+    facets: &[Facet],
+    solid: &Polyhedron,
+    (skeleton, spec): (&Skeleton, &SkeletonSpec),
+    body: &mut BodyVerdict,
+) -> Vec<Finding> {
+    let (thickness, through) = (spec.panel_thickness_mm, spec.panel_thickness_mm + spec.wall_mm);
+    let (rib, window) = (skeleton.rib_mm, skeleton.window_mm);
+    // Distance from the edges, and the depth there; `None` in the window.
+    let felt = [
+        (rib / 2.0, Some(0.0)),
+        (rib - BESIDE_MM, Some(0.0)),
+        (rib + BESIDE_MM, Some(thickness)),
+        ((rib + window) / 2.0, Some(thickness)),
+        (window - BESIDE_MM, Some(thickness)),
+        (window + BESIDE_MM, None),
+    ];
+    let faces: Vec<(usize, f64, Option<String>)> = (0..solid.faces.len())
+        .into_par_iter()
+        .map(|face| {
+            let corners = solid.triangle_mm(face);
+            let circle = Incircle::of(corners);
+            let mut most = 0.0f64;
+            for (inset, stated) in felt {
+                let [a, b, c] = circle.inset(corners, inset, -ABOVE_MM);
+                let places = [(a, b), (b, c), (c, a)].into_iter();
+                for at in places.flat_map(|(from, to)| PLACES.map(|part| from.lerp(to, part))) {
+                    let found = depth(facets, at, -circle.normal) - ABOVE_MM;
+                    let off = match stated {
+                        Some(stated) => (found - stated).abs(),
+                        None => (through - found).max(0.0),
+                    };
+                    if off > MESH_TOLERANCE_MM {
+                        let below = stated.map_or("open".to_owned(), |mm| format!("{mm:.3} mm"));
+                        let problem = format!(
+                            "face {face}: {inset:.2} mm from its edge the skeleton is {found:.3} \
+                             mm below it instead of {below}"
+                        );
+                        return (face, most, Some(problem));
+                    }
+                    most = most.max(off);
+                }
+            }
+            (face, most, None)
+        })
+        .collect();
+    let mut findings = Vec::new();
+    for (_, off, problem) in faces {
+        body.seats += usize::from(problem.is_none());
+        body.max_deviation_mm = body.max_deviation_mm.max(off);
+        findings.extend(problem.map(|problem| Finding::Body { problem }));
+    }
+    findings
+}
+
+/// How far a ray gets, mm.
+fn depth(facets: &[Facet], from: DVec3, direction: DVec3) -> f64 {
+    let meets = facets.iter().filter_map(|facet| {
+        let [a, b, c] = facet.vertices_mm;
+        let normal = (b - a).cross(c - a);
+        let t = normal.dot(a - from) / normal.dot(direction);
+        let p = from + direction * t;
+        let inside =
+            [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (v - u).cross(p - u).dot(normal) >= 0.0);
+        (t >= 0.0 && inside).then_some(t)
+    });
+    meets.fold(f64::INFINITY, f64::min)
+}
+
+/// The volume inside a closed surface, by the divergence theorem.
+fn volume(triangles: impl Iterator<Item = [DVec3; 3]>) -> f64 {
+    triangles.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+}

@@ -1,0 +1,237 @@
+//! What a file is built of, held against a list of what every viewer shows alike.
+//!
+//! A picture of a file proves what one program shows. Scripts, animations, rules for print, layers,
+//! blend modes, vertex colours or a second scene make another program show something else. So each
+//! format has a list of what its writer here uses and the reader interprets exactly; anything else
+//! is named and refused, known as harmful or not. What is refused is not drawn.
+
+mod glb;
+mod glb_json;
+mod ink;
+mod mtl;
+mod obj;
+mod pdf;
+mod pdf_content;
+mod png;
+mod stl;
+mod svg;
+
+use std::path::Path;
+
+use flate2::{Decompress, FlushDecompress, Status};
+use serde_json::Value;
+
+use super::document::bounded;
+use super::{DocumentError, Finding, Format};
+use deltille_core::artwork::subject;
+use deltille_core::targets::Target;
+use deltille_files::export::mesh::extras;
+use deltille_files::limits::Limits;
+
+/// Of marks that a viewer which shows more than the page shows too.
+const OFF_PAGE: &str = "a mark that reaches over the edge of the page";
+
+/// Most characters of a number.
+const MOST_DIGITS: usize = 40;
+
+/// More than this of a file is not listed.
+const MOST_LISTED: usize = 64;
+
+/// What is not on the list, as it is met on the way through a file.
+#[derive(Default)]
+struct Findings(Vec<Finding>);
+
+impl Findings {
+    /// Adds a construct, such as "element <image>", and where it is, such as "line 12".
+    fn add(&mut self, place: impl Into<String>, construct: impl Into<String>) {
+        if !self.is_full() {
+            let (place, construct) = (place.into(), construct.into());
+            self.0.push(Finding::Construct { place, construct });
+        }
+    }
+
+    /// Adds a construct unless something holds.
+    fn unless(&mut self, holds: bool, place: impl Into<String>, construct: impl Into<String>) {
+        if !holds {
+            self.add(place, construct);
+        }
+    }
+
+    /// Adds, unless something holds, what no picture shows; what is drawn is compared all the same.
+    fn unseen_unless(&mut self, holds: bool, place: impl Into<String>, problem: impl Into<String>) {
+        if !holds && !self.is_full() {
+            let (place, problem) = (place.into(), problem.into());
+            self.0.push(Finding::Unseen { place, problem });
+        }
+    }
+
+    /// Whether the file is not drawn.
+    fn refuse(&self) -> bool {
+        refuse(&self.0)
+    }
+
+    /// Whether no more is listed.
+    fn is_full(&self) -> bool {
+        self.0.len() >= MOST_LISTED
+    }
+
+    /// Adds what a file that belongs to this one has, with its name.
+    fn add_of(&mut self, file: &str, other: Findings) {
+        for finding in other.0 {
+            match finding {
+                Finding::Construct { place, construct } => {
+                    self.add(format!("{file}, {place}"), construct);
+                }
+                Finding::Unseen { place, problem } => {
+                    self.unseen_unless(false, format!("{file}, {place}"), problem);
+                }
+                other => self.0.push(other),
+            }
+        }
+    }
+}
+
+/// Whether there is something in a file that not every viewer shows alike, so that it is not drawn.
+pub(super) fn refuse(findings: &[Finding]) -> bool {
+    findings.iter().any(|finding| match finding {
+        Finding::OnPage { finding, .. } => matches!(**finding, Finding::Construct { .. }),
+        finding => matches!(finding, Finding::Construct { .. }),
+    })
+}
+
+/// What files say of their target in words, for people and programs that do not look at the picture.
+struct Words {
+    /// Its name.
+    title: String,
+    /// One line on what it is.
+    subject: String,
+    /// The same for programs.
+    extras: Value,
+}
+
+impl Words {
+    fn of(target: &Target) -> Self {
+        Self { title: target.name.to_string(), subject: subject(target), extras: extras(target) }
+    }
+
+    /// Whether data in a mesh is that of the target; any version of the program may have written it.
+    fn are_extras(&self, found: &Value) -> bool {
+        let creator = found["generator"].as_str().is_some_and(is_creator);
+        let mut stated = self.extras.clone();
+        stated["generator"] = found["generator"].clone();
+        creator && stated == *found
+    }
+}
+
+/// Whether words name this program in any of its versions.
+fn is_creator(words: &str) -> bool {
+    let version = words.strip_prefix("deltille ").unwrap_or_default();
+    !version.is_empty() && version.chars().all(|c| c.is_ascii_digit() || c == '.')
+}
+
+/// What of a drawn page, a mesh or a body is not on the list of its format, or says in words
+/// what the target is not. An error means that the file cannot be read at all.
+pub(super) fn check(
+    path: &Path,
+    format: Format,
+    target: &Target,
+    limits: &Limits,
+) -> Result<Vec<Finding>, DocumentError> {
+    let bytes = limits.read(path)?;
+    let (words, limits) = (Words::of(target), *limits);
+    if format == Format::Obj {
+        return obj::check(path, &bytes, &words, &limits).map(|found| found.0);
+    }
+    let found = bounded(path, &limits, move || match format {
+        Format::Svg => svg::check(&bytes, &words, &limits),
+        Format::Pdf => pdf::check(&bytes, &words, &limits),
+        Format::Png => png::check(&bytes, &words.title, &limits),
+        Format::Glb => glb::check(&bytes, &words, &limits),
+        Format::Stl => stl::check(&bytes, &words.title, &limits),
+        // Their readers know nothing but what is written.
+        Format::Obj | Format::Dsc | Format::Dxf => Ok(Findings::default()),
+    })?;
+    Ok(found.0)
+}
+
+/// The text of a file.
+fn text(bytes: &[u8]) -> Result<&str, String> {
+    std::str::from_utf8(bytes).map_err(|_| "not a text file in UTF-8".to_owned())
+}
+
+/// The first characters of what is named in a finding.
+fn start(text: &str, characters: usize) -> String {
+    text.chars().take(characters).collect()
+}
+
+/// A decimal number as all readers take it: digits on both sides of a point, without an exponent or
+/// a plus, and no more of them than any reader has room for.
+fn decimal(word: &str) -> Option<f64> {
+    let digits = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+    let size = word.strip_prefix('-').unwrap_or(word);
+    let (whole, fraction) = size.split_once('.').unwrap_or((size, "0"));
+    let plain = word.len() <= MOST_DIGITS && digits(whole) && digits(fraction);
+    plain.then(|| word.parse().ok()).flatten()
+}
+
+/// Unpacks what is packed by zlib, block by block, and tells its length: `None` unless it ends with the
+/// last of these bytes, its check sum is right, and it is no longer than `most`.
+fn unpack(packed: &[u8], most: u64, mut each: impl FnMut(&[u8])) -> Option<u64> {
+    let mut stream = Decompress::new(true);
+    let mut block = vec![0; 1 << 16];
+    loop {
+        let (read, before) = (stream.total_in(), stream.total_out());
+        let rest = packed.get(usize::try_from(read).ok()?..)?;
+        let status = stream.decompress(rest, &mut block, FlushDecompress::None).ok()?;
+        let length = stream.total_out() - before;
+        each(block.get(..usize::try_from(length).ok()?)?);
+        if stream.total_out() > most {
+            return None;
+        }
+        match status {
+            Status::StreamEnd if stream.total_in() == packed.len() as u64 => {
+                return Some(stream.total_out());
+            }
+            Status::StreamEnd => return None,
+            // Nothing goes on: the end is missing.
+            _ if length == 0 && stream.total_in() == read => return None,
+            _ => {}
+        }
+    }
+}
+
+/// Whether a name is that of a file in the same folder.
+fn is_plain_file_name(name: &str) -> bool {
+    let listed = |c: char| !matches!(c, '/' | '\\' | ':') && !c.is_control();
+    !name.is_empty() && name != ".." && name.trim() == name && name.chars().all(listed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_decimals_and_names_stay_in_the_folder() {
+        assert_eq!(decimal("-0.5"), Some(-0.5));
+        let long = "0".repeat(50);
+        for word in
+            ["1e3", "inf", "nan", "0x1", "", "-", "1.2.3", "1,5", "+1", ".5", "5.", "--1", &long]
+        {
+            assert_eq!(decimal(word), None, "{word}");
+        }
+        assert!(is_plain_file_name("t-texture.png"));
+        for name in [
+            "",
+            "..",
+            "../t.png",
+            "/t.png",
+            "a\\b.png",
+            "c:t.png",
+            "http://t/t.png",
+            "t.png\r",
+            "t.png ",
+        ] {
+            assert!(!is_plain_file_name(name), "{name}");
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! The lines of an OBJ that every viewer takes alike: triangles with one material, each corner with
+//! its position, texture coordinate and normal.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::{Findings, Words, decimal, is_creator, is_plain_file_name, mtl, png, start, text};
+use crate::DocumentError;
+use deltille_files::limits::Limits;
+
+/// Goes through an OBJ, its material library and its texture.
+pub(super) fn check(
+    path: &Path,
+    bytes: &[u8],
+    words: &Words,
+    limits: &Limits,
+) -> Result<Findings, DocumentError> {
+    let text = text(bytes).map_err(|problem| DocumentError::unreadable(path, problem))?;
+    let lines = text.lines().count();
+    limits.check_nodes(lines).map_err(|e| DocumentError::unreadable(path, e.to_string()))?;
+    let mut reader = Reader::default();
+    for (index, line) in text.split_terminator('\n').enumerate() {
+        let place = format!("line {}", index + 1);
+        match line.strip_prefix("# ") {
+            Some(comment) => reader.comment(comment, index, words, &place),
+            None => reader.line(line, &place),
+        }
+    }
+    for (used, (what, count)) in
+        reader.used.iter().zip(["v", "vt", "vn"].into_iter().zip(reader.counts))
+    {
+        reader.found.unless(used.len() == count, "the file", format!("a line {what} of no use"));
+    }
+    let named = reader.object.as_deref() == Some(&*words.title);
+    reader.found.unseen_unless(named, "the file", "an object other than the target's name");
+    let mut found = reader.found;
+    let Some(library) = reader.library.filter(|_| !found.refuse()) else {
+        found.unless(found.refuse(), "the file", "no material library");
+        return Ok(found);
+    };
+    let file = path.with_file_name(&library);
+    let (material, of_library) = mtl::check(&limits.read_text(&file)?);
+    found.add_of(&library, of_library);
+    let known = material.name.is_some() && material.name == reader.material;
+    found.unless(known, "the file", "a material other than that of its library");
+    if let Some(texture) = material.texture.filter(|_| !found.refuse()) {
+        let file = path.with_file_name(&texture);
+        let picture = png::check(&limits.read(&file)?, &words.title, limits)
+            .map_err(|problem| DocumentError::unreadable(&file, problem))?;
+        found.add_of(&texture, picture);
+    }
+    Ok(found)
+}
+
+/// What was read so far.
+#[derive(Default)]
+struct Reader {
+    found: Findings,
+    library: Option<String>,
+    object: Option<String>,
+    material: Option<String>,
+    /// Positions, texture coordinates and normals.
+    counts: [usize; 3],
+    /// Which of them faces have.
+    used: [BTreeSet<usize>; 3],
+}
+
+impl Reader {
+    /// The first two lines say what wrote the file, and of what target.
+    fn comment(&mut self, comment: &str, index: usize, words: &Words, place: &str) {
+        let holds = match index {
+            0 => comment.strip_suffix(", millimetres").is_some_and(is_creator),
+            1 => serde_json::from_str(comment).is_ok_and(|found: Value| {
+                let anew = found.to_string();
+                words.are_extras(&found) && anew == comment
+            }),
+            _ => false,
+        };
+        // Behind a backslash the next line belongs to the comment, or not.
+        let listed = index < 2 && !comment.contains('\\');
+        self.found.unless(listed, place, "a comment");
+        self.found.unseen_unless(!listed || holds, place, "words that do not describe the target");
+    }
+
+    fn line(&mut self, line: &str, place: &str) {
+        let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
+        let once = |slot: &mut Option<String>| slot.replace(rest.to_owned()).is_none();
+        let holds = match word {
+            "o" => once(&mut self.object),
+            "mtllib" => once(&mut self.library) && is_plain_file_name(rest),
+            "usemtl" => once(&mut self.material),
+            "v" => self.numbers(rest, 0, 3),
+            "vt" => self.numbers(rest, 1, 2) && rest.split(' ').all(on_texture),
+            "vn" => self.numbers(rest, 2, 3),
+            "f" => {
+                let dressed = self.material.is_some();
+                self.found.unless(dressed, place, "a face before its material");
+                self.is_triangle(rest)
+            }
+            _ => {
+                return self.found.add(place, format!("statement {}", start(word, 20)));
+            }
+        };
+        self.found.unless(holds, place, format!("`{}`", start(line, 60)));
+    }
+
+    /// Whether a line holds so many numbers; they are counted.
+    fn numbers(&mut self, rest: &str, list: usize, count: usize) -> bool {
+        self.counts[list] += 1;
+        let numbers: Option<Vec<f64>> = rest.split(' ').map(decimal).collect();
+        numbers.is_some_and(|numbers| numbers.len() == count)
+    }
+
+    /// Whether a face has three corners that are listed above it.
+    fn is_triangle(&mut self, rest: &str) -> bool {
+        let corners: Vec<&str> = rest.split(' ').collect();
+        corners.len() == 3 && corners.into_iter().all(|corner| self.is_listed(corner))
+    }
+
+    /// Whether the position, texture coordinates and normal of a corner are listed above it.
+    fn is_listed(&mut self, corner: &str) -> bool {
+        let indices: Vec<usize> = corner.split('/').filter_map(index).collect();
+        let written = corner.split('/').count();
+        let listed = indices.iter().zip(self.counts).all(|(i, count)| (1..=count).contains(i));
+        indices.iter().zip(&mut self.used).for_each(|(&index, used)| {
+            used.insert(index);
+        });
+        written == 3 && indices.len() == 3 && listed
+    }
+}
+
+/// A number without a sign or zeros before it.
+fn index(word: &str) -> Option<usize> {
+    word.parse().ok().filter(|index: &usize| index.to_string() == word)
+}
+
+/// Beyond the texture viewers repeat it or not.
+fn on_texture(word: &str) -> bool {
+    decimal(word).is_some_and(|value| (0.0..=1.0).contains(&value))
+}

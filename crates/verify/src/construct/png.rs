@@ -1,0 +1,135 @@
+//! The PNG chunks and pixels that every viewer shows alike: grey of 8 bits without transparency,
+//! without a colour space to interpret and without a second picture.
+
+use super::{Findings, is_creator, unpack};
+use deltille_files::export::kind::SOFTWARE;
+use deltille_files::limits::{Exceeded, Limits};
+
+const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+
+/// Pixels, their size on paper, what wrote them, and a title.
+const CHUNKS: [&[u8]; 6] = [b"IHDR", b"pHYs", b"tEXt", b"iTXt", b"IDAT", b"IEND"];
+
+/// What stands before the title: a word, and that it is neither packed nor in a language.
+const TITLE: &[u8] = b"Title\0\0\0\0\0";
+
+/// Depth, colour type, compression, filter and interlace of 8-bit grey.
+const GREY: [u8; 5] = [8, 0, 0, 0, 0];
+
+/// Goes through the chunks of a PNG with that title.
+pub(super) fn check(bytes: &[u8], title: &str, limits: &Limits) -> Result<Findings, String> {
+    let mut rest = bytes.strip_prefix(&SIGNATURE).ok_or("not a readable PNG (its signature)")?;
+    let mut found = Findings::default();
+    let mut seen: Vec<&[u8]> = Vec::new();
+    let (mut packed, mut first) = (Vec::new(), [].as_slice());
+    while seen.last() != Some(&b"IEND".as_slice()) {
+        let Chunk { kind, data, is_intact, after } =
+            Chunk::first_of(rest).ok_or("not a readable PNG (it is cut off)")?;
+        let name = String::from_utf8_lossy(kind).into_owned();
+        let place = format!("byte {}", bytes.len() - rest.len());
+        // Some readers refuse what others show.
+        found.unless(is_intact, &place, format!("a check sum of {name} that is wrong"));
+        if !CHUNKS.contains(&kind) {
+            found.add(&place, format!("chunk {name}"));
+        }
+        let pixels = kind == b"IDAT";
+        let twice = !pixels && seen.contains(&kind);
+        found.unless(!twice, &place, format!("a second chunk {name}"));
+        let in_row = !pixels || !seen.contains(&kind) || seen.last() == Some(&kind);
+        found.unless(in_row, &place, "pixels in two places");
+        let is_title = kind != b"iTXt" || data.strip_prefix(TITLE) == Some(title.as_bytes());
+        found.unseen_unless(is_title, &place, "words other than the target's name for a title");
+        let is_software = kind != b"tEXt" || names_writer(data);
+        found.unseen_unless(is_software, &place, "words other than the program that wrote it");
+        found.unless(kind != b"IEND" || data.is_empty(), &place, "data in the chunk IEND");
+        let head = kind == b"IHDR";
+        found.unless(head == seen.is_empty(), &place, format!("chunk {name} in this place"));
+        if head {
+            first = data;
+        }
+        // A head that is damaged is told, and its pixels are not looked at.
+        if head && is_intact {
+            check_size(data, limits).map_err(|exceeded| exceeded.to_string())?;
+        }
+        if pixels {
+            packed.extend_from_slice(data);
+        }
+        if head && data.get(8..) != Some(&GREY) {
+            found.add(&place, "pixels other than grey of 8 bits, line by line");
+        }
+        if kind == b"pHYs" && seen.contains(&b"IDAT".as_slice()) {
+            found.add(&place, "the resolution after the pixels");
+        }
+        seen.push(kind);
+        rest = after;
+    }
+    found.unseen_unless(seen.contains(&b"iTXt".as_slice()), "the file", "no title");
+    found.unseen_unless(seen.contains(&b"tEXt".as_slice()), "the file", "no name of what wrote it");
+    let place = format!("byte {}", bytes.len() - rest.len());
+    found.unless(rest.is_empty(), place, "data after the end");
+    // What is not grey of 8 bits is told already.
+    let is_whole = found.refuse() || is_whole(&packed, first);
+    found.unless(
+        is_whole,
+        "the pixels",
+        "a check sum that is wrong, or more or less data than of the picture",
+    );
+    Ok(found)
+}
+
+/// Whether words name this program as the software.
+fn names_writer(words: &[u8]) -> bool {
+    let name = words.strip_prefix(SOFTWARE.as_bytes()).and_then(|rest| rest.strip_prefix(b"\0"));
+    name.and_then(|name| std::str::from_utf8(name).ok()).is_some_and(is_creator)
+}
+
+/// Refuses a picture of too many pixels by its head.
+fn check_size(head: &[u8], limits: &Limits) -> Result<(), Exceeded> {
+    let (width, height) = size(head).unwrap_or_default();
+    limits.check_pixels(width, height)
+}
+
+/// Refuses a PNG of too many pixels; one that is damaged is left to [`check`].
+pub(super) fn check_pixels(bytes: &[u8], limits: &Limits) -> Result<(), Exceeded> {
+    let head = bytes.strip_prefix(&SIGNATURE).and_then(Chunk::first_of);
+    head.map_or(Ok(()), |head| check_size(head.data, limits))
+}
+
+/// Width and height, with which the head of a PNG begins.
+fn size(head: &[u8]) -> Option<(u32, u32)> {
+    let word = |at: usize| head.get(at..)?.first_chunk::<4>().map(|b| u32::from_be_bytes(*b));
+    Some((word(0)?, word(4)?))
+}
+
+/// Whether the packed pixels are whole, with their check sum and nothing behind it, and fill the picture: a byte and
+/// the pixels of each row.
+fn is_whole(packed: &[u8], head: &[u8]) -> bool {
+    let Some((width, height)) = size(head) else { return false };
+    let length = (u64::from(width) + 1) * u64::from(height);
+    unpack(packed, length, |_| ()) == Some(length)
+}
+
+/// A chunk, which begins with the length of its content and ends with a check sum.
+struct Chunk<'a> {
+    /// Its name.
+    kind: &'a [u8],
+    data: &'a [u8],
+    /// Whether the check sum is that of name and content.
+    is_intact: bool,
+    /// What follows the chunk.
+    after: &'a [u8],
+}
+
+impl<'a> Chunk<'a> {
+    /// The chunk that these bytes begin with.
+    fn first_of(bytes: &'a [u8]) -> Option<Self> {
+        let (length, rest) = bytes.split_first_chunk::<4>()?;
+        let (kind, rest) = rest.split_at_checked(4)?;
+        let (data, rest) = rest.split_at_checked(u32::from_be_bytes(*length) as usize)?;
+        let (stated, after) = rest.split_first_chunk::<4>()?;
+        let mut sum = flate2::Crc::new();
+        sum.update(kind);
+        sum.update(data);
+        Some(Self { kind, data, is_intact: sum.sum() == u32::from_be_bytes(*stated), after })
+    }
+}

@@ -1,0 +1,26 @@
+//! What every reader of binary STL takes alike: the head that is written, and triangles without
+//! attributes, which some readers take for colours.
+
+use super::Findings;
+use deltille_files::export::stl::header;
+use deltille_files::limits::Limits;
+
+/// Bytes before the triangles, of a triangle, and of a triangle without its attributes.
+const HEAD: usize = 84;
+const TRIANGLE: usize = 50;
+const GEOMETRY: usize = 48;
+
+/// Goes through an STL of a target of that name. What is too short is left to the reader.
+pub(super) fn check(bytes: &[u8], name: &str, limits: &Limits) -> Result<Findings, String> {
+    let count = bytes.len().saturating_sub(HEAD) / TRIANGLE;
+    limits.check_nodes(count).map_err(|exceeded| exceeded.to_string())?;
+    let mut found = Findings::default();
+    let head = bytes.get(..80).is_none_or(|head| head == header(name));
+    found.unless(head, "the head", "words other than the target's name");
+    let triangles = bytes.get(HEAD..).unwrap_or_default().chunks_exact(TRIANGLE);
+    let coloured = triangles.enumerate().find(|(_, triangle)| triangle[GEOMETRY..] != [0, 0]);
+    if let Some((index, _)) = coloured {
+        found.add(format!("triangle {index}"), "attribute bytes");
+    }
+    Ok(found)
+}

@@ -1,0 +1,307 @@
+//! Artifacts read back from disk as pictures, by other code than wrote them: hayro for PDF, resvg
+//! for SVG, the image crates for PNG.
+
+mod pdf;
+mod png;
+mod svg;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use deltille_core::raster::Gray;
+use deltille_files::limits::{self, Broken, Kind, Limits, ReadError};
+
+/// Largest picture that is drawn for a check, px.
+pub(super) const MAX_PIXELS: f64 = 60.0e6;
+
+/// How far the ink of an area may be from 0 or 1 on a page that is drawn or read: what rounding leaves of 255 grey
+/// values.
+pub(super) const MAX_INK_ERROR: f64 = 0.01;
+
+/// The same so near to an edge that its smear reaches there.
+pub(super) const SMEARED_INK_ERROR: f64 = 0.3;
+
+/// Which kind of file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// Portable Document Format.
+    Pdf,
+    /// Scalable Vector Graphics.
+    Svg,
+    /// Portable Network Graphics.
+    Png,
+    /// glTF 2.0 binary.
+    Glb,
+    /// Wavefront OBJ.
+    Obj,
+    /// Binary STL.
+    Stl,
+    /// List of boards, corners and tags for other detectors.
+    Dsc,
+    /// Drawing for a cutter.
+    Dxf,
+}
+
+impl Format {
+    /// All kinds with the extensions of their files.
+    pub const ALL: [(Self, &str); 8] = [
+        (Self::Pdf, "pdf"),
+        (Self::Svg, "svg"),
+        (Self::Png, "png"),
+        (Self::Glb, "glb"),
+        (Self::Obj, "obj"),
+        (Self::Stl, "stl"),
+        (Self::Dsc, "dsc"),
+        (Self::Dxf, "dxf"),
+    ];
+
+    /// The kind that a file name tells.
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_string_lossy().to_lowercase();
+        Self::ALL.iter().find(|(_, known)| *known == extension).map(|(format, _)| *format)
+    }
+
+    /// Whether files of this kind are printed pages.
+    pub fn is_document(self) -> bool {
+        matches!(self, Self::Pdf | Self::Svg | Self::Png)
+    }
+}
+
+/// Why an artifact cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum DocumentError {
+    /// The file cannot be opened.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file is not what its name says, has no size in units of length, or takes more than the
+    /// [`Limits`].
+    #[error("{}: {problem}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+impl DocumentError {
+    /// What is wrong with a file that was read.
+    pub(super) fn unreadable(path: &Path, problem: impl Into<String>) -> Self {
+        Self::Unreadable { path: path.to_owned(), problem: problem.into() }
+    }
+}
+
+/// Reads or draws a file by code of others, which may panic, or never end.
+pub(super) fn bounded<T: Send + 'static>(
+    path: &Path,
+    limits: &Limits,
+    work: impl FnOnce() -> Result<T, String> + Send + 'static,
+) -> Result<T, DocumentError> {
+    let problem = match limits::bounded(limits.time(), work) {
+        Ok(Ok(result)) => return Ok(result),
+        Ok(Err(problem)) => problem,
+        Err(Broken::Time) => limits.exceeded(Kind::Seconds).to_string(),
+        Err(broken) => broken.to_string(),
+    };
+    Err(DocumentError::unreadable(path, problem))
+}
+
+/// An opened artifact.
+pub struct Document {
+    path: PathBuf,
+    content: Arc<Content>,
+    format: Format,
+    limits: Limits,
+}
+
+enum Content {
+    Pdf(pdf::Pdf),
+    Svg(Box<svg::Svg>),
+    Png(png::Png),
+}
+
+/// One page as a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Page {
+    /// Page width as the file states it, mm.
+    pub width_mm: f64,
+    /// Page height as the file states it, mm.
+    pub height_mm: f64,
+    /// Resolution, px/mm; the picture's upper-left corner is the page's.
+    pub px_per_mm: f64,
+    /// The picture.
+    pub image: Gray<u8>,
+    /// How much further edges reach than over the pixel that they cross, px: on a page that is put together from
+    /// pixels of others.
+    pub smear_px: f64,
+}
+
+impl Page {
+    /// How far ink may be from 0 or 1 beside an edge.
+    pub fn max_ink_error_at_edges(&self) -> f64 {
+        if self.smear_px > 0.0 { SMEARED_INK_ERROR } else { MAX_INK_ERROR }
+    }
+}
+
+impl Document {
+    /// Opens a `.pdf`, `.svg` or `.png` file.
+    pub fn open(path: &Path) -> Result<Self, DocumentError> {
+        Self::open_within(path, &Limits::default())
+    }
+
+    /// The same within other limits than the default.
+    pub fn open_within(path: &Path, limits: &Limits) -> Result<Self, DocumentError> {
+        let unreadable = |problem: String| DocumentError::unreadable(path, problem);
+        let Some(format) = Format::of(path).filter(|format| format.is_document()) else {
+            return Err(unreadable("not a .pdf, .svg or .png file".to_owned()));
+        };
+        let (bytes, limits) = (limits.read(path)?, *limits);
+        let content = bounded(path, &limits, move || {
+            Ok(match format {
+                Format::Pdf => Content::Pdf(pdf::Pdf::parse(bytes)?),
+                Format::Svg => Content::Svg(Box::new(svg::Svg::parse(&bytes)?)),
+                _ => Content::Png(png::Png::parse(&bytes, &limits)?),
+            })
+        })?;
+        Ok(Self { path: path.to_owned(), content: Arc::new(content), format, limits })
+    }
+
+    /// Kind of the file.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// Number of pages.
+    pub fn pages(&self) -> usize {
+        match &*self.content {
+            Content::Pdf(pdf) => pdf.pages(),
+            Content::Svg(_) | Content::Png(_) => 1,
+        }
+    }
+
+    /// Width and height of a page (counted from 0) as the file states them, mm.
+    pub fn size_mm(&self, page: usize) -> [f64; 2] {
+        match &*self.content {
+            Content::Pdf(pdf) => pdf.size_mm(page),
+            Content::Svg(svg) => svg.size_mm(),
+            Content::Png(png) => png.size_mm(),
+        }
+    }
+
+    /// What is said of a page that is far larger than it should be.
+    pub(super) fn too_large(&self, found_mm: [f64; 2], stated_mm: [f64; 2]) -> DocumentError {
+        let [[width, height], [stated_width, stated_height]] = [found_mm, stated_mm];
+        let problem = format!(
+            "a page of {width} x {height} mm instead of {stated_width} x {stated_height} mm is not \
+             looked at"
+        );
+        DocumentError::unreadable(&self.path, problem)
+    }
+
+    /// How far the stated size may be from the true one by the nature of the format, mm.
+    pub fn size_tolerance_mm(&self) -> f64 {
+        match &*self.content {
+            // Points in single precision, and decimals written.
+            Content::Pdf(_) | Content::Svg(_) => 1e-3,
+            // Whole pixels: half of one, and as much again for the rounding of the resolution.
+            Content::Png(png) => 0.5001 / png.px_per_mm() + 1e-3,
+        }
+    }
+
+    /// A page as a picture, on white. `px_per_mm` is a wish: a PNG has its own resolution, and
+    /// large pages are drawn coarser to bound the memory.
+    pub fn render(&self, page: usize, px_per_mm: f64) -> Result<Page, DocumentError> {
+        let [width_mm, height_mm] = self.size_mm(page);
+        let most = (MAX_PIXELS / (width_mm * height_mm)).sqrt();
+        let px_per_mm = match &*self.content {
+            Content::Png(png) => png.image_px_per_mm(),
+            _ => px_per_mm.min(most),
+        };
+        let content = Arc::clone(&self.content);
+        let image = match &*self.content {
+            Content::Png(png) => png.image().clone(),
+            _ => {
+                // A page of no breadth has a pixel across, and as many along as it is long.
+                let [width, height] = [width_mm, height_mm].map(|mm| pixels(mm, px_per_mm));
+                if width.saturating_mul(height) as f64 > 2.0 * MAX_PIXELS {
+                    let problem = format!("a page of {width_mm} x {height_mm} mm cannot be drawn");
+                    return Err(DocumentError::unreadable(&self.path, problem));
+                }
+                let end = Instant::now().checked_add(self.limits.time());
+                bounded(&self.path, &self.limits, move || match &*content {
+                    Content::Pdf(pdf) => Ok(pdf.render(page, px_per_mm, end)),
+                    Content::Svg(svg) => svg.render(px_per_mm, end),
+                    Content::Png(png) => Ok(png.image().clone()),
+                })?
+            }
+        };
+        Ok(Page { width_mm, height_mm, px_per_mm, image, smear_px: 0.0 })
+    }
+}
+
+impl Page {
+    /// Pixel position of a point of the page frame (mm, y up).
+    pub fn px_from_page(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [x * self.px_per_mm - 0.5, (self.height_mm - y) * self.px_per_mm - 0.5]
+    }
+
+    /// Point of the page frame (mm, y up) of a pixel position.
+    pub fn page_from_px(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [(x + 0.5) / self.px_per_mm, self.height_mm - (y + 0.5) / self.px_per_mm]
+    }
+
+    /// The page as a lens shows it: each pixel with its neighbours, weighted 1 2 1 along both axes,
+    /// which is a blur of 0.71 px, on the scale of 16 bits.
+    ///
+    /// Corners are located by a blurred model; of a sharp edge along the pixels a single grey value
+    /// tells the place, and the model misreads it by up to a quarter of a pixel.
+    pub fn blurred(&self) -> Gray<u16> {
+        let (width, height) = (self.image.width(), self.image.height());
+        let near = |i: usize, size: usize| [i.saturating_sub(1), i, i, (i + 1).min(size - 1)];
+        let mut blurred = Gray::new(width, height);
+        for y in 0..height {
+            let rows = near(y, height).map(|y| self.image.row(y));
+            let down = |x: usize| rows.iter().map(|row| u32::from(row[x])).sum::<u32>();
+            for (x, pixel) in blurred.row_mut(y).iter_mut().enumerate() {
+                // A sum of sixteen pixels; 257 · 255 is full scale.
+                let sum: u32 = near(x, width).into_iter().map(down).sum();
+                *pixel = (sum * 257 / 16) as u16;
+            }
+        }
+        blurred
+    }
+
+    /// The page as in a mirror, left and right exchanged.
+    pub fn mirrored(&self) -> Self {
+        let mut page = self.clone();
+        let width = page.image.width();
+        page.image.pixels_mut().chunks_exact_mut(width).for_each(<[u8]>::reverse);
+        page
+    }
+
+    /// Ink at a pixel, 0 on paper to 1 in solid black; paper beyond the page.
+    pub fn ink(&self, [x, y]: [f64; 2]) -> f64 {
+        let inside = x > -0.5
+            && y > -0.5
+            && x < self.image.width() as f64 - 0.5
+            && y < self.image.height() as f64 - 0.5;
+        if inside { 1.0 - f64::from(self.image.bilinear(x, y)) / 255.0 } else { 0.0 }
+    }
+}
+
+/// Whether the time for drawing is over; what is drawn after that is not looked at.
+fn is_over(end: Option<Instant>) -> bool {
+    end.is_some_and(|end| Instant::now() > end)
+}
+
+/// Whole pixels of a length.
+fn pixels(mm: f64, px_per_mm: f64) -> usize {
+    ((mm * px_per_mm).round() as usize).max(1)
+}
+
+/// Luma of an opaque colour, Rec. 709 weights.
+fn luma([r, g, b]: [u8; 3]) -> u8 {
+    (0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b)).round() as u8
+}

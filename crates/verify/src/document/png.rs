@@ -1,0 +1,100 @@
+use std::io::Cursor;
+
+use image::ImageReader;
+
+use super::MAX_PIXELS;
+use deltille_core::raster::Gray;
+use deltille_files::limits::Limits;
+
+/// A PNG with its resolution.
+pub(super) struct Png {
+    /// Its pixels, or the means of so many by so many of them.
+    image: Gray<u8>,
+    reduced: usize,
+    size_px: [usize; 2],
+    /// Resolution of the file.
+    px_per_mm: f64,
+}
+
+impl Png {
+    pub fn parse(bytes: &[u8], limits: &Limits) -> Result<Self, String> {
+        let broken = |error: &dyn std::fmt::Display| format!("not a readable PNG ({error})");
+        let reader =
+            png::Decoder::new(Cursor::new(bytes)).read_info().map_err(|error| broken(&error))?;
+        let px_per_mm = match reader.info().pixel_dims {
+            Some(dims) if dims.unit == png::Unit::Meter && dims.xppu == dims.yppu => {
+                f64::from(dims.xppu) / 1000.0
+            }
+            Some(dims) if dims.unit == png::Unit::Meter => {
+                let (x, y) = (dims.xppu, dims.yppu);
+                return Err(format!("its pixels are not square: {x} and {y} in a metre"));
+            }
+            _ => {
+                return Err(
+                    "it states no resolution in pixels per metre: its size is unknown".into()
+                );
+            }
+        };
+        let (width, height) = reader.info().size();
+        limits.check_pixels(width, height).map_err(|exceeded| exceeded.to_string())?;
+        let mut reader = ImageReader::new(Cursor::new(bytes));
+        reader.set_format(image::ImageFormat::Png);
+        reader.no_limits();
+        let grey = reader.decode().map_err(|error| broken(&error))?.into_luma8();
+        let (width, height) = (grey.width() as usize, grey.height() as usize);
+        let image = Gray::from_vec(width, height, grey.into_raw());
+        let mut image = image.ok_or("its pixels do not fill it")?;
+        let reduced = ((width * height) as f64 / MAX_PIXELS).sqrt().ceil().max(1.0) as usize;
+        if reduced > 1 {
+            image = means(&image, reduced);
+        }
+        Ok(Self { image, reduced, size_px: [width, height], px_per_mm })
+    }
+
+    pub fn size_mm(&self) -> [f64; 2] {
+        self.size_px.map(|px| px as f64 / self.px_per_mm)
+    }
+
+    /// The resolution of the file.
+    pub fn px_per_mm(&self) -> f64 {
+        self.px_per_mm
+    }
+
+    /// The resolution of the [`image`](Self::image).
+    pub fn image_px_per_mm(&self) -> f64 {
+        self.px_per_mm / self.reduced as f64
+    }
+
+    pub fn image(&self) -> &Gray<u8> {
+        &self.image
+    }
+}
+
+/// The means of squares of pixels, with paper beyond the edges.
+fn means(image: &Gray<u8>, side: usize) -> Gray<u8> {
+    let [width, height] = [image.width(), image.height()];
+    let paper = u64::from(u8::MAX);
+    let mut rows: Vec<u8> = Vec::with_capacity(width.div_ceil(side) * height.div_ceil(side));
+    for top in (0..height).step_by(side) {
+        let mut missing = vec![0; width.div_ceil(side)];
+        for y in top..(top + side).min(height) {
+            for (missing, square) in missing.iter_mut().zip(image.row(y).chunks(side)) {
+                *missing += square.iter().map(|&v| paper - u64::from(v)).sum::<u64>();
+            }
+        }
+        let area = (side * side) as u64;
+        rows.extend(missing.iter().map(|missing| (paper - (missing + area / 2) / area) as u8));
+    }
+    Gray::from_vec(width.div_ceil(side), height.div_ceil(side), rows).expect("all squares")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_keep_the_ink() {
+        let image = Gray::from_vec(3, 3, vec![255, 255, 0, 255, 255, 0, 255, 255, 0]).unwrap();
+        assert_eq!(means(&image, 2).pixels(), [255, 127, 255, 191]);
+    }
+}

@@ -1,0 +1,168 @@
+//! Where the edges of tiles and cells lie, to a fraction of a pixel.
+//!
+//! A pixel that an edge crosses may have any grey and tells little by itself. But an edge that lies d px beside its
+//! place has d px² of ink too much or too little along each px of its length, whichever pixels it
+//! crosses: over a square of pixels these add up, and what rounding and smear do to single pixels
+//! does not.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::tiles::{Expected, PlacedPanel};
+use deltille_core::lattice::Tile;
+
+/// Side of the squares over which ink is added up, px: shorter than the side of a cell that is drawn for a check.
+const SQUARE: usize = 8;
+
+/// Pixels so near to one that an edge crosses are added up with it, px.
+const NEAR: usize = 2;
+
+/// Samples per pixel and axis of a pixel that an edge crosses.
+const SAMPLES: usize = 4;
+
+/// An edge that lies elsewhere than stated.
+pub(super) struct MovedEdge {
+    pub tile: Tile,
+    pub at_mm: [f64; 2],
+    /// Mean over the length looked at.
+    pub by_mm: f64,
+}
+
+/// From pixels to positions in the lattice of the panel, in edges.
+struct LatticeFromPx {
+    origin: [f64; 2],
+    right: [f64; 2],
+    down: [f64; 2],
+}
+
+impl LatticeFromPx {
+    fn new(placed: &PlacedPanel) -> Option<Self> {
+        let stated_from_found = placed.found_from_stated.inverse()?;
+        let at = |px| {
+            let stated = stated_from_found.apply(placed.page.page_from_px(px));
+            placed.panel_from_page(stated).map(|mm| mm / placed.panel.edge_mm)
+        };
+        let origin = at([0.0, 0.0]);
+        let from_origin = |[x, y]: [f64; 2]| [x - origin[0], y - origin[1]];
+        Some(Self { origin, right: from_origin(at([1.0, 0.0])), down: from_origin(at([0.0, 1.0])) })
+    }
+
+    fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|i| self.origin[i] + x * self.right[i] + y * self.down[i])
+    }
+}
+
+impl PlacedPanel<'_> {
+    /// The edges that lie further beside their place than `tolerance_px`: of each tile the one that does most.
+    pub fn moved_edges(
+        &self,
+        expected: &BTreeMap<Tile, Expected>,
+        tolerance_px: f64,
+    ) -> Vec<MovedEdge> {
+        let Some(lattice_from_px) = LatticeFromPx::new(self) else { return Vec::new() };
+        let tile_at = |px| self.panel.kind.tile_at(lattice_from_px.apply(px));
+        let is_black = |px: [f64; 2]| {
+            let at = lattice_from_px.apply(px);
+            let tile = self.panel.kind.tile_at(at);
+            let here = expected.get(&tile).map(|expected| expected.is_black_at(uv(tile, at)));
+            here.unwrap_or(self.panel.inverted)
+        };
+        let (width, height) = (self.page.image.width(), self.page.image.height());
+        let corners = expected.keys().flat_map(|tile| tile.vertices());
+        let corners = corners.map(|vertex| self.px_of(vertex));
+        let ([left, upper], [right, lower]) =
+            corners.fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), at| {
+                ([0, 1].map(|i| low[i].min(at[i])), [0, 1].map(|i| high[i].max(at[i])))
+            });
+        let squares = |low: f64, high: f64, size: usize| {
+            let low = (low - NEAR as f64).max(0.0) as usize / SQUARE;
+            low..((high + NEAR as f64).max(0.0) as usize / SQUARE + 1).min(size / SQUARE)
+        };
+        let (rows, columns) = (squares(upper, lower, height), squares(left, right, width));
+        let of_row = |row: usize| -> Vec<([usize; 2], f64)> {
+            let of_square = |column: usize| {
+                let at = [column * SQUARE, row * SQUARE];
+                Some((at, self.displaced(at, &is_black)?))
+            };
+            columns
+                .clone()
+                .filter_map(of_square)
+                .filter(|(_, by)| by.abs() > tolerance_px)
+                .collect()
+        };
+        let found: Vec<_> = rows.into_par_iter().flat_map_iter(of_row).collect();
+        let mut most = BTreeMap::<Tile, ([f64; 2], f64)>::new();
+        for (corner, by) in found {
+            let middle = corner.map(|low| low as f64 + (SQUARE - 1) as f64 / 2.0);
+            let entry = most.entry(tile_at(middle)).or_insert((middle, by));
+            if by.abs() > entry.1.abs() {
+                *entry = (middle, by);
+            }
+        }
+        let moved = most.into_iter().map(|(tile, (at, by))| MovedEdge {
+            tile,
+            at_mm: self.page.page_from_px(at),
+            by_mm: by / self.page.px_per_mm,
+        });
+        moved.collect()
+    }
+
+    /// How far edges lie beside their place in the square of pixels whose first is `low`, px, positive where there is
+    /// too much ink; `None` where there is no edge.
+    fn displaced(&self, low: [usize; 2], is_black: &impl Fn([f64; 2]) -> bool) -> Option<f64> {
+        const SIDE: usize = SQUARE + 2 * NEAR;
+        // Corner of a pixel, counted from that of the nearest pixel that counts.
+        let corner = |x: usize, y: usize| {
+            is_black([(low[0] + x) as f64, (low[1] + y) as f64].map(|v| v - NEAR as f64 - 0.5))
+        };
+        let coarse = (0..=SIDE).step_by(SIDE / 3);
+        let mut coarse = coarse.clone().flat_map(|y| coarse.clone().map(move |x| corner(x, y)));
+        let first = coarse.next()?;
+        if coarse.all(|black| black == first) {
+            return None;
+        }
+        let corners: [[bool; SIDE + 1]; SIDE + 1] =
+            std::array::from_fn(|y| std::array::from_fn(|x| corner(x, y)));
+        let is_crossed = |x: usize, y: usize| {
+            let [upper, lower] = [&corners[y][x..=x + 1], &corners[y + 1][x..=x + 1]];
+            upper.iter().chain(lower).any(|&black| black != corners[y][x])
+        };
+        let crossed: [[bool; SIDE]; SIDE] =
+            std::array::from_fn(|y| std::array::from_fn(|x| is_crossed(x, y)));
+        let (mut error, mut length) = (0.0, 0);
+        for (y, x) in (0..SQUARE).flat_map(|y| (0..SQUARE).map(move |x| (y, x))) {
+            let is_near =
+                crossed[y..=y + 2 * NEAR].iter().any(|row| row[x..=x + 2 * NEAR].contains(&true));
+            if !is_near {
+                continue;
+            }
+            let px = [low[0] + x, low[1] + y];
+            let expected = match crossed[y + NEAR][x + NEAR] {
+                true => covered(px, is_black),
+                false => f64::from(u8::from(corners[y + NEAR][x + NEAR])),
+            };
+            error += 1.0 - f64::from(self.page.image.at(px[0], px[1])) / 255.0 - expected;
+            length += usize::from(crossed[y + NEAR][x + NEAR]);
+        }
+        (error != 0.0).then(|| error / length.max(SQUARE) as f64)
+    }
+}
+
+/// Part of a pixel that is black.
+fn covered([x, y]: [usize; 2], is_black: &impl Fn([f64; 2]) -> bool) -> f64 {
+    let sample = |i: usize| (i as f64 + 0.5) / SAMPLES as f64 - 0.5;
+    let samples = (0..SAMPLES).flat_map(|j| (0..SAMPLES).map(move |i| (i, j)));
+    let black = samples.filter(|&(i, j)| is_black([x as f64 + sample(i), y as f64 + sample(j)]));
+    black.count() as f64 / (SAMPLES * SAMPLES) as f64
+}
+
+/// Tile coordinates of a position in the lattice, in edges.
+fn uv(tile: Tile, at: [f64; 2]) -> [f64; 2] {
+    let [a, b, c] = tile.frame().map(|v| tile.kind().position(v.row.into(), v.col.into()));
+    let from_a = |p: [f64; 2]| DVec2::from(p) - DVec2::from(a);
+    let (ab, ac, p) = (from_a(b), from_a(c), from_a(at));
+    let det = ab.perp_dot(ac);
+    [p.perp_dot(ac) / det, ab.perp_dot(p) / det]
+}

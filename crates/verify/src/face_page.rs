@@ -1,0 +1,85 @@
+//! The printed side of a face of a mesh, laid out flat.
+
+use glam::{DVec2, DVec3};
+
+use super::document::Page;
+use super::model::Model;
+use deltille_core::raster::Gray;
+use deltille_core::targets::{Panel, Placement};
+
+/// Triangles this near to the panel's plane are its face, mm.
+const IN_PLANE_MM: f64 = 0.25;
+
+/// Samples per pixel and axis.
+const SAMPLES: usize = 2;
+
+/// What the texture of a loaded mesh shows on the face of a panel, seen from its front, and where
+/// the panel lies on that page; white where the mesh has no triangle in the face.
+///
+/// `outline` is that of the face, counter-clockwise in the panel frame, mm: triangles that lie in its
+/// plane beside it belong to another face. `area_mm` is the left, lower, right and upper end of the page in the panel frame.
+pub(super) fn face_page(
+    model: &Model,
+    panel: &Panel,
+    outline: [DVec2; 3],
+    area_mm: [f64; 4],
+    px_per_mm: f64,
+) -> (Page, Placement) {
+    let [left, lower, right, upper] = area_mm;
+    let (width_mm, height_mm) = (right - left, upper - lower);
+    let [width, height] =
+        [width_mm, height_mm].map(|mm| (mm * px_per_mm).ceil().max(1.0) as usize * SAMPLES);
+    let scale = px_per_mm * SAMPLES as f64;
+    let texture = &model.texture;
+    let size = DVec2::new(texture.width() as f64, texture.height() as f64);
+    let mut shades = vec![u8::MAX; width * height];
+    // The largest pixel of the texture, px of the page.
+    let mut texel_px = 0.0f64;
+    for triangle in &model.triangles {
+        let flat = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v));
+        let middle = flat.iter().sum::<DVec3>().truncate() / 3.0;
+        let inside = |i: usize| {
+            let (from, to) = (outline[i], outline[(i + 1) % 3]);
+            (to - from).perp_dot(middle - from) > 0.0
+        };
+        if flat.iter().any(|p| p.z.abs() > IN_PLANE_MM) || !(0..3).all(inside) {
+            continue;
+        }
+        // Sample positions, y down.
+        let [a, b, c] =
+            flat.map(|p| DVec2::new(p.x - left, upper - p.y) * scale - DVec2::splat(0.5));
+        let area = (b - a).perp_dot(c - a);
+        // On the screen a front is clockwise.
+        if area >= 0.0 {
+            continue;
+        }
+        let [p, q, r] = triangle.uv.map(|uv| DVec2::from(uv) * size);
+        let texels = (q - p).perp_dot(r - p).abs();
+        texel_px = texel_px.max((area.abs() / texels).sqrt() / SAMPLES as f64);
+        let low = a.min(b).min(c).ceil().max(DVec2::ZERO);
+        let high = a.max(b).max(c).floor() + 1.0;
+        let end = |high: f64, size: usize| (high.max(0.0) as usize).min(size);
+        for y in low.y as usize..end(high.y, height) {
+            for x in low.x as usize..end(high.x, width) {
+                let p = DVec2::new(x as f64, y as f64);
+                let weights = [
+                    (b - p).perp_dot(c - p) / area,
+                    (c - p).perp_dot(a - p) / area,
+                    (a - p).perp_dot(b - p) / area,
+                ];
+                if weights.iter().all(|&w| w >= 0.0) {
+                    let uv: DVec2 = (0..3).map(|i| DVec2::from(triangle.uv[i]) * weights[i]).sum();
+                    let at = uv * size - DVec2::splat(0.5);
+                    shades[y * width + x] = texture.bilinear(at.x, at.y).round() as u8;
+                }
+            }
+        }
+    }
+    let image = Gray::from_fn(width / SAMPLES, height / SAMPLES, |x, y| {
+        let rows = (0..SAMPLES).map(|s| (y * SAMPLES + s) * width + x * SAMPLES);
+        let sum: u32 = rows.flat_map(|at| &shades[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
+        (sum / (SAMPLES * SAMPLES) as u32) as u8
+    });
+    let page = Page { width_mm, height_mm, px_per_mm, image, smear_px: 1.0 + texel_px };
+    (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [-left, -lower] })
+}

@@ -1,0 +1,500 @@
+//! The fold of a net, from what was found on the paper: the faces, each with the pose that its
+//! detected corners have there, are folded about the edges that they share, and must come to lie
+//! where the target says.
+//!
+//! ```text
+//!    page            R_child = turn(edge, dihedral angle) · R_parent       solid
+//!   ╱╲──╱╲                                                                   ╱│╲
+//!  ╱1 ╲╱2 ╲   ──▶   face 1 is laid where it is stated to be; face 2 turns   ╱1│2╲
+//!  ────────         about their edge by the angle between the two faces     ‾‾‾‾‾
+//! ```
+//!
+//! Of the layout only the fold lines and the numbers of edges are used, and the ink of both is
+//! compared by itself; where a face lies, its corners say. A face that comes to lie in the place of
+//! another, or turned in its own, is named as that.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use glam::{DMat3, DVec2, DVec3};
+use kurbo::Shape as _;
+
+use super::{Finding, FoldVerdict, SheetVerdict};
+use deltille_core::artwork;
+use deltille_core::targets::{SheetLayout, Target, TargetSpec};
+
+/// Largest distance of a folded corner, or of an end of an edge, from where it belongs, mm: that
+/// of meshes, see [`MESH_TOLERANCE_MM`](super::MESH_TOLERANCE_MM).
+pub const FOLD_TOLERANCE_MM: f64 = 0.05;
+
+/// Two sides within this of each other on the paper are one fold, mm: more than any print that
+/// passes is off, less than the width of any tab.
+const COMMON_MM: f64 = 0.2;
+
+/// Roots tried where the first leads to a contradiction: it may be the misprinted face itself.
+const MOST_ROOTS: usize = 32;
+
+/// Page positions of the corners found on a sheet: by panel, then by corner.
+pub(super) type Seen = BTreeMap<u32, BTreeMap<u32, [f64; 2]>>;
+
+/// Whether a target's sheets are those of a net.
+pub(super) fn is_net(target: &Target) -> bool {
+    let folds = |sheet: &SheetLayout| sheet.lines.iter().any(|line| line.kind.joins_faces());
+    matches!(target.spec, TargetSpec::Solid(_)) && target.sheets.iter().any(folds)
+}
+
+/// Folds the net that was found, and adds to the verdicts what that shows. Where a face was not
+/// found there is nothing to prove.
+pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict]) {
+    let Some(net) = Net::new(target, seen) else { return };
+    let mut carried = vec![None; net.faces.len()];
+    let mut misplaced = false;
+    let mut deviations = vec![0.0f64; verdicts.len()];
+    for sheet in 0..seen.len() {
+        let members: Vec<usize> =
+            (0..net.faces.len()).filter(|&face| net.faces[face].sheet == sheet).collect();
+        let folded = net.best_fold(&members);
+        misplaced |= folded.misplaced;
+        deviations[sheet] = folded.deviation_mm;
+        verdicts[sheet].findings.extend(folded.findings);
+        for (face, at) in folded.places {
+            carried[face] = Some(at.space_from_page);
+        }
+    }
+    // Edges of faces that lie in each other's places would only repeat that.
+    let mut edges = vec![0; verdicts.len()];
+    if !misplaced {
+        for edge in net.edges() {
+            let sheet = net.faces[edge.sides[1].0].sheet;
+            match net.check_edge(&edge, &carried) {
+                Ok(gap_mm) => {
+                    edges[sheet] += 1;
+                    deviations[sheet] = deviations[sheet].max(gap_mm);
+                }
+                Err(finding) => verdicts[sheet].findings.push(finding),
+            }
+        }
+        let last = verdicts.len() - 1;
+        verdicts[last].findings.extend(net.numbers_used_twice());
+        for (index, face) in net.faces.iter().enumerate() {
+            verdicts[face.sheet].findings.extend(net.check_words(index));
+        }
+    }
+    for (sheet, verdict) in verdicts.iter_mut().enumerate() {
+        let (max_deviation_mm, edges) = (deviations[sheet], edges[sheet]);
+        verdict.fold = Some(FoldVerdict { max_deviation_mm, edges });
+    }
+}
+
+/// A face as it was found.
+struct PrintedFace {
+    panel: u32,
+    sheet: usize,
+    /// Its outline on the page, from the pose of its corners there, mm.
+    outline_mm: [DVec2; 3],
+    page_from_panel: Rigid,
+    /// Vertices of the solid at the corners of its outline.
+    vertices: [usize; 3],
+    /// The corners found: on the page and, stated, in space; mm.
+    corners: Vec<(DVec2, DVec3)>,
+    /// Numbers printed along each of its sides.
+    numbers: [Vec<usize>; 3],
+    /// Faces that tabs along its sides say that they go under: side and number of the face.
+    under: Vec<(usize, usize)>,
+    /// Numbers of the face that are printed in it.
+    names: Vec<usize>,
+}
+
+/// `page = turn · panel + shift`.
+#[derive(Clone, Copy)]
+struct Rigid {
+    turn: DVec2,
+    shift: DVec2,
+}
+
+impl Rigid {
+    /// The motion of least squares: with centred p and q as complex numbers, turn ∝ Σ p̄ q.
+    fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
+        let n = pairs.len() as f64;
+        let p0 = pairs.iter().map(|(p, _)| *p).sum::<DVec2>() / n;
+        let q0 = pairs.iter().map(|(_, q)| *q).sum::<DVec2>() / n;
+        let conjugate = |p: DVec2| DVec2::new(p.x, -p.y);
+        let sum: DVec2 = pairs.iter().map(|(p, q)| conjugate(*p - p0).rotate(*q - q0)).sum();
+        let turn = sum.try_normalize()?;
+        Some(Self { turn, shift: q0 - turn.rotate(p0) })
+    }
+
+    fn apply(&self, p: DVec2) -> DVec2 {
+        self.turn.rotate(p) + self.shift
+    }
+}
+
+/// `space = linear · (x, y, 0) + shift`: the plane of the page laid into space.
+#[derive(Clone, Copy)]
+struct SpaceFromPage {
+    linear: DMat3,
+    shift: DVec3,
+}
+
+impl SpaceFromPage {
+    fn apply(&self, p: DVec2) -> DVec3 {
+        self.linear * p.extend(0.0) + self.shift
+    }
+
+    /// The same turned about the line through two points of the page.
+    fn folded(&self, [p, q]: [DVec2; 2], angle_rad: f64) -> Self {
+        let (a, b) = (self.apply(p), self.apply(q));
+        let turn = DMat3::from_axis_angle((b - a).normalize_or(DVec3::X), angle_rad);
+        Self { linear: turn * self.linear, shift: turn * (self.shift - a) + a }
+    }
+}
+
+/// The place of the solid that a printed face came to lie in.
+struct Place {
+    /// Index of the face that belongs there.
+    slot: usize,
+    /// Vertices of the solid at the corners of the printed outline.
+    vertices: [usize; 3],
+    space_from_page: SpaceFromPage,
+}
+
+struct Folded {
+    places: Vec<(usize, Place)>,
+    findings: Vec<Finding>,
+    misplaced: bool,
+    deviation_mm: f64,
+}
+
+/// An edge of the solid with the two sides that run along it: face and side.
+struct Edge {
+    sides: [(usize, usize); 2],
+}
+
+struct Net {
+    faces: Vec<PrintedFace>,
+    /// Places of the vertices of the solid, as the panels' poses state them, mm.
+    vertices_mm: BTreeMap<usize, DVec3>,
+    /// Pose of each panel: rotation and shift.
+    poses: Vec<SpaceFromPage>,
+    /// Face and side along a directed edge.
+    along: BTreeMap<[usize; 2], (usize, usize)>,
+    /// For each side the one that it is folded against.
+    folds: BTreeMap<(usize, usize), (usize, usize)>,
+    /// Sides along which a tab is folded.
+    tabs: BTreeSet<(usize, usize)>,
+}
+
+impl Net {
+    /// The faces that were found, all of them.
+    fn new(target: &Target, seen: &[Seen]) -> Option<Self> {
+        let TargetSpec::Solid(spec) = &target.spec else { return None };
+        let (outlines, solid) = (spec.faces().ok()?, spec.polyhedron());
+        let mut net = Self {
+            faces: Vec::with_capacity(target.panels.len()),
+            vertices_mm: BTreeMap::new(),
+            poses: Vec::with_capacity(target.panels.len()),
+            along: BTreeMap::new(),
+            folds: BTreeMap::new(),
+            tabs: BTreeSet::new(),
+        };
+        for (index, (panel, face)) in target.panels.iter().zip(&outlines).enumerate() {
+            let (sheet, found) =
+                seen.iter().enumerate().find_map(|(n, seen)| Some((n, seen.get(&panel.id)?)))?;
+            let corner = |c: &deltille_core::targets::Corner| {
+                let at = DVec2::from(*found.get(&c.id)?);
+                Some((DVec2::from(c.panel_mm), at, DVec3::from(c.target_mm)))
+            };
+            let corners: Vec<_> = panel.corners.iter().filter_map(corner).collect();
+            let pairs: Vec<_> = corners.iter().map(|&(flat, at, _)| (flat, at)).collect();
+            let page_from_panel = Rigid::fit(&pairs)?;
+            let vertices = *solid.faces.get(index)?;
+            for side in 0..3 {
+                net.along.insert([vertices[side], vertices[(side + 1) % 3]], (index, side));
+            }
+            for (vertex, corner) in vertices.into_iter().zip(face.outline_mm) {
+                net.vertices_mm.insert(vertex, panel.pose.target_from_panel(corner).into());
+            }
+            net.poses.push(SpaceFromPage {
+                linear: panel.pose.matrix(),
+                shift: panel.pose.translation_mm.into(),
+            });
+            net.faces.push(PrintedFace {
+                panel: panel.id,
+                sheet,
+                outline_mm: face.outline_mm.map(|p| page_from_panel.apply(p.into())),
+                page_from_panel,
+                vertices,
+                corners: corners.into_iter().map(|(_, at, space)| (at, space)).collect(),
+                numbers: Default::default(),
+                under: Vec::new(),
+                names: Vec::new(),
+            });
+        }
+        for (sheet, layout) in target.sheets.iter().enumerate() {
+            net.find_folds(sheet, layout);
+            net.read_numbers(sheet, layout);
+        }
+        Some(net)
+    }
+
+    fn ends(&self, (face, side): (usize, usize)) -> [DVec2; 2] {
+        let outline = self.faces[face].outline_mm;
+        [outline[side], outline[(side + 1) % 3]]
+    }
+
+    fn sides_on(&self, sheet: usize) -> impl Iterator<Item = (usize, usize)> {
+        let faces = (0..self.faces.len()).filter(move |&face| self.faces[face].sheet == sheet);
+        faces.flat_map(|face| (0..3).map(move |side| (face, side)))
+    }
+
+    /// Sides of two faces on the same fold line, and of one where a tab hangs on it.
+    fn find_folds(&mut self, sheet: usize, layout: &SheetLayout) {
+        let sides: Vec<_> = self.sides_on(sheet).map(|side| (side, self.ends(side))).collect();
+        for line in layout.lines.iter().filter(|line| line.kind.joins_faces()) {
+            let ends = [line.from_mm, line.to_mm].map(DVec2::from);
+            let near = |[p, q]: [DVec2; 2]| {
+                p.distance(ends[0]) < COMMON_MM && q.distance(ends[1]) < COMMON_MM
+            };
+            let along = |side: [DVec2; 2]| ends.iter().all(|&end| distance(end, side) < COMMON_MM);
+            let forward = sides.iter().find(|(_, ends)| near(*ends));
+            let backward = sides.iter().find(|(_, [p, q])| near([*q, *p]));
+            if let (Some(&(a, _)), Some(&(b, _))) = (forward, backward) {
+                self.folds.insert(a, b);
+                self.folds.insert(b, a);
+            } else if let Some(&(side, _)) = sides.iter().find(|(_, ends)| along(*ends)) {
+                self.tabs.insert(side);
+            }
+        }
+    }
+
+    /// Gives each number to the face that it stands in, and to the side that it stands at: in a
+    /// face one of that face, else the nearest that is cut.
+    fn read_numbers(&mut self, sheet: usize, layout: &SheetLayout) {
+        for text in &layout.texts {
+            let Some(words) = Words::read(&text.text) else { continue };
+            let Ok(outline) = artwork::text_outline(text) else { continue };
+            let centre = outline.bounding_box().center();
+            let at = DVec2::new(centre.x, centre.y);
+            let inside = |face: usize| {
+                (0..3).all(|side| {
+                    let [p, q] = self.ends((face, side));
+                    (q - p).perp_dot(at - p) > 0.0
+                })
+            };
+            let within = self.sides_on(sheet).map(|(face, _)| face).find(|&face| inside(face));
+            let (number, under) = match words {
+                Words::Face(number) => {
+                    within.into_iter().for_each(|face| self.faces[face].names.push(number));
+                    continue;
+                }
+                Words::Edge { number, under } => (number, under),
+            };
+            let sides = self.sides_on(sheet).filter(|side| match within {
+                Some(face) => side.0 == face,
+                None => !self.folds.contains_key(side),
+            });
+            let distance = |side: &(usize, usize)| distance(at, self.ends(*side));
+            let nearest = sides.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            if let Some((face, side)) = nearest {
+                self.faces[face].numbers[side].push(number);
+                self.faces[face].under.extend(under.map(|under| (side, under)));
+            }
+        }
+    }
+
+    /// The fold from the root that leads to the fewest contradictions.
+    fn best_fold(&self, members: &[usize]) -> Folded {
+        let mut best: Option<Folded> = None;
+        for &root in members.iter().take(MOST_ROOTS) {
+            let folded = self.fold(members, root);
+            let fewer = |best: &Folded| folded.findings.len() < best.findings.len();
+            if best.as_ref().is_none_or(fewer) {
+                best = Some(folded);
+            }
+            if best.as_ref().is_some_and(|best| best.findings.is_empty()) {
+                break;
+            }
+        }
+        let nothing = Folded {
+            places: Vec::new(),
+            findings: Vec::new(),
+            misplaced: false,
+            deviation_mm: 0.0,
+        };
+        best.unwrap_or(nothing)
+    }
+
+    /// Lays `root` where it is stated to be, and folds the others onto it.
+    fn fold(&self, members: &[usize], root: usize) -> Folded {
+        let face = &self.faces[root];
+        let pose = &self.poses[root];
+        // space_from_panel · panel_from_page, with the inverse turn as a rotation about z.
+        let back = DVec2::new(face.page_from_panel.turn.x, -face.page_from_panel.turn.y);
+        let columns = [DVec2::X, DVec2::Y].map(|axis| back.rotate(axis).extend(0.0));
+        let linear = pose.linear * DMat3::from_cols(columns[0], columns[1], DVec3::Z);
+        let origin = back.rotate(-face.page_from_panel.shift).extend(0.0);
+        let space_from_page = SpaceFromPage { linear, shift: pose.linear * origin + pose.shift };
+        let mut places: BTreeMap<usize, Place> = BTreeMap::new();
+        places.insert(root, Place { slot: root, vertices: face.vertices, space_from_page });
+        let mut queue = VecDeque::from([root]);
+        while let Some(parent) = queue.pop_front() {
+            for side in 0..3 {
+                let Some(&(child, own)) = self.folds.get(&(parent, side)) else { continue };
+                if !places.contains_key(&child)
+                    && let Some(place) = self.across(&places[&parent], (parent, side), (child, own))
+                {
+                    places.insert(child, place);
+                    queue.push_back(child);
+                }
+            }
+        }
+        self.judge(members, places)
+    }
+
+    /// The place of a face that hangs on one whose place is known.
+    fn across(
+        &self,
+        parent: &Place,
+        (face, side): (usize, usize),
+        (child, own): (usize, usize),
+    ) -> Option<Place> {
+        let [a, b] = [parent.vertices[side], parent.vertices[(side + 1) % 3]];
+        let &(slot, slot_side) = self.along.get(&[b, a])?;
+        let far = self.faces[slot].vertices[(slot_side + 2) % 3];
+        // The child's side runs from b to a.
+        let mut vertices = [0; 3];
+        vertices[own] = b;
+        vertices[(own + 1) % 3] = a;
+        vertices[(own + 2) % 3] = far;
+        let axis = (self.vertices_mm[&b] - self.vertices_mm[&a]).normalize_or(DVec3::X);
+        let [from, to] = [parent.slot, slot].map(|slot| self.poses[slot].linear.z_axis);
+        let angle_rad = axis.dot(from.cross(to)).atan2(from.dot(to));
+        let ([p, q], [q_own, p_own]) = (self.ends((face, side)), self.ends((child, own)));
+        let edge = [(p + p_own) / 2.0, (q + q_own) / 2.0];
+        let space_from_page = parent.space_from_page.folded(edge, angle_rad);
+        Some(Place { slot, vertices, space_from_page })
+    }
+
+    /// Compares the places of the faces with those that they should have.
+    fn judge(&self, members: &[usize], places: BTreeMap<usize, Place>) -> Folded {
+        let (mut findings, mut deviation_mm, mut misplaced) = (Vec::new(), 0.0f64, false);
+        for &index in members {
+            let (face, panel) = (&self.faces[index], self.faces[index].panel);
+            let Some(place) = places.get(&index) else {
+                misplaced = true;
+                findings.push(Finding::FaceLoose { panel });
+                continue;
+            };
+            if place.slot != index {
+                misplaced = true;
+                let instead = self.faces[place.slot].panel;
+                findings.push(Finding::FaceElsewhere { panel, instead });
+                continue;
+            }
+            if place.vertices != face.vertices {
+                misplaced = true;
+                let turns = (0..3)
+                    .find(|&n| (0..3).all(|i| place.vertices[(i + 3 - n) % 3] == face.vertices[i]));
+                let angle_deg = 120.0 * turns.unwrap_or_default() as f64;
+                findings.push(Finding::FaceTurned { panel, angle_deg });
+                continue;
+            }
+            let off =
+                |&(at, space): &(DVec2, DVec3)| place.space_from_page.apply(at).distance(space);
+            let most = face.corners.iter().map(off).fold(0.0, f64::max);
+            deviation_mm = deviation_mm.max(most);
+            if most > FOLD_TOLERANCE_MM {
+                findings.push(Finding::FoldOff { panel, by_mm: most });
+            }
+        }
+        Folded { places: places.into_iter().collect(), findings, misplaced, deviation_mm }
+    }
+
+    /// All edges of the solid.
+    fn edges(&self) -> Vec<Edge> {
+        let forward = self.along.iter().filter(|([a, b], _)| a < b);
+        let both = forward.filter_map(|([a, b], &one)| Some([one, *self.along.get(&[*b, *a])?]));
+        both.map(|sides| Edge { sides }).collect()
+    }
+
+    /// How far the two sides of an edge are apart in space, if they belong together: folded
+    /// against each other on the page, or cut and carrying the same number, with a tab on one.
+    fn check_edge(&self, edge: &Edge, carried: &[Option<SpaceFromPage>]) -> Result<f64, Finding> {
+        let [one, other] = edge.sides;
+        let panels = [self.faces[one.0].panel, self.faces[other.0].panel];
+        let ends = |side: (usize, usize)| {
+            let place = carried[side.0]?;
+            Some(self.ends(side).map(|end| place.apply(end)))
+        };
+        let (Some([a, b]), Some([d, c])) = (ends(one), ends(other)) else {
+            return Err(Finding::EdgeOpen { panels, gap_mm: f64::INFINITY });
+        };
+        let gap_mm = a.distance(c).max(b.distance(d));
+        if gap_mm > FOLD_TOLERANCE_MM {
+            return Err(Finding::EdgeOpen { panels, gap_mm });
+        }
+        let numbers = edge.sides.map(|(face, side)| self.faces[face].numbers[side].as_slice());
+        let folded = self.folds.get(&one) == Some(&other);
+        let tabs = edge.sides.iter().filter(|side| self.tabs.contains(side)).count();
+        match numbers {
+            [[], []] if folded => Ok(gap_mm),
+            [[a], [b]] if !folded && a == b && tabs == 1 => Ok(gap_mm),
+            [[a], [b]] if !folded && a == b => Err(Finding::EdgeTabs { panels, tabs }),
+            _ => Err(Finding::EdgeNumbers { panels, numbers: numbers.map(<[usize]>::to_vec) }),
+        }
+    }
+
+    /// What is wrong with the name of a face and with the names that its tabs carry.
+    fn check_words(&self, index: usize) -> Vec<Finding> {
+        let face = &self.faces[index];
+        let mut findings = Vec::new();
+        if face.names != [index] {
+            let names = face.names.clone();
+            findings.push(Finding::FaceNumber { panel: face.panel, names, stated: index });
+        }
+        for &(side, named) in &face.under {
+            let [a, b] = [face.vertices[side], face.vertices[(side + 1) % 3]];
+            let beyond = self.along.get(&[b, a]).map(|&(other, _)| other);
+            if let Some(stated) = beyond.filter(|&other| other != named) {
+                findings.push(Finding::TabNames { panel: face.panel, named, stated });
+            }
+        }
+        findings
+    }
+
+    /// Numbers that more than two sides carry.
+    fn numbers_used_twice(&self) -> Vec<Finding> {
+        let mut count = BTreeMap::<usize, usize>::new();
+        let numbers = self.faces.iter().flat_map(|face| face.numbers.iter().flatten());
+        numbers.for_each(|&number| *count.entry(number).or_default() += 1);
+        let twice = count.into_iter().filter(|&(_, count)| count > 2);
+        twice.map(|(number, sides)| Finding::EdgeNumberAgain { number, sides }).collect()
+    }
+}
+
+/// Distance of a point from a segment.
+fn distance(at: DVec2, [p, q]: [DVec2; 2]) -> f64 {
+    let along = ((at - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
+    at.distance(p + (q - p) * along)
+}
+
+/// What is printed on the faces and tabs of a net.
+enum Words {
+    /// `edge 7`, or on a tab `edge 7 · under face 3`.
+    Edge { number: usize, under: Option<usize> },
+    /// `face 3`.
+    Face(usize),
+}
+
+impl Words {
+    fn read(text: &str) -> Option<Self> {
+        if let Some(number) = text.strip_prefix("face ") {
+            return Some(Self::Face(number.parse().ok()?));
+        }
+        let rest = text.strip_prefix("edge ")?;
+        let (number, under) = match rest.split_once(" · under face ") {
+            Some((number, face)) => (number, Some(face.parse().ok()?)),
+            None => (rest, None),
+        };
+        Some(Self::Edge { number: number.parse().ok()?, under })
+    }
+}

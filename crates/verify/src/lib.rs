@@ -1,0 +1,574 @@
+//! An artifact read back from disk, seen, detected and compared with its target.
+//!
+//! Nothing here knows how a file was drawn: a PDF is rasterised by hayro, an SVG by resvg, and the
+//! picture goes through the detector like a photograph. Then, for each page:
+//!
+//! - the page size that the file states is the target's;
+//! - each check bar, measured in the picture, has its stated length;
+//! - every corner is found, once, with its label, within [`TOLERANCE_MM`] of its stated position,
+//!   and no other corner is;
+//! - every tile, and every cell of every tag, has its colour over its whole area, also where
+//!   decoding would correct a wrong cell, and its edges lie within a quarter of a pixel of their places: 0.02 mm at
+//!   300 dpi;
+//! - the sheet has the words of the description, and no ink beside the tiles, words and bars.
+//!
+//! What is wrong is named by its cause where one cause explains it: a scale, a mirror image, a
+//! turn, a shift of the whole board rather than a list of all corners.
+//!
+//! The pages of a sheet that is larger than the paper are laid together by their stated places;
+//! where they overlap they must show the same. The net of a solid is folded: the faces, each with
+//! the pose that its detected corners have on the paper, are turned about the fold lines, and must
+//! come to lie within [`FOLD_TOLERANCE_MM`] of their stated positions in space; the two sides of
+//! each edge must meet, and carry the same number where they are cut.
+//!
+//! A mesh (`.glb`, `.obj`) is loaded, its texture included, and looked at by a camera before each
+//! face; every corner is followed along its ray onto the loaded triangles and must lie within
+//! [`MESH_TOLERANCE_MM`] of its stated position in space. The texture on each face is then laid out
+//! flat and compared like a sheet: every tile, every cell of every tag, and no other mark. A body
+//! to print (`.stl`) must be closed, outside out, and of the stated shape.
+//!
+//! What is drawn here must be what is seen elsewhere. So before a file is drawn it is gone through,
+//! and anything in it that not every viewer shows alike is a finding: files are accepted by a list
+//! of what may be in them, not refused by a list of what may not. Titles and descriptions must be those of
+//! the target, and there is nothing that is of no use.
+//!
+//! Lists for other detectors (`.dsc`) and drawings for a cutter (`.dxf`) are read and compared with
+//! the target number by number.
+//!
+//! Limits: words and stray ink are compared only where the boards lie as stated and are recognised;
+//! dirt within a few pixels of a word or a bar counts to it.
+
+mod assemble;
+mod bars;
+mod board;
+mod body;
+mod construct;
+mod cutting;
+mod document;
+mod edges;
+mod face_page;
+mod finding;
+mod fit;
+mod fold;
+mod listing;
+mod marks;
+mod model;
+mod solid;
+mod tags;
+mod tiles;
+mod verdict;
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use deltille_core::artwork::CuttingError;
+use deltille_core::detect::{Detector, DetectorConfig, Ink, Tone};
+use deltille_core::family::Family;
+use deltille_core::targets::{SheetLayout, SheetPage, Target};
+use deltille_files::export::{obj, sheet_file_name};
+use deltille_files::limits::Limits;
+use fit::AffineMap;
+use fold::Seen;
+use tiles::PlacedPanel;
+
+pub use document::{Document, DocumentError, Format, Page};
+pub use finding::Finding;
+pub use fold::FOLD_TOLERANCE_MM;
+pub use solid::MESH_TOLERANCE_MM;
+pub use verdict::{
+    BodyVerdict, CutVerdict, FaceVerdict, FoldVerdict, ListVerdict, SheetVerdict, Verdict,
+};
+
+/// Largest deviation of a position or a length, mm: a fifth of what a good printer adds.
+pub const TOLERANCE_MM: f64 = 0.02;
+
+/// Print resolution of 300 dpi, px/mm: 0.02 mm is a quarter of a pixel.
+const PRINT_PX_PER_MM: f64 = 300.0 / 25.4;
+
+/// Least edge of a tag's cell in the picture, px: its inside is then more than a few pixels.
+const CELL_PX: f64 = 8.0;
+
+/// A page with a side so many times as long as stated is not looked at: at the resolution that is
+/// left for it nothing would be seen of its boards.
+const MOST_ENLARGED: f64 = 10.0;
+
+/// Why an artifact cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The artifact cannot be read.
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    /// The comparison was stopped from outside.
+    #[error("interrupted before all was compared")]
+    Cancelled,
+    /// The target says nothing about paper.
+    #[error("{}: target {target} has no sheets: it was not laid out on paper", path.display())]
+    NoSheets {
+        /// The file.
+        path: PathBuf,
+        /// Name of the target.
+        target: String,
+    },
+    /// A file of another kind.
+    #[error(
+        "{}: only .pdf, .svg, .png, .glb, .obj, .stl, .dsc and .dxf files are compared with their \
+         target",
+        path.display()
+    )]
+    OtherKind {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is a part of another one.
+    #[error("{}: it is compared with {whole}: name that", path.display())]
+    PartOf {
+        /// The file.
+        path: PathBuf,
+        /// The file that it is a part of.
+        whole: String,
+    },
+    /// The file name does not tell which sheet is on it.
+    #[error("{}: the target has {sheets} sheets; name the file {example} for the first", path.display())]
+    WhichSheet {
+        /// The file.
+        path: PathBuf,
+        /// Number of sheets.
+        sheets: usize,
+        /// A name that tells.
+        example: String,
+    },
+    /// The file name does not tell what is cut.
+    #[error(
+        "{}: name the file {target}-panels.dxf or {target}-net.dxf, for what it shows",
+        path.display()
+    )]
+    WhichDrawing {
+        /// The file.
+        path: PathBuf,
+        /// Name of the target.
+        target: String,
+    },
+    /// The target says nothing about what the file shows.
+    #[error("{}: {source}", path.display())]
+    NothingToCut {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: CuttingError,
+    },
+    /// The family needed is not the one given.
+    #[error("the target needs family {needed}: {given}")]
+    Family {
+        /// Name and fingerprint of the family of the target.
+        needed: String,
+        /// What was given instead.
+        given: String,
+    },
+}
+
+/// Compares artifacts with their target.
+pub struct Verifier<'a> {
+    target: &'a Target,
+    family: Option<&'a Family>,
+    detector: Detector,
+    limits: Limits,
+    cancel: Option<&'a AtomicBool>,
+}
+
+impl<'a> Verifier<'a> {
+    /// A verifier for the artifacts of `target`, whose family must be given if it has tags.
+    pub fn new(target: &'a Target, family: Option<&'a Family>) -> Result<Self, VerifyError> {
+        if let Some(needed) = &target.family {
+            // A .dsc file names its family without a fingerprint.
+            let same = |family: &Family| {
+                needed.fingerprint.is_empty() || family.fingerprint() == needed.fingerprint
+            };
+            let given = match family {
+                Some(family) if same(family) => None,
+                Some(family) => {
+                    Some(format!("{} has fingerprint {}", family.name(), family.fingerprint()))
+                }
+                None => Some("none is given".to_owned()),
+            };
+            if let Some(given) = given {
+                let needed = format!("{} with fingerprint {}", needed.name, needed.fingerprint);
+                return Err(VerifyError::Family { needed, given });
+            }
+        }
+        let detector = Detector::for_target(
+            target,
+            family,
+            DetectorConfig { tone: Tone::Linear, ink: Ink::Um(0.0), ..DetectorConfig::default() },
+        );
+        Ok(Self { target, family, detector, limits: Limits::default(), cancel: None })
+    }
+
+    /// The same, and reading artifacts within other limits than the default.
+    pub fn within(self, limits: Limits) -> Self {
+        Self { limits, ..self }
+    }
+
+    /// The same, and looking at `flag` before each page: once it is set, [`verify`](Self::verify)
+    /// ends with [`VerifyError::Cancelled`].
+    pub fn stopped_by(self, flag: &'a AtomicBool) -> Self {
+        Self { cancel: Some(flag), ..self }
+    }
+
+    /// The files that are verified together with one: the pages of a net, each in a file of its
+    /// own, belong together. Any other file is verified by itself.
+    pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
+        match fold::is_net(self.target) {
+            true => self.pages_with(path),
+            false => vec![path.to_owned()],
+        }
+    }
+
+    /// The files of all pages of which one is in this file; the file alone where it holds all.
+    pub fn pages_with(&self, path: &Path) -> Vec<PathBuf> {
+        let single = matches!(Format::of(path), Some(Format::Svg | Format::Png));
+        let count = self.target.page_count();
+        if !single || count == 1 || self.sheet_of(path).is_err() {
+            return vec![path.to_owned()];
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = stem.rsplit_once('-').map_or(&*stem, |(name, _)| name);
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        let file = |index| path.with_file_name(sheet_file_name(name, index, count, &extension));
+        (0..count).map(file).collect()
+    }
+
+    /// What is wrong with files that are named together: pages are left out that belong to others.
+    /// One page may be named alone where it can be verified so and `alone` says that it is meant to.
+    pub fn left_out(&self, named: &[PathBuf], alone: bool) -> Vec<Verdict> {
+        // A folder may be named in several ways.
+        let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
+        let named: Vec<PathBuf> = named.iter().map(absolute).collect();
+        let sets: BTreeSet<Vec<PathBuf>> = named.iter().map(|path| self.pages_with(path)).collect();
+        let mut verdicts = Vec::new();
+        for pages in sets {
+            let verified_together = self.set_of(&pages[0]).len() > 1;
+            let missing: Vec<&PathBuf> =
+                pages.iter().filter(|page| !named.contains(page)).collect();
+            let single = alone && missing.len() + 1 == pages.len();
+            if let Some(format) = Format::of(&pages[0])
+                && !(verified_together || single || missing.is_empty())
+            {
+                verdicts.push(Self::without(&pages, format, &missing));
+            }
+        }
+        verdicts
+    }
+
+    /// Pages of which some are missing.
+    fn without(pages: &[PathBuf], format: Format, missing: &[&PathBuf]) -> Verdict {
+        let findings = missing.iter().map(|page| Finding::PageMissing { page: file_name(page) });
+        let verdict = Verdict::new(&pages[0], format, findings.collect());
+        Verdict { artifact: of_all(pages), ..verdict }
+    }
+
+    /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
+    /// that its name tells; for a page of a net all files of [`set_of`](Self::set_of) are read.
+    pub fn verify(&self, path: &Path) -> Result<Verdict, VerifyError> {
+        let name = file_name(path);
+        let of_mesh = [".mtl", &obj::texture_name("")].map(|end| name.strip_suffix(end));
+        if let Some(mesh) = of_mesh.into_iter().flatten().next() {
+            let whole = format!("{mesh}.obj");
+            return Err(VerifyError::PartOf { path: path.to_owned(), whole });
+        }
+        let Some(format) = Format::of(path) else {
+            return Err(VerifyError::OtherKind { path: path.to_owned() });
+        };
+        match format {
+            Format::Dsc => return Ok(listing::verify(self, path)?),
+            Format::Dxf => return cutting::verify(self, path),
+            Format::Pdf | Format::Svg | Format::Png => return self.verify_sheets(path, format),
+            Format::Glb | Format::Obj | Format::Stl => {}
+        }
+        let refused = construct::check(path, format, self.target, &self.limits)?;
+        if construct::refuse(&refused) {
+            return Ok(Verdict::new(path, format, refused));
+        }
+        let mut verdict = match format {
+            Format::Stl => body::verify(self, path)?,
+            _ => solid::verify(self, path, format)?,
+        };
+        verdict.passed &= refused.is_empty();
+        verdict.findings.extend(refused);
+        Ok(verdict)
+    }
+
+    /// Compares printed pages.
+    fn verify_sheets(&self, path: &Path, format: Format) -> Result<Verdict, VerifyError> {
+        if self.target.sheets.is_empty() {
+            let (path, target) = (path.to_owned(), self.target.name.to_string());
+            return Err(VerifyError::NoSheets { path, target });
+        }
+        let mut findings = Vec::new();
+        let files = self.set_of(path);
+        let missing: Vec<&PathBuf> = files.iter().filter(|file| !file.exists()).collect();
+        if path.exists() && !missing.is_empty() {
+            return Ok(Self::without(&files, format, &missing));
+        }
+        let refused = self.refused(&files, format)?;
+        if construct::refuse(&refused) {
+            return Ok(Verdict::new(path, format, refused));
+        }
+        findings.extend(refused);
+        let documents: Vec<Document> = files
+            .iter()
+            .map(|file| Document::open_within(file, &self.limits))
+            .collect::<Result<_, _>>()?;
+        let stated = self.target.page_count();
+        // Where each page of the target is to be seen.
+        let sources: Vec<Option<Source>> = match format {
+            Format::Pdf => {
+                let found = documents[0].pages();
+                if found != stated {
+                    findings.push(Finding::Pages { found, stated });
+                }
+                let source =
+                    |page| (page < found).then_some(Source { document: &documents[0], page });
+                (0..stated).map(source).collect()
+            }
+            _ if documents.len() > 1 => {
+                documents.iter().map(|document| Some(Source { document, page: 0 })).collect()
+            }
+            _ => {
+                let shown = self.sheet_of(path)?;
+                let source = Source { document: &documents[0], page: 0 };
+                (0..stated).map(|page| (page == shown).then_some(source)).collect()
+            }
+        };
+        let (mut verdicts, mut seen) = (Vec::new(), Vec::new());
+        let mut first = 0;
+        for (index, layout) in self.target.sheets.iter().enumerate() {
+            if self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                return Err(VerifyError::Cancelled);
+            }
+            let pages = &sources[first..first + layout.page_count()];
+            first += layout.page_count();
+            let Some(pages) = pages.iter().copied().collect::<Option<Vec<Source>>>() else {
+                continue;
+            };
+            let (verdict, found) = match layout.pages.is_empty() {
+                true => self.verify_page(pages[0], index)?,
+                false => self.verify_pages(&pages, index)?,
+            };
+            verdicts.push(verdict);
+            seen.push(found);
+        }
+        if fold::is_net(self.target) && verdicts.len() == self.target.sheets.len() {
+            fold::check(self.target, &seen, &mut verdicts);
+        }
+        let mut verdict =
+            Verdict { artifact: of_all(&files), ..Verdict::new(path, format, findings) };
+        verdict.passed &= verdicts.iter().all(|sheet| sheet.findings.is_empty());
+        Ok(Verdict { sheets: verdicts, ..verdict })
+    }
+
+    /// What is not on the list of a format in files that belong together.
+    fn refused(&self, files: &[PathBuf], format: Format) -> Result<Vec<Finding>, DocumentError> {
+        let mut refused = Vec::new();
+        for file in files {
+            let found = construct::check(file, format, self.target, &self.limits)?;
+            refused.extend(found.into_iter().map(|finding| match files.len() {
+                1 => finding,
+                _ => Finding::OnPage { page: file_name(file), finding: Box::new(finding) },
+            }));
+        }
+        Ok(refused)
+    }
+
+    /// The page that a file of a single page shows, by its name.
+    fn sheet_of(&self, path: &Path) -> Result<usize, VerifyError> {
+        let count = self.target.page_count();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let number = stem.rsplit_once('-').and_then(|(_, number)| number.parse::<usize>().ok());
+        match number {
+            _ if count == 1 => Ok(0),
+            Some(number) if (1..=count).contains(&number) => Ok(number - 1),
+            _ => {
+                let extension = path.extension().unwrap_or_default().to_string_lossy();
+                let example = sheet_file_name(&self.target.name, 0, count, &extension);
+                Err(VerifyError::WhichSheet { path: path.to_owned(), sheets: count, example })
+            }
+        }
+    }
+
+    /// The panels of a page where they are stated.
+    fn placed<'p>(&'p self, page: &'p Page, layout: &'p SheetLayout) -> Vec<PlacedPanel<'p>> {
+        let found_from_stated = AffineMap::IDENTITY;
+        let placed = layout.placements.iter().filter_map(|placement| {
+            let panel = self.target.panels.iter().find(|panel| panel.id == placement.panel)?;
+            Some(PlacedPanel { page, panel, placement, found_from_stated })
+        });
+        placed.collect()
+    }
+
+    /// Print resolution, or finer where the cells of tags are small.
+    fn wish_px_per_mm(&self, layout: &SheetLayout) -> f64 {
+        let panels = self.target.panels.iter();
+        let here = panels.filter(|panel| layout.placements.iter().any(|p| p.panel == panel.id));
+        let cells_mm = here.filter_map(|panel| {
+            panel.border_bits?;
+            Some(panel.edge_mm / self.family?.cells().width(panel.tag_inset_bits()))
+        });
+        cells_mm.map(|cell_mm| CELL_PX / cell_mm).fold(PRINT_PX_PER_MM, f64::max)
+    }
+
+    fn verify_page(
+        &self,
+        source: Source,
+        index: usize,
+    ) -> Result<(SheetVerdict, Seen), DocumentError> {
+        let layout = &self.target.sheets[index];
+        let (page, findings) = source.render(layout, self.wish_px_per_mm(layout))?;
+        let mut verdict = SheetVerdict::new(index, &page, findings);
+        let seen = self.verify_sheet(&page, layout, &mut verdict);
+        Ok((verdict, seen))
+    }
+
+    /// Compares a sheet that is printed on several pages: what is around the window of each, then
+    /// all that the windows show, laid together.
+    fn verify_pages(
+        &self,
+        sources: &[Source],
+        index: usize,
+    ) -> Result<(SheetVerdict, Seen), DocumentError> {
+        let layout = &self.target.sheets[index];
+        let wish = self.wish_px_per_mm(layout);
+        let most = (document::MAX_PIXELS / (layout.width_mm * layout.height_mm)).sqrt();
+        let mut pages = Vec::with_capacity(sources.len());
+        let mut findings = Vec::new();
+        let mut check_bars_mm = Vec::new();
+        for (source, SheetPage { label, window_mm, marks, .. }) in sources.iter().zip(&layout.pages)
+        {
+            let (page, wrong) = source.render(marks, wish)?;
+            let mut verdict = SheetVerdict::new(index, &page, wrong);
+            check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
+            marks::check(&page, marks, &[], Some(*window_mm), &mut verdict);
+            findings.extend(verdict.findings.into_iter().map(|finding| Finding::OnPage {
+                page: label.clone(),
+                finding: Box::new(finding),
+            }));
+            check_bars_mm.extend(verdict.check_bars_mm);
+            // Kept no finer than the sheet is looked at.
+            pages.push(if wish > most { source.render(marks, most)?.0 } else { page });
+        }
+        let (sheet, different) = assemble::assemble(&pages, layout, wish.min(most));
+        let mut verdict = SheetVerdict::new(index, &sheet, different);
+        verdict.pages = pages.len();
+        let seen = self.verify_sheet(&sheet, layout, &mut verdict);
+        verdict.findings.extend(findings);
+        verdict.check_bars_mm = check_bars_mm;
+        Ok((verdict, seen))
+    }
+
+    /// Compares the panels and marks of a whole sheet.
+    fn verify_sheet(&self, page: &Page, layout: &SheetLayout, verdict: &mut SheetVerdict) -> Seen {
+        let placed = self.placed(page, layout);
+        let tags_alone = !placed.is_empty()
+            && placed.len() == layout.placements.len()
+            && placed.iter().all(|p| p.panel.is_tag_alone());
+        let (found_from_stated, seen) = if tags_alone {
+            tags::check(self, page, layout, verdict);
+            (AffineMap::IDENTITY, Seen::new())
+        } else {
+            board::check(self, page, layout, verdict)
+        };
+        let toneless =
+            |f: &Finding| matches!(f, Finding::Inverted { .. } | Finding::Contrast { .. });
+        if verdict.findings.iter().any(toneless) {
+            return seen;
+        }
+        let in_place = verdict.findings.iter().all(Finding::is_local);
+        check_bars(page, layout, &found_from_stated, verdict);
+        if in_place {
+            marks::check(page, layout, &placed, None, verdict);
+        }
+        seen
+    }
+}
+
+/// The name of a file, or of the first and the last of several.
+fn of_all(files: &[PathBuf]) -> String {
+    match files {
+        [first, .., last] => format!("{} to {}", file_name(first), file_name(last)),
+        _ => files.iter().map(|file| file_name(file)).collect(),
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// A page of a document.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    document: &'a Document,
+    page: usize,
+}
+
+impl Source<'_> {
+    /// The page as a picture, and whether it has the stated size.
+    fn render(
+        &self,
+        layout: &SheetLayout,
+        px_per_mm: f64,
+    ) -> Result<(Page, Vec<Finding>), DocumentError> {
+        let tolerance_mm = self.document.size_tolerance_mm();
+        let stated_mm = [layout.width_mm, layout.height_mm];
+        let found_mm = self.document.size_mm(self.page);
+        if (0..2).any(|i| found_mm[i] > MOST_ENLARGED * stated_mm[i]) {
+            return Err(self.document.too_large(found_mm, stated_mm));
+        }
+        let mut page = self.document.render(self.page, px_per_mm)?;
+        if (0..2).any(|i| (found_mm[i] - stated_mm[i]).abs() > tolerance_mm) {
+            return Ok((page, vec![Finding::PageSize { found_mm, stated_mm }]));
+        }
+        // Pictures begin at the upper edge and end with a whole pixel: heights are counted from
+        // the true lower edge, not from the end of the last pixel.
+        page.height_mm = layout.height_mm;
+        Ok((page, Vec::new()))
+    }
+}
+
+impl SheetVerdict {
+    /// The verdict on a page of which only its size was looked at.
+    fn new(index: usize, page: &Page, findings: Vec<Finding>) -> Self {
+        Self {
+            sheet: index + 1,
+            px_per_mm: page.px_per_mm,
+            size_mm: [page.width_mm, page.height_mm],
+            check_bars_mm: Vec::new(),
+            corners: 0,
+            corners_found: 0,
+            tags: 0,
+            tags_exact: 0,
+            max_deviation_mm: 0.0,
+            pages: 1,
+            fold: None,
+            findings,
+        }
+    }
+}
+
+/// Measures the check bars. Where the boards lie only tells where to look for them.
+fn check_bars(
+    page: &Page,
+    layout: &SheetLayout,
+    found_from_stated: &AffineMap,
+    verdict: &mut SheetVerdict,
+) {
+    for (index, bar) in layout.check_bars.iter().enumerate() {
+        let [dx, dy] = [0, 1].map(|i| bar.to_mm[i] - bar.from_mm[i]);
+        let stated_mm = dx.hypot(dy);
+        let found_mm =
+            bars::measure(page, [bar.from_mm, bar.to_mm].map(|end| found_from_stated.apply(end)));
+        verdict.check_bars_mm.push((stated_mm, found_mm));
+        if found_mm.is_none_or(|found| (found - stated_mm).abs() > TOLERANCE_MM) {
+            verdict.findings.push(Finding::CheckBar { bar: index + 1, found_mm, stated_mm });
+        }
+    }
+}

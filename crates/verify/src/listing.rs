@@ -1,0 +1,158 @@
+//! Corner lists for other detectors, as `.dsc`: the same boards, corners and tags as the target's,
+//! every position in millimetres.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::{DocumentError, Finding, Format, ListVerdict, Verdict, Verifier};
+use deltille_core::targets::{Panel, Target};
+use deltille_files::export::dsc::{self, Dialect};
+
+/// Largest deviation of a position or an edge, mm: what written digits leave.
+const LIST_TOLERANCE_MM: f64 = 1e-6;
+
+/// Reads a `.dsc` from disk and compares it with the target.
+pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
+    let text = &verifier.limits.read_text(path).map_err(DocumentError::from)?;
+    if text.lines().next().is_none_or(|head| head.split(',').count() != 4) {
+        let problem = "not a .dsc: it does not start with a line `id,A,B,size`";
+        return Err(DocumentError::unreadable(path, problem));
+    }
+    let mut list = ListVerdict::default();
+    let mut findings = unlisted(text);
+    if findings.is_empty() {
+        match dsc::read_in_mm(text, &verifier.target.name) {
+            Ok(listed) => {
+                findings = compare(&listed, verifier.target, &mut list);
+                findings.extend(written_otherwise(text, &listed).filter(|_| findings.is_empty()));
+            }
+            Err(error) => findings.push(Finding::Listed { problem: error.to_string() }),
+        }
+    }
+    Ok(Verdict { list: Some(list), ..Verdict::new(path, Format::Dsc, findings) })
+}
+
+/// Lines with anything but words, numbers and commas: readers differ in what they pass over.
+fn unlisted(text: &str) -> Vec<Finding> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, ',' | '.' | '-');
+    let lines = text.split_terminator('\n').enumerate();
+    let odd = lines.filter(|(_, line)| line.is_empty() || !line.chars().all(plain));
+    odd.map(|(index, _)| Finding::Construct {
+        place: format!("line {}", index + 1),
+        construct: "a blank or a character other than of words and numbers".to_owned(),
+    })
+    .collect()
+}
+
+/// The first line that is not written as what is read of it is: readers take numbers, and the order of
+/// lines, each in their way.
+fn written_otherwise(text: &str, listed: &Target) -> Option<Finding> {
+    let dialect = Dialect::of(listed);
+    let anew = dsc::write(listed, dialect).unwrap_or_default();
+    if text == anew {
+        return None;
+    }
+    let same = text.lines().zip(anew.lines()).take_while(|(found, anew)| found == anew).count();
+    let construct = "a number or an order that is written otherwise".to_owned();
+    Some(Finding::Construct { place: format!("line {}", same + 1), construct })
+}
+
+fn compare(listed: &Target, target: &Target, list: &mut ListVerdict) -> Vec<Finding> {
+    let mut problems = Vec::new();
+    let name = |target: &Target| target.family.as_ref().map(|family| family.name.clone());
+    let [found, stated] = [listed, target].map(|t| name(t).unwrap_or_else(|| "none".to_owned()));
+    if found != stated {
+        problems.push(format!("family {found} instead of {stated}"));
+    }
+    for panel in &target.panels {
+        match listed.panels.iter().find(|listed| listed.id == panel.id) {
+            Some(found) => {
+                list.boards += 1;
+                let matrix = Dialect::of(listed) == Dialect::Fork;
+                compare_board(found, panel, matrix, list, &mut problems);
+            }
+            None => problems.push(format!("board {} is not listed", panel.id)),
+        }
+    }
+    for panel in &listed.panels {
+        if !target.panels.iter().any(|stated| stated.id == panel.id) {
+            problems.push(format!("board {} is listed, which the target does not have", panel.id));
+        }
+    }
+    problems.into_iter().map(|problem| Finding::Listed { problem }).collect()
+}
+
+/// Compares a board; the number of columns and rows is only in one dialect that of the corners.
+fn compare_board(
+    found: &Panel,
+    stated: &Panel,
+    matrix: bool,
+    list: &mut ListVerdict,
+    problems: &mut Vec<String>,
+) {
+    let board = format!("board {}", stated.id);
+    if found.kind != stated.kind {
+        return problems.push(format!("{board} is of another kind of grid"));
+    }
+    if matrix && found.matrix != stated.matrix {
+        let [[a, b], [c, d]] = [found.matrix, stated.matrix];
+        problems.push(format!("{board} has {a} columns and {b} rows instead of {c} and {d}"));
+    }
+    if (found.edge_mm - stated.edge_mm).abs() > LIST_TOLERANCE_MM {
+        let [found, stated] = [found.edge_mm, stated.edge_mm];
+        problems.push(format!("{board} has an edge of {found} mm instead of {stated} mm"));
+    }
+    if found.border_bits != stated.border_bits {
+        let [found, stated] = [found, stated].map(|panel| panel.border_bits.unwrap_or_default());
+        problems.push(format!("{board} has a border of {found} bits instead of {stated}"));
+    }
+    compare_corners(found, stated, list, problems);
+    compare_tags(found, stated, list, problems);
+}
+
+fn compare_corners(
+    found: &Panel,
+    stated: &Panel,
+    list: &mut ListVerdict,
+    problems: &mut Vec<String>,
+) {
+    for corner in &stated.corners {
+        let (row, col) = (corner.row, corner.col);
+        let place = format!("board {}: the corner at row {row} col {col}", stated.id);
+        let listed = found.corners.iter().find(|c| (c.row, c.col) == (row, col));
+        let Some(listed) = listed else {
+            problems.push(format!("{place} is not listed"));
+            continue;
+        };
+        list.corners += 1;
+        let off = DVec3::from(listed.target_mm).distance(DVec3::from(corner.target_mm));
+        list.max_deviation_mm = list.max_deviation_mm.max(off);
+        if off > LIST_TOLERANCE_MM {
+            problems.push(format!("{place} is off by {off:.6} mm"));
+        }
+    }
+    let extra = found.corners.len().saturating_sub(stated.corners.len());
+    if extra > 0 {
+        problems.push(format!("board {} lists {extra} corners too many", stated.id));
+    }
+}
+
+fn compare_tags(found: &Panel, stated: &Panel, list: &mut ListVerdict, problems: &mut Vec<String>) {
+    let at = |panel: &Panel, row: i32, col: i32| {
+        panel.tags.iter().find(|tag| (tag.row, tag.col) == (row, col)).map(|tag| tag.id)
+    };
+    for tag in &stated.tags {
+        let (id, row, col) = (tag.id, tag.row, tag.col);
+        let place = format!("board {}: tag {id} at row {row} col {col}", stated.id);
+        match at(found, row, col) {
+            Some(listed) if listed == id => list.tags += 1,
+            Some(listed) => problems.push(format!("{place} is listed as tag {listed}")),
+            None => problems.push(format!("{place} is not listed")),
+        }
+    }
+    for tag in found.tags.iter().filter(|tag| at(stated, tag.row, tag.col).is_none()) {
+        let (id, row, col) = (tag.id, tag.row, tag.col);
+        problems.push(format!("board {}: tag {id} is listed at row {row} col {col}", stated.id));
+    }
+}

@@ -1,0 +1,408 @@
+//! What lies outside the tiles: every text, check bar and line has its ink, and nothing else is on the sheet.
+//!
+//! Outlines of marks come from the same place as those printed; what is proved is that the sheet has
+//! what the description says, and no more. The length of check bars is measured by itself.
+
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape};
+use rayon::prelude::*;
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, RTree};
+
+use super::document::{MAX_INK_ERROR, Page};
+use super::tiles::{EDGE_PX, PROBES, PlacedPanel};
+use super::{Finding, SheetVerdict};
+use deltille_core::artwork;
+use deltille_core::lattice::Tile;
+use deltille_core::raster::{Coverage, Gray};
+use deltille_core::targets::{CHECK_BAR_STROKE_MM, SheetLayout};
+
+/// Ink of a mark and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
+/// that lies 0.02 mm off at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
+const MAX_MARK_ERROR: f64 = 0.3;
+
+/// White around a mark that belongs to it, px.
+const BLANK_PX: f64 = 3.0;
+
+/// Long marks are compared in pieces of at most this length, mm.
+const PIECE_MM: f64 = 20.0;
+
+/// Blank around the window of a page that belongs to it, px: what it shows is cut off at its rim,
+/// through pixels and through the width of lines.
+const WINDOW_BLANK_PX: f64 = 3.0;
+
+/// More spots of a page are not listed: it is dirty all over.
+const MOST_SPOTS: usize = 200;
+
+/// How finely curves are turned into lines, mm.
+const FLATNESS_MM: f64 = 0.002;
+
+/// Compares the marks, and looks for ink where none should be. What is in `window`
+/// (left, lower, right, upper end, mm), the part of a larger sheet, is left to others.
+pub(super) fn check(
+    page: &Page,
+    layout: &SheetLayout,
+    panels: &[PlacedPanel],
+    window: Option<[f64; 4]>,
+    verdict: &mut SheetVerdict,
+) {
+    let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
+    let window = window.map(|window| pixels(page, window, WINDOW_BLANK_PX));
+    // What the window or a panel shows is compared by itself.
+    let is_own = |x: usize, y: usize| {
+        let in_window =
+            |[x0, y0, x1, y1]: [usize; 4]| (x0..x1).contains(&x) && (y0..y1).contains(&y);
+        let at = [x as f64, y as f64];
+        let is_beside = |ground: &Ground| ground.expected(page, at, EDGE_PX).is_none();
+        !window.is_some_and(in_window) && grounds.iter().all(is_beside)
+    };
+    let (marks, mut findings) = marks(layout);
+    let drawn = Drawn::new(page, &marks);
+    findings.par_extend(marks.par_iter().filter_map(|mark| {
+        let is_right = mark.areas.iter().all(|area| drawn.is_in(area, is_own));
+        (!is_right).then(|| mark.what.differs(layout))
+    }));
+    // Of a bar of another length there is no more to say.
+    let is_said = |differs: &Finding| {
+        let is_same = |found: &Finding| match (found, differs) {
+            (Finding::CheckBar { bar, .. }, Finding::CheckBarDiffers { bar: other }) => {
+                bar == other
+            }
+            _ => false,
+        };
+        verdict.findings.iter().any(is_same)
+    };
+    findings.retain(|finding| !is_said(finding));
+    verdict.findings.extend(findings);
+    let width = page.image.width();
+    let mut known = vec![false; page.image.pixels().len()];
+    if let Some([x0, y0, x1, y1]) = window {
+        (y0..y1).for_each(|y| known[y * width + x0..y * width + x1].fill(true));
+    }
+    marks.iter().flat_map(|mark| &mark.areas).for_each(|area| area.cover(page, &mut known));
+    verdict.findings.extend(spots(page, &known, panels));
+}
+
+/// What a mark is, with its index.
+#[derive(Clone, Copy)]
+enum What {
+    Text(usize),
+    CheckBar(usize),
+    Line(usize),
+}
+
+impl What {
+    /// That a mark is not as the layout has it.
+    fn differs(self, layout: &SheetLayout) -> Finding {
+        match self {
+            Self::Text(i) => {
+                Finding::TextDiffers { text: i + 1, stated: layout.texts[i].text.clone() }
+            }
+            Self::CheckBar(i) => Finding::CheckBarDiffers { bar: i + 1 },
+            Self::Line(i) => Finding::LineDiffers { line: i + 1, purpose: layout.lines[i].kind },
+        }
+    }
+}
+
+/// A mark beside the panels.
+struct Mark {
+    what: What,
+    /// What is black, on the page, mm.
+    outlines: Vec<Vec<[f64; 2]>>,
+    /// What belongs to it, in pieces.
+    areas: Vec<Area>,
+}
+
+/// A rectangle along a mark, so that what is slanted claims no more than what is upright.
+struct Area {
+    /// From the page to a frame along the mark.
+    along: Affine,
+    /// In that frame, mm.
+    bounds: Rect,
+}
+
+/// All marks of a layout; of texts that cannot be drawn it is said that they differ.
+fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<Finding>) {
+    let (mut marks, mut findings) = (Vec::new(), Vec::new());
+    for (index, text) in layout.texts.iter().enumerate() {
+        match artwork::text_outline(text) {
+            Ok(path) if path.is_empty() => {}
+            Ok(path) => {
+                let along = Affine::rotate(-text.angle_rad);
+                let bounds = (along * &path).bounding_box();
+                let areas = vec![Area { along, bounds }];
+                marks.push(Mark { what: What::Text(index), outlines: polygons(&path), areas });
+            }
+            Err(_) => findings.push(What::Text(index).differs(layout)),
+        }
+    }
+    for (index, bar) in layout.check_bars.iter().enumerate() {
+        let areas = pieces([bar.from_mm, bar.to_mm], CHECK_BAR_STROKE_MM);
+        let outlines = polygons(&artwork::check_bar_outline(bar));
+        marks.push(Mark { what: What::CheckBar(index), outlines, areas });
+    }
+    for (index, line) in artwork::drawn_lines(layout) {
+        let areas = pieces([line.from_mm, line.to_mm], line.width_mm);
+        let stroke = |[from, to]: [[f64; 2]; 2]| {
+            let length = distance(from, to).max(f64::MIN_POSITIVE);
+            let across =
+                [from[1] - to[1], to[0] - from[0]].map(|d| d / length * line.width_mm / 2.0);
+            let beside = |p: [f64; 2], side: f64| [0, 1].map(|i| p[i] + side * across[i]);
+            vec![beside(from, 1.0), beside(from, -1.0), beside(to, -1.0), beside(to, 1.0)]
+        };
+        let outlines = artwork::strokes_mm(line).into_iter().map(stroke).collect();
+        marks.push(Mark { what: What::Line(index), outlines, areas });
+    }
+    (marks, findings)
+}
+
+/// A path as polygons.
+fn polygons(path: &BezPath) -> Vec<Vec<[f64; 2]>> {
+    let mut polygons: Vec<Vec<[f64; 2]>> = Vec::new();
+    kurbo::flatten(path, FLATNESS_MM, |element| match (element, polygons.last_mut()) {
+        (PathEl::MoveTo(p), _) => polygons.push(vec![[p.x, p.y]]),
+        (PathEl::LineTo(p), Some(polygon)) => polygon.push([p.x, p.y]),
+        _ => {}
+    });
+    polygons
+}
+
+/// Pieces of the area of a straight mark.
+fn pieces([from, to]: [[f64; 2]; 2], width_mm: f64) -> Vec<Area> {
+    let length = distance(from, to);
+    let along = Affine::rotate(-(to[1] - from[1]).atan2(to[0] - from[0]))
+        * Affine::translate((-from[0], -from[1]));
+    let count = (length / PIECE_MM).ceil().max(1.0);
+    let piece = |n: usize| {
+        let [start, end] = [n, n + 1].map(|n| n as f64 / count * length);
+        Area { along, bounds: Rect::new(start, -width_mm / 2.0, end, width_mm / 2.0) }
+    };
+    (0..count as usize).map(piece).collect()
+}
+
+impl Area {
+    /// The rectangle of pixels around it.
+    fn pixels(&self, page: &Page) -> [usize; 4] {
+        let Rect { x0, y0, x1, y1 } = self.along.inverse().transform_rect_bbox(self.bounds);
+        pixels(page, [x0, y0, x1, y1], BLANK_PX)
+    }
+
+    /// Whether a pixel belongs to it, with `blank` around.
+    fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
+        let [x, y] = page.page_from_px([x as f64, y as f64]);
+        let blank = blank_px / page.px_per_mm;
+        self.bounds.inflate(blank, blank).contains(self.along * Point::new(x, y))
+    }
+
+    /// Marks its pixels.
+    fn cover(&self, page: &Page, known: &mut [bool]) {
+        let [x0, y0, x1, y1] = self.pixels(page);
+        for y in y0..y1 {
+            for x in x0..x1 {
+                known[y * page.image.width() + x] |= self.contains(page, x, y, BLANK_PX);
+            }
+        }
+    }
+}
+
+/// An outline in the picture, by the rectangle around it, and whether it is of a letter.
+type Outline = GeomWithData<Rectangle<[f64; 2]>, (Vec<[f64; 2]>, bool)>;
+
+/// What a page should show of marks.
+struct Drawn<'a> {
+    page: &'a Page,
+    outlines: RTree<Outline>,
+}
+
+impl<'a> Drawn<'a> {
+    fn new(page: &'a Page, marks: &[Mark]) -> Self {
+        let of_mark = |mark: &Mark| {
+            let is_text = matches!(mark.what, What::Text(_));
+            let of = move |polygon: &Vec<[f64; 2]>| {
+                let polygon: Vec<[f64; 2]> =
+                    polygon.iter().map(|&p| page.px_from_page(p)).collect();
+                let end = |of: fn(f64, f64) -> f64| {
+                    polygon.iter().copied().reduce(|a, b| [of(a[0], b[0]), of(a[1], b[1])])
+                };
+                let around = Rectangle::from_corners(end(f64::min)?, end(f64::max)?);
+                Some(GeomWithData::new(around, (polygon, is_text)))
+            };
+            mark.outlines.iter().filter_map(of).collect::<Vec<_>>()
+        };
+        Self { page, outlines: RTree::bulk_load(marks.iter().flat_map(of_mark).collect()) }
+    }
+
+    /// Whether an area has the ink of the marks, and no other, where it `is_own`.
+    fn is_in(&self, area: &Area, is_own: impl Fn(usize, usize) -> bool) -> bool {
+        let page = self.page;
+        let [x0, y0, x1, y1] = area.pixels(page);
+        let (width, height) = (x1 - x0, y1 - y0);
+        let stated = self.stated([x0, y0], [width, height]);
+        let found = Gray::from_fn(width, height, |x, y| {
+            1.0 - f32::from(page.image.at(x0 + x, y0 + y)) / 255.0
+        });
+        let mean = |image: &Gray<f32>, x: usize, y: usize| {
+            let rows = (y - 1..=y + 1).map(|y| image.row(y)[x - 1..=x + 1].iter().sum::<f32>());
+            f64::from(rows.sum::<f32>()) / 9.0
+        };
+        let inside = |n: usize| 1..n.saturating_sub(1);
+        inside(height).all(|y| {
+            inside(width).all(|x| {
+                (mean(&stated, x, y) - mean(&found, x, y)).abs() <= MAX_MARK_ERROR
+                    || !area.contains(page, x0 + x, y0 + y, BLANK_PX - 1.0)
+                    || !is_own(x0 + x, y0 + y)
+            })
+        })
+    }
+
+    /// The ink of the marks in a part of the picture.
+    fn stated(&self, [x0, y0]: [usize; 2], [width, height]: [usize; 2]) -> Gray<f32> {
+        let first = [x0 as f64 - 0.5, y0 as f64 - 0.5];
+        let part = AABB::from_corners(first, [first[0] + width as f64, first[1] + height as f64]);
+        let [mut letters, mut strokes] = [0, 1].map(|_| Coverage::new(width, height));
+        for outline in self.outlines.locate_in_envelope_intersecting(part) {
+            let (polygon, is_text) = &outline.data;
+            let polygon: Vec<[f64; 2]> =
+                polygon.iter().map(|[x, y]| [x - x0 as f64, y - y0 as f64]).collect();
+            // Which way outlines of letters run is the font's business; those of strokes cross each other.
+            match is_text {
+                true => letters.add(&polygon, 1.0),
+                false => strokes.add(&polygon, signed_area(&polygon).signum()),
+            }
+        }
+        let (letters, strokes) = (letters.finish(), strokes.finish());
+        Gray::from_fn(width, height, |x, y| (letters.at(x, y).abs() + strokes.at(x, y)).min(1.0))
+    }
+}
+
+/// Positive where a polygon runs clockwise on the screen.
+fn signed_area(polygon: &[[f64; 2]]) -> f64 {
+    let next = polygon.iter().cycle().skip(1);
+    polygon.iter().zip(next).map(|([x, y], [u, v])| x * v - y * u).sum()
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The pixels of a rectangle of the page (mm) with `blank` more on every side: first and
+/// past-the-end column and row, as left, upper, right, lower.
+fn pixels(page: &Page, [x0, y0, x1, y1]: [f64; 4], blank: f64) -> [usize; 4] {
+    let (least, most) = (page.px_from_page([x0, y1]), page.px_from_page([x1, y0]));
+    let (width, height) = (page.image.width() as f64, page.image.height() as f64);
+    let [left, upper] = least.map(|v| (v - blank).floor().max(0.0));
+    let [right, lower] = most.map(|v| (v + blank).ceil() + 1.0);
+    let (right, lower) = (right.clamp(0.0, width), lower.clamp(0.0, height));
+    [left.min(right), upper.min(lower), right, lower].map(|v| v as usize)
+}
+
+/// Names each connected spot of wrong pixels outside the tiles and the `known` marks.
+pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<Finding> {
+    let (width, height) = (page.image.width(), page.image.height());
+    let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
+    let mut wrong = vec![false; width * height];
+    wrong.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        for (x, (wrong, &pixel)) in row.iter_mut().zip(page.image.row(y)).enumerate() {
+            let ink = 1.0 - f64::from(pixel) / 255.0;
+            // White is right wherever no inverted panel is; most of the sheet is done here.
+            let plain = ink <= MAX_INK_ERROR && grounds.iter().all(|ground| !ground.inverted());
+            if plain || known[y * width + x] {
+                continue;
+            }
+            // Where this far from edges.
+            let is_off = |most: f64, near_px: f64| {
+                let expected =
+                    |ground: &Ground| ground.expected(page, [x as f64, y as f64], near_px);
+                let expected = grounds.iter().find_map(expected).unwrap_or(Some(0.0));
+                expected.is_some_and(|expected| (ink - expected).abs() > most)
+            };
+            *wrong = is_off(page.max_ink_error_at_edges(), EDGE_PX)
+                || page.smear_px > 0.0 && is_off(MAX_INK_ERROR, EDGE_PX + page.smear_px);
+        }
+    });
+    let mut spots = Vec::new();
+    for start in 0..wrong.len() {
+        if spots.len() == MOST_SPOTS {
+            break;
+        }
+        if !std::mem::take(&mut wrong[start]) {
+            continue;
+        }
+        let (mut stack, mut count, mut moment) = (vec![start], 0.0, [0.0; 2]);
+        while let Some(at) = stack.pop() {
+            let (x, y) = (at % width, at / width);
+            count += 1.0;
+            moment = [moment[0] + x as f64, moment[1] + y as f64];
+            for y in y.saturating_sub(1)..(y + 2).min(height) {
+                for x in x.saturating_sub(1)..(x + 2).min(width) {
+                    if std::mem::take(&mut wrong[y * width + x]) {
+                        stack.push(y * width + x);
+                    }
+                }
+            }
+        }
+        let at_mm = page.page_from_px(moment.map(|m| m / count));
+        spots.push(Finding::Spot { at_mm, area_mm2: count / page.px_per_mm.powi(2) });
+    }
+    spots
+}
+
+/// The area of a panel on its page.
+struct Ground<'a> {
+    placed: &'a PlacedPanel<'a>,
+    tiles: BTreeSet<Tile>,
+    /// The tiles and the black field of an inverted panel: left, lower, right, upper end, mm.
+    field: [f64; 4],
+    /// Where on the picture that may be: left, upper, right, lower end, px.
+    around_px: [f64; 4],
+}
+
+impl<'a> Ground<'a> {
+    fn new(placed: &'a PlacedPanel<'a>) -> Self {
+        let panel = placed.panel;
+        let field = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
+        let [left, lower, right, upper] = field;
+        let ends = [[left, lower], [right, lower], [right, upper], [left, upper]];
+        let ends = ends.map(|p| placed.page.px_from_page(placed.page_from_panel(p)));
+        let reach_px = 2.0 * EDGE_PX + placed.page.smear_px;
+        let most = |i: usize, sign: f64| {
+            ends.map(|p| sign * p[i]).into_iter().fold(f64::MIN, f64::max) + reach_px
+        };
+        let around_px = [-most(0, -1.0), -most(1, -1.0), most(0, 1.0), most(1, 1.0)];
+        Self { placed, tiles: panel.tiles(), field, around_px }
+    }
+
+    fn inverted(&self) -> bool {
+        self.placed.panel.inverted
+    }
+
+    /// What a pixel of the panel's area should be; `Some(None)` in and beside the tiles, which are
+    /// compared by themselves, and at the edge of the field, `near_px` to either side. Between the tiles of a panel
+    /// that is not inverted there may be another one.
+    fn expected(&self, page: &Page, [x, y]: [f64; 2], near_px: f64) -> Option<Option<f64>> {
+        let [left, upper, right, lower] = self.around_px;
+        if x < left || x > right || y < upper || y > lower {
+            return None;
+        }
+        let [u, v] = self.placed.panel_from_page(page.page_from_px([x, y]));
+        let [left, lower, right, upper] = self.field;
+        let inside = (u - left).min(right - u).min(v - lower).min(upper - v) * page.px_per_mm;
+        if inside < -near_px {
+            return None;
+        }
+        let edge_mm = self.placed.panel.edge_mm;
+        let near = near_px / page.px_per_mm;
+        let reaches = |[du, dv]: [f64; 2]| {
+            let at = [(u + du) / edge_mm, (v + dv) / edge_mm];
+            self.tiles.contains(&self.placed.panel.kind.tile_at(at))
+        };
+        // Fine enough that no tip of a tile, also a lone one, slips between two directions.
+        let around = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
+        let in_tile = reaches([0.0, 0.0])
+            || around.into_iter().any(|angle| reaches([near * angle.cos(), near * angle.sin()]));
+        let undecided = in_tile || (self.inverted() && inside < near_px);
+        if undecided { Some(None) } else { self.inverted().then_some(Some(1.0)) }
+    }
+}

@@ -1,0 +1,157 @@
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat4, DVec3, Vec3};
+use image::ImageDecoder as _;
+
+use super::{Model, Triangle};
+use crate::DocumentError;
+use crate::document::bounded;
+use deltille_core::raster::Gray;
+use deltille_files::limits::Limits;
+
+/// Loads a `.glb` or an `.obj` with its material and texture.
+pub(crate) fn load(path: &Path, limits: &Limits) -> Result<Model, DocumentError> {
+    let unreadable = |problem: String| DocumentError::unreadable(path, problem);
+    let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+    let (bytes, file, within) = (limits.read(path)?, path.to_owned(), *limits);
+    let model = bounded(path, limits, move || match is_obj {
+        true => obj(&bytes, &file, &within),
+        false => glb(&bytes, &within),
+    })?;
+    if model.triangles.is_empty() {
+        return Err(unreadable("it has no triangles".to_owned()));
+    }
+    Ok(model)
+}
+
+fn glb(bytes: &[u8], limits: &Limits) -> Result<Model, String> {
+    let file = gltf::Gltf::from_slice(bytes).map_err(|error| format!("not glTF: {error}"))?;
+    let blob = file.blob.as_deref().ok_or("it has no binary part")?;
+    let mut triangles = Vec::new();
+    let mut texture = None;
+    // The crate counts through all nodes for each child.
+    let nodes: Vec<gltf::Node> = file.nodes().collect();
+    let roots = file.default_scene().into_iter().flat_map(|scene| scene.nodes());
+    // Every node is reached once, as was seen to before.
+    let mut open: Vec<(usize, DMat4)> = roots.map(|node| (node.index(), DMat4::IDENTITY)).collect();
+    while let Some((index, parent)) = open.pop() {
+        let here = visit(&nodes[index], parent, blob, &mut triangles, &mut texture)?;
+        let children = file.as_json().nodes[index].children.iter().flatten();
+        open.extend(children.map(|child| (child.value(), here)));
+    }
+    let texture = texture.ok_or("it has no texture")?;
+    Ok(Model { triangles, texture: image(texture, limits)? })
+}
+
+/// Adds the triangles of a node, and tells its motion; glTF is in metres.
+fn visit<'a>(
+    node: &gltf::Node<'a>,
+    parent: DMat4,
+    blob: &'a [u8],
+    triangles: &mut Vec<Triangle>,
+    texture: &mut Option<&'a [u8]>,
+) -> Result<DMat4, String> {
+    let columns = node.transform().matrix().map(|column| column.map(f64::from));
+    let here = parent * DMat4::from_cols_array_2d(&columns);
+    for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
+        let reader = primitive.reader(|_| Some(blob));
+        let place = |v: [f32; 3]| here.transform_point3(Vec3::from(v).as_dvec3()) * 1e3;
+        let turn =
+            |v: [f32; 3]| here.transform_vector3(Vec3::from(v).as_dvec3()).normalize_or_zero();
+        let positions: Vec<DVec3> =
+            reader.read_positions().ok_or("it has no positions")?.map(place).collect();
+        let normals: Vec<DVec3> =
+            reader.read_normals().ok_or("it has no normals")?.map(turn).collect();
+        let uvs = reader.read_tex_coords(0).ok_or("it has no texture coordinates")?;
+        let uvs: Vec<[f64; 2]> = uvs.into_f32().map(|uv| uv.map(f64::from)).collect();
+        let indices: Vec<u32> = match reader.read_indices() {
+            Some(indices) => indices.into_u32().collect(),
+            None => (0..positions.len() as u32).collect(),
+        };
+        add(triangles, &indices, &positions, (&indices, &normals), (&indices, &uvs))?;
+        let material = primitive.material().pbr_metallic_roughness();
+        let source = material.base_color_texture().map(|info| info.texture().source().source());
+        if let Some(gltf::image::Source::View { view, .. }) = source {
+            *texture = blob.get(view.offset()..view.offset() + view.length());
+        }
+    }
+    Ok(here)
+}
+
+fn obj(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model, String> {
+    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+    let (models, materials) = tobj::load_obj_buf(&mut &*bytes, &options, |library| {
+        let library = limits.read(&path.with_file_name(library));
+        let library = library.map_err(|_| tobj::LoadError::OpenFileFailed)?;
+        tobj::load_mtl_buf(&mut &library[..])
+    })
+    .map_err(|error| error.to_string())?;
+    let materials = materials.map_err(|error| format!("its material library: {error}"))?;
+    let mut triangles = Vec::new();
+    let mut texture: Option<PathBuf> = None;
+    for mesh in models.iter().map(|model| &model.mesh) {
+        let points = |values: &[f64]| -> Vec<DVec3> {
+            values.as_chunks::<3>().0.iter().copied().map(DVec3::from).collect()
+        };
+        // OBJ counts v upwards from the lower edge of the texture.
+        let uvs = mesh.texcoords.as_chunks::<2>().0.iter();
+        let uvs: Vec<[f64; 2]> = uvs.map(|&[u, v]| [u, 1.0 - v]).collect();
+        add(
+            &mut triangles,
+            &mesh.indices,
+            &points(&mesh.positions),
+            (&mesh.normal_indices, &points(&mesh.normals)),
+            (&mesh.texcoord_indices, &uvs),
+        )?;
+        let material = mesh.material_id.and_then(|id| materials.get(id));
+        let name = material.and_then(|material| material.diffuse_texture.as_ref());
+        texture = name.map(|name| path.with_file_name(name)).or(texture);
+    }
+    let texture = texture.ok_or("it has no texture")?;
+    let bytes = limits.read(&texture).map_err(|error| error.to_string())?;
+    Ok(Model { triangles, texture: image(&bytes, limits)? })
+}
+
+/// Adds triangles from indexed lists.
+fn add(
+    triangles: &mut Vec<Triangle>,
+    indices: &[u32],
+    positions: &[DVec3],
+    normals: (&[u32], &[DVec3]),
+    uvs: (&[u32], &[[f64; 2]]),
+) -> Result<(), String> {
+    fn pick<T: Copy>(list: &[T], at: Option<&u32>) -> Result<T, String> {
+        let found = at.and_then(|&at| list.get(at as usize)).copied();
+        found.ok_or_else(|| "an index points nowhere".to_owned())
+    }
+    for first in (0..indices.len() / 3).map(|i| 3 * i) {
+        let three = [first, first + 1, first + 2];
+        let mut triangle = Triangle {
+            vertices_mm: [DVec3::ZERO; 3],
+            normals: [DVec3::ZERO; 3],
+            uv: [[0.0; 2]; 3],
+        };
+        for (i, at) in three.into_iter().enumerate() {
+            triangle.vertices_mm[i] = pick(positions, indices.get(at))?;
+            triangle.normals[i] = pick(normals.1, normals.0.get(at))?;
+            triangle.uv[i] = pick(uvs.1, uvs.0.get(at))?;
+        }
+        triangles.push(triangle);
+    }
+    Ok(())
+}
+
+fn image(bytes: &[u8], limits: &Limits) -> Result<Gray<u8>, String> {
+    let broken = |error: &dyn std::fmt::Display| format!("its texture: {error}");
+    // Only PNG comes so far.
+    let mut reader = image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Png);
+    reader.no_limits();
+    let decoder = reader.into_decoder().map_err(|error| broken(&error))?;
+    let (width, height) = decoder.dimensions();
+    limits.check_pixels(width, height).map_err(|error| broken(&error))?;
+    let decoded = image::DynamicImage::from_decoder(decoder).map_err(|error| broken(&error))?;
+    let grey = decoded.into_luma8();
+    let (width, height) = (grey.width() as usize, grey.height() as usize);
+    Gray::from_vec(width, height, grey.into_raw()).ok_or_else(|| "its texture is empty".to_owned())
+}

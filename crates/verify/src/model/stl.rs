@@ -1,0 +1,40 @@
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+
+use crate::DocumentError;
+use deltille_files::limits::Limits;
+
+/// Bytes before the triangles of a binary STL, and of a triangle.
+const HEAD: usize = 84;
+const TRIANGLE: usize = 50;
+
+/// A triangle of an STL, mm.
+pub(crate) struct Facet {
+    pub normal: DVec3,
+    pub vertices_mm: [DVec3; 3],
+}
+
+/// Loads a binary STL.
+pub(crate) fn load_stl(path: &Path, limits: &Limits) -> Result<Vec<Facet>, DocumentError> {
+    let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
+    let bytes = limits.read(path)?;
+    let (Some(head), Some(body)) = (bytes.get(..HEAD), bytes.get(HEAD..)) else {
+        return Err(unreadable("too short for a binary STL"));
+    };
+    let count = u32::from_le_bytes([head[80], head[81], head[82], head[83]]) as usize;
+    if count == 0 || Some(body.len()) != count.checked_mul(TRIANGLE) {
+        return Err(unreadable("not a binary STL: its length is not that of its triangles"));
+    }
+    let facets = body.chunks_exact(TRIANGLE).map(|record| {
+        let vectors: Vec<DVec3> = record.as_chunks::<12>().0[..4].iter().map(vector).collect();
+        Facet { normal: vectors[0], vertices_mm: [vectors[1], vectors[2], vectors[3]] }
+    });
+    Ok(facets.collect())
+}
+
+fn vector(bytes: &[u8; 12]) -> DVec3 {
+    let number =
+        |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
+    Vec3::new(number(0), number(4), number(8)).as_dvec3()
+}

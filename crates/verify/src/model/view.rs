@@ -1,0 +1,108 @@
+use glam::{DVec2, DVec3};
+
+use super::Model;
+use deltille_core::camera::{Camera, Pose};
+use deltille_core::raster::Gray;
+
+/// Samples per pixel and axis.
+const SAMPLES: usize = 2;
+
+/// Level around the object.
+const BACKGROUND: u8 = 128;
+
+/// A pinhole camera before a loaded mesh.
+pub(crate) struct View {
+    pub camera: Camera,
+    pub camera_from_target: Pose,
+}
+
+impl View {
+    /// The picture of the mesh: the nearest triangle that turns its front to the camera, by the
+    /// order of its vertices, with its texture.
+    pub fn render(&self, model: &Model) -> Gray<u8> {
+        let [width, height] = [self.camera.width, self.camera.height].map(|n| n as usize * SAMPLES);
+        let mut nearest = vec![0.0f32; width * height];
+        let mut shades = vec![BACKGROUND; width * height];
+        let scale = SAMPLES as f64;
+        let sample =
+            |[x, y]: [f64; 2]| DVec2::new((x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5);
+        let texture = &model.texture;
+        let size = [texture.width() as f64, texture.height() as f64];
+        for triangle in &model.triangles {
+            let seen = triangle.vertices_mm.map(|v| self.camera_from_target.apply(v));
+            let normal = (seen[1] - seen[0]).cross(seen[2] - seen[0]);
+            if normal.dot(seen[0]) >= 0.0 {
+                continue;
+            }
+            let Some(pixels) = all(seen.map(|v| self.camera.project(v).map(sample))) else {
+                continue;
+            };
+            let [a, b, c] = pixels;
+            let area = (b - a).perp_dot(c - a);
+            let low = a.min(b).min(c).ceil().max(DVec2::ZERO);
+            let high = a.max(b).max(c).floor() + 1.0;
+            let columns = low.x as usize..(high.x.max(0.0) as usize).min(width);
+            for y in low.y as usize..(high.y.max(0.0) as usize).min(height) {
+                for x in columns.clone() {
+                    let p = DVec2::new(x as f64, y as f64);
+                    let weights = [
+                        (b - p).perp_dot(c - p) / area,
+                        (c - p).perp_dot(a - p) / area,
+                        (a - p).perp_dot(b - p) / area,
+                    ];
+                    if weights.iter().any(|&w| w < 0.0) {
+                        continue;
+                    }
+                    // What is affine on the triangle is affine on the screen after division by z.
+                    let per_z = [0, 1, 2].map(|i| weights[i] / seen[i].z);
+                    let inverse_z: f64 = per_z.iter().sum();
+                    let at = y * width + x;
+                    if inverse_z as f32 <= nearest[at] {
+                        continue;
+                    }
+                    nearest[at] = inverse_z as f32;
+                    let uv = [0, 1].map(|axis| {
+                        let sum: f64 = (0..3).map(|i| per_z[i] * triangle.uv[i][axis]).sum();
+                        sum / inverse_z * size[axis] - 0.5
+                    });
+                    shades[at] = texture.bilinear(uv[0], uv[1]).round() as u8;
+                }
+            }
+        }
+        Gray::from_fn(width / SAMPLES, height / SAMPLES, |x, y| {
+            let rows = (0..SAMPLES).map(|s| (y * SAMPLES + s) * width + x * SAMPLES);
+            let sum: u32 =
+                rows.flat_map(|at| &shades[at..at + SAMPLES]).map(|&v| u32::from(v)).sum();
+            (sum / (SAMPLES * SAMPLES) as u32) as u8
+        })
+    }
+
+    /// Where the ray of a pixel meets the mesh first, in the target frame, mm.
+    pub fn meet(&self, model: &Model, [x, y]: [f64; 2]) -> Option<DVec3> {
+        let [fx, fy] = self.camera.focal_px;
+        let [cx, cy] = self.camera.centre_px;
+        let target_from_camera = self.camera_from_target.inverse();
+        let eye = target_from_camera.translation;
+        let ray = target_from_camera.rotation * DVec3::new((x - cx) / fx, (y - cy) / fy, 1.0);
+        let meets = model.triangles.iter().filter_map(|triangle| {
+            let normal = triangle.winding();
+            let towards = normal.dot(ray);
+            if towards >= 0.0 {
+                return None;
+            }
+            let [a, b, c] = triangle.vertices_mm;
+            let t = normal.dot(a - eye) / towards;
+            let p = eye + ray * t;
+            let inside = [(a, b), (b, c), (c, a)]
+                .iter()
+                .all(|(p0, p1)| (*p1 - *p0).cross(p - *p0).dot(normal) >= 0.0);
+            (t > 0.0 && inside).then_some((t, p))
+        });
+        meets.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
+    }
+}
+
+fn all<T: Copy>(values: [Option<T>; 3]) -> Option<[T; 3]> {
+    let [a, b, c] = values;
+    Some([a?, b?, c?])
+}

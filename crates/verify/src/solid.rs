@@ -1,0 +1,302 @@
+//! Meshes of solids: every face looked at by a camera, every corner followed back onto the mesh.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::board::wrong_tones;
+use super::face_page::face_page;
+use super::fit::AffineMap;
+use super::marks::spots;
+use super::model::{self, Model, View};
+use super::tiles::PlacedPanel;
+use super::{DocumentError, FaceVerdict, Finding, Format, Verdict, Verifier};
+use deltille_core::camera::{Camera, Pose};
+use deltille_core::detect::Detection;
+use deltille_core::lattice::Vertex;
+use deltille_core::raster::Gray;
+use deltille_core::targets::{Panel, TargetSpec};
+
+/// Largest deviation of a corner of a mesh, mm: a tenth of what a well glued panel is off.
+pub const MESH_TOLERANCE_MM: f64 = 0.05;
+
+/// Deviation of a corner of a neighbouring face, seen at a grazing angle, mm: less than half a
+/// tile of any board that is detected so.
+const GRAZING_TOLERANCE_MM: f64 = 1.0;
+
+/// Edge of a tag's cell in the picture, px.
+const CELL_PX: f64 = 8.0;
+
+/// Longest side of a picture, px.
+const MAX_SIDE_PX: f64 = 4000.0;
+
+/// Distance of the camera in radii of the face, and its step aside, so that it sees the face at an
+/// angle of 11°, where depth matters.
+const DISTANCE: f64 = 6.0;
+const ASIDE: f64 = 1.2;
+
+/// How far a unit normal may be from that of its triangle.
+const NORMAL_SLACK: f64 = 1e-4;
+
+/// A mesh this much larger or smaller, relative, is not looked at any further.
+const MAX_SCALE_ERROR: f64 = 0.05;
+
+/// A mesh with so many times the stated triangles is not looked at any further either.
+const MOST_TRIANGLES: usize = 2;
+
+/// What there is to say of a mesh that has not the stated number of triangles.
+pub(super) fn other_count(found: usize, stated: usize) -> Option<Finding> {
+    let problem = || format!("{found} triangles instead of {stated}");
+    (found != stated).then(|| Finding::Body { problem: problem() })
+}
+
+/// Whether a mesh has so many triangles that it is another one.
+pub(super) fn is_other_mesh(found: usize, stated: usize) -> bool {
+    found > MOST_TRIANGLES * stated
+}
+
+/// Reads a mesh from disk and compares it with the target.
+pub(super) fn verify(
+    verifier: &Verifier,
+    path: &Path,
+    format: Format,
+) -> Result<Verdict, DocumentError> {
+    let model = model::load(path, &verifier.limits)?;
+    let mut findings = Vec::new();
+    let mut faces = Vec::new();
+    let scale = scale(verifier, &model);
+    if let Some((scale, radius_mm)) = scale
+        && (scale - 1.0).abs() * radius_mm > MESH_TOLERANCE_MM
+    {
+        findings.push(Finding::Scale { panel: verifier.target.panels[0].id, scale });
+    }
+    if let TargetSpec::Solid(spec) = &verifier.target.spec {
+        // As many as there are faces, all of which are looked at: there is nothing else.
+        let [found, stated] = [model.triangles.len(), spec.polyhedron().faces.len()];
+        findings.extend(other_count(found, stated));
+        if is_other_mesh(found, stated) {
+            return Ok(Verdict::new(path, format, findings));
+        }
+    }
+    let wrong = model.triangles.iter().filter(|triangle| {
+        let normal = triangle.winding().normalize_or_zero();
+        triangle.normals.iter().any(|n| n.distance(normal) > NORMAL_SLACK)
+    });
+    let wrong = wrong.count();
+    if wrong > 0 {
+        findings.push(Finding::Normals { triangles: wrong });
+    }
+    if scale.is_none_or(|(scale, _)| (scale - 1.0).abs() < MAX_SCALE_ERROR) {
+        let panels = verifier.target.panels.par_iter();
+        faces = panels.map(|panel| check_face(verifier, &model, panel)).collect();
+    }
+    let mut verdict = Verdict::new(path, format, findings);
+    verdict.passed &= faces.iter().all(|face| face.findings.is_empty());
+    Ok(Verdict { faces, ..verdict })
+}
+
+/// Largest distance from the origin on the mesh over that on the target's solid, and the latter,
+/// mm.
+fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
+    let TargetSpec::Solid(spec) = &verifier.target.spec else { return None };
+    let radius = |lengths: &mut dyn Iterator<Item = f64>| lengths.fold(0.0, f64::max);
+    let stated = radius(&mut spec.polyhedron().vertices_mm.iter().map(|v| v.length()));
+    let vertices = model.triangles.iter().flat_map(|triangle| triangle.vertices_mm);
+    let found = radius(&mut vertices.map(|v| v.length()));
+    Some((found / stated, stated))
+}
+
+/// A camera before a face, from where the target says that it is; on one side of it from where
+/// nothing hides the face, if there is one.
+fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
+    let centre = panel.middle_mm();
+    let corners = || panel.corners.iter().map(|c| DVec3::from(c.target_mm));
+    let radius = corners().map(|c| c.distance(centre)).fold(0.0, f64::max) + 2.0 * panel.edge_mm;
+    let rows = verifier.family.map_or(0, |family| family.dimension().rows());
+    let cell_mm = panel.edge_mm / (f64::from(rows) + 3.0 * panel.border_bits.unwrap_or_default());
+    let px_per_mm = (CELL_PX / cell_mm).min(MAX_SIDE_PX / (2.0 * radius));
+    let [x, y, z] = [0, 1, 2].map(|axis| panel.pose.matrix().col(axis));
+    let side = (2.0 * radius * px_per_mm).ceil().max(64.0) as u32;
+    let from = |aside: DVec3| {
+        let eye = centre + radius * (DISTANCE * z + ASIDE * aside);
+        let mut camera = Camera::pinhole(side, side, 1.0);
+        camera.focal_px = [px_per_mm * eye.distance(centre); 2];
+        View { camera, camera_from_target: Pose::looking_at(eye, centre, y) }
+    };
+    let open = |view: &View| {
+        corners().all(|corner| {
+            let pixel = view.camera.project(view.camera_from_target.apply(corner));
+            let met = pixel.and_then(|pixel| view.meet(model, pixel));
+            met.is_some_and(|met| met.distance(corner) < GRAZING_TOLERANCE_MM)
+        })
+    };
+    let first = from(x);
+    if open(&first) {
+        return (first, px_per_mm);
+    }
+    let others = [y, -x, -y, DVec3::ZERO].map(from);
+    (others.into_iter().find(open).unwrap_or(first), px_per_mm)
+}
+
+fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict {
+    let (view, px_per_mm) = view(verifier, model, panel);
+    let image = view.render(model);
+    let detection = verifier.detector.detect(&image, "face");
+    let mut verdict = FaceVerdict {
+        panel: panel.id,
+        px_per_mm,
+        corners: panel.corners.len(),
+        corners_found: 0,
+        tags: panel.tags.len(),
+        tags_exact: 0,
+        max_deviation_mm: 0.0,
+        findings: Vec::new(),
+    };
+    if !sees(&detection, panel.id) {
+        let mirrored = sees(&verifier.detector.detect(&mirror(image), "mirror"), panel.id);
+        let panel = panel.id;
+        let finding =
+            if mirrored { Finding::Mirrored { panel } } else { Finding::PanelMissing { panel } };
+        verdict.findings.push(finding);
+        return verdict;
+    }
+    check_corners(verifier, model, panel, &view, &detection, &mut verdict);
+    if verdict.findings.iter().any(|finding| matches!(finding, Finding::CornerOff3d { .. })) {
+        // What else is wrong follows from that.
+        return verdict;
+    }
+    check_print(verifier, model, panel, px_per_mm, &mut verdict);
+    if !verdict.findings.is_empty() {
+        return verdict;
+    }
+    verdict.tags_exact = 0;
+    let own = || detection.grids.iter().filter(|grid| grid.panel == Some(panel.id));
+    for tag in &panel.tags {
+        let same = |found: &&deltille_core::detect::DecodedTag| {
+            (found.id, found.row, found.col) == (tag.id, tag.row, tag.col)
+        };
+        let errors = own().flat_map(|grid| &grid.tags).find(same).map(|found| found.errors);
+        if errors == Some(0) {
+            verdict.tags_exact += 1;
+        } else {
+            let (id, row, col) = (tag.id, tag.row, tag.col);
+            verdict.findings.push(Finding::TagInexact { id, row, col, errors });
+        }
+    }
+    verdict
+}
+
+/// Compares the texture on the face, tile by tile and cell by cell, and looks for other marks.
+fn check_print(
+    verifier: &Verifier,
+    model: &Model,
+    panel: &Panel,
+    px_per_mm: f64,
+    verdict: &mut FaceVerdict,
+) {
+    let outline = verifier.face_outline_mm(panel);
+    let [a, b, c] = outline;
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    let area_mm = [low.x, low.y, high.x, high.y];
+    let (page, placement) = face_page(model, panel, outline, area_mm, px_per_mm);
+    let found_from_stated = AffineMap::IDENTITY;
+    let placed = PlacedPanel { page: &page, panel, placement: &placement, found_from_stated };
+    if let Some(finding) = wrong_tones(&placed) {
+        verdict.findings.push(finding);
+        return;
+    }
+    let report = placed.check_tiles(verifier.family);
+    verdict.tags_exact = report.tags_exact;
+    let known = vec![false; page.image.pixels().len()];
+    let marks = spots(&page, &known, &[placed]);
+    let on_panel = |[x, y]: [f64; 2]| [x + area_mm[0], y + area_mm[1]];
+    verdict.findings.extend(report.findings.into_iter().chain(marks).map(
+        |finding| match finding {
+            Finding::Blemish { row, col, at_mm, area_mm2 } => {
+                Finding::Blemish { row, col, at_mm: on_panel(at_mm), area_mm2 }
+            }
+            Finding::EdgeMoved { row, col, at_mm, by_mm } => {
+                Finding::EdgeMoved { row, col, at_mm: on_panel(at_mm), by_mm }
+            }
+            Finding::Spot { at_mm, area_mm2 } => Finding::Spot { at_mm: on_panel(at_mm), area_mm2 },
+            other => other,
+        },
+    ));
+}
+
+impl Verifier<'_> {
+    /// The outline of a panel's face in the panel frame, mm.
+    fn face_outline_mm(&self, panel: &Panel) -> [DVec2; 3] {
+        let of_panel = || {
+            // Large enough for all that is printed.
+            let [left, lower, right, upper] = panel.bounds_mm();
+            let (width, height) = (right - left, upper - lower);
+            let corner = DVec2::new(left, lower);
+            [corner, corner + DVec2::new(2.0 * width, 0.0), corner + DVec2::new(0.0, 2.0 * height)]
+        };
+        let TargetSpec::Solid(spec) = &self.target.spec else { return of_panel() };
+        let solid = spec.polyhedron();
+        let index = self.target.panels.iter().position(|p| p.id == panel.id);
+        let Some(index) = index.filter(|&index| index < solid.faces.len()) else {
+            return of_panel();
+        };
+        solid.triangle_mm(index).map(|v| panel.pose.panel_from_target(v).truncate())
+    }
+}
+
+/// Follows every labelled corner back onto the mesh; neighbouring faces in the picture must be
+/// where they belong, too.
+fn check_corners(
+    verifier: &Verifier,
+    model: &Model,
+    panel: &Panel,
+    view: &View,
+    detection: &Detection,
+    verdict: &mut FaceVerdict,
+) {
+    let mut found = BTreeSet::new();
+    for grid in &detection.grids {
+        let Some(seen) = verifier.target.panels.iter().find(|p| Some(p.id) == grid.panel) else {
+            continue;
+        };
+        let own = seen.id == panel.id;
+        let tolerance_mm = if own { MESH_TOLERANCE_MM } else { GRAZING_TOLERANCE_MM };
+        for corner in &grid.corners {
+            let vertex = Vertex::new(corner.row, corner.col);
+            let Some(stated) = seen.corner_at(vertex).filter(|c| corner.id == Some(c.id)) else {
+                continue;
+            };
+            let at = view.meet(model, [corner.x, corner.y]).unwrap_or(DVec3::NAN);
+            let by_mm = (at - DVec3::from(stated.target_mm)).to_array();
+            let deviation_mm = DVec3::from(by_mm).length();
+            if own {
+                found.insert(stated.id);
+                verdict.max_deviation_mm = verdict.max_deviation_mm.max(deviation_mm);
+            }
+            // A ray that misses the mesh counts as off.
+            if deviation_mm.is_nan() || deviation_mm > tolerance_mm {
+                let (id, row, col) = (stated.id, stated.row, stated.col);
+                verdict.findings.push(Finding::CornerOff3d { id, row, col, by_mm });
+            }
+        }
+    }
+    verdict.corners_found = found.len();
+    let missing = panel.corners.iter().filter(|corner| !found.contains(&corner.id));
+    verdict.findings.extend(missing.map(|corner| Finding::CornerMissing {
+        id: corner.id,
+        row: corner.row,
+        col: corner.col,
+    }));
+}
+
+fn sees(detection: &Detection, panel: u32) -> bool {
+    detection.grids.iter().any(|grid| grid.panel == Some(panel))
+}
+
+fn mirror(mut image: Gray<u8>) -> Gray<u8> {
+    let width = image.width();
+    image.pixels_mut().chunks_exact_mut(width).for_each(<[u8]>::reverse);
+    image
+}

@@ -1,0 +1,383 @@
+//! Every tile and every cell of a tag compared with the picture, pixel by pixel.
+//!
+//! This is independent of detection, and stricter: a cell that decoding would correct, a hairline
+//! or a spot inside a tile is found.
+
+use std::cell::OnceCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
+
+use super::Finding;
+use super::document::{MAX_INK_ERROR, Page};
+use super::fit::AffineMap;
+use deltille_core::family::{Decoder, Family};
+use deltille_core::lattice::{GridKind, TagCells, Tile, Vertex};
+use deltille_core::targets::{Panel, Placement, TagPlacement};
+
+/// Pixels nearer than this to a change of colour are left out, px: the half diagonal of a pixel
+/// (0.71), over which an edge is smeared, and 0.02 mm at 300 dpi (0.24), and some blur.
+pub(super) const EDGE_PX: f64 = 1.25;
+
+/// Directions in which an edge is looked for beside a pixel: so fine that no tip of a tile or cell, of 60°, slips between
+/// two of them and reaches the pixel.
+pub(super) const PROBES: u32 = 24;
+
+/// Every so many of these are enough to count pixels.
+const COARSE: usize = 3;
+
+/// Tiles of one colour are alike where the ink of nine in ten is so near to their median.
+const TONE_SPREAD: f64 = 0.1;
+
+/// Edges may lie so far beside their place, px: twice what rounding does to edges along pixels, on pages as they are
+/// drawn (0.02 mm at 300 dpi), and on those that are put together from pixels of others.
+const MOVED_EDGE_PX: f64 = 0.25;
+const SMEARED_MOVED_EDGE_PX: f64 = 0.5;
+
+/// Counted pixels.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    checked: usize,
+    wrong: usize,
+    /// Sum of the positions of wrong pixels.
+    moment: [f64; 2],
+}
+
+impl Tally {
+    fn mostly_wrong(&self) -> bool {
+        2 * self.wrong > self.checked
+    }
+}
+
+/// What a tile should look like.
+pub(super) struct Expected<'a> {
+    /// Black, as a whole or around its tag.
+    black: bool,
+    /// Black and white are exchanged.
+    inverted: bool,
+    tag: Option<ExpectedTag<'a>>,
+}
+
+impl Expected<'_> {
+    /// Whether the tile is black at tile coordinates.
+    pub fn is_black_at(&self, p: [f64; 2]) -> bool {
+        let Some(tag) = &self.tag else { return self.black };
+        match tag.looks.region(p) {
+            Region::Margin => self.black,
+            Region::Border => !self.inverted,
+            Region::Cell(bit) => (tag.word >> bit & 1 == 0) != self.inverted,
+        }
+    }
+}
+
+struct ExpectedTag<'a> {
+    placement: TagPlacement,
+    word: u64,
+    looks: &'a TagLooks,
+}
+
+/// Where the cells of a panel's tags are, in tile coordinates.
+pub(super) struct TagLooks {
+    cells: TagCells,
+    /// From the edges of the tile to the border, and to the cells, bit-widths.
+    margin: f64,
+    inset: f64,
+    width: f64,
+    /// Bit of each cell, by (row, column, upright).
+    bits: BTreeMap<(u32, u32, bool), u32>,
+}
+
+/// A part of a tile with a tag.
+#[derive(Clone, Copy, PartialEq)]
+enum Region {
+    Margin,
+    Border,
+    Cell(u32),
+}
+
+impl TagLooks {
+    pub fn new(family: &Family, panel: &Panel) -> Self {
+        let cells = family.cells();
+        let (margin, inset) = (panel.tag_margin_bits(), panel.tag_inset_bits());
+        let bits = cells.cells().iter().enumerate();
+        let bits = bits.map(|(bit, c)| ((c.row, c.col, c.upright), bit as u32)).collect();
+        let width = cells.width(inset);
+        Self { cells, margin, inset, width, bits }
+    }
+
+    /// What is at tile coordinates.
+    fn region(&self, [u, v]: [f64; 2]) -> Region {
+        if let Some(bit) = self.bit([u, v]) {
+            return Region::Cell(bit);
+        }
+        // Only squares have a margin.
+        let margin = self.margin / self.width;
+        match [u, v].into_iter().all(|t| (margin..=1.0 - margin).contains(&t)) {
+            true => Region::Border,
+            false => Region::Margin,
+        }
+    }
+
+    /// The bit of the cell at tile coordinates (u, v); `None` beside the cells.
+    fn bit(&self, [u, v]: [f64; 2]) -> Option<u32> {
+        let (u, v) = (u * self.width - self.inset, v * self.width - self.inset);
+        if u < 0.0 || v < 0.0 {
+            return None;
+        }
+        let upright = self.cells.kind() == GridKind::Checker || u.fract() + v.fract() < 1.0;
+        self.bits.get(&(v as u32, u as u32, upright)).copied()
+    }
+}
+
+/// The outcome for one panel.
+#[derive(Debug, Default)]
+pub(super) struct TileReport {
+    pub findings: Vec<Finding>,
+    pub tags_exact: usize,
+    pub tiles: usize,
+    /// Tiles of the wrong colour.
+    pub wrong_tiles: usize,
+}
+
+/// A panel on its page, as found.
+pub(super) struct PlacedPanel<'a> {
+    pub page: &'a Page,
+    pub panel: &'a Panel,
+    pub placement: &'a Placement,
+    /// From stated to found page positions.
+    pub found_from_stated: AffineMap,
+}
+
+impl PlacedPanel<'_> {
+    /// Stated page position of a point of the panel.
+    pub fn page_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (sin, cos) = self.placement.angle_rad.sin_cos();
+        let [ox, oy] = self.placement.origin_mm;
+        [cos * x - sin * y + ox, sin * x + cos * y + oy]
+    }
+
+    /// Stated panel position of a point of the page.
+    pub fn panel_from_page(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (sin, cos) = self.placement.angle_rad.sin_cos();
+        let [ox, oy] = self.placement.origin_mm;
+        let (x, y) = (x - ox, y - oy);
+        [cos * x + sin * y, cos * y - sin * x]
+    }
+
+    /// The ink of the tiles that should be white and black, in the middle of plain tiles; `None`
+    /// where those of one colour are not alike, so that the picture shows something else.
+    pub fn tones(&self) -> Option<[f64; 2]> {
+        let tagged: BTreeSet<Tile> =
+            self.panel.tags.iter().map(|tag| self.panel.tag_tile(tag)).collect();
+        let mut inks = [Vec::new(), Vec::new()];
+        for tile in self.panel.tiles() {
+            if tagged.contains(&tile) {
+                continue;
+            }
+            let [a, b, c] = self.frame_px(tile);
+            let [u, v] = self.panel.kind.middle();
+            let centre = [0, 1].map(|i| a[i] + u * (b[i] - a[i]) + v * (c[i] - a[i]));
+            inks[usize::from(tile.is_dark() != self.panel.inverted)].push(self.page.ink(centre));
+        }
+        let tone = |inks: &mut Vec<f64>| {
+            inks.sort_by(f64::total_cmp);
+            let median = *inks.get(inks.len() / 2)?;
+            let alike = inks.iter().filter(|ink| (*ink - median).abs() <= TONE_SPREAD).count();
+            (10 * alike >= 9 * inks.len()).then_some(median)
+        };
+        let [white, black] = &mut inks;
+        Some([tone(white)?, tone(black)?])
+    }
+
+    /// Picture positions of a tile's A, B and C.
+    fn frame_px(&self, tile: Tile) -> [[f64; 2]; 3] {
+        tile.frame().map(|vertex| self.px_of(vertex))
+    }
+
+    /// Picture position of a vertex.
+    pub fn px_of(&self, vertex: Vertex) -> [f64; 2] {
+        let stated = self.page_from_panel(self.panel.lattice_mm(vertex));
+        self.page.px_from_page(self.found_from_stated.apply(stated))
+    }
+
+    /// Compares all tiles of the panel.
+    pub fn check_tiles(&self, family: Option<&Family>) -> TileReport {
+        let looks = family.map(|family| TagLooks::new(family, self.panel));
+        let tags: BTreeMap<Tile, TagPlacement> =
+            self.panel.tags.iter().map(|tag| (self.panel.tag_tile(tag), *tag)).collect();
+        // Needed only where something is wrong.
+        let decoder = OnceCell::new();
+        let mut report = TileReport::default();
+        let expected = self.panel.tiles().into_iter().map(|tile| {
+            let tag = tags.get(&tile).and_then(|&placement| {
+                let word = family?.code(placement.id)?;
+                Some(ExpectedTag { placement, word, looks: looks.as_ref()? })
+            });
+            let inverted = self.panel.inverted;
+            (tile, Expected { black: tile.is_dark() != inverted, inverted, tag })
+        });
+        let expected: BTreeMap<Tile, Expected> = expected.collect();
+        for (&tile, expected) in &expected {
+            let tally = self.compare(tile, expected);
+            report.tiles += 1;
+            self.judge(tile, expected, &tally, family, &decoder, &mut report);
+        }
+        if report.findings.is_empty() {
+            let is_smeared = self.page.smear_px > 0.0;
+            let tolerance_px = if is_smeared { SMEARED_MOVED_EDGE_PX } else { MOVED_EDGE_PX };
+            let moved = self.moved_edges(&expected, tolerance_px);
+            report.findings.extend(moved.into_iter().map(|moved| Finding::EdgeMoved {
+                row: moved.tile.anchor.row,
+                col: moved.tile.anchor.col,
+                at_mm: moved.at_mm,
+                by_mm: moved.by_mm,
+            }));
+        }
+        report
+    }
+
+    /// Counts wrong pixels, by cell; the key `None` is what is around the cells, or a plain tile.
+    fn compare(&self, tile: Tile, expected: &Expected) -> BTreeMap<Option<u32>, Tally> {
+        let [a, b, c] = self.frame_px(tile);
+        let (ab, ac) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+        let det = ab[0] * ac[1] - ab[1] * ac[0];
+        let uv = |[x, y]: [f64; 2]| [(x * ac[1] - y * ac[0]) / det, (y * ab[0] - x * ab[1]) / det];
+        let circle = |radius_px: f64| -> Vec<[f64; 2]> {
+            (0..PROBES)
+                .map(|i| f64::from(i) * TAU / f64::from(PROBES))
+                .map(|angle| uv([radius_px * angle.cos(), radius_px * angle.sin()]))
+                .collect()
+        };
+        let (around, further) = (circle(EDGE_PX), circle(EDGE_PX + self.page.smear_px));
+        let most_at_edges = self.page.max_ink_error_at_edges();
+        let bit = |p: [f64; 2]| expected.tag.as_ref().and_then(|tag| tag.looks.bit(p));
+        let black_at = |p: [f64; 2]| expected.is_black_at(p);
+        let inside = |[u, v]: [f64; 2]| match self.panel.kind {
+            GridKind::Deltille => u >= 0.0 && v >= 0.0 && u + v <= 1.0,
+            GridKind::Checker => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
+        };
+        let fourth = [0, 1].map(|i| match self.panel.kind {
+            GridKind::Deltille => c[i],
+            GridKind::Checker => b[i] + c[i] - a[i],
+        });
+
+        let mut tallies = BTreeMap::<Option<u32>, Tally>::new();
+        let image = &self.page.image;
+        let low = |i: usize| a[i].min(b[i]).min(c[i]).min(fourth[i]).ceil().max(0.0) as usize;
+        let high = |i: usize, size: usize| {
+            ((a[i].max(b[i]).max(c[i]).max(fourth[i]).floor() + 1.0).max(0.0) as usize).min(size)
+        };
+        for y in low(1)..high(1, image.height()) {
+            for x in low(0)..high(0, image.width()) {
+                let position = [x as f64, y as f64];
+                let p = uv([position[0] - a[0], position[1] - a[1]]);
+                if !inside(p) {
+                    continue;
+                }
+                let here = bit(p);
+                let black = black_at(p);
+                let found = 1.0 - f64::from(image.at(x, y)) / 255.0;
+                let error = (found - f64::from(u8::from(black))).abs();
+                let is_uniform = |around: &[[f64; 2]], step: usize| {
+                    around.iter().step_by(step).all(|d| {
+                        let q = [p[0] + d[0], p[1] + d[1]];
+                        inside(q) && black_at(q) == black
+                    })
+                };
+                let is_wrong = error > most_at_edges && is_uniform(&around, 1)
+                    || error > MAX_INK_ERROR && is_uniform(&further, 1);
+                // Most pixels are right, and those that are need not be looked at as closely.
+                if !is_wrong && !is_uniform(&around, COARSE) {
+                    continue;
+                }
+                let tally = tallies.entry(here).or_default();
+                tally.checked += 1;
+                if is_wrong {
+                    tally.wrong += 1;
+                    tally.moment[0] += position[0];
+                    tally.moment[1] += position[1];
+                }
+            }
+        }
+        // Cells too small for a pixel clear of their edges are judged by their centres.
+        if let Some(tag) = &expected.tag {
+            for bit in 0..tag.looks.cells.dimension().bits() {
+                tallies.entry(Some(bit)).or_insert_with(|| {
+                    let [u, v] = tag.looks.cells.centre(bit, tag.looks.inset);
+                    let at = [0, 1].map(|i| a[i] + u * ab[i] + v * ac[i]);
+                    let wrong = (self.page.ink(at) > 0.5) != black_at([u, v]);
+                    Tally { checked: 1, wrong: usize::from(wrong), moment: at }
+                });
+            }
+        }
+        tallies
+    }
+
+    fn judge(
+        &self,
+        tile: Tile,
+        expected: &Expected,
+        tallies: &BTreeMap<Option<u32>, Tally>,
+        family: Option<&Family>,
+        decoder: &OnceCell<Decoder>,
+        report: &mut TileReport,
+    ) {
+        let Vertex { row, col } = tile.anchor;
+        let plain = tallies.get(&None).copied().unwrap_or_default();
+        if plain.mostly_wrong() {
+            report.wrong_tiles += 1;
+            report.findings.push(Finding::TileColour { row, col, should_be_black: expected.black });
+            return;
+        }
+        let flipped: Vec<u32> = tallies
+            .iter()
+            .filter(|(_, tally)| tally.mostly_wrong())
+            .filter_map(|(&bit, _)| bit)
+            .collect();
+        if let Some(tag) = &expected.tag {
+            match read_tag(tag, &flipped, family, decoder) {
+                Some(finding) => report.findings.push(finding),
+                None => report.tags_exact += 1,
+            }
+        }
+        let spots = tallies.values().filter(|tally| !tally.mostly_wrong());
+        let spot = spots.fold(Tally::default(), |sum, t| Tally {
+            checked: sum.checked + t.checked,
+            wrong: sum.wrong + t.wrong,
+            moment: [sum.moment[0] + t.moment[0], sum.moment[1] + t.moment[1]],
+        });
+        if spot.wrong > 0 {
+            let n = spot.wrong as f64;
+            report.findings.push(Finding::Blemish {
+                row,
+                col,
+                at_mm: self.page.page_from_px(spot.moment.map(|m| m / n)),
+                area_mm2: n / self.page.px_per_mm.powi(2),
+            });
+        }
+    }
+}
+
+/// What is wrong with a tag whose cells `flipped` have the wrong colour.
+fn read_tag(
+    tag: &ExpectedTag,
+    flipped: &[u32],
+    family: Option<&Family>,
+    decoder: &OnceCell<Decoder>,
+) -> Option<Finding> {
+    let TagPlacement { id, row, col } = tag.placement;
+    if flipped.is_empty() {
+        return None;
+    }
+    let family = family?;
+    let decoder = decoder.get_or_init(|| Decoder::new(family));
+    let word = flipped.iter().fold(tag.word, |word, bit| word ^ 1 << bit);
+    let bits = flipped.to_vec();
+    let decoded = decoder.decode(word, family.correctable());
+    Some(match decoded {
+        Some(read) if (read.id, read.turns) != (id, 0) => {
+            Finding::TagReads { id, row, col, reads: read.id, turns: read.turns }
+        }
+        Some(_) => Finding::TagDamaged { id, row, col, bits },
+        None => Finding::TagUnreadable { id, row, col, bits },
+    })
+}

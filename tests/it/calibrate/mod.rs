@@ -1,0 +1,6 @@
+mod board_shape;
+mod cameras;
+mod commands;
+mod gross_errors;
+mod models;
+mod rig;

@@ -1,0 +1,287 @@
+//! Rigs of simulated cameras: what is found is what was put in, and the stated deviations are true.
+
+use deltille::calibrate::{
+    CalibrationError, Loss, Misfit, Model, Observation, PanelPlace, PanelRef, RigOptions,
+    RigSolution, RigViews, Sighting, View, Weights, calibrate_rig, wrong_cameras,
+};
+use deltille::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille::family::Family;
+use deltille::targets::{SolidShape, SolidSpec, Target, TargetSpec};
+use glam::{DQuat, DVec3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+
+/// Deviation of the simulated corners, px.
+const NOISE_PX: f64 = 0.05;
+
+/// Placement errors of the panels, mm and rad.
+const PLACED_MM: f64 = 0.1;
+const PLACED_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
+
+/// Cameras around an icosahedron, and what they saw of it.
+struct Simulated {
+    stated: Vec<PanelPlace>,
+    /// Where the panels really are.
+    panels: Vec<Pose>,
+    cameras: Vec<Camera>,
+    camera_from_rig: Vec<Pose>,
+    views: Vec<RigViews>,
+}
+
+fn small_pose(random: &mut ChaCha8Rng, turn_rad: f64, move_mm: f64) -> Pose {
+    let normal = Normal::new(0.0, 1.0).unwrap();
+    let mut vector = || DVec3::from_fn(|_| normal.sample(random));
+    Pose { rotation: DQuat::from_scaled_axis(vector() * turn_rad), translation: vector() * move_mm }
+}
+
+trait FromFn {
+    fn from_fn(f: impl FnMut(usize) -> f64) -> Self;
+}
+
+impl FromFn for DVec3 {
+    fn from_fn(mut f: impl FnMut(usize) -> f64) -> Self {
+        DVec3::new(f(0), f(1), f(2))
+    }
+}
+
+fn simulated(seed: u64, frames: usize) -> Simulated {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
+    let family = Family::shipped("delTag25h7").unwrap();
+    let target = Target::build("ico", &spec, Some(&family), None).unwrap();
+    let stated: Vec<Pose> = target.panels.iter().map(|panel| panel.pose.to_pose()).collect();
+    let panels: Vec<Pose> = stated
+        .iter()
+        .map(|pose| {
+            let off = small_pose(&mut random, PLACED_RAD, PLACED_MM);
+            Pose {
+                rotation: off.rotation * pose.rotation,
+                translation: pose.translation + off.translation,
+            }
+        })
+        .collect();
+    let as_stated = |&target_from_panel: &Pose| PanelPlace { target_from_panel, covariance: None };
+    let stated = stated.iter().map(as_stated).collect();
+    let cameras: Vec<Camera> = (0..3)
+        .map(|_| {
+            let lens = BrownConrady {
+                radial: [random.random_range(-0.1..0.1), random.random_range(-0.1..0.1), 0.0],
+                ..BrownConrady::default()
+            };
+            let lens = Lens::BrownConrady(lens);
+            Camera::centred(2000, 1500, random.random_range(2500.0..3500.0), lens)
+        })
+        .collect();
+    // Cameras a quarter of a metre apart, turned to a point 0.9 m before the first.
+    let camera_from_rig: Vec<Pose> = (0..3)
+        .map(|index| {
+            let eye = DVec3::new(250.0 * index as f64, 30.0 * index as f64, 0.0);
+            match index {
+                0 => Pose::IDENTITY,
+                _ => Pose::looking_at(eye, DVec3::new(0.0, 0.0, 900.0), DVec3::NEG_Y),
+            }
+        })
+        .collect();
+    let rig_from_target: Vec<Pose> = (0..frames)
+        .map(|_| Pose {
+            rotation: DQuat::from_scaled_axis(DVec3::from_fn(|_| random.random_range(-3.0..3.0))),
+            translation: DVec3::new(
+                random.random_range(-60.0..60.0),
+                random.random_range(-60.0..60.0),
+                random.random_range(750.0..1050.0),
+            ),
+        })
+        .collect();
+    let noise = Normal::new(0.0, NOISE_PX).unwrap();
+    let views = cameras.iter().zip(&camera_from_rig).enumerate().map(|(index, (camera, place))| {
+        let views = rig_from_target.iter().enumerate().filter_map(|(frame, rig)| {
+            // Not every camera sees every frame.
+            if (frame + index) % 4 == 0 {
+                return None;
+            }
+            let camera_from_target = place.after(rig);
+            let sightings = target.panels.iter().enumerate().filter_map(|(p, panel)| {
+                let pose = camera_from_target.after(&panels[p]);
+                let (normal, at) = (pose.rotation * DVec3::Z, pose.translation);
+                if normal.dot(-at.normalize()) < 0.4 {
+                    return None;
+                }
+                let observations = panel.corners.iter().map(|corner| {
+                    let panel_mm = DVec3::new(corner.panel_mm[0], corner.panel_mm[1], 0.0);
+                    let [x, y] = camera.project(pose.apply(panel_mm))?;
+                    camera.sees([x, y], 5.0).then(|| Observation {
+                        row: corner.row,
+                        col: corner.col,
+                        panel_mm,
+                        pixel: [x + noise.sample(&mut random), y + noise.sample(&mut random)],
+                        cov: Some([NOISE_PX * NOISE_PX, 0.0, NOISE_PX * NOISE_PX]),
+                    })
+                });
+                let observations: Option<Vec<_>> = observations.collect();
+                observations.map(|observations| Sighting {
+                    panel: PanelRef::new(p, panel.id),
+                    observations,
+                })
+            });
+            let sightings: Vec<Sighting> = sightings.collect();
+            let name = format!("{frame:03}");
+            (!sightings.is_empty()).then(|| View {
+                name: name.clone(),
+                image: name,
+                size_px: [2000, 1500],
+                sightings,
+            })
+        });
+        RigViews { name: format!("c{index}"), views: views.collect(), known: None }
+    });
+    let views = views.collect();
+    Simulated { stated, panels, cameras, camera_from_rig, views }
+}
+
+fn options(refine_target: bool) -> RigOptions {
+    RigOptions {
+        model: Model::Radtan,
+        loss: Loss::Huber,
+        weights: Weights::Covariance,
+        refine_target,
+    }
+}
+
+/// Errors of everything that was found, in stated deviations. The target frame is that of the panel
+/// that was kept, so that panels are compared relative to it.
+fn normalised_errors(truth: &Simulated, found: &RigSolution) -> Vec<f64> {
+    let mut errors = Vec::new();
+    for (index, camera) in found.cameras.iter().enumerate() {
+        let true_values = truth.cameras[index].parameters();
+        for (parameter, value) in camera.parameters.iter().zip(true_values) {
+            errors.extend(parameter.sd.map(|sd| (parameter.value - value) / sd));
+        }
+        if let Some(sd) = camera.pose_sd {
+            errors.extend(pose_errors(&camera.camera_from_rig, &truth.camera_from_rig[index], sd));
+        }
+    }
+    let held = found.panels.iter().position(|panel| panel.covariance.is_none()).unwrap();
+    // The true poses of the panels in a frame in which the held one is where it is stated to be.
+    let frame = truth.stated[held].target_from_panel.after(&truth.panels[held].inverse());
+    for (panel, truth) in found.panels.iter().zip(&truth.panels) {
+        if let Some(covariance) = panel.covariance {
+            let sd = std::array::from_fn(|i| covariance[i][i].sqrt());
+            errors.extend(pose_errors(&panel.target_from_panel, &frame.after(truth), sd));
+        }
+    }
+    errors
+}
+
+fn pose_errors(found: &Pose, truth: &Pose, sd: [f64; 6]) -> [f64; 6] {
+    let [turn, moved] = found.off(truth);
+    let off = [turn.x, turn.y, turn.z, moved.x, moved.y, moved.z];
+    std::array::from_fn(|i| off[i] / sd[i])
+}
+
+/// Part of the errors within three deviations; normally distributed ones have 0.9973.
+fn honest(seeds: std::ops::Range<u64>, frames: usize) -> f64 {
+    let mut errors = Vec::new();
+    for seed in seeds {
+        let truth = simulated(seed, frames);
+        let found = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
+        assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.1, "rms {}", found.rms_px);
+        errors.extend(normalised_errors(&truth, &found));
+    }
+    errors.iter().filter(|error| error.abs() < 3.0).count() as f64 / errors.len() as f64
+}
+
+#[test]
+fn a_rig_and_its_target_are_found_within_their_deviations() {
+    let part = honest(0..2, 30);
+    assert!(part >= 0.98, "{part}");
+}
+
+/// The figure of fifty seeds, for a release build: some minutes.
+#[test]
+#[ignore = "takes minutes; run with --release -- --ignored"]
+fn fifty_rigs_are_found_within_their_deviations() {
+    let part = honest(0..50, 40);
+    println!("within three deviations: {:.4}", part);
+    assert!(part >= 0.99, "{part}");
+}
+
+/// What one calibration found of the target helps the next, which sees little of it.
+#[test]
+fn a_refined_target_is_known_in_the_next_calibration() {
+    let truth = simulated(11, 40);
+    let first = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
+    let few = |views: &RigViews| {
+        let mut views = views.clone();
+        views.views.truncate(8);
+        views
+    };
+    let few: Vec<RigViews> = truth.views.iter().map(few).collect();
+    let alone = calibrate_rig(&few, &truth.stated, options(true)).unwrap();
+    let with = calibrate_rig(&few, &first.panels, options(true)).unwrap();
+    let deviation = |solution: &RigSolution| {
+        let of = |panel: &PanelPlace| panel.covariance.map(|c| c[3][3] + c[4][4] + c[5][5]);
+        let all: Vec<f64> = solution.panels.iter().filter_map(of).collect();
+        (all.iter().sum::<f64>() / all.len() as f64).sqrt()
+    };
+    let [first, alone, with] = [&first, &alone, &with].map(deviation);
+    assert!(with < 1.05 * first && with < 0.7 * alone, "{first} {alone} {with}");
+    let within =
+        normalised_errors(&truth, &calibrate_rig(&few, &truth.stated, options(true)).unwrap());
+    assert!(within.iter().filter(|e| e.abs() < 3.0).count() as f64 > 0.97 * within.len() as f64);
+}
+
+#[test]
+fn placement_errors_show_unless_the_target_is_refined() {
+    let truth = simulated(7, 30);
+    let stated = calibrate_rig(&truth.views, &truth.stated, options(false)).unwrap();
+    let refined = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
+    assert!(stated.rms_px > 2.0 * refined.rms_px, "{} {}", stated.rms_px, refined.rms_px);
+    let first = stated.misfits.first();
+    assert!(matches!(first, Some(Misfit::Target { .. })), "{:?}", stated.misfits);
+    assert_eq!(refined.misfits, []);
+    assert!(stated.panels.iter().all(|panel| panel.covariance.is_none()));
+    let kept = refined.panels.iter().filter(|panel| panel.covariance.is_none()).count();
+    assert_eq!(kept, 1);
+}
+
+#[test]
+fn a_camera_that_is_another_one_is_named() {
+    let mut truth = simulated(5, 20);
+    for (views, camera) in truth.views.iter_mut().zip(&truth.cameras) {
+        views.known = Some(camera.clone());
+    }
+    let wrong = |truth: &Simulated| wrong_cameras(&truth.views, &truth.really(), options(false));
+    assert!(wrong(&truth).is_empty());
+    truth.views[1].known = Some(truth.cameras[2].clone());
+    assert_eq!(wrong(&truth), [1]);
+}
+
+impl Simulated {
+    fn really(&self) -> Vec<PanelPlace> {
+        let panels = self.panels.iter();
+        panels
+            .map(|&target_from_panel| PanelPlace { target_from_panel, covariance: None })
+            .collect()
+    }
+}
+
+#[test]
+fn pictures_of_another_moment_are_left_out_and_cameras_without_common_frames_refused() {
+    let mut truth = simulated(3, 30);
+    // One picture of camera 1 carries the name of another moment.
+    let views = &mut truth.views[1].views;
+    let (a, b) = (views[3].name.clone(), views[7].name.clone());
+    (views[3].name, views[7].name) = (b.clone(), a.clone());
+    let found = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
+    let out: Vec<&str> = found.excluded.iter().map(|out| out.view.as_str()).collect();
+    assert!(out.contains(&a.as_str()) && out.contains(&b.as_str()), "{out:?}");
+    assert!(found.rms_px < 1.2 * NOISE_PX, "{}", found.rms_px);
+
+    for view in &mut truth.views[2].views {
+        view.name = format!("late-{}", view.name);
+    }
+    let error = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap_err();
+    assert!(matches!(error, CalibrationError::Apart { .. }), "{error}");
+    assert!(error.to_string().starts_with("c2: no frame shows the target"), "{error}");
+}

@@ -1,0 +1,15 @@
+//! What several tests share.
+
+pub mod command;
+pub mod folder;
+pub mod glb;
+pub mod png;
+pub mod view;
+
+use std::path::{Path, PathBuf};
+
+/// A folder of the photographs and published artifacts. Tests that use it are ignored where `build.rs` has not found it.
+pub fn data(folder: &str) -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    std::env::var_os("DELTILLE_DATA").map_or_else(beside, PathBuf::from).join(folder)
+}

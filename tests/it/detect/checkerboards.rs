@@ -1,0 +1,212 @@
+//! Plain checkerboards on synthetic photographs, where the truth is exact.
+
+use std::collections::BTreeMap;
+
+use crate::common::view::tilted;
+use deltille::camera::{Camera, KannalaBrandt, Lens, Pose};
+use deltille::detect::{Detection, Detector, DetectorConfig, Grid};
+use deltille::raster::Gray;
+use deltille::synth::{Light, Scene, Surface, Truth};
+use deltille::targets::GridKind;
+use glam::{DQuat, DVec3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+const ROWS: i32 = 6;
+const COLS: i32 = 9;
+const EDGE_MM: f64 = 20.0;
+
+/// A rectangle, counter-clockwise.
+fn rectangle([left, lower, right, upper]: [f64; 4]) -> Vec<[f64; 2]> {
+    vec![[left, lower], [right, lower], [right, upper], [left, upper]]
+}
+
+/// A board of 6 × 9 corners whose corner (0, 0) is at the origin. The square up and right of it is
+/// dark, or bright on an inverted board, which lies on a dark field.
+fn board(inverted: bool) -> Scene {
+    let mut black_mm = Vec::new();
+    for row in -1..ROWS {
+        for col in -1..COLS {
+            if ((row + col).rem_euclid(2) == 0) != inverted {
+                let (x, y) = (f64::from(col) * EDGE_MM, f64::from(row) * EDGE_MM);
+                black_mm.push(vec![rectangle([x, y, x + EDGE_MM, y + EDGE_MM])]);
+            }
+        }
+    }
+    let field = |margin: f64| {
+        let (right, upper) = (f64::from(COLS) * EDGE_MM, f64::from(ROWS) * EDGE_MM);
+        let low = -EDGE_MM - margin;
+        rectangle([low, low, right + margin, upper + margin])
+    };
+    if inverted {
+        black_mm.push(vec![field(10.0), field(0.0)]);
+    }
+    let corners = (0..ROWS).flat_map(|row| (0..COLS).map(move |col| (row, col)));
+    let surface = Surface {
+        panel: 0,
+        target_from_surface: Pose { rotation: DQuat::IDENTITY, translation: DVec3::ZERO },
+        paper_mm: field(15.0),
+        black_mm,
+        corners: corners
+            .map(|(row, col)| {
+                let place = [f64::from(col) * EDGE_MM, f64::from(row) * EDGE_MM];
+                ((row * COLS + col) as u32, row, col, place)
+            })
+            .collect(),
+    };
+    Scene { surfaces: vec![surface] }
+}
+
+/// A sheet of paper lies so far above the board.
+const COVER_MM: f64 = 5.0;
+
+/// Nearer than this to a cover the smallest circles that show a corner's edges show the cover too, px,
+/// and the edges of the squares end at it.
+const NEAR_COVER_PX: f64 = 12.0;
+
+/// The board with a sheet of grey paper above it, up to `right_mm`.
+fn covered(right_mm: f64) -> Scene {
+    let mut scene = board(false);
+    scene.surfaces.push(Surface {
+        panel: 1,
+        target_from_surface: Pose {
+            rotation: DQuat::IDENTITY,
+            translation: DVec3::new(0.0, 0.0, COVER_MM),
+        },
+        paper_mm: rectangle([-60.0, -60.0, right_mm, 200.0]),
+        black_mm: Vec::new(),
+        corners: Vec::new(),
+    });
+    scene
+}
+
+fn seen_from(rng: &mut ChaCha8Rng, distance_mm: f64, tilt: f64) -> Pose {
+    let centre =
+        DVec3::new(f64::from(COLS - 1) / 2.0 * EDGE_MM, f64::from(ROWS - 1) / 2.0 * EDGE_MM, 0.0);
+    tilted(rng, centre, distance_mm, tilt)
+}
+
+fn detect(image: &Gray<f32>, kind: GridKind, size: Option<(u32, u32)>) -> Detection {
+    let image = image.map(|v| (v * 255.0 + 0.5) as u8);
+    Detector::for_grid(kind, size, DetectorConfig::default()).detect(&image, "view")
+}
+
+const SIZE: Option<(u32, u32)> = Some((ROWS as u32, COLS as u32));
+
+/// Distance of each corner of a wholly labelled board from the truth; panics on a wrong label.
+fn errors(grid: &Grid, truth: &Truth, inverted: bool) -> Vec<f64> {
+    let at: BTreeMap<(i32, i32), [f64; 2]> =
+        truth.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+    let distance = |c: &deltille::detect::GridCorner| {
+        // Row 0, column 0 has a dark square: on the inverted board that is half a turn round.
+        let label = if inverted { (ROWS - 1 - c.row, COLS - 1 - c.col) } else { (c.row, c.col) };
+        let [x, y] = at[&label];
+        let error = (c.x - x).hypot(c.y - y);
+        assert!(error < 2.0, "corner {label:?} is {error} px off: a wrong label");
+        error
+    };
+    grid.corners.iter().map(distance).collect()
+}
+
+fn rms(errors: &[f64]) -> f64 {
+    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+}
+
+#[test]
+fn whole_boards_are_labelled_from_their_dark_corner_up_to_60_degrees() {
+    let camera = Camera::pinhole(1280, 960, 0.9);
+    for inverted in [false, true] {
+        let scene = board(inverted);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut all = Vec::new();
+        for view in 0..12u32 {
+            let tilt = f64::from(view) / 12.0 * 60f64.to_radians();
+            let pose = seen_from(&mut rng, 330.0, tilt);
+            let light = Light { seed: view.into(), gradient: [0.5, -0.3], ..Light::default() };
+            let image = scene.render(&camera, &pose, &light);
+            let detection = detect(&image, GridKind::Checker, SIZE);
+            assert_eq!(detection.grids.len(), 1, "view {view}");
+            let grid = &detection.grids[0];
+            assert_eq!((grid.kind, grid.corners.len()), (GridKind::Checker, 54), "view {view}");
+            all.extend(errors(grid, &scene.truth(&camera, &pose, 0.0), inverted));
+            assert!(detect(&image, GridKind::Deltille, None).grids.is_empty(), "view {view}");
+        }
+        println!("rms {} px", rms(&all));
+        assert!(rms(&all) < 0.03, "rms {}", rms(&all));
+    }
+}
+
+#[test]
+fn a_fisheye_lens_bends_the_rows_but_not_the_labels() {
+    let mut camera = Camera::pinhole(1600, 1200, 1.2);
+    camera.focal_px = [420.0; 2];
+    camera.lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![-0.02, 0.002, 0.0, 0.0] });
+    let scene = board(false);
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut all = Vec::new();
+    for view in 0..8u32 {
+        let pose = seen_from(&mut rng, 120.0, 0.1 * f64::from(view));
+        let light = Light { seed: view.into(), ..Light::default() };
+        let image = scene.render(&camera, &pose, &light);
+        let truth = scene.truth(&camera, &pose, 14.0);
+        let detection = detect(&image, GridKind::Checker, SIZE);
+        assert_eq!(detection.grids.len(), 1, "view {view}");
+        if truth.corners.len() == 54 {
+            assert_eq!(detection.grids[0].corners.len(), 54, "view {view}");
+            all.extend(errors(&detection.grids[0], &truth, false));
+        }
+    }
+    assert!(all.len() >= 2 * 54);
+    println!("rms {} px", rms(&all));
+    assert!(rms(&all) < 0.04, "rms {}", rms(&all));
+}
+
+#[test]
+fn all_that_is_seen_of_a_covered_board_is_found_where_it_is() {
+    let camera = Camera::pinhole(1280, 960, 0.9);
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    for view in 0..20u32 {
+        let right_mm = (0.1 + 0.025 * f64::from(view)) * f64::from(COLS) * EDGE_MM;
+        let scene = covered(right_mm);
+        let pose = seen_from(&mut rng, 330.0, 0.5);
+        let light = Light { seed: view.into(), ..Light::default() };
+        let truth = scene.truth(&camera, &pose, 0.0);
+        let detection = detect(&scene.render(&camera, &pose, &light), GridKind::Checker, SIZE);
+        assert_eq!(detection.grids.len(), 1, "view {view}");
+        let corners = &detection.grids[0].corners;
+        let cover = |row: i32| {
+            let edge_mm = DVec3::new(right_mm, f64::from(row) * EDGE_MM, COVER_MM);
+            camera.project(pose.apply(edge_mm)).unwrap()
+        };
+        for lost in &truth.corners {
+            let found = corners.iter().any(|c| (c.x - lost.x).hypot(c.y - lost.y) < 0.25);
+            let [x, y] = cover(lost.row);
+            let away = (x - lost.x).hypot(y - lost.y);
+            assert!(found || away < NEAR_COVER_PX, "view {view}: {lost:?}, {away} px away");
+        }
+        let nearest = |x: f64, y: f64| {
+            let distance = |c: &&deltille::synth::TruthCorner| (c.x - x).hypot(c.y - y);
+            let found = truth.corners.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            let found = found.unwrap();
+            let off = distance(&found);
+            assert!(off < 0.25, "view {view}: {off} px from any corner at {x}, {y}");
+            (found.row, found.col)
+        };
+        let labels: BTreeMap<(i32, i32), (i32, i32)> =
+            corners.iter().map(|c| ((c.row, c.col), nearest(c.x, c.y))).collect();
+        // Steps along rows and columns of the grid are turned by the same quarter turns everywhere.
+        let mut steps = std::collections::BTreeSet::new();
+        for (&(row, col), &(r, c)) in &labels {
+            if let Some(&(r1, c1)) = labels.get(&(row, col + 1)) {
+                steps.insert((r1 - r, c1 - c));
+            }
+            if let Some(&(r1, c1)) = labels.get(&(row + 1, col)) {
+                // A quarter turn counter-clockwise of the step along the row.
+                steps.insert((-(c1 - c), r1 - r));
+            }
+        }
+        assert_eq!(steps.len(), 1, "view {view}: {steps:?}");
+        let &(dr, dc) = steps.first().unwrap();
+        assert_eq!(dr.abs() + dc.abs(), 1);
+    }
+}

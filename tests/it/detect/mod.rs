@@ -1,0 +1,13 @@
+mod any_part;
+mod checkerboards;
+mod commands;
+mod control_boards;
+mod false_positives;
+mod from_photographs;
+mod hard;
+mod panel_ids;
+mod photographs;
+mod reasons;
+mod refine;
+mod solid_views;
+mod synthetic;

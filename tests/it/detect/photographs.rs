@@ -1,0 +1,247 @@
+//! Real photographs: two in `tests/photographs`, and the sets and published artifacts in `../shared/data` or where
+//! `DELTILLE_DATA` says.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::common::data;
+use deltille::detect::{Detector, DetectorConfig, Grid, InkEstimate};
+use deltille::export::dsc;
+use deltille::family::Family;
+use deltille::photograph;
+use deltille::raster::Gray;
+use deltille::targets::GridKind;
+use deltille::verify::Document;
+use image::imageops::{self, FilterType};
+
+/// Every image of a folder of the data.
+fn images(folder: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(data(folder)).unwrap();
+    let mut images: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    images.sort();
+    images
+}
+
+/// Whether the next corner of a row and of a column, where they are there, lie as on the print.
+fn is_unmirrored(p: &[f64; 2], along: Option<&[f64; 2]>, up: Option<&[f64; 2]>) -> bool {
+    along
+        .zip(up)
+        .is_none_or(|(q, r)| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0)
+}
+
+/// A grid is a lattice seen through a lens: every corner lies near the middle of its opposite
+/// neighbours, and all small triangles have the same, unmirrored handedness.
+fn topology_is_consistent(grid: &Grid) -> bool {
+    let at: BTreeMap<(i32, i32), [f64; 2]> =
+        grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+    at.iter().all(|(&(row, col), p)| {
+        let near = |dr: i32, dc: i32| at.get(&(row + dr, col + dc));
+        let straight = [(0, 1), (1, 0), (1, -1)].into_iter().all(|(dr, dc)| {
+            let (Some(q), Some(r)) = (near(dr, dc), near(-dr, -dc)) else { return true };
+            let edge = (q[0] - r[0]).hypot(q[1] - r[1]) / 2.0;
+            ((q[0] + r[0]) / 2.0 - p[0]).hypot((q[1] + r[1]) / 2.0 - p[1]) < 0.1 * edge
+        });
+        straight && is_unmirrored(p, near(0, 1), near(1, 0))
+    })
+}
+
+#[test]
+fn all_corners_of_a_photograph_of_either_tiling() {
+    for (name, kind, size, is_consistent) in [
+        (
+            "robot-hand-0108",
+            GridKind::Deltille,
+            (10, 11),
+            topology_is_consistent as fn(&Grid) -> bool,
+        ),
+        ("fisheye-0200", GridKind::Checker, (8, 11), squares_are_consistent),
+    ] {
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/photographs/{name}.png"));
+        let detector = Detector::for_grid(kind, Some(size), DetectorConfig::default());
+        let detection = detector.detect_any(&photograph::read(&path).unwrap(), name);
+        let [grid] = &detection.grids[..] else {
+            panic!("{name}: {} grids", detection.grids.len())
+        };
+        assert_eq!(grid.corners.len() as u32, size.0 * size.1, "{name}");
+        assert!(is_consistent(grid), "wrong topology in {name}");
+        let last = grid.corners.last().map(|c| (c.row as u32, c.col as u32));
+        assert_eq!(last, Some((size.0 - 1, size.1 - 1)), "labels of {name}");
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
+fn all_110_corners_of_the_robot_hand_photographs() {
+    let images = images("robot-hand");
+    let detector =
+        Detector::for_grid(GridKind::Deltille, Some((10, 11)), DetectorConfig::default());
+    let mut complete = 0;
+    for path in &images {
+        let detection = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+        assert!(detection.grids.len() <= 1, "a false grid in {}", path.display());
+        let Some(grid) = detection.grids.first() else { continue };
+        assert!(topology_is_consistent(grid), "wrong topology in {}", path.display());
+        let labelled = (grid.corners.first().map(|c| (c.row, c.col)) == Some((0, 4)))
+            && grid.corners.last().map(|c| (c.row, c.col)) == Some((9, 10));
+        complete += usize::from(grid.corners.len() == 110 && labelled);
+    }
+    println!("{complete} of {} photographs complete", images.len());
+    assert_eq!(complete, images.len());
+}
+
+/// What looks like a tone curve in these pictures is the print's: every one of them says the same, from whatever side
+/// and distance.
+#[test]
+#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
+fn all_pictures_of_one_print_have_the_same_ink() {
+    let images = images("robot-hand");
+    let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
+    let ink =
+        |path: &PathBuf| detector.detect_any(&photograph::read(path).unwrap(), "photograph").ink;
+    let inks: Vec<InkEstimate> = images.iter().step_by(3).filter_map(ink).collect();
+    let all = InkEstimate::of_all(&inks).unwrap();
+    println!("{all}, from {} of {} pictures", all.pictures, images.len().div_ceil(3));
+    assert!(all.used && inks.len() == images.len().div_ceil(3));
+    assert!(
+        inks.iter().all(|ink| ink.used && (ink.edges / all.edges - 1.0).abs() < 0.1),
+        "{inks:?}"
+    );
+}
+
+#[test]
+#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
+fn checkerboards_and_lamps_are_no_deltille_grids() {
+    let images = images("fisheye");
+    let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
+    for path in images.iter().step_by(4) {
+        let detection = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+        assert!(detection.grids.is_empty(), "a false grid in {}", path.display());
+    }
+}
+
+/// Largest ratio of an edge to the next. Seen by an equidistant lens at x edges from the foot of the
+/// camera on the plane and at a height of one edge, it is ((x + 1)² + 1)/(x² + 1), at most the golden
+/// ratio squared; a camera this wide cannot be nearer than that and see the board.
+const MAX_RATIO: f64 = 2.618;
+
+/// Rows and columns of a checkerboard are straight for a few squares, and unmirrored.
+fn squares_are_consistent(grid: &Grid) -> bool {
+    let at: BTreeMap<(i32, i32), [f64; 2]> =
+        grid.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+    at.iter().all(|(&(row, col), p)| {
+        let near = |dr: i32, dc: i32| at.get(&(row + dr, col + dc));
+        let straight = [(0, 1), (1, 0)].into_iter().all(|(dr, dc)| {
+            let (Some(q), Some(r)) = (near(dr, dc), near(-dr, -dc)) else { return true };
+            let (a, b) = ([q[0] - p[0], q[1] - p[1]], [p[0] - r[0], p[1] - r[1]]);
+            let cos = (a[0] * b[0] + a[1] * b[1]) / (a[0].hypot(a[1]) * b[0].hypot(b[1]));
+            let ratio = a[0].hypot(a[1]) / b[0].hypot(b[1]);
+            // A row turns by less than 45° at a corner.
+            cos > 0.7 && (1.0 / MAX_RATIO..MAX_RATIO).contains(&ratio)
+        });
+        straight && is_unmirrored(p, near(0, 1), near(1, 0))
+    })
+}
+
+#[test]
+#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
+fn corners_of_the_fisheye_photographs() {
+    let images = images("fisheye");
+    let detector = Detector::for_grid(GridKind::Checker, Some((8, 11)), DetectorConfig::default());
+    let mut found = 0;
+    for path in &images {
+        let detection = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+        assert_eq!(detection.grids.len(), 1, "a false grid in {}", path.display());
+        let grid = &detection.grids[0];
+        assert!(squares_are_consistent(grid), "wrong topology in {}", path.display());
+        let span = |of: fn(&deltille::detect::GridCorner) -> i32| {
+            let values = grid.corners.iter().map(of);
+            values.clone().max().unwrap() - values.min().unwrap() + 1
+        };
+        let mut size = [span(|c| c.row), span(|c| c.col)];
+        size.sort();
+        assert!(size[0] <= 8 && size[1] <= 11, "{size:?} in {}", path.display());
+        if grid.corners.len() == 88 {
+            let last = grid.corners.last().map(|c| (c.row, c.col));
+            assert_eq!(last, Some((7, 10)), "labels of {}", path.display());
+        }
+        found += grid.corners.len();
+    }
+    let all = 88 * images.len();
+    println!("{found} of {all} corners");
+    assert!(found * 1000 >= all * 999, "{found} of {all} corners");
+}
+
+/// Enlarged to 48 megapixels a photograph shows its corners where it did before: among the grain, which is as large
+/// as they are and far more, and with ink that has spread over pixels.
+#[test]
+#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
+fn enlarged_photographs_show_the_same_corners() {
+    for (folder, kind, size) in
+        [("robot-hand", GridKind::Deltille, (10, 11)), ("fisheye", GridKind::Checker, (8, 11))]
+    {
+        let images = images(folder);
+        let detector = Detector::for_grid(kind, Some(size), DetectorConfig::default());
+        for (path, filter) in images.iter().zip([FilterType::Triangle, FilterType::CatmullRom]) {
+            let small = image::open(path).unwrap().into_luma8();
+            let (width, height) = (5 * small.width(), 5 * small.height());
+            let large = imageops::resize(&small, width, height, filter);
+            let large = Gray::from_fn(width as usize, height as usize, |x, y| {
+                large.get_pixel(x as u32, y as u32).0[0]
+            });
+            let before = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+            let after = detector.detect(&large, "photograph");
+            let (before, after) = (&before.grids[0].corners, &after.grids[0].corners);
+            let mut errors: Vec<f64> = Vec::new();
+            for corner in after {
+                let [x, y] = [corner.x, corner.y].map(|c| (c + 0.5) / 5.0 - 0.5);
+                let distance = before.iter().map(|b| (b.x - x).hypot(b.y - y));
+                errors.push(distance.fold(f64::INFINITY, f64::min));
+            }
+            errors.sort_by(f64::total_cmp);
+            let (count, all) = (errors.len(), before.len());
+            assert!(count + 1 >= all && count <= all, "{count} of {all}: {}", path.display());
+            let median = errors[count / 2];
+            assert!(median < 0.05, "median {median} px: {}", path.display());
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
+fn deltille_boards_are_no_checkerboards() {
+    let images = images("robot-hand");
+    let detector = Detector::for_grid(GridKind::Checker, None, DetectorConfig::default());
+    for path in images.iter().step_by(4) {
+        let detection = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+        assert!(detection.grids.is_empty(), "a false grid in {}", path.display());
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_data), ignore = "no photographs: set DELTILLE_DATA to their folder")]
+fn published_targets_decode_completely() {
+    for (name, corners, tags) in [("a4_deltille", 76, 8), ("ico_deltille", 66, 10)] {
+        let folder = data("reference-boards");
+        let text = std::fs::read_to_string(folder.join(format!("{name}.dsc"))).unwrap();
+        let target = dsc::read(&text, name).unwrap();
+        let family = Family::shipped(&target.family.as_ref().unwrap().name).unwrap();
+        let detector = Detector::for_target(&target, Some(&family), DetectorConfig::default());
+        let document = Document::open(&folder.join(format!("{name}.pdf"))).unwrap();
+        assert_eq!(document.pages(), target.panels.len());
+        for page in 0..document.pages() {
+            let image = document.render(page, 300.0 / 25.4).unwrap().image;
+            let detection = detector.detect(&image, name);
+            assert_eq!(detection.grids.len(), 1, "{name}, page {page}");
+            let grid = &detection.grids[0];
+            assert_eq!(grid.panel, Some(page as u32));
+            assert_eq!(
+                (grid.corners.len(), grid.tags.len()),
+                (corners, tags),
+                "{name}, page {page}"
+            );
+            assert!(grid.tags.iter().all(|tag| tag.errors == 0));
+            assert!(grid.corners.iter().all(|corner| corner.id.is_some()));
+        }
+    }
+}

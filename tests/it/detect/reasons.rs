@@ -1,0 +1,109 @@
+//! A picture without labels says why, and what would help.
+
+use deltille::artwork;
+use deltille::camera::{Camera, Pose};
+use deltille::detect::{Detection, Detector, DetectorConfig, ReasonKind};
+use deltille::family::Family;
+use deltille::raster::Gray;
+use deltille::synth::{Light, Scene, scene_of_sheet};
+use deltille::targets::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
+use glam::DVec3;
+
+struct Board {
+    detector: Detector,
+    scene: Scene,
+    centre_mm: DVec3,
+}
+
+fn board(grid: GridKind, change: impl Fn(&mut BoardSpec)) -> Board {
+    let mut spec = BoardSpec::new(grid, 8, 9, 20.0);
+    change(&mut spec);
+    let family = spec.tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
+    let (spec, paper) = (TargetSpec::Board(spec), PaperSpec::default());
+    let target = Target::build("board", &spec, family.as_ref(), Some(&paper)).unwrap();
+    let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
+    let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
+    let scene = scene_of_sheet(&target, &sheets[0], 0);
+    Board { detector, scene, centre_mm: target.panels[0].middle_mm() }
+}
+
+impl Board {
+    /// A photograph of 800 × 600 from so far, mm, a little from the side.
+    fn photograph(&self, mm: f64, light: &Light) -> Gray<u8> {
+        let eye = self.centre_mm + mm * DVec3::new(0.1, -0.2, 0.97);
+        let pose = Pose::looking_at(eye, self.centre_mm, DVec3::Y);
+        let image = self.scene.render(&Camera::pinhole(800, 600, 0.9), &pose, light);
+        image.map(|v| (v * 255.0 + 0.5) as u8)
+    }
+
+    /// The kinds of the reasons for which this board is not seen in a picture.
+    fn not_seen_in(&self, image: &Gray<u8>) -> Vec<ReasonKind> {
+        let Detection { grids, reasons, .. } = self.detector.detect(image, "view");
+        assert!(grids.iter().all(|grid| grid.panel.is_none()), "it is seen");
+        assert!(reasons.iter().all(|reason| !reason.to_string().contains("NaN")), "{reasons:?}");
+        reasons.iter().map(|reason| reason.kind).collect()
+    }
+}
+
+fn light() -> Light {
+    Light { blur_px: 0.7, noise: 0.01, seed: 5, ..Light::default() }
+}
+
+fn tags(change: impl Fn(&mut TagSpec)) -> Option<TagSpec> {
+    let mut tags = TagSpec::default();
+    change(&mut tags);
+    Some(tags)
+}
+
+#[test]
+fn nothing_is_seen_in_bad_light_and_focus_and_from_too_far() {
+    for kind in [GridKind::Deltille, GridKind::Checker] {
+        let board = board(kind, |_| {});
+        let why = |mm: f64, light: Light| board.not_seen_in(&board.photograph(mm, &light));
+        let dark = Light { white: 0.008, black: 0.002, background: 0.004, ..light() };
+        assert_eq!(why(300.0, dark), [ReasonKind::TooDark], "{kind:?}");
+        let bright = Light { white: 9.0, black: 2.0, background: 3.0, ..light() };
+        assert_eq!(why(300.0, bright), [ReasonKind::Overexposed], "{kind:?}");
+        let blurred = Light { blur_px: 25.0, ..light() };
+        assert_eq!(why(300.0, blurred), [ReasonKind::TooBlurred], "{kind:?}");
+        // Tiles of 5.5 px; those of 6 px are read on some checkerboards.
+        assert_eq!(why(3000.0, light()), [ReasonKind::TooSmall], "{kind:?}");
+        let nothing = Gray::from_fn(800, 600, |x, y| if x + y < 700 { 40 } else { 220u8 });
+        assert_eq!(board.not_seen_in(&nothing), [ReasonKind::NoCorners], "{kind:?}");
+    }
+}
+
+#[test]
+fn what_is_seen_is_another_board() {
+    let wanted = board(GridKind::Deltille, |_| {});
+    let why = |other: Board| wanted.not_seen_in(&other.photograph(400.0, &light()));
+    assert_eq!(why(board(GridKind::Checker, |_| {})), [ReasonKind::OtherTiling]);
+    assert_eq!(why(board(GridKind::Deltille, |spec| spec.tags = None)), [ReasonKind::NoTags]);
+    let other_ids = |spec: &mut BoardSpec| spec.tags = tags(|tags| tags.first_id = 300);
+    assert_eq!(why(board(GridKind::Deltille, other_ids)), [ReasonKind::OtherIds]);
+    let other_family = |spec: &mut BoardSpec| spec.tags = tags(|t| t.family = "d36h9".to_owned());
+    assert_eq!(why(board(GridKind::Deltille, other_family)), [ReasonKind::OtherFamily]);
+    let seen = wanted.photograph(400.0, &light());
+    let mirrored = Gray::from_fn(seen.width(), seen.height(), |x, y| seen.at(799 - x, y));
+    assert_eq!(wanted.not_seen_in(&mirrored), [ReasonKind::Mirrored]);
+}
+
+/// Blur that leaves corners, and of tags too little; never "no tag is seen".
+#[test]
+fn tags_that_cannot_be_read_are_no_missing_tags() {
+    let board = board(GridKind::Deltille, |_| {});
+    let mut unread = 0;
+    for mm in [400.0, 600.0, 900.0] {
+        for blur_px in [2.0, 3.0, 4.0, 5.0, 6.0] {
+            let image = board.photograph(mm, &Light { blur_px, ..light() });
+            let Detection { grids, reasons, .. } = board.detector.detect(&image, "view");
+            if grids.is_empty() || grids.iter().any(|grid| grid.panel.is_some()) {
+                continue;
+            }
+            let kinds: Vec<ReasonKind> = reasons.iter().map(|reason| reason.kind).collect();
+            assert_eq!(kinds, [ReasonKind::UnreadableTags], "{mm} mm, {blur_px} px: {reasons:?}");
+            unread += 1;
+        }
+    }
+    assert!(unread > 2, "{unread}");
+}

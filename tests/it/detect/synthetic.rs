@@ -1,0 +1,160 @@
+//! Labels and positions on synthetic photographs, where the truth is exact.
+
+use std::collections::BTreeMap;
+
+use crate::common::view::tilted;
+use deltille::artwork;
+use deltille::camera::{Camera, KannalaBrandt, Lens, Pose};
+use deltille::detect::{Detection, Detector, DetectorConfig};
+use deltille::family::Family;
+use deltille::raster::Gray;
+use deltille::synth::{Light, Scene, Truth, scene_of_sheet};
+use deltille::targets::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
+use glam::DVec3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+struct Board {
+    target: Target,
+    family: Option<Family>,
+    scene: Scene,
+    centre_mm: DVec3,
+}
+
+fn board(tags: Option<TagSpec>, inverted: bool) -> Board {
+    let family = tags.as_ref().map(|tags| Family::shipped(&tags.family).unwrap());
+    let plain = BoardSpec::new(GridKind::Deltille, 8, 9, 18.0);
+    let spec = BoardSpec { board_id: 4, tags, inverted, ..plain };
+    let paper = PaperSpec::default();
+    let target =
+        Target::build("board", &TargetSpec::Board(spec), family.as_ref(), Some(&paper)).unwrap();
+    let sheets = artwork::draw(&target, family.as_ref()).unwrap().sheets;
+    let scene = scene_of_sheet(&target, &sheets[0], 0);
+    let centre_mm = target.panels[0].middle_mm();
+    Board { target, family, scene, centre_mm }
+}
+
+impl Board {
+    fn detector(&self) -> Detector {
+        Detector::for_target(&self.target, self.family.as_ref(), DetectorConfig::default())
+    }
+
+    fn seen_from(&self, rng: &mut ChaCha8Rng, distance_mm: f64, tilt: f64) -> Pose {
+        tilted(rng, self.centre_mm, distance_mm, tilt)
+    }
+}
+
+fn eight_bits(image: &Gray<f32>) -> Gray<u8> {
+    image.map(|v| (v * 255.0 + 0.5) as u8)
+}
+
+/// Distance of every detected corner from the corner with the same id; panics on a wrong label.
+fn errors(detection: &Detection, truth: &Truth) -> Vec<f64> {
+    let by_id: BTreeMap<u32, _> = truth.corners.iter().map(|c| (c.id, c)).collect();
+    detection
+        .grids
+        .iter()
+        .flat_map(|grid| &grid.corners)
+        .map(|corner| {
+            let id = corner.id.expect("all corners are labelled");
+            let truth = by_id.get(&id).expect("the corner is visible");
+            assert_eq!((corner.row, corner.col), (truth.row, truth.col));
+            let error = (corner.x - truth.x).hypot(corner.y - truth.y);
+            assert!(error < 2.0, "corner {id} is {error} px off: a wrong label");
+            error
+        })
+        .collect()
+}
+
+fn rms(errors: &[f64]) -> f64 {
+    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+}
+
+#[test]
+fn every_corner_of_a_tagged_board_is_labelled_up_to_60_degrees() {
+    let board = board(Some(TagSpec::default()), false);
+    let detector = board.detector();
+    let camera = Camera::pinhole(1280, 960, 0.9);
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut all = Vec::new();
+    for view in 0..24u32 {
+        let tilt = f64::from(view) / 24.0 * 60f64.to_radians();
+        let pose = board.seen_from(&mut rng, 330.0, tilt);
+        let light = Light { seed: view.into(), gradient: [0.5, -0.3], ..Light::default() };
+        let image = eight_bits(&board.scene.render(&camera, &pose, &light));
+        let truth = board.scene.truth(&camera, &pose, 14.0);
+        let everything = board.scene.truth(&camera, &pose, 0.0);
+        let detection = detector.detect(&image, "view");
+        assert_eq!(detection.grids.len(), 1, "view {view}");
+        assert_eq!(detection.grids[0].panel, Some(4));
+        let found = errors(&detection, &everything);
+        assert!(
+            found.len() >= truth.corners.len(),
+            "view {view}: {} of {}",
+            found.len(),
+            truth.corners.len()
+        );
+        all.extend(found);
+    }
+    assert!(rms(&all) < 0.03, "rms {}", rms(&all));
+}
+
+#[test]
+fn a_fisheye_view_and_an_inverted_board_are_labelled_too() {
+    let mut camera = Camera::pinhole(1600, 1200, 1.2);
+    camera.focal_px = [420.0; 2];
+    camera.lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![-0.02, 0.002, 0.0, 0.0] });
+    for inverted in [false, true] {
+        let board = board(Some(TagSpec::default()), inverted);
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for view in 0..6u32 {
+            let pose = board.seen_from(&mut rng, 110.0, 0.1 * f64::from(view));
+            let light = Light { seed: view.into(), ..Light::default() };
+            let image = eight_bits(&board.scene.render(&camera, &pose, &light));
+            let detection = board.detector().detect(&image, "view");
+            let truth = board.scene.truth(&camera, &pose, 14.0);
+            let found = errors(&detection, &board.scene.truth(&camera, &pose, 0.0));
+            assert!(
+                found.len() * 100 >= truth.corners.len() * 97,
+                "{} of {}",
+                found.len(),
+                truth.corners.len()
+            );
+            assert!(rms(&found) < 0.04, "rms {}", rms(&found));
+        }
+    }
+}
+
+#[test]
+fn an_untagged_board_seen_whole_is_labelled_by_its_outline() {
+    let board = board(None, false);
+    let camera = Camera::pinhole(1280, 960, 0.9);
+    let pose = board.seen_from(&mut ChaCha8Rng::seed_from_u64(3), 330.0, 0.4);
+    let image = eight_bits(&board.scene.render(&camera, &pose, &Light::default()));
+    let found =
+        errors(&board.detector().detect(&image, "view"), &board.scene.truth(&camera, &pose, 0.0));
+    assert_eq!(found.len(), 72);
+}
+
+/// A part of the board with one tag in it is enough for absolute labels.
+#[test]
+fn partial_views_are_labelled_by_few_tags() {
+    let board = board(Some(TagSpec::default()), false);
+    let camera = Camera::pinhole(640, 480, 0.5);
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let (mut labelled, mut views) = (0, 0);
+    for view in 0..20 {
+        let pose = board.seen_from(&mut rng, 180.0, 0.5);
+        let image = eight_bits(&board.scene.render(&camera, &pose, &Light::default()));
+        let detection = board.detector().detect(&image, "view");
+        let truth = board.scene.truth(&camera, &pose, 0.0);
+        views += usize::from(truth.corners.len() > 8);
+        for grid in detection.grids.iter().filter(|grid| grid.panel.is_some()) {
+            labelled += 1;
+            assert!(!grid.tags.is_empty(), "view {view}");
+            let one = Detection { grids: vec![grid.clone()], ..detection.clone() };
+            assert!(rms(&errors(&one, &truth)) < 0.03);
+        }
+    }
+    assert!(labelled * 10 >= views * 9, "{labelled} of {views}");
+}

@@ -1,0 +1,247 @@
+//! Every shipped family: what it claims holds, and it decodes what was misread.
+
+use deltille::clock;
+use deltille::family::{
+    Construction, Control, Decoder, Family, Rules, Screen, TagWords, best, certify, lexicode,
+    shipped_names,
+};
+use deltille::lattice::Dimension;
+use proptest::prelude::*;
+
+use crate::common::data;
+
+fn shipped() -> Vec<Family> {
+    shipped_names().into_iter().map(|name| Family::shipped(name).unwrap()).collect()
+}
+
+#[test]
+fn every_claim_of_every_shipped_family_holds() {
+    for family in shipped() {
+        let certificate = certify(&family);
+        assert_eq!(certificate.failures, [""; 0], "{}", family.name());
+    }
+}
+
+#[test]
+fn files_read_back_as_written() {
+    for family in shipped() {
+        assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
+        // The file in the repository is what this version writes.
+        let path = format!("{}/families/{}.json", env!("CARGO_MANIFEST_DIR"), family.name());
+        assert!(std::fs::read_to_string(&path).unwrap() == family.to_json(), "{path}");
+    }
+}
+
+/// Size and fingerprint of the published families, and the files of their codes.
+const PUBLISHED: [(&str, &str, usize, &str); 5] = [
+    ("delTag16h5", "d16h5.txt", 34, "d250fdd5130d8e60"),
+    ("delTag25h7", "d25h7.txt", 343, "bc9573cc255c8668"),
+    ("delTag25h9", "d25h9.txt", 47, "c671f2882edb930c"),
+    ("delTag36h9", "d36h9.txt", 6659, "23cf18bf544c2252"),
+    ("delTag36h11", "d36h11.txt", 753, "0d6eda16b2685b64"),
+];
+
+#[test]
+fn published_families_are_the_published_ones() {
+    for (name, _, size, fingerprint) in PUBLISHED {
+        let family = Family::shipped(name).unwrap();
+        assert_eq!((family.len(), family.fingerprint()), (size, fingerprint), "{name}");
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_data), ignore = "no published codes: set DELTILLE_DATA to their folder")]
+fn published_families_have_the_published_codes() {
+    for (name, file, ..) in PUBLISHED {
+        let family = Family::shipped(name).unwrap();
+        let table = std::fs::read_to_string(data("reference-families").join(file)).unwrap();
+        let words = TagWords::new(family.dimension());
+        let codes: Vec<String> = family.codes().iter().map(|&c| words.hex(c)).collect();
+        assert_eq!(table.split_whitespace().collect::<Vec<_>>(), codes, "{name}");
+    }
+}
+
+/// What the searches reached must not be lost again.
+#[test]
+fn own_families_are_as_large_as_documented() {
+    for (name, size) in [
+        ("d16h5", 78),
+        ("d25h7", 1208),
+        ("d25h9", 83),
+        ("d36h9", 12_964),
+        ("d36h11", 1902),
+        ("d49h12", 20_000),
+    ] {
+        let family = Family::shipped(name).unwrap();
+        assert!(family.len() >= size, "{name} has {}", family.len());
+        assert_eq!(family.rules(), &Rules::published(family.distance()), "{name}");
+    }
+}
+
+/// Minutes of work: `cargo test --release -- --ignored`.
+#[test]
+#[ignore = "looks for the codes among all 2^36 words, minutes of work"]
+fn lexicodes_of_36_bits_are_the_published_ones() {
+    for name in ["delTag36h11", "delTag36h9"] {
+        let published = Family::shipped(name).unwrap();
+        let search = lexicode::Lexicode::published(published.dimension(), published.distance());
+        assert_eq!(search.family(name, Control::default()).unwrap(), published);
+    }
+}
+
+/// Beyond 100,000 codes the distance is proved by structure, and a wrong code is still found.
+#[test]
+fn very_large_families_are_proved_by_their_structure() {
+    let shipped = Family::shipped("d49h12").unwrap();
+    let Construction::Algebraic(mut construction) = shipped.construction().clone() else {
+        panic!("d49h12 is algebraic")
+    };
+    construction.limit = Some(120_000);
+    let words = TagWords::new(shipped.dimension());
+    let screen = Screen::new(words, shipped.distance(), shipped.rules());
+    let codes = construction.codes(&screen).unwrap();
+    assert_eq!(codes[..shipped.len()], *shipped.codes());
+    let family = |codes| {
+        let construction = Construction::Algebraic(construction.clone());
+        let (dimension, rules) = (shipped.dimension(), shipped.rules().clone());
+        Family::new("large", dimension, 12, codes, rules, construction).unwrap()
+    };
+    let certificate = certify(&family(codes.clone()));
+    assert_eq!(certificate.failures, [""; 0]);
+    assert!(!certificate.all_compared && certificate.min_distance >= 12);
+
+    let mut wrong = codes;
+    wrong[77_777] ^= 1 << 20;
+    let failures = certify(&family(wrong)).failures;
+    assert!(
+        failures.iter().any(|f| f == "distance: code 77777 is not in the linear code"),
+        "{failures:?}"
+    );
+}
+
+#[test]
+fn best_families_hold_whatever_the_rules() {
+    for (bits, distance, rules) in [
+        (9, 3, Rules { min_complexity: 0.0, black_distance: 3, white_distance: 0 }),
+        (16, 6, Rules { min_complexity: 0.6, black_distance: 6, white_distance: 6 }),
+        (36, 13, Rules::published(13)),
+    ] {
+        let search = best::Best {
+            dimension: Dimension::from_bits(bits).unwrap(),
+            distance,
+            rules,
+            budget: best::Budget::Time(std::time::Duration::from_millis(500), clock::now),
+            seed: 3,
+            limit: None,
+            exchange: true,
+        };
+        let family = search.family("test", search.start(), Control::default()).unwrap();
+        assert_eq!(certify(&family).failures, [""; 0]);
+        assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);
+    }
+}
+
+#[test]
+fn lexicodes_of_up_to_25_bits_are_the_published_ones() {
+    for name in ["delTag16h5", "delTag25h7", "delTag25h9"] {
+        let published = Family::shipped(name).unwrap();
+        let search = lexicode::Lexicode::published(published.dimension(), published.distance());
+        assert_eq!(search.family(name, Control::default()).unwrap(), published);
+    }
+}
+
+#[test]
+fn the_first_candidates_of_the_36_bit_lexicodes_give_the_published_prefix() {
+    for name in ["delTag36h9", "delTag36h11"] {
+        let published = Family::shipped(name).unwrap();
+        let mut search = lexicode::Lexicode::published(published.dimension(), published.distance());
+        search.candidates = 200_000;
+        let codes = search.codes(Control::default()).unwrap();
+        assert!(codes.len() > 100);
+        assert_eq!(codes, published.codes()[..codes.len()]);
+    }
+}
+
+/// The number of threads may change the time a search takes, and nothing else.
+#[test]
+fn lexicodes_do_not_depend_on_threads() {
+    let published = Family::shipped("delTag36h11").unwrap();
+    let mut search = lexicode::Lexicode::published(published.dimension(), 11);
+    search.candidates = 50_000;
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| search.codes(Control::default()).unwrap())
+    };
+    assert_eq!(with(1), with(3));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn up_to_t_errors_are_corrected(
+        pick: prop::sample::Index, id: prop::sample::Index, turns in 0..3u8,
+        flips in prop::collection::btree_set(0..49u32, 0..6),
+    ) {
+        // Decoders are built once; all shipped families take their turn.
+        static DECODERS: std::sync::OnceLock<Vec<(Family, Decoder)>> = std::sync::OnceLock::new();
+        let decoders = DECODERS.get_or_init(|| {
+            shipped().into_iter().map(|f| { let d = Decoder::new(&f); (f, d) }).collect()
+        });
+        let (family, decoder) = &decoders[pick.index(decoders.len())];
+        let id = id.index(family.len());
+        let words = TagWords::new(family.dimension());
+        let flips: Vec<u32> = flips.into_iter()
+            .filter(|&bit| bit < family.dimension().bits())
+            .take(family.correctable() as usize)
+            .collect();
+        let read = flips.iter()
+            .fold(words.turns(family.codes()[id])[turns as usize], |word, bit| word ^ 1 << bit);
+        let errors = flips.len() as u32;
+        let decoded = decoder.decode(read, family.correctable()).unwrap();
+        prop_assert_eq!((decoded.id as usize, decoded.turns, decoded.errors), (id, turns, errors));
+        prop_assert_eq!(decoder.decode(read, errors), Some(decoded));
+        if errors > 0 {
+            prop_assert_eq!(decoder.decode(read, errors - 1), None);
+        }
+        // The slower search beyond ⌊(h−1)/2⌋ sees the same.
+        let beyond = decoder.decode(read, family.correctable() + 1).unwrap();
+        prop_assert_eq!((beyond.id, beyond.turns, beyond.errors), (decoded.id, turns, errors));
+    }
+
+    #[test]
+    fn both_ways_of_decoding_agree(
+        pick in 0..4usize, word: u64, id: prop::sample::Index, turns in 0..3usize,
+        flips in prop::collection::vec(0..49u32, 0..7),
+    ) {
+        static PAIRS: std::sync::OnceLock<Vec<(Family, Decoder, Decoder)>> =
+            std::sync::OnceLock::new();
+        let pairs = PAIRS.get_or_init(|| {
+            ["d25h9", "d36h9", "d36h11", "d49h12"]
+                .map(|name| Family::shipped(name).unwrap())
+                .map(|f| (f.clone(), Decoder::by_blocks(&f), Decoder::by_syndromes(&f).unwrap()))
+                .into()
+        });
+        let (family, blocks, syndromes) = &pairs[pick];
+        let words = TagWords::new(family.dimension());
+        let code = words.turns(family.codes()[id.index(family.len())])[turns];
+        let misread = flips.iter().filter(|&&bit| bit < family.dimension().bits());
+        let misread = misread.fold(code, |word, bit| word ^ 1 << bit);
+        for read in [word & family.dimension().mask(), misread] {
+            for errors in 0..=family.correctable() + 1 {
+                prop_assert_eq!(blocks.decode(read, errors), syndromes.decode(read, errors));
+            }
+        }
+    }
+
+    #[test]
+    fn a_word_read_at_random_decodes_to_its_nearest_code_or_not_at_all(word: u64) {
+        let family = Family::shipped("delTag25h7").unwrap();
+        let word = word & family.dimension().mask();
+        let words = TagWords::new(family.dimension());
+        let nearest = family.codes().iter().map(|&c| words.distance(word, c)).min().unwrap();
+        let decoded = Decoder::new(&family).decode(word, family.correctable());
+        let expected = (nearest <= family.correctable()).then_some(nearest);
+        prop_assert_eq!(decoded.map(|d| d.errors), expected);
+    }
+}

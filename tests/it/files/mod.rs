@@ -1,0 +1,9 @@
+mod hostile;
+#[cfg(unix)]
+mod interrupt;
+mod numbers;
+mod pictures;
+mod readers;
+mod reproducible;
+mod robustness;
+mod sets;

@@ -1,0 +1,51 @@
+//! Every reader of files is given good files, files that were found to do harm, and files with a
+//! few changes that keep their form. None may panic, end without a finding, or let in what it must
+//! not. The fuzz targets in `fuzz/` do the same for hours.
+
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use crate::changed::{Dice, READERS, Reader};
+
+/// Changed files of each reader.
+const CHANGED: u64 = 300;
+
+/// Reads a file; what panicked is named.
+fn harm(reader: &Reader, what: &str, bytes: &[u8]) -> Option<String> {
+    let read = catch_unwind(AssertUnwindSafe(|| reader.read(bytes)));
+    read.is_err().then(|| format!("{}: {what}", reader.name))
+}
+
+#[test]
+fn good_files_are_read() {
+    let refused = READERS.iter().filter(|reader| !reader.read(&reader.good()));
+    let refused: Vec<&str> = refused.map(|reader| reader.name).collect();
+    assert!(refused.is_empty(), "{refused:?}");
+}
+
+#[test]
+fn files_of_the_corpus_do_no_harm() {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus");
+    let mut harms = Vec::new();
+    for folder in fs::read_dir(corpus).unwrap().map(|entry| entry.unwrap().path()) {
+        let reader = READERS.iter().find(|reader| folder.ends_with(reader.name)).unwrap();
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            harms.extend(harm(reader, &path.display().to_string(), &fs::read(&path).unwrap()));
+        }
+    }
+    assert!(harms.is_empty(), "{harms:?}");
+}
+
+#[test]
+fn changed_files_do_no_harm() {
+    let mut harms = Vec::new();
+    for reader in READERS {
+        let mut bytes = reader.good();
+        for seed in 0..CHANGED {
+            bytes = reader.changed(&bytes, &mut Dice::new(seed));
+            harms.extend(harm(reader, &format!("seed {seed}"), &bytes));
+        }
+    }
+    assert!(harms.is_empty(), "{harms:?}");
+}

@@ -1,0 +1,348 @@
+//! What becomes of files that are there already, of runs that are killed or told to end, and of
+//! several that write to one folder.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::common::command::{deltille, refused};
+use crate::common::folder::names;
+use deltille::export::staging;
+use predicates::prelude::PredicateBooleanExt;
+use predicates::str::contains;
+
+const DELTILLE: &str = env!("CARGO_BIN_EXE_deltille");
+const DELTAG: &str = env!("CARGO_BIN_EXE_deltag");
+
+/// All files of a folder, in the folders within it as well, with their content.
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for name in names(folder) {
+        let path = folder.join(&name);
+        if path.is_dir() {
+            all.extend(contents(&path).into_iter().map(|(n, c)| (format!("{name}/{n}"), c)));
+        } else {
+            all.insert(name, std::fs::read(path).unwrap());
+        }
+    }
+    all
+}
+
+fn run(program: &str, folder: &Path, args: &str) -> (Option<i32>, String) {
+    let mut command = Command::new(program);
+    let output = command.current_dir(folder).args(args.split_whitespace()).output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// Every command replaces what it wrote itself, and nothing else without `--force`.
+#[test]
+fn only_files_of_the_same_kind_are_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    deltille(at, "board --rows 4 --cols 4 --png --svg --dpi 200 --name t --no-verify").success();
+    std::fs::write(at.join("seeds.csv"), "x,y\n20,20\n").unwrap();
+    let camera = "width: 320\nheight: 240\nfocal_px: [400, 400]\ncentre_px: [159.5, 119.5]\n\
+                  model: pinhole\ndistortion: []\n";
+    std::fs::write(at.join("camera.yaml"), camera).unwrap();
+    let commands = [
+        (DELTILLE, "board --rows 4 --cols 4 --pdf --svg --png --dsc --dpi 200 --no-verify -o out"),
+        (DELTILLE, "checkerboard --rows 4 --cols 4 --save-template out/t.toml -o out --no-verify"),
+        (
+            DELTILLE,
+            "tetrahedron --tiles 6 --edge 60mm --family delTag16h5 --gltf --obj \
+             --stl --skeleton --dxf --svg --dsc --no-verify -o out",
+        ),
+        (DELTILLE, "detect t.png --target t.json --format json,orpc,csv --overlay -o out"),
+        (DELTILLE, "render t.json --camera camera.yaml --eye 10,10,300 -o out/view.png"),
+        (DELTILLE, "refine --kind deltille --seeds seeds.csv t.png -o out/corners.csv"),
+        (DELTILLE, "verify t.json t.svg --report out/verdict.json"),
+        (DELTAG, "export delTag16h5 --format c -o out"),
+        (DELTAG, "export delTag16h5 --format rust -o out"),
+        (DELTAG, "export delTag16h5 --format python -o out"),
+        (DELTAG, "export delTag16h5 --format txt -o out"),
+        (DELTAG, "export delTag16h5 --format opencv -o out"),
+        (DELTAG, "show delTag16h5 --svg --png --dpi 50 -o out"),
+        (DELTAG, "sheet delTag16h5 --ids 0-3 --pdf --no-verify -o out"),
+        (DELTAG, "gen-family d9h4 --work 1 --from-nothing -o out"),
+    ];
+    let foreign: [&[u8]; 3] =
+        [b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", b"{\"mine\": 1}", b"\x89PNG\r\n\x1a\n"];
+    for (program, args) in commands {
+        let out = at.join("out");
+        for _ in 0..2 {
+            let (code, said) = run(program, at, args);
+            assert_eq!(code, Some(0), "{args}: {said}");
+        }
+        for name in names(&out) {
+            let own = std::fs::read(out.join(&name)).unwrap();
+            for content in foreign {
+                std::fs::write(out.join(&name), content).unwrap();
+                let before = contents(at);
+                let (code, said) = run(program, at, args);
+                assert_eq!(code, Some(2), "{args} over {name}: {said}");
+                assert!(said.contains(&name) && said.contains("--force"), "{args}: {said}");
+                assert_eq!(said.lines().count(), 1, "{said}");
+                assert!(contents(at) == before, "{args} over {name}");
+            }
+            std::fs::write(out.join(&name), own).unwrap();
+        }
+        for name in names(&out) {
+            std::fs::write(out.join(name), foreign[0]).unwrap();
+        }
+        let (code, said) = run(program, at, &format!("{args} --force"));
+        assert_eq!(code, Some(0), "{args}: {said}");
+        assert_eq!(run(program, at, args).0, Some(0), "{args}");
+        std::fs::remove_dir_all(&out).unwrap();
+    }
+    std::fs::copy(at.join("t.png"), at.join("page.png")).unwrap();
+    let said = refused(at, "render t.json --camera camera.yaml --eye 10,10,300 -o page.png");
+    assert!(said.contains("page.png holds a PNG to scale"), "{said}");
+}
+
+#[test]
+fn a_mesh_is_no_place_for_a_template() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("part.obj"), "# deltille 0.1.0, millimetres\nv 0 0 0\n")
+        .unwrap();
+    let before = contents(folder.path());
+    let said = refused(folder.path(), "board --rows 4 --cols 4 --save-template part.obj");
+    assert!(said.contains("--save-template: part.obj holds") && said.contains("--force"), "{said}");
+    assert!(contents(folder.path()) == before);
+}
+
+#[test]
+fn another_board_of_the_same_name_says_what_is_left_of_the_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let time = |name: &str| at.join(name).metadata().unwrap().modified().unwrap();
+    deltille(at, "board --rows 4 --cols 4 --pdf --svg --png --dsc --no-verify")
+        .success()
+        .stderr("");
+    std::fs::write(at.join("board-2.png"), "not of a board").unwrap();
+    let written = ["board.json", "board.pdf", "board.svg"].map(time);
+    // The same again, fewer files: nothing is left over, and nothing is touched.
+    deltille(at, "board --rows 4 --cols 4 --pdf --no-verify").success().stderr("");
+    assert_eq!(["board.json", "board.pdf", "board.svg"].map(time), written);
+    deltille(at, "board --rows 5 --cols 4 --pdf --no-verify").success().stderr(
+        contains("board.json: takes the place of a target that differs")
+            .and(contains("beside it: board.dsc, board.png, board.svg: remove them")),
+    );
+}
+
+/// What a link leads to is written, and verified as what the link's name says.
+#[cfg(unix)]
+#[test]
+fn files_behind_links_of_any_name_are_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("out.bin"), "x").unwrap();
+    std::os::unix::fs::symlink("out.bin", folder.path().join("board.pdf")).unwrap();
+    deltille(folder.path(), "board --rows 5 --cols 6 --pdf --force")
+        .success()
+        .stdout(contains("board.pdf").and(contains("verified: 1 file")));
+    assert!(std::fs::read(folder.path().join("out.bin")).unwrap().starts_with(b"%PDF"));
+    assert!(folder.path().join("board.pdf").is_symlink());
+}
+
+/// Two boards that differ, by the content of all their files.
+struct Boards {
+    folder: tempfile::TempDir,
+    sets: [BTreeMap<String, Vec<u8>>; 2],
+}
+
+const BOARDS: [&str; 2] = [
+    "board --rows 4 --cols 4 --pdf --svg --png --dsc --dpi 200 --paper A5 --no-verify",
+    "board --rows 5 --cols 4 --pdf --svg --png --dsc --dpi 200 --paper A5 --no-verify",
+];
+
+impl Boards {
+    fn new() -> Self {
+        let sets = BOARDS.map(|args| {
+            let folder = tempfile::tempdir().unwrap();
+            deltille(folder.path(), args).success();
+            contents(folder.path())
+        });
+        Self { folder: tempfile::tempdir().unwrap(), sets }
+    }
+
+    fn start(&self, which: usize) -> Child {
+        let mut command = Command::new(DELTILLE);
+        command.args(BOARDS[which].split_whitespace()).current_dir(self.folder.path());
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    }
+
+    /// Whether the folder holds one of the two and nothing else.
+    fn is_whole(&self) -> bool {
+        self.sets.contains(&contents(self.folder.path()))
+    }
+}
+
+/// Runs are killed at random moments: then a command that only reads the description finds the folder
+/// as it was, or as it was to become.
+fn kill(trials: u64) {
+    let boards = Boards::new();
+    let at = boards.folder.path();
+    let start = Instant::now();
+    assert!(boards.start(0).wait().unwrap().success());
+    let takes = start.elapsed();
+    let (mut mixed, mut left, mut done) = (0, 0, 0);
+    for trial in 0..trials {
+        let mut child = boards.start((trial % 2) as usize);
+        // A sequence that fills the interval evenly.
+        let share = (trial as f64 * 0.618_034).fract();
+        std::thread::sleep(takes.mul_f64(1.2 * share));
+        done += u32::from(child.try_wait().unwrap().is_some());
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let mut there = contents(at);
+        left += u32::from(there.keys().any(|name| name.starts_with(".deltille-")));
+        there.retain(|name, _| !name.starts_with(".deltille-"));
+        mixed += u32::from(!boards.sets.contains(&there));
+        // It fails for want of a camera, once it has read the description.
+        deltille(at, "render board.json --camera none.yaml --eye 0,0,300").code(2);
+        assert!(boards.is_whole(), "trial {trial}: {:?}", contents(at).keys());
+    }
+    eprintln!(
+        "{trials} runs of {takes:?} killed, {done} of them after their end; before the next run {left} \
+         folders held temporary files, {mixed} a mixture; after it none"
+    );
+}
+
+#[test]
+fn killed_runs_leave_no_mixture() {
+    kill(24);
+}
+
+#[test]
+#[ignore = "many minutes"]
+fn a_thousand_killed_runs_leave_no_mixture() {
+    kill(1000);
+}
+
+/// What `kill -9` leaves in the moment between two renames is too rare to wait for.
+#[test]
+fn what_is_complete_is_finished_and_what_is_not_is_removed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let write = |name: &str, text: &str| {
+        let path = at.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    };
+    write("a.json", "new");
+    write("a.pdf", "old");
+    write(".deltille-writing-aaaaaa/files/a.pdf", "new");
+    write(".deltille-writing-aaaaaa/complete", "");
+    write(".deltille-writing-bbbbbb/files/a.pdf", "newer, but not all there");
+    write(".deltille-writing-cccccc", "half");
+    // Killed while it was removed.
+    write(".deltille-writing-dddddd/complete", "");
+    write(".deltille-writing-of-mine/keep", "");
+    let living = staging::Staging::new(at).unwrap();
+    std::fs::write(living.files().join("b.txt"), "b").unwrap();
+    // A living run keeps what it has: here as seen by another process.
+    deltille(at, "render a.json --camera none.yaml --eye 0,0,300").code(2);
+    assert_eq!(std::fs::read(at.join("a.pdf")).unwrap(), b"new");
+    assert_eq!(names(at).len(), 4, "{:?}", names(at));
+    living.commit().unwrap();
+    assert_eq!(names(at), [".deltille-writing-of-mine", "a.json", "a.pdf", "b.txt"]);
+}
+
+#[test]
+fn runs_at_the_same_time_do_not_mix() {
+    let boards = Boards::new();
+    for _ in 0..6 {
+        let mut children = [0, 1, 0, 1].map(|which| boards.start(which));
+        assert!(children.iter_mut().all(|child| child.wait().unwrap().success()));
+        assert!(boards.is_whole(), "{:?}", names(boards.folder.path()));
+    }
+}
+
+/// Longer than the half second that is asked for, on a machine that does other things as well.
+#[cfg(unix)]
+const SOON: Duration = Duration::from_secs(5);
+
+/// Whether these tests run under `nohup`, which their children inherit.
+#[cfg(unix)]
+fn ignores_hangup() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_none_or(|mask| mask & 1 == 1)
+}
+
+/// Work that takes much longer than that ends soon after any of the signals, and leaves nothing.
+#[cfg(unix)]
+#[test]
+fn signals_end_the_work_soon_and_leave_nothing() {
+    let sheet = tempfile::tempdir().unwrap();
+    deltille(sheet.path(), "board --rows 30 --cols 30 --png --dpi 600 --paper A2 --no-verify")
+        .success();
+    let page = sheet.path().join("board");
+    // One takes half a second.
+    let pages = sheet.path().join("pages");
+    std::fs::create_dir(&pages).unwrap();
+    for i in 0..40 {
+        std::fs::copy(page.with_extension("png"), pages.join(format!("{i:02}.png"))).unwrap();
+    }
+    let (page, pages) = (page.display(), pages.display());
+    let cases = [
+        ("board --rows 30 --cols 30 --png --dpi 1200 --paper A1".to_owned(), "INT", 130),
+        ("icosahedron --texture-dpi 750 --gltf".to_owned(), "TERM", 143),
+        (format!("verify {page}.json"), "HUP", 129),
+        (format!("detect {pages} --target {page}.json -o ."), "TERM", 143),
+        ("experiment corners --images 100000".to_owned(), "INT", 130),
+    ];
+    for (args, signal, code) in cases {
+        if signal == "HUP" && ignores_hangup() {
+            continue;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = Command::new(DELTILLE);
+        command.args(args.split_whitespace()).current_dir(folder.path());
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(700));
+        assert!(child.try_wait().unwrap().is_none(), "{args}: it is done already");
+        let id = child.id().to_string();
+        assert!(
+            Command::new("kill").args([&format!("-{signal}"), &id]).status().unwrap().success()
+        );
+        let start = Instant::now();
+        let output = child.wait_with_output().unwrap();
+        let took = start.elapsed();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{args}: {said}");
+        assert!(said.starts_with("interrupted: ") && said.lines().count() == 1, "{args}: {said}");
+        assert!(took < SOON, "{args}: {took:?}");
+        // Detections of pictures that were done in time stay.
+        let is_done = |name: &String| args.starts_with("detect") && name.ends_with(".json");
+        let left: Vec<String> = names(folder.path()).into_iter().filter(|n| !is_done(n)).collect();
+        assert!(left.is_empty(), "{args}: {left:?}");
+        eprintln!("{args}: {took:?} after {signal}");
+    }
+}
+
+/// `detect --stream | head -1`
+#[cfg(unix)]
+#[test]
+fn work_whose_output_nobody_reads_ends() {
+    const IMAGES: usize = 60;
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    deltille(at, "board --rows 4 --cols 4 --png --dpi 200 --paper A5 --no-verify").success();
+    std::fs::create_dir(at.join("images")).unwrap();
+    for i in 0..IMAGES {
+        std::fs::copy(at.join("board.png"), at.join(format!("images/{i:02}.png"))).unwrap();
+    }
+    let mut command = Command::new(DELTILLE);
+    command.args("detect images --target board.json --stream -o out -j 1".split_whitespace());
+    command.current_dir(at).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut first = String::new();
+    BufReader::with_capacity(64, child.stdout.take().unwrap()).read_line(&mut first).unwrap();
+    assert!(first.contains("deltille/detection/1"));
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), &*output.stderr), (Some(141), &b""[..]));
+    // One is read, one is written while the reader goes, one fails to be.
+    assert!(names(&at.join("out")).len() <= 5, "{:?}", names(&at.join("out")));
+}

@@ -1,0 +1,7 @@
+mod board;
+mod checkerboard_targets;
+mod dsc;
+mod export;
+mod net;
+mod solid;
+mod tag_sheets;

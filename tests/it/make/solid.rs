@@ -1,0 +1,556 @@
+//! `deltille icosahedron` and its sisters: what they write, and what proves it.
+
+use crate::common::command::{deltille, refused};
+use crate::common::folder::names;
+use deltille::export::dsc;
+use deltille::targets::{LineKind, Target};
+use predicates::prelude::PredicateBooleanExt;
+use predicates::str::contains;
+
+#[test]
+fn an_icosahedron_needs_no_option() {
+    let folder = tempfile::tempdir().unwrap();
+    deltille(folder.path(), "icosahedron")
+        .success()
+        .stdout(contains("icosahedron.glb: verified, 20 faces, 720 corners in space within"));
+    assert_eq!(names(folder.path()), ["icosahedron.glb", "icosahedron.json"]);
+}
+
+/// The description of the reference programs says the same: corners, tags, places in space.
+#[test]
+fn every_format_is_written_and_the_dsc_reads_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = "tetrahedron --edge 8cm --tiles 7 --face-margin 4mm --obj --stl --gltf --svg --dsc \
+                --per-face --name t -o new --first-id 9";
+    deltille(folder.path(), args)
+        .success()
+        .stdout(contains("t.glb: verified, 4 faces").and(contains("t.obj: verified, 4 faces")));
+    let out = folder.path().join("new");
+    let expected = [
+        "t-1.svg",
+        "t-2.svg",
+        "t-3.svg",
+        "t-4.svg",
+        "t-texture.png",
+        "t.dsc",
+        "t.glb",
+        "t.json",
+        "t.mtl",
+        "t.obj",
+        "t.stl",
+    ];
+    assert_eq!(names(&out), expected);
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    let (target, listed) =
+        (Target::from_json(&read("t.json")).unwrap(), dsc::read(&read("t.dsc"), "t").unwrap());
+    for (a, b) in target.panels.iter().zip(&listed.panels) {
+        assert_eq!((&a.corners, &a.tags), (&b.corners, &b.tags));
+        let turned = a.pose.rotation.iter().zip(&b.pose.rotation).map(|(a, b)| (a - b).abs());
+        assert!(turned.fold(0.0, f64::max) < 1e-9);
+    }
+    // Eighty bytes of header, a count, fifty bytes a triangle.
+    assert_eq!(std::fs::metadata(out.join("t.stl")).unwrap().len(), 84 + 4 * 50);
+}
+
+/// Changes of an OBJ that an eye would not notice, and what is said of them.
+#[test]
+fn wrong_meshes_are_refused_with_the_cause() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    deltille(path, "tetrahedron --edge 80mm --tiles 7 --face-margin 4mm --obj --name t").success();
+    let text = std::fs::read_to_string(path.join("t.obj")).unwrap();
+    let change = |edit: &dyn Fn(&str) -> String| -> String {
+        text.lines().map(|line| edit(line) + "\n").collect()
+    };
+    let numbers = |line: &str| -> Vec<f64> {
+        line.split(' ').skip(1).map(|word| word.parse().unwrap()).collect()
+    };
+    let scaled = change(&|line| match line.strip_prefix("v ") {
+        Some(_) => format!(
+            "v {}",
+            numbers(line).iter().map(|v| (v * 1.01).to_string()).collect::<Vec<_>>().join(" ")
+        ),
+        None => line.to_owned(),
+    });
+    let mirrored = change(&|line| match line.strip_prefix("v ") {
+        Some(_) => {
+            let v = numbers(line);
+            format!("v {} {} {}", -v[0], v[1], v[2])
+        }
+        None => line.to_owned(),
+    });
+    let inside_out = change(&|line| {
+        let words: Vec<&str> = line.split(' ').collect();
+        if words[0] == "f" {
+            format!("f {} {} {}", words[1], words[3], words[2])
+        } else {
+            line.to_owned()
+        }
+    });
+    let first = text.lines().find(|line| line.starts_with("v ")).unwrap();
+    let v = numbers(first);
+    let dented = text.replacen(first, &format!("v {} {} {}", v[0] + 0.5, v[1], v[2]), 1);
+    let untextured = text.replace("usemtl print\n", "");
+    for (name, text, code, said) in [
+        ("scaled", scaled, 1, "scale 1.0100"),
+        ("mirrored", mirrored, 1, "not recognised"),
+        ("inside-out", inside_out, 1, "wrong normals"),
+        ("dented", dented, 1, "off by"),
+        ("untextured", untextured, 1, "a face before its material"),
+    ] {
+        assert_ne!(text, std::fs::read_to_string(path.join("t.obj")).unwrap());
+        std::fs::write(path.join(format!("{name}.obj")), text).unwrap();
+        let result = deltille(path, &format!("verify t.json {name}.obj")).code(code);
+        let output = result.get_output();
+        let all = [&output.stdout[..], &output.stderr[..]].concat();
+        let all = String::from_utf8_lossy(&all).into_owned();
+        assert!(all.contains(said), "{name}: {all}");
+    }
+}
+
+/// The 16 equilateral triangles of a gyroelongated square bipyramid: two pyramids on an antiprism.
+fn bipyramid(edge: f64) -> String {
+    let radius = edge / 2f64.sqrt();
+    let across = 2.0 * radius * (std::f64::consts::FRAC_PI_8).sin();
+    let half = (edge * edge - across * across).sqrt() / 2.0;
+    let mut text = String::new();
+    for k in 0..8 {
+        let (ring, turn) = (k / 4, f64::from(k % 4) + f64::from(k / 4) / 2.0);
+        let (sin, cos) = (turn * std::f64::consts::FRAC_PI_2).sin_cos();
+        let z = if ring == 0 { half } else { -half };
+        text += &format!("v {} {} {z}\n", radius * cos, radius * sin);
+    }
+    let top = half + (edge * edge - radius * radius).sqrt();
+    text += &format!("v 0 0 {top}\nv 0 0 {}\n", -top);
+    for k in 0..4 {
+        let (u, u1, l, l1) = (k + 1, (k + 1) % 4 + 1, k + 5, (k + 1) % 4 + 5);
+        text += &format!("f {u} {u1} 9\nf {u1} {u} {l}\nf {l} {l1} {u1}\nf {l1} {l} 10\n");
+    }
+    text
+}
+
+/// Every output of a solid from a mesh, inside out and in metres, from the file to the proof.
+#[test]
+fn any_closed_mesh_becomes_a_target() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let inside_out: String = bipyramid(0.12)
+        .lines()
+        .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+            ["f", a, b, c] => format!("f {a} {c} {b}\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    std::fs::write(path.join("gyro.obj"), inside_out).unwrap();
+    let args = "solid --mesh gyro.obj --scale 1000 --gltf --obj --stl --skeleton --dxf --svg --dsc \
+                -o new --first-id 5";
+    deltille(path, args)
+        .success()
+        .stdout(contains("they were turned"))
+        .stdout(contains("gyro: mesh of 120 mm edges, 16 faces"))
+        .stdout(contains("gyro.glb: verified, 16 faces").and(contains("gyro.obj: verified")))
+        .stdout(contains("gyro.stl: verified, closed body of 16 triangles"))
+        .stdout(contains("gyro-skeleton.stl: verified").and(contains("16 seats within")));
+    // The description is enough to make the target again.
+    let target = std::fs::read_to_string(path.join("new/gyro.json")).unwrap();
+    let target = Target::from_json(&target).unwrap();
+    let family = deltille::family::Family::shipped("delTag25h7").unwrap();
+    let again = Target::build("gyro", &target.spec, Some(&family), None).unwrap();
+    for (made, read) in again.panels.iter().zip(&target.panels) {
+        assert_eq!((made.id, &made.corners, &made.tags), (read.id, &read.corners, &read.tags));
+    }
+    assert_eq!(again.panels.len(), 16);
+}
+
+/// A mesh is refused in one line that names its file and what is wrong.
+/// Faces that lie in one plane do not see each other's print; a material that hides it is refused.
+#[test]
+fn a_tetrahedron_with_each_face_cut_in_four_is_sixteen_faces() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]].map(|v| v.map(|x| 60 * x));
+    let middle = |i: usize, j: usize| [0, 1, 2].map(|k| (corners[i][k] + corners[j][k]) / 2);
+    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let vertices = corners.into_iter().chain(pairs.map(|(i, j)| middle(i, j)));
+    let mut text: String = vertices.map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    let number = |i: usize, j: usize| {
+        5 + pairs.iter().position(|&pair| pair == (i.min(j), i.max(j))).unwrap()
+    };
+    for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]] {
+        let [ab, bc, ca] = [number(a, b), number(b, c), number(c, a)];
+        let [a, b, c] = [a + 1, b + 1, c + 1];
+        text += &format!("f {a} {ab} {ca}\nf {ab} {b} {bc}\nf {ca} {bc} {c}\nf {ab} {bc} {ca}\n");
+    }
+    std::fs::write(path.join("cut.obj"), text).unwrap();
+    deltille(path, "solid --mesh cut.obj --gltf --obj --tiles 6 --name t")
+        .success()
+        .stdout(contains("t.glb: verified, 16 faces").and(contains("t.obj: verified, 16 faces")));
+    // The faces of a quarter lie in one plane: its three inner edges are not folded.
+    deltille(path, "solid --mesh cut.obj --pdf --dxf --tiles 6 --name flat")
+        .success()
+        .stdout(contains("24 edges matched"));
+    let json = std::fs::read_to_string(path.join("flat.json")).unwrap();
+    let sheets = Target::from_json(&json).unwrap().sheets;
+    let lines = || sheets.iter().flat_map(|sheet| &sheet.lines);
+    let count = |kind| lines().filter(|line| line.kind == kind).count();
+    assert_eq!((count(LineKind::Flat), count(LineKind::Fold)), (12, 12));
+    let words = || sheets.iter().flat_map(|sheet| &sheet.texts);
+    assert!(words().any(|text| text.text.contains("Do not fold dotted lines.")));
+    let dxf = std::fs::read_to_string(path.join("flat-net.dxf")).unwrap();
+    assert_eq!(dxf.matches("LINE\n  8\nFOLD\n").count(), 12);
+    let material = std::fs::read_to_string(path.join("t.mtl")).unwrap();
+    std::fs::write(path.join("t.mtl"), material.replace("Kd 1 1 1", "Kd 0 0 0")).unwrap();
+    deltille(path, "verify t.json t.obj").code(1).stdout(contains("t.mtl, line 4: `Kd 0 0 0`"));
+}
+
+#[test]
+fn meshes_that_are_no_solids_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let good = bipyramid(120.0);
+    let without_last = good.trim_end().rsplit_once('\n').unwrap().0.to_owned();
+    let flattened = good.replace("f 1 2 9\n", "f 1 1 9\n");
+    let quad = good.replace("f 1 2 9\n", "f 1 2 3 9\n");
+    let wound = good.replace("f 1 2 9\n", "f 2 1 9\n");
+    let twice = good.clone() + &good.replace("v 0 0 ", "v 999 0 ");
+    let skewed: String = good
+        .lines()
+        .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+            ["v", x, y, z] => format!("v {x} {y} {}\n", 1.6 * z.parse::<f64>().unwrap()),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    let shifted: String = good
+        .lines()
+        .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+            ["v", x, y, z] => format!("v {} {y} {z}\n", 1e8 + x.parse::<f64>().unwrap()),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    for (name, text, options, said) in [
+        ("open", without_last, "", "it is open"),
+        ("flat", flattened, "", "triangle 1 has no area"),
+        ("quad", quad, "", "face 1 has 4 corners"),
+        ("wound", wound, "", "wound against each other"),
+        ("crowd", twice, "", "not manifold"),
+        ("nan", good.replacen("v ", "v nan ", 1), "", "vertex 1: its coordinates"),
+        ("far", shifted, "--tiles 7", "--mesh: it reaches"),
+        ("text", "hello".to_owned(), "", "no triangles"),
+        ("index", good.clone() + "f 1 2 99\n", "", "out of bounds"),
+        ("skew", skewed.clone(), "", "give --allow-skew"),
+        ("small", good.clone(), "--scale 0.001", "is --scale right?"),
+        ("both", good.clone(), "--scale 2 --edge 100mm", "cannot be used with"),
+        ("zero", good.clone(), "--scale 0", "--scale"),
+        ("ids", good.clone(), "--tag-spacing 1", "raise --tag-spacing to at least 2"),
+    ] {
+        std::fs::write(path.join(format!("{name}.obj")), text).unwrap();
+        let args = format!("solid --mesh {name}.obj -o out {options}");
+        let stderr = refused(path, &args);
+        assert!(stderr.contains(said), "{name}: {stderr}");
+        let of_file = options.is_empty();
+        assert!(!of_file || stderr.contains(&format!("{name}.obj")), "{name}: {stderr}");
+    }
+    deltille(path, "solid --mesh both.obj --obj").code(2).stderr(contains("over the mesh"));
+    deltille(path, "solid --mesh nowhere.obj").code(2).stderr(contains("nowhere.obj"));
+    assert!(!path.join("out").exists());
+    // What is skewed on purpose is made.
+    std::fs::write(path.join("skew.obj"), skewed).unwrap();
+    deltille(path, "solid --mesh skew.obj --allow-skew --tiles 7").success();
+}
+
+/// An octahedron from the command to its proof, and to a photograph in which it is found.
+#[test]
+fn an_octahedron_is_made_photographed_and_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    deltille(path, "octahedron --gltf --obj --stl --dxf --skeleton --face-margin 7mm")
+        .success()
+        .stdout(contains("faces meet at 109.47°").and(contains("mitred by 35.26°")))
+        .stdout(contains("verified: 6 files of target octahedron"));
+    let camera = "width: 1600\nheight: 1200\nmodel: pinhole\nfocal_px: [1800, 1800]\n\
+                  centre_px: [799.5, 599.5]\n";
+    std::fs::write(path.join("camera.yaml"), camera).unwrap();
+    let args = "render octahedron.json --camera camera.yaml --eye 250,180,220 --bits 16 --seed 3";
+    deltille(path, args).success().stdout(contains("corners in view"));
+    deltille(path, "detect --target octahedron.json octahedron-view.png -o found").success();
+    let read = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&std::fs::read_to_string(path.join(name)).unwrap()).unwrap()
+    };
+    let (truth, found) = (read("octahedron-view.json"), read("found/octahedron-view.json"));
+    let truth: std::collections::BTreeMap<u64, [f64; 2]> = truth["corners"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| (c["id"].as_u64().unwrap(), ["x", "y"].map(|key| c[key].as_f64().unwrap())))
+        .collect();
+    let grids = found["grids"].as_array().unwrap();
+    let corners = grids.iter().flat_map(|grid| grid["corners"].as_array().unwrap());
+    let mut near = 0;
+    for corner in corners {
+        let [x, y] = truth[&corner["id"].as_u64().unwrap()];
+        let at = ["x", "y"].map(|key| corner[key].as_f64().unwrap());
+        assert!((at[0] - x).hypot(at[1] - y) < 0.2, "{corner}");
+        near += 1;
+    }
+    assert!(near >= 36, "{near}");
+    let picture = image::ImageReader::open(path.join("octahedron-view.png")).unwrap();
+    assert_eq!(picture.decode().unwrap().color(), image::ColorType::L16);
+}
+
+/// What is printed wrong on a mesh is named, also where the detector would not mind.
+#[test]
+fn wrong_marks_on_a_mesh_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    deltille(path, "tetrahedron --edge 80mm --tiles 7 --face-margin 4mm --obj --name t").success();
+    let target = Target::from_json(&std::fs::read_to_string(path.join("t.json")).unwrap()).unwrap();
+    let written = std::fs::read(path.join("t-texture.png")).unwrap();
+    let good = image::open(path.join("t-texture.png")).unwrap().into_luma8();
+    let obj = std::fs::read_to_string(path.join("t.obj")).unwrap();
+    let uv: Vec<[f64; 2]> = obj
+        .lines()
+        .filter_map(|line| line.strip_prefix("vt "))
+        .map(|line| {
+            let (u, v) = line.split_once(' ').unwrap();
+            [u.parse().unwrap(), v.parse().unwrap()]
+        })
+        .collect();
+    // Texels of the first face from millimetres of its panel: its lower edge is horizontal.
+    let (w, h) = (f64::from(good.width()), f64::from(good.height()));
+    let texels_per_mm = (uv[1][0] - uv[0][0]) * w / 80.0;
+    let panel = &target.panels[0];
+    let margin = 4.0;
+    let left = -1.5 * panel.edge_mm - 3f64.sqrt() * margin;
+    let lower = -0.75f64.sqrt() * panel.edge_mm - margin;
+    let texel = |[x, y]: [f64; 2]| {
+        let u = uv[0][0] * w + (x - left) * texels_per_mm;
+        let v = (1.0 - uv[0][1]) * h - (y - lower) * texels_per_mm;
+        [u as i64, v as i64]
+    };
+    let e = panel.edge_mm;
+    let tag = panel.tags[0];
+    let centre = |row: i32, col: i32, third: f64| {
+        let (row, col) = (f64::from(row) + third, f64::from(col) + third);
+        [(col + row / 2.0) * e, row * 0.75f64.sqrt() * e]
+    };
+    // Where, how wide (mm), and what is said of the changed square.
+    let cell = e / 9.5;
+    for (name, at, side, said) in [
+        ("cell", centre(tag.row, tag.col, 1.0 / 3.0), cell * 0.8, "tag 0 at row"),
+        ("tile", centre(-1, 0, 1.0 / 3.0), e, "in the tile at row"),
+        ("white", centre(0, 0, 2.0 / 3.0), e / 4.0, "in the tile at row"),
+        ("margin", [0.0, lower + 1.2], 1.0, "spot of"),
+    ] {
+        let mut changed = good.clone();
+        let [u, v] = texel(at);
+        let half = (side * texels_per_mm / 2.0) as i64;
+        for (x, y) in (v - half..=v + half).flat_map(|y| (u - half..=u + half).map(move |x| (x, y)))
+        {
+            let pixel = changed.get_pixel_mut(x as u32, y as u32);
+            pixel.0[0] = if name == "cell" || name == "tile" { 255 - pixel.0[0] } else { 0 };
+        }
+        changed.save(path.join("t-texture.png")).unwrap();
+        let result = deltille(path, "verify t.json t.obj").code(1);
+        let output = String::from_utf8_lossy(&result.get_output().stdout).into_owned();
+        assert!(output.contains("on board 0: ") && output.contains(said), "{name}: {output}");
+    }
+    std::fs::write(path.join("t-texture.png"), written).unwrap();
+    deltille(path, "verify t.json t.obj").success();
+}
+
+/// Bodies to print that are open, turned or of another size are refused.
+#[test]
+fn wrong_bodies_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    deltille(path, "icosahedron --stl --skeleton --name i").success();
+    let read = |name: &str| std::fs::read(path.join(name)).unwrap();
+    let numbers = |bytes: &mut Vec<u8>, change: &dyn Fn(usize, [f32; 3]) -> [f32; 3]| {
+        for at in (84..bytes.len()).step_by(50).flat_map(|t| (0..4).map(move |i| t + 12 * i)) {
+            let number =
+                |i: usize| f32::from_le_bytes(bytes[at + 4 * i..][..4].try_into().unwrap());
+            let vector = change((at - 84) % 50 / 12, [0, 1, 2].map(number));
+            bytes.splice(at..at + 12, vector.into_iter().flat_map(f32::to_le_bytes));
+        }
+    };
+    let bare = read("i.stl");
+    let mut open = bare[..bare.len() - 50].to_vec();
+    open[80] -= 1;
+    let mut mirrored = bare.clone();
+    numbers(&mut mirrored, &|_, [x, y, z]| [-x, y, z]);
+    let mut scaled = bare.clone();
+    numbers(&mut scaled, &|i, v| if i == 0 { v } else { v.map(|x| x * 1.01) });
+    let mut turned = bare.clone();
+    numbers(&mut turned, &|_, [x, y, z]| [-y, x, z]);
+    let mut thick = read("i-skeleton.stl");
+    numbers(&mut thick, &|i, v| if i == 0 { v } else { v.map(|x| x * 1.002) });
+    // A wall that is thinner deep inside, where no seat is felt.
+    let mut thin = read("i-skeleton.stl");
+    let far = |v: [f32; 3]| v.iter().map(|x| x * x).sum::<f32>().sqrt();
+    let nearest_mm = std::cell::Cell::new(f32::INFINITY);
+    numbers(&mut thin, &|i, v| {
+        nearest_mm.set(nearest_mm.get().min(if i > 0 { far(v) } else { f32::INFINITY }));
+        v
+    });
+    let is_deep = |v: [f32; 3]| far(v) < 1.001 * nearest_mm.get();
+    numbers(&mut thin, &|i, v| if i > 0 && is_deep(v) { v.map(|x| x * 1.02) } else { v });
+    for at in (84..thin.len()).step_by(50) {
+        let number = |i: usize| f32::from_le_bytes(thin[at + 4 * i..][..4].try_into().unwrap());
+        let [a, b, c] = [1, 2, 3].map(|k| glam::Vec3::from([0, 1, 2].map(|i| number(3 * k + i))));
+        let normal = (b - a).cross(c - a).normalize().to_array();
+        thin.splice(at..at + 12, normal.into_iter().flat_map(f32::to_le_bytes));
+    }
+    for (name, bytes, code, said) in [
+        ("open.stl", open, 1, "it is open"),
+        ("mirrored.stl", mirrored, 1, "inside out"),
+        ("scaled.stl", scaled, 1, "scale 1.0100"),
+        ("turned.stl", turned, 1, "is not there"),
+        ("cut.stl", bare[..300].to_vec(), 2, "not a binary STL"),
+        ("i-skeleton.stl", thick, 1, "below it instead of"),
+        ("i-skeleton.stl", thin, 1, "volume of"),
+    ] {
+        std::fs::write(path.join(name), bytes).unwrap();
+        let result = deltille(path, &format!("verify i.json {name}")).code(code);
+        let output = result.get_output();
+        let all = String::from_utf8_lossy(&[&output.stdout[..], &output.stderr[..]].concat())
+            .into_owned();
+        assert!(all.contains(said), "{name}: {all}");
+    }
+}
+
+/// Outlines to cut have the size of the faces, or of what the seats take.
+#[test]
+fn panels_to_cut_have_their_true_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    for (options, name, edge_mm) in [("", "whole", 150.0), ("--skeleton", "seats", f64::NAN)] {
+        deltille(path, &format!("icosahedron --dxf --name {name} {options}")).success();
+        let text = std::fs::read_to_string(path.join(format!("{name}-panels.dxf"))).unwrap();
+        let outlines = closed_polylines(&text, "CUT");
+        assert_eq!(outlines.len(), 20);
+        for outline in &outlines {
+            assert_eq!(outline.len(), 3);
+            let sides: Vec<f64> = (0..3)
+                .map(|i| {
+                    let (a, b) = (outline[i], outline[(i + 1) % 3]);
+                    (a[0] - b[0]).hypot(a[1] - b[1])
+                })
+                .collect();
+            // Ribs of icosahedra: 3 mm below, faces meet at 138.19°; 0.8 mm of foot, 0.15 of play.
+            let inset = 3.0 / (138.1897f64 / 2.0).to_radians().tan() + 0.8 + 0.15;
+            let stated = if edge_mm.is_nan() { 150.0 - 12f64.sqrt() * inset } else { edge_mm };
+            assert!(sides.iter().all(|side| (side - stated).abs() < 1e-4), "{sides:?} {stated}");
+        }
+        assert!(closed_polylines(&text, "ENGRAVE").len() >= 80);
+    }
+}
+
+/// The sheets of single faces are cut to what the seats take, by default with room around the tiles.
+#[test]
+fn single_faces_are_cut_to_the_seats_of_the_skeleton() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    deltille(path, "tetrahedron --skeleton --per-face --svg --dxf").success();
+    let json = std::fs::read_to_string(path.join("tetrahedron.json")).unwrap();
+    let sheet = &Target::from_json(&json).unwrap().sheets[0];
+    // Two marks at each vertex; the lines through those along an edge make the outline.
+    let cuts: Vec<_> = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut).collect();
+    let length = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let between = length(cuts[0].from_mm, cuts[1].from_mm);
+    let text = std::fs::read_to_string(path.join("tetrahedron-panels.dxf")).unwrap();
+    let outline = &closed_polylines(&text, "CUT")[0];
+    let edge = length(outline[0], outline[1]);
+    // Marks begin 3 mm beyond the vertices.
+    assert!((between - edge - 6.0).abs() < 1e-4, "{between} {edge}");
+    assert!(sheet.texts.iter().any(|text| text.text == "edge 0 · face 3"));
+}
+
+/// The net is one outline around all faces and tabs, with a line to fold for each edge between two
+/// faces and for each tab.
+#[test]
+fn the_net_to_cut_holds_all_faces_and_tabs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    for (options, name, printed) in [("", "bare", false), ("--paper A4 --svg", "tiled", true)] {
+        let args = "icosahedron --edge 60mm --tiles 7 --face-margin 4mm --dxf --no-verify";
+        deltille(path, &format!("{args} --name {name} {options}")).success();
+        assert_eq!(path.join(format!("{name}-2.svg")).exists(), printed);
+        let text = std::fs::read_to_string(path.join(format!("{name}-net.dxf"))).unwrap();
+        let outlines = closed_polylines(&text, "CUT");
+        assert_eq!(outlines.len(), 1);
+        let outline = &outlines[0];
+        let next = |i: usize| outline[(i + 1) % outline.len()];
+        let twice: f64 =
+            outline.iter().enumerate().map(|(i, a)| a[0] * next(i)[1] - a[1] * next(i)[0]).sum();
+        let faces_mm2 = 20.0 * 60.0 * 60.0 * 0.75f64.sqrt() / 2.0;
+        let tab_mm2 = (twice / 2.0 - faces_mm2) / 11.0;
+        assert!((60.0..900.0).contains(&tab_mm2), "{tab_mm2}");
+        // 19 edges join faces, the other 11 have tabs.
+        let folds = text.matches("LINE\n  8\nFOLD\n").count();
+        assert_eq!(folds, 19 + 11);
+        let texts = closed_polylines(&text, "ENGRAVE").len();
+        assert!((100..600).contains(&texts), "{texts}");
+    }
+    deltille(path, "tetrahedron --dxf --per-face --pdf --no-verify").success();
+    assert!(path.join("tetrahedron-panels.dxf").exists());
+    assert!(!path.join("tetrahedron-net.dxf").exists());
+}
+
+/// The closed polylines of a layer of a DXF of release 12.
+fn closed_polylines(text: &str, layer: &str) -> Vec<Vec<[f64; 2]>> {
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let (mut outlines, mut entity, mut on_layer) = (Vec::<Vec<[f64; 2]>>::new(), "", false);
+    for group in lines.chunks_exact(2) {
+        match (group[0], group[1]) {
+            ("0", name) => entity = name,
+            ("8", name) => on_layer = name == layer,
+            ("70", "1") if entity == "POLYLINE" && on_layer => outlines.push(Vec::new()),
+            ("10", x) if entity == "VERTEX" && on_layer => {
+                outlines.last_mut().unwrap().push([x.parse().unwrap(), 0.0]);
+            }
+            ("20", y) if entity == "VERTEX" && on_layer => {
+                outlines.last_mut().unwrap().last_mut().unwrap()[1] = y.parse().unwrap();
+            }
+            _ => {}
+        }
+    }
+    outlines
+}
+
+#[test]
+fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, said) in [
+        ("dodecahedron", "unrecognized subcommand"),
+        ("icosahedron --edge 20mm", "an --edge of at least 28 mm"),
+        ("icosahedron --edge NaN", "--edge"),
+        ("icosahedron --edge -150mm", "--edge"),
+        ("icosahedron --tiles 3", "--tiles"),
+        ("icosahedron --face-margin -1mm", "--face-margin"),
+        ("icosahedron --first-id 300", "at most 223"),
+        ("icosahedron --texture-dpi 100", "--texture-dpi"),
+        ("icosahedron --texture-dpi 9000", "lower --texture-dpi"),
+        ("icosahedron --pdf --per-face --edge 3m", "even A0"),
+        ("icosahedron --pdf --per-face --paper A5", "an --edge of at most "),
+        ("icosahedron -o /proc/nowhere", "-o: cannot write"),
+        ("icosahedron --skeleton --rib 1mm", "--rib: 1 mm leaves no foot"),
+        ("icosahedron --skeleton --panel-thickness 12mm --face-margin 5mm", "--face-margin"),
+        ("icosahedron --stl --paper A4", "--paper: it says nothing without"),
+        ("icosahedron --stl --texture-dpi 300", "--texture-dpi: it says nothing without"),
+        (
+            "tetrahedron --skeleton --edge 60mm --tiles 6 --face-margin 6mm --wall 6mm",
+            "a larger --edge",
+        ),
+        ("icosahedron --wall 4mm", "--skeleton"),
+        ("icosahedron --family delTag16h5", "take --family delTag25h7"),
+        ("solid", "--mesh"),
+    ] {
+        let stderr = refused(folder.path(), args);
+        assert!(stderr.contains(said), "{args}: {stderr}");
+    }
+    assert!(names(folder.path()).is_empty());
+    // A file that cannot be replaced keeps the others from being written.
+    std::fs::create_dir(folder.path().join("octahedron.stl")).unwrap();
+    deltille(folder.path(), "octahedron --stl").code(2).stderr(contains("octahedron.stl"));
+    assert_eq!(names(folder.path()), ["octahedron.stl"]);
+}

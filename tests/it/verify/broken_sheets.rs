@@ -1,0 +1,382 @@
+//! Sheets broken on purpose: each must fail verification, and for the right reason.
+
+use std::path::PathBuf;
+
+use deltille::artwork::{self, Artwork, Paint, Part, Shape, Sheet};
+use deltille::export::{pdf, png, svg};
+use deltille::family::Family;
+use deltille::lattice::Vertex;
+use deltille::targets::{BoardSpec, GridKind, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
+use deltille::verify::{Finding, Verdict, Verifier};
+use kurbo::{Affine, BezPath, Point};
+use tempfile::TempDir;
+
+/// Resolution of the PNG files, dpi.
+const DPI: f64 = 300.0;
+
+struct Board {
+    target: Target,
+    family: Family,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Format {
+    Pdf,
+    Svg,
+    Png,
+}
+
+const ALL: [Format; 3] = [Format::Pdf, Format::Svg, Format::Png];
+
+fn spec() -> BoardSpec {
+    let tags = Some(TagSpec { first_id: 17, ..TagSpec::default() });
+    BoardSpec { board_id: 3, tags, ..BoardSpec::new(GridKind::Deltille, 5, 7, 20.0) }
+}
+
+/// A checkerboard with tags from id 17.
+fn squares(tags_in: TagsIn) -> BoardSpec {
+    let tags = TagSpec { first_id: 17, ..TagSpec::for_squares(tags_in) };
+    BoardSpec { grid: GridKind::Checker, tags: Some(tags), ..spec() }
+}
+
+/// A board of every kind.
+fn all_specs() -> [BoardSpec; 3] {
+    [spec(), squares(TagsIn::Black), squares(TagsIn::White)]
+}
+
+fn board(spec: BoardSpec) -> Board {
+    let family = spec.tags.as_ref().map_or("delTag25h7", |tags| &tags.family);
+    let family = Family::shipped(family).unwrap();
+    let spec = TargetSpec::Board(spec);
+    let target = Target::build("b", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();
+    Board { target, family }
+}
+
+impl Board {
+    fn artwork(&self) -> Artwork {
+        artwork::draw(&self.target, Some(&self.family)).unwrap()
+    }
+
+    fn verify(&self, artwork: &Artwork, format: Format) -> Verdict {
+        let folder = TempDir::new().unwrap();
+        let path = |extension: &str| -> PathBuf { folder.path().join(format!("b.{extension}")) };
+        let path = match format {
+            Format::Pdf => {
+                pdf::write(artwork, &path("pdf")).unwrap();
+                path("pdf")
+            }
+            Format::Svg => {
+                svg::write(artwork, 0, &path("svg")).unwrap();
+                path("svg")
+            }
+            Format::Png => {
+                png::write(&artwork.sheets[0], "b", &path("png"), DPI).unwrap();
+                path("png")
+            }
+        };
+        Verifier::new(&self.target, Some(&self.family)).unwrap().verify(&path).unwrap()
+    }
+
+    /// The first tag's tile.
+    fn tag(&self, index: usize) -> (i32, i32) {
+        let tag = self.target.panels[0].tags[index];
+        (tag.row, tag.col)
+    }
+}
+
+/// The shape of a tile.
+fn tile(artwork: &mut Artwork, (row, col): (i32, i32)) -> &mut Shape {
+    let is_it = |shape: &&mut Shape| matches!(shape.part, Part::Tile { row: r, col: c, .. } if (r, c) == (row, col));
+    artwork.sheets[0].shapes.iter_mut().find(is_it).expect("the tile is drawn")
+}
+
+/// Exchanges black and white in one cell: with the even-odd rule a loop more toggles its inside.
+fn flip(board: &Board, artwork: &mut Artwork, at: (i32, i32), bit: u32) {
+    let (panel, placement) = (&board.target.panels[0], board.target.sheets[0].placements[0]);
+    assert_eq!(placement.angle_rad, 0.0);
+    let [a, b, c] = panel.kind.tag_tile(Vertex::new(at.0, at.1)).frame().map(|v| {
+        let [x, y] = placement.page_from_panel(panel.lattice_mm(v));
+        Point::new(x, y)
+    });
+    let corners = board.family.cells().corners(bit, panel.tag_inset_bits());
+    let mut path = BezPath::new();
+    for (i, [u, v]) in corners.into_iter().enumerate() {
+        let point = a + (b - a) * u + (c - a) * v;
+        if i == 0 { path.move_to(point) } else { path.line_to(point) }
+    }
+    path.close_path();
+    tile(artwork, at).path.extend(path);
+}
+
+fn transform(artwork: &mut Artwork, affine: impl Fn(&Sheet) -> Affine) {
+    for sheet in &mut artwork.sheets {
+        let affine = affine(sheet);
+        sheet.shapes.iter_mut().for_each(|shape| shape.path = affine * &shape.path);
+    }
+}
+
+fn about_centre(sheet: &Sheet, affine: Affine) -> Affine {
+    let centre = (sheet.width_mm / 2.0, sheet.height_mm / 2.0);
+    Affine::translate(centre) * affine * Affine::translate((-centre.0, -centre.1))
+}
+
+#[track_caller]
+fn assert_fails(verdict: &Verdict, reasons: &[&str]) {
+    let line = verdict.to_string();
+    assert!(!verdict.passed && line.contains("FAILED"), "{line}");
+    let all = verdict.findings.iter().chain(verdict.sheets.iter().flat_map(|s| &s.findings));
+    let all: Vec<String> = all.map(Finding::to_string).collect();
+    for reason in reasons {
+        assert!(all.iter().any(|finding| finding.contains(reason)), "no {reason:?} in {all:#?}");
+    }
+}
+
+#[test]
+fn whole_sheets_pass_in_every_format() {
+    for spec in all_specs() {
+        for (tagged, inverted) in [(true, false), (false, false), (true, true), (false, true)] {
+            let tags = spec.tags.clone().filter(|_| tagged);
+            let spec = BoardSpec { tags, inverted, ..spec.clone() };
+            let board = board(spec.clone());
+            for format in ALL {
+                let verdict = board.verify(&board.artwork(), format);
+                assert!(verdict.passed, "{spec:?}: {verdict}");
+                let sheet = &verdict.sheets[0];
+                assert_eq!((sheet.corners_found, sheet.corners), (35, 35));
+                assert_eq!(sheet.tags_exact, board.target.panels[0].tags.len());
+                assert!(sheet.max_deviation_mm < 0.006, "{spec:?}: {verdict}");
+            }
+        }
+    }
+}
+
+#[test]
+fn swapped_tags_are_named() {
+    for board in all_specs().map(board) {
+        let mut swapped = board.target.clone();
+        let tags = &mut swapped.panels[0].tags;
+        (tags[0].id, tags[1].id) = (tags[1].id, tags[0].id);
+        let artwork = artwork::draw(&swapped, Some(&board.family)).unwrap();
+        let (row, col) = board.tag(0);
+        let reason = format!("tag 17 at row {row} col {col} reads 18");
+        for format in ALL {
+            assert_fails(&board.verify(&artwork, format), &[&reason, "reads 17"]);
+        }
+    }
+}
+
+#[test]
+fn a_flipped_cell_is_found_although_decoding_would_correct_it() {
+    for board in all_specs().map(board) {
+        let at = board.tag(1);
+        for bit in [0, 12, 24] {
+            let mut artwork = board.artwork();
+            flip(&board, &mut artwork, at, bit);
+            for format in ALL {
+                let reason = format!("tag 18 at row {} col {} damaged: 1 bit differs", at.0, at.1);
+                assert_fails(&board.verify(&artwork, format), &[&reason]);
+            }
+        }
+    }
+}
+
+#[test]
+fn cells_flipped_beyond_correction_make_a_tag_unreadable() {
+    let board = board(spec());
+    let at = board.tag(0);
+    let mut artwork = board.artwork();
+    (4..8).for_each(|bit| flip(&board, &mut artwork, at, bit));
+    assert_fails(&board.verify(&artwork, Format::Pdf), &["tag 17", "unreadable: 4 bits differ"]);
+}
+
+#[test]
+fn a_scale_is_named_with_its_value() {
+    let board = board(spec());
+    for (scale, reason) in [(0.99, "scale 0.9900"), (1.0005, "scale 1.0005")] {
+        let mut artwork = board.artwork();
+        transform(&mut artwork, |sheet| about_centre(sheet, Affine::scale(scale)));
+        for format in ALL {
+            let verdict = board.verify(&artwork, format);
+            assert_fails(&verdict, &[reason, "check bar 1 measures", "check bar 2 measures"]);
+            let findings = &verdict.sheets[0].findings;
+            assert_eq!(findings.len(), 3, "one cause, not its consequences: {findings:?}");
+        }
+    }
+}
+
+#[test]
+fn stretching_turning_and_shifting_are_told_apart() {
+    let board = board(spec());
+    let changes = [
+        (Affine::scale_non_uniform(1.0, 0.998), "stretched: scale 1.0000 along x, 0.9980 along y"),
+        (Affine::rotate(0.002), "turned by 0.115°"),
+        (Affine::translate((0.0, 0.3)), "shifted by (0.000, 0.300) mm"),
+    ];
+    for (change, reason) in changes {
+        let mut artwork = board.artwork();
+        transform(&mut artwork, |sheet| about_centre(sheet, change));
+        assert_fails(&board.verify(&artwork, Format::Pdf), &[reason]);
+    }
+}
+
+#[test]
+fn a_mirrored_page_is_named() {
+    for tags in [spec().tags, None] {
+        let board = board(BoardSpec { tags, rows: 4, ..spec() });
+        let mut artwork = board.artwork();
+        let mirror = Affine::scale_non_uniform(-1.0, 1.0);
+        transform(&mut artwork, |sheet| about_centre(sheet, mirror));
+        for format in ALL {
+            assert_fails(&board.verify(&artwork, format), &["board 3 is mirrored"]);
+        }
+    }
+}
+
+#[test]
+fn a_deleted_tile_is_named() {
+    let plain = all_specs().map(|spec| BoardSpec { tags: None, ..spec });
+    for board in all_specs().into_iter().chain(plain).map(board) {
+        let mut artwork = board.artwork();
+        let path = &mut tile(&mut artwork, (1, 3)).path;
+        *path = BezPath::new();
+        artwork.sheets[0].shapes.retain(|shape| !shape.path.is_empty());
+        for format in ALL {
+            let verdict = board.verify(&artwork, format);
+            assert_fails(&verdict, &["tile missing at row 1 col 3", "at row 1 col 3 not found"]);
+        }
+    }
+}
+
+#[test]
+fn a_short_check_bar_is_measured() {
+    let board = board(spec());
+    let mut short = board.target.clone();
+    short.sheets[0].check_bars[0].to_mm[0] -= 0.1;
+    let artwork = artwork::draw(&short, Some(&board.family)).unwrap();
+    let bar = &board.target.sheets[0].check_bars[0];
+    let length = bar.to_mm[0] - bar.from_mm[0];
+    for format in ALL {
+        let verdict = board.verify(&artwork, format);
+        assert_fails(&verdict, &["check bar 1 measures"]);
+        assert_eq!(verdict.sheets[0].findings.len(), 1);
+        let (stated, found) = verdict.sheets[0].check_bars_mm[0];
+        assert!((stated - length).abs() < 1e-9);
+        let off = found.unwrap() - (length - 0.1);
+        // The renderers draw either end to within a 32nd of a pixel.
+        assert!(off.abs() < 2.0 / 32.0 * 25.4 / DPI, "{off}: {verdict}");
+    }
+    let mut none = board.artwork();
+    none.sheets[0].shapes.retain(|shape| shape.part != (Part::CheckBar { index: 1 }));
+    assert_fails(&board.verify(&none, Format::Pdf), &["check bar 2 not found"]);
+}
+
+#[test]
+fn another_page_size_or_number_is_named() {
+    let board = board(spec());
+    let mut artwork = board.artwork();
+    artwork.sheets[0].width_mm += 0.2;
+    for format in ALL {
+        assert_fails(&board.verify(&artwork, format), &["page of "]);
+    }
+    let mut artwork = board.artwork();
+    artwork.sheets.push(artwork.sheets[0].clone());
+    assert_fails(&board.verify(&artwork, Format::Pdf), &["2 pages instead of 1"]);
+}
+
+#[test]
+fn dirt_and_holes_in_tiles_are_found() {
+    let board = board(spec());
+    let mut artwork = board.artwork();
+    // A hairline of 0.1 mm across a black tile, as a seam between two halves would show.
+    let shape = tile(&mut artwork, (1, 3));
+    let bounds = kurbo::Shape::bounding_box(&shape.path);
+    let (x, y) = bounds.center().into();
+    let seam = kurbo::Rect::new(x - 4.0, y - 0.05, x + 4.0, y + 0.05);
+    shape.path.extend(kurbo::Shape::path_elements(&seam, 0.1));
+    // A spot of half a millimetre in the white tile beside it.
+    let spot = kurbo::Rect::new(bounds.x1 - 0.25, y - 0.25, bounds.x1 + 0.25, y + 0.25);
+    let path = kurbo::Shape::to_path(&spot, 0.1);
+    artwork.sheets[0].shapes.push(Shape {
+        part: Part::Label { index: 9 },
+        paint: Paint::Fill,
+        path,
+    });
+    for format in ALL {
+        let verdict = board.verify(&artwork, format);
+        let spots = &verdict.sheets[0].findings;
+        let spots = spots.iter().filter(|finding| matches!(finding, Finding::Blemish { .. }));
+        assert_eq!(spots.count(), 2, "{verdict}");
+    }
+}
+
+#[test]
+fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
+    let board = board(spec());
+    let mut altered = board.target.clone();
+    let label = &mut altered.sheets[0].texts[0].text;
+    *label = label.replace("edge 20 mm", "edge 21 mm");
+    let altered = artwork::draw(&altered, Some(&board.family)).unwrap();
+    let mut erased = board.artwork();
+    erased.sheets[0].shapes.retain(|shape| shape.part != (Part::Label { index: 1 }));
+    let mut blot = board.artwork();
+    let [left, lower] = board.target.sheets[0].placements[0].origin_mm;
+    let at = kurbo::Circle::new((left, lower - 2.5), 0.5);
+    let path = kurbo::Shape::to_path(&at, 0.001);
+    blot.sheets[0].shapes.push(Shape { part: Part::Label { index: 9 }, paint: Paint::Fill, path });
+    let cases = [
+        (altered, "label 1 differs from the description"),
+        (erased, "label 2 differs from the description"),
+        (blot, "spot of 0."),
+    ];
+    for (artwork, reason) in cases {
+        for format in ALL {
+            let verdict = board.verify(&artwork, format);
+            assert_fails(&verdict, &[reason]);
+            assert_eq!(verdict.sheets[0].findings.len(), 1, "{verdict}");
+        }
+    }
+}
+
+/// Verifies a picture of the sheet whose grey values were changed.
+fn verify_toned(board: &Board, tone: impl Fn(u8) -> u8) -> Verdict {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("b.png");
+    png::write(&board.artwork().sheets[0], "b", &path, DPI).unwrap();
+    let decoder = ::png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    let info = reader.info().clone();
+    pixels.iter_mut().for_each(|pixel| *pixel = tone(*pixel));
+    let mut encoder =
+        ::png::Encoder::new(std::fs::File::create(&path).unwrap(), info.width, info.height);
+    encoder.set_color(info.color_type);
+    encoder.set_depth(info.bit_depth);
+    encoder.set_pixel_dims(info.pixel_dims);
+    encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
+    Verifier::new(&board.target, Some(&board.family)).unwrap().verify(&path).unwrap()
+}
+
+#[test]
+fn wrong_tones_and_other_boards_are_called_that() {
+    let whole = board(spec());
+    assert_fails(&verify_toned(&whole, |v| 255 - v), &["inverted (black and white exchanged)"]);
+    assert_fails(&verify_toned(&whole, |v| 170 + v / 3), &["contrast of board 3 too low"]);
+    let other = board(BoardSpec { rows: 4, cols: 5, ..spec() });
+    let verdict = whole.verify(&other.artwork(), Format::Png);
+    assert_fails(&verdict, &["shows another board: 20 corners instead of 35"]);
+    assert!(verdict.to_string().contains("another board"), "{verdict}");
+}
+
+#[test]
+fn a_bar_much_shorter_than_stated_is_measured() {
+    let mut board = board(spec());
+    let artwork = board.artwork();
+    let bar = &mut board.target.sheets[0].check_bars[0];
+    let printed = bar.length_mm();
+    bar.to_mm[0] += 10.0;
+    let verdict = board.verify(&artwork, Format::Png);
+    assert_fails(&verdict, &["check bar 1 measures"]);
+    let (_, found) = verdict.sheets[0].check_bars_mm[0];
+    assert!((found.unwrap() - printed).abs() < 0.02, "{verdict}");
+}

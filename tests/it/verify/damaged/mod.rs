@@ -1,0 +1,250 @@
+//! A corpus of damaged artifacts: each differs from one that passes by a single cause, must fail,
+//! and must be told by that cause.
+//!
+//! Most of the damage does not show in the picture that the verifier draws: it is what other
+//! viewers would show otherwise. A table for each format has a line for each cause.
+
+mod edit;
+mod glb;
+mod lists;
+mod obj;
+mod pdf;
+mod png;
+mod stl;
+mod svg;
+
+use std::fs;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use deltille::artwork;
+use deltille::export::dsc::{self, Dialect};
+use deltille::export::mesh::TexturedMesh;
+use deltille::export::{dxf, gltf, obj as obj_writer, pdf as pdf_writer, png as png_writer};
+use deltille::export::{stl as stl_writer, svg as svg_writer};
+use deltille::family::Family;
+use deltille::targets::{
+    BoardSpec, GridKind, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec,
+};
+use deltille::verify::{Format, Verdict, Verifier};
+use tempfile::TempDir;
+
+/// Least number of damaged files.
+const LEAST: usize = 440;
+
+/// One way of damaging a file.
+struct Case {
+    /// What is done to it.
+    name: &'static str,
+    /// The file that is damaged.
+    file: &'static str,
+    /// Words of the finding that names the cause.
+    named: &'static str,
+    damage: Damage,
+}
+
+/// Makes a damaged file of a good one.
+type Damage = Box<dyn Fn(&[u8]) -> Vec<u8>>;
+
+/// A line of a table: what is done, what is said of it, and how it is done.
+type Row = (&'static str, &'static str, Damage);
+
+/// The cases of a table, all for one file.
+fn cases(file: &'static str, rows: Vec<Row>) -> Vec<Case> {
+    let case = |(name, named, damage)| Case { name, file, named, damage };
+    rows.into_iter().map(case).collect()
+}
+
+/// A target with its files in a folder.
+struct Artifacts {
+    target: Target,
+    family: Family,
+    folder: TempDir,
+}
+
+/// A small board as `b.pdf`, `.svg`, `.png`, `.dsc`.
+static BOARD: LazyLock<Artifacts> = LazyLock::new(|| {
+    let spec = TargetSpec::Board(BoardSpec::new(GridKind::Deltille, 4, 5, 20.0));
+    let artifacts = Artifacts::new("b", &spec);
+    artifacts.draw();
+    artifacts
+});
+
+/// A small tetrahedron in all formats; its net is on one page.
+static SOLID: LazyLock<Artifacts> = LazyLock::new(|| {
+    let spec = SolidSpec {
+        edge_mm: 60.0,
+        tiles: 7,
+        margin_mm: 4.0,
+        ..SolidSpec::new(SolidShape::Tetrahedron)
+    };
+    let artifacts = Artifacts::new("t", &TargetSpec::Solid(spec.clone()));
+    artifacts.draw();
+    let (target, write) =
+        (&artifacts.target, |name: &str, bytes: &[u8]| artifacts.write(name, bytes));
+    let mesh = TexturedMesh::new(target, Some(&artifacts.family), None).unwrap();
+    write("t.glb", &gltf::to_bytes(&mesh));
+    write("t.obj", obj_writer::text(&mesh).as_bytes());
+    write("t.mtl", obj_writer::material(&mesh).as_bytes());
+    write("t-texture.png", &mesh.texture_png);
+    write("t.stl", &stl_writer::to_bytes("t", &spec.polyhedron().triangles_mm()));
+    write("t-panels.dxf", dxf::text(&artwork::panels_to_cut(target).unwrap()).as_bytes());
+    write("t-net.dxf", dxf::text(&artwork::net_to_cut(target).unwrap()).as_bytes());
+    artifacts
+});
+
+impl Artifacts {
+    fn new(name: &str, spec: &TargetSpec) -> Self {
+        let family = Family::shipped("delTag25h7").unwrap();
+        let paper = PaperSpec::default();
+        let target = Target::build(name, spec, Some(&family), Some(&paper)).unwrap();
+        Self { target, family, folder: TempDir::new().unwrap() }
+    }
+
+    fn write(&self, name: &str, bytes: &[u8]) {
+        fs::write(self.folder.path().join(name), bytes).unwrap();
+    }
+
+    /// Writes the formats that all targets have.
+    fn draw(&self) {
+        let artwork = artwork::draw(&self.target, Some(&self.family)).unwrap();
+        let path = |extension| self.folder.path().join(format!("{}.{extension}", self.target.name));
+        pdf_writer::write(&artwork, &path("pdf")).unwrap();
+        svg_writer::write(&artwork, 0, &path("svg")).unwrap();
+        png_writer::write(&artwork.sheets[0], &artwork.title, &path("png"), 300.0).unwrap();
+        let list = dsc::write(&self.target, Dialect::Fork).unwrap();
+        fs::write(path("dsc"), list).unwrap();
+    }
+
+    fn verify(&self, path: &Path) -> Result<Verdict, String> {
+        let verifier = Verifier::new(&self.target, Some(&self.family)).unwrap();
+        verifier.verify(path).map_err(|error| error.to_string())
+    }
+
+    /// What is said of a damaged file; `None` if it passes.
+    fn damaged(&self, case: &Case) -> Option<String> {
+        let good = fs::read(self.folder.path().join(case.file)).unwrap();
+        let bad = (case.damage)(&good);
+        assert!(bad != good, "{}, {}: nothing is damaged", case.file, case.name);
+        let folder = TempDir::new().unwrap();
+        // A material library and a texture are verified with their mesh.
+        for name in ["t.obj", "t.mtl", "t-texture.png"] {
+            let _ = fs::copy(self.folder.path().join(name), folder.path().join(name));
+        }
+        fs::write(folder.path().join(case.file), bad).unwrap();
+        let verified = match case.file {
+            "t.mtl" | "t-texture.png" => "t.obj",
+            file => file,
+        };
+        match self.verify(&folder.path().join(verified)) {
+            Ok(verdict) if verdict.passed => None,
+            Ok(verdict) => Some(all_findings(&verdict)),
+            Err(error) => Some(error),
+        }
+    }
+
+    fn assert_all_fail(&self, cases: &[Case]) {
+        let mut wrong = Vec::new();
+        for case in cases {
+            let Case { name, file, named, .. } = case;
+            match self.damaged(case) {
+                None => wrong.push(format!("{file}, {name}: passes")),
+                Some(said) if !said.contains(named) => {
+                    wrong.push(format!("{file}, {name}: `{named}` is not in `{said}`"));
+                }
+                Some(_) => {}
+            }
+        }
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+}
+
+/// Everything found, not only what is told on one line.
+fn all_findings(verdict: &Verdict) -> String {
+    let sheets = verdict.sheets.iter().flat_map(|sheet| &sheet.findings);
+    let faces = verdict.faces.iter().flat_map(|face| &face.findings);
+    let all = verdict.findings.iter().chain(sheets).chain(faces).map(ToString::to_string);
+    all.collect::<Vec<_>>().join("; ")
+}
+
+#[test]
+fn undamaged_artifacts_pass() {
+    for (artifacts, least) in [(&*BOARD, 4), (&*SOLID, 9)] {
+        let mut passed = 0;
+        for entry in fs::read_dir(artifacts.folder.path()).unwrap() {
+            let path = entry.unwrap().path();
+            if Format::of(&path).is_none() || path.ends_with("t-texture.png") {
+                continue;
+            }
+            let verdict = artifacts.verify(&path).unwrap();
+            assert!(verdict.passed, "{verdict}");
+            passed += 1;
+        }
+        assert_eq!(passed, least);
+    }
+}
+
+#[test]
+fn the_corpus_is_large_and_its_names_are_unique() {
+    let board = [svg::board(), pdf::board(), png::board(), lists::dsc()];
+    let solid = [
+        svg::net(),
+        glb::all(),
+        obj::mesh(),
+        obj::material(),
+        obj::texture(),
+        stl::all(),
+        lists::net(),
+        lists::panels(),
+    ];
+    let all: Vec<Case> = board.into_iter().chain(solid).flatten().collect();
+    assert!(all.len() >= LEAST, "{} cases", all.len());
+    let mut names: Vec<_> = all.iter().map(|case| (case.file, case.name)).collect();
+    names.sort_unstable();
+    let twice = names.windows(2).find(|pair| pair[0] == pair[1]);
+    assert_eq!(twice, None);
+}
+
+#[test]
+fn damaged_svg_fails() {
+    BOARD.assert_all_fail(&svg::board());
+    SOLID.assert_all_fail(&svg::net());
+}
+
+#[test]
+fn damaged_pdf_fails() {
+    BOARD.assert_all_fail(&pdf::board());
+}
+
+#[test]
+fn damaged_png_fails() {
+    BOARD.assert_all_fail(&png::board());
+}
+
+#[test]
+fn damaged_glb_fails() {
+    SOLID.assert_all_fail(&glb::all());
+}
+
+#[test]
+fn damaged_obj_fails() {
+    SOLID.assert_all_fail(&obj::mesh());
+    SOLID.assert_all_fail(&obj::material());
+    SOLID.assert_all_fail(&obj::texture());
+}
+
+#[test]
+fn damaged_stl_fails() {
+    SOLID.assert_all_fail(&stl::all());
+}
+
+#[test]
+fn damaged_dsc_fails() {
+    BOARD.assert_all_fail(&lists::dsc());
+}
+
+#[test]
+fn damaged_dxf_fails() {
+    SOLID.assert_all_fail(&lists::net());
+    SOLID.assert_all_fail(&lists::panels());
+}

@@ -1,0 +1,3 @@
+mod broken_sheets;
+mod commands;
+mod damaged;
