@@ -95,7 +95,7 @@ fn detect(
     let found = images.par_iter().map(|path| {
         let name = path.as_ref().file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let image = photograph::read(path.as_ref())?;
-        Ok((name.clone(), detector.detect_any(&image, &name)))
+        Ok((name.clone(), detector.detect(&image, &name)))
     });
     let found = found.collect::<Result<Vec<_>, ImageError>>()?;
     Ok(views(&found, &reference())?.views)

@@ -56,7 +56,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             if interrupt::is_raised() {
                 return Err(Interrupted("nothing was timed to the end".to_owned()).into());
             }
-            let found = detector.detect_any(&image, "");
+            let found = detector.detect(&image, "");
             corners += found.grids.iter().map(|grid| grid.corners.len()).sum::<usize>();
             let sum = |laps: &BTreeMap<String, f64>| laps.values().sum::<f64>();
             if best.as_ref().is_none_or(|best| sum(&found.timing_ms) < sum(best)) {

@@ -340,7 +340,7 @@ fn one_image(
     let Photograph { image, notes } =
         photograph::read_with_notes(path, &limits, args.accept_damaged)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let found = Detection { file: notes, ..detector.detect_any(&image, &name) };
+    let found = Detection { file: notes, ..detector.detect(&image, &name) };
     if let Some(folder) = args.folder() {
         let save = |extension: &str, content: &[u8]| {
             let path = folder.join(format!("{stem}.{extension}"));

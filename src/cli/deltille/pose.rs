@@ -62,7 +62,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let image = image?;
         all += 1;
         let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let found = detector.detect_any(&photograph::read_within(&image, &limits)?, &name);
+        let found = detector.detect(&photograph::read_within(&image, &limits)?, &name);
         let mut shown = views(&[(name, found)], &reference)?.views;
         sightings::put_on(&sheet, Some(&target), &mut shown)?;
         let (loss, weights) = (Loss::default(), Weights::default());

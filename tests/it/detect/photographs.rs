@@ -59,7 +59,7 @@ fn all_corners_of_a_photograph_of_either_tiling() {
         let path =
             Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/photographs/{name}.png"));
         let detector = Detector::for_grid(kind, Some(size), DetectorConfig::default());
-        let detection = detector.detect_any(&photograph::read(&path).unwrap(), name);
+        let detection = detector.detect(&photograph::read(&path).unwrap(), name);
         let [grid] = &detection.grids[..] else {
             panic!("{name}: {} grids", detection.grids.len())
         };
@@ -78,7 +78,7 @@ fn all_110_corners_of_the_robot_hand_photographs() {
         Detector::for_grid(GridKind::Deltille, Some((10, 11)), DetectorConfig::default());
     let mut complete = 0;
     for path in &images {
-        let detection = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+        let detection = detector.detect(&photograph::read(path).unwrap(), "photograph");
         assert!(detection.grids.len() <= 1, "a false grid in {}", path.display());
         let Some(grid) = detection.grids.first() else { continue };
         assert!(topology_is_consistent(grid), "wrong topology in {}", path.display());
@@ -97,8 +97,7 @@ fn all_110_corners_of_the_robot_hand_photographs() {
 fn all_pictures_of_one_print_have_the_same_ink() {
     let images = images("robot-hand");
     let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
-    let ink =
-        |path: &PathBuf| detector.detect_any(&photograph::read(path).unwrap(), "photograph").ink;
+    let ink = |path: &PathBuf| detector.detect(&photograph::read(path).unwrap(), "photograph").ink;
     let inks: Vec<InkEstimate> = images.iter().step_by(3).filter_map(ink).collect();
     let all = InkEstimate::of_all(&inks).unwrap();
     println!("{all}, from {} of {} pictures", all.pictures, images.len().div_ceil(3));
@@ -115,7 +114,7 @@ fn checkerboards_and_lamps_are_no_deltille_grids() {
     let images = images("fisheye");
     let detector = Detector::for_grid(GridKind::Deltille, None, DetectorConfig::default());
     for path in images.iter().step_by(4) {
-        let detection = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+        let detection = detector.detect(&photograph::read(path).unwrap(), "photograph");
         assert!(detection.grids.is_empty(), "a false grid in {}", path.display());
     }
 }
@@ -150,7 +149,7 @@ fn corners_of_the_fisheye_photographs() {
     let detector = Detector::for_grid(GridKind::Checker, Some((8, 11)), DetectorConfig::default());
     let mut found = 0;
     for path in &images {
-        let detection = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+        let detection = detector.detect(&photograph::read(path).unwrap(), "photograph");
         assert_eq!(detection.grids.len(), 1, "a false grid in {}", path.display());
         let grid = &detection.grids[0];
         assert!(squares_are_consistent(grid), "wrong topology in {}", path.display());
@@ -189,7 +188,7 @@ fn enlarged_photographs_show_the_same_corners() {
             let large = Gray::from_fn(width as usize, height as usize, |x, y| {
                 large.get_pixel(x as u32, y as u32).0[0]
             });
-            let before = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+            let before = detector.detect(&photograph::read(path).unwrap(), "photograph");
             let after = detector.detect(&large, "photograph");
             let (before, after) = (&before.grids[0].corners, &after.grids[0].corners);
             let mut errors: Vec<f64> = Vec::new();
@@ -213,7 +212,7 @@ fn deltille_boards_are_no_checkerboards() {
     let images = images("robot-hand");
     let detector = Detector::for_grid(GridKind::Checker, None, DetectorConfig::default());
     for path in images.iter().step_by(4) {
-        let detection = detector.detect_any(&photograph::read(path).unwrap(), "photograph");
+        let detection = detector.detect(&photograph::read(path).unwrap(), "photograph");
         assert!(detection.grids.is_empty(), "a false grid in {}", path.display());
     }
 }

@@ -1,11 +1,11 @@
 //! Whatever comes in, nothing panics, and what comes out is finite.
 
 use deltille::camera::Camera;
-use deltille::detect::{Detection, Detector, DetectorConfig, Pixel};
+use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::{detection, dsc, obj};
 use deltille::family::Family;
 use deltille::photograph;
-use deltille::raster::Gray;
+use deltille::raster::{Gray, ImageView};
 use deltille::targets::{
     BoardSpec, GridKind, PaperSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec,
 };
@@ -35,7 +35,8 @@ fn detectors() -> [Detector; 3] {
     ]
 }
 
-fn nothing_in<T: Pixel>(image: &Gray<T>) {
+fn nothing_in<'a>(image: impl Into<ImageView<'a>>) {
+    let image = image.into();
     for detector in detectors() {
         assert!(detector.detect(image, "").grids.is_empty());
     }
@@ -108,7 +109,7 @@ fn recorded_faults_are_refused_or_read() {
         read_all(&String::from_utf8_lossy(&bytes));
         drop(obj::read(&bytes));
         if let Ok(image) = photograph::read(&path) {
-            detectors().iter().for_each(|detector| drop(detector.detect_any(&image, "")));
+            detectors().iter().for_each(|detector| drop(detector.detect(&image, "")));
         }
         if let Ok(document) = Document::open(&path) {
             (0..document.pages().min(1)).for_each(|page| drop(document.render(page, 1.0)));
@@ -197,7 +198,7 @@ proptest! {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), bytes).unwrap();
         if let Ok(image) = photograph::read(file.path()) {
-            detectors().iter().for_each(|detector| drop(detector.detect_any(&image, "")));
+            detectors().iter().for_each(|detector| drop(detector.detect(&image, "")));
         }
     }
 }

@@ -58,9 +58,9 @@ pub fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
     }
     let goes_on = |(i, grid): (usize, &&Grid)| {
         let is_others = |place, reach| corners.within(place, reach).any(|(c, _)| owners[c] != i);
-        let goes_on = |tiles: &CheckerTiles<i16>, most| tiles.goes_on(is_others, most);
+        let goes_on = |tiles: &CheckerTiles, most| tiles.goes_on(is_others, most);
         grid.kind == GridKind::Checker && {
-            let all = CheckerTiles::of(image, grid);
+            let all = CheckerTiles::of(image.into(), grid);
             let most = if all.is_compact() { MOST_DIFFERENT } else { MOST_DIFFERENT_ROWS };
             goes_on(&all, most) || {
                 let squares = all.without_loose_corners();
@@ -72,7 +72,7 @@ pub fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
     grids.iter().enumerate().map(goes_on).collect()
 }
 
-impl CheckerTiles<'_, i16> {
+impl CheckerTiles<'_> {
     /// Whether more than some part of what is beyond alternates; `is_others` tells whether a corner of
     /// another grid is within a distance of a place, px.
     fn goes_on(&self, is_others: impl Fn(Point, f64) -> bool, most: f64) -> bool {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::detection::{Grid, median};
 use super::tiling::{CHECKER, step};
 use crate::lattice::Vertex;
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 
 /// Squares are sampled in the middle and at so many edges from it along rows and columns: on a dot that
 /// is much smaller than its square too.
@@ -58,13 +58,13 @@ pub fn parity(vertex: Vertex) -> usize {
 
 /// The corners of a grid in a picture.
 #[derive(Clone, Debug)]
-pub struct CheckerTiles<'a, T> {
-    pub image: &'a Gray<T>,
+pub struct CheckerTiles<'a> {
+    pub image: ImageView<'a>,
     pub corners: BTreeMap<Vertex, Point>,
 }
 
-impl<'a, T: Intensity> CheckerTiles<'a, T> {
-    pub fn of(image: &'a Gray<T>, grid: &Grid) -> Self {
+impl<'a> CheckerTiles<'a> {
+    pub fn of(image: ImageView<'a>, grid: &Grid) -> Self {
         let corner = |c: &super::GridCorner| (Vertex::new(c.row, c.col), [c.x, c.y]);
         Self { image, corners: grid.corners.iter().map(corner).collect() }
     }

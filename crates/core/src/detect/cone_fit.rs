@@ -7,7 +7,7 @@
 use multiversion::multiversion;
 use nalgebra::DMatrix;
 
-use crate::raster::{Gray, Intensity};
+use crate::raster::{ImageView, Intensity, View, of_any};
 
 /// Powers (i, j) of a monomial uⁱvʲ.
 pub type Powers = (i32, i32);
@@ -62,11 +62,7 @@ impl<const N: usize> ConeFit<N> {
     }
 
     /// The coefficients around a position; `None` where the window leaves the image.
-    pub fn coefficients<T: Intensity>(
-        &self,
-        image: &Gray<T>,
-        [x, y]: [f64; 2],
-    ) -> Option<[f64; N]> {
+    pub fn coefficients(&self, image: ImageView, [x, y]: [f64; 2]) -> Option<[f64; N]> {
         let reach = (2 * self.radius) as f64;
         let fits = x >= reach
             && y >= reach
@@ -77,7 +73,9 @@ impl<const N: usize> ConeFit<N> {
         }
         let corner = [x as usize - 2 * self.radius, y as usize - 2 * self.radius];
         let fraction = [x.fract() as f32, y.fract() as f32];
-        Some(products(&self.kernels, self.side, image, corner, fraction).map(f64::from))
+        let (kernels, side) = (&self.kernels, self.side);
+        let products = of_any!(image, view => products(kernels, side, view, corner, fraction));
+        Some(products.map(f64::from))
     }
 }
 
@@ -87,7 +85,7 @@ impl<const N: usize> ConeFit<N> {
 fn products<const N: usize, T: Intensity>(
     kernels: &[[[f32; LANES]; N]],
     side: usize,
-    image: &Gray<T>,
+    image: View<T>,
     [left, top]: [usize; 2],
     [fx, fy]: [f32; 2],
 ) -> [f32; N] {
@@ -109,7 +107,7 @@ fn products<const N: usize, T: Intensity>(
 fn half_sums<const N: usize, T: Intensity>(
     kernels: &[[[f32; LANES]; N]],
     (side, first): (usize, usize),
-    image: &Gray<T>,
+    image: View<T>,
     ([left, top], [fx, fy], level): ([usize; 2], [f32; 2], f32),
 ) -> [[f32; HALF]; N] {
     let groups = side.div_ceil(LANES);

@@ -37,7 +37,7 @@ use super::blurred_corner::{
 use super::correlation::Influence;
 use super::curve::{Piece, TONE_PARAMS};
 use super::optics::{INK_UNIT, Optics, STEP};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 
 /// Largest radius of a window, px.
 pub const MAX_RADIUS: usize = 15;
@@ -234,23 +234,18 @@ impl Window {
     }
 
     /// Takes the pixels around `centre`, full scale 1; `None` where one lies outside the image.
-    fn read<T: Intensity>(
+    fn read(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         centre: [f64; 2],
         pixels: &mut [f32; MAX_PIXELS],
     ) -> Option<()> {
         let [x, y] = centre.map(|c| c as i32);
-        let to_one = 1.0 / T::FULL_SCALE;
         let mut rest = &mut pixels[..];
         for &([u, v], length) in &self.runs {
             let (first, row) = (usize::try_from(x + u).ok()?, usize::try_from(y + v).ok()?);
-            if row >= image.height() {
-                return None;
-            }
             let (run, after) = rest.split_at_mut(length);
-            let shown = image.row(row).get(first..first + length)?;
-            run.iter_mut().zip(shown).for_each(|(to, from)| *to = from.to_f32() * to_one);
+            image.read_row(first, row, run)?;
             rest = after;
         }
         Some(())
@@ -493,9 +488,9 @@ impl<const K: usize> Look<K> {
 
 impl CornerFitter {
     /// The corner near `start`; `None` when the window leaves the image or the fit is no corner.
-    pub fn fit<const K: usize, T: Intensity>(
+    pub fn fit<const K: usize>(
         &mut self,
-        image: &Gray<T>,
+        image: ImageView,
         window: &Window,
         start: &Corner<K>,
         (optics, accuracy): (&Optics, Accuracy),
@@ -607,12 +602,7 @@ impl CornerFitter {
     }
 
     /// Takes the pixels around a position; the centre of the window, or `None` outside the image.
-    fn load<T: Intensity>(
-        &mut self,
-        image: &Gray<T>,
-        window: &Window,
-        position: [f64; 2],
-    ) -> Option<[f64; 2]> {
+    fn load(&mut self, image: ImageView, window: &Window, position: [f64; 2]) -> Option<[f64; 2]> {
         let centre = position.map(f64::round);
         window.read(image, centre, &mut self.pixels)?;
         let (low, high) = ends(&self.pixels[..window.count]);
@@ -624,9 +614,9 @@ impl CornerFitter {
     }
 
     /// The pixels around a position, full scale 1; `None` where one lies outside the image.
-    pub(super) fn pixels<T: Intensity>(
+    pub(super) fn pixels(
         &mut self,
-        image: &Gray<T>,
+        image: ImageView,
         window: &Window,
         position: [f64; 2],
     ) -> Option<&[f32]> {
@@ -676,9 +666,9 @@ impl CornerFitter {
 
     /// The normal equations at a corner in picture coordinates, from the window around the pixel `centre`, with
     /// the parameters of the optics behind its own; `None` outside the image.
-    pub(super) fn joint<const K: usize, T: Intensity>(
+    pub(super) fn joint<const K: usize>(
         &mut self,
-        image: &Gray<T>,
+        image: ImageView,
         (window, centre): (&Window, [f64; 2]),
         corner: &Corner<K>,
         optics: &Optics,
@@ -739,9 +729,9 @@ impl CornerFitter {
 
     /// What the pixels of a fitted corner do to its position, and what is left of them; the corner as for
     /// [`Self::joint`].
-    pub(super) fn influence<const K: usize, T: Intensity>(
+    pub(super) fn influence<const K: usize>(
         &mut self,
-        image: &Gray<T>,
+        image: ImageView,
         (window, centre): (&Window, [f64; 2]),
         corner: &Corner<K>,
         optics: &Optics,

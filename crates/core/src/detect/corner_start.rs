@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use multiversion::multiversion;
 
 use super::corner_model::{Corner, Window};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 
 /// Directions on the half-circle: 7.5° apart, so that the 17° between edges at 75° hold two.
 const DIRECTIONS: usize = 24;
@@ -105,8 +105,8 @@ fn sums<const K: usize>(
 }
 
 /// The start around `position`, from circles; `None` when the circles leave the image or show no contrast.
-pub fn start<const K: usize, T: Intensity>(
-    image: &Gray<T>,
+pub fn start<const K: usize>(
+    image: ImageView,
     position: [f64; 2],
     radius: usize,
 ) -> Option<Corner<K>> {
@@ -132,7 +132,7 @@ pub fn start<const K: usize, T: Intensity>(
         }
     }
     let samples = (2 * CIRCLES.len()) as f64;
-    let scale = 1.0 / (samples * f64::from(T::FULL_SCALE));
+    let scale = 1.0 / (samples * f64::from(image.full_scale()));
     let profile = profile.map(|v| v * scale);
     let mean = total * scale / DIRECTIONS as f64;
     let runs = best_runs::<K>(&profile, odd)?;

@@ -12,7 +12,7 @@
 use nalgebra::{Matrix3x2, Vector3};
 
 use super::cone_fit::{ConeFit, Powers};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 
 /// Number of coefficients kept: c1 … c7; slopes and level do not move the corner.
 const KEPT: usize = 7;
@@ -77,30 +77,21 @@ impl CubicFit {
     }
 
     /// The surface around `position`; `None` where the window leaves the image.
-    pub fn surface<T: Intensity>(
-        &self,
-        image: &Gray<T>,
-        position: [f64; 2],
-    ) -> Option<CubicSurface> {
+    pub fn surface(&self, image: ImageView, position: [f64; 2]) -> Option<CubicSurface> {
         Some(CubicSurface { c: self.fit.coefficients(image, position)? })
     }
 
     /// Iterates from `start`, at most `iterations` times. `None` when the surface is no
     /// star-shaped umbilic, a step or the whole way exceeds the radius, or the window leaves the
     /// image.
-    pub fn refine<T: Intensity>(
-        &self,
-        image: &Gray<T>,
-        start: [f64; 2],
-        iterations: usize,
-    ) -> Option<Umbilic> {
+    pub fn refine(&self, image: ImageView, start: [f64; 2], iterations: usize) -> Option<Umbilic> {
         self.walk(image, start, iterations, CONVERGED_PX)
     }
 
     /// [`Self::refine`] that ends with a step shorter than `converged_px`.
-    pub fn walk<T: Intensity>(
+    pub fn walk(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         start: [f64; 2],
         iterations: usize,
         converged_px: f64,
@@ -128,7 +119,7 @@ impl CubicFit {
     }
 
     /// The way from `start` to the umbilic point of the surface there; `None` when it is not star-shaped.
-    pub fn step<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn step(&self, image: ImageView, start: [f64; 2]) -> Option<[f64; 2]> {
         let surface = self.surface(image, start)?;
         (surface.star_discriminant() < 0.0).then(|| surface.umbilic_point()).flatten()
     }
@@ -137,6 +128,7 @@ impl CubicFit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::Gray;
 
     /// x³ − 3xy² about (cx, cy), plus slopes and a level that must not matter.
     fn monkey_saddle(cx: f64, cy: f64) -> Gray<f32> {
@@ -150,7 +142,7 @@ mod tests {
     fn a_monkey_saddle_is_found_exactly_in_two_steps() {
         for radius in [2, 3, 5] {
             let fit = CubicFit::new(radius);
-            let found = fit.refine(&monkey_saddle(31.4, 29.8), [31.0, 31.0], 2).unwrap();
+            let found = fit.refine((&monkey_saddle(31.4, 29.8)).into(), [31.0, 31.0], 2).unwrap();
             let error = (found.position[0] - 31.4).hypot(found.position[1] - 29.8);
             assert!(error < 2e-3, "radius {radius}: {error}");
             assert!(found.surface.star_discriminant() < 0.0);
@@ -161,9 +153,9 @@ mod tests {
     fn quadrics_planes_and_borders_are_refused() {
         let fit = CubicFit::new(3);
         let saddle = Gray::from_fn(64, 64, |x, y| (x as f32 - 30.0) * (y as f32 - 30.0));
-        let found = fit.refine(&saddle, [30.0, 30.0], 5);
+        let found = fit.refine((&saddle).into(), [30.0, 30.0], 5);
         assert!(found.is_none_or(|u| u.surface.star_discriminant().abs() < 1e-6));
-        assert!(fit.refine(&Gray::<u8>::new(64, 64), [30.0, 30.0], 5).is_none());
-        assert!(fit.refine(&monkey_saddle(3.0, 3.0), [3.0, 3.0], 5).is_none());
+        assert!(fit.refine((&Gray::<u8>::new(64, 64)).into(), [30.0, 30.0], 5).is_none());
+        assert!(fit.refine((&monkey_saddle(3.0, 3.0)).into(), [3.0, 3.0], 5).is_none());
     }
 }

@@ -14,7 +14,6 @@ use super::ink::{Ink, InkEstimate};
 use super::label::Budget;
 use super::labels::{Labels, MOST_CORNERS, report_once};
 use super::optics::Optics;
-use super::pixel::Pixel;
 use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
 use super::refine_grid::{is_sampled, sharp_level};
@@ -25,7 +24,7 @@ use super::why;
 use crate::Clock;
 use crate::family::Family;
 use crate::lattice::GridKind;
-use crate::raster::{AnyGray, FileNotes, Gray, Intensity, PYRAMID_FULL_SCALE, Pyramid};
+use crate::raster::{FileNotes, Gray, ImageView, PYRAMID_FULL_SCALE, Pyramid};
 use crate::targets::{Target, least_untagged_corners};
 
 /// Most levels of the pyramid that every image has: the coarsest sees four times the blur that the finest can.
@@ -165,21 +164,22 @@ impl Detector {
     }
 
     /// Finds grids in one image; `name` is only noted in the result.
-    pub fn detect<T: Pixel>(&self, image: &Gray<T>, name: &str) -> Detection {
-        T::detect(self, image, name)
+    pub fn detect<'a>(&self, image: impl Into<ImageView<'a>>, name: &str) -> Detection {
+        self.detect_view(image.into(), name)
     }
 
-    pub(super) fn detect_in<T: Intensity>(&self, image: &Gray<T>, name: &str) -> Detection {
+    /// [`Self::detect`], compiled here and not in every crate that uses it.
+    fn detect_view(&self, image: ImageView, name: &str) -> Detection {
         match &self.finder {
             Finder::Deltille(finder) => self.detect_with(finder, image, name),
             Finder::Checker(finder) => self.detect_with(finder, image, name),
         }
     }
 
-    fn detect_with<const N: usize, T: Intensity>(
+    fn detect_with<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
-        image: &Gray<T>,
+        image: ImageView,
         name: &str,
     ) -> Detection {
         let mut timing = Timing::start(self.clock);
@@ -190,7 +190,7 @@ impl Detector {
         let found = grids(finder, &pyramid, &saddles);
         let mut left_out = Vec::new();
         if too_many(&pyramid, saddles.len()) {
-            let edge_px = (image.pixels().len() as f64 / saddles.len() as f64).sqrt();
+            let edge_px = ((image.width() * image.height()) as f64 / saddles.len() as f64).sqrt();
             let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
             left_out.push(match edge_px < MIN_UNTAGGED_EDGE_PX {
                 true => Reason::new(ReasonKind::TooSmall, figures),
@@ -199,11 +199,11 @@ impl Detector {
         }
         timing.lap("grids");
         let least = least_untagged_corners(kind::<N>()) as usize;
-        let mut grids = self.plausible::<N, T>(image, &pyramid, &found, &mut left_out);
+        let mut grids = self.plausible::<N>(image, &pyramid, &found, &mut left_out);
         timing.lap("labels");
         if grids.is_empty() && self.labels.are_wanted() {
             let found = foreshortened_grids(finder, &pyramid);
-            grids = self.plausible::<N, T>(image, &pyramid, &found, &mut left_out);
+            grids = self.plausible::<N>(image, &pyramid, &found, &mut left_out);
             // Compressed patterns of all kinds have triangles and squares too.
             grids.retain(|(grid, _)| is_labelled(grid));
             timing.lap("foreshortened");
@@ -257,9 +257,9 @@ impl Detector {
     }
 
     /// The grids with their labels that may be what is looked for, and why others are left out.
-    fn plausible<const N: usize, T: Intensity>(
+    fn plausible<const N: usize>(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         pyramid: &Pyramid,
         found: &[SaddleGrid],
         left_out: &mut Vec<Reason>,
@@ -309,16 +309,16 @@ impl Detector {
 
     /// Refines all grids on the level of the pyramid that suits their blur; what they have in common, and for
     /// each grid whether the blur leaves of it but a wave.
-    fn refine<T: Intensity>(
+    fn refine(
         &self,
         fitter: &mut CornerFitter,
-        (image, pyramid): (&Gray<T>, &Pyramid),
+        (image, pyramid): (ImageView, &Pyramid),
         grids: &mut [Grid],
     ) -> (Optics, Vec<bool>) {
         let levels = pyramid.levels();
         let blurs = self.refiner.blurs(fitter, (image, levels), grids, &self.tag_areas);
         for level in (1..=sharp_level(&blurs, levels.len())).rev() {
-            let image = &levels[level];
+            let image = ImageView::from(&levels[level]);
             grids.iter_mut().for_each(|grid| grid.moved_to_level(level));
             let blurs =
                 self.refiner.blurs(fitter, (image, &levels[level..]), grids, &self.tag_areas);
@@ -338,10 +338,10 @@ impl Detector {
     }
 
     /// [`Self::refine`] in an image that shows the grids under these optics and blurs, px.
-    fn refine_under<T: Intensity>(
+    fn refine_under(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         grids: &mut [Grid],
         (optics, blurs): (&Optics, &[Option<f64>]),
     ) -> Vec<bool> {
@@ -375,14 +375,6 @@ impl Detector {
             return Reason::new(ReasonKind::TooSmall, figures);
         }
         reason
-    }
-
-    /// [`Self::detect`] for an image of either depth.
-    pub fn detect_any(&self, image: &AnyGray, name: &str) -> Detection {
-        match image {
-            AnyGray::U8(image) => self.detect(image, name),
-            AnyGray::U16(image) => self.detect(image, name),
-        }
     }
 }
 
@@ -466,7 +458,7 @@ fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refi
 }
 
 /// Number of levels of an image's pyramid.
-fn levels_of<T: Intensity>(image: &Gray<T>) -> usize {
+fn levels_of(image: ImageView) -> usize {
     let side = image.width().min(image.height());
     let fitting = (side / MIN_FURTHER_SIDE).checked_ilog2().unwrap_or(0) as usize + 1;
     fitting.max(PYRAMID_LEVELS)

@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::blurred_corner::erf_sqrt_half;
 use super::grow::SaddleGrid;
 use crate::lattice::{GridKind, Tile, Vertex};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 
 /// Samples across an edge.
 const ACROSS: usize = 13;
@@ -115,8 +115,8 @@ struct Profile {
 
 impl GridLight {
     /// That of a grid; `None` where too little of it is seen.
-    pub fn of<T: Intensity>(
-        image: &Gray<T>,
+    pub fn of(
+        image: ImageView,
         grid: &SaddleGrid,
         kind: GridKind,
         clear: ClearDepth,
@@ -145,7 +145,7 @@ impl GridLight {
             return None;
         }
         if 2 * saturated > count {
-            let least = LEAST_DEVIATION * f64::from(T::FULL_SCALE);
+            let least = LEAST_DEVIATION * f64::from(image.full_scale());
             light.clipped_share = clipped_share(&by_direction, least);
         }
         let (mut curvature, mut power) = (0.0, 0.0);
@@ -207,9 +207,9 @@ impl GridLight {
     }
 
     /// Black and white over a tile whose corners are in the grid.
-    pub fn levels<T: Intensity>(
+    pub fn levels(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         grid: &SaddleGrid,
         tile: Tile,
         known: &mut BTreeMap<(Vertex, usize), Option<[f64; 2]>>,
@@ -281,9 +281,9 @@ impl GridLight {
     }
 
     /// What lies across the edge along step `k` from a vertex; `None` where a tile beside it leaves the image.
-    fn profile<T: Intensity>(
+    fn profile(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         grid: &SaddleGrid,
         vertex: Vertex,
         k: usize,
@@ -318,7 +318,7 @@ impl GridLight {
         let reach = [-self.clear.dark * dark_px, self.clear.bright * bright_px];
         let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
         let mut saturated = 0;
-        let full = SATURATED * f64::from(T::FULL_SCALE);
+        let full = SATURATED * f64::from(image.full_scale());
         let distances_px: [f64; ACROSS] = std::array::from_fn(|j| {
             reach[0] + (reach[1] - reach[0]) * j as f64 / (ACROSS - 1) as f64
         });

@@ -38,7 +38,7 @@ use super::tag_words::TargetWords;
 use super::tags::{Read, Reading, TagPlace, TagReader};
 use crate::family::{Decoder, Family};
 use crate::lattice::{LatticeMap, Orientation, Tile, Vertex};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 use crate::targets::{Panel, TagsIn, Target};
 
 /// The chance that a tag is hidden or spoiled, so that its tile tells nothing of it.
@@ -259,12 +259,7 @@ impl TagLabeller {
     }
 
     /// The panels in a grid, by the tags read in `image`.
-    pub fn label<T: Intensity>(
-        &self,
-        image: &Gray<T>,
-        grid: &SaddleGrid,
-        budget: &mut Budget,
-    ) -> TagEvidence {
+    pub fn label(&self, image: ImageView, grid: &SaddleGrid, budget: &mut Budget) -> TagEvidence {
         let mut evidence = TagEvidence::default();
         let mut sights = Vec::new();
         for (reader, inverted) in self.ways_to_read() {
@@ -941,7 +936,8 @@ mod tests {
                     (Vertex::new(corner.row, corner.col), placed)
                 })
                 .collect();
-            let readings = labeller.readers[0].read(&image, &grid, false, MOST_TILES).readings;
+            let readings =
+                labeller.readers[0].read((&image).into(), &grid, false, MOST_TILES).readings;
             let Some(at) = readings.iter().position(|r| r.tile == tile) else {
                 continue;
             };

@@ -16,7 +16,7 @@ use super::reason::{Reason, ReasonKind};
 use super::why;
 use crate::family::Family;
 use crate::lattice::{GridKind, LatticeMap, Vertex};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 use crate::targets::{Target, zigzag_vertices};
 
 /// How corners get absolute labels.
@@ -85,9 +85,9 @@ impl Labels {
 
     /// The panels in a grid; the grid itself with relative labels where there are none, and why there are
     /// none.
-    pub fn label<T: Intensity>(
+    pub fn label(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         grid: &SaddleGrid,
         budget: &mut Budget,
     ) -> Vec<(Grid, Option<Reason>)> {

@@ -15,7 +15,7 @@ use super::correlation::{self, Influence};
 use super::curve::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
 use super::detection::median;
 use super::ink::InkEstimate;
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 
 /// Corners that are fitted together; more tell the curve better than single corners can use it.
 pub const SAMPLES: usize = 16;
@@ -306,9 +306,9 @@ impl Optics {
     }
 
     /// The optics that a picture's corners show; a tone curve that is known is kept.
-    pub fn estimate<const K: usize, T: Intensity>(
+    pub fn estimate<const K: usize>(
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         samples: Vec<Sample>,
         known: &Self,
     ) -> Self {
@@ -335,12 +335,11 @@ impl Optics {
         let active = (0..PARAMS).filter(|&p| is_active(p)).collect();
         let members = samples.into_iter().map(Member::from).collect();
         let greys = [blacks, whites].map(|greys| median(greys).unwrap_or(0.0));
-        let mut problem = Problem::<K, T> { fitter, image, members, greys, active };
-        let reported =
-            |problem: &Problem<K, T>, optics: &Self, cov: &DMatrix<f64>, used| Reported {
-                tone: optics.tone_between(greys, (cov, &problem.active), used),
-                ink: problem.ink(optics, cov, used),
-            };
+        let mut problem = Problem::<K> { fitter, image, members, greys, active };
+        let reported = |problem: &Problem<K>, optics: &Self, cov: &DMatrix<f64>, used| Reported {
+            tone: optics.tone_between(greys, (cov, &problem.active), used),
+            ink: problem.ink(optics, cov, used),
+        };
         let all = problem.active.clone();
         let mut optics = known.clone();
         let (mut used, mut found) = (Vec::new(), Reported::default());
@@ -522,9 +521,9 @@ impl<const K: usize> From<Sample> for Member<K> {
 }
 
 /// Corners to be fitted together.
-struct Problem<'a, const K: usize, T> {
+struct Problem<'a, const K: usize> {
     fitter: &'a mut CornerFitter,
-    image: &'a Gray<T>,
+    image: ImageView<'a>,
     members: Vec<Member<K>>,
     /// Median black and white of the corners.
     greys: [f64; 2],
@@ -557,7 +556,7 @@ impl Reduced {
     }
 }
 
-impl<const K: usize, T: Intensity> Problem<'_, K, T> {
+impl<const K: usize> Problem<'_, K> {
     /// Where a first step leads, under the noise alone, and the covariance by the scatter too.
     fn first_step(&self, optics: &Optics, equations: &[Option<Joint>]) -> (Estimate, DMatrix<f64>) {
         let count = self.active.len();
@@ -732,7 +731,7 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
             .iter()
             .filter_map(|member| {
                 let window = (&member.window, member.centre);
-                fitter.influence(image, window, &member.corner, optics)
+                fitter.influence(*image, window, &member.corner, optics)
             })
             .collect();
         found.sort_by(|a, b| a.noise.total_cmp(&b.noise));
@@ -746,7 +745,7 @@ impl<const K: usize, T: Intensity> Problem<'_, K, T> {
             .iter()
             .map(|member| {
                 let window = (&member.window, member.centre);
-                fitter.joint(image, window, &member.corner, optics, &common)
+                fitter.joint(*image, window, &member.corner, optics, &common)
             })
             .collect()
     }
@@ -858,6 +857,7 @@ mod tests {
     use super::*;
     use crate::detect::Tone;
     use crate::detect::corner_model::{Accuracy, Fitted};
+    use crate::raster::Gray;
 
     /// Square of each corner, px; points of each pixel's side; blur, px.
     const SIDE: usize = 33;
@@ -968,7 +968,7 @@ mod tests {
         optics: &Optics,
     ) -> Fitted<3> {
         let start = Corner { position: corner.position.map(f64::round), ..*corner };
-        fitter.fit(image, &Window::new(9), &start, (optics, Accuracy::Full)).unwrap()
+        fitter.fit(image.into(), &Window::new(9), &start, (optics, Accuracy::Full)).unwrap()
     }
 
     /// Of all parameters, a corner's own and the common ones, under a halo, ink, a motion and a curve.
@@ -992,7 +992,7 @@ mod tests {
         let common: Vec<Common> = (0..PARAMS).map(|p| optics.common(p)).collect();
         let mut fitter = CornerFitter::default();
         let mut joint = |corner: &Corner<K>, optics: &Optics| {
-            fitter.joint(image, (&window, centre), corner, optics, &common).unwrap()
+            fitter.joint(image.into(), (&window, centre), corner, optics, &common).unwrap()
         };
         let here = joint(corner, optics);
         for i in 0..OWN + PARAMS {
@@ -1039,7 +1039,7 @@ mod tests {
                 }
             });
             let samples = samples.collect();
-            let optics = Optics::estimate::<3, f32>(&mut fitter, &image, samples, &known);
+            let optics = Optics::estimate::<3>(&mut fitter, (&image).into(), samples, &known);
             let found = optics.ink_found.unwrap();
             assert_eq!(found.used, ink != 0.0, "{ink} {name}: {found:?}");
             assert!((found.edges - ink).abs() < 2e-4, "{ink} {name}: {found:?}");

@@ -3,7 +3,7 @@
 
 use super::cubic::{CubicFit, Umbilic};
 use super::quadric::{QuadricFit, QuadricSaddle};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 use crate::targets::GridKind;
 
 /// Most iterations of the fits; the reference detector's.
@@ -87,9 +87,9 @@ impl Polynomial {
     }
 
     /// The corner that the fit reaches from `start` in at most so many iterations.
-    pub fn refine<T: Intensity>(
+    pub fn refine(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         start: [f64; 2],
         iterations: usize,
     ) -> Option<FittedCorner> {
@@ -100,7 +100,7 @@ impl Polynomial {
     }
 
     /// [`Self::refine`] as closely as a first look needs.
-    pub fn find<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<FittedCorner> {
+    pub fn find(&self, image: ImageView, start: [f64; 2]) -> Option<FittedCorner> {
         let (most, found_px) = (FIND_ITERATIONS, FOUND_PX);
         match self {
             Self::Cubic(fit) => fit.walk(image, start, most, found_px).map(FittedCorner::from),
@@ -109,7 +109,7 @@ impl Polynomial {
     }
 
     /// The first step of that fit, px; `None` where it sees no corner.
-    pub fn step<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn step(&self, image: ImageView, start: [f64; 2]) -> Option<[f64; 2]> {
         match self {
             Self::Cubic(fit) => fit.step(image, start),
             Self::Quadric(fit) => fit.step(image, start),
@@ -120,6 +120,7 @@ impl Polynomial {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::Gray;
 
     #[test]
     fn forms_are_bright_where_the_image_is() {
@@ -128,14 +129,14 @@ mod tests {
             0.001 * (u * u * u - 3.0 * u * v * v)
         });
         let fit = Polynomial::new(GridKind::Deltille, 3);
-        let form = fit.refine(&monkey, [32.0, 32.0], 5).unwrap().form;
+        let form = fit.refine((&monkey).into(), [32.0, 32.0], 5).unwrap().form;
         assert!(form.towards([1.0, 0.0]) > 0.0 && form.towards([-1.0, 0.0]) < 0.0);
         let saddle = Gray::from_fn(64, 64, |x, y| {
             let (u, v) = (x as f32 - 32.0, y as f32 - 32.0);
             0.01 * (u * u - v * v)
         });
         let fit = Polynomial::new(GridKind::Checker, 3);
-        let form = fit.refine(&saddle, [32.0, 32.0], 5).unwrap().form;
+        let form = fit.refine((&saddle).into(), [32.0, 32.0], 5).unwrap().form;
         assert!(
             form.towards([1.0, 0.0]) > 0.0
                 && form.towards([0.0, 1.0]) < 0.0

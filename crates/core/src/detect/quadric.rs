@@ -8,7 +8,7 @@
 //! where the Hessian's determinant 4 c1 c3 − c2² is negative. The fit is [`super::cone_fit`]'s.
 
 use super::cone_fit::{ConeFit, Powers};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 
 /// Monomials in the order of the coefficients.
 const MONOMIALS: [Powers; 6] = [(2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0)];
@@ -39,9 +39,9 @@ impl QuadricFit {
 
     /// Iterates from `start`, at most `iterations` times. `None` when the surface is no saddle, a
     /// step or the whole way exceeds the radius, or the window leaves the image.
-    pub fn refine<T: Intensity>(
+    pub fn refine(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         start: [f64; 2],
         iterations: usize,
     ) -> Option<QuadricSaddle> {
@@ -49,9 +49,9 @@ impl QuadricFit {
     }
 
     /// [`Self::refine`] that ends with a step shorter than `converged_px`.
-    pub fn walk<T: Intensity>(
+    pub fn walk(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         start: [f64; 2],
         iterations: usize,
         converged_px: f64,
@@ -76,7 +76,7 @@ impl QuadricFit {
     }
 
     /// The way from `start` to the saddle point of the surface there; `None` when it has none.
-    pub fn step<T: Intensity>(&self, image: &Gray<T>, start: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn step(&self, image: ImageView, start: [f64; 2]) -> Option<[f64; 2]> {
         stationary_point(self.fit.coefficients(image, start)?)
     }
 }
@@ -91,6 +91,7 @@ fn stationary_point([c1, c2, c3, c4, c5]: [f64; 5]) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::Gray;
 
     fn surface(form: impl Fn(f32, f32) -> f32) -> Gray<f32> {
         Gray::from_fn(40, 40, |x, y| form(x as f32 - 20.3, y as f32 - 18.9))
@@ -99,15 +100,15 @@ mod tests {
     #[test]
     fn a_saddle_is_found_exactly_in_two_steps() {
         let saddle = surface(|u, v| 0.01 * (u * u - 2.0 * v * v + 0.5 * u * v) + 3.0);
-        let [x, y] = QuadricFit::new(5).refine(&saddle, [20.0, 20.0], 2).unwrap().position;
+        let [x, y] = QuadricFit::new(5).refine((&saddle).into(), [20.0, 20.0], 2).unwrap().position;
         assert!((x - 20.3).hypot(y - 18.9) < 1e-3, "{x} {y}");
     }
 
     #[test]
     fn bowls_planes_and_borders_are_refused() {
         let fit = QuadricFit::new(3);
-        assert!(fit.refine(&surface(|u, v| u * u + v * v), [20.0, 20.0], 5).is_none());
-        assert!(fit.refine(&surface(|_, _| 1.0), [20.0, 20.0], 5).is_none());
-        assert!(fit.refine(&surface(|u, v| u * v), [3.0, 20.0], 5).is_none());
+        assert!(fit.refine((&surface(|u, v| u * u + v * v)).into(), [20.0, 20.0], 5).is_none());
+        assert!(fit.refine((&surface(|_, _| 1.0)).into(), [20.0, 20.0], 5).is_none());
+        assert!(fit.refine((&surface(|u, v| u * v)).into(), [3.0, 20.0], 5).is_none());
     }
 }

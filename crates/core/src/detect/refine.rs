@@ -20,9 +20,8 @@ use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Wi
 use super::corner_start::{start, start_along};
 use super::curve::Tone;
 use super::optics::{Optics, SAMPLES, Sample};
-use super::pixel::Pixel;
 use super::polynomial::Polynomial;
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 use crate::targets::GridKind;
 
 /// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
@@ -128,7 +127,7 @@ pub(super) struct Room<'a> {
 
 impl Room<'_> {
     /// The pixels of the image that show nothing but the corner at `position`, within a radius.
-    fn window<T: Intensity>(&self, image: &Gray<T>, position: [f64; 2], radius: usize) -> Window {
+    fn window(&self, image: ImageView, position: [f64; 2], radius: usize) -> Window {
         let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 1.0);
         let pixel = position.map(f64::round);
         let off = [0, 1].map(|i| pixel[i] - position[i]);
@@ -211,20 +210,21 @@ impl Refiner {
     /// The corner near `start`, in the whole window.
     ///
     /// An unknown tone curve is estimated from this corner; [`Self::refine_all`] asks all of a picture.
-    pub fn refine<T: Pixel>(&self, image: &Gray<T>, start: [f64; 2]) -> Refined {
+    pub fn refine<'a>(&self, image: impl Into<ImageView<'a>>, start: [f64; 2]) -> Refined {
         self.refine_all(image, &[start])[0]
     }
 
     /// The corners of a picture near `starts`, each in the whole window.
-    pub fn refine_all<T: Pixel>(&self, image: &Gray<T>, starts: &[[f64; 2]]) -> Vec<Refined> {
-        T::refine_all(self, image, starts)
-    }
-
-    pub(super) fn refine_in<T: Intensity>(
+    pub fn refine_all<'a>(
         &self,
-        image: &Gray<T>,
+        image: impl Into<ImageView<'a>>,
         starts: &[[f64; 2]],
     ) -> Vec<Refined> {
+        self.refine_view(image.into(), starts)
+    }
+
+    /// [`Self::refine_all`], compiled here and not in every crate that uses it.
+    fn refine_view(&self, image: ImageView, starts: &[[f64; 2]]) -> Vec<Refined> {
         let mut fitter = CornerFitter::default();
         let mut fit = |start: &[f64; 2]| self.refine_with(&mut fitter, image, *start, &self.known);
         let first: Vec<(Refined, Option<Fit>)> = starts.iter().map(&mut fit).collect();
@@ -251,31 +251,31 @@ impl Refiner {
     }
 
     /// The optics of a picture that these corners show, of which so much is known.
-    pub(super) fn joint_optics<T: Intensity>(
+    pub(super) fn joint_optics(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         samples: Vec<Sample>,
         known: &Optics,
     ) -> Optics {
         match self.polynomial {
-            Polynomial::Cubic(_) => Optics::estimate::<3, T>(fitter, image, samples, known),
-            Polynomial::Quadric(_) => Optics::estimate::<2, T>(fitter, image, samples, known),
+            Polynomial::Cubic(_) => Optics::estimate::<3>(fitter, image, samples, known),
+            Polynomial::Quadric(_) => Optics::estimate::<2>(fitter, image, samples, known),
         }
     }
 
-    fn refine_with<T: Intensity>(
+    fn refine_with(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         start: [f64; 2],
         optics: &Optics,
     ) -> (Refined, Option<Fit>) {
         let found = self.polynomial.refine(image, start, self.iterations).map(|c| c.position);
         let position = found.unwrap_or(start);
         let model = || match self.polynomial {
-            Polynomial::Cubic(_) => self.alone::<3, T>(fitter, image, position, optics),
-            Polynomial::Quadric(_) => self.alone::<2, T>(fitter, image, position, optics),
+            Polynomial::Cubic(_) => self.alone::<3>(fitter, image, position, optics),
+            Polynomial::Quadric(_) => self.alone::<2>(fitter, image, position, optics),
         };
         match (self.method == Refinement::Model).then(model).flatten() {
             Some((window, fit)) => {
@@ -287,10 +287,10 @@ impl Refiner {
 
     /// A corner of a grid near `start`, from pixels that show nothing else. Beside it what the model
     /// found.
-    pub(super) fn refine_within<T: Intensity>(
+    pub(super) fn refine_within(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         start: [f64; 2],
         room: Room,
     ) -> (Refined, Option<ModelFit>) {
@@ -323,39 +323,39 @@ impl Refiner {
     }
 
     /// The model of a single corner, in the largest window that lies in the image.
-    fn alone<const K: usize, T: Intensity>(
+    fn alone<const K: usize>(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         position: [f64; 2],
         optics: &Optics,
     ) -> Option<(&Window, ModelFit)> {
         let reach = distance_to_rim(image, position);
         let window = self.windows.iter().rev().find(|w| w.radius() as f64 <= reach)?;
-        let first = start::<K, T>(image, position, window.radius())?;
+        let first = start::<K>(image, position, window.radius())?;
         Some((window, fitter.fit(image, window, &first, (optics, Accuracy::Full))?.into()))
     }
 
     /// The model of a corner of a grid, in all of its room that is clear and lies in the image, with
     /// the bends that the grid shows: as good as the noise allows from a fit `before`, and such a fit without.
-    pub(super) fn model<T: Intensity>(
+    pub(super) fn model(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         position: [f64; 2],
         room: Room,
         before: Option<&ModelFit>,
     ) -> Option<ModelFit> {
         match self.polynomial {
-            Polynomial::Cubic(_) => self.model_of::<3, T>(fitter, image, position, room, before),
-            Polynomial::Quadric(_) => self.model_of::<2, T>(fitter, image, position, room, before),
+            Polynomial::Cubic(_) => self.model_of::<3>(fitter, image, position, room, before),
+            Polynomial::Quadric(_) => self.model_of::<2>(fitter, image, position, room, before),
         }
     }
 
-    fn model_of<const K: usize, T: Intensity>(
+    fn model_of<const K: usize>(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         position: [f64; 2],
         room: Room,
         before: Option<&ModelFit>,
@@ -384,9 +384,9 @@ impl Refiner {
     }
 
     /// The pixels of a corner's room.
-    pub(super) fn window<T: Intensity>(
+    pub(super) fn window(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         position: [f64; 2],
         room: Room,
     ) -> Cow<'_, Window> {
@@ -420,7 +420,7 @@ fn edge_along(edges: &[Edge], angle_rad: f64) -> Edge {
 }
 
 /// Pixels between a position and the nearest side of the image, where bilinear samples end.
-fn distance_to_rim<T: Intensity>(image: &Gray<T>, [x, y]: [f64; 2]) -> f64 {
+fn distance_to_rim(image: ImageView, [x, y]: [f64; 2]) -> f64 {
     let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 2.0);
     [x - 1.0, y - 1.0, right - x, bottom - y].into_iter().fold(f64::INFINITY, f64::min)
 }
@@ -432,6 +432,7 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     use super::*;
+    use crate::raster::Gray;
     use crate::synth::SimulatedCorner;
 
     /// Side of the square in which each corner of a picture lies, px.

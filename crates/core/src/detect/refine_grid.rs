@@ -16,7 +16,7 @@ use super::detection::{Grid, GridCorner, median};
 use super::optics::{Optics, REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
 use super::refine::{MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room};
 use crate::lattice::Vertex;
-use crate::raster::{Gray, Intensity, Pyramid};
+use crate::raster::{Gray, ImageView, Pyramid};
 
 /// Corners that tell the blur: those with the most room of a few times as many, from all over the grid.
 const BLUR_CORNERS: usize = 15;
@@ -62,10 +62,10 @@ const NEXT_WINDOW: f64 = 0.7;
 
 impl Refiner {
     /// The blur of each grid in px, where the model can tell it.
-    pub(super) fn blurs<T: Intensity>(
+    pub(super) fn blurs(
         &self,
         fitter: &mut CornerFitter,
-        images: (&Gray<T>, &[Gray<i16>]),
+        images: (ImageView, &[Gray<i16>]),
         grids: &[Grid],
         tags: &TagAreas,
     ) -> Vec<Option<f64>> {
@@ -73,10 +73,10 @@ impl Refiner {
     }
 
     /// What the grids of a picture, with these blurs, have in common, as a level of its pyramid shows them.
-    pub(super) fn optics<T: Intensity>(
+    pub(super) fn optics(
         &self,
         fitter: &mut CornerFitter,
-        (image, level): (&Gray<T>, usize),
+        (image, level): (ImageView, usize),
         (grids, blurs): (&[Grid], &[Option<f64>]),
         tags: &TagAreas,
     ) -> Optics {
@@ -125,10 +125,10 @@ impl Refiner {
     }
 
     /// Refines the corners of a grid in place, under its blur in px, and drops those that are spoilt.
-    pub(super) fn refine_grid<T: Intensity>(
+    pub(super) fn refine_grid(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         grid: &mut Grid,
         tags: &TagAreas,
         (optics, blur_px): (&Optics, Option<f64>),
@@ -175,9 +175,9 @@ impl Refiner {
 
     /// Fits the corners again, now that their places tell how the edges are bent; what leaves more
     /// than `limit` does not count.
-    fn follow_bends<T: Intensity>(
+    fn follow_bends(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         grid: &mut Grid,
         fits: &[Option<ModelFit>],
         limit: f64,
@@ -214,14 +214,14 @@ impl Refiner {
     }
 
     /// Whether the model can be fitted to what is clear around a corner.
-    fn has_room<T: Intensity>(&self, image: &Gray<T>, corner: &GridCorner, room: Room) -> bool {
+    fn has_room(&self, image: ImageView, corner: &GridCorner, room: Room) -> bool {
         self.window(image, [corner.x, corner.y], room).count() >= MIN_PIXELS
     }
 
     /// All corners of a grid, each by itself.
-    fn refine_each<T: Intensity>(
+    fn refine_each(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         grid: &Grid,
         around: &[Surroundings],
         (blur_px, optics): (f64, &Optics),
@@ -262,10 +262,10 @@ impl Refiner {
     }
 
     /// The blur of a grid, px: as the finest level of the pyramid shows it that shows enough of it.
-    fn blur_of_grid<T: Intensity>(
+    fn blur_of_grid(
         &self,
         fitter: &mut CornerFitter,
-        (image, levels): (&Gray<T>, &[Gray<i16>]),
+        (image, levels): (ImageView, &[Gray<i16>]),
         grid: &Grid,
         tags: &TagAreas,
     ) -> Option<f64> {
@@ -278,17 +278,17 @@ impl Refiner {
             if known.is_some_and(|blur_px| blur_px <= most_px * f64::from(1u32 << (n - 1))) {
                 break;
             }
-            known = self.blur(fitter, level, n, grid, shown).or(known);
+            known = self.blur(fitter, level.into(), n, grid, shown).or(known);
         }
         known
     }
 
     /// The blur of a grid as `image`, a level of its pyramid, shows it, px of level 0: the median over
     /// the corners with the most room.
-    fn blur<T: Intensity>(
+    fn blur(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         level: usize,
         grid: &Grid,
         tags: &TagAreas,
@@ -313,10 +313,10 @@ impl Refiner {
     }
 
     /// The model in the largest window smaller than that of `room` that leaves no more than `limit`.
-    fn clean_fit<T: Intensity>(
+    fn clean_fit(
         &self,
         fitter: &mut CornerFitter,
-        image: &Gray<T>,
+        image: ImageView,
         corner: &GridCorner,
         room: Room,
         limit: f64,

@@ -97,7 +97,7 @@ impl<const N: usize> SaddleFinder<N> {
                     continue;
                 }
                 let fit = &self.fits[USUAL];
-                let Some(on_level) = fit.find(level, start) else {
+                let Some(on_level) = fit.find(level.into(), start) else {
                     continue;
                 };
                 let place = Pyramid::to_level_0(n, on_level.position);
@@ -157,7 +157,7 @@ impl<const N: usize> SaddleFinder<N> {
     }
 
     fn at_size(&self, pyramid: &Pyramid, start: [f64; 2], size: usize) -> Option<Saddle<N>> {
-        let corner = self.fits[size].find(&pyramid.levels()[0], start)?;
+        let corner = self.fits[size].find((&pyramid.levels()[0]).into(), start)?;
         self.describe(&pyramid.levels()[0], 0, &corner, size)
     }
 
@@ -179,10 +179,10 @@ impl<const N: usize> SaddleFinder<N> {
         let wider = &self.fits[size + 1];
         let moved = match kind::<N>() {
             // One step tells.
-            GridKind::Deltille => wider.step(image, position),
+            GridKind::Deltille => wider.step(image.into(), position),
             // That of a quadric overshoots where the squares are as narrow as its window.
             GridKind::Checker => wider
-                .find(image, position)
+                .find(image.into(), position)
                 .map(|corner| [0, 1].map(|i| corner.position[i] - position[i])),
         };
         moved.is_some_and(|[dx, dy]| dx.hypot(dy) < STABLE_PX)
@@ -228,7 +228,7 @@ impl<const N: usize> SaddleFinder<N> {
         let mut refused: Vec<([f64; 2], usize)> = Vec::new();
         starts.find_map(|start| {
             sizes.iter().find_map(|&size| {
-                let corner = self.fits[size].find(image, start)?;
+                let corner = self.fits[size].find(image.into(), start)?;
                 let position = corner.position;
                 let same = |&(other, with): &([f64; 2], usize)| {
                     with == size && distance(position, other) < STABLE_PX

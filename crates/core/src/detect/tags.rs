@@ -8,7 +8,7 @@ use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
 use super::tile_map::TileMap;
 use crate::family::Family;
 use crate::lattice::{GridKind, TagCells, Tile, Vertex};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 use crate::targets::{Panel, TagsIn};
 
 /// The contrast at the edges of a tile must be this part of that at its corners.
@@ -116,13 +116,7 @@ impl TagReader {
 
     /// Reads tiles of a grid whose corners are known: those that may carry a tag of a board that is not
     /// inverted, or of one that is; no more than `most` of them, spread over the grid.
-    pub fn read<T: Intensity>(
-        &self,
-        image: &Gray<T>,
-        grid: &SaddleGrid,
-        inverted: bool,
-        most: usize,
-    ) -> Read {
+    pub fn read(&self, image: ImageView, grid: &SaddleGrid, inverted: bool, most: usize) -> Read {
         let ClearDepth { dark, bright } = self.clear;
         let clear = if inverted { ClearDepth { dark: bright, bright: dark } } else { self.clear };
         let Some(light) = GridLight::of(image, grid, self.kind, clear) else {
@@ -168,9 +162,9 @@ impl TagReader {
         }
     }
 
-    fn read_tile<T: Intensity>(
+    fn read_tile(
         &self,
-        image: &Gray<T>,
+        image: ImageView,
         grid: &SaddleGrid,
         tile: Tile,
         light: &GridLight,
@@ -180,7 +174,7 @@ impl TagReader {
         let levels = light.levels(image, grid, tile, edges)?;
         let middle = self.kind.middle();
         let [_, contrast] = levels.at(middle);
-        if contrast < MIN_CONTRAST * corner_contrast::<T>(grid, tile) {
+        if contrast < MIN_CONTRAST * corner_contrast(image, grid, tile) {
             return None;
         }
         let width = self.model.width();
@@ -193,7 +187,7 @@ impl TagReader {
         let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
         // Cells of the colour around the border are 1, on inverted boards dark ones.
         let inverted = tile.is_dark() != (self.tags_in == TagsIn::Black);
-        let full = SATURATED * f64::from(T::FULL_SCALE);
+        let full = SATURATED * f64::from(image.full_scale());
         let brightest = 1.0 + GLARE + GLARE_NOISE * light.noise;
         let mut samples = Vec::with_capacity(self.model.points().len());
         for &point in self.model.points() {
@@ -240,8 +234,8 @@ fn mirror(cells: &TagCells) -> Vec<usize> {
 }
 
 /// Contrast between dark and bright around the corners of a tile, in units of the image.
-fn corner_contrast<T: Intensity>(grid: &SaddleGrid, tile: Tile) -> f64 {
+fn corner_contrast(image: ImageView, grid: &SaddleGrid, tile: Tile) -> f64 {
     let amplitudes = tile.vertices().filter_map(|v| grid.get(&v));
     let least = amplitudes.map(|p| p.amplitude).fold(f64::INFINITY, f64::min);
-    2.0 * least * f64::from(T::FULL_SCALE / crate::raster::PYRAMID_FULL_SCALE)
+    2.0 * least * f64::from(image.full_scale() / crate::raster::PYRAMID_FULL_SCALE)
 }

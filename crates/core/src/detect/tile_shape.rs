@@ -21,7 +21,7 @@ use std::collections::BTreeSet;
 use super::checker_tiles::{CheckerTiles, Point, Square, difference, parity};
 use super::detection::Grid;
 use crate::lattice::{GridKind, Vertex};
-use crate::raster::{Gray, Intensity};
+use crate::raster::ImageView;
 
 /// The least board, of 3 × 3 corners, has so many whole squares.
 const LEAST_SQUARES: usize = 4;
@@ -50,7 +50,7 @@ const SAMPLES: usize = 8;
 
 /// Whether a grid without tags is made of squares, with its corners refined. Of deltille grids it
 /// tells nothing.
-pub fn is_of_squares<T: Intensity>(image: &Gray<T>, grid: &Grid, may_have_tags: bool) -> bool {
+pub fn is_of_squares(image: ImageView, grid: &Grid, may_have_tags: bool) -> bool {
     if grid.kind == GridKind::Deltille {
         return true;
     }
@@ -74,7 +74,7 @@ struct Waves {
 
 impl Waves {
     /// Of the whole squares together.
-    fn of(tiles: &CheckerTiles<impl Intensity>) -> Option<Self> {
+    fn of(tiles: &CheckerTiles) -> Option<Self> {
         let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
         let mut mean = [[0.0; SAMPLES]; SAMPLES];
         for square in tiles.whole_squares() {
@@ -115,7 +115,7 @@ impl Waves {
 }
 
 /// Whether there are few single squares of the wrong colour among others.
-fn has_few_wrong_squares(tiles: &CheckerTiles<impl Intensity>, whole: usize) -> bool {
+fn has_few_wrong_squares(tiles: &CheckerTiles, whole: usize) -> bool {
     let Some(levels) = tiles.levels() else {
         return true;
     };
@@ -132,7 +132,7 @@ fn has_few_wrong_squares(tiles: &CheckerTiles<impl Intensity>, whole: usize) -> 
 }
 
 /// The square at a vertex, if none of its corners is known and some are on each of its sides.
-fn single(tiles: &CheckerTiles<impl Intensity>, vertex: Vertex) -> Option<Square> {
+fn single(tiles: &CheckerTiles, vertex: Vertex) -> Option<Square> {
     let at = |row, col| tiles.at(vertex + Vertex::new(row, col));
     let own = [(0, 0), (0, 1), (1, 0), (1, 1)];
     if own.into_iter().any(|(row, col)| at(row, col).is_some()) {

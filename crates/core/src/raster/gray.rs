@@ -1,3 +1,5 @@
+use super::View;
+
 /// A pixel type: 8 or 16 bits, signed for intermediate results, or a float.
 pub trait Intensity: Copy + Default + Send + Sync + PartialOrd + 'static {
     /// The value of white: 255, 65535, of a pyramid's levels 1023, or 1.
@@ -116,50 +118,24 @@ impl<T: Intensity> Gray<T> {
         self.data[y * self.width + x]
     }
 
+    /// All of it, without a copy.
+    #[inline]
+    pub fn view(&self) -> View<'_, T> {
+        View::of(self.width, self.height, &self.data)
+    }
+
     /// Bilinear interpolation at (x, y); positions outside take the nearest border value.
     ///
     /// An empty image reads 0.
     #[inline]
     pub fn bilinear(&self, x: f64, y: f64) -> f32 {
-        let inside =
-            x >= 0.0 && y >= 0.0 && x + 1.0 < self.width as f64 && y + 1.0 < self.height as f64;
-        if inside {
-            let (left, top) = (x as i32, y as i32);
-            let (fx, fy) = ((x - f64::from(left)) as f32, (y - f64::from(top)) as f32);
-            let first = top as usize * self.width + left as usize;
-            let blended = |pair: &[T]| pair[0].to_f32() * (1.0 - fx) + pair[1].to_f32() * fx;
-            let upper = blended(&self.data[first..first + 2]);
-            let lower = blended(&self.data[first + self.width..first + self.width + 2]);
-            return upper * (1.0 - fy) + lower * fy;
-        }
-        if self.data.is_empty() {
-            return 0.0;
-        }
-        let x = x.clamp(0.0, (self.width - 1) as f64);
-        let y = y.clamp(0.0, (self.height - 1) as f64);
-        let (x0, y0) = (x as usize, y as usize);
-        let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(self.height - 1));
-        let (fx, fy) = ((x - x0 as f64) as f32, (y - y0 as f64) as f32);
-        let upper = self.at(x0, y0).to_f32() * (1.0 - fx) + self.at(x1, y0).to_f32() * fx;
-        let lower = self.at(x0, y1).to_f32() * (1.0 - fx) + self.at(x1, y1).to_f32() * fx;
-        upper * (1.0 - fy) + lower * fy
+        self.view().bilinear(x, y)
     }
 
     /// [`Self::bilinear`] of a place that is known to lie in the image, less its last row and column.
     #[inline(always)]
     pub fn bilinear_inside(&self, x: f64, y: f64) -> f64 {
-        // By way of signed numbers, which processors convert at once.
-        let (left, top) = (x as i32, y as i32);
-        let (fx, fy) = ((x - f64::from(left)) as f32, (y - f64::from(top)) as f32);
-        let first = top as usize * self.width + left as usize;
-        let upper = &self.data[first..first + 2];
-        let lower = &self.data[first + self.width..first + self.width + 2];
-        let across = |pair: &[T]| {
-            let (a, b) = (pair[0].to_f32(), pair[1].to_f32());
-            a + fx * (b - a)
-        };
-        let (upper, lower) = (across(upper), across(lower));
-        f64::from(upper + fy * (lower - upper))
+        self.view().bilinear_inside(x, y)
     }
 
     /// The image in another pixel type.

@@ -9,6 +9,7 @@ mod coverage;
 mod gray;
 
 mod pyramid;
+mod view;
 
 pub use any_gray::{AnyGray, FileNotes};
 pub use bands::{bands, fill_bands};
@@ -16,3 +17,5 @@ pub use blur::gaussian;
 pub use coverage::Coverage;
 pub use gray::{Gray, Intensity};
 pub use pyramid::{PYRAMID_FULL_SCALE, Pyramid};
+pub(crate) use view::of_any;
+pub use view::{ImageView, View};

@@ -1,6 +1,6 @@
 use multiversion::multiversion;
 
-use super::{Gray, Intensity, fill_bands};
+use super::{Gray, ImageView, Intensity, View, fill_bands, of_any};
 
 /// Full scale of a pyramid's pixels: 10 bits leave room for sums of a dozen in 16-bit arithmetic.
 pub const PYRAMID_FULL_SCALE: f32 = 1023.0;
@@ -16,8 +16,9 @@ pub struct Pyramid {
 
 impl Pyramid {
     /// At most `count` levels; stops before a side would fall under `min_side` pixels.
-    pub fn new<T: Intensity>(image: &Gray<T>, count: usize, min_side: usize) -> Self {
-        let mut levels = vec![binomial(image)];
+    pub fn new<'a>(image: impl Into<ImageView<'a>>, count: usize, min_side: usize) -> Self {
+        let first = of_any!(image.into(), view => binomial(view));
+        let mut levels = vec![first];
         while levels.len() < count {
             let last = &levels[levels.len() - 1];
             if last.width().min(last.height()) / 2 < min_side {
@@ -47,7 +48,7 @@ impl Pyramid {
 }
 
 /// The 3×3 binomial (1 2 1)ᵀ(1 2 1)/16, borders repeated, in 10 bits.
-fn binomial<T: Intensity>(image: &Gray<T>) -> Gray<i16> {
+fn binomial<T: Intensity>(image: View<T>) -> Gray<i16> {
     let (width, height) = (image.width(), image.height());
     let mut out = Gray::new(width, height);
     if width == 0 || height == 0 {
@@ -163,7 +164,7 @@ mod tests {
         // The same picture in 16 bits, rounded to even numbers where the sum lies half-way.
         let bytes = Gray::from_fn(67, 41, |x, y| ((x * x * 31 + y * y * 17 + x * y) % 256) as u8);
         let words = bytes.map(|v| 257 * u16::from(v));
-        let (fast, general) = (binomial(&bytes), binomial(&words));
+        let (fast, general) = (binomial(bytes.view()), binomial(words.view()));
         let differ = fast.pixels().iter().zip(general.pixels()).filter(|(a, b)| a != b);
         assert!(differ.clone().all(|(a, b)| [(171, 170), (853, 852)].contains(&(*a, *b))));
         assert!(differ.count() < 5);
