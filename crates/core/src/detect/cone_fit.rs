@@ -81,7 +81,7 @@ impl<const N: usize> ConeFit<N> {
 
 /// The products of the kernels with bilinear samples of a window of `side` pixels, whose first
 /// pixel is (left, top), shifted by a fraction.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn products<const N: usize, T: Intensity>(
     kernels: &[[[f32; LANES]; N]],
     side: usize,

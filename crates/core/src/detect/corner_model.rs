@@ -889,7 +889,7 @@ impl<const K: usize> Corner<K> {
     }
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn fill_checker<const C: usize>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
@@ -912,7 +912,7 @@ fn fill_checker_with_halo<const C: usize, const JOINT: bool>(
     fill::<2, C, JOINT>(columns, pixels, window, corner, look, pattern);
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn fill_square<const C: usize>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
@@ -935,7 +935,7 @@ fn fill_square_with_halo<const C: usize, const JOINT: bool>(
     fill::<2, C, JOINT>(columns, pixels, window, corner, look, pattern);
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn fill_deltille<const C: usize>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
@@ -970,7 +970,7 @@ fn fill_deltille_with_ink<const C: usize>(
     fill::<3, C, false>(columns, pixels, window, corner, look, pattern);
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn fill_deltille_with_all<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
@@ -1130,7 +1130,7 @@ fn with_prior<const K: usize>(
 }
 
 /// Products of each two of the first N columns, over `count` pixels; only the upper half is filled.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn products<const N: usize>(columns: &mut Columns, count: usize) -> [[f64; N]; N] {
     let padded = count.next_multiple_of(LANES).min(MAX_PIXELS);
     for column in columns.iter_mut().take(N) {

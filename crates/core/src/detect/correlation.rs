@@ -232,7 +232,7 @@ impl Field {
     }
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn lagged_product(fields: &[f32], [pixels, room]: [usize; 2], offset: usize) -> f64 {
     let mut sums = [0.0f32; LANES];
     let mut first = 0;

@@ -241,7 +241,7 @@ impl ResponseRow {
 }
 
 /// R of deltille corners at places whose opposite samples are given.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn odd_row(
     ring: Ring,
     threshold: Threshold,
@@ -329,7 +329,7 @@ fn odd_block(pixels: Pixels) -> [f32; BLOCK] {
 }
 
 /// R of checkerboard corners at places whose opposite samples are given, and the centres.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn even_row(
     ring: Ring,
     centre: &[i16],
@@ -524,7 +524,7 @@ fn even_response(at: impl Fn(usize, usize) -> i16, centre: i16) -> f32 {
 
 /// Whether some of the middle one of three rows reach a threshold and none of the four places next to
 /// them is stronger.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn may_hold_maximum(rows: [&Vec<f32>; 3], places: Range<usize>, threshold: f32) -> bool {
     let part = |row: usize, from: usize| &rows[row][from..from + places.len()];
     let (above, below) = (part(0, places.start), part(2, places.start));

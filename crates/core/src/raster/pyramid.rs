@@ -75,7 +75,7 @@ fn binomial<T: Intensity>(image: View<T>) -> Gray<i16> {
 /// ```text
 ///     1023/4080 S = (S + S/340) / 4        S/340 = 771 (S + 1)/2¹⁸ for whole numbers
 /// ```
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn binomial_row_of_bytes(rows: [&[u8]; 3], columns: &mut [u16], out: &mut [i16]) {
     let width = out.len();
     let [above, here, below] = rows.map(|row| &row[..width]);
@@ -101,7 +101,7 @@ fn bytes_to_10_bits(sum: u16) -> i16 {
 /// 1.5·2²³: a float of this size has no bits behind the point.
 const ROUND: f32 = 12_582_912.0;
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn binomial_row<T: Intensity>(rows: [&[T]; 3], columns: &mut [f32], out: &mut [i16]) {
     let width = out.len();
     let [above, here, below] = rows.map(|row| &row[..width]);
@@ -133,7 +133,7 @@ fn half(image: &Gray<i16>) -> Gray<i16> {
     out
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn half_row([upper, lower]: [&[i16]; 2], out: &mut [i16]) {
     let blocks = upper.chunks_exact(2).zip(lower.chunks_exact(2));
     for (pixel, (u, l)) in out.iter_mut().zip(blocks) {

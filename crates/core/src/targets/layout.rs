@@ -452,7 +452,17 @@ mod tests {
             let spec = BoardSpec { grid, inverted, ..spec(rows, cols, edge) };
             let orientation = [Auto, Landscape, Portrait][orientation];
             let paper = PaperSpec { orientation, margin_mm: margin, ..PaperSpec::default() };
-            let Ok(target) = build(&spec, &paper) else { return Ok(()) };
+            let target = match build(&spec, &paper) {
+                Ok(target) => target,
+                Err(TargetError::DoesNotFit { fitting_edge_mm, .. }) => {
+                    // Ink wider than A0 less its margins does not fit, and much less does.
+                    let across = [edge * f64::from(cols), 0.86 * edge * f64::from(rows)];
+                    prop_assert!(across.iter().any(|&mm| mm > 600.0), "{across:?} do not fit A0");
+                    prop_assert!(fitting_edge_mm.is_none_or(|mm| f64::from(mm) < edge));
+                    return Ok(());
+                }
+                Err(error) => return Err(TestCaseError::fail(error.to_string())),
+            };
             let sheet = &target.sheets[0];
             let [left, lower, right, upper] = ink(&target);
             let margin = margin.max(LEAST_MARGIN_MM);
