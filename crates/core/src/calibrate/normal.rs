@@ -438,3 +438,155 @@ impl Problem {
         problem
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::calibrate::problem::{CameraUnknowns, Observation, PanelUnknowns, Prior};
+    use crate::calibrate::{PanelRef, Shape};
+    use crate::camera::{Camera, Pose};
+
+    /// Two cameras and two panels in three frames, every link open that may be, seen with noise; or one camera and a
+    /// panel that is bent.
+    fn problem(is_bent: bool) -> Problem {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let count = if is_bent { 1 } else { 2 };
+        let beside = |x: f64| Pose { translation: DVec3::new(x, 3.0, -2.0), ..Pose::IDENTITY };
+        let cameras = (0..count).map(|i| {
+            let camera = Camera::pinhole(640 + 80 * i, 480, 1.0);
+            let free = vec![true; camera.parameters().len()];
+            let free = free.iter().enumerate().map(|(i, _)| i < 6).collect();
+            let camera_from_rig = beside(-60.0 * f64::from(i));
+            CameraUnknowns { camera, free, camera_from_rig, pose_free: i > 0 }
+        });
+        let mut covariance = [[0.0; 6]; 6];
+        (0..6).for_each(|i| covariance[i][i] = if i < 3 { 1e-6 } else { 1e-2 });
+        let panels = (0..count).map(|i| {
+            let target_from_panel = beside(70.0 * f64::from(i));
+            let prior = Prior::new(beside(70.0 * f64::from(i) + 0.05), covariance);
+            let prior = prior.filter(|_| i > 0);
+            PanelUnknowns { target_from_panel, pose_free: i > 0, prior }
+        });
+        let frames = [[30.0, 40.0], [-50.0, 20.0], [10.0, -60.0]].map(|[x, y]| {
+            Pose::looking_at(DVec3::new(x, y, 300.0), DVec3::new(30.0, 20.0, 0.0), DVec3::Y)
+        });
+        let shape = is_bent.then(|| Shape {
+            middle_mm: DVec3::new(30.0, 20.0, 0.0),
+            reach_mm: 40.0,
+            coefficients_mm: std::array::from_fn(|i| 0.1 * i as f64),
+        });
+        let mut problem = Problem {
+            cameras: cameras.collect(),
+            frames: frames.to_vec(),
+            panels: panels.collect(),
+            blocks: Vec::new(),
+            shape,
+        };
+        for frame in 0..3 {
+            for (camera, panel) in (0..count).flat_map(|c| (0..count).map(move |p| (c, p))) {
+                let seen = (0..20).map(|k| Observation {
+                    row: k / 5,
+                    col: k % 5,
+                    panel_mm: DVec3::new(12.0 * f64::from(k % 5), 11.0 * f64::from(k / 5), 0.0),
+                    pixel: [0.0; 2],
+                    cov: None,
+                });
+                let panel = PanelRef::new(panel as usize, panel);
+                let block =
+                    Block { camera: camera as usize, frame, panel, observations: seen.collect() };
+                let residuals = problem.residuals(&block).expect("all corners are in sight");
+                let mut block = block;
+                for (seen, [x, y]) in block.observations.iter_mut().zip(residuals) {
+                    let noise = [0; 2].map(|_| rng.random_range(-0.5..0.5));
+                    seen.pixel = [noise[0] - x, noise[1] - y];
+                }
+                problem.blocks.push(block);
+            }
+        }
+        problem
+    }
+
+    fn whitening(problem: &Problem) -> Whitening {
+        let of = |block: &Block| {
+            (0..block.observations.len()).map(|k| [2.0, 0.1 * (k % 7) as f64, 1.5]).collect()
+        };
+        Whitening { blocks: problem.blocks.iter().map(of).collect(), common_px: None, sigma: 0.8 }
+    }
+
+    /// All residuals, whitened: those of the corners, and what is off from what was known beforehand.
+    fn residuals(problem: &Problem, whitening: &Whitening) -> DVector<f64> {
+        let mut all = Vec::new();
+        for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
+            for (residual, &w) in problem.residuals(block).unwrap().into_iter().zip(weights) {
+                all.extend(Whitening::apply(w, residual));
+            }
+        }
+        for panel in &problem.panels {
+            if let Some(prior) = &panel.prior {
+                let (off, information) = prior.off(&panel.target_from_panel);
+                let half = (information * whitening.sigma.powi(2)).cholesky().unwrap().l();
+                all.extend((half.transpose() * -off).iter());
+            }
+        }
+        DVector::from_vec(all)
+    }
+
+    fn step(layout: &Layout, values: &DVector<f64>) -> Step {
+        let (shared, frames) = values.as_slice().split_at(layout.count);
+        let frames = frames.chunks_exact(6).map(Vector6::from_column_slice).collect();
+        Step { shared: DVector::from_column_slice(shared), frames }
+    }
+
+    /// Eliminating the frames changes nothing, and every derivative is that of the residuals: cost, step and
+    /// covariances are those of the whole equations, made from differences.
+    #[test]
+    fn equations_are_those_of_the_residuals_differences() {
+        for is_bent in [false, true] {
+            let problem = problem(is_bent);
+            let (layout, whitening) = (Layout::of(&problem), whitening(&problem));
+            let normal = Normal::of(&problem, &layout, &whitening, Loss::Squared).unwrap();
+            let here = residuals(&problem, &whitening);
+            let count = layout.count + 6 * problem.frames.len();
+            let column = |i: usize| {
+                // A ten-millionth of a pixel, about, whatever the unit.
+                let unit = DVector::from_fn(count, |j, _| f64::from(u8::from(i == j)));
+                let at = |by: f64| {
+                    residuals(&problem.after(&layout, &step(&layout, &(&unit * by))), &whitening)
+                };
+                let size = 1e-4 / (at(1e-6) - &here).norm().max(1e-9) * 1e-6;
+                (at(size) - at(-size)) / (2.0 * size)
+            };
+            let columns: Vec<DVector<f64>> = (0..count).map(column).collect();
+            let jacobian = DMatrix::from_columns(&columns);
+            let whole = jacobian.tr_mul(&jacobian);
+            let scale = DVector::from_fn(count, |i, _| whole[(i, i)].sqrt());
+            let scaled = DMatrix::from_fn(count, count, |i, j| whole[(i, j)] / scale[i] / scale[j]);
+            let inverse = scaled.cholesky().expect("nothing is open").inverse();
+            let right = jacobian.tr_mul(&-&here).component_div(&scale);
+            let expected = (&inverse * right).component_div(&scale);
+
+            assert!((normal.cost - here.norm_squared()).abs() < 1e-9 * normal.cost);
+            let found = normal.step(0.0).unwrap();
+            let frames = found.frames.iter().flat_map(|frame| frame.iter().copied());
+            let found = DVector::from_iterator(count, found.shared.iter().copied().chain(frames));
+            for i in 0..count {
+                let deviation = inverse[(i, i)].sqrt() / scale[i];
+                let off = (found[i] - expected[i]).abs();
+                assert!(off < 1e-4 * deviation, "unknown {i}: {off} of {deviation}");
+            }
+            let covariances = normal.covariances().unwrap();
+            assert!(covariances.loose.is_empty());
+            for i in 0..count {
+                let found = match i.checked_sub(layout.count) {
+                    None => covariances.shared[(i, i)],
+                    Some(k) => covariances.frames[k / 6][(k % 6, k % 6)],
+                };
+                let ratio = found / inverse[(i, i)] * scale[i] * scale[i];
+                assert!((ratio - 1.0).abs() < 1e-3, "variance of unknown {i}: {ratio}");
+            }
+        }
+    }
+}
