@@ -497,3 +497,46 @@ fn parallel_to_neighbours<const N: usize>(
         (0..N).all(|k| turn(along(grown, k), along(other, k)).abs() <= 2.0 * MAX_CHORD_RAD)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tiling::{CHECKER, DELTILLE};
+    use super::*;
+    use crate::lattice::GridKind;
+
+    /// A lattice of rows and columns about a place, with edges of this length, px.
+    fn lattice(kind: GridKind, side: i32, [x, y]: [f64; 2], edge_px: f64) -> SaddleGrid {
+        let corner = |row: i32, col: i32| {
+            let [u, v] = kind.position(f64::from(row), f64::from(col));
+            let position = [x + edge_px * u, y - edge_px * v];
+            (Vertex::new(row, col), PlacedSaddle { position, amplitude: 100.0 })
+        };
+        (0..side).flat_map(|row| (0..side).map(move |col| corner(row, col))).collect()
+    }
+
+    /// Cells of a tag lie in one tile of a grid around them; what lies beside a grid, or across its edges, stays.
+    #[test]
+    fn only_what_lies_in_one_tile_of_a_larger_grid_is_dropped() {
+        fn check<const N: usize>(kind: GridKind) {
+            let board = lattice(kind, 6, [100.0, 900.0], 100.0);
+            // The middle of a tile, of an edge, and of nothing.
+            let [in_tile, on_edge, beside] = match kind {
+                GridKind::Deltille => [[245.0, 875.0], [250.0, 905.0], [1500.0, 500.0]],
+                GridKind::Checker => [[240.0, 870.0], [240.0, 905.0], [1500.0, 500.0]],
+            };
+            let of_tag = |at| lattice(kind, 3, at, 5.0);
+            let grids = vec![board.clone(), of_tag(in_tile), of_tag(on_edge), of_tag(beside)];
+            let kept = without_tag_cells::<N>(grids);
+            assert_eq!(kept, [board, of_tag(on_edge), of_tag(beside)], "{kind:?}");
+        }
+        check::<DELTILLE>(GridKind::Deltille);
+        check::<CHECKER>(GridKind::Checker);
+    }
+
+    #[test]
+    fn a_grid_alone_is_never_dropped() {
+        let board = lattice(GridKind::Deltille, 4, [10.0, 90.0], 20.0);
+        assert_eq!(without_tag_cells::<DELTILLE>(vec![board.clone()]), [board]);
+        assert_eq!(without_tag_cells::<DELTILLE>(Vec::new()), []);
+    }
+}

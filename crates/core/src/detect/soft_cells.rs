@@ -340,3 +340,123 @@ pub fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [[f64; 2]; 2]) -> Option<([f64; 3
     let mapped = inverse * covariance * inverse.transpose();
     Some(([mapped[(0, 0)], mapped[(0, 1)], mapped[(1, 1)]], determinant))
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::lattice::Dimension;
+
+    const MARGIN_BITS: f64 = 0.5;
+    const INSET_BITS: f64 = 1.5;
+
+    /// Whether a polygon of either winding has a point.
+    fn has(polygon: &[[f64; 2]], [u, v]: [f64; 2]) -> bool {
+        let side = |i: usize| {
+            let (a, b) = (polygon[i], polygon[(i + 1) % polygon.len()]);
+            (b[0] - a[0]) * (v - a[1]) - (b[1] - a[1]) * (u - a[0]) > 0.0
+        };
+        (1..polygon.len()).all(|i| side(i) == side(0))
+    }
+
+    /// What a tag shows at a place of its tile: 1 for white.
+    fn drawn(cells: &TagCells, word: u64, [u, v]: [f64; 2]) -> f32 {
+        let (width, margin) = (cells.width(INSET_BITS), MARGIN_BITS);
+        let far = match cells.kind() {
+            GridKind::Deltille => width * (1.0 - u - v),
+            GridKind::Checker => width * (1.0 - u).min(1.0 - v),
+        };
+        if (width * u.min(v)).min(far) < margin {
+            return 1.0;
+        }
+        let bit =
+            (0..cells.dimension().bits()).find(|&bit| has(&cells.corners(bit, INSET_BITS), [u, v]));
+        bit.map_or(0.0, |bit| f32::from(u8::from(word >> bit & 1 == 1)))
+    }
+
+    /// The samples of a tag under a blur that is the same in all directions on the print, drawn at random, and the blur.
+    fn seen(
+        model: &CellModel,
+        cells: &TagCells,
+        word: u64,
+        bits: f64,
+        rng: &mut impl Rng,
+    ) -> Vec<Sample> {
+        let (width, noise) = (cells.width(INSET_BITS), StandardNormal);
+        let share = |&[u, v]: &[f64; 2], rng: &mut _| {
+            let mut sum = 0.0;
+            for _ in 0..400 {
+                let [a, b]: [f64; 2] = [0; 2].map(|_| noise.sample(rng));
+                let [du, dv] = match cells.kind() {
+                    // Steps along u and v lie 60° apart.
+                    GridKind::Deltille => [a - b / 3f64.sqrt(), 2.0 * b / 3f64.sqrt()],
+                    GridKind::Checker => [a, b],
+                };
+                sum += drawn(cells, word, [u + du * bits / width, v + dv * bits / width]);
+            }
+            Sample::Share(sum / 400.0)
+        };
+        model.points().iter().map(|point| share(point, rng)).collect()
+    }
+
+    fn blur(kind: GridKind, bits: f64) -> TileBlur {
+        let variance = bits * bits;
+        let covariance = match kind {
+            GridKind::Deltille => [4.0 / 3.0, -2.0 / 3.0, 4.0 / 3.0].map(|of| of * variance),
+            GridKind::Checker => [variance, 0.0, variance],
+        };
+        TileBlur { covariance, area_px2: 16.0, noise: 0.05 }
+    }
+
+    /// What is drawn and blurred without this model is read by it: all cells under a weak blur, and under a strong one no
+    /// more are wrong than the odds say.
+    #[test]
+    fn cells_are_as_often_wrong_as_their_odds_say() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        for kind in [GridKind::Deltille, GridKind::Checker] {
+            let cells = TagCells::of(kind, Dimension::from_bits(25).unwrap());
+            let model = CellModel::new(&cells, INSET_BITS, MARGIN_BITS);
+            for bits in [0.25, 0.8, 1.1] {
+                let mixing = model.mixing(blur(kind, bits), &mut Mixings::new()).unwrap();
+                let (mut wrong, mut expected) = (0, 0.0);
+                for _ in 0..40 {
+                    let word = rng.random::<u64>() & cells.dimension().mask();
+                    let odds = mixing.half_odds(&seen(&model, &cells, word, bits, &mut rng));
+                    for (bit, half) in odds.iter().enumerate() {
+                        wrong += usize::from((*half > 0.0) != (word >> bit & 1 == 1));
+                        expected += 1.0 / (1.0 + (2.0 * half.abs()).exp());
+                    }
+                }
+                assert!(
+                    wrong as f32 <= 1.2 * expected,
+                    "{kind:?}, {bits}: {wrong}, expected {expected}"
+                );
+                assert!(bits > 0.3 || wrong == 0, "{kind:?}: {wrong} under hardly any blur");
+            }
+        }
+    }
+
+    /// Erased samples say nothing, and a bound says no more than what lies at it.
+    #[test]
+    fn what_is_not_seen_is_not_known() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let cells = TagCells::of(GridKind::Deltille, Dimension::from_bits(16).unwrap());
+        let model = CellModel::new(&cells, INSET_BITS, MARGIN_BITS);
+        let mixing = model.mixing(blur(cells.kind(), 0.4), &mut Mixings::new()).unwrap();
+        let samples = seen(&model, &cells, 0b1010_0110_0011_0101, 0.4, &mut rng);
+        let nothing = mixing.half_odds(&vec![Sample::Erased; samples.len()]);
+        assert!(nothing.iter().all(|half| half.abs() < 1e-6), "{nothing:?}");
+        let at_least = |sample: &Sample| match *sample {
+            Sample::Share(share) => Sample::AtLeast(share),
+            other => other,
+        };
+        let bounds: Vec<Sample> = samples.iter().map(at_least).collect();
+        let (seen, bounded) = (mixing.half_odds(&samples), mixing.half_odds(&bounds));
+        let sure =
+            |odds: &[f32]| odds.iter().filter(|half| **half < 0.0).map(|half| -half).sum::<f32>();
+        assert!(sure(&bounded) < sure(&seen), "black is not known from a bound below");
+    }
+}
