@@ -53,3 +53,8 @@ pub mod family {
 pub mod cli;
 #[cfg(feature = "experiment")]
 pub mod experiment;
+
+/// The program in the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -6,7 +6,7 @@
 //!
 //! Fields of files name theirs, so that a number outside it is refused with the name of the field:
 //!
-//! ```ignore
+//! ```text
 //! #[serde(deserialize_with = "quantity::place_mm::de")]
 //! pub target_mm: [f64; 3],
 //! ```
