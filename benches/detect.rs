@@ -11,9 +11,10 @@ use deltille::camera::{Camera, Pose};
 use deltille::clock;
 use deltille::detect::{Detector, DetectorConfig, Refinement};
 use deltille::family::Family;
+use deltille::lattice::GridKind;
 use deltille::raster::Gray;
 use deltille::synth::{Light, scene_of_sheet};
-use deltille::targets::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
 use glam::DVec3;
 
 /// A board of 10 × 11 corners with tags, seen at 35°.

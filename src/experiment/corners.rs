@@ -16,9 +16,10 @@ use rayon::prelude::*;
 
 use super::bound;
 use crate::detect::{RefineStatus, Refinement, Refiner, Tone};
+use crate::lattice::GridKind;
 use crate::raster::Gray;
+use crate::statistics::quantile;
 use crate::synth::SimulatedCorner;
-use crate::targets::GridKind;
 
 /// Side of the window that all methods read, px: the reference's 11×11 fit on smoothed pixels.
 pub const WINDOW_PX: usize = 21;
@@ -199,9 +200,8 @@ pub fn point(
     let rows = METHODS.iter().enumerate().map(|(m, &method)| {
         let outcomes = || samples.iter().flat_map(|sample| sample.outcomes[m]);
         let mut errors: Vec<f64> = outcomes().filter_map(|o| Some(o?.error_px)).collect();
-        errors.sort_by(f64::total_cmp);
-        let quantile =
-            |q: f64| errors.get((q * errors.len() as f64) as usize).copied().unwrap_or(f64::NAN);
+        let middle = mean(&errors);
+        let mut quantile = |part: f64| quantile(&mut errors, part).unwrap_or(f64::NAN);
         let nees: Vec<f64> = outcomes().filter_map(|o| o?.nees).collect();
         Row {
             kind,
@@ -209,7 +209,7 @@ pub fn point(
             value,
             method,
             fits: 4 * images,
-            error_px: [mean(&errors), quantile(0.5), quantile(0.95)],
+            error_px: [middle, quantile(0.5), quantile(0.95)],
             bound_px,
             failed: 4 * images - errors.len(),
             far: errors.iter().filter(|&&error| error > FAR_PX).count(),

@@ -9,7 +9,7 @@ use super::corners::{METHODS, Method, Row, Sweep, name};
 use crate::artwork::text;
 use crate::export::GENERATOR;
 use crate::export::kind::signed_png;
-use crate::targets::GridKind;
+use crate::lattice::GridKind;
 
 /// Size of a panel's axes and the room around it, in user units.
 const PANEL: [f64; 2] = [300.0, 230.0];

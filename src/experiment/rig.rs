@@ -27,10 +27,11 @@ use crate::calibrate::{
 use crate::camera::{BrownConrady, Camera, Lens, Pose};
 use crate::detect::{Detection, Detector, DetectorConfig};
 use crate::family::{Family, FamilyError};
+use crate::lattice::GridKind;
 use crate::synth::{Light, Scene, scene_of_target};
 use crate::targets::{
-    BoardSpec, GridKind, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, Target,
-    TargetError, TargetSpec,
+    BoardSpec, ListFormat, ListedSpec, PanelPose, SolidShape, SolidSpec, Target, TargetError,
+    TargetSpec,
 };
 
 /// Cameras of the rig.

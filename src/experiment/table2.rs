@@ -10,8 +10,8 @@ use crate::calibrate::{
     poses, views,
 };
 use crate::detect::{Detector, DetectorConfig, Refinement};
+use crate::lattice::GridKind;
 use crate::photograph::{self, ImageError};
-use crate::targets::GridKind;
 
 /// Rows and columns of the board of the paper's sequence, and its edges.
 const SIZE: [u32; 2] = [10, 11];

@@ -12,6 +12,7 @@ use super::document::{MAX_INK_ERROR, Page};
 use super::fit::AffineMap;
 use deltille_core::family::{Decoder, Family};
 use deltille_core::lattice::{GridKind, TagCells, Tile, Vertex};
+use deltille_core::statistics::median;
 use deltille_core::targets::{Panel, Placement, TagPlacement};
 
 /// Pixels nearer than this to a change of colour are left out, px: the half diagonal of a pixel
@@ -178,13 +179,12 @@ impl PlacedPanel<'_> {
             let centre = [0, 1].map(|i| a[i] + u * (b[i] - a[i]) + v * (c[i] - a[i]));
             inks[usize::from(tile.is_dark() != self.panel.inverted)].push(self.page.ink(centre));
         }
-        let tone = |inks: &mut Vec<f64>| {
-            inks.sort_by(f64::total_cmp);
-            let median = *inks.get(inks.len() / 2)?;
+        let tone = |inks: &Vec<f64>| {
+            let median = median(inks.clone())?;
             let alike = inks.iter().filter(|ink| (*ink - median).abs() <= TONE_SPREAD).count();
             (10 * alike >= 9 * inks.len()).then_some(median)
         };
-        let [white, black] = &mut inks;
+        let [white, black] = &inks;
         Some([tone(white)?, tone(black)?])
     }
 

@@ -10,11 +10,10 @@ use deltille::export::mesh::TexturedMesh;
 use deltille::export::{detection, dxf, gltf, obj as obj_writer, pdf as pdf_writer};
 use deltille::export::{png, stl as stl_writer, svg as svg_writer};
 use deltille::family::Family;
+use deltille::lattice::GridKind;
 use deltille::photograph;
 use deltille::raster::{AnyGray, Gray};
-use deltille::targets::{
-    BoardSpec, GridKind, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec,
-};
+use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec};
 use image::{DynamicImage, GrayImage, ImageFormat};
 use tempfile::TempDir;
 

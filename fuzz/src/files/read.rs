@@ -7,9 +7,10 @@ use deltille::cli::deltille::settings::Settings;
 use deltille::export::dsc::{self, Dialect};
 use deltille::export::{calibration, csv, detection as detections, obj, orpc};
 use deltille::family::Family;
+use deltille::lattice::GridKind;
 use deltille::limits::Limits;
 use deltille::photograph;
-use deltille::targets::{GridKind, Target};
+use deltille::targets::Target;
 use deltille::verify::Verifier;
 use glam::DVec3;
 

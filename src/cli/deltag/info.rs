@@ -2,7 +2,8 @@ use std::process::ExitCode;
 
 use crate::cli::output::say;
 use crate::family::{Family, TagWords, bounds::bounds};
-use crate::targets::{BoardSpec, GridKind, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use crate::lattice::GridKind;
+use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 
 #[derive(clap::Args)]
 pub(super) struct Args {

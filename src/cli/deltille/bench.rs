@@ -13,6 +13,7 @@ use crate::cli::output::say;
 use crate::cli::run::Interrupted;
 use crate::clock;
 use crate::photograph;
+use crate::statistics::quantile;
 
 /// Arguments of `deltille bench`.
 #[derive(clap::Args)]
@@ -85,9 +86,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Median, 5 % and 95 % quantile, nearest ranks; zeros without values.
+/// Median, 5 % and 95 % quantile; zeros without values.
 fn quantiles(values: &mut [f64]) -> [f64; 3] {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1) as f64;
-    [0.5, 0.05, 0.95].map(|share| values.get((share * last).round() as usize).map_or(0.0, |&v| v))
+    [0.5, 0.05, 0.95].map(|part| quantile(values, part).unwrap_or(0.0))
 }

@@ -13,7 +13,8 @@ use crate::cli::output::{self, tell};
 use crate::export::dsc;
 use crate::export::kind::Kind;
 use crate::family::{self, FamilyError, FamilyFileError, square_names};
-use crate::targets::{GridKind, Target, TargetSpec, id_range};
+use crate::lattice::GridKind;
+use crate::targets::{Target, TargetSpec, id_range};
 
 /// Arguments of both.
 #[derive(clap::Args)]

@@ -9,8 +9,9 @@ use super::limits::ImageLimits;
 use super::refine::Method;
 use super::target_file;
 use crate::detect::{Detector, DetectorConfig, Ink, Tone};
+use crate::lattice::GridKind;
 use crate::limits::Limits;
-use crate::targets::{GridKind, Target};
+use crate::targets::Target;
 
 /// Options that say what to look for.
 #[derive(clap::Args)]

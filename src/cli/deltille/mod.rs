@@ -26,7 +26,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::targets::{GridKind, SolidShape};
+use crate::lattice::GridKind;
+use crate::targets::SolidShape;
 
 /// Make, detect and verify deltille targets.
 #[derive(Parser)]

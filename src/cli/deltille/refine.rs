@@ -11,10 +11,10 @@ use super::limits::ImageLimits;
 use crate::cli::output::{self, Overwrite};
 use crate::detect::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner, Tone};
 use crate::export::csv;
+use crate::lattice::GridKind;
 use crate::limits::Limits;
 use crate::photograph;
 use crate::raster::AnyGray;
-use crate::targets::GridKind;
 
 /// Corners that are refined at a time: as many as of one picture.
 const MOST_SEEDS: usize = 20_000;

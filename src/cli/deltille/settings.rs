@@ -11,10 +11,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::export::GENERATOR;
 use crate::export::dsc::Dialect;
+use crate::lattice::GridKind;
 use crate::limits;
 use crate::targets::{
-    BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, GridKind, MOST_ROWS, PaperSpec, SIDES, TagSpec,
-    TagsIn, largest_edge_mm, parse_length_mm,
+    BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, MOST_ROWS, PaperSpec, SIDES, TagSpec, TagsIn,
+    largest_edge_mm, parse_length_mm,
 };
 
 /// Edge where neither an edge nor a paper is given, mm: that of the published board, which fits

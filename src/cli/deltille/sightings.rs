@@ -13,9 +13,10 @@ use crate::cli::output::tell;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::{self, Print, Sheet};
 use crate::export::detection;
+use crate::lattice::GridKind;
 use crate::limits::{Limits, ReadError};
 use crate::quantity::{edge_mm, print_scale};
-use crate::targets::{GridKind, Target, TargetSpec, parse_length_mm};
+use crate::targets::{Target, TargetSpec, parse_length_mm};
 use crate::words::counted;
 
 /// Detections and what they show.

@@ -46,7 +46,8 @@ use crate::clock;
 use crate::detect::{Detector, DetectorConfig};
 use crate::export::{ExportError, atomic};
 use crate::family::Family;
-use crate::targets::{BoardSpec, GridKind, PaperSpec, Target, TargetSpec};
+use crate::lattice::GridKind;
+use crate::targets::{BoardSpec, PaperSpec, Target, TargetSpec};
 use crate::verify::DocumentError;
 
 /// Why a page cannot be photographed.

@@ -9,7 +9,8 @@ use super::paths::Vertices;
 use crate::artwork;
 use crate::export::pdf;
 use crate::family::Family;
-use crate::targets::{GridKind, Target};
+use crate::lattice::GridKind;
+use crate::targets::Target;
 use crate::verify::Document;
 
 /// Resolution asked for, px/mm: 1200 dpi. Large pages come coarser.

@@ -13,6 +13,7 @@ use super::score::Score;
 use crate::export::kind::signed_png;
 use crate::json;
 use crate::raster::Gray;
+use crate::statistics::quantile;
 
 /// Schema of the result's JSON.
 const SCHEMA: &str = "deltille/photographs/1";
@@ -98,11 +99,6 @@ impl Row {
 
 fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
-fn quantile(values: &mut [f64], part: f64) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get((part * values.len() as f64) as usize).copied()
 }
 
 /// The result as a table for people.

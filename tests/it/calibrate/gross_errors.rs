@@ -10,7 +10,8 @@ use deltille::calibrate::{
 };
 use deltille::camera::{Camera, Lens, Pose};
 use deltille::family::Family;
-use deltille::targets::{BoardSpec, GridKind, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use deltille::lattice::GridKind;
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use glam::{DQuat, DVec3};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use deltille::detect::{Detection, Detector, DetectorConfig};
+use deltille::lattice::GridKind;
 use deltille::raster::{Gray, gaussian};
-use deltille::targets::GridKind;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -6,8 +6,9 @@ use deltille::calibrate::{Loss, Model, Options, Reference, Weights, calibrate, v
 use deltille::camera::{BrownConrady, Camera, KannalaBrandt, Lens};
 use deltille::detect::{Detector, DetectorConfig};
 use deltille::family::Family;
+use deltille::lattice::GridKind;
 use deltille::synth::{Light, scene_of_sheet};
-use deltille::targets::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -34,7 +34,7 @@ impl Board {
         let tags = TagSpec::default();
         let family = Family::shipped(&tags.family).unwrap();
         let bits_across = f64::from(family.dimension().rows()) + 3.0 * tags.border_bits;
-        let plain = BoardSpec::new(deltille::targets::GridKind::Deltille, 6, 7, EDGE_MM);
+        let plain = BoardSpec::new(deltille::lattice::GridKind::Deltille, 6, 7, EDGE_MM);
         let spec = TargetSpec::Board(BoardSpec { inverted, ..plain });
         let target =
             Target::build("board", &spec, Some(&family), Some(&PaperSpec::default())).unwrap();

@@ -8,9 +8,9 @@ use crate::common::data;
 use deltille::detect::{Detector, DetectorConfig, Grid, InkEstimate};
 use deltille::export::dsc;
 use deltille::family::Family;
+use deltille::lattice::GridKind;
 use deltille::photograph;
 use deltille::raster::Gray;
-use deltille::targets::GridKind;
 use deltille::verify::Document;
 use image::imageops::{self, FilterType};
 

@@ -4,9 +4,10 @@ use deltille::artwork;
 use deltille::camera::{Camera, Pose};
 use deltille::detect::{Detection, Detector, DetectorConfig, ReasonKind};
 use deltille::family::Family;
+use deltille::lattice::GridKind;
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, scene_of_sheet};
-use deltille::targets::{BoardSpec, GridKind, PaperSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
 use glam::DVec3;
 
 struct Board {

@@ -8,9 +8,9 @@ use deltille::detect::{Detection, Grid, GridCorner};
 use deltille::export::calibration::{self, Print};
 use deltille::export::{camera, detection, dsc, orpc};
 use deltille::family::Family;
+use deltille::lattice::GridKind;
 use deltille::targets::{
-    BoardSpec, ClosedMesh, GridKind, PaperSpec, Polyhedron, SolidShape, SolidSpec, Target,
-    TargetSpec,
+    BoardSpec, ClosedMesh, PaperSpec, Polyhedron, SolidShape, SolidSpec, Target, TargetSpec,
 };
 use rand::SeedableRng;
 use serde_json::Value;

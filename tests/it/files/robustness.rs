@@ -4,11 +4,10 @@ use deltille::camera::Camera;
 use deltille::detect::{Detection, Detector, DetectorConfig};
 use deltille::export::{detection, dsc, obj};
 use deltille::family::Family;
+use deltille::lattice::GridKind;
 use deltille::photograph;
 use deltille::raster::{Gray, ImageView};
-use deltille::targets::{
-    BoardSpec, GridKind, PaperSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec,
-};
+use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use deltille::verify::Document;
 use proptest::prelude::*;
 

@@ -2,10 +2,10 @@
 
 use deltille::export::dsc::{self, Dialect, DscError};
 use deltille::family::Family;
-use deltille::lattice::Vertex;
+use deltille::lattice::{GridKind, Vertex};
 use deltille::targets::{
-    BoardSpec, Corner, GridKind, ListFormat, Outline, Panel, PanelPose, TagPlacement, TagsIn,
-    Target, TargetSpec,
+    BoardSpec, Corner, ListFormat, Outline, Panel, PanelPose, TagPlacement, TagsIn, Target,
+    TargetSpec,
 };
 use proptest::prelude::*;
 

@@ -24,7 +24,8 @@ mod window;
 use kurbo::BezPath;
 
 use crate::family::Family;
-use crate::targets::{GridKind, LineKind, Panel, Placement, SheetText, Target};
+use crate::lattice::GridKind;
+use crate::targets::{LineKind, Panel, Placement, SheetText, Target};
 
 pub use atlas::Atlas;
 pub use board::drawn_lines;

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 use super::problem::Observation;
 use super::view::{LEAST_CORNERS, Sighting, View};
-use super::weights::median;
+use crate::statistics::median;
 
 /// How far the middle of three may lie from the middle, as a part of the whole: the two ways are then as
 /// 5 to 3 at most, which a board shows only where it nearly touches the lens. A label that is off
@@ -98,7 +98,7 @@ fn agreeing_triples(corners: &[Observation]) -> Vec<[usize; 3]> {
         }
     }
     found.retain(|(_, step_mm, _)| *step_mm <= LONGEST_STEP * shortest_mm);
-    let usual = median(found.iter().map(|(_, _, length)| *length).collect());
+    let usual = median(found.iter().map(|(_, _, length)| *length).collect()).unwrap_or(0.0);
     found.retain(|(_, _, length)| *length <= LONGEST_TRIPLE * usual);
     found.into_iter().map(|(triple, ..)| triple).collect()
 }

@@ -3,8 +3,8 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 use crate::detect::Grid;
-use crate::lattice::Vertex;
-use crate::targets::{GridKind, zigzag_vertices};
+use crate::lattice::{GridKind, Vertex};
+use crate::targets::zigzag_vertices;
 
 /// An untagged board that no file describes. Its labels may differ between views by a motion of the
 /// lattice, which the pose of the view takes up.

@@ -31,9 +31,10 @@ use super::rig::middle;
 use super::settle::{Settled, deviations, residuals, scale, settle, with_gross_errors};
 use super::stranger::Opinions;
 use super::view::{LEAST_CORNERS, Sighting, View};
-use super::weights::{Weights, Whitening, median};
+use super::weights::{Weights, Whitening};
 use super::wrong::{limit_px, median_px};
 use crate::camera::Pose;
+use crate::statistics::median;
 
 /// The loss while the scale is walked down, as a part of the usual one: 1.5 deviations. A loss that
 /// lets go later comes to rest between two crowds of corners.
@@ -158,7 +159,7 @@ impl Gross {
                 frames.insert(frame, WrongFrame::OnlyWrongPanels);
             }
         }
-        let usual_px = median(medians);
+        let usual_px = median(medians).unwrap_or(0.0);
         Self { problem, left_out, frames, usual_px, panels, off_px, some_stand_out }
     }
 
@@ -355,6 +356,7 @@ fn place_anew(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRef>) {
             blocks.flat_map(|block| block.observations.iter().map(move |seen| (block, seen)));
         let residuals = seen.map(|(block, seen)| problem.residual(block, seen));
         median(residuals.map(|r| r.map_or(f64::INFINITY, |[x, y]| x.hypot(y))).collect())
+            .unwrap_or(0.0)
     };
     let blocks = problem.blocks.iter().filter(is_right);
     let Some(largest) = blocks.clone().max_by_key(|block| block.observations.len()) else { return };

@@ -8,8 +8,9 @@ use super::minimise::{Until, minimise};
 use super::problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem};
 use super::settle::scale;
 use super::view::Sighting;
-use super::weights::{Weights, Whitening, median};
+use super::weights::{Weights, Whitening};
 use crate::camera::{Camera, Pose};
+use crate::statistics::median;
 
 /// Corners that determine a homography.
 const LEAST_RAYS: usize = 4;
@@ -34,7 +35,7 @@ pub fn estimate_pose(camera: &Camera, panels: &[Pose], sightings: &[Sighting]) -
         let (least, most) = medians
             .iter()
             .fold((f64::INFINITY, 0.0), |(least, most), &off| (off.min(least), off.max(most)));
-        let error = median(medians);
+        let error = median(medians).unwrap_or(0.0);
         if best.as_ref().is_none_or(|(least, _)| error < *least) {
             best = Some((error, pose));
         }
@@ -52,7 +53,7 @@ fn median_off_px(camera: &Camera, panels: &[Pose], sighting: &Sighting, pose: &P
         let at = camera.project(camera_from_panel.apply(seen.panel_mm));
         at.map_or(f64::INFINITY, |[x, y]| (seen.pixel[0] - x).hypot(seen.pixel[1] - y))
     });
-    median(off.collect())
+    median(off.collect()).unwrap_or(0.0)
 }
 
 /// The pose that is found from that of one panel.

@@ -10,9 +10,10 @@ use super::solution::{Corner, Solution};
 use super::solve::{self, Options, calibrated};
 use super::start::evenly;
 use super::view::View;
-use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA, Weights, median};
+use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA, Weights};
 use super::{Model, SHAPE_COEFFICIENTS};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
+use crate::statistics::median;
 
 /// Where detections explain at least this part of the squares of the residuals, nothing is sought: what is
 /// left beside them does not matter, whatever it is.
@@ -153,7 +154,7 @@ fn gain(solution: &Solution, other: &Solution, instead: Instead) -> Option<f64> 
         let of = |corner: &Corner| corner.residual.iter().map(|r| r * r).sum::<f64>();
         solution.views.iter().flat_map(|view| &view.corners).map(of).collect()
     };
-    let variance = median(squares(other)) / MEDIAN_OF_CHI_SQUARED_2;
+    let variance = median(squares(other)).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2;
     let most = OUTLIER_SIGMA * OUTLIER_SIGMA * variance;
     let mean = |solution: &Solution| {
         let squares = squares(solution);

@@ -17,8 +17,9 @@ use super::shape::{self, BoardShape, Shape};
 use super::solution::{Corner, Parameter, Solution, ViewSolution, rms_px};
 use super::start::first_camera;
 use super::view::{MIRRORED, View};
-use super::weights::{Weights, median};
+use super::weights::Weights;
 use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Pose};
+use crate::statistics::median;
 
 /// Two views of a plane determine focal lengths and principal point if nothing is off; a third
 /// shows whether something is.
@@ -231,7 +232,7 @@ impl Search<'_> {
         let error = |(view, pose): (&View, &Option<Pose>)| {
             pose.map_or(f64::INFINITY, |pose| view_error_px(&self.camera, self.panels, view, pose))
         };
-        median(views.map(error).collect())
+        median(views.map(error).collect()).unwrap_or(0.0)
     }
 
     /// Leaves out views that do not belong, and solves for what is asked.
@@ -389,7 +390,7 @@ fn view_error_px(camera: &Camera, panels: &[Pose], view: &View, pose: Pose) -> f
             }
         })
     });
-    median(errors.collect())
+    median(errors.collect()).unwrap_or(0.0)
 }
 
 /// Refuses views of a board that was never tilted.

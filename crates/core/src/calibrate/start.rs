@@ -8,8 +8,8 @@ use super::model::Model;
 use super::pose::planar_pose;
 use super::problem::Observation;
 use super::view::View;
-use super::weights::median;
 use crate::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
+use crate::statistics::median;
 
 /// Focal lengths that are tried, in image widths: from lenses that show all around to those that
 /// show a degree.
@@ -39,7 +39,7 @@ pub(super) fn first_camera(views: &[View], model: Model) -> Option<Camera> {
         while part < LONGEST {
             let camera = Camera::centred(width, height, part * f64::from(width), lens.clone());
             let errors = samples.iter().map(|view| error_px(&camera, view)).collect();
-            let error = median(errors);
+            let error = median(errors).unwrap_or(0.0);
             if error.is_finite() && best.as_ref().is_none_or(|(least, _)| error < *least) {
                 best = Some((error, camera));
             }

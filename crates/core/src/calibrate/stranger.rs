@@ -19,7 +19,7 @@ use super::misfit::deviate_of_f;
 use super::normal::{Layout, Normal};
 use super::problem::Problem;
 use super::settle::Settled;
-use super::weights::median;
+use crate::statistics::median;
 
 /// Fewest views of which one can stand out: three are left then.
 const LEAST_VIEWS: usize = 4;
@@ -69,7 +69,7 @@ impl Opinions {
         if told.len() < LEAST_VIEWS {
             return None;
         }
-        let usual = median(told.iter().map(|pull| pull.strange).collect());
+        let usual = median(told.iter().map(|pull| pull.strange).collect()).unwrap_or(0.0);
         let all: f64 = told.iter().map(|pull| pull.freedom).sum();
         let deviations = |pull: &Pull| {
             let others = EFFICIENCY * (all - pull.freedom);

@@ -1,6 +1,7 @@
 //! How far each corner is to be trusted.
 
 use super::problem::Problem;
+use crate::statistics::median;
 
 /// The median of a squared distance in the plane whose coordinates have variance 1: 2 ln 2.
 pub(super) const MEDIAN_OF_CHI_SQUARED_2: f64 = 1.386_294_361_119_890_6;
@@ -104,7 +105,7 @@ impl Whitening {
             let [x, y] = Self::apply(w, r);
             x * x + y * y
         });
-        (median(squares.collect()) / MEDIAN_OF_CHI_SQUARED_2).sqrt().max(LEAST_SIGMA)
+        (median(squares.collect()).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2).sqrt().max(LEAST_SIGMA)
     }
 }
 
@@ -137,13 +138,4 @@ fn triangle([xx, xy, yy]: [f64; 3], common: f64) -> [f64; 3] {
     let m = xy / l;
     let n = (yy + common - m * m).sqrt();
     [1.0 / l, -m / (l * n), 1.0 / n]
-}
-
-/// The middle value; zero of none.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

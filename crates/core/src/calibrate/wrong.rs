@@ -1,4 +1,4 @@
-use super::weights::median;
+use crate::statistics::median;
 
 /// Corners seen together do not belong with the others when their median error is more than so many
 /// times the usual: blur, light and distance make a few times as much of it, labels that are off by a
@@ -11,10 +11,10 @@ const WRONG_PX: f64 = 1.0;
 
 /// The median error of corners, px.
 pub(super) fn median_px<'a>(residuals: impl IntoIterator<Item = &'a [f64; 2]>) -> f64 {
-    median(residuals.into_iter().map(|[x, y]| x.hypot(*y)).collect())
+    median(residuals.into_iter().map(|[x, y]| x.hypot(*y)).collect()).unwrap_or(0.0)
 }
 
 /// The median error beyond which corners do not belong with the others, px, from those of all.
 pub(super) fn limit_px(medians: &[f64]) -> f64 {
-    f64::max(WRONG_RATIO * median(medians.to_vec()), WRONG_PX)
+    f64::max(WRONG_RATIO * median(medians.to_vec()).unwrap_or(0.0), WRONG_PX)
 }

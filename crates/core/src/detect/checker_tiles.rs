@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::detection::{Grid, median};
+use super::detection::Grid;
 use super::tiling::{CHECKER, step};
 use crate::lattice::Vertex;
 use crate::raster::ImageView;
+use crate::statistics::median;
 
 /// Squares are sampled in the middle and at so many edges from it along rows and columns: on a dot that
 /// is much smaller than its square too.

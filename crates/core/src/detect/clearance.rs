@@ -18,8 +18,8 @@ use super::detection::{Grid, GridCorner};
 use super::local_map::{Bend, LocalMap};
 use super::tiling::{CHECKER, DELTILLE};
 use crate::family::Family;
-use crate::lattice::{Tile, Vertex};
-use crate::targets::{GridKind, Panel, TagsIn, Target};
+use crate::lattice::{GridKind, Tile, Vertex};
+use crate::targets::{Panel, TagsIn, Target};
 
 /// Blur of the next edges reaches this many standard deviations into the clear: beyond, an edge
 /// changes what is seen by less than 2.5 % of its contrast.

@@ -5,9 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::curve::ToneEstimate;
 use super::ink::InkEstimate;
 use super::reason::Reason;
+use crate::lattice::GridKind;
 use crate::quantity;
 use crate::raster::{FileNotes, Pyramid};
-use crate::targets::GridKind;
+use crate::statistics::median;
 
 /// What was found in one image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -86,12 +87,6 @@ impl Grid {
 
 fn is_false(value: &bool) -> bool {
     !value
-}
-
-/// The middle value.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// A corner in the image.

@@ -84,7 +84,7 @@ const MODEL_RADIUS: usize = 10;
 /// ```
 /// use deltille_core::detect::{Detector, DetectorConfig};
 /// use deltille_core::raster::Gray;
-/// use deltille_core::targets::GridKind;
+/// use deltille_core::lattice::GridKind;
 ///
 /// let detector = Detector::for_grid(GridKind::Deltille, Some((10, 11)), DetectorConfig::default());
 /// let detection = detector.detect(&Gray::<u8>::new(640, 480), "black.png");

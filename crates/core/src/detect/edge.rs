@@ -3,8 +3,8 @@
 use super::saddles::Saddle;
 use super::sectors::turn;
 use super::tiling::kind;
+use crate::lattice::GridKind;
 use crate::raster::Pyramid;
-use crate::targets::GridKind;
 
 /// Largest angle between the chord of an edge and the rays at its ends. Over one tile a fisheye
 /// bends an edge by up to 20°, half of it at either end; the rays add a few degrees of noise.

@@ -18,9 +18,8 @@ use super::rectified::Rectified;
 use super::saddles::{Saddle, SaddleFinder, merge_px, too_many};
 use super::sectors::turn;
 use super::tiling::{kind, neighbours, step, tiles_at};
-use crate::lattice::Vertex;
+use crate::lattice::{GridKind, Vertex};
 use crate::raster::Pyramid;
-use crate::targets::GridKind;
 
 /// Largest distance of a corner from where its neighbours predict it, over the edge length.
 const MAX_SURPRISE: f64 = 0.2;

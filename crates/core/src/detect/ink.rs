@@ -5,8 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::detection::median;
 use crate::quantity;
+use crate::statistics::median;
 
 /// How far what is dark has grown, as the user tells it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -13,9 +13,9 @@ use super::blurred_corner::PLACES_OF_FOUR;
 use super::corner_model::{COMMON, Common, Corner, CornerFitter, Joint, OWN, Window};
 use super::correlation::{self, Influence};
 use super::curve::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
-use super::detection::median;
 use super::ink::InkEstimate;
 use crate::raster::ImageView;
+use crate::statistics::median;
 
 /// Corners that are fitted together; more tell the curve better than single corners can use it.
 pub const SAMPLES: usize = 16;

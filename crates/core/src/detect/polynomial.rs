@@ -3,8 +3,8 @@
 
 use super::cubic::{CubicFit, Umbilic};
 use super::quadric::{QuadricFit, QuadricSaddle};
+use crate::lattice::GridKind;
 use crate::raster::ImageView;
-use crate::targets::GridKind;
 
 /// Most iterations of the fits; the reference detector's.
 const CUBIC_ITERATIONS: usize = 5;

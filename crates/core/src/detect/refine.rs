@@ -6,7 +6,7 @@
 //! ```
 //! use deltille_core::detect::{Refinement, Refiner};
 //! use deltille_core::synth::SimulatedCorner;
-//! use deltille_core::targets::GridKind;
+//! use deltille_core::lattice::GridKind;
 //!
 //! let image = SimulatedCorner::seen_from(2, 0.3, 0.5, [20.2, 19.9], 1.0).render(41, 41);
 //! let refined = Refiner::new(GridKind::Checker, Refinement::Model, 21).refine(&image, [21.0, 20.0]);
@@ -21,8 +21,8 @@ use super::corner_start::{start, start_along};
 use super::curve::Tone;
 use super::optics::{Optics, SAMPLES, Sample};
 use super::polynomial::Polynomial;
+use crate::lattice::GridKind;
 use crate::raster::ImageView;
-use crate::targets::GridKind;
 
 /// Smallest radius in which the model is fitted: 49 pixels for ten unknowns.
 pub const MIN_MODEL_RADIUS: usize = 3;

@@ -12,11 +12,12 @@ use rayon::prelude::*;
 
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
 use super::corner_model::{CornerFitter, MAX_WAY_PX};
-use super::detection::{Grid, GridCorner, median};
+use super::detection::{Grid, GridCorner};
 use super::optics::{Optics, REACH_PX, REACH_SIGMAS, SAMPLES, Sample};
 use super::refine::{MIN_MODEL_RADIUS, MIN_PIXELS, ModelFit, Refined, Refinement, Refiner, Room};
 use crate::lattice::Vertex;
 use crate::raster::{Gray, ImageView, Pyramid};
+use crate::statistics::median;
 
 /// Corners that tell the blur: those with the most room of a few times as many, from all over the grid.
 const BLUR_CORNERS: usize = 15;

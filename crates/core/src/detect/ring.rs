@@ -46,8 +46,8 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::tiling::kind;
+use crate::lattice::GridKind;
 use crate::raster::{Gray, bands};
-use crate::targets::GridKind;
 
 /// Offsets of half the ring, near 0°, 30°, …, 150°; the other half is opposite. Radius 3.6 to 4 px:
 /// the smallest ring on which the twelve directions stay within 4° of multiples of 30°, so that it

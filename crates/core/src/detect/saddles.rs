@@ -5,8 +5,8 @@ use super::polynomial::{FittedCorner, Polynomial};
 use super::ring::{Candidate, candidates, maxima_near};
 use super::sectors::{Sectors, contrast_around};
 use super::tiling::kind;
+use crate::lattice::GridKind;
 use crate::raster::{Gray, Pyramid};
-use crate::targets::GridKind;
 
 /// Radii of the fits, px. The middle one decides what is a corner; the reference detector's choice.
 const FIT_RADII: [usize; 3] = [2, 3, 4];

@@ -24,8 +24,8 @@ use multiversion::multiversion;
 
 use super::polynomial::Form;
 use super::tiling::kind;
+use crate::lattice::GridKind;
 use crate::raster::Gray;
-use crate::targets::GridKind;
 
 /// Samples on a circle. A sector seen at 75° is 17° wide; 7.5° steps put two samples into it.
 const SAMPLES: usize = 48;

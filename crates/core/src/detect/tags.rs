@@ -141,7 +141,7 @@ impl TagReader {
                 bits_px.push(bit_px);
             }
         }
-        let bit_px = super::detection::median(bits_px).unwrap_or(0.0);
+        let bit_px = crate::statistics::median(bits_px).unwrap_or(0.0);
         Read { readings, bit_px, blur_px: light.blur_px() }
     }
 

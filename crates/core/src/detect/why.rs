@@ -1,11 +1,11 @@
 //! What a picture without labels can tell of the reason.
 
-use super::detection::median;
 use super::grow::SaddleGrid;
 use super::label::TagEvidence;
 use super::reason::{Reason, ReasonKind};
 use crate::lattice::GridKind;
 use crate::raster::{Gray, PYRAMID_FULL_SCALE, Pyramid};
+use crate::statistics::median;
 
 /// A picture whose brightest pixels are under this part of full scale is too dark to show a board in
 /// more than a dozen grey levels.

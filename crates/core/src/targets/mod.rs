@@ -29,7 +29,7 @@ mod tag_sheet;
 use serde::{Deserialize, Serialize};
 
 pub use crate::Name;
-pub use crate::lattice::GridKind;
+use crate::lattice::GridKind;
 use crate::quantity;
 pub use board::zigzag_vertices;
 pub use build::largest_edge_mm;

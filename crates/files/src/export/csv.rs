@@ -8,7 +8,7 @@
 use std::fmt::Write;
 
 use deltille_core::detect::Detection;
-use deltille_core::targets::GridKind;
+use deltille_core::lattice::GridKind;
 
 /// The header line.
 pub const HEADER: &str = "grid,kind,panel,row,col,id,x,y,cov_xx,cov_xy,cov_yy";

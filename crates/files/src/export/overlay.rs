@@ -13,9 +13,8 @@ use tiny_skia::{
 use super::kind::signed_png;
 use deltille_core::artwork::text;
 use deltille_core::detect::{Detection, Grid};
-use deltille_core::lattice::Vertex;
+use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::raster::{AnyGray, Gray, Intensity};
-use deltille_core::targets::GridKind;
 
 /// Colours of successive grids: far apart in hue, bright enough on black.
 const COLOURS: [[u8; 3]; 6] =

@@ -2,6 +2,7 @@
 
 use super::{Given, Named, Report, Survey, cannot_tell_apart, causes};
 use deltille_core::calibrate::{Model, Parameter};
+use deltille_core::statistics::median;
 use deltille_core::words::counted;
 
 /// How much a piece of advice matters.
@@ -113,9 +114,8 @@ fn views(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String))
         );
         add(Weight::Warning, text);
     }
-    let mut rms: Vec<f64> = report.solution.views.iter().map(|view| view.rms_px).collect();
-    rms.sort_by(f64::total_cmp);
-    let median = rms.get(rms.len() / 2).copied().unwrap_or_default();
+    let rms = report.solution.views.iter().map(|view| view.rms_px);
+    let median = median(rms.collect()).unwrap_or_default();
     let bad = report.solution.views.iter().filter(|view| view.rms_px > BAD_VIEW * median);
     let bad: Vec<&str> = bad.map(|view| view.name.as_str()).collect();
     if !bad.is_empty() {

@@ -23,9 +23,8 @@ use deltille::export::mesh::TexturedMesh;
 use deltille::export::{dxf, gltf, obj as obj_writer, pdf as pdf_writer, png as png_writer};
 use deltille::export::{stl as stl_writer, svg as svg_writer};
 use deltille::family::Family;
-use deltille::targets::{
-    BoardSpec, GridKind, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec,
-};
+use deltille::lattice::GridKind;
+use deltille::targets::{BoardSpec, PaperSpec, SolidShape, SolidSpec, Target, TargetSpec};
 use deltille::verify::{Format, Verdict, Verifier};
 use tempfile::TempDir;
 

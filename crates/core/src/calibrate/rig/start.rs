@@ -4,8 +4,8 @@ use super::{PanelPlace, RigOptions, RigViews, alone, camera_unknowns, panel_unkn
 use crate::calibrate::error::CalibrationError;
 use crate::calibrate::excluded::Excluded;
 use crate::calibrate::problem::{Block, Problem};
-use crate::calibrate::weights::median;
 use crate::camera::{Camera, Pose};
+use crate::statistics::median;
 
 /// Frames that two cameras must share: one may be wrong, of three the middle one is not.
 const LEAST_SHARED: usize = 3;
@@ -136,12 +136,15 @@ fn lay_together(
 /// The pose that lies in the middle of others: its median distance from them is the least. A turn
 /// counts by how far it moves a point as far away as the translations reach.
 pub(in crate::calibrate) fn middle(poses: &[Pose]) -> Pose {
-    let arm = median(poses.iter().map(|pose| pose.translation.length()).collect()).max(1.0);
+    let arm = median(poses.iter().map(|pose| pose.translation.length()).collect())
+        .unwrap_or(0.0)
+        .max(1.0);
     let apart = |a: &Pose, b: &Pose| {
         let turn = a.rotation.angle_between(b.rotation);
         (a.translation - b.translation).length() + arm * turn
     };
-    let spread = |pose: &Pose| median(poses.iter().map(|other| apart(pose, other)).collect());
+    let spread =
+        |pose: &Pose| median(poses.iter().map(|other| apart(pose, other)).collect()).unwrap_or(0.0);
     let best = poses.iter().min_by(|a, b| spread(a).total_cmp(&spread(b)));
     best.copied().unwrap_or(Pose::IDENTITY)
 }

@@ -45,8 +45,8 @@ use std::str::FromStr;
 pub use read::{read, read_in_mm};
 pub use write::write;
 
-use deltille_core::lattice::Vertex;
-use deltille_core::targets::{GridKind, ListFormat, ListedSpec, Panel, Target, TargetSpec};
+use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::targets::{ListFormat, ListedSpec, Panel, Target, TargetSpec};
 
 /// Who reads the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

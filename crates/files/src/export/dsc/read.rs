@@ -2,11 +2,12 @@ use std::collections::BTreeMap;
 
 use super::{Dialect, DscError, FAMILIES};
 use deltille_core::family::Family;
-use deltille_core::lattice::Vertex;
+use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::quantity::{Range, border_bits, edge_mm, place_mm};
+use deltille_core::statistics::median;
 use deltille_core::targets::{
-    Corner, FamilyRef, GridKind, ListFormat, ListedSpec, Name, Outline, Panel, PanelPose,
-    TagPlacement, TagsIn, Target, TargetSpec,
+    Corner, FamilyRef, ListFormat, ListedSpec, Name, Outline, Panel, PanelPose, TagPlacement,
+    TagsIn, Target, TargetSpec,
 };
 
 /// Most boards in a file, and most columns or rows of one: beyond this a number is a typing error.
@@ -247,7 +248,7 @@ impl<'a> Block<'a> {
         known: &[Units],
     ) -> Result<[f64; 2], DscError> {
         // The next corner along the row is one edge away on both kinds of board.
-        let mut steps: Vec<f64> = corners
+        let steps: Vec<f64> = corners
             .iter()
             .filter_map(|(&vertex, from)| {
                 let to = corners.get(&(vertex + Vertex::new(0, 1)))?;
@@ -255,8 +256,7 @@ impl<'a> Block<'a> {
                 Some(squares.sum::<f64>().sqrt())
             })
             .collect();
-        steps.sort_by(f64::total_cmp);
-        let Some(&step) = steps.get(steps.len() / 2) else {
+        let Some(step) = median(steps) else {
             return Err(self.head.fault("no two corners of a row are neighbours"));
         };
         let ratio = self.size / step;

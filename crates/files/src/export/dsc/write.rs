@@ -1,8 +1,8 @@
 use std::fmt::Write;
 
 use super::{Dialect, DscError, FAMILIES};
-use deltille_core::lattice::Vertex;
-use deltille_core::targets::{GridKind, Panel, TagsIn, Target};
+use deltille_core::lattice::{GridKind, Vertex};
+use deltille_core::targets::{Panel, TagsIn, Target};
 
 /// The text of the `.dsc` of a target; positions are those in the target frame, mm.
 pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
