@@ -5,8 +5,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use deltille::calibrate::{
-    Loss, Model, Observation, Options, PanelPlace, PanelRef, RigOptions, RigViews, Sighting, View,
-    Weights, calibrate, calibrate_rig,
+    Calibration, CameraViews, Model, Observation, PanelPlace, PanelRef, Sighting, View,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use glam::{DQuat, DVec3};
@@ -70,7 +69,7 @@ fn board() -> (Vec<View>, Vec<Pose>) {
 
 /// Four cameras, 150 frames, and a body of twenty triangular faces of 36 corners, eight of which
 /// each camera sees.
-fn rig() -> (Vec<RigViews>, Vec<PanelPlace>) {
+fn rig() -> (Vec<CameraViews>, Vec<PanelPlace>) {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let corners = (0..8).flat_map(|row| (0..8 - row).map(move |col| (row, col)));
     let corners = corners.map(|(row, col)| {
@@ -124,7 +123,7 @@ fn rig() -> (Vec<RigViews>, Vec<PanelPlace>) {
                 seen.filter_map(|(p, pose)| sighting(camera, pose, *p, &corners, &mut random));
             view(name, camera, seen.collect())
         });
-        RigViews { name: format!("c{index}"), views: views.collect(), known: None }
+        CameraViews::new(&format!("c{index}"), views.collect(), Model::Radtan)
     };
     let views = cameras.iter().enumerate().map(of_camera).collect();
     let stated = |&pose: &Pose| {
@@ -133,7 +132,7 @@ fn rig() -> (Vec<RigViews>, Vec<PanelPlace>) {
             rotation: pose.rotation * off,
             translation: pose.translation + DVec3::new(0.1, -0.1, 0.05),
         };
-        PanelPlace { target_from_panel, covariance: None }
+        target_from_panel.into()
     };
     (views, panels.iter().map(stated).collect())
 }
@@ -141,18 +140,18 @@ fn rig() -> (Vec<RigViews>, Vec<PanelPlace>) {
 fn benches(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("calibrate");
     group.sample_size(10);
-    let (loss, weights) = (Loss::default(), Weights::default());
     let (views, panels) = board();
     for model in [Model::Radtan, Model::Rational] {
-        let options = Options { model, loss, weights };
+        let calibration = Calibration::new(panels.iter().copied()).camera("", views.clone(), model);
         group.bench_function(format!("109 views of 110 corners, {model}"), |bencher| {
-            bencher.iter(|| black_box(calibrate(&views, &panels, options)))
+            bencher.iter(|| black_box(calibration.solve()))
         });
     }
     let (views, panels) = rig();
-    let options = RigOptions { model: Model::Radtan, loss, weights, refine_target: true };
+    let blank = Calibration::new(panels).refine_panels(true);
+    let calibration = views.into_iter().fold(blank, Calibration::with);
     group.bench_function("rig of 4 × 150 views of 8 faces of 36 corners", |bencher| {
-        bencher.iter(|| black_box(calibrate_rig(&views, &panels, options)))
+        bencher.iter(|| black_box(calibration.solve()))
     });
     group.finish();
 }

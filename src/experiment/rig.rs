@@ -20,10 +20,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::artwork::ArtworkError;
-use crate::calibrate::{
-    CalibrationError, Loss, Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews,
-    Weights, calibrate_rig, views,
-};
+use crate::calibrate::{Calibration, CalibrationError, Estimate, Model, Reference, views};
 use crate::camera::{BrownConrady, Camera, Lens, Pose};
 use crate::detect::{Detection, Detector, DetectorConfig};
 use crate::family::{Family, FamilyError};
@@ -204,25 +201,17 @@ pub fn run(
         let Some(found) = found else { return Ok(None) };
         let failed = |error| RigExperimentError::Calibration { object, error };
         let reference = Reference::Target(&stated);
-        let mut cameras = Vec::with_capacity(CAMERAS);
+        let mut calibration = Calibration::new(reference.panels());
         for index in 0..CAMERAS {
             let of_camera = found.iter().filter(|(camera, ..)| *camera == index);
             let of_camera: Vec<(String, Detection)> =
                 of_camera.map(|(_, name, detection)| (name.clone(), detection.clone())).collect();
             let views = views(&of_camera, &reference).map_err(failed)?.views;
-            cameras.push(RigViews { name: format!("c{index}"), views, known: None });
+            calibration = calibration.camera(&format!("c{index}"), views, Model::Radtan);
         }
-        let panels: Vec<PanelPlace> =
-            stated.panels.iter().map(|panel| (&panel.pose).into()).collect();
         for refined in [false, true] {
-            let options = RigOptions {
-                model: Model::Radtan,
-                loss: Loss::Huber,
-                weights: Weights::Covariance,
-                refine_target: refined,
-            };
-            let solution = calibrate_rig(&cameras, &panels, options).map_err(failed)?;
-            outcomes.push(Outcome::new(object, refined, &world, &solution));
+            let found = calibration.clone().refine_panels(refined).solve().map_err(failed)?;
+            outcomes.push(Outcome::new(object, refined, &world, &found));
         }
     }
     Ok(Some(outcomes))
@@ -299,29 +288,29 @@ fn misplaced(target: &Target, seed: u64) -> Target {
 }
 
 impl Outcome {
-    fn new(object: Object, refined: bool, world: &World, solution: &RigSolution) -> Self {
+    fn new(object: Object, refined: bool, world: &World, found: &Estimate) -> Self {
         let rms = |errors: Vec<f64>| {
             (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
         };
         let truth = &world.camera;
-        let cameras = || solution.cameras.iter();
+        let cameras = || found.cameras.iter();
         let focal =
             cameras().flat_map(|c| [0, 1].map(|i| c.camera.focal_px[i] / truth.focal_px[i] - 1.0));
         let centre =
             cameras().flat_map(|c| [0, 1].map(|i| c.camera.centre_px[i] - truth.centre_px[i]));
-        let off = cameras().enumerate().skip(1).map(|(index, found)| {
+        let off = cameras().enumerate().skip(1).map(|(index, camera)| {
             let truth = world.camera_from_rig(index);
-            let place = found.camera_from_rig.inverse().translation - truth.inverse().translation;
-            (place.length(), found.camera_from_rig.rotation.angle_between(truth.rotation))
+            let place = camera.camera_from_rig.inverse().translation - truth.inverse().translation;
+            (place.length(), camera.camera_from_rig.rotation.angle_between(truth.rotation))
         });
         let (places, turns): (Vec<f64>, Vec<f64>) = off.unzip();
         Self {
             object,
             refined,
-            rms_px: solution.rms_px,
-            frames_px: solution.frames.iter().map(|frame| frame.rms_px).collect(),
-            left_out: solution.excluded.len(),
-            corners: cameras().map(|camera| camera.corners).sum(),
+            rms_px: found.rms_px,
+            frames_px: found.frames.iter().map(|frame| frame.rms_px).collect(),
+            left_out: found.excluded.len(),
+            corners: found.corner_count(),
             focal: rms(focal.collect()),
             centre_px: rms(centre.collect()),
             place_mm: rms(places),

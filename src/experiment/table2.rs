@@ -6,8 +6,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::calibrate::{
-    CalibrationError, Loss, Model, Options, Reference, UntaggedGrid, View, Weights, calibrate,
-    poses, views,
+    Calibration, CalibrationError, Loss, Model, Reference, UntaggedGrid, View, Weights, views,
 };
 use crate::detect::{Detector, DetectorConfig, Refinement};
 use crate::lattice::GridKind;
@@ -67,14 +66,15 @@ pub fn run(images: &[impl AsRef<Path> + Sync]) -> Result<Vec<Row>, Table2Error> 
         let (first, second) = views.split_at(views.len() / 2);
         for model in [Model::Radtan, Model::Radtan5, Model::Rational] {
             let (loss, weights) = (Loss::Squared, Weights::Equal);
-            let panels = reference().panels();
-            let training = calibrate(first, &panels, Options { model, loss, weights })?;
-            let test = poses(second, &panels, &training.camera, loss, weights)?;
+            let blank = Calibration::new(reference().panels()).loss(loss).weights(weights);
+            let training = blank.clone().camera("", first.to_vec(), model).solve()?;
+            let camera = training.cameras[0].camera.clone();
+            let test = blank.camera("", second.to_vec(), camera).solve()?;
             rows.push(Row {
                 refinement,
                 model,
-                training: (training.views.len(), training.rms_px),
-                test: (test.views.len(), test.rms_px),
+                training: (training.frames.len(), training.rms_px),
+                test: (test.frames.len(), test.rms_px),
             });
         }
     }

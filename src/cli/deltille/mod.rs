@@ -3,6 +3,7 @@
 mod bench;
 mod board;
 mod calibrate;
+mod calibrating;
 mod camera_file;
 mod delivery;
 mod detect;

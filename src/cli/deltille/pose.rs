@@ -9,13 +9,12 @@ use super::images::Images;
 use super::limits::ImageLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
-use crate::calibrate::{self, Loss, Reference, Weights, views};
+use crate::calibrate::{Calibration, Reference, Words, views};
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::FAILED;
 use crate::detect::{Detector, DetectorConfig};
 use crate::export::pose;
 use crate::photograph;
-use crate::report::Named;
 
 /// Arguments of `deltille pose`.
 #[derive(clap::Args)]
@@ -54,7 +53,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let sheet = args.sheet.read(&limits)?;
     let scale = sightings::solid_scale(&sheet, &target)?;
     let mut panels = reference.panels();
-    panels.iter_mut().for_each(|panel| panel.translation *= scale);
+    panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
     let (mut lines, mut all, mut without) = (String::new(), 0, 0);
@@ -65,20 +64,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let found = detector.detect(&photograph::read_within(&image, &limits)?, &name);
         let mut shown = views(&[(name, found)], &reference)?.views;
         sightings::put_on(&sheet, Some(&target), &mut shown)?;
-        let (loss, weights) = (Loss::default(), Weights::default());
-        let solution = calibrate::poses(&shown, &panels, &camera, loss, weights)
-            .with_context(|| image.display().to_string())?;
-        if solution.views.is_empty() {
+        let calibration = Calibration::new(panels.clone()).camera("", shown, camera.clone());
+        let found = calibration.solve().with_context(|| image.display().to_string())?;
+        if found.frames.is_empty() {
             without += 1;
-            let why = solution.excluded.first().map_or("no target in it", |out| &out.reason);
+            let why = found.excluded.first().map(|out| out.reason.to_string());
+            let why = why.as_deref().unwrap_or("no target in it");
             tell!("{}: {why}", image.display());
         }
-        let named = Named { cameras: &[] };
-        for finding in &solution.findings {
-            tell!("{}: {}", image.display(), named.sentence(finding));
+        let words = Words { estimate: &found, print_scale: None };
+        for finding in &found.findings {
+            tell!("{}: {}", image.display(), words.finding(finding));
         }
-        for view in &solution.views {
-            let line = pose::write_line(view, &target.name);
+        for view in found.cameras.iter().flat_map(|camera| &camera.views) {
+            let line = pose::write_line(&found, view, &target.name);
             match path {
                 Some(_) => lines += &(line + "\n"),
                 None => output::print(&(line + "\n"))?,

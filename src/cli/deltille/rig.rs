@@ -1,25 +1,26 @@
 //! `deltille rig`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, bail};
 use clap::ValueEnum;
 
-use super::calibrate::{Robust, Weighting, without_outliers};
+use super::calibrating::{Calibrated, SolveArgs, check_images, without_outliers};
 use super::files::{File, same_file, text_file, write_all};
 use super::limits::FileLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
-    Excluded, Model, PanelPlace, Reference, RigOptions, RigSolution, RigViews, calibrate_rig,
-    wrong_cameras,
+    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference,
 };
 use crate::camera::{Camera, Pose};
-use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
+use crate::cli::output::{Overwrite, check_folder, fixed, say};
+use crate::cli::run::{FAILED, report};
+use crate::detect::InkEstimate;
+use crate::export::calibration::Print;
 use crate::export::camera::{colmap, colmap_rig, kalibr};
 use crate::export::rig;
-use crate::report::{Named, cannot_tell_apart, causes_of_rig};
 use crate::targets::Name;
 use crate::words::{counted, shown};
 
@@ -44,12 +45,11 @@ pub struct Args {
     /// Find where the target's panels are on it, and write that as <target>-refined.json
     #[arg(long, conflicts_with = "print_scale")]
     refine_target: bool,
-    /// How corners far off their prediction count
-    #[arg(long, default_value = "huber")]
-    robust: Robust,
-    /// How corners are weighted
-    #[arg(long, default_value = "covariance")]
-    weights: Weighting,
+    #[command(flatten)]
+    solve: SolveArgs,
+    /// A camera and the folder of its photographs, for small pictures on the page
+    #[arg(long, value_name = "NAME=FOLDER", value_parser = named, requires = "report")]
+    images: Vec<(String, PathBuf)>,
     /// What to write beside rig.json and <camera>.yaml; several may be given, separated by commas
     #[arg(long, value_delimiter = ',')]
     format: Vec<Format>,
@@ -93,11 +93,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(name) = names.iter().find(|name| bad(name)) {
         bail!("--camera: {name} cannot be the name of a file");
     }
-    let mut known: Vec<&str> = args.known.iter().map(|(name, _)| name.as_str()).collect();
-    known.sort_unstable();
-    if let Some(twice) = known.windows(2).find(|pair| pair[0] == pair[1]) {
-        bail!("--known: {} has two files", twice[0]);
-    }
+    check_named("--known", &args.known, &names)?;
+    check_named("--images", &args.images, &names)?;
     check_folders(&args.camera)?;
     check_folder(&args.output).context("-o")?;
     let limits = args.limits.limits();
@@ -105,69 +102,45 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let reference = Reference::Target(&target);
     let sheet = args.sheet.read(&limits)?;
     let scale = sightings::solid_scale(&sheet, &target)?;
-    let mut cameras = Vec::with_capacity(args.camera.len());
-    let mut left_out: Vec<Excluded> = Vec::new();
+    let page = args.solve.page("rig")?;
+    let mut panels = reference.panels();
+    panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
+    let mut calibration = Calibration::new(panels).refine_panels(args.refine_target);
+    let (mut left_out, mut ink) = (Vec::new(), Vec::new());
     for (name, folder) in &args.camera {
         let read = sightings::read(std::slice::from_ref(folder), &reference, &limits);
-        let sightings::Read { mut views, left_out: out, .. } =
+        let sightings::Read { mut views, left_out: out, ink: of_camera, .. } =
             read.with_context(|| format!("--camera {name}"))?;
         sightings::put_on(&sheet, Some(&target), &mut views)?;
-        let of_camera = |out| Excluded { camera: Some(name.clone()), ..out };
-        left_out.extend(out.into_iter().map(of_camera));
-        cameras.push(RigViews { name: name.clone(), views, known: args.known(name)? });
-    }
-    if let Some((name, _)) = args.known.iter().find(|(name, _)| !names.contains(&name.as_str())) {
-        bail!("--known: there is no --camera {name}");
-    }
-    let mut panels: Vec<PanelPlace> =
-        target.panels.iter().map(|panel| (&panel.pose).into()).collect();
-    panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
-    let options = RigOptions {
-        model: args.model,
-        loss: args.robust.into(),
-        weights: args.weights.into(),
-        refine_target: args.refine_target,
-    };
-    let wrong = wrong_cameras(&cameras, &panels, options);
-    let of_wrong = wrong.iter().map(|&camera| cameras[camera].name.as_str());
-    let of_wrong: Vec<&str> = of_wrong.collect();
-    let mut solution =
-        calibrate_rig(&cameras, &panels, options).map_err(|error| match of_wrong.as_slice() {
-            [] => anyhow!(error),
-            names => anyhow!(error).context(format!(
-                "--known: the camera given for {} did not take its pictures",
-                names.join(", ")
-            )),
-        })?;
-    for camera in &solution.cameras {
-        if let Some(end) = &camera.lens_end {
-            tell!("warning: camera {}: {end}", camera.name);
+        left_out.extend(out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }));
+        ink.extend(of_camera);
+        if let Some(folder) = of_name(&args.images, name) {
+            check_images(folder, &views)?;
         }
+        let known = of_name(&args.known, name).map(|path| camera_file::read("--known", path));
+        let known = known.transpose()?.map(Intrinsics::Known);
+        let intrinsics = known.unwrap_or(Intrinsics::Unknown(args.model));
+        calibration = calibration.with(CameraViews::new(name, views, intrinsics));
     }
-    let names: Vec<&str> = solution.cameras.iter().map(|camera| camera.name.as_str()).collect();
-    let named = Named { cameras: &names };
-    for finding in &solution.findings {
-        tell!("warning: {}", named.sentence(finding));
+    let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
+    let mut solved = args.solve.solve(calibration, print)?;
+    if let Err(foreign) = solved.tell() {
+        report(&foreign.context("--known"));
+        return Ok(ExitCode::from(FAILED));
     }
-    let is_given = |name: &str| args.known.iter().any(|(known, _)| known == name);
-    for cause in causes_of_rig(&solution, args.model, is_given, &wrong, args.refine_target) {
-        tell!("warning: {cause}");
-    }
-    if !solution.loose.is_empty() {
-        tell!("warning: {}", cannot_tell_apart(&solution.loose, None));
-    }
-    let text = summary(&solution);
-    solution.excluded.splice(0..0, left_out);
-    let mut files =
-        vec![text_file("rig.json".to_owned(), rig::write(&solution, &args.model.to_string()))];
-    for camera in &solution.cameras {
+    let text = summary(&solved);
+    solved.estimate.excluded.splice(0..0, left_out);
+    let Calibrated { estimate, diagnoses, print } = &solved;
+    let json = rig::write(estimate, diagnoses, &args.model.to_string(), *print);
+    let mut files = vec![text_file("rig.json".to_owned(), json)];
+    for camera in &estimate.cameras {
         files.push(text_file(format!("{}.yaml", camera.name), camera.camera.to_yaml()));
     }
     for format in &args.format {
-        files.extend(format.files(&solution).context("--format")?);
+        files.extend(format.files(estimate).context("--format")?);
     }
     if args.refine_target {
-        let refined = solution.refined(&target);
+        let refined = estimate.refined(&target);
         let place = args.output.join(format!("{}.json", refined.name));
         if same_file(&place, &args.target) {
             bail!(
@@ -177,7 +150,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         files.push(text_file(format!("{}.json", refined.name), refined.to_json()));
     }
-    let written = write_all(&args.output, &files, args.overwrite)?;
+    let mut written = write_all(&args.output, &files, args.overwrite)?;
+    if let Some(page) = page {
+        let folder = |(name, _): &(String, PathBuf)| of_name(&args.images, name);
+        let folders: Vec<_> = args.camera.iter().map(folder).collect();
+        solved.write_page(&page, "rig", &folders, args.overwrite)?;
+        written.push(page);
+    }
     for line in text.lines() {
         say!("{line}");
     }
@@ -201,16 +180,27 @@ fn check_folders(cameras: &[(String, PathBuf)]) -> anyhow::Result<()> {
     Ok(())
 }
 
-impl Args {
-    fn known(&self, name: &str) -> anyhow::Result<Option<Camera>> {
-        let known = self.known.iter().find(|(known, _)| known == name);
-        known.map(|(_, path)| camera_file::read("--known", path)).transpose()
+/// Refuses names that are no camera's, or given twice.
+fn check_named(option: &str, given: &[(String, PathBuf)], cameras: &[&str]) -> anyhow::Result<()> {
+    for (index, (name, _)) in given.iter().enumerate() {
+        if given[..index].iter().any(|(other, _)| other == name) {
+            bail!("{option}: {name} is given twice");
+        }
+        if !cameras.contains(&name.as_str()) {
+            bail!("{option}: there is no --camera {name}");
+        }
     }
+    Ok(())
+}
+
+/// What was given for a camera.
+fn of_name<'a>(given: &'a [(String, PathBuf)], name: &str) -> Option<&'a Path> {
+    given.iter().find(|(of, _)| of == name).map(|(_, path)| path.as_path())
 }
 
 impl Format {
-    fn files(self, solution: &RigSolution) -> anyhow::Result<Vec<File>> {
-        let cameras = solution.cameras.iter();
+    fn files(self, estimate: &Estimate) -> anyhow::Result<Vec<File>> {
+        let cameras = estimate.cameras.iter();
         let cameras: Vec<(&str, &Camera, Pose)> =
             cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig)).collect();
         let alone: Vec<&Camera> = cameras.iter().map(|(_, camera, _)| *camera).collect();
@@ -225,35 +215,41 @@ impl Format {
     }
 }
 
-fn summary(solution: &RigSolution) -> String {
-    let mut text = format!(
-        "{}, {}, rms {:.4} px{}\n",
-        counted(solution.cameras.len(), "camera"),
-        counted(solution.frames.len(), "frame"),
-        solution.rms_px,
-        without_outliers(solution.outlier_count(), solution.inlier_rms_px())
-    );
-    for camera in &solution.cameras {
+fn summary(solved: &Calibrated) -> String {
+    let estimate = &solved.estimate;
+    let headline = |estimate: &Estimate| {
+        format!(
+            "{}, rms {:.4} px{}",
+            counted(estimate.frames.len(), "frame"),
+            estimate.rms_px,
+            without_outliers(estimate.outlier_count(), estimate.inlier_rms_px())
+        )
+    };
+    let mut lines =
+        vec![format!("{}, {}", counted(estimate.cameras.len(), "camera"), headline(estimate))];
+    for camera in &estimate.cameras {
         let [fx, fy] = camera.camera.focal_px;
         let at = camera.camera_from_rig.inverse().translation;
-        text += &format!(
-            "{}: {} corners, rms {:.4} px{}, fx {fx:.2}, fy {fy:.2}; at ({}) mm",
+        let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
+        let deviation = camera.pose_sd.map_or(String::new(), |sd| {
+            format!(" ± {:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
+        });
+        lines.push(format!(
+            "{}: {} corners, rms {:.4} px{}, fx {fx:.2}, fy {fy:.2}; at ({}) mm{deviation}",
             camera.name,
-            camera.corners,
+            camera.corner_count(),
             camera.rms_px,
-            without_outliers(camera.outliers, camera.inlier_rms_px),
+            without_outliers(camera.outlier_count(), camera.inlier_rms_px()),
             at.to_array().map(|mm| fixed(mm, 2)).join(", ")
-        );
-        if let Some(sd) = camera.pose_sd {
-            let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
-            text +=
-                &format!(" ± {:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees());
-        }
-        text.push('\n');
+        ));
     }
-    for out in &solution.excluded {
-        text += &shown(&format!("left out {}: {}", out.shown(), out.reason));
-        text.push('\n');
-    }
-    text.trim_end().to_owned()
+    lines.extend(solved.lines());
+    lines.extend(estimate.held_out.iter().map(|test| format!("held out: {}", headline(test))));
+    let of_test = estimate.held_out.iter().flat_map(|test| &test.excluded);
+    let excluded = estimate.excluded.iter().chain(of_test);
+    lines.extend(
+        excluded
+            .map(|out| shown(&format!("left out {}: {}", out.shown(), out.reason)).into_owned()),
+    );
+    lines.join("\n")
 }

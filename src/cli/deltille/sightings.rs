@@ -7,8 +7,7 @@ use clap::ValueEnum;
 
 use super::limits::FileLimits;
 use super::target_file;
-use crate::calibrate::{Excluded, Reference, Shown, UntaggedGrid, View, views};
-use crate::camera::Pose;
+use crate::calibrate::{Excluded, PanelPlace, Reference, Shown, UntaggedGrid, View, views};
 use crate::cli::output::tell;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::{self, Print, Sheet};
@@ -84,8 +83,8 @@ enum Kind {
 /// Views, and the panels that they show.
 pub struct Sightings {
     pub views: Vec<View>,
-    /// target_from_panel of each panel.
-    pub panels: Vec<Pose>,
+    /// Where each panel is on the target.
+    pub panels: Vec<PanelPlace>,
     /// Files of the detections in which no view was found.
     pub empty: Vec<PathBuf>,
     /// What does not belong to the target.
@@ -126,7 +125,7 @@ impl SightingsArgs {
         let mut panels = reference.panels();
         if let Some(target) = &target {
             let scale = solid_scale(&sheet, target)?;
-            panels.iter_mut().for_each(|panel| panel.translation *= scale);
+            panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
         }
         let print = Print { scale: sheet.print_scale, ink };
         Ok(Sightings { panels, views, empty, left_out, print })

@@ -1,8 +1,8 @@
 //! The shape of a board's sheet: found where it is bent, and called chance where it is not.
 
 use deltille::calibrate::{
-    BoardShape, Instead, Loss, Misfit, Model, Observation, Options, PanelRef, Sighting, View,
-    Weights, calibrate, calibrate_with_shape, remedy,
+    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Instead, LackOfFit, Model,
+    Observation, PanelRef, Remedy, Sighting, View,
 };
 use deltille::camera::{Camera, Pose};
 use glam::{DQuat, DVec3};
@@ -11,13 +11,16 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
 const NOISE_PX: f64 = 0.05;
-const OPTIONS: Options =
-    Options { model: Model::Radtan, loss: Loss::Huber, weights: Weights::Covariance };
+
+fn calibration(views: &[View]) -> Calibration {
+    Calibration::new([Pose::IDENTITY]).camera("", views.to_vec(), Model::Radtan)
+}
 
 /// Views of a board of 9 × 9 corners, 20 mm apart, whose corners are moved by `offset` of the place
-/// from its middle in parts of its half diagonal.
-fn views(offset: impl Fn(f64, f64) -> DVec3, seed: u64) -> Vec<View> {
+/// from its middle in parts of its half diagonal, seen by a camera at this place on its rig.
+fn views_of(camera_from_rig: &Pose, offset: impl Fn(f64, f64) -> DVec3, seed: u64) -> Vec<View> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut noisy = ChaCha8Rng::seed_from_u64(seed ^ camera_from_rig.translation.x.to_bits());
     let noise = Normal::new(0.0, NOISE_PX).unwrap();
     let camera = Camera::pinhole(1600, 1200, 1.0);
     let reach = 80.0 * 2f64.sqrt();
@@ -30,12 +33,13 @@ fn views(offset: impl Fn(f64, f64) -> DVec3, seed: u64) -> Vec<View> {
             random.random_range(280.0..420.0),
         );
         let pose = Pose { rotation, translation: at - rotation * DVec3::new(80.0, 80.0, 0.0) };
+        let pose = camera_from_rig.after(&pose);
         let corners = (0..81).map(|i| {
             let (row, col) = (i / 9, i % 9);
             let panel_mm = DVec3::new(20.0 * f64::from(col), 20.0 * f64::from(row), 0.0);
             let [u, v] = [panel_mm.x, panel_mm.y].map(|mm| (mm - 80.0) / reach);
             let [x, y] = camera.project(pose.apply(panel_mm + offset(u, v))).unwrap();
-            let pixel = [x + noise.sample(&mut random), y + noise.sample(&mut random)];
+            let pixel = [x + noise.sample(&mut noisy), y + noise.sample(&mut noisy)];
             let cov = Some([NOISE_PX * NOISE_PX, 0.0, NOISE_PX * NOISE_PX]);
             Observation { row, col, panel_mm, pixel, cov }
         });
@@ -46,44 +50,86 @@ fn views(offset: impl Fn(f64, f64) -> DVec3, seed: u64) -> Vec<View> {
     (0..20).map(view).collect()
 }
 
-#[test]
-fn a_bent_and_stretched_sheet_is_found() {
-    let truth = [1.0, 0.3, -0.6, 0.2, 0.0, -0.1, 0.0, 0.08, -0.05];
-    let offset = |u: f64, v: f64| {
-        let [b1, b2, b3, b4, _, b6, _, a1, a2] = truth;
-        let z = b1 * u * u + b2 * u * v + b3 * v * v + b4 * u.powi(3) + b6 * u * v * v;
-        DVec3::new(a1 * u + a2 * v, a2 * u - a1 * v, z)
-    };
-    let views = views(offset, 1);
-    let flat = calibrate(&views, &[Pose::IDENTITY], OPTIONS).unwrap();
-    let found = calibrate_with_shape(&views, &[Pose::IDENTITY], OPTIONS).unwrap();
-    let [Misfit::Target { panel: PanelRef::ONLY, rms_mm, .. }] = flat.misfits[..] else {
-        panic!("{:?}", flat.misfits)
-    };
-    assert!((0.05..0.5).contains(&rms_mm), "{rms_mm}");
-    assert_eq!(found.misfits, []);
-    let remedy = |solution| remedy(&views, &[Pose::IDENTITY], OPTIONS, solution);
-    assert_eq!(remedy(&flat).unwrap().instead, Instead::Shape);
-    assert_eq!(remedy(&found), None);
-    assert!(flat.rms_px > 2.0 * found.rms_px, "{} {}", flat.rms_px, found.rms_px);
-    assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.05, "{}", found.rms_px);
+fn views(offset: impl Fn(f64, f64) -> DVec3, seed: u64) -> Vec<View> {
+    views_of(&Pose::IDENTITY, offset, seed)
+}
+
+/// The shape of a sheet.
+const BENT: [f64; 9] = [1.0, 0.3, -0.6, 0.2, 0.0, -0.1, 0.0, 0.08, -0.05];
+
+fn bent(u: f64, v: f64) -> DVec3 {
+    let [b1, b2, b3, b4, _, b6, _, a1, a2] = BENT;
+    let z = b1 * u * u + b2 * u * v + b3 * v * v + b4 * u.powi(3) + b6 * u * v * v;
+    DVec3::new(a1 * u + a2 * v, a2 * u - a1 * v, z)
+}
+
+fn check_shape(found: &Estimate) {
     let BoardShape { shape, sd_mm, .. } = found.shape.unwrap();
     assert!(found.shape.unwrap().is_significant());
-    for ((found, truth), sd) in shape.coefficients_mm.iter().zip(truth).zip(sd_mm) {
+    for ((found, truth), sd) in shape.coefficients_mm.iter().zip(BENT).zip(sd_mm) {
         assert!((found - truth).abs() < 4.0 * sd && sd < 0.05, "{found} ± {sd}, not {truth}");
     }
+}
+
+/// Two cameras tell the shape better than one, and frames that took no part are as good with it.
+#[test]
+fn a_rig_finds_the_shape_of_a_sheet() {
+    let eye = DVec3::new(60.0, 0.0, 0.0);
+    let right = Pose::looking_at(eye, DVec3::new(0.0, 0.0, 350.0), DVec3::NEG_Y);
+    let of_right = views_of(&right, bent, 1);
+    let alone = calibration(&views(bent, 1)).board_shape(true).solve().unwrap();
+    let rig = calibration(&views(bent, 1)).camera("right", of_right, Model::Radtan);
+    let found = rig.clone().board_shape(true).hold_out(Some(5)).solve().unwrap();
+    check_shape(&found);
+    let sds = |found: &Estimate| found.shape.unwrap().sd_mm;
+    assert!(sds(&found).iter().zip(sds(&alone)).all(|(rig, alone)| *rig < alone));
+    let held_out = found.held_out.as_ref().unwrap();
+    assert_eq!((found.frames.len(), held_out.frames.len()), (16, 4));
+    for rms_px in [found.rms_px, held_out.rms_px] {
+        assert!((rms_px / NOISE_PX - 1.0).abs() < 0.05, "{rms_px}");
+    }
+    let [turn, step] = found.cameras[1].camera_from_rig.off(&right);
+    assert!(turn.length() < 1e-3 && step.length() < 0.5, "{turn} {step}");
+    // Without the shape the board is to blame.
+    let flat = rig.solve().unwrap();
+    let said = rig.diagnose(&flat);
+    let is_of_shape = |said: &Diagnosis| matches!(said, Diagnosis::Remedied { remedy, .. } if remedy.instead == Instead::Shape);
+    assert!(said.len() == 1 && said.iter().all(is_of_shape), "{said:?}");
+}
+
+#[test]
+fn a_bent_and_stretched_sheet_is_found() {
+    let views = views(bent, 1);
+    let (plain, with_shape) = (calibration(&views), calibration(&views).board_shape(true));
+    let (flat, found) = (plain.solve().unwrap(), with_shape.solve().unwrap());
+    let [LackOfFit::Target { panel: PanelRef::ONLY, rms_mm, .. }] = flat.lack_of_fit[..] else {
+        panic!("{:?}", flat.lack_of_fit)
+    };
+    assert!((0.05..0.5).contains(&rms_mm), "{rms_mm}");
+    assert_eq!(found.lack_of_fit, []);
+    let said = plain.diagnose(&flat);
+    let [Diagnosis::Remedied { remedy: Remedy { instead: Instead::Shape, .. }, .. }] = said[..]
+    else {
+        panic!("{said:?}")
+    };
+    assert_eq!(with_shape.diagnose(&found), []);
+    assert!(flat.rms_px > 2.0 * found.rms_px, "{} {}", flat.rms_px, found.rms_px);
+    assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.05, "{}", found.rms_px);
+    check_shape(&found);
     // The camera has as many parameters as without.
-    assert_eq!(found.covariance.shape(), flat.covariance.shape());
+    assert_eq!(found.cameras[0].covariance.shape(), flat.cameras[0].covariance.shape());
 }
 
 #[test]
 fn a_flat_sheet_is_called_flat() {
     let significant = (0..10).filter(|&seed| {
         let views = views(|_, _| DVec3::ZERO, 100 + seed);
-        let found = calibrate_with_shape(&views, &[Pose::IDENTITY], OPTIONS).unwrap();
+        let found = calibration(&views).board_shape(true).solve().unwrap();
         found.shape.unwrap().is_significant()
     });
     assert_eq!(significant.count(), 0);
     let views = views(|_, _| DVec3::ZERO, 1);
-    assert!(calibrate_with_shape(&views, &[Pose::IDENTITY; 2], OPTIONS).is_err());
+    let of_two = Calibration::new([Pose::IDENTITY; 2]);
+    let of_two = of_two.camera("", views, Model::Radtan).board_shape(true);
+    assert!(matches!(of_two.solve(), Err(CalibrationError::ShapeOfMany { panels: 2 })));
 }

@@ -290,7 +290,7 @@ fn options_that_contradict_each_other_or_the_disk_are_refused() {
         (format!("{rig} --camera b=./corners"), "a and b have the same folder"),
         (
             format!("{rig} --camera b=other --known a=known.yaml --known a=known.yaml"),
-            "--known: a has two files",
+            "--known: a is given twice",
         ),
         (
             format!("{rig} --camera b=other -o known.yaml"),
@@ -554,6 +554,32 @@ fn a_rig_is_calibrated_from_pictures() {
     assert!((motion(larger).translation - 1.01 * planned).length() < 1e-2, "{larger}");
     let said = refused(at, &format!("{pose} 1.01,1.02"));
     assert!(said.contains("--print-scale: faces that are stretched in one direction"), "{said}");
+
+    // Frames that took no part, and a page with a section for each camera.
+    let page = "--holdout 5 --report held --images left=left";
+    std::fs::create_dir(at.join("held")).unwrap();
+    let said = done(at, &format!("rig {cameras} --target ico.json -o held {page}"));
+    let [first, .., held_out] = said.lines().filter(|l| l.contains("rms")).collect::<Vec<_>>()[..]
+    else {
+        panic!("{said}")
+    };
+    assert!(first.starts_with("2 cameras, 4 frames, rms 0.0"), "{said}");
+    assert!(held_out.starts_with("held out: 1 frame, rms 0.0"), "{said}");
+    let rig = json(&at.join("held/rig.json"));
+    let names = |of: &Value| -> Vec<String> {
+        let frames = of["frames"].as_array().unwrap().iter();
+        frames.map(|frame| frame["name"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!((names(&rig).len(), names(&rig["held_out"])), (4, vec!["4".to_owned()]));
+    for camera in rig["cameras"].as_array().unwrap() {
+        let views = camera["views"].as_array().unwrap();
+        let corners = views.iter().map(|view| view["corners"].as_array().unwrap().len());
+        assert_eq!(Some(corners.sum::<usize>() as u64), camera["corners"].as_u64());
+    }
+    let page = std::fs::read_to_string(at.join("held/rig-report.html")).unwrap();
+    let of_cameras = page.match_indices("class=\"camera\">").count();
+    let pictures = page.matches("data:image/png").count();
+    assert_eq!((of_cameras, pictures), (2, 4), "sections of cameras and pictures of the left one");
 
     let wrong = refused(at, &format!("rig {cameras} --camera third=nowhere --target ico.json"));
     assert!(wrong.contains("third") && wrong.contains("nowhere"), "{wrong}");

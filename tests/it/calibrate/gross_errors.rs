@@ -4,9 +4,8 @@
 use std::f64::consts::PI;
 
 use deltille::calibrate::{
-    CalibrationError, Finding, Instead, Loss, Model, Observation, Options, PanelPlace, PanelRef,
-    RigOptions, RigViews, Shared, Sighting, Solution, View, Weights, calibrate, calibrate_rig,
-    poses, remedy,
+    Calibration, CalibrationError, CameraViews, Diagnosis, Estimate, Finding, LackOfFit, Model,
+    Observation, PanelPlace, PanelRef, Shared, Sighting, View,
 };
 use deltille::camera::{Camera, Lens, Pose};
 use deltille::family::Family;
@@ -218,8 +217,8 @@ fn views(model: Model, target: &Target, wrong: Wrong, seed: u64) -> Vec<View> {
     views
 }
 
-fn options(model: Model) -> Options {
-    Options { model, loss: Loss::default(), weights: Weights::default() }
+fn of_target(target: &Target) -> Calibration {
+    Calibration::new(target.panels.iter().map(|panel| &panel.pose))
 }
 
 fn solve(
@@ -227,23 +226,22 @@ fn solve(
     target: &Target,
     wrong: Wrong,
     seed: u64,
-) -> Result<Solution, CalibrationError> {
-    let panels: Vec<Pose> = target.panels.iter().map(|panel| panel.pose.to_pose()).collect();
-    calibrate(&views(model, target, wrong, seed), &panels, options(model))
+) -> Result<Estimate, CalibrationError> {
+    of_target(target).camera("", views(model, target, wrong, seed), model).solve()
 }
 
 /// Error of the focal length in deviations, and its deviation, px.
-fn focal(found: &Solution, model: Model) -> (f64, f64) {
-    let (truth, fx) = (camera(model).focal_px[0], &found.parameters[0]);
+fn focal(found: &Estimate, model: Model) -> (f64, f64) {
+    let (truth, fx) = (camera(model).focal_px[0], &found.cameras[0].parameters[0]);
     let sd = fx.sd.unwrap();
     ((fx.value - truth) / sd, sd)
 }
 
 /// How many corners are called outliers that are none, and how many are that are not called so.
-fn confused(found: &Solution, model: Model, target: &Target, seed: u64) -> (usize, usize) {
+fn confused(found: &Estimate, model: Model, target: &Target, seed: u64) -> (usize, usize) {
     let clean = views(model, target, Wrong::Nothing, seed);
     let (mut innocent, mut missed) = (0, 0);
-    for view in &found.views {
+    for view in &found.cameras[0].views {
         let clean = clean.iter().find(|clean| clean.name == view.name).unwrap();
         let clean =
             clean.sightings.iter().flat_map(|s| s.observations.iter().map(move |o| (s.panel, o)));
@@ -278,7 +276,7 @@ const OF_SOLIDS: [Wrong; 4] =
     [Wrong::Displaced(0.6), Wrong::Displaced(1.5), Wrong::Exchanged, Wrong::PanelPermuted];
 
 /// The findings and views left out that a fault must lead to.
-fn check_named(found: &Solution, target: &Target, wrong: Wrong, case: &str) {
+fn check_named(found: &Estimate, target: &Target, wrong: Wrong, case: &str) {
     let shared: Vec<&Shared> = found.findings.iter().map(|finding| &finding.shared).collect();
     let is_solid = target.panels.len() > 1;
     match wrong {
@@ -315,7 +313,7 @@ fn check_named(found: &Solution, target: &Target, wrong: Wrong, case: &str) {
             assert_eq!(panel.index(), 7, "{case}");
             assert!((moved.by_mm - mm).abs() < 0.05, "{case}: {moved:?}");
             assert!(2 * outliers > *corners, "{case}: {outliers} of {corners}");
-            let innocent = found.views.iter().flat_map(|view| &view.corners);
+            let innocent = found.corners();
             let innocent =
                 innocent.filter(|corner| corner.outlier && corner.panel != *panel).count();
             assert!(innocent <= 1, "{case}: {innocent} innocent corners");
@@ -416,7 +414,7 @@ fn gross_errors_over_twenty_seeds() {
 }
 
 /// Three cameras around an icosahedron, each with its own views of the same frames.
-fn rig(wrong: Wrong, frames: usize, seed: u64) -> (Vec<RigViews>, Vec<PanelPlace>) {
+fn rig(wrong: Wrong, frames: usize, seed: u64) -> (Vec<CameraViews>, Vec<PanelPlace>) {
     let target = icosahedron();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let camera = camera(RADTAN);
@@ -438,23 +436,20 @@ fn rig(wrong: Wrong, frames: usize, seed: u64) -> (Vec<RigViews>, Vec<PanelPlace
             seen(&camera, &target, &panels, &place, &format!("{i:02}"), &mut rng)
         });
         let views = views.filter(|view| !view.sightings.is_empty()).collect();
-        RigViews { name: format!("c{index}"), views, known: None }
+        CameraViews::new(&format!("c{index}"), views, RADTAN)
     });
     let views = views.collect();
-    let as_stated = |target_from_panel| PanelPlace { target_from_panel, covariance: None };
-    (views, stated.into_iter().map(as_stated).collect())
+    (views, stated.into_iter().map(PanelPlace::from).collect())
+}
+
+fn solve_rig(views: &[CameraViews], panels: &[PanelPlace]) -> Result<Estimate, CalibrationError> {
+    views.iter().cloned().fold(Calibration::new(panels.iter().copied()), Calibration::with).solve()
 }
 
 #[test]
 fn what_is_wrong_in_a_rig_is_named() {
-    let options = RigOptions {
-        model: RADTAN,
-        loss: Loss::default(),
-        weights: Weights::default(),
-        refine_target: false,
-    };
     let (views, panels) = rig(Wrong::Displaced(0.6), 20, 5);
-    let found = calibrate_rig(&views, &panels, options).unwrap();
+    let found = solve_rig(&views, &panels).unwrap();
     let [Finding { shared: Shared::Panel { panel, moved: Some(moved) }, .. }] = found.findings[..]
     else {
         panic!("{:?}", found.findings)
@@ -468,33 +463,27 @@ fn what_is_wrong_in_a_rig_is_named() {
     late[1].views.iter_mut().zip(names.iter().cycle().skip(3)).for_each(|(view, name)| {
         view.name.clone_from(name);
     });
-    let error = calibrate_rig(&late, &panels, options).unwrap_err();
+    let error = solve_rig(&late, &panels).unwrap_err();
     assert!(error.to_string().contains("most of all camera c1"), "{error}");
 }
 
 /// A camera that is turned after half of the frames: these go, and no panel is to blame.
 #[test]
 fn panels_are_not_to_blame_for_a_camera_that_was_moved() {
-    let options = RigOptions {
-        model: RADTAN,
-        loss: Loss::default(),
-        weights: Weights::default(),
-        refine_target: false,
-    };
     for seed in 0..4 {
         let (mut views, panels) = rig(Wrong::Nothing, 20, seed);
         let late = views[1].views.iter_mut().filter(|view| view.name.as_str() >= "10");
         for seen in late.flat_map(|view| &mut view.sightings).flat_map(|s| &mut s.observations) {
             seen.pixel[0] += 15.0;
         }
-        let found = calibrate_rig(&views, &panels, options).unwrap();
+        let found = solve_rig(&views, &panels).unwrap();
         assert!(found.findings.is_empty(), "seed {seed}: {:?}", found.findings);
         assert!(found.frames.len() >= 10, "seed {seed}: {}", found.frames.len());
     }
 }
 
 /// The panels that findings name, and nothing but panels.
-fn panels_named(found: &Solution) -> Vec<usize> {
+fn panels_named(found: &Estimate) -> Vec<usize> {
     let panels = found.findings.iter().map(|finding| match &finding.shared {
         Shared::Panel { panel, .. } => panel.index(),
         other => panic!("{other:?}"),
@@ -525,13 +514,20 @@ fn only_panels_that_were_exchanged_are_named() {
 #[test]
 fn displaced_panels_are_no_fault_of_the_lens() {
     let target = icosahedron();
-    let panels: Vec<Pose> = target.panels.iter().map(|panel| panel.pose.to_pose()).collect();
     for seed in 0..2 {
         let views = views(RADTAN, &target, Wrong::AllDisplaced(0.5), seed);
-        let found = calibrate(&views, &panels, options(RADTAN)).unwrap();
-        let remedy = remedy(&views, &panels, options(RADTAN), &found);
-        let instead = remedy.map(|remedy| remedy.instead);
-        assert_eq!(instead, Some(Instead::Panels), "seed {seed}");
+        let calibration = of_target(&target).camera("", views, RADTAN);
+        let said = calibration.diagnose(&calibration.solve().unwrap());
+        let is_of_panels =
+            |said: &Diagnosis| matches!(said, Diagnosis::LackOfFit(LackOfFit::Target { .. }));
+        let is_of_lens = |said: &Diagnosis| {
+            matches!(
+                said,
+                Diagnosis::LackOfFit(LackOfFit::Lens { .. }) | Diagnosis::Remedied { .. }
+            )
+        };
+        assert!(said.iter().any(is_of_panels), "seed {seed}: {said:?}");
+        assert!(!said.iter().any(is_of_lens), "seed {seed}: {said:?}");
     }
 }
 
@@ -556,13 +552,12 @@ fn a_pose_holds_with_two_fifths_of_wrong_corners() {
         let all = views(model, &target, wrong, 3);
         let clean = views(model, &target, Wrong::Nothing, 3);
         let find = |views: &[View]| {
-            let weights = Weights::default();
-            poses(views, &[Pose::IDENTITY], &camera, Loss::default(), weights).unwrap()
+            of_target(&target).camera("", views.to_vec(), camera.clone()).solve().unwrap()
         };
         for (view, clean) in all.iter().zip(&clean) {
-            let of_view = |view: &View| find(std::slice::from_ref(view)).views[0].clone();
+            let of_view = |view: &View| find(std::slice::from_ref(view)).frames[0].clone();
             let (found, truth) = (of_view(view), of_view(clean));
-            let [turned, moved] = found.pose.off(&truth.pose);
+            let [turned, moved] = found.rig_from_target.off(&truth.rig_from_target);
             let sd = |range: std::ops::Range<usize>| {
                 found.pose_sd[range].iter().map(|sd| sd * sd).sum::<f64>().sqrt()
             };
@@ -578,7 +573,7 @@ fn a_pose_holds_with_two_fifths_of_wrong_corners() {
 fn no_view_is_left_out_for_a_lens_that_does_not_fit() {
     for seed in 0..6 {
         let views = views(FISHEYE, &board(), Wrong::Nothing, seed);
-        let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Eucm)).unwrap();
+        let found = of_target(&board()).camera("", views, Model::Eucm).solve().unwrap();
         assert!(found.inlier_rms_px() > 1.1 * NOISE_PX, "seed {seed}: {}", found.inlier_rms_px());
         assert!(found.excluded.is_empty(), "seed {seed}: {:?}", found.excluded);
     }

@@ -1,8 +1,8 @@
 //! Calibration of simulated cameras, whose truth is known, and of views that make none.
 
 use deltille::calibrate::{
-    CalibrationError, Instead, Loss, Misfit, Model, Observation, Options, PanelRef, Sighting, View,
-    Weights, calibrate, poses, remedy, sufficient,
+    Calibration, CalibrationError, Diagnosis, Estimate, Instead, Intrinsics, LackOfFit, Loss,
+    Model, Observation, PanelRef, Remedy, Sighting, View, Weights,
 };
 use deltille::camera::{Camera, Pose};
 use glam::{DQuat, DVec3};
@@ -101,8 +101,12 @@ const MODELS: [Model; 8] = [
     Model::Pupil,
 ];
 
-fn options(model: Model) -> Options {
-    Options { model, loss: Loss::Huber, weights: Weights::Covariance }
+fn of(views: &[View], intrinsics: impl Into<Intrinsics>) -> Calibration {
+    Calibration::new([Pose::IDENTITY]).camera("", views.to_vec(), intrinsics)
+}
+
+fn solved(views: &[View], model: Model) -> Estimate {
+    of(views, model).solve().unwrap()
 }
 
 /// How many parameters of cameras and poses lie within three standard deviations of the truth, and
@@ -110,16 +114,16 @@ fn options(model: Model) -> Options {
 fn within_3_sigma(model: Model, seed: u64) -> (usize, usize) {
     let truth = camera(model);
     let (views, poses) = simulated(&truth, 25, 0.8, seed);
-    let found = calibrate(&views, &[Pose::IDENTITY], options(model)).unwrap();
+    let found = solved(&views, model);
     assert!(found.excluded.is_empty(), "{model}: {:?}", found.excluded);
     assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.1, "{model}: {} px", found.rms_px);
     let mut errors = Vec::new();
-    for (parameter, value) in found.parameters.iter().zip(truth.parameters()) {
+    for (parameter, value) in found.cameras[0].parameters.iter().zip(truth.parameters()) {
         errors.extend(parameter.sd.map(|sd| (parameter.value - value) / sd));
     }
-    for (view, pose) in found.views.iter().zip(&poses) {
-        let change = view.pose.off(pose).map(|part| part.to_array());
-        let change = change.as_flattened().iter().zip(view.pose_sd);
+    for (frame, pose) in found.frames.iter().zip(&poses) {
+        let change = frame.rig_from_target.off(pose).map(|part| part.to_array());
+        let change = change.as_flattened().iter().zip(frame.pose_sd);
         errors.extend(change.map(|(error, sd)| error / sd));
     }
     (errors.iter().filter(|error| error.abs() <= 3.0).count(), errors.len())
@@ -161,10 +165,10 @@ fn wrong_views_and_wrong_corners_are_named_and_do_no_harm() {
         }
     }
     views[6].sightings[0].observations[40].pixel[1] += 2.0;
-    let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Radtan)).unwrap();
+    let found = solved(&views, Model::Radtan);
     let excluded: Vec<&str> = found.excluded.iter().map(|out| out.view.as_str()).collect();
     assert_eq!(excluded, ["3", "11", "20", "21"]);
-    let outliers: Vec<_> = found
+    let outliers: Vec<_> = found.cameras[0]
         .views
         .iter()
         .flat_map(|view| {
@@ -172,7 +176,7 @@ fn wrong_views_and_wrong_corners_are_named_and_do_no_harm() {
         })
         .collect();
     assert_eq!(outliers, [("6", 3, 7)]);
-    for (parameter, value) in found.parameters.iter().zip(truth.parameters()) {
+    for (parameter, value) in found.cameras[0].parameters.iter().zip(truth.parameters()) {
         if let Some(sd) = parameter.sd {
             assert!((parameter.value - value).abs() < 4.0 * sd, "{parameter:?} {value}");
         }
@@ -184,8 +188,8 @@ fn poses_alone_are_those_of_the_truth() {
     for model in [Model::Radtan, Model::Pupil] {
         let truth = camera(model);
         let (views, expected) = simulated(&truth, 5, 0.8, 3);
-        let loss = Loss::Squared;
-        let found = poses(&views, &[Pose::IDENTITY], &truth, loss, Weights::Equal).unwrap();
+        let found = of(&views, truth).loss(Loss::Squared).weights(Weights::Equal).solve().unwrap();
+        let found = &found.cameras[0];
         for (view, pose) in found.views.iter().zip(&expected) {
             assert!((view.pose.translation - pose.translation).length() < 1.0);
             assert!(view.pose.rotation.angle_between(pose.rotation) < 0.005);
@@ -198,8 +202,7 @@ fn poses_alone_are_those_of_the_truth() {
 fn views_that_determine_no_camera_are_refused() {
     let truth = camera(Model::Radtan);
     let (views, _) = simulated(&truth, 12, 0.8, 5);
-    let panels = [Pose::IDENTITY];
-    let refused = |views: &[View]| calibrate(views, &panels, options(Model::Radtan)).unwrap_err();
+    let refused = |views: &[View]| of(views, Model::Radtan).solve().unwrap_err();
     assert!(matches!(refused(&views[..1]), CalibrationError::TooFewViews { found: 1, .. }));
     let mut noise = || 0.0;
     let flat = |z: f64| {
@@ -221,11 +224,12 @@ fn parameters_that_cannot_be_told_apart_are_named_and_do_no_harm() {
     values[..4].copy_from_slice(&[625.0, 625.0, 804.0, 606.0]);
     let truth = camera(Model::Radtan).with_parameters(&values);
     let (views, _) = simulated(&truth, 20, 0.8, 9);
-    let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Rational)).unwrap();
-    assert!(found.loose.contains(&"k1".to_owned()) && found.loose.contains(&"k4".to_owned()));
-    assert!(found.loose.iter().all(|name| name.starts_with('k')), "{:?}", found.loose);
+    let found = solved(&views, Model::Rational);
+    let open = &found.cameras[0].ill_conditioned;
+    assert!(open.contains(&"k1".to_owned()) && open.contains(&"k4".to_owned()));
+    assert!(open.iter().all(|name| name.starts_with('k')), "{open:?}");
     assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.1, "{} px", found.rms_px);
-    for (parameter, value) in found.parameters[..4].iter().zip(values) {
+    for (parameter, value) in found.cameras[0].parameters[..4].iter().zip(values) {
         assert!((parameter.value - value).abs() < 4.0 * parameter.sd.unwrap(), "{parameter:?}");
     }
 }
@@ -243,8 +247,8 @@ fn any_focal_length_is_found() {
             let pose = any_pose(&mut rng, 0.02, 0.9, f64::max(250.0, 0.4 * focal));
             views.extend(view(&truth, &pose, "", &mut noise));
         }
-        let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Radtan)).unwrap();
-        let ratio = found.camera.focal_px[0] / focal;
+        let found = solved(&views, Model::Radtan);
+        let ratio = found.cameras[0].camera.focal_px[0] / focal;
         assert!((ratio - 1.0).abs() < 1e-4, "{focal}: {ratio}");
     }
 }
@@ -253,8 +257,8 @@ fn any_focal_length_is_found() {
 fn a_lens_of_its_model_leaves_no_pattern() {
     for seed in 0..20 {
         let (views, _) = simulated(&camera(Model::Radtan), 20, 0.8, 300 + seed);
-        let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Radtan)).unwrap();
-        assert_eq!(found.misfits, [], "seed {seed}");
+        let found = solved(&views, Model::Radtan);
+        assert_eq!(found.lack_of_fit, [], "seed {seed}");
     }
 }
 
@@ -269,48 +273,55 @@ fn with(model: Model, index: usize, value: f64) -> Camera {
 #[test]
 fn a_lens_of_another_model_leaves_a_pattern_over_the_image() {
     let (views, _) = simulated(&with(Model::Radtan5, 8, -0.02), 25, 0.8, 3);
-    let found = calibrate(&views, &[Pose::IDENTITY], options(Model::Radtan)).unwrap();
+    let found = solved(&views, Model::Radtan);
     assert!(
-        matches!(found.misfits[..], [Misfit::Lens { camera: 0, rms_px }, ..] if rms_px > 0.5 * NOISE_PX),
+        matches!(found.lack_of_fit[..], [LackOfFit::Lens { camera: 0, rms_px }, ..] if rms_px > 0.5 * NOISE_PX),
         "{:?}",
-        found.misfits
+        found.lack_of_fit
     );
 }
 
 /// A lens that needs no denominator leaves numerator and denominator to chance; one that does needs both.
 #[test]
 fn the_smallest_model_that_holds_a_lens_is_named() {
-    let of = |truth: &Camera, model: Model| {
+    let smallest = |truth: &Camera, model: Model| {
         let (views, _) = simulated(truth, 20, 0.8, 5);
-        let found = calibrate(&views, &[Pose::IDENTITY], options(model)).unwrap();
-        (found.loose.len(), sufficient(&views, &[Pose::IDENTITY], options(model), &found))
+        let found = solved(&views, model);
+        let sufficient = of(&views, model).sufficient_model(0, &found);
+        (found.cameras[0].ill_conditioned.len(), sufficient)
     };
     let mild = camera(Model::Radtan);
     for model in [Model::Rational, Model::ThinPrism] {
-        let (loose, smaller) = of(&mild, model);
+        let (loose, smaller) = smallest(&mild, model);
         assert!(loose > 1 && smaller == Some(Model::Radtan), "{model}: {loose} {smaller:?}");
     }
-    assert_eq!(of(&mild, Model::Radtan5), (0, Some(Model::Radtan)));
-    assert_eq!(of(&camera(Model::ThinPrism), Model::ThinPrism).1, None);
-    assert_eq!(of(&camera(Model::Radtan5), Model::Radtan5).1, None);
+    assert_eq!(smallest(&mild, Model::Radtan5), (0, Some(Model::Radtan)));
+    assert_eq!(smallest(&camera(Model::ThinPrism), Model::ThinPrism).1, None);
+    assert_eq!(smallest(&camera(Model::Radtan5), Model::Radtan5).1, None);
 }
 
 /// A lens of another model is told, and what holds it; one of its own model needs nothing.
 #[test]
 fn what_makes_a_calibration_fit_is_found() {
-    let of = |truth: &Camera, model: Model| {
+    let said = |truth: &Camera, model: Model| {
         let (views, _) = simulated(truth, 20, 0.8, 5);
-        let found = calibrate(&views, &[Pose::IDENTITY], options(model)).unwrap();
-        remedy(&views, &[Pose::IDENTITY], options(model), &found)
+        of(&views, model).diagnose(&solved(&views, model))
     };
-    assert_eq!(of(&camera(Model::Radtan), Model::Radtan), None);
+    assert_eq!(said(&camera(Model::Radtan), Model::Radtan), []);
     for (truth, model, better) in [
         (with(Model::Radtan5, 8, -0.02), Model::Radtan, Model::Rational),
         (with(Model::KannalaBrandt(6), 8, 2e-3), Model::KannalaBrandt(4), Model::KannalaBrandt(6)),
         (camera(Model::Pupil), Model::Eucm, Model::Pupil),
     ] {
-        let found = of(&truth, model).unwrap_or_else(|| panic!("{model}"));
-        assert_eq!(found.instead, Instead::Model(better), "{model}: {found:?}");
-        assert!(found.rms_px < 1.1 * NOISE_PX, "{model}: {found:?}");
+        let said = said(&truth, model);
+        let remedies = said.iter().filter_map(|said| match said {
+            Diagnosis::Remedied { camera: 0, remedy } => Some(*remedy),
+            _ => None,
+        });
+        let [Remedy { instead, from_px, to_px }] = remedies.collect::<Vec<_>>()[..] else {
+            panic!("{model}: {said:?}")
+        };
+        assert_eq!(instead, Instead::Model(better), "{model}");
+        assert!(to_px < 1.1 * NOISE_PX && from_px > to_px, "{model}: {from_px} {to_px}");
     }
 }

@@ -1,8 +1,8 @@
 //! Rigs of simulated cameras: what is found is what was put in, and the stated deviations are true.
 
 use deltille::calibrate::{
-    CalibrationError, Loss, Misfit, Model, Observation, PanelPlace, PanelRef, RigOptions,
-    RigSolution, RigViews, Sighting, View, Weights, calibrate_rig, wrong_cameras,
+    Calibration, CalibrationError, CameraViews, Diagnosis, Estimate, Instead, LackOfFit, Model,
+    Observation, PanelPlace, PanelRef, Sighting, View,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::family::Family;
@@ -26,7 +26,7 @@ struct Simulated {
     panels: Vec<Pose>,
     cameras: Vec<Camera>,
     camera_from_rig: Vec<Pose>,
-    views: Vec<RigViews>,
+    views: Vec<CameraViews>,
 }
 
 fn small_pose(random: &mut ChaCha8Rng, turn_rad: f64, move_mm: f64) -> Pose {
@@ -61,8 +61,7 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
             }
         })
         .collect();
-    let as_stated = |&target_from_panel: &Pose| PanelPlace { target_from_panel, covariance: None };
-    let stated = stated.iter().map(as_stated).collect();
+    let stated = stated.iter().map(|&target_from_panel| target_from_panel.into()).collect();
     let cameras: Vec<Camera> = (0..3)
         .map(|_| {
             let lens = BrownConrady {
@@ -133,24 +132,26 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
                 sightings,
             })
         });
-        RigViews { name: format!("c{index}"), views: views.collect(), known: None }
+        CameraViews::new(&format!("c{index}"), views.collect(), Model::Radtan)
     });
     let views = views.collect();
     Simulated { stated, panels, cameras, camera_from_rig, views }
 }
 
-fn options(refine_target: bool) -> RigOptions {
-    RigOptions {
-        model: Model::Radtan,
-        loss: Loss::Huber,
-        weights: Weights::Covariance,
-        refine_target,
+fn calibration(views: &[CameraViews], panels: &[PanelPlace], refine: bool) -> Calibration {
+    let blank = Calibration::new(panels.iter().copied()).refine_panels(refine);
+    views.iter().cloned().fold(blank, Calibration::with)
+}
+
+impl Simulated {
+    fn solve(&self, refine: bool) -> Estimate {
+        calibration(&self.views, &self.stated, refine).solve().unwrap()
     }
 }
 
 /// Errors of everything that was found, in stated deviations. The target frame is that of the panel
 /// that was kept, so that panels are compared relative to it.
-fn normalised_errors(truth: &Simulated, found: &RigSolution) -> Vec<f64> {
+fn normalised_errors(truth: &Simulated, found: &Estimate) -> Vec<f64> {
     let mut errors = Vec::new();
     for (index, camera) in found.cameras.iter().enumerate() {
         let true_values = truth.cameras[index].parameters();
@@ -184,7 +185,7 @@ fn honest(seeds: std::ops::Range<u64>, frames: usize) -> f64 {
     let mut errors = Vec::new();
     for seed in seeds {
         let truth = simulated(seed, frames);
-        let found = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
+        let found = truth.solve(true);
         assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.1, "rms {}", found.rms_px);
         errors.extend(normalised_errors(&truth, &found));
     }
@@ -210,36 +211,35 @@ fn fifty_rigs_are_found_within_their_deviations() {
 #[test]
 fn a_refined_target_is_known_in_the_next_calibration() {
     let truth = simulated(11, 40);
-    let first = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
-    let few = |views: &RigViews| {
+    let first = truth.solve(true);
+    let few = |views: &CameraViews| {
         let mut views = views.clone();
         views.views.truncate(8);
         views
     };
-    let few: Vec<RigViews> = truth.views.iter().map(few).collect();
-    let alone = calibrate_rig(&few, &truth.stated, options(true)).unwrap();
-    let with = calibrate_rig(&few, &first.panels, options(true)).unwrap();
-    let deviation = |solution: &RigSolution| {
+    let few: Vec<CameraViews> = truth.views.iter().map(few).collect();
+    let alone = calibration(&few, &truth.stated, true).solve().unwrap();
+    let with = calibration(&few, &first.panels, true).solve().unwrap();
+    let deviation = |found: &Estimate| {
         let of = |panel: &PanelPlace| panel.covariance.map(|c| c[3][3] + c[4][4] + c[5][5]);
-        let all: Vec<f64> = solution.panels.iter().filter_map(of).collect();
+        let all: Vec<f64> = found.panels.iter().filter_map(of).collect();
         (all.iter().sum::<f64>() / all.len() as f64).sqrt()
     };
+    let within = normalised_errors(&truth, &alone);
     let [first, alone, with] = [&first, &alone, &with].map(deviation);
     assert!(with < 1.05 * first && with < 0.7 * alone, "{first} {alone} {with}");
-    let within =
-        normalised_errors(&truth, &calibrate_rig(&few, &truth.stated, options(true)).unwrap());
     assert!(within.iter().filter(|e| e.abs() < 3.0).count() as f64 > 0.97 * within.len() as f64);
 }
 
 #[test]
 fn placement_errors_show_unless_the_target_is_refined() {
     let truth = simulated(7, 30);
-    let stated = calibrate_rig(&truth.views, &truth.stated, options(false)).unwrap();
-    let refined = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
+    let stated = truth.solve(false);
+    let refined = truth.solve(true);
     assert!(stated.rms_px > 2.0 * refined.rms_px, "{} {}", stated.rms_px, refined.rms_px);
-    let first = stated.misfits.first();
-    assert!(matches!(first, Some(Misfit::Target { .. })), "{:?}", stated.misfits);
-    assert_eq!(refined.misfits, []);
+    let first = stated.lack_of_fit.first();
+    assert!(matches!(first, Some(LackOfFit::Target { .. })), "{:?}", stated.lack_of_fit);
+    assert_eq!(refined.lack_of_fit, []);
     assert!(stated.panels.iter().all(|panel| panel.covariance.is_none()));
     let kept = refined.panels.iter().filter(|panel| panel.covariance.is_none()).count();
     assert_eq!(kept, 1);
@@ -249,20 +249,35 @@ fn placement_errors_show_unless_the_target_is_refined() {
 fn a_camera_that_is_another_one_is_named() {
     let mut truth = simulated(5, 20);
     for (views, camera) in truth.views.iter_mut().zip(&truth.cameras) {
-        views.known = Some(camera.clone());
+        views.intrinsics = camera.clone().into();
     }
-    let wrong = |truth: &Simulated| wrong_cameras(&truth.views, &truth.really(), options(false));
-    assert!(wrong(&truth).is_empty());
-    truth.views[1].known = Some(truth.cameras[2].clone());
-    assert_eq!(wrong(&truth), [1]);
+    let said = |truth: &Simulated| {
+        let calibration = calibration(&truth.views, &truth.really(), false);
+        calibration.diagnose(&calibration.solve().unwrap())
+    };
+    assert_eq!(said(&truth), []);
+    // Refocused since: all fits worse.
+    let mut refocused = truth.cameras[1].clone();
+    refocused.focal_px = refocused.focal_px.map(|focal| 1.01 * focal);
+    truth.views[1].intrinsics = refocused.into();
+    let said = said(&truth);
+    let is_named = |said: &Diagnosis| {
+        let Diagnosis::Remedied { camera, remedy } = said else { return false };
+        (*camera, remedy.instead) == (1, Instead::Camera)
+    };
+    assert!(!said.is_empty() && said.iter().all(is_named), "{said:?}");
+    // Another one: nothing fits.
+    truth.views[1].intrinsics = truth.cameras[2].clone().into();
+    let error = calibration(&truth.views, &truth.really(), false).solve().unwrap_err();
+    assert!(
+        matches!(&error, CalibrationError::ForeignCameras { cameras, .. } if cameras == "c1"),
+        "{error}"
+    );
 }
 
 impl Simulated {
     fn really(&self) -> Vec<PanelPlace> {
-        let panels = self.panels.iter();
-        panels
-            .map(|&target_from_panel| PanelPlace { target_from_panel, covariance: None })
-            .collect()
+        self.panels.iter().map(|&target_from_panel| target_from_panel.into()).collect()
     }
 }
 
@@ -273,7 +288,7 @@ fn pictures_of_another_moment_are_left_out_and_cameras_without_common_frames_ref
     let views = &mut truth.views[1].views;
     let (a, b) = (views[3].name.clone(), views[7].name.clone());
     (views[3].name, views[7].name) = (b.clone(), a.clone());
-    let found = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap();
+    let found = truth.solve(true);
     let out: Vec<&str> = found.excluded.iter().map(|out| out.view.as_str()).collect();
     assert!(out.contains(&a.as_str()) && out.contains(&b.as_str()), "{out:?}");
     assert!(found.rms_px < 1.2 * NOISE_PX, "{}", found.rms_px);
@@ -281,7 +296,7 @@ fn pictures_of_another_moment_are_left_out_and_cameras_without_common_frames_ref
     for view in &mut truth.views[2].views {
         view.name = format!("late-{}", view.name);
     }
-    let error = calibrate_rig(&truth.views, &truth.stated, options(true)).unwrap_err();
+    let error = calibration(&truth.views, &truth.stated, true).solve().unwrap_err();
     assert!(matches!(error, CalibrationError::Apart { .. }), "{error}");
     assert!(error.to_string().starts_with("c2: no frame shows the target"), "{error}");
 }

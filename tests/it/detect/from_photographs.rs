@@ -2,7 +2,7 @@
 
 use crate::common::view::tilted;
 use deltille::artwork;
-use deltille::calibrate::{Loss, Model, Options, Reference, Weights, calibrate, views};
+use deltille::calibrate::{Calibration, Model, Reference, views};
 use deltille::camera::{BrownConrady, Camera, KannalaBrandt, Lens};
 use deltille::detect::{Detector, DetectorConfig};
 use deltille::family::Family;
@@ -43,15 +43,10 @@ fn lenses_that_bend_edges_are_found_within_their_deviations() {
         let seen: Vec<_> = seen.collect();
         let shown = views(&seen, &Reference::Target(&target)).unwrap();
         let panels = Reference::Target(&target).panels();
-        let found = calibrate(
-            &shown.views,
-            &panels,
-            Options { model, loss: Loss::Huber, weights: Weights::Covariance },
-        )
-        .unwrap();
+        let found = Calibration::new(panels).camera("", shown.views, model).solve().unwrap();
         assert!(found.rms_px < 0.006, "{model}: {} px", found.rms_px);
-        assert!(found.views.len() >= 13, "{model}: {} views", found.views.len());
-        for (parameter, truth) in found.parameters.iter().zip(camera.parameters()) {
+        assert!(found.frames.len() >= 13, "{model}: {} views", found.frames.len());
+        for (parameter, truth) in found.cameras[0].parameters.iter().zip(camera.parameters()) {
             // Views of the middle do not tell the last terms of a fisheye.
             let Some(sd) = parameter.sd else { continue };
             let off = (parameter.value - truth) / sd;

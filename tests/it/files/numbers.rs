@@ -2,7 +2,7 @@
 //! field, or all that comes of it is finite.
 
 use crate::common::view::tilted;
-use deltille::calibrate::{Loss, Model, Options, Reference, Weights, calibrate, views};
+use deltille::calibrate::{Calibration, Model, Reference, views};
 use deltille::camera::Camera;
 use deltille::detect::{Detection, Grid, GridCorner};
 use deltille::export::calibration::{self, Print};
@@ -298,15 +298,16 @@ fn detections() {
             }
         };
         let panels = Reference::Target(&target).panels();
-        let options =
-            Options { model: Model::Radtan, loss: Loss::Huber, weights: Weights::Covariance };
-        match calibrate(&shown.views, &panels, options) {
+        let calibration = Calibration::new(panels).camera("", shown.views, Model::Radtan);
+        match calibration.solve() {
             Err(error) => is_told(&error.to_string(), &what),
-            Ok(solution) => {
-                let text = calibration::write(&solution, "pinhole", None, Print::default());
+            Ok(found) => {
+                let said = calibration.diagnose(&found);
+                let text = calibration::write(&found, &said, Print::default()).unwrap();
                 is_finite_json(&text, &what);
-                is_finite(&solution.camera.to_yaml(), &what);
-                let [fx, _] = solution.camera.focal_px;
+                let camera = &found.cameras[0].camera;
+                is_finite(&camera.to_yaml(), &what);
+                let [fx, _] = camera.focal_px;
                 assert!((fx / 1100.5 - 1.0).abs() < 0.2, "{what}: fx {fx}");
             }
         }

@@ -35,6 +35,22 @@ pub enum CalibrationError {
         /// How many show something.
         all: usize,
     },
+    /// Cameras that were given and did not take their pictures, which may be why nothing was found.
+    #[error("the camera given for {cameras} did not take its pictures: {error}")]
+    ForeignCameras {
+        /// Their names.
+        cameras: String,
+        /// Why nothing was found.
+        error: Box<CalibrationError>,
+    },
+    /// More frames than there are would have to be held out.
+    #[error("there are only {all} views, so that none is the {every}-th")]
+    NothingHeldOut {
+        /// Every how many-th was to be held out.
+        every: usize,
+        /// How many there are.
+        all: usize,
+    },
     /// Not enough views.
     #[error(
         "usable views: {found} of {all}; a calibration needs at least {needed}, tilted differently \

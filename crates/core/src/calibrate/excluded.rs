@@ -1,4 +1,6 @@
-use serde::Serialize;
+use std::fmt;
+
+use serde::{Serialize, Serializer};
 
 /// Something seen that took no part, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -15,7 +17,86 @@ pub struct Excluded {
     /// How many corners went.
     pub corners: usize,
     /// Why.
-    pub reason: String,
+    pub reason: Reason,
+}
+
+/// Why something takes no part.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Reason {
+    /// A detection that is not of the target, and what is wrong with it.
+    Foreign(String),
+    /// A view for which there is no pose.
+    NoPose,
+    /// A view whose corners are too far off.
+    Off {
+        /// The median error of its corners, px.
+        off_px: f64,
+        /// That of other views, px.
+        usual_px: f64,
+    },
+    /// A frame of a rig in which one camera's corners are too far off.
+    AnotherMoment {
+        /// Name of the camera.
+        camera: String,
+        /// The median error of its corners, px.
+        off_px: f64,
+    },
+    /// A frame that speaks for other cameras than all others do.
+    Stranger {
+        /// Whether there are several cameras.
+        is_rig: bool,
+        /// By how many of their deviations the cameras would move.
+        deviations: f64,
+    },
+    /// Labels that run the wrong way round.
+    Mirrored,
+    /// A frame that shows only panels that take no part.
+    OnlyWrongPanels,
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Foreign(problem) => f.write_str(problem),
+            Self::NoPose => f.write_str(
+                "no pose explains its corners: wrong labels, another target, or corners where the lens \
+                 model has ended",
+            ),
+            Self::Off { off_px, usual_px } => write!(
+                f,
+                "its corners are off by {off_px:.1} px where those of other views are by {usual_px:.2} px: \
+                 wrong labels, or another target"
+            ),
+            Self::AnotherMoment { camera, off_px } => write!(
+                f,
+                "the corners of camera {camera} are off by {off_px:.1} px: not taken at the same moment, or \
+                 wrong labels"
+            ),
+            Self::Stranger { is_rig: false, deviations } => write!(
+                f,
+                "it speaks for another camera than the other views do, and would move theirs by \
+                 {deviations:.1} deviations: another zoom, focus or crop, or a board that was bent"
+            ),
+            Self::Stranger { is_rig: true, deviations } => write!(
+                f,
+                "it speaks for other cameras than the other frames do, and would move theirs by \
+                 {deviations:.1} deviations: not taken at the same moment, or one had moved"
+            ),
+            Self::Mirrored => f.write_str(
+                "the labels are mirrored: rows and columns are exchanged, or the image was flipped",
+            ),
+            Self::OnlyWrongPanels => f.write_str(
+                "it shows only panels that are not where the target's file has them",
+            ),
+        }
+    }
+}
+
+impl Serialize for Reason {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
 }
 
 impl Excluded {

@@ -1,8 +1,9 @@
 //! From detections to calibrated cameras.
 //!
 //! ```text
-//!   detections ─ view ─→ views ─ start ─→ problem ─ minimise ─→ solution
-//!     target ──┘          (first focal length, poses)   (bundle adjustment)
+//!   detections ─ view ─→ views ─ Calibration ─ start ─→ problem ─ gross errors ─ reweighting ─→ Estimate
+//!     target ──┘          (what is known)  (first cameras, poses)    (bundle adjustment)           │
+//!                                                                        diagnoses, in words  ←────┘
 //! ```
 //!
 //! A pixel is predicted through a chain of frames,
@@ -19,55 +20,52 @@
 //! pose leads to, and the translation grows by τ. Standard deviations of poses are those of ω (rad)
 //! and τ (mm).
 
+mod calibration;
 mod consensus;
+mod diagnosis;
 mod error;
+mod estimate;
 mod excluded;
 mod finding;
 mod grid;
-mod gross;
+mod gross_errors;
 mod image_circle;
+mod lack_of_fit;
 mod lens_end;
 mod loss;
 mod minimise;
-mod misfit;
 mod model;
+mod model_selection;
 mod normal;
 mod panel;
+mod panels;
 mod pose;
 mod problem;
-mod remedy;
-mod rig;
-mod settle;
+mod reweighting;
 mod shape;
-mod solution;
 mod solve;
 mod start;
-mod stranger;
-mod sufficient;
 mod view;
+mod view_consistency;
 mod weights;
-mod wrong;
+mod words;
 
+pub use calibration::{Calibration, CameraViews, Intrinsics, PanelPlace};
+pub use diagnosis::Diagnosis;
 pub use error::CalibrationError;
-pub use excluded::Excluded;
+pub use estimate::{CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, ViewEstimate};
+pub use excluded::{Excluded, Reason};
 pub use finding::{Finding, Moved, Shared};
 pub use grid::UntaggedGrid;
 pub use image_circle::ImageCircle;
+pub use lack_of_fit::LackOfFit;
 pub use lens_end::LensEnd;
 pub use loss::Loss;
-pub use misfit::Misfit;
 pub use model::{Model, ModelError};
+pub use model_selection::{Instead, Remedy};
 pub use panel::PanelRef;
-pub use pose::estimate_pose;
-pub use problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Prior, Problem};
-pub use remedy::{Instead, Remedy, remedy, remedy_of_given};
-pub use rig::{
-    PanelPlace, RigCamera, RigFrame, RigOptions, RigSolution, RigViews, calibrate_rig,
-    wrong_cameras,
-};
+pub use problem::Observation;
 pub use shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
-pub use solution::{Corner, Parameter, Solution, ViewSolution};
-pub use solve::{Options, calibrate, calibrate_with_shape, poses};
-pub use sufficient::sufficient;
 pub use view::{Reference, Shown, Sighting, View, views};
 pub use weights::Weights;
+pub use words::Words;

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, SMatrix};
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
 use super::problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem};
-use super::settle::scale;
+use super::reweighting::scale;
 use super::view::Sighting;
 use super::weights::{Weights, Whitening};
 use crate::camera::{Camera, Pose};
@@ -24,7 +24,11 @@ const DISAGREE: f64 = 5.0;
 /// camera_from_target; `panels` are the poses of the target's panels on it. Of one panel it has the least
 /// squared error of all corners; of several it is the one on which most corners agree. `None` where the
 /// corners lie on a line or out of the camera's reach.
-pub fn estimate_pose(camera: &Camera, panels: &[Pose], sightings: &[Sighting]) -> Option<Pose> {
+pub(super) fn estimate_pose(
+    camera: &Camera,
+    panels: &[Pose],
+    sightings: &[Sighting],
+) -> Option<Pose> {
     let mut by_size: Vec<&Sighting> = sightings.iter().collect();
     by_size.sort_by_key(|sighting| std::cmp::Reverse(sighting.observations.len()));
     let mut best: Option<(f64, Pose)> = None;

@@ -23,7 +23,7 @@ pub struct Observation {
 
 /// A camera and what of it is unknown.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CameraUnknowns {
+pub(super) struct CameraUnknowns {
     /// The camera.
     pub camera: Camera,
     /// Which of its parameters are unknown, in the order of [`Camera::parameter_names`].
@@ -36,7 +36,7 @@ pub struct CameraUnknowns {
 
 /// A panel of the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PanelUnknowns {
+pub(super) struct PanelUnknowns {
     /// Where it is on the target.
     pub target_from_panel: Pose,
     /// Whether that is unknown; one panel must stay where it is.
@@ -47,7 +47,7 @@ pub struct PanelUnknowns {
 
 /// A pose that was measured before.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Prior {
+pub(super) struct Prior {
     pose: Pose,
     /// Inverse of the covariance of (ω, τ).
     information: Matrix6<f64>,
@@ -75,7 +75,7 @@ impl Prior {
 
 /// What one camera saw of one panel in one frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Block {
+pub(super) struct Block {
     /// Index of the camera.
     pub camera: usize,
     /// Index of the frame.
@@ -88,7 +88,7 @@ pub struct Block {
 
 /// Unknowns and observations. The pose of every frame is unknown.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Problem {
+pub(super) struct Problem {
     /// Cameras.
     pub cameras: Vec<CameraUnknowns>,
     /// rig_from_target, for each moment at which pictures were taken.

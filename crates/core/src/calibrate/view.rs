@@ -2,8 +2,9 @@ use std::collections::BTreeMap;
 
 use glam::{DQuat, DVec3};
 
+use super::calibration::PanelPlace;
 use super::error::CalibrationError;
-use super::excluded::Excluded;
+use super::excluded::{Excluded, Reason};
 use super::grid::UntaggedGrid;
 use super::panel::PanelRef;
 use super::problem::Observation;
@@ -14,10 +15,6 @@ use crate::targets::{Panel, Target, TargetSpec};
 
 /// Corners that a panel needs in a view, so that a few wrong ones show.
 pub(super) const LEAST_CORNERS: usize = 6;
-
-/// What is wrong with labels that run the wrong way round.
-pub(super) const MIRRORED: &str =
-    "the labels are mirrored: rows and columns are exchanged, or the image was flipped";
 
 /// Corners of a mirrored picture turn the wrong way round, but for wrong ones: by so much, at least, of all of
 /// them more do than do not.
@@ -75,7 +72,7 @@ impl View {
     }
 
     /// The view as one that does not fit as a whole.
-    pub(super) fn excluded(&self, reason: String) -> Excluded {
+    pub(super) fn excluded(&self, reason: Reason) -> Excluded {
         Excluded {
             camera: None,
             view: self.name.clone(),
@@ -107,11 +104,11 @@ impl Sighting {
 }
 
 impl Reference<'_> {
-    /// target_from_panel of every panel.
-    pub fn panels(&self) -> Vec<Pose> {
+    /// Where its panels are on it.
+    pub fn panels(&self) -> Vec<PanelPlace> {
         match self {
-            Self::Grid(_) => vec![Pose::IDENTITY],
-            Self::Target(target) => target.panels.iter().map(|p| p.pose.to_pose()).collect(),
+            Self::Grid(_) => vec![Pose::IDENTITY.into()],
+            Self::Target(target) => target.panels.iter().map(|p| (&p.pose).into()).collect(),
         }
     }
 
@@ -201,7 +198,7 @@ pub fn views(
                     image: detection.image.clone(),
                     panel,
                     corners: detection.grids.iter().map(|grid| grid.corners.len()).sum(),
-                    reason: problem.clone(),
+                    reason: Reason::Foreign(problem.clone()),
                 };
                 left_out.push((index, wrong));
                 let view = name.clone();
@@ -240,8 +237,8 @@ fn sightings(
     let mut sightings = reference.sightings(detection)?;
     sightings.retain(|sighting| sighting.observations.len() >= LEAST_CORNERS);
     match (is_mirrored(&sightings), sightings.as_slice()) {
-        (true, [only]) => Err((reference.panel_id(only.panel), MIRRORED.to_owned())),
-        (true, _) => Err((None, MIRRORED.to_owned())),
+        (true, [only]) => Err((reference.panel_id(only.panel), Reason::Mirrored.to_string())),
+        (true, _) => Err((None, Reason::Mirrored.to_string())),
         (false, _) => Ok(sightings),
     }
 }

@@ -114,7 +114,7 @@ impl Whitening {
 fn covariances(problem: &Problem) -> Option<Vec<Vec<[f64; 3]>>> {
     let all = || problem.blocks.iter().flat_map(|block| &block.observations);
     let largest = all().filter_map(|o| o.cov).map(|[xx, _, yy]| xx.max(yy)).fold(0.0, f64::max);
-    let of = |block: &super::Block| {
+    let of = |block: &super::problem::Block| {
         block.observations.iter().map(|o| o.cov.unwrap_or([largest, 0.0, largest])).collect()
     };
     (largest > 0.0).then(|| problem.blocks.iter().map(of).collect())

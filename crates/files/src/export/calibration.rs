@@ -3,9 +3,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::estimate::{
+    DiagnosisRecord, ParameterRecord, ShapeRecord, ViewRecord, correlations, diagnoses, parameters,
+    shape, views,
+};
 use super::finding::{FindingRecord, records};
-use super::motion::Motion;
-use deltille_core::calibrate::{Excluded, PanelRef, SHAPE_COEFFICIENTS as COUNT, Shape, Solution};
+use deltille_core::calibrate::{Diagnosis, Estimate, Excluded, SHAPE_COEFFICIENTS as COUNT, Shape};
 use deltille_core::detect::InkEstimate;
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
@@ -88,9 +91,9 @@ struct CalibrationFile<'a> {
     model: String,
     width: u32,
     height: u32,
-    parameters: Vec<Parameter>,
+    parameters: Vec<ParameterRecord<'a>>,
     correlations: Vec<Vec<f64>>,
-    loose: Vec<String>,
+    loose: &'a [String],
     rms_px: f64,
     inlier_rms_px: f64,
     outliers: usize,
@@ -101,134 +104,54 @@ struct CalibrationFile<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     ink: Option<InkEstimate>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    board_shape: Option<ShapeOfBoard>,
-    views: Vec<View>,
+    board_shape: Option<ShapeRecord>,
+    views: Vec<ViewRecord<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     held_out: Option<HeldOut<'a>>,
     excluded: &'a [Excluded],
     #[serde(skip_serializing_if = "Vec::is_empty")]
     findings: Vec<FindingRecord>,
-}
-
-#[derive(Serialize)]
-struct ShapeOfBoard {
-    middle_mm: [f64; 3],
-    reach_mm: f64,
-    /// b₁ … b₇, a₁, a₂ of [`deltille_core::calibrate::Shape`].
-    coefficients_mm: Vec<f64>,
-    sd_mm: Vec<f64>,
-    bent_mm: f64,
-    stretched_mm: f64,
-    f_ratio: f64,
-    significant: bool,
-}
-
-#[derive(Serialize)]
-struct Parameter {
-    name: String,
-    value: f64,
-    sd: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct View {
-    name: String,
-    image: String,
-    rms_px: f64,
-    outliers: usize,
-    camera_from_target: Motion,
-    /// Row, column, x, y, dx, dy of each corner, by panel.
-    corners: Vec<Corner>,
-}
-
-#[derive(Serialize)]
-struct Corner {
-    panel: PanelRef,
-    row: i32,
-    col: i32,
-    x: f64,
-    y: f64,
-    dx: f64,
-    dy: f64,
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    outlier: bool,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    diagnoses: Vec<DiagnosisRecord<'a>>,
 }
 
 #[derive(Serialize)]
 struct HeldOut<'a> {
     rms_px: f64,
-    views: Vec<View>,
+    views: Vec<ViewRecord<'a>>,
     excluded: &'a [Excluded],
 }
 
-/// The text of the file; `model` is the name of what was calibrated, `held_out` are the views that
-/// only had their poses found.
-pub fn write(
-    solution: &Solution,
-    model: &str,
-    held_out: Option<&Solution>,
-    print: Print,
-) -> String {
-    let found = solution.found().count();
-    let correlations =
-        (0..found).map(|i| (0..found).map(|j| solution.correlation(i, j)).collect()).collect();
-    let parameters = solution.parameters.iter();
+/// The text of the file of a single camera; `None` where there is none.
+pub fn write(found: &Estimate, said: &[Diagnosis], print: Print) -> Option<String> {
+    let camera = found.cameras.first()?;
+    let held_out = found.held_out.as_deref();
+    let held_out = held_out.and_then(|test| Some((test, test.cameras.first()?)));
     let file = CalibrationFile {
         schema: SCHEMA,
-        model: model.to_owned(),
-        width: solution.camera.width,
-        height: solution.camera.height,
-        parameters: parameters
-            .map(|p| Parameter { name: p.name.clone(), value: p.value, sd: p.sd })
-            .collect(),
-        correlations,
-        loose: solution.loose.clone(),
-        rms_px: solution.rms_px,
-        inlier_rms_px: solution.inlier_rms_px(),
-        outliers: solution.outlier_count(),
-        sigma: solution.sigma,
-        common_px: solution.common_px,
+        model: camera.model.map_or("fixed".to_owned(), |model| model.to_string()),
+        width: camera.camera.width,
+        height: camera.camera.height,
+        parameters: parameters(camera),
+        correlations: correlations(camera),
+        loose: &camera.ill_conditioned,
+        rms_px: found.rms_px,
+        inlier_rms_px: found.inlier_rms_px(),
+        outliers: found.outlier_count(),
+        sigma: found.sigma,
+        common_px: found.common_px,
         print_scale: print.scale,
         ink: print.ink,
-        board_shape: solution.shape.map(|found| ShapeOfBoard {
-            middle_mm: found.shape.middle_mm.to_array(),
-            reach_mm: found.shape.reach_mm,
-            coefficients_mm: found.shape.coefficients_mm.to_vec(),
-            sd_mm: found.sd_mm.to_vec(),
-            bent_mm: found.bent_mm,
-            stretched_mm: found.stretched_mm,
-            f_ratio: found.f_ratio,
-            significant: found.is_significant(),
-        }),
-        held_out: held_out.map(|test| HeldOut {
+        board_shape: found.shape.map(shape),
+        views: views(found, camera),
+        held_out: held_out.map(|(test, camera)| HeldOut {
             rms_px: test.rms_px,
-            views: test.views.iter().map(view).collect(),
+            views: views(test, camera),
             excluded: &test.excluded,
         }),
-        views: solution.views.iter().map(view).collect(),
-        excluded: &solution.excluded,
-        findings: records(&solution.findings, &[]),
+        excluded: &found.excluded,
+        findings: records(&found.findings, &[]),
+        diagnoses: diagnoses(found, said, print.scale),
     };
-    json::to_text(&file, 4)
-}
-
-fn view(view: &deltille_core::calibrate::ViewSolution) -> View {
-    let corners = view.corners.iter().map(|corner| Corner {
-        panel: corner.panel,
-        row: corner.row,
-        col: corner.col,
-        x: corner.pixel[0],
-        y: corner.pixel[1],
-        dx: corner.residual[0],
-        dy: corner.residual[1],
-        outlier: corner.outlier,
-    });
-    View {
-        name: view.name.clone(),
-        image: view.image.clone(),
-        rms_px: view.rms_px,
-        outliers: view.outlier_count(),
-        camera_from_target: Motion::new(&view.pose, Some(view.pose_sd)),
-        corners: corners.collect(),
-    }
+    Some(json::to_text(&file, 4))
 }

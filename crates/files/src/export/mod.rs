@@ -11,6 +11,7 @@ pub mod csv;
 pub mod detection;
 pub mod dsc;
 pub mod dxf;
+mod estimate;
 mod finding;
 #[cfg(feature = "meshes")]
 pub mod gltf;

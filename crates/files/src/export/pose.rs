@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::motion::Motion;
-use deltille_core::calibrate::ViewSolution;
+use deltille_core::calibrate::{Estimate, ViewEstimate};
 
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/pose/1";
@@ -20,8 +20,8 @@ struct PoseLine<'a> {
     camera_from_target: Motion,
 }
 
-/// The line of a view, without its end.
-pub fn write_line(view: &ViewSolution, target: &str) -> String {
+/// The line of a view of a single camera, without its end.
+pub fn write_line(estimate: &Estimate, view: &ViewEstimate, target: &str) -> String {
     let line = PoseLine {
         schema: SCHEMA,
         view: &view.name,
@@ -30,7 +30,10 @@ pub fn write_line(view: &ViewSolution, target: &str) -> String {
         corners: view.corners.len(),
         outliers: view.outlier_count(),
         rms_px: view.rms_px,
-        camera_from_target: Motion::new(&view.pose, Some(view.pose_sd)),
+        camera_from_target: Motion::new(
+            &view.pose,
+            estimate.frames.get(view.frame).map(|frame| frame.pose_sd),
+        ),
     };
     serde_json::to_string(&line).expect("plain data has a JSON form")
 }

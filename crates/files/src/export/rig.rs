@@ -3,9 +3,15 @@
 
 use serde::Serialize;
 
+use super::calibration::Print;
+use super::estimate::{
+    DiagnosisRecord, ParameterRecord, ShapeRecord, ViewRecord, correlations, diagnoses, parameters,
+    shape, views,
+};
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;
-use deltille_core::calibrate::{Excluded, Parameter, RigSolution};
+use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Excluded};
+use deltille_core::json;
 
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/rig/1";
@@ -19,31 +25,36 @@ struct RigFile<'a> {
     outliers: usize,
     sigma: f64,
     common_px: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    print_scale: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    board_shape: Option<ShapeRecord>,
     cameras: Vec<Camera<'a>>,
     frames: Vec<Frame<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_out: Option<HeldOut<'a>>,
     excluded: &'a [Excluded],
     #[serde(skip_serializing_if = "Vec::is_empty")]
     findings: Vec<FindingRecord>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    diagnoses: Vec<DiagnosisRecord<'a>>,
 }
 
 #[derive(Serialize)]
 struct Camera<'a> {
     name: &'a str,
+    model: String,
     width: u32,
     height: u32,
     rms_px: f64,
     inlier_rms_px: f64,
     corners: usize,
     outliers: usize,
-    parameters: Vec<Value<'a>>,
+    parameters: Vec<ParameterRecord<'a>>,
+    correlations: Vec<Vec<f64>>,
+    loose: &'a [String],
     camera_from_rig: Motion,
-}
-
-#[derive(Serialize)]
-struct Value<'a> {
-    name: &'a str,
-    value: f64,
-    sd: Option<f64>,
+    views: Vec<ViewRecord<'a>>,
 }
 
 #[derive(Serialize)]
@@ -53,41 +64,78 @@ struct Frame<'a> {
     rig_from_target: Motion,
 }
 
-/// The text of a rig's file.
-pub fn write(solution: &RigSolution, model: &str) -> String {
-    let names: Vec<&str> = solution.cameras.iter().map(|camera| camera.name.as_str()).collect();
-    let cameras = solution.cameras.iter().map(|camera| Camera {
-        name: &camera.name,
-        width: camera.camera.width,
-        height: camera.camera.height,
-        rms_px: camera.rms_px,
-        inlier_rms_px: camera.inlier_rms_px,
-        corners: camera.corners,
-        outliers: camera.outliers,
-        parameters: camera.parameters.iter().map(value).collect(),
-        camera_from_rig: Motion::new(&camera.camera_from_rig, camera.pose_sd),
-    });
-    let frames = solution.frames.iter().map(|frame| Frame {
-        name: &frame.name,
-        rms_px: frame.rms_px,
-        rig_from_target: Motion::new(&frame.rig_from_target, Some(frame.pose_sd)),
+#[derive(Serialize)]
+struct HeldOut<'a> {
+    rms_px: f64,
+    cameras: Vec<Seen<'a>>,
+    frames: Vec<Frame<'a>>,
+    excluded: &'a [Excluded],
+}
+
+/// What a camera saw in frames that were held out.
+#[derive(Serialize)]
+struct Seen<'a> {
+    name: &'a str,
+    rms_px: f64,
+    views: Vec<ViewRecord<'a>>,
+}
+
+/// The text of a rig's file; `model` is that of its cameras, if nothing else was said of them.
+pub fn write(found: &Estimate, said: &[Diagnosis], model: &str, print: Print) -> String {
+    let names: Vec<&str> = found.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    let held_out = found.held_out.as_deref().map(|test| HeldOut {
+        rms_px: test.rms_px,
+        cameras: test.cameras.iter().map(|camera| seen(test, camera)).collect(),
+        frames: frames(test),
+        excluded: &test.excluded,
     });
     let file = RigFile {
         schema: SCHEMA,
         model,
-        rms_px: solution.rms_px,
-        inlier_rms_px: solution.inlier_rms_px(),
-        outliers: solution.outlier_count(),
-        sigma: solution.sigma,
-        common_px: solution.common_px,
-        cameras: cameras.collect(),
-        frames: frames.collect(),
-        excluded: &solution.excluded,
-        findings: records(&solution.findings, &names),
+        rms_px: found.rms_px,
+        inlier_rms_px: found.inlier_rms_px(),
+        outliers: found.outlier_count(),
+        sigma: found.sigma,
+        common_px: found.common_px,
+        print_scale: print.scale,
+        board_shape: found.shape.map(shape),
+        cameras: found.cameras.iter().map(|camera| of_camera(found, camera)).collect(),
+        frames: frames(found),
+        held_out,
+        excluded: &found.excluded,
+        findings: records(&found.findings, &names),
+        diagnoses: diagnoses(found, said, print.scale),
     };
-    deltille_core::json::to_text(&file, 4)
+    json::to_text(&file, 4)
 }
 
-fn value(parameter: &Parameter) -> Value<'_> {
-    Value { name: &parameter.name, value: parameter.value, sd: parameter.sd }
+fn of_camera<'a>(estimate: &Estimate, found: &'a CameraEstimate) -> Camera<'a> {
+    Camera {
+        name: &found.name,
+        model: found.model.map_or("fixed".to_owned(), |model| model.to_string()),
+        width: found.camera.width,
+        height: found.camera.height,
+        rms_px: found.rms_px,
+        inlier_rms_px: found.inlier_rms_px(),
+        corners: found.corner_count(),
+        outliers: found.outlier_count(),
+        parameters: parameters(found),
+        correlations: correlations(found),
+        loose: &found.ill_conditioned,
+        camera_from_rig: Motion::new(&found.camera_from_rig, found.pose_sd),
+        views: views(estimate, found),
+    }
+}
+
+fn seen<'a>(estimate: &Estimate, found: &'a CameraEstimate) -> Seen<'a> {
+    Seen { name: &found.name, rms_px: found.rms_px, views: views(estimate, found) }
+}
+
+fn frames(estimate: &Estimate) -> Vec<Frame<'_>> {
+    let frames = estimate.frames.iter().map(|frame| Frame {
+        name: &frame.name,
+        rms_px: frame.rms_px,
+        rig_from_target: Motion::new(&frame.rig_from_target, Some(frame.pose_sd)),
+    });
+    frames.collect()
 }

@@ -1,7 +1,7 @@
 //! Plain words on what a calibration lacks. Every rule has its reason; none depends on a camera.
 
-use super::{Given, Named, Report, Survey, cannot_tell_apart, causes};
-use deltille_core::calibrate::{Model, Parameter};
+use super::{Report, Survey};
+use deltille_core::calibrate::{CameraEstimate, Diagnosis, Excluded, Parameter};
 use deltille_core::statistics::median;
 use deltille_core::words::counted;
 
@@ -57,14 +57,68 @@ const BAD_VIEW: f64 = 2.5;
 /// Held-out views worse by more than this part show that the model fits noise, or views that differ.
 const HOLDOUT: f64 = 1.25;
 
-/// What would make a calibration better, what matters most first.
-pub fn advice(report: &Report, survey: &Survey) -> Vec<Advice> {
+/// What would make a calibration better, what matters most first; `surveys` are those of its cameras.
+pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let mut found = Vec::new();
+    let cameras = || report.estimate.cameras.iter().zip(surveys).enumerate();
+    for (index, (camera, survey)) in cameras() {
+        let mut add = |weight, text: String| {
+            found.push(Advice { weight, text: of_camera(report, camera, text) });
+        };
+        views(report, camera, survey, &mut add);
+        coverage(camera, survey, &mut add);
+        told(
+            report,
+            &mut add,
+            |diagnosis| matches!(diagnosis, Diagnosis::LensEnds { camera, .. } if *camera == index),
+        );
+        superfluous(camera, &mut add);
+        told(
+            report,
+            &mut add,
+            |diagnosis| matches!(diagnosis, Diagnosis::IllConditioned { camera, .. } if *camera == index),
+        );
+        correlated(camera, &mut add);
+    }
     let mut add = |weight, text: String| found.push(Advice { weight, text });
-    views(report, survey, &mut add);
-    coverage(report, survey, &mut add);
-    parameters(report, &mut add);
-    residuals(report, survey, &mut add);
+    left_out(report, &mut add, |out| report.is_rig() && out.camera.is_none());
+    told(report, &mut add, |diagnosis| {
+        matches!(diagnosis, Diagnosis::ForeignCamera { .. } | Diagnosis::GrossErrors(_))
+    });
+    told(report, &mut add, is_cause);
+    for (index, (camera, survey)) in cameras() {
+        let mut add = |weight, text: String| {
+            found.push(Advice { weight, text: of_camera(report, camera, text) });
+        };
+        residuals(report, index, survey, &mut add);
+    }
+    let mut add = |weight, text: String| found.push(Advice { weight, text });
+    if let Some(shape) = report.estimate.shape.filter(|shape| shape.is_significant()) {
+        let text = format!(
+            "The sheet is bent by {:.2} mm and its corners lie up to {:.2} mm beside their places; that \
+             is allowed for. Glue it on something flat.",
+            shape.bent_mm, shape.stretched_mm
+        );
+        add(Weight::Hint, text);
+    }
+    let outliers = report.estimate.outlier_count();
+    if outliers > 0 {
+        let text = format!(
+            "{outliers} of {} corners lie farther off than chance allows; they are drawn in red.",
+            report.estimate.corner_count()
+        );
+        add(Weight::Hint, text);
+    }
+    if let Some(held_out) = &report.estimate.held_out {
+        let (test, own) = (held_out.rms_px, report.estimate.rms_px);
+        let figures = format!("{test:.4} px on views that took no part, {own:.4} px on its own");
+        if test > HOLDOUT * own {
+            let text = format!("{figures}: the model fits noise, or the views differ in kind.");
+            add(Weight::Warning, text);
+        } else {
+            add(Weight::Good, format!("{figures}."));
+        }
+    }
     if report.print.scale.is_none() {
         let text =
             "Distances are as true as the print: measure both check bars of the sheet and give \
@@ -76,8 +130,42 @@ pub fn advice(report: &Report, survey: &Survey) -> Vec<Advice> {
     found
 }
 
-fn views(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
-    let count = report.solution.views.len();
+/// A text about a camera, which is named where there are several.
+fn of_camera(report: &Report, camera: &CameraEstimate, text: String) -> String {
+    // What is told of a diagnosis names its camera.
+    let named = format!("Camera {}", camera.name);
+    match report.is_rig() && !text.starts_with(&named) {
+        true => format!("{named}: {text}"),
+        false => text,
+    }
+}
+
+/// What is said of the diagnoses of a kind.
+fn told(
+    report: &Report,
+    add: &mut impl FnMut(Weight, String),
+    of_kind: impl Fn(&Diagnosis) -> bool,
+) {
+    for diagnosis in report.diagnoses.iter().filter(|diagnosis| of_kind(diagnosis)) {
+        add(Weight::Warning, sentence(&report.words().sentence(diagnosis)));
+    }
+}
+
+/// Whether it says why residuals are not noise.
+fn is_cause(diagnosis: &Diagnosis) -> bool {
+    matches!(
+        diagnosis,
+        Diagnosis::Remedied { .. } | Diagnosis::LackOfFit(_) | Diagnosis::PoorFit { .. }
+    )
+}
+
+fn views(
+    report: &Report,
+    camera: &CameraEstimate,
+    survey: &Survey,
+    add: &mut impl FnMut(Weight, String),
+) {
+    let count = camera.views.len();
     if count < VIEWS {
         add(
             Weight::Warning,
@@ -99,36 +187,50 @@ fn views(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String))
             add(Weight::Good, format!("{tilted} of {count} views are tilted by more than 20°."));
         }
     }
-    let named = |names: Vec<&str>| match names.as_slice() {
-        [a, b, c, rest @ ..] if !rest.is_empty() => {
-            format!("{a}, {b}, {c} and {} more", rest.len())
-        }
-        few => few.join(", "),
-    };
-    let excluded: Vec<&str> =
-        report.solution.excluded.iter().map(|out| out.view.as_str()).collect();
-    if !excluded.is_empty() {
-        let text = format!(
-            "Left out, because they do not fit the others or the target: {}.",
-            named(excluded)
-        );
-        add(Weight::Warning, text);
-    }
-    let rms = report.solution.views.iter().map(|view| view.rms_px);
+    left_out(report, add, |out| match &out.camera {
+        Some(name) => *name == camera.name,
+        None => !report.is_rig(),
+    });
+    let rms = camera.views.iter().map(|view| view.rms_px);
     let median = median(rms.collect()).unwrap_or_default();
-    let bad = report.solution.views.iter().filter(|view| view.rms_px > BAD_VIEW * median);
+    let bad = camera.views.iter().filter(|view| view.rms_px > BAD_VIEW * median);
     let bad: Vec<&str> = bad.map(|view| view.name.as_str()).collect();
     if !bad.is_empty() {
         let text = format!(
             "Much worse than the others: {}. Look for motion blur, a bent board, or reflections.",
-            named(bad)
+            named(&bad)
         );
         add(Weight::Hint, text);
     }
 }
 
-fn coverage(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
-    let (covered, reach) = (survey.covered(), survey.reach(report.solution));
+/// Names what took no part.
+fn left_out(
+    report: &Report,
+    add: &mut impl FnMut(Weight, String),
+    is_meant: impl Fn(&Excluded) -> bool,
+) {
+    let excluded = report.estimate.excluded.iter().filter(|out| is_meant(out));
+    let excluded: Vec<&str> = excluded.map(|out| out.view.as_str()).collect();
+    if !excluded.is_empty() {
+        let names = named(&excluded);
+        let text = format!("Left out, because they do not fit the others or the target: {names}.");
+        add(Weight::Warning, text);
+    }
+}
+
+/// Some names, the first of many.
+fn named(names: &[&str]) -> String {
+    match names {
+        [a, b, c, rest @ ..] if !rest.is_empty() => {
+            format!("{a}, {b}, {c} and {} more", rest.len())
+        }
+        few => few.join(", "),
+    }
+}
+
+fn coverage(camera: &CameraEstimate, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
+    let (covered, reach) = (survey.covered(), survey.reach(camera));
     let of_what = if survey.circle.is_some() { "image circle" } else { "image" };
     if covered < COVERED {
         let text = format!(
@@ -151,9 +253,6 @@ fn coverage(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, Strin
         );
         add(Weight::Hint, text);
     }
-    if let Some(end) = report.solution.lens_end() {
-        add(Weight::Warning, sentence(&end.to_string()));
-    }
 }
 
 /// With a capital and a full stop.
@@ -163,15 +262,14 @@ fn sentence(text: &str) -> String {
     first.into_iter().chain(letters).chain(['.']).collect()
 }
 
-fn parameters(report: &Report, add: &mut impl FnMut(Weight, String)) {
-    let solution = report.solution;
-    let model: Option<Model> = report.model.parse().ok();
-    if let Some(model) = model
+/// Parameters that a smaller model does without.
+fn superfluous(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
+    if let Some(model) = camera.model
         && let Some(smaller) = model.smaller()
     {
         // What the smaller model does without.
         let there = smaller.free().into_iter().chain(std::iter::repeat(false));
-        let more = model.free().into_iter().zip(there).zip(&solution.parameters);
+        let more = model.free().into_iter().zip(there).zip(&camera.parameters);
         let more: Vec<_> =
             more.filter(|((here, there), _)| *here && !there).map(|(_, p)| p).collect();
         let weak = |p: &&Parameter| p.sd.is_some_and(|sd| p.value.abs() < SIGNIFICANT * sd);
@@ -185,16 +283,15 @@ fn parameters(report: &Report, add: &mut impl FnMut(Weight, String)) {
             add(Weight::Hint, text);
         }
     }
-    let is_loose = |name: &str| solution.loose.iter().any(|loose| loose == name);
-    if !solution.loose.is_empty() {
-        let text = cannot_tell_apart(&solution.loose, report.sufficient);
-        add(Weight::Warning, sentence(&text));
-    }
-    let names: Vec<&str> = solution.found().collect();
+}
+
+fn correlated(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
+    let is_loose = |name: &str| camera.ill_conditioned.iter().any(|loose| loose == name);
+    let names: Vec<&str> = camera.found().collect();
     let mut pairs = Vec::new();
     for i in 0..names.len() {
         for j in 0..i {
-            let correlation = solution.correlation(i, j);
+            let correlation = camera.correlation(i, j);
             // Square pixels tie the two focal lengths to each other; that is no loss.
             let focal = [names[j], names[i]] == ["fx", "fy"];
             let told = is_loose(names[i]) && is_loose(names[j]);
@@ -216,23 +313,13 @@ fn parameters(report: &Report, add: &mut impl FnMut(Weight, String)) {
     }
 }
 
-fn residuals(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
-    let solution = report.solution;
+fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
+    let camera = &report.estimate.cameras[index];
     let means = survey.means_px.iter().flatten().map(|cell| cell.mean_px);
     let count = means.clone().count().max(1) as f64;
     let size = (means.map(|[x, y]| (x * x + y * y) / 2.0).sum::<f64>() / count).sqrt();
-    let model = report.model.parse().ok();
-    let given = Given { model, print_scale: report.print.scale, remedy: report.remedy };
-    let causes = causes(solution, given);
-    let named = Named { cameras: &[] };
-    for finding in &solution.findings {
-        add(Weight::Warning, sentence(&named.sentence(finding)));
-    }
-    for cause in &causes {
-        add(Weight::Warning, sentence(cause));
-    }
-    match survey.pattern().filter(|_| causes.is_empty()) {
-        Some(pattern) if pattern > PATTERN && size > PATTERN_PART * solution.rms_px => add(
+    match survey.pattern().filter(|_| !report.diagnoses.iter().any(is_cause)) {
+        Some(pattern) if pattern > PATTERN && size > PATTERN_PART * camera.rms_px => add(
             Weight::Hint,
             format!(
                 "Residuals leave a pattern over the image, {pattern:.1} times what chance makes and \
@@ -245,32 +332,6 @@ fn residuals(report: &Report, survey: &Survey, add: &mut impl FnMut(Weight, Stri
         }
         None => {}
     }
-    if let Some(shape) = solution.shape.filter(|shape| shape.is_significant()) {
-        let text = format!(
-            "The sheet is bent by {:.2} mm and its corners lie up to {:.2} mm beside their places; that \
-             is allowed for. Glue it on something flat.",
-            shape.bent_mm, shape.stretched_mm
-        );
-        add(Weight::Hint, text);
-    }
-    let outliers: usize = solution.views.iter().map(|view| view.outlier_count()).sum();
-    if outliers > 0 {
-        let text = format!(
-            "{outliers} of {} corners lie farther off than chance allows; they are drawn in red.",
-            solution.corner_count()
-        );
-        add(Weight::Hint, text);
-    }
-    if let Some(holdout) = report.holdout {
-        let (test, own) = (holdout.rms_px, solution.rms_px);
-        let figures = format!("{test:.4} px on views that took no part, {own:.4} px on its own");
-        if test > HOLDOUT * own {
-            let text = format!("{figures}: the model fits noise, or the views differ in kind.");
-            add(Weight::Warning, text);
-        } else {
-            add(Weight::Good, format!("{figures}."));
-        }
-    }
 }
 
 #[cfg(test)]
@@ -281,8 +342,8 @@ mod tests {
 
     use super::*;
     use crate::export::calibration::Print;
-    use deltille_core::calibrate::Solution;
-    use deltille_core::camera::Camera;
+    use deltille_core::calibrate::{Estimate, Model};
+    use deltille_core::camera::{Camera, Pose};
 
     /// What is advised where no parameter of the lens is told from zero.
     fn advised(model: Model) -> String {
@@ -293,32 +354,28 @@ mod tests {
             .map(|((name, value), free)| Parameter { name, value, sd: free.then_some(1.0) })
             .collect();
         let count = model.free().into_iter().filter(|free| *free).count();
-        let solution = Solution {
+        let camera = CameraEstimate {
+            name: "camera".to_owned(),
             camera,
+            model: Some(model),
             parameters,
             covariance: DMatrix::identity(count, count),
+            ill_conditioned: Vec::new(),
+            camera_from_rig: Pose::IDENTITY,
+            pose_sd: None,
             views: Vec::new(),
-            excluded: Vec::new(),
             rms_px: 0.1,
-            common_px: None,
-            sigma: 1.0,
-            loose: Vec::new(),
-            shape: None,
-            misfits: Vec::new(),
-            findings: Vec::new(),
-            steps: 1,
         };
+        let surveys = [Survey::new(&camera)];
+        let estimate = Estimate { cameras: vec![camera], ..Estimate::default() };
         let report = Report {
             title: "camera",
-            model: &model.to_string(),
-            solution: &solution,
-            holdout: None,
+            estimate: &estimate,
+            diagnoses: &[],
             print: Print { scale: Some([1.0; 2]), ink: None },
-            sufficient: None,
-            remedy: None,
             thumbnails: BTreeMap::new(),
         };
-        let advice = advice(&report, &Survey::new(&solution));
+        let advice = advice(&report, &surveys);
         advice.into_iter().map(|advice| advice.text + "\n").collect()
     }
 

@@ -2,17 +2,15 @@
 //! tables and words on what would make it better.
 //!
 //! ```text
-//!   solution ─ survey ─→ what the views cover and show ─┬─ plots ──→ SVG
-//!       └───── causes ─→ why it does not fit ───────────├─ advice ─→ words
-//!                                                       └─ page ───→ HTML
+//!   estimate ─── survey ─→ what the views of a camera cover and show ─┬─ plots ──→ SVG
+//!   diagnoses ───────────→ why it does not fit ───────────────────────├─ advice ─→ words
+//!                                                                     └─ page ───→ HTML
 //! ```
 //!
 //! Limits: tilts are those of planar targets; a solid shows its faces at all of them.
 
 mod advice;
 mod axes;
-mod causes;
-mod findings;
 mod page;
 mod plots;
 mod survey;
@@ -21,11 +19,9 @@ mod thumbnail;
 use std::collections::BTreeMap;
 
 use crate::export::calibration::Print;
-use deltille_core::calibrate::{Model, Remedy, Solution};
+use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Words};
 
 pub use advice::{Advice, Weight, advice};
-pub use causes::{Given, cannot_tell_apart, causes, causes_of_rig};
-pub use findings::Named;
 pub use survey::{Survey, SurveyedView};
 pub use thumbnail::thumbnail;
 
@@ -34,25 +30,33 @@ pub use thumbnail::thumbnail;
 pub struct Report<'a> {
     /// Its headline, such as the name of the camera.
     pub title: &'a str,
-    /// Name of the camera model.
-    pub model: &'a str,
     /// The calibration.
-    pub solution: &'a Solution,
-    /// The same camera on views that took no part in it.
-    pub holdout: Option<&'a Solution>,
+    pub estimate: &'a Estimate,
+    /// What is to be said about it.
+    pub diagnoses: &'a [Diagnosis],
     /// What is known of the print.
     pub print: Print,
-    /// A smaller model that holds the lens as well, where parameters cannot be told apart.
-    pub sufficient: Option<Model>,
-    /// What makes it fit where it does not.
-    pub remedy: Option<Remedy>,
-    /// Small pictures of the views, by name, as PNG; see [`thumbnail`].
-    pub thumbnails: BTreeMap<String, Vec<u8>>,
+    /// Small pictures of the views, by camera and name, as PNG; see [`thumbnail`].
+    pub thumbnails: BTreeMap<(usize, String), Vec<u8>>,
 }
 
 impl Report<'_> {
     /// The page.
     pub fn html(&self) -> String {
         page::html(self)
+    }
+
+    /// Whether there are several cameras.
+    fn is_rig(&self) -> bool {
+        self.estimate.cameras.len() > 1
+    }
+
+    fn words(&self) -> Words<'_> {
+        Words { estimate: self.estimate, print_scale: self.print.scale }
+    }
+
+    /// A camera on views that were held out.
+    fn held_out(&self, camera: usize) -> Option<&CameraEstimate> {
+        self.estimate.held_out.as_ref()?.cameras.get(camera)
     }
 }

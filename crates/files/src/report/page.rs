@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use base64::Engine as _;
 
 use super::{Report, Survey, SurveyedView, Weight, advice, plots};
-use deltille_core::calibrate::{Parameter, Solution, ViewSolution};
+use deltille_core::calibrate::{CameraEstimate, Excluded, Parameter, ViewEstimate};
 
 /// Views in the table: all, or where there are more the worst ones.
 const MOST_VIEWS: usize = 300;
@@ -16,8 +16,8 @@ const STRONG: f64 = 0.85;
 const STYLE: &str = include_str!("page.css");
 
 pub(super) fn html(report: &Report) -> String {
-    let solution = report.solution;
-    let survey = Survey::new(solution);
+    let cameras = &report.estimate.cameras;
+    let surveys: Vec<Survey> = cameras.iter().map(Survey::new).collect();
     let title = escaped(report.title);
     let mut page = format!(
         "<!DOCTYPE html>\n<!-- deltille {} -->\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -25,10 +25,13 @@ pub(super) fn html(report: &Report) -> String {
          <title>{title} – camera calibration</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <header><h1>{title}</h1>{}</header>\n",
         env!("CARGO_PKG_VERSION"),
-        figures(report)
+        match cameras.as_slice() {
+            [only] => figures(&of_camera(report, 0, only)),
+            _ => figures(&of_rig(report)),
+        }
     );
     page += "<section><h2>What to make of it</h2><ul class=\"advice\">";
-    for piece in advice(report, &survey) {
+    for piece in advice(report, &surveys) {
         let (class, sign) = match piece.weight {
             Weight::Good => ("good", "✓"),
             Weight::Hint => ("hint", "→"),
@@ -41,9 +44,18 @@ pub(super) fn html(report: &Report) -> String {
         );
     }
     page += "</ul></section>\n";
-    page += &parameters(solution);
-    page += &drawings(solution, &survey);
-    page += &views(report, &survey);
+    if report.is_rig() {
+        page += &places(report);
+    }
+    for (index, (camera, survey)) in cameras.iter().zip(&surveys).enumerate() {
+        if report.is_rig() {
+            let figures = figures(&of_camera(report, index, camera));
+            let _ = write!(page, "<h2 class=\"camera\">{}</h2>{figures}", escaped(&camera.name));
+        }
+        page += &parameters(camera);
+        page += &drawings(camera, survey);
+        page += &views(report, index, survey);
+    }
     let _ = write!(
         page,
         "<footer>deltille {}. Residuals are seen less predicted positions; rms is per coordinate, \
@@ -54,38 +66,107 @@ pub(super) fn html(report: &Report) -> String {
     page
 }
 
-/// The figures that are looked for first.
-fn figures(report: &Report) -> String {
-    let solution = report.solution;
-    let camera = &solution.camera;
+/// A figure and what it is.
+type Figure = (String, &'static str);
+
+/// The figures of a camera that are looked for first.
+fn of_camera(report: &Report, index: usize, found: &CameraEstimate) -> Vec<Figure> {
+    let camera = &found.camera;
+    let model = found.model.map_or("fixed".to_owned(), |model| model.to_string());
     let mut cells = vec![
-        (format!("{:.4} px", solution.rms_px), "rms of a coordinate"),
-        (escaped(report.model), "model"),
+        (format!("{:.4} px", found.rms_px), "rms of a coordinate"),
+        (escaped(&model), "model"),
         (format!("{} × {}", camera.width, camera.height), "image, px"),
-        (solution.views.len().to_string(), "views"),
-        (solution.corner_count().to_string(), "corners"),
+        (found.views.len().to_string(), "views"),
+        (found.corner_count().to_string(), "corners"),
     ];
-    if solution.outlier_count() > 0 {
-        cells.insert(1, (format!("{:.4} px", solution.inlier_rms_px()), "rms without outliers"));
+    if found.outlier_count() > 0 {
+        cells.insert(1, (format!("{:.4} px", found.inlier_rms_px()), "rms without outliers"));
     }
-    if let Some(holdout) = report.holdout {
+    if let Some(held_out) = report.held_out(index) {
         let name = "rms on views held out";
-        cells.insert(1, (format!("{:.4} px", holdout.rms_px), name));
+        cells.insert(1, (format!("{:.4} px", held_out.rms_px), name));
     }
-    if let Some((um, deviation)) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_deviation)) {
-        cells.push((
-            format!("{um:.1} ± {deviation:.1} µm").replace('-', "−"),
-            "growth of what is dark",
-        ));
+    cells.extend(of_print(report).filter(|_| !report.is_rig()));
+    cells
+}
+
+/// The same of all cameras together.
+fn of_rig(report: &Report) -> Vec<Figure> {
+    let found = report.estimate;
+    let mut cells = vec![
+        (format!("{:.4} px", found.rms_px), "rms of a coordinate"),
+        (found.cameras.len().to_string(), "cameras"),
+        (found.frames.len().to_string(), "frames"),
+        (found.corner_count().to_string(), "corners"),
+    ];
+    if found.outlier_count() > 0 {
+        cells.insert(1, (format!("{:.4} px", found.inlier_rms_px()), "rms without outliers"));
     }
+    if let Some(held_out) = &found.held_out {
+        cells.insert(1, (format!("{:.4} px", held_out.rms_px), "rms on frames held out"));
+    }
+    cells.extend(of_print(report));
+    cells
+}
+
+fn of_print(report: &Report) -> Option<Figure> {
+    let (um, deviation) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_deviation))?;
+    let growth = format!("{um:.1} ± {deviation:.1} µm").replace('-', "−");
+    Some((growth, "growth of what is dark"))
+}
+
+fn figures(cells: &[Figure]) -> String {
     let cells = cells.iter().map(|(value, name)| format!("<div><b>{value}</b>{name}</div>"));
     format!("<div class=\"figures\">{}</div>", cells.collect::<String>())
 }
 
-fn parameters(solution: &Solution) -> String {
+/// Where the cameras are to each other, and the frames that took no part.
+fn places(report: &Report) -> String {
+    let first = report.estimate.cameras.first().map_or("", |camera| camera.name.as_str());
+    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
+    let rows = report.estimate.cameras.iter().map(|camera| {
+        let at = camera.camera_from_rig.inverse().translation;
+        // Adding zero makes a negative zero positive.
+        let at = at.to_array().map(|mm| (100.0 * mm).round() / 100.0 + 0.0);
+        let at = at.map(|mm| format!("{mm:.2}").replace('-', "−")).join(", ");
+        let sd = camera.pose_sd.map_or("–".to_owned(), |sd| {
+            format!("{:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
+        });
+        format!(
+            "<tr><td>{}</td><td class=\"number\">{at}</td><td class=\"number\">{sd}</td>\
+             <td class=\"number\">{:.4}</td><td class=\"number\">{}</td></tr>",
+            escaped(&camera.name),
+            camera.rms_px,
+            camera.corner_count()
+        )
+    });
+    let rows: String = rows.collect();
+    let frames = report.estimate.excluded.iter().filter(|out| out.camera.is_none());
+    let frames = frames.map(|out| format!("<tr>{}", out_row(out, 4)));
+    let frames: String = frames.collect();
+    format!(
+        "<section><h2>Relative camera poses</h2><table class=\"plain\"><tr><th>camera</th>\
+         <th>place, mm</th><th>± standard deviation</th><th>rms, px</th><th>corners</th></tr>{rows}\
+         {frames}</table><p class=\"note\">Places are those of the cameras' optical centres in the frame of \
+         camera {}.</p></section>\n",
+        escaped(first)
+    )
+}
+
+/// What took no part, over so many columns beside its name.
+fn out_row(out: &Excluded, columns: usize) -> String {
+    format!(
+        "<td class=\"name\">{}</td><td colspan=\"{columns}\" class=\"out\">left out: {}</td></tr>",
+        escaped(&out.view),
+        escaped(&out.reason.to_string())
+    )
+}
+
+fn parameters(camera: &CameraEstimate) -> String {
     let mut rows = String::new();
     let told = |p: &&Parameter| p.sd.is_some() || p.value != 0.0;
-    for parameter in solution.parameters.iter().filter(told) {
+    for parameter in camera.parameters.iter().filter(told) {
         let (value, sd) = rounded(parameter.value, parameter.sd);
         let _ = write!(
             rows,
@@ -93,14 +174,14 @@ fn parameters(solution: &Solution) -> String {
             escaped(&parameter.name)
         );
     }
-    let names: Vec<&str> = solution.found().collect();
+    let names: Vec<&str> = camera.found().collect();
     let mut matrix = String::new();
     if !names.is_empty() {
         let heads = names.iter().map(|name| format!("<th>{}</th>", escaped(name)));
         let _ = write!(matrix, "<tr><th></th>{}</tr>", heads.collect::<String>());
         for (i, name) in names.iter().enumerate() {
             let cells = (0..names.len()).map(|j| {
-                let c = solution.correlation(i, j);
+                let c = camera.correlation(i, j);
                 let hue = if c < 0.0 { "var(--below)" } else { "var(--above)" };
                 // Ink is hard to read on the full blue.
                 let strong = if c > STRONG { " class=\"strong\"" } else { "" };
@@ -136,7 +217,7 @@ fn rounded(value: f64, sd: Option<f64>) -> (String, String) {
     }
 }
 
-fn drawings(solution: &Solution, survey: &Survey) -> String {
+fn drawings(camera: &CameraEstimate, survey: &Survey) -> String {
     let (arrows, scale) = plots::residual_map(survey);
     let mut figures = vec![
         (
@@ -148,24 +229,24 @@ fn drawings(solution: &Solution, survey: &Survey) -> String {
         ),
         (plots::coverage(survey), "Corners in each part of the image.".to_owned()),
         (
-            plots::scatter(solution),
+            plots::scatter(camera),
             "Residuals of all corners; a round cloud is noise, anything else is not. Rings on the rim \
              lie beyond it."
                 .to_owned(),
         ),
         (
-            plots::histogram(solution),
+            plots::histogram(camera),
             "Residuals of both coordinates, and the normal distribution of the same deviation."
                 .to_owned(),
         ),
         (
-            plots::against_radius(solution),
+            plots::against_radius(camera),
             "Errors of corners, and the rms of rings per coordinate. It should be level. Circles on \
              the rim lie beyond it."
                 .to_owned(),
         ),
     ];
-    if let Some(tilt) = plots::against_tilt(solution, survey) {
+    if let Some(tilt) = plots::against_tilt(camera, survey) {
         figures
             .push((tilt, "The rms of each view. Steep views are blurred and coarse.".to_owned()));
     }
@@ -178,37 +259,35 @@ fn drawings(solution: &Solution, survey: &Survey) -> String {
     )
 }
 
-fn views(report: &Report, survey: &Survey) -> String {
-    let solution = report.solution;
-    let mut order: Vec<usize> = (0..solution.views.len()).collect();
+fn views(report: &Report, index: usize, survey: &Survey) -> String {
+    let camera = &report.estimate.cameras[index];
+    let mut order: Vec<usize> = (0..camera.views.len()).collect();
     let all = order.len();
     if all > MOST_VIEWS {
-        let rms = |index: usize| solution.views[index].rms_px;
+        let rms = |index: usize| camera.views[index].rms_px;
         order.sort_by(|&a, &b| rms(b).total_cmp(&rms(a)));
         order.truncate(MOST_VIEWS);
         order.sort_unstable();
     }
-    let held_out = report.holdout.map(|holdout| (holdout, Survey::new(holdout)));
+    let held_out = report.held_out(index).map(|held_out| (held_out, Survey::new(held_out)));
     let of_test =
-        held_out.iter().flat_map(|(holdout, survey)| holdout.views.iter().zip(&survey.views));
-    let of_test: Vec<(&ViewSolution, &SurveyedView)> = of_test.collect();
-    let every = solution.views.iter().chain(of_test.iter().map(|(view, _)| *view));
+        held_out.iter().flat_map(|(held_out, survey)| held_out.views.iter().zip(&survey.views));
+    let of_test: Vec<(&ViewEstimate, &SurveyedView)> = of_test.collect();
+    let every = camera.views.iter().chain(of_test.iter().map(|(view, _)| *view));
     let worst = every.map(|view| view.rms_px).fold(f64::MIN_POSITIVE, f64::max);
     let mut rows = String::new();
-    for index in order {
-        rows += &row(report, &solution.views[index], &survey.views[index], worst, "");
+    for of_view in order {
+        rows += &row(report, index, &camera.views[of_view], &survey.views[of_view], worst, "");
     }
     for (view, stands) in of_test {
-        rows += &row(report, view, stands, worst, " (held out)");
+        rows += &row(report, index, view, stands, worst, " (held out)");
     }
-    let excluded = solution.excluded.iter().map(|out| {
-        format!(
-            "<tr><td></td><td class=\"name\">{}</td><td colspan=\"5\" class=\"out\">left out: {}\
-             </td></tr>",
-            escaped(&out.view),
-            escaped(&out.reason)
-        )
-    });
+    let is_here = |out: &&Excluded| match &out.camera {
+        Some(name) => *name == camera.name,
+        None => !report.is_rig(),
+    };
+    let excluded = report.estimate.excluded.iter().filter(is_here);
+    let excluded = excluded.map(|out| format!("<tr><td></td>{}", out_row(out, 5)));
     let excluded: String = excluded.collect();
     let note = match all > MOST_VIEWS {
         true => format!("<p>The worst {MOST_VIEWS} of {all} views.</p>"),
@@ -224,7 +303,8 @@ fn views(report: &Report, survey: &Survey) -> String {
 /// A view in the table; `worst` is the largest rms in it, px.
 fn row(
     report: &Report,
-    view: &ViewSolution,
+    camera: usize,
+    view: &ViewEstimate,
     stands: &SurveyedView,
     worst: f64,
     note: &str,
@@ -236,7 +316,7 @@ fn row(
          <td class=\"number\">{:.4}<div class=\"meter\" style=\"width:{:.0}%\"></div></td>\
          <td class=\"number{}\">{outliers}</td><td class=\"number\">{tilt}</td>\
          <td class=\"number\">{:.0}</td></tr>",
-        picture(report, view),
+        picture(report, camera, view),
         escaped(&view.name),
         view.corners.len(),
         view.rms_px,
@@ -247,15 +327,15 @@ fn row(
 }
 
 /// The small picture of a view with its corners; these alone where there is no picture.
-fn picture(report: &Report, view: &ViewSolution) -> String {
-    let camera = &report.solution.camera;
+fn picture(report: &Report, index: usize, view: &ViewEstimate) -> String {
+    let camera = &report.estimate.cameras[index].camera;
     let (width, height) = (camera.width, camera.height);
     let dots = view.corners.iter().map(|corner| {
         let class = if corner.outlier { "out" } else { "seen" };
         let [x, y] = corner.pixel;
         format!("<circle class=\"{class}\" cx=\"{x:.0}\" cy=\"{y:.0}\" r=\"{}\"/>", width / 160)
     });
-    let image = report.thumbnails.get(&view.name).map_or(String::new(), |png| {
+    let image = report.thumbnails.get(&(index, view.name.clone())).map_or(String::new(), |png| {
         let data = base64::engine::general_purpose::STANDARD.encode(png);
         format!(
             "<image href=\"data:image/png;base64,{data}\" width=\"{width}\" height=\"{height}\"/>"

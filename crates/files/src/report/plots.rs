@@ -2,7 +2,7 @@
 
 use super::axes::Axes;
 use super::survey::Survey;
-use deltille_core::calibrate::{Corner, Solution};
+use deltille_core::calibrate::{CameraEstimate, Corner};
 
 /// Size of the small plots, user units.
 const SMALL: [f64; 2] = [330.0, 250.0];
@@ -25,38 +25,34 @@ const RINGS: usize = 12;
 /// Length of the longest arrow of the residual map, cells.
 const ARROW_CELLS: f64 = 1.2;
 
-fn corners(solution: &Solution) -> impl Iterator<Item = &Corner> {
-    solution.views.iter().flat_map(|view| &view.corners)
-}
-
 /// A range for residuals: four standard deviations, so that the bulk fills the plot.
-fn range_px(solution: &Solution) -> f64 {
-    let inliers = || corners(solution).filter(|corner| !corner.outlier);
+fn range_px(camera: &CameraEstimate) -> f64 {
+    let inliers = || camera.corners().filter(|corner| !corner.outlier);
     let sum: f64 = inliers().flat_map(|corner| corner.residual).map(|r| r * r).sum();
     let rms = (sum / (2 * inliers().count()).max(1) as f64).sqrt();
     (4.0 * rms).max(1e-6)
 }
 
 /// Every n-th corner, so that few enough are left.
-fn thinned(solution: &Solution) -> impl Iterator<Item = &Corner> {
-    let step = solution.corner_count().div_ceil(MOST_DOTS).max(1);
-    corners(solution).step_by(step)
+fn thinned(camera: &CameraEstimate) -> impl Iterator<Item = &Corner> {
+    let step = camera.corner_count().div_ceil(MOST_DOTS).max(1);
+    camera.corners().step_by(step)
 }
 
 /// Residuals as a cloud.
-pub(super) fn scatter(solution: &Solution) -> String {
-    let range = range_px(solution);
+pub(super) fn scatter(camera: &CameraEstimate) -> String {
+    let range = range_px(camera);
     let side = SMALL[1];
     let mut axes = Axes::new([side, side], [-range, range], [-range, range]);
     axes.line(&[[-range, 0.0], [range, 0.0]], "guide");
     axes.line(&[[0.0, -range], [0.0, range]], "guide");
-    for corner in thinned(solution) {
+    for corner in thinned(camera) {
         let [dx, dy] = corner.residual;
         if dx.abs() <= range && dy.abs() <= range {
             axes.dot(dx, -dy, 1.3, if corner.outlier { "dot out" } else { "dot" });
         }
     }
-    for corner in corners(solution) {
+    for corner in camera.corners() {
         // On the way from the middle, where it leaves the plot.
         let [dx, dy] = corner.residual;
         let beyond = dx.abs().max(dy.abs()) / range;
@@ -68,12 +64,12 @@ pub(super) fn scatter(solution: &Solution) -> String {
 }
 
 /// Residuals of both coordinates, with the normal distribution of the same deviation.
-pub(super) fn histogram(solution: &Solution) -> String {
-    let range = range_px(solution);
+pub(super) fn histogram(camera: &CameraEstimate) -> String {
+    let range = range_px(camera);
     let width = range / BINS as f64;
     let mut counts = vec![0usize; 2 * BINS];
     let mut total = 0;
-    for value in corners(solution).flat_map(|corner| corner.residual) {
+    for value in camera.corners().flat_map(|corner| corner.residual) {
         total += 1;
         let bin = ((value + range) / width).floor();
         if (0.0..counts.len() as f64).contains(&bin) {
@@ -170,25 +166,25 @@ pub(super) fn coverage(survey: &Survey) -> String {
 }
 
 /// Error against the distance from the principal point: every corner, and the rms of rings.
-pub(super) fn against_radius(solution: &Solution) -> String {
-    let [cx, cy] = solution.camera.centre_px;
+pub(super) fn against_radius(camera: &CameraEstimate) -> String {
+    let [cx, cy] = camera.camera.centre_px;
     let radius = |corner: &Corner| (corner.pixel[0] - cx).hypot(corner.pixel[1] - cy);
-    let farthest = corners(solution).map(radius).fold(1.0, f64::max);
-    let top = range_px(solution);
+    let farthest = camera.corners().map(radius).fold(1.0, f64::max);
+    let top = range_px(camera);
     let mut axes = Axes::new(SMALL, [0.0, farthest], [0.0, top]);
-    for corner in thinned(solution) {
+    for corner in thinned(camera) {
         let error = corner.residual[0].hypot(corner.residual[1]);
         if error <= top {
             axes.dot(radius(corner), error, 1.1, if corner.outlier { "dot out" } else { "dot" });
         }
     }
-    for corner in corners(solution) {
+    for corner in camera.corners() {
         if corner.residual[0].hypot(corner.residual[1]) > top {
             axes.dot(radius(corner), top, BEYOND, "beyond");
         }
     }
     let mut rings = [(0.0, 0usize); RINGS];
-    for corner in corners(solution).filter(|corner| !corner.outlier) {
+    for corner in camera.corners().filter(|corner| !corner.outlier) {
         let ring = (radius(corner) / farthest * RINGS as f64) as usize;
         let (sum, count) = &mut rings[ring.min(RINGS - 1)];
         *sum += corner.residual.iter().map(|r| r * r).sum::<f64>() / 2.0;
@@ -205,16 +201,16 @@ pub(super) fn against_radius(solution: &Solution) -> String {
 }
 
 /// Error of each view against its tilt; `None` for solids.
-pub(super) fn against_tilt(solution: &Solution, survey: &Survey) -> Option<String> {
+pub(super) fn against_tilt(camera: &CameraEstimate, survey: &Survey) -> Option<String> {
     let tilts: Vec<f64> = survey
         .views
         .iter()
         .map(|view| view.tilt_rad.map(f64::to_degrees))
         .collect::<Option<_>>()?;
     let steepest = tilts.iter().copied().fold(10.0, f64::max);
-    let worst = solution.views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
+    let worst = camera.views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
     let mut axes = Axes::new(SMALL, [0.0, 1.05 * steepest], [0.0, 1.1 * worst]);
-    for (view, tilt) in solution.views.iter().zip(&tilts) {
+    for (view, tilt) in camera.views.iter().zip(&tilts) {
         axes.dot(*tilt, view.rms_px, 3.0, "view");
     }
     Some(axes.svg(["tilt of the board, °", "rms of the view, px"], "Error against tilt"))

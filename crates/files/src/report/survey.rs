@@ -1,12 +1,12 @@
 use glam::DVec3;
 
-use deltille_core::calibrate::{ImageCircle, Solution, ViewSolution};
+use deltille_core::calibrate::{CameraEstimate, ImageCircle, ViewEstimate};
 use deltille_core::camera::Camera;
 
 /// Cells of the maps along the longer side of the image.
 const CELLS: usize = 16;
 
-/// What the views of a calibration cover and show.
+/// What the views of a camera cover and show.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
     /// Width and height of the image, px.
@@ -49,14 +49,14 @@ pub struct SurveyedView {
 const LEAST_IN_CELL: usize = 4;
 
 impl Survey {
-    /// Surveys a calibration.
-    pub fn new(solution: &Solution) -> Self {
-        let size_px = [solution.camera.width, solution.camera.height].map(f64::from);
+    /// Surveys the views of a camera.
+    pub fn new(camera: &CameraEstimate) -> Self {
+        let size_px = [camera.camera.width, camera.camera.height].map(f64::from);
         let cell = size_px[0].max(size_px[1]) / CELLS as f64;
         let cells = size_px.map(|side| ((side / cell).round() as usize).max(1));
         let mut inside: Vec<Vec<[f64; 2]>> = vec![Vec::new(); cells[0] * cells[1]];
         let mut counts = vec![0; inside.len()];
-        for corner in solution.views.iter().flat_map(|view| &view.corners) {
+        for corner in camera.corners() {
             let at = |axis: usize| {
                 let part = (corner.pixel[axis] + 0.5) / size_px[axis];
                 ((part * cells[axis] as f64).max(0.0) as usize).min(cells[axis] - 1)
@@ -67,13 +67,12 @@ impl Survey {
                 inside[index].push(corner.residual);
             }
         }
-        let corners = || solution.views.iter().flat_map(|view| &view.corners);
-        let planar = corners().all(|corner| corner.panel.index() == 0);
+        let planar = camera.corners().all(|corner| corner.panel.index() == 0);
         let views =
-            solution.views.iter().map(|view| surveyed(&solution.camera, view, planar)).collect();
+            camera.views.iter().map(|view| surveyed(&camera.camera, view, planar)).collect();
         let means_px = inside.iter().map(|residuals| cell_mean(residuals)).collect();
-        let seen: Vec<[f64; 2]> = corners().map(|corner| corner.pixel).collect();
-        let circle = ImageCircle::of(&solution.camera, &seen);
+        let seen: Vec<[f64; 2]> = camera.corners().map(|corner| corner.pixel).collect();
+        let circle = ImageCircle::of(&camera.camera, &seen);
         Self { size_px, cells, counts, means_px, views, planar, circle }
     }
 
@@ -93,13 +92,12 @@ impl Survey {
 
     /// Distance of the outermost corner from the middle of the image, as a part of half its
     /// diagonal; or from the middle of its circle, as a part of its radius.
-    pub fn reach(&self, solution: &Solution) -> f64 {
+    pub fn reach(&self, camera: &CameraEstimate) -> f64 {
         let [w, h] = self.size_px;
         let whole =
             ImageCircle { centre_px: [w / 2.0 - 0.5, h / 2.0 - 0.5], radius_px: w.hypot(h) / 2.0 };
         let circle = self.circle.unwrap_or(whole);
-        let corners = solution.views.iter().flat_map(|view| &view.corners);
-        let radii = corners.map(|corner| circle.radius_of(corner.pixel));
+        let radii = camera.corners().map(|corner| circle.radius_of(corner.pixel));
         radii.fold(0.0, f64::max) / circle.radius_px
     }
 
@@ -133,7 +131,7 @@ fn cell_mean(residuals: &[[f64; 2]]) -> Option<CellMean> {
     (sd_px > 0.0).then_some(CellMean { mean_px, sd_px })
 }
 
-fn surveyed(camera: &Camera, view: &ViewSolution, planar: bool) -> SurveyedView {
+fn surveyed(camera: &Camera, view: &ViewEstimate, planar: bool) -> SurveyedView {
     let normal = view.pose.rotation * DVec3::Z;
     let count = view.corners.len().max(1) as f64;
     let middle = [0, 1].map(|i| view.corners.iter().map(|c| c.pixel[i]).sum::<f64>() / count);

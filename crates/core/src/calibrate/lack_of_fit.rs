@@ -46,7 +46,7 @@ const LEAST_VIEWS: usize = 3;
 
 /// A pattern that noise does not make, and that matters beside the noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Misfit {
+pub enum LackOfFit {
     /// Residuals depend on the place in the image: the lens is not what the model says.
     Lens {
         /// Index of the camera.
@@ -104,7 +104,7 @@ struct Explained {
 
 /// The patterns of a problem's residuals, the strongest first. Each is taken out before weaker ones are
 /// looked for: corners of the board and places in the image go together where all views are alike.
-pub(super) fn misfits(problem: &Problem, whitening: &Whitening) -> Vec<Misfit> {
+pub(super) fn lack_of_fit(problem: &Problem, whitening: &Whitening) -> Vec<LackOfFit> {
     let (mut seen, px) = seen(problem, whitening);
     let mut open: Vec<Source> = (0..problem.cameras.len()).map(Source::Lens).collect();
     open.extend([Source::Target, Source::Panels]);
@@ -128,10 +128,10 @@ pub(super) fn misfits(problem: &Problem, whitening: &Whitening) -> Vec<Misfit> {
             open.retain(|other| matches!(other, Source::Lens(_)));
         }
         found.push(match source {
-            Source::Lens(camera) => Misfit::Lens { camera, rms_px },
+            Source::Lens(camera) => LackOfFit::Lens { camera, rms_px },
             Source::Target | Source::Panels => {
                 let most = explained.by_panel.iter().max_by(|a, b| a.1.total_cmp(b.1));
-                Misfit::Target {
+                LackOfFit::Target {
                     panel: most.map_or(PanelRef::ONLY, |(&panel, _)| panel),
                     rms_px,
                     rms_mm: explained.rms_mm(),

@@ -21,18 +21,17 @@ use glam::DVec3;
 
 use super::error::CalibrationError;
 use super::finding::{Count, Finding, Moved, Shared, shared_outliers};
+use super::lack_of_fit::lack_of_fit;
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
-use super::misfit::misfits;
 use super::panel::PanelRef;
 use super::pose::{estimate_pose, planar_pose};
 use super::problem::{Block, CameraUnknowns, Problem};
-use super::rig::middle;
-use super::settle::{Settled, deviations, residuals, scale, settle, with_gross_errors};
-use super::stranger::Opinions;
+use super::reweighting::{Settled, deviations, residuals, scale, settle, with_gross_errors};
+use super::start::middle;
 use super::view::{LEAST_CORNERS, Sighting, View};
+use super::view_consistency::Opinions;
 use super::weights::{Weights, Whitening};
-use super::wrong::{limit_px, median_px};
 use crate::camera::Pose;
 use crate::statistics::median;
 
@@ -55,6 +54,15 @@ const LEAST_PANELS: usize = 3;
 
 /// Corners farther outside their picture than it is large, by this factor, were not seen in it.
 const BEYOND: f64 = 1.0;
+
+/// Corners seen together do not belong with the others when their median error is more than so many
+/// times the usual: blur, light and distance make a few times as much of it, labels that are off by a
+/// tile a hundred times, as pictures do that were not taken at the same moment.
+const WRONG_RATIO: f64 = 10.0;
+
+/// Nor are they wrong below this: a corner that was found at all is found to the pixel, however much
+/// better the others are.
+const WRONG_PX: f64 = 1.0;
 
 /// A problem where most of its corners agree, and what does not belong.
 pub(super) struct Gross {
@@ -288,6 +296,16 @@ impl Gross {
     }
 }
 
+/// The median error of corners, px.
+fn median_px<'a>(residuals: impl IntoIterator<Item = &'a [f64; 2]>) -> f64 {
+    median(residuals.into_iter().map(|[x, y]| x.hypot(*y)).collect()).unwrap_or(0.0)
+}
+
+/// The median error beyond which corners do not belong with the others, px, from those of all.
+fn limit_px(medians: &[f64]) -> f64 {
+    f64::max(WRONG_RATIO * median(medians.to_vec()).unwrap_or(0.0), WRONG_PX)
+}
+
 /// What a quarter of the corners are off by at most, px: labels that are wrong fit none.
 fn nearest_px(residuals: &[[f64; 2]]) -> f64 {
     let mut off: Vec<f64> = residuals.iter().map(|[x, y]| x.hypot(*y)).collect();
@@ -344,7 +362,7 @@ fn walked_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Wa
 
 /// Whether residuals depend neither on the place in the image nor on that on the target.
 fn has_no_pattern(settled: &Settled) -> bool {
-    misfits(&settled.minimum.problem, &settled.whitening).is_empty()
+    lack_of_fit(&settled.minimum.problem, &settled.whitening).is_empty()
 }
 
 /// Estimates the pose of a frame anew, from the panels that are not wrong, and keeps the better one.

@@ -4,10 +4,10 @@
 //! in the middle, the one is taken under which the views look most like views of planes. Half of the
 //! views may be wrong.
 
-use super::model::Model;
-use super::pose::planar_pose;
-use super::problem::Observation;
-use super::view::View;
+use super::super::model::Model;
+use super::super::pose::planar_pose;
+use super::super::problem::Observation;
+use super::super::view::View;
 use crate::camera::{BrownConrady, Camera, KannalaBrandt, Lens, Pose};
 use crate::statistics::median;
 
@@ -67,7 +67,7 @@ fn largest_panel(view: &View) -> Option<Vec<Observation>> {
 }
 
 /// At most so many of the items, evenly over their sequence.
-pub(super) fn evenly<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
+pub(in crate::calibrate) fn evenly<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
     let count = items.len().min(most);
     (0..count).map(move |i| &items[i * items.len() / count])
 }

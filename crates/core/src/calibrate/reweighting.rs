@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use super::error::CalibrationError;
-use super::gross::Kept;
+use super::gross_errors::Kept;
 use super::loss::Loss;
 use super::minimise::{Minimum, Until, minimise};
 use super::problem::{Block, Observation, Problem};

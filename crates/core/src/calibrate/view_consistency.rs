@@ -14,11 +14,11 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::lack_of_fit::deviate_of_f;
 use super::loss::Loss;
-use super::misfit::deviate_of_f;
 use super::normal::{Layout, Normal};
 use super::problem::Problem;
-use super::settle::Settled;
+use super::reweighting::Settled;
 use crate::statistics::median;
 
 /// Fewest views of which one can stand out: three are left then.

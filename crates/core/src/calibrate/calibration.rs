@@ -1,0 +1,280 @@
+//! What a calibration starts from: cameras with their views, a target, and what of them is known.
+
+use std::collections::BTreeSet;
+
+use super::error::CalibrationError;
+use super::estimate::Estimate;
+use super::loss::Loss;
+use super::model::Model;
+use super::shape::BoardShape;
+use super::view::View;
+use super::weights::Weights;
+use crate::camera::{Camera, Pose};
+use crate::targets::PanelPose;
+
+/// Cameras that are fixed to each other, their views of one rigid target, and what of these is known.
+///
+/// A single camera is a rig of one. Everything that is not said to be known is found by
+/// [`solve`](Self::solve): the cameras without any guess, the poses between them, and where the
+/// target was in each frame; on request also where its panels are on it and how its board is bent.
+///
+/// ```
+/// # use deltille_core::calibrate::{Calibration, CalibrationError, Estimate, Model, PanelPlace, View};
+/// # fn calibrated(panels: Vec<PanelPlace>, left: Vec<View>, right: Vec<View>) -> Result<Estimate, CalibrationError> {
+/// Calibration::new(panels)
+///     .camera("left", left, Model::Radtan)
+///     .camera("right", right, Model::KannalaBrandt(4))
+///     .hold_out(Some(5))
+///     .solve()
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    pub(super) panels: Vec<PanelPlace>,
+    pub(super) cameras: Vec<CameraViews>,
+    pub(super) loss: Loss,
+    pub(super) weights: Weights,
+    pub(super) refine_panels: bool,
+    pub(super) board_shape: bool,
+    pub(super) hold_out: Option<usize>,
+}
+
+/// What one camera saw, and what is known of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraViews {
+    /// Name of the camera.
+    pub name: String,
+    /// Its views; those of the same name in different cameras were taken at the same moment.
+    pub views: Vec<View>,
+    /// What is known of its lens.
+    pub intrinsics: Intrinsics,
+    /// Its place on the rig, where that is known. The first camera is the rig, and lies at its origin
+    /// unless said otherwise.
+    pub camera_from_rig: Option<Pose>,
+}
+
+/// What is known of a camera by itself.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Intrinsics {
+    /// Nothing but the model.
+    Unknown(Model),
+    /// All of it; it is kept.
+    Known(Camera),
+    /// Nearly all: some of its parameters are found, from the values that they have.
+    Near {
+        /// The camera.
+        camera: Camera,
+        /// Which parameters are found, in the order of [`Camera::parameter_names`].
+        free: Vec<bool>,
+    },
+}
+
+/// Where a panel is on its target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PanelPlace {
+    /// target_from_panel.
+    pub target_from_panel: Pose,
+    /// Covariance of a turn (rad) and a move (mm) along the target's axes, where it was measured;
+    /// `None` where it is as stated.
+    pub covariance: Option<[[f64; 6]; 6]>,
+}
+
+impl From<&PanelPose> for PanelPlace {
+    fn from(pose: &PanelPose) -> Self {
+        Self { target_from_panel: pose.to_pose(), covariance: pose.covariance }
+    }
+}
+
+impl From<Pose> for PanelPlace {
+    fn from(target_from_panel: Pose) -> Self {
+        Self { target_from_panel, covariance: None }
+    }
+}
+
+impl From<Model> for Intrinsics {
+    fn from(model: Model) -> Self {
+        Self::Unknown(model)
+    }
+}
+
+impl From<Camera> for Intrinsics {
+    fn from(camera: Camera) -> Self {
+        Self::Known(camera)
+    }
+}
+
+impl Intrinsics {
+    /// The model that is to be found; `None` where a camera was given.
+    pub fn model(&self) -> Option<Model> {
+        match self {
+            Self::Unknown(model) => Some(*model),
+            Self::Known(_) | Self::Near { .. } => None,
+        }
+    }
+
+    /// Which parameters are found.
+    pub(super) fn free(&self) -> Vec<bool> {
+        match self {
+            Self::Unknown(model) => model.free(),
+            Self::Known(camera) => vec![false; camera.parameters().len()],
+            Self::Near { free, .. } => free.clone(),
+        }
+    }
+}
+
+impl CameraViews {
+    /// A camera whose place on the rig is to be found.
+    pub fn new(name: &str, views: Vec<View>, intrinsics: impl Into<Intrinsics>) -> Self {
+        let (name, intrinsics) = (name.to_owned(), intrinsics.into());
+        Self { name, views, intrinsics, camera_from_rig: None }
+    }
+}
+
+impl Calibration {
+    /// A calibration with a target of these panels, see
+    /// [`Reference::panels`](super::Reference::panels), without any camera yet.
+    pub fn new(panels: impl IntoIterator<Item = impl Into<PanelPlace>>) -> Self {
+        Self {
+            panels: panels.into_iter().map(Into::into).collect(),
+            cameras: Vec::new(),
+            loss: Loss::default(),
+            weights: Weights::default(),
+            refine_panels: false,
+            board_shape: false,
+            hold_out: None,
+        }
+    }
+
+    /// Adds a camera: of an unknown lens of a [`Model`], or a known [`Camera`] that is kept.
+    #[must_use]
+    pub fn camera(self, name: &str, views: Vec<View>, intrinsics: impl Into<Intrinsics>) -> Self {
+        self.with(CameraViews::new(name, views, intrinsics))
+    }
+
+    /// Adds a camera.
+    #[must_use]
+    pub fn with(mut self, camera: CameraViews) -> Self {
+        self.cameras.push(camera);
+        self
+    }
+
+    /// How corners far off count; by [`Loss::Huber`] unless said otherwise.
+    #[must_use]
+    pub fn loss(self, loss: Loss) -> Self {
+        Self { loss, ..self }
+    }
+
+    /// How corners are weighted; by [`Weights::Covariance`] unless said otherwise.
+    #[must_use]
+    pub fn weights(self, weights: Weights) -> Self {
+        Self { weights, ..self }
+    }
+
+    /// Whether the poses of the target's panels on it are found, too. One panel stays: that which was
+    /// seen most of those that were never measured. What an earlier measurement says of the others
+    /// counts as an observation.
+    #[must_use]
+    pub fn refine_panels(self, refine_panels: bool) -> Self {
+        Self { refine_panels, ..self }
+    }
+
+    /// Whether the shape of the board's sheet is found, too; for targets of one panel.
+    #[must_use]
+    pub fn board_shape(self, board_shape: bool) -> Self {
+        Self { board_shape, ..self }
+    }
+
+    /// Keeps every n-th frame (the n-th, the 2n-th, …) out of the calibration; only the poses in these are
+    /// found, see [`Estimate::held_out`].
+    #[must_use]
+    pub fn hold_out(self, hold_out: Option<usize>) -> Self {
+        Self { hold_out, ..self }
+    }
+
+    /// The cameras and their views.
+    pub fn cameras(&self) -> &[CameraViews] {
+        &self.cameras
+    }
+
+    /// Target_from_panel of every panel.
+    pub(super) fn panel_poses(&self) -> Vec<Pose> {
+        self.panels.iter().map(|panel| panel.target_from_panel).collect()
+    }
+
+    /// Whether it is one camera with a target that is taken as it is stated.
+    pub(super) fn is_single(&self) -> bool {
+        self.cameras.len() == 1 && !self.refine_panels
+    }
+
+    /// The same with other cameras.
+    pub(super) fn of_cameras(&self, cameras: Vec<CameraViews>) -> Self {
+        Self { panels: self.panels.clone(), cameras, ..*self }
+    }
+
+    /// One of its cameras by itself, with panels at these places.
+    pub(super) fn alone(&self, camera: usize, panels: &[PanelPlace]) -> Self {
+        let cameras = vec![self.cameras[camera].clone()];
+        Self { panels: panels.to_vec(), cameras, refine_panels: false, hold_out: None, ..*self }
+    }
+
+    /// The frames that take part, and those that are held out.
+    ///
+    /// # Errors
+    /// Where there are too few to hold one out.
+    pub(super) fn split(&self) -> Result<(Self, Option<Self>), CalibrationError> {
+        let Some(every) = self.hold_out else { return Ok((self.clone(), None)) };
+        let views = self.cameras.iter().flat_map(|camera| &camera.views);
+        let names: BTreeSet<&str> = views.map(|view| view.name.as_str()).collect();
+        let names: Vec<&str> = names.into_iter().collect();
+        // Views of a single camera may have the same name.
+        let (count, is_single) = match self.cameras.as_slice() {
+            [only] => (only.views.len(), true),
+            _ => (names.len(), false),
+        };
+        if every > count {
+            return Err(CalibrationError::NothingHeldOut { every, all: count });
+        }
+        let is_held_out = |(index, view): (usize, &View)| {
+            let of_rig = || names.partition_point(|name| *name < view.name.as_str());
+            (if is_single { index } else { of_rig() } + 1).is_multiple_of(every)
+        };
+        let part = |held_out: bool| {
+            let cameras = self.cameras.iter().map(|camera| {
+                let views = camera.views.iter().enumerate();
+                let views = views.filter(|&of| is_held_out(of) == held_out);
+                CameraViews {
+                    views: views.map(|(_, view)| view.clone()).collect(),
+                    ..camera.clone()
+                }
+            });
+            Self { hold_out: None, ..self.of_cameras(cameras.collect()) }
+        };
+        Ok((part(false), Some(part(true))))
+    }
+
+    /// The same with nothing to be found but where the target was: all else is as an estimate has it.
+    pub(super) fn given(&self, estimate: &Estimate) -> Self {
+        let cameras = self.cameras.iter().zip(&estimate.cameras).map(|(camera, found)| {
+            let mut views = camera.views.clone();
+            if let Some(BoardShape { shape, .. }) = &estimate.shape {
+                let sightings = views.iter_mut().flat_map(|view| &mut view.sightings);
+                sightings.for_each(|sighting| sighting.bend(shape));
+            }
+            CameraViews {
+                name: camera.name.clone(),
+                views,
+                intrinsics: found.camera.clone().into(),
+                camera_from_rig: Some(found.camera_from_rig),
+            }
+        });
+        let panels = estimate.panels.iter().map(|panel| panel.target_from_panel.into());
+        let panels = panels.collect();
+        Self {
+            panels,
+            cameras: cameras.collect(),
+            refine_panels: false,
+            board_shape: false,
+            ..*self
+        }
+    }
+}

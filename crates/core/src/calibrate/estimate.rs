@@ -1,0 +1,393 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::DMatrix;
+
+use super::calibration::{CameraViews, PanelPlace};
+use super::error::CalibrationError;
+use super::excluded::Excluded;
+use super::finding::Finding;
+use super::lack_of_fit::{LackOfFit, lack_of_fit};
+use super::lens_end::LensEnd;
+use super::minimise::Minimum;
+use super::model::Model;
+use super::normal::Covariances;
+use super::panel::PanelRef;
+use super::reweighting::{Settled, variance};
+use super::shape::{BoardShape, Shape};
+use super::start::Frame;
+use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
+use crate::targets::{Name, PanelPose, Target};
+
+/// Cameras, and where they and the target were, as the views have it, with what that is worth.
+///
+/// One camera is a rig of one: the rig frame is that of the camera, and a frame a view.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// The cameras, in the order given.
+    pub cameras: Vec<CameraEstimate>,
+    /// The moments at which pictures were taken: in the order of the views of a single camera, by name for
+    /// a rig.
+    pub frames: Vec<FrameEstimate>,
+    /// The panels of the target; those that were found have a covariance.
+    pub panels: Vec<PanelPlace>,
+    /// The shape of the board's sheet, where it was to be found.
+    pub shape: Option<BoardShape>,
+    /// Root mean square error of a coordinate over all corners, px: √(Σ(dx² + dy²)/2N).
+    pub rms_px: f64,
+    /// The deviation that was added to every corner's covariance, px; `None` where corners were
+    /// taken as equally precise.
+    pub common_px: Option<f64>,
+    /// A-posteriori standard deviation of a coordinate: in px where corners were taken as equally
+    /// precise, else in units of what its covariance says. All covariances are scaled by its square.
+    pub sigma: f64,
+    /// Views and frames that do not belong with the others and took no part, and why.
+    pub excluded: Vec<Excluded>,
+    /// What outliers share, and corners that were left out together.
+    pub findings: Vec<Finding>,
+    /// Patterns in the residuals that noise does not make, the strongest first.
+    pub lack_of_fit: Vec<LackOfFit>,
+    /// The same cameras in frames that took no part, where some were held out; only the poses of the
+    /// target were found there.
+    pub held_out: Option<Box<Estimate>>,
+    /// Steps of the last bundle adjustment.
+    pub steps: usize,
+}
+
+/// A camera as its views have it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraEstimate {
+    /// Its name.
+    pub name: String,
+    /// The camera.
+    pub camera: Camera,
+    /// The model that was found; `None` where the camera was given.
+    pub model: Option<Model>,
+    /// Its parameters, those that were found and those that were kept.
+    pub parameters: Vec<Parameter>,
+    /// Covariance of the parameters that were found, in their order.
+    pub covariance: DMatrix<f64>,
+    /// Names of parameters that the views cannot tell apart: some change of them together moves no
+    /// corner, and their deviations are the least that they can be; or hardly any, so that neither the
+    /// value nor the deviation of one alone means anything.
+    pub ill_conditioned: Vec<String>,
+    /// Where it is on the rig.
+    pub camera_from_rig: Pose,
+    /// Standard deviations of that: of a turn (rad) and a move (mm) along the camera's axes; `None`
+    /// where it was not to be found, as of the first camera, which is the rig.
+    pub pose_sd: Option<[f64; 6]>,
+    /// Its views that took part, in the order of the frames.
+    pub views: Vec<ViewEstimate>,
+    /// Root mean square error of a coordinate over all its views, px.
+    pub rms_px: f64,
+}
+
+/// A moment at which pictures were taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameEstimate {
+    /// Its name.
+    pub name: String,
+    /// Where the target was.
+    pub rig_from_target: Pose,
+    /// Standard deviations of that: of a turn (rad) and a move (mm) along the rig's axes.
+    pub pose_sd: [f64; 6],
+    /// Root mean square error of a coordinate over all cameras, px.
+    pub rms_px: f64,
+}
+
+/// A parameter of a camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name, such as `k1`.
+    pub name: String,
+    /// Its value; lengths in px or mm.
+    pub value: f64,
+    /// Its standard deviation; `None` where it was not to be found.
+    pub sd: Option<f64>,
+}
+
+/// A view as its camera explains it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewEstimate {
+    /// Name of the view.
+    pub name: String,
+    /// File name of its picture.
+    pub image: String,
+    /// Index of the frame in which it was taken.
+    pub frame: usize,
+    /// camera_from_target.
+    pub pose: Pose,
+    /// Root mean square error of a coordinate, px.
+    pub rms_px: f64,
+    /// The corners.
+    pub corners: Vec<Corner>,
+}
+
+/// A corner as its camera explains it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corner {
+    /// The panel.
+    pub panel: PanelRef,
+    /// Lattice row.
+    pub row: i32,
+    /// Lattice column.
+    pub col: i32,
+    /// Where it was seen, px.
+    pub pixel: [f64; 2],
+    /// Seen less predicted position, px.
+    pub residual: [f64; 2],
+    /// Whether it is farther off than corners are by chance.
+    pub outlier: bool,
+}
+
+impl Estimate {
+    /// All corners, by camera.
+    pub fn corners(&self) -> impl Iterator<Item = &Corner> {
+        self.cameras.iter().flat_map(CameraEstimate::corners)
+    }
+
+    /// How many corners took part.
+    pub fn corner_count(&self) -> usize {
+        self.corners().count()
+    }
+
+    /// How many corners are outliers.
+    pub fn outlier_count(&self) -> usize {
+        self.corners().filter(|corner| corner.outlier).count()
+    }
+
+    /// [`Self::rms_px`] of the corners that are no outliers.
+    pub fn inlier_rms_px(&self) -> f64 {
+        rms_px(self.corners().filter(|corner| !corner.outlier))
+    }
+
+    /// Whether panels were to be found.
+    pub fn has_refined_panels(&self) -> bool {
+        self.panels.iter().any(|panel| panel.covariance.is_some())
+    }
+
+    /// The target with its panels where they were found, named `<target>-refined`.
+    pub fn refined(&self, target: &Target) -> Target {
+        let poses = self.panels.iter();
+        let poses =
+            poses.map(|panel| PanelPose::from_pose(&panel.target_from_panel, panel.covariance));
+        let name = Name::like(&format!("{}-refined", target.name.trim_end_matches("-refined")));
+        Target { name, ..target.with_poses(&poses.collect::<Vec<_>>()) }
+    }
+
+    /// How many unknowns were found beside the poses of the frames.
+    pub(super) fn unknown_count(&self) -> usize {
+        let of_panels = self.panels.iter().filter(|panel| panel.covariance.is_some()).count();
+        let of_cameras = self
+            .cameras
+            .iter()
+            .map(|camera| camera.found().count() + if camera.pose_sd.is_some() { 6 } else { 0 });
+        let of_shape = self.shape.map_or(0, |found| found.sd_mm.len());
+        of_cameras.sum::<usize>() + 6 * of_panels + of_shape
+    }
+}
+
+impl CameraEstimate {
+    /// All its corners, by view.
+    pub fn corners(&self) -> impl Iterator<Item = &Corner> {
+        self.views.iter().flat_map(|view| &view.corners)
+    }
+
+    /// How many corners took part.
+    pub fn corner_count(&self) -> usize {
+        self.corners().count()
+    }
+
+    /// How many corners are outliers.
+    pub fn outlier_count(&self) -> usize {
+        self.corners().filter(|corner| corner.outlier).count()
+    }
+
+    /// [`Self::rms_px`] of the corners that are no outliers.
+    pub fn inlier_rms_px(&self) -> f64 {
+        rms_px(self.corners().filter(|corner| !corner.outlier))
+    }
+
+    /// Correlation of two of the parameters that were found.
+    pub fn correlation(&self, i: usize, j: usize) -> f64 {
+        let c = &self.covariance;
+        c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt()
+    }
+
+    /// The names of the parameters that were found.
+    pub fn found(&self) -> impl Iterator<Item = &str> {
+        self.parameters.iter().filter(|p| p.sd.is_some()).map(|p| p.name.as_str())
+    }
+
+    /// Where the lens ends to be good, if that is within the image.
+    pub fn lens_end(&self) -> Option<LensEnd> {
+        let seen: Vec<[f64; 2]> = self.corners().map(|corner| corner.pixel).collect();
+        LensEnd::of(&self.camera, &seen)
+    }
+}
+
+impl ViewEstimate {
+    /// How many of its corners are outliers.
+    pub fn outlier_count(&self) -> usize {
+        self.corners.iter().filter(|corner| corner.outlier).count()
+    }
+}
+
+/// √(Σ(dx² + dy²)/2N); zero of none.
+fn rms_px<'a>(corners: impl Iterator<Item = &'a Corner>) -> f64 {
+    let residuals = corners.map(|corner| corner.residual);
+    let (sum, count) =
+        residuals.fold((0.0, 0), |(sum, count), [x, y]| (sum + x * x + y * y, count + 2));
+    if count == 0 { 0.0 } else { (sum / f64::from(count)).sqrt() }
+}
+
+impl Estimate {
+    /// What was settled on; `frames` are those of the settled problem, and `f_ratio` is that of the
+    /// shape.
+    ///
+    /// # Errors
+    /// Where views leave the pose of a frame, a camera or a panel open.
+    pub(super) fn new(
+        cameras: &[CameraViews],
+        frames: &[&Frame],
+        settled: &Settled,
+        f_ratio: f64,
+    ) -> Result<Self, CalibrationError> {
+        let Settled { minimum, whitening, .. } = settled;
+        let Minimum { problem, normal, layout, steps } = minimum;
+        let open = |parameters: String| CalibrationError::Undetermined { parameters };
+        let found = normal.covariances().ok_or_else(|| open("the poses".to_owned()))?;
+        let is_open = |first: Option<usize>| {
+            first.is_some_and(|first| (first..first + 6).any(|i| found.loose.contains(&i)))
+        };
+        let of_cameras = cameras.iter().zip(&layout.cameras).filter(|(_, first)| is_open(**first));
+        let of_cameras = of_cameras.map(|(camera, _)| format!("the pose of {}", camera.name));
+        let panels: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
+        let of_panels = panels.into_iter().filter(|panel| is_open(layout.panels[panel.index()]));
+        let of_panels = of_panels.map(|panel| format!("the pose of panel {panel}"));
+        let poses: Vec<String> = of_cameras.chain(of_panels).collect();
+        if !poses.is_empty() {
+            return Err(open(poses.join(", ")));
+        }
+        let variance = variance(minimum);
+        let covariance = &found.shared * variance;
+        let mut views = views(cameras, frames, settled);
+        let cameras = cameras.iter().enumerate().map(|(index, camera)| {
+            let views = std::mem::take(&mut views[index]);
+            camera_estimate(index, camera, views, settled, &found, &covariance)
+        });
+        let cameras: Vec<CameraEstimate> = cameras.collect();
+        let of_frames = problem.frames.iter().zip(&found.frames).zip(frames).enumerate();
+        let of_frames = of_frames.map(|(index, ((pose, own), frame))| {
+            let views = cameras.iter().flat_map(|camera| &camera.views);
+            let views = views.filter(|view| view.frame == index);
+            FrameEstimate {
+                name: frame.name.clone(),
+                rig_from_target: *pose,
+                pose_sd: std::array::from_fn(|i| (own[(i, i)] * variance).sqrt()),
+                rms_px: rms_px(views.flat_map(|view| &view.corners)),
+            }
+        });
+        let panels = problem.panels.iter().zip(&layout.panels).map(|(panel, first)| PanelPlace {
+            target_from_panel: panel.target_from_panel,
+            covariance: first.map(|first| {
+                std::array::from_fn(|i| std::array::from_fn(|j| covariance[(first + i, first + j)]))
+            }),
+        });
+        Ok(Self {
+            frames: of_frames.collect(),
+            panels: panels.collect(),
+            shape: board_shape(minimum, &covariance, f_ratio),
+            rms_px: rms_px(cameras.iter().flat_map(CameraEstimate::corners)),
+            common_px: whitening.common_px,
+            sigma: variance.sqrt(),
+            lack_of_fit: lack_of_fit(problem, whitening),
+            steps: *steps,
+            cameras,
+            ..Self::default()
+        })
+    }
+}
+
+/// The views of every camera, with all corners that are within its reach.
+fn views(cameras: &[CameraViews], frames: &[&Frame], settled: &Settled) -> Vec<Vec<ViewEstimate>> {
+    let Settled { problem, outliers, .. } = settled;
+    let mut corners: BTreeMap<(usize, usize), Vec<Corner>> = BTreeMap::new();
+    for (block, outliers) in problem.blocks.iter().zip(outliers) {
+        let of_block = block.observations.iter().zip(outliers).filter_map(|(seen, &outlier)| {
+            let (panel, row, col, pixel) = (block.panel, seen.row, seen.col, seen.pixel);
+            let residual = problem.residual(block, seen)?;
+            Some(Corner { panel, row, col, pixel, residual, outlier })
+        });
+        corners.entry((block.camera, block.frame)).or_default().extend(of_block);
+    }
+    let of_camera = |(index, camera): (usize, &CameraViews)| {
+        let taken = frames.iter().enumerate().filter_map(|(frame, of_frame)| {
+            let (_, view) = of_frame.views.iter().find(|(camera, _)| *camera == index)?;
+            let (view, corners) = (&camera.views[*view], corners.remove(&(index, frame))?);
+            Some(ViewEstimate {
+                name: view.name.clone(),
+                image: view.image.clone(),
+                frame,
+                pose: problem.cameras[index].camera_from_rig.after(&problem.frames[frame]),
+                rms_px: rms_px(corners.iter()),
+                corners,
+            })
+        });
+        taken.collect()
+    };
+    cameras.iter().enumerate().map(of_camera).collect()
+}
+
+fn camera_estimate(
+    index: usize,
+    given: &CameraViews,
+    views: Vec<ViewEstimate>,
+    settled: &Settled,
+    found: &Covariances,
+    covariance: &DMatrix<f64>,
+) -> CameraEstimate {
+    let Minimum { problem, layout, .. } = &settled.minimum;
+    let unknowns = &problem.cameras[index];
+    let columns = &layout.parameters[index];
+    let names = unknowns.camera.parameter_names();
+    let is_loose = |&(i, column): &(usize, usize)| {
+        found.loose.contains(&column)
+            || i >= PROJECTION_PARAMETERS.len() && found.tied.contains(&column)
+    };
+    let loose = columns.iter().copied().filter(is_loose).map(|(i, _)| names[i].clone());
+    let sd = |column: usize| covariance[(column, column)].sqrt();
+    let sd_of = |i: usize| columns.iter().find(|(of, _)| *of == i).map(|&(_, column)| sd(column));
+    let values = names.iter().zip(unknowns.camera.parameters()).enumerate();
+    CameraEstimate {
+        name: given.name.clone(),
+        camera: unknowns.camera.clone(),
+        model: given.intrinsics.model(),
+        parameters: values
+            .map(|(i, (name, value))| Parameter { name: name.clone(), value, sd: sd_of(i) })
+            .collect(),
+        covariance: DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
+            covariance[(columns[i].1, columns[j].1)]
+        }),
+        ill_conditioned: loose.collect(),
+        camera_from_rig: unknowns.camera_from_rig,
+        pose_sd: layout.cameras[index].map(|first| std::array::from_fn(|i| sd(first + i))),
+        rms_px: rms_px(views.iter().flat_map(|view| &view.corners)),
+        views,
+    }
+}
+
+fn board_shape(minimum: &Minimum, covariance: &DMatrix<f64>, f_ratio: f64) -> Option<BoardShape> {
+    let (shape, first): (Shape, usize) = minimum.problem.shape.zip(minimum.layout.shape)?;
+    let seen = minimum.problem.blocks.iter().flat_map(|block| &block.observations);
+    let offsets = seen.map(|seen| shape.offset(seen.panel_mm));
+    let (low, high, beside) = offsets.fold((0.0, 0.0, 0.0), |(low, high, beside), d| {
+        (d.z.min(low), d.z.max(high), d.truncate().length().max(beside))
+    });
+    Some(BoardShape {
+        shape,
+        sd_mm: std::array::from_fn(|i| covariance[(first + i, first + i)].sqrt()),
+        f_ratio,
+        bent_mm: high - low,
+        stretched_mm: beside,
+    })
+}

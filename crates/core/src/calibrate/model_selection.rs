@@ -1,0 +1,245 @@
+//! What would make a calibration fit that does not: what it takes for given is found instead.
+
+use std::collections::BTreeSet;
+
+use super::calibration::{Calibration, CameraViews, Intrinsics};
+use super::estimate::{Corner, Estimate};
+use super::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
+use super::model::Model;
+use super::start::evenly;
+use super::view::View;
+use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
+use crate::camera::{Camera, PROJECTION_PARAMETERS};
+use crate::statistics::median;
+
+/// Where detections explain at least this part of the squares of the residuals, nothing is sought: what is
+/// left beside them does not matter, whatever it is.
+const EXPLAINED: f64 = 1.0 / (1.0 + MATTERS * MATTERS);
+
+/// A remedy is as good as the best if it gains this part of what that does: squares of a thousand corners
+/// are known to a few in a hundred.
+const AS_GOOD: f64 = 0.9;
+
+/// Views that are calibrated anew, evenly over the sequence: what matters shows in so many, and trying must
+/// not take longer than the calibration itself.
+const TRIAL_VIEWS: usize = 12;
+
+/// What makes the residuals of a calibration smaller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Remedy {
+    /// What was found that had been given.
+    pub instead: Instead,
+    /// Root mean square error of a coordinate as it is, outliers left out, px.
+    pub from_px: f64,
+    /// The same with the remedy.
+    pub to_px: f64,
+}
+
+/// What is to be found instead of taken for given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instead {
+    /// A lens of another model.
+    Model(Model),
+    /// The shape of the board's sheet.
+    Shape,
+    /// The places of the target's panels.
+    Panels,
+    /// The camera itself.
+    Camera,
+}
+
+impl Calibration {
+    /// The camera of a calibration of one, with other views.
+    pub(super) fn of_views(&self, views: Vec<View>) -> Self {
+        self.of_cameras(vec![CameraViews { views, ..self.cameras[0].clone() }])
+    }
+
+    /// The same of which this is known.
+    fn of_intrinsics(&self, intrinsics: impl Into<Intrinsics>) -> Self {
+        let intrinsics = intrinsics.into();
+        self.of_cameras(vec![CameraViews { intrinsics, ..self.cameras[0].clone() }])
+    }
+
+    /// The model that a calibration of one camera finds with fewer views, so that others can be tried, and what
+    /// comes of it.
+    fn trial(&self, found: &Estimate) -> Option<(Self, Estimate)> {
+        let views = &self.cameras[0].views;
+        let sample = self.of_views(evenly(views, TRIAL_VIEWS).cloned().collect());
+        let of_sample = match sample.cameras[0].views.len() < views.len() {
+            true => sample.adjusted().ok()?,
+            false => found.clone(),
+        };
+        Some((sample, of_sample))
+    }
+
+    /// What explains the residuals of a calibration of one camera better, by more than chance and so much
+    /// that it matters; `None` where they are what detections lead to expect, or nothing here does.
+    pub(super) fn remedy(&self, found: &Estimate) -> Option<Remedy> {
+        if is_explained(found) {
+            return None;
+        }
+        match &self.cameras[0].intrinsics {
+            Intrinsics::Unknown(model) => self.remedy_of_found(*model, found),
+            Intrinsics::Known(camera) => self.remedy_of_known(camera, found),
+            Intrinsics::Near { .. } => None,
+        }
+    }
+
+    fn remedy_of_found(&self, model: Model, found: &Estimate) -> Option<Remedy> {
+        let (trial, tried_on) = self.trial(found)?;
+        let models = model
+            .richer()
+            .iter()
+            .map(|&model| (Instead::Model(model), trial.of_intrinsics(model).adjusted().ok()));
+        let bends = self.panels.len() == 1 && !self.board_shape;
+        let shape =
+            bends.then(|| (Instead::Shape, trial.clone().board_shape(true).adjusted().ok()));
+        let shows_several = trial.cameras[0].views.iter().any(|view| view.sightings.len() > 1);
+        let places = shows_several.then(|| (Instead::Panels, trial.with_panels_found()));
+        let tried = shape.into_iter().chain(models).chain(places);
+        let tried = tried.filter_map(|(instead, other)| Some((instead, other?)));
+        let from_px = found.inlier_rms_px();
+        let best = best(&tried_on, tried).filter(|remedy| remedy.to_px < from_px)?;
+        Some(Remedy { from_px, ..best })
+    }
+
+    /// The same where the camera was given: whether it is another one, or the board is bent.
+    fn remedy_of_known(&self, camera: &Camera, found: &Estimate) -> Option<Remedy> {
+        let values = camera.parameters().into_iter().enumerate();
+        let of_lens = |(i, value): (usize, f64)| i < PROJECTION_PARAMETERS.len() || value != 0.0;
+        let near = Intrinsics::Near { camera: camera.clone(), free: values.map(of_lens).collect() };
+        let bent = (self.panels.len() == 1).then(|| self.clone().board_shape(true).adjusted().ok());
+        let bent = bent.flatten().map(|other| (Instead::Shape, other));
+        let other = self.of_intrinsics(near).board_shape(false).adjusted().ok();
+        best(found, bent.into_iter().chain(other.map(|other| (Instead::Camera, other))))
+    }
+
+    /// The estimate with the panels where the views have them.
+    fn with_panels_found(&self) -> Option<Estimate> {
+        // Each view is a frame of its own, whatever it is called.
+        let views = self.cameras[0].views.iter().enumerate();
+        let views = views.map(|(index, view)| View { name: format!("{index:06}"), ..view.clone() });
+        let panels = self.of_views(views.collect()).refine_panels(true).adjusted().ok()?.panels;
+        let stated = |place: &super::PanelPlace| place.target_from_panel.into();
+        let panels = panels.iter().map(stated).collect();
+        Self { panels, ..self.clone() }.adjusted().ok()
+    }
+
+    /// The cameras of a rig that were given and that their own pictures speak against: other ones, or changed
+    /// since.
+    pub(super) fn foreign_cameras(&self) -> Vec<usize> {
+        let is_foreign = |&index: &usize| {
+            let alone = self.alone(index, &self.panels);
+            let is_known = matches!(self.cameras[index].intrinsics, Intrinsics::Known(_));
+            let remedy = || alone.remedy(&alone.adjusted().ok()?);
+            is_known && remedy().is_some_and(|remedy| remedy.instead == Instead::Camera)
+        };
+        match self.cameras.len() {
+            1 => Vec::new(),
+            count => (0..count).filter(is_foreign).collect(),
+        }
+    }
+
+    /// The model with the fewest parameters that holds the lens of a camera as well as its own, of those that
+    /// have fewer of the same parameters; `None` where all of its own are needed.
+    pub fn sufficient_model(&self, camera: usize, found: &Estimate) -> Option<Model> {
+        let (alone, found) = self.and_alone(camera, found)?;
+        alone.sufficient(&found)
+    }
+
+    /// The same of a calibration of one camera.
+    ///
+    /// With q parameters less the squares of the residuals grow by F q of their variances, and by chance F
+    /// is about 1.
+    pub(super) fn sufficient(&self, found: &Estimate) -> Option<Model> {
+        let (trial, of_trial) = self.trial(found)?;
+        let mut sufficient = None;
+        let mut next = self.cameras[0].intrinsics.model()?.smaller();
+        while let Some(model) = next {
+            let smaller = trial.of_intrinsics(model).adjusted();
+            if !smaller.is_ok_and(|smaller| holds_as_well(&smaller, &of_trial)) {
+                break;
+            }
+            sufficient = Some(model);
+            next = model.smaller();
+        }
+        sufficient
+    }
+}
+
+/// Whether residuals are what detections lead to expect.
+pub(super) fn is_explained(found: &Estimate) -> bool {
+    let of_noise = |common: f64| 1.0 - (common / found.inlier_rms_px()).powi(2);
+    found.common_px.is_some_and(|common| of_noise(common) > EXPLAINED)
+}
+
+fn best(found: &Estimate, tried: impl Iterator<Item = (Instead, Estimate)>) -> Option<Remedy> {
+    let from_px = found.inlier_rms_px();
+    let better = tried.filter_map(|(instead, other)| {
+        let gain = gain(found, &other, instead)?;
+        Some((gain, Remedy { instead, from_px, to_px: other.inlier_rms_px() }))
+    });
+    let better: Vec<_> = better.collect();
+    let most = better.iter().map(|(gain, _)| *gain).fold(0.0, f64::max);
+    // Those with fewer parameters come first.
+    better.into_iter().find(|(gain, _)| *gain > AS_GOOD * most).map(|(_, remedy)| remedy)
+}
+
+/// How many times smaller the mean square is. What is an outlier where the fit is better counts as just
+/// one in both, so that wild corners are no gain; nor is it one to call more of them wild.
+fn gain(found: &Estimate, other: &Estimate, instead: Instead) -> Option<f64> {
+    let squares = |estimate: &Estimate| -> Vec<f64> {
+        let of = |corner: &Corner| corner.residual.iter().map(|r| r * r).sum::<f64>();
+        estimate.corners().map(of).collect()
+    };
+    let variance = median(squares(other)).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2;
+    let most = OUTLIER_SIGMA * OUTLIER_SIGMA * variance;
+    let mean = |estimate: &Estimate| {
+        let squares = squares(estimate);
+        squares.iter().map(|square| square.min(most)).sum::<f64>() / squares.len() as f64
+    };
+    let of_panels = match instead {
+        Instead::Panels => 6.0 * (panel_count(other) - 1.0),
+        Instead::Model(_) | Instead::Shape | Instead::Camera => 0.0,
+    };
+    let unknowns = |estimate: &Estimate| estimate.unknown_count() as f64;
+    let frames = |estimate: &Estimate| estimate.frames.len();
+    let gain = mean(found) / mean(other);
+    let more = (unknowns(other) + of_panels - unknowns(found)).max(1.0);
+    let freedom = (2 * other.corner_count()) as f64
+        - unknowns(other)
+        - of_panels
+        - 6.0 * frames(other) as f64;
+    let is_sure = deviate_of_f((gain - 1.0) * freedom / more, more, freedom) > SIGNIFICANT;
+    let is_of_all = frames(other) >= frames(found);
+    let is_smaller = other.inlier_rms_px() < found.inlier_rms_px();
+    (is_of_all && is_sure && is_smaller && gain > 1.0 + MATTERS * MATTERS).then_some(gain)
+}
+
+/// How many panels were seen.
+fn panel_count(estimate: &Estimate) -> f64 {
+    estimate.corners().map(|corner| corner.panel.index()).collect::<BTreeSet<usize>>().len() as f64
+}
+
+fn holds_as_well(smaller: &Estimate, found: &Estimate) -> bool {
+    let names = |estimate: &Estimate| -> Vec<String> {
+        estimate.frames.iter().map(|frame| frame.name.clone()).collect()
+    };
+    if names(smaller) != names(found) {
+        return false;
+    }
+    let (mut own, mut other, mut count) = (0.0, 0.0, 0.0);
+    for (a, b) in found.corners().zip(smaller.corners()) {
+        // An outlier of the smaller model may be what it does not hold.
+        if !a.outlier {
+            own += a.residual.iter().map(|r| r * r).sum::<f64>();
+            other += b.residual.iter().map(|r| r * r).sum::<f64>();
+            count += 2.0;
+        }
+    }
+    let parameters = |estimate: &Estimate| estimate.cameras[0].found().count() as f64;
+    let less = parameters(found) - parameters(smaller);
+    let freedom = count - parameters(found) - 6.0 * found.frames.len() as f64;
+    let f_ratio = (other - own).max(0.0) / less / (own / freedom);
+    deviate_of_f(f_ratio, less, freedom) < SIGNIFICANT
+}

@@ -1,0 +1,207 @@
+//! A single camera: its lens, and the poses of its views.
+
+use glam::DVec3;
+
+use super::super::calibration::{Calibration, CameraViews, Intrinsics};
+use super::super::consensus::agreeing;
+use super::super::error::CalibrationError;
+use super::super::excluded::Reason;
+use super::super::loss::Loss;
+use super::super::minimise::{Until, minimise};
+use super::super::model::Model;
+use super::super::pose::{blocks, estimate_pose, fixed};
+use super::super::problem::{CameraUnknowns, Problem};
+use super::super::reweighting::scale;
+use super::super::view::View;
+use super::first_camera::first_camera;
+use super::{Frame, Start};
+use crate::camera::{Camera, Lens, Pose};
+use crate::statistics::median;
+
+/// Two views of a plane determine focal lengths and principal point if nothing is off; a third
+/// shows whether something is.
+const LEAST_VIEWS: usize = 3;
+
+/// Boards whose normals differ by less count as parallel. A corner's noise of a twentieth of a
+/// pixel on a board of 500 px already looks like a tilt of one degree.
+const PARALLEL_RAD: f64 = 0.05;
+
+pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
+    let CameraViews { views, intrinsics, .. } = &calibration.cameras[0];
+    let panels = calibration.panel_poses();
+    let search = match intrinsics {
+        Intrinsics::Unknown(model) => Search::without_guess(views, &panels, *model)?,
+        Intrinsics::Known(camera) | Intrinsics::Near { camera, .. } => {
+            Search::with_camera(views, &panels, camera)?
+        }
+    };
+    let (used, problem) = search.problem(views, intrinsics.free());
+    let out = (0..views.len()).filter(|index| !used.contains(index));
+    let excluded = out.map(|index| (index, views[index].excluded(Reason::NoPose))).collect();
+    let frame =
+        |view: usize| Frame { name: views[view].name.clone(), place: view, views: vec![(0, view)] };
+    Ok(Start { problem, frames: used.into_iter().map(frame).collect(), excluded })
+}
+
+/// Refuses too few views to find a camera from.
+pub(in crate::calibrate) fn enough(found: usize, all: usize) -> Result<(), CalibrationError> {
+    match found < LEAST_VIEWS {
+        true => Err(CalibrationError::TooFewViews { found, all, needed: LEAST_VIEWS }),
+        false => Ok(()),
+    }
+}
+
+/// The camera and the poses on the way.
+struct Search<'a> {
+    /// The views with only those corners that agree with each other.
+    views: Vec<View>,
+    panels: &'a [Pose],
+    camera: Camera,
+    /// `None` where a view has no pose that the camera can have seen, or does not belong.
+    poses: Vec<Option<Pose>>,
+}
+
+impl<'a> Search<'a> {
+    /// A camera of a model that explains the views.
+    fn without_guess(
+        views: &[View],
+        panels: &'a [Pose],
+        model: Model,
+    ) -> Result<Self, CalibrationError> {
+        enough(views.len(), views.len())?;
+        let agreeing: Vec<View> = views.iter().map(agreeing).collect();
+        let ideal = first_camera(&agreeing, model).ok_or(CalibrationError::NoStart)?;
+        let [width, height] = views[0].size_px;
+        let poses: Vec<Option<Pose>> =
+            agreeing.iter().map(|view| estimate_pose(&ideal, panels, &view.sightings)).collect();
+        let from = |(lens, scale): (Lens, f64)| {
+            let camera = Camera::centred(width, height, scale * ideal.focal_px[0], lens);
+            let (views, poses) = (agreeing.clone(), poses.clone());
+            let mut search = Search { views, panels, camera, poses };
+            search.adjust(model.coarse())?;
+            search.adjust(model.free())?;
+            search.look_again();
+            search.adjust(model.free())?;
+            Ok((search.error_px(), search))
+        };
+        // The best of all starts; an error where none leads anywhere.
+        let found = model.starts().into_iter().map(from);
+        let error =
+            |found: &Result<(f64, Search), _>| found.as_ref().map_or(f64::INFINITY, |f| f.0);
+        let best = found.min_by(|a, b| error(a).total_cmp(&error(b)));
+        let (_, search) = best.ok_or(CalibrationError::NoStart)??;
+        if panels.len() == 1 {
+            check_tilts(&search.poses)?;
+        }
+        Ok(search)
+    }
+
+    /// The poses of the views of a camera.
+    fn with_camera(
+        views: &[View],
+        panels: &'a [Pose],
+        camera: &Camera,
+    ) -> Result<Self, CalibrationError> {
+        let size_px = [camera.width, camera.height];
+        if let Some(view) = views.iter().find(|view| view.size_px != size_px) {
+            return Err(CalibrationError::MixedSizes {
+                first: "the camera".to_owned(),
+                first_px: size_px,
+                other: view.name.clone(),
+                other_px: view.size_px,
+            });
+        }
+        let views: Vec<View> = views.iter().map(agreeing).collect();
+        let pose = |view: &View| estimate_pose(camera, panels, &view.sightings);
+        let poses = views.iter().map(pose).collect();
+        Ok(Self { views, panels, camera: camera.clone(), poses })
+    }
+
+    /// The views that have a pose and are within the camera's reach, and the problem of what is seen in
+    /// them.
+    fn problem(&self, views: &[View], free: Vec<bool>) -> (Vec<usize>, Problem) {
+        let mut problem = Problem {
+            cameras: vec![CameraUnknowns::alone(self.camera.clone(), free)],
+            panels: fixed(self.panels),
+            ..Problem::default()
+        };
+        let mut used = Vec::new();
+        for (index, (view, pose)) in views.iter().zip(&self.poses).enumerate() {
+            let Some(pose) = pose else { continue };
+            problem.frames.push(*pose);
+            let first = problem.blocks.len();
+            problem.blocks.extend(blocks(&view.sightings, used.len()));
+            if problem.blocks[first..].iter().all(|block| problem.residuals(block).is_some()) {
+                used.push(index);
+            } else {
+                problem.blocks.truncate(first);
+                problem.frames.pop();
+            }
+        }
+        (used, problem)
+    }
+
+    /// Bundle adjustment in which wrong corners and wrong views hardly count.
+    fn adjust(&mut self, free: Vec<bool>) -> Result<(), CalibrationError> {
+        let (used, problem) = self.problem(&self.views, free);
+        enough(used.len(), self.views.len())?;
+        let whitening = scale(&problem);
+        let minimum = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
+            .ok_or(CalibrationError::NoStart)?;
+        self.camera = minimum.problem.cameras[0].camera.clone();
+        for (index, pose) in used.into_iter().zip(minimum.problem.frames) {
+            self.poses[index] = Some(pose);
+        }
+        Ok(())
+    }
+
+    /// Estimates the pose of every view anew, now that the camera is nearly known, and keeps the
+    /// better one.
+    fn look_again(&mut self) {
+        for (view, pose) in self.views.iter().zip(&mut self.poses) {
+            let again = estimate_pose(&self.camera, self.panels, &view.sightings);
+            let error = |pose: &Option<Pose>| {
+                pose.map_or(f64::INFINITY, |pose| {
+                    view_error_px(&self.camera, self.panels, view, pose)
+                })
+            };
+            if error(&again) < error(pose) {
+                *pose = again;
+            }
+        }
+    }
+
+    /// Median over all views of the median error of their corners, px.
+    fn error_px(&self) -> f64 {
+        let views = self.views.iter().zip(&self.poses);
+        let error = |(view, pose): (&View, &Option<Pose>)| {
+            pose.map_or(f64::INFINITY, |pose| view_error_px(&self.camera, self.panels, view, pose))
+        };
+        median(views.map(error).collect()).unwrap_or(0.0)
+    }
+}
+
+/// Median error of a view's corners at a pose, px.
+fn view_error_px(camera: &Camera, panels: &[Pose], view: &View, pose: Pose) -> f64 {
+    let errors = view.sightings.iter().flat_map(|sighting| {
+        let camera_from_panel = pose.after(&panels[sighting.panel.index()]);
+        sighting.observations.iter().map(move |seen| {
+            match camera.project(camera_from_panel.apply(seen.panel_mm)) {
+                Some([x, y]) => (seen.pixel[0] - x).hypot(seen.pixel[1] - y),
+                None => f64::INFINITY,
+            }
+        })
+    });
+    median(errors.collect()).unwrap_or(0.0)
+}
+
+/// Refuses views of a board that was never tilted.
+fn check_tilts(poses: &[Option<Pose>]) -> Result<(), CalibrationError> {
+    let normals = || poses.iter().flatten().map(|pose| pose.rotation * DVec3::Z);
+    let mean = normals().sum::<DVec3>().normalize_or(DVec3::Z);
+    let spread = normals().map(|normal| normal.angle_between(mean)).fold(0.0, f64::max);
+    match spread < PARALLEL_RAD {
+        true => Err(CalibrationError::Parallel { spread_deg: spread.to_degrees() }),
+        false => Ok(()),
+    }
+}

@@ -1,0 +1,251 @@
+//! Diagnoses in words, for a terminal, a page and a file.
+
+use super::diagnosis::{Diagnosis, FOREIGN_PART};
+use super::estimate::Estimate;
+use super::finding::{Finding, Moved, Shared};
+use super::lack_of_fit::LackOfFit;
+use super::model::Model;
+use super::model_selection::{Instead, Remedy};
+use super::panel::PanelRef;
+use crate::words::counted;
+
+/// A panel that is turned by less looks only moved.
+const TURNED_DEG: f64 = 0.05;
+
+const GIVEN_CAMERA: &str =
+    "the camera that was given is another one, or has changed since (lens, focus, zoom, crop)";
+
+/// Tells what is to be said about an estimate, in sentences without capital and full stop.
+#[derive(Clone, Copy, Debug)]
+pub struct Words<'a> {
+    /// What it is said about.
+    pub estimate: &'a Estimate,
+    /// How the print came out, where that was given.
+    pub print_scale: Option<[f64; 2]>,
+}
+
+impl Words<'_> {
+    /// A diagnosis.
+    pub fn sentence(&self, diagnosis: &Diagnosis) -> String {
+        match diagnosis {
+            Diagnosis::ForeignCamera { camera, rms_px } => self.of_camera(
+                *camera,
+                format!(
+                    "with this camera corners are off by {rms_px:.1} px, more than {} % of the image's \
+                     width: it did not take these pictures, or not with this lens, zoom or crop",
+                    100.0 * FOREIGN_PART
+                ),
+            ),
+            Diagnosis::LensEnds { camera, end } => self.of_camera(*camera, end.to_string()),
+            Diagnosis::GrossErrors(finding) => self.finding(finding),
+            Diagnosis::Remedied { camera, remedy } => self.remedied(*camera, remedy),
+            Diagnosis::LackOfFit(misfit) => self.lack_of_fit(misfit),
+            Diagnosis::PoorFit { camera, rms_px } => self.of_camera(
+                *camera,
+                format!(
+                    "corners are off by {rms_px:.1} px: {}, or labels are wrong",
+                    other_lens(self.model(*camera))
+                ),
+            ),
+            Diagnosis::IllConditioned { camera, parameters, sufficient } => {
+                self.of_camera(*camera, cannot_tell_apart(parameters, *sufficient))
+            }
+        }
+    }
+
+    /// What outliers share.
+    pub fn finding(&self, finding: &Finding) -> String {
+        let Finding { shared, outliers, corners, left_out } = finding;
+        let of = |camera: &usize, what: String| match self.name(*camera) {
+            Some(name) => format!("camera {name}, {what}"),
+            None => what,
+        };
+        let count = match outliers {
+            1 => format!("1 of {} is an outlier", counted(*corners, "corner")),
+            n => format!("{n} of {} are outliers", counted(*corners, "corner")),
+        };
+        let text = match shared {
+            Shared::Beyond { camera, view } => {
+                let far = counted(*outliers, "corner");
+                let who = of(camera, format!("view {view}"));
+                return format!("{who}: {far} of {corners} far outside the picture, left out");
+            }
+            Shared::Panel { panel, moved } => {
+                let why = match moved {
+                    Some(Moved { by_mm, turned_rad }) => {
+                        let degrees = turned_rad.to_degrees();
+                        let turned = match degrees >= TURNED_DEG {
+                            true => format!(" and turned by {degrees:.1}°"),
+                            false => String::new(),
+                        };
+                        format!(
+                            "it seems displaced by {by_mm:.2} mm{turned} from where the target's file has \
+                             it (`deltille rig --refine-target` finds where panels are)"
+                        )
+                    }
+                    None => {
+                        "no place of it explains them: wrong labels, a sheet that is not flat, or \
+                             another print"
+                            .to_owned()
+                    }
+                };
+                format!("panel {panel}: {count}: {why}")
+            }
+            Shared::PanelInView { panel, camera, view, off_px } => {
+                let who = of(camera, format!("view {view}, panel {panel}"));
+                format!(
+                    "{who}: its corners are off by {off_px:.1} px where the view's others fit: wrong labels"
+                )
+            }
+            Shared::View { camera, view } => {
+                format!("{}: {count}: look at the picture", of(camera, format!("view {view}")))
+            }
+            Shared::Region { camera, from_px: [left, top], to_px: [right, bottom] } => {
+                let where_ = format!("x {left:.0} to {right:.0}, y {top:.0} to {bottom:.0} px");
+                format!(
+                    "{}: {count}, in several views: the lens is not one of the model there, or \
+                     something is before it",
+                    of(camera, where_)
+                )
+            }
+            Shared::Camera { camera } => {
+                format!("{}: {count}", of(camera, "all views".to_owned()))
+            }
+        };
+        if *left_out { text + "; left out" } else { text }
+    }
+
+    fn remedied(&self, camera: usize, Remedy { instead, from_px, to_px }: &Remedy) -> String {
+        let model = self.model(camera);
+        let (cause, found) = match *instead {
+            Instead::Shape => (self.board(model), "the shape of the board".to_owned()),
+            Instead::Panels => (self.moved_panels(None), "the place of every panel".to_owned()),
+            Instead::Camera => (GIVEN_CAMERA.to_owned(), "the camera".to_owned()),
+            Instead::Model(other) => (
+                match model {
+                    Some(model) => {
+                        format!("the lens is not one of `{model}`: take --model {other}")
+                    }
+                    None => GIVEN_CAMERA.to_owned(),
+                },
+                format!("a lens of `{other}`"),
+            ),
+        };
+        self.of_camera(
+            camera,
+            format!(
+                "corners are off by {from_px:.3} px, and by {to_px:.3} px where {found} is found: {cause}"
+            ),
+        )
+    }
+
+    fn lack_of_fit(&self, misfit: &LackOfFit) -> String {
+        match *misfit {
+            LackOfFit::Lens { camera, rms_px } => {
+                let lens = other_lens(self.model(camera));
+                let text =
+                    format!("residuals leave a pattern of {rms_px:.3} px over the image: {lens}");
+                self.of_camera(camera, text)
+            }
+            LackOfFit::Target { rms_px, rms_mm, panel } => {
+                let cause = match self.is_solid() {
+                    true => self.moved_panels(Some(panel)),
+                    false => self.board(self.model(0)),
+                };
+                format!(
+                    "corners lie {rms_mm:.2} mm beside their places on the target, in all views alike \
+                     ({rms_px:.3} px): {cause}"
+                )
+            }
+        }
+    }
+
+    fn moved_panels(&self, most: Option<PanelRef>) -> String {
+        let most = most.map_or(String::new(), |panel| format!(", most of all panel {panel}"));
+        if self.estimate.has_refined_panels() {
+            return format!("panels are not flat or not printed as stated{most}");
+        }
+        let advice = match self.estimate.cameras.len() {
+            1 => "`deltille rig --refine-target` finds where they are",
+            _ => "try --refine-target",
+        };
+        format!("panels are not where the target's file has them{most}: {advice}")
+    }
+
+    fn board(&self, model: Option<Model>) -> String {
+        let scale = match self.print_scale {
+            Some([across, up]) => {
+                format!("--print-scale {across},{up} is not how it was printed, or ")
+            }
+            None => String::new(),
+        };
+        let bars = match self.print_scale {
+            Some(_) => "measure its check bars again",
+            None => "measure its check bars for --print-scale",
+        };
+        match (self.estimate.shape, model) {
+            (Some(_), _) => format!(
+                "{scale}the board is bent in more ways than --board-shape describes, or not the same in \
+                 all views: glue it on something flat, {bars}"
+            ),
+            (None, Some(_)) => format!(
+                "{scale}the board is not flat or not printed as stated: try --board-shape, {bars}"
+            ),
+            (None, None) => format!(
+                "{scale}the board is not flat or not printed as stated, or the camera that was given is \
+                 another one: take the .json of `calibrate --board-shape` as --shape, {bars}"
+            ),
+        }
+    }
+
+    /// Whether views show several panels, fixed to each other.
+    fn is_solid(&self) -> bool {
+        let views = self.estimate.cameras.iter().flat_map(|camera| &camera.views);
+        views.into_iter().any(|view| {
+            let mut panels = view.corners.iter().map(|corner| corner.panel);
+            let first = panels.next();
+            panels.any(|panel| Some(panel) != first)
+        })
+    }
+
+    fn model(&self, camera: usize) -> Option<Model> {
+        self.estimate.cameras.get(camera)?.model
+    }
+
+    /// Name of a camera where there are several.
+    fn name(&self, camera: usize) -> Option<&str> {
+        let cameras = &self.estimate.cameras;
+        cameras.get(camera).filter(|_| cameras.len() > 1).map(|camera| camera.name.as_str())
+    }
+
+    fn of_camera(&self, camera: usize, text: String) -> String {
+        match self.name(camera) {
+            Some(name) => format!("camera {name}: {text}"),
+            None => text,
+        }
+    }
+}
+
+/// What follows from parameters that the views leave open; `sufficient` is a smaller model that holds
+/// the lens as well.
+fn cannot_tell_apart(parameters: &[String], sufficient: Option<Model>) -> String {
+    let advice = match sufficient {
+        Some(model) => format!("take --model {model}, which holds this lens as well"),
+        None => "fill the corners of the image, or choose a model with fewer parameters".to_owned(),
+    };
+    format!(
+        "the views cannot tell apart {}: their numbers mean nothing by themselves; where corners were \
+         seen the camera is right, beyond them it may not be; {advice}",
+        parameters.join(", ")
+    )
+}
+
+fn other_lens(model: Option<Model>) -> String {
+    let Some(model) = model else {
+        return GIVEN_CAMERA.to_owned();
+    };
+    match model.richer().iter().map(|model| format!("`{model}`")).collect::<Vec<_>>().as_slice() {
+        [] => format!("the lens is not one of `{model}`, nor of any richer model here"),
+        models => format!("the lens is not one of `{model}`: try --model {}", models.join(" or ")),
+    }
+}

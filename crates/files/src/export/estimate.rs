@@ -1,0 +1,203 @@
+//! What files tell of an estimate, of a single camera and of a rig alike.
+
+use serde::Serialize;
+
+use super::motion::Motion;
+use deltille_core::calibrate::{
+    BoardShape, CameraEstimate, Diagnosis, Estimate, Instead, LackOfFit, LensEnd, PanelRef,
+    ViewEstimate, Words,
+};
+
+#[derive(Serialize)]
+pub(super) struct ParameterRecord<'a> {
+    name: &'a str,
+    value: f64,
+    sd: Option<f64>,
+}
+
+#[derive(Serialize)]
+pub(super) struct ViewRecord<'a> {
+    name: &'a str,
+    image: &'a str,
+    rms_px: f64,
+    outliers: usize,
+    camera_from_target: Motion,
+    /// Row, column, x, y, dx, dy of each corner, by panel.
+    corners: Vec<CornerRecord>,
+}
+
+#[derive(Serialize)]
+struct CornerRecord {
+    panel: PanelRef,
+    row: i32,
+    col: i32,
+    x: f64,
+    y: f64,
+    dx: f64,
+    dy: f64,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    outlier: bool,
+}
+
+#[derive(Serialize)]
+pub(super) struct ShapeRecord {
+    middle_mm: [f64; 3],
+    reach_mm: f64,
+    /// b₁ … b₇, a₁, a₂ of [`deltille_core::calibrate::Shape`].
+    coefficients_mm: Vec<f64>,
+    sd_mm: Vec<f64>,
+    bent_mm: f64,
+    stretched_mm: f64,
+    f_ratio: f64,
+    significant: bool,
+}
+
+/// What is said of an estimate beside its findings, with the figures behind the words.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct DiagnosisRecord<'a> {
+    kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    panel: Option<PanelRef>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rms_px: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rms_mm: Option<f64>,
+    /// Radius up to which a lens is good.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    steady_px: Option<f64>,
+    /// What was found instead of taken for given, and what is left then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instead: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rms_px_then: Option<f64>,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    parameters: &'a [String],
+    /// A model of fewer parameters that holds the lens as well.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sufficient: Option<String>,
+    text: String,
+}
+
+pub(super) fn parameters(camera: &CameraEstimate) -> Vec<ParameterRecord<'_>> {
+    let parameters = camera.parameters.iter();
+    parameters.map(|p| ParameterRecord { name: &p.name, value: p.value, sd: p.sd }).collect()
+}
+
+pub(super) fn correlations(camera: &CameraEstimate) -> Vec<Vec<f64>> {
+    let found = camera.found().count();
+    (0..found).map(|i| (0..found).map(|j| camera.correlation(i, j)).collect()).collect()
+}
+
+/// The views of a camera; poses have deviations where the camera is the rig.
+pub(super) fn views<'a>(estimate: &Estimate, camera: &'a CameraEstimate) -> Vec<ViewRecord<'a>> {
+    let is_rig_frame = camera.pose_sd.is_none() && estimate.cameras.len() == 1;
+    let record = |view: &'a ViewEstimate| {
+        let frame = estimate.frames.get(view.frame).filter(|_| is_rig_frame);
+        let corners = view.corners.iter().map(|corner| CornerRecord {
+            panel: corner.panel,
+            row: corner.row,
+            col: corner.col,
+            x: corner.pixel[0],
+            y: corner.pixel[1],
+            dx: corner.residual[0],
+            dy: corner.residual[1],
+            outlier: corner.outlier,
+        });
+        ViewRecord {
+            name: &view.name,
+            image: &view.image,
+            rms_px: view.rms_px,
+            outliers: view.outlier_count(),
+            camera_from_target: Motion::new(&view.pose, frame.map(|frame| frame.pose_sd)),
+            corners: corners.collect(),
+        }
+    };
+    camera.views.iter().map(record).collect()
+}
+
+pub(super) fn shape(found: BoardShape) -> ShapeRecord {
+    ShapeRecord {
+        middle_mm: found.shape.middle_mm.to_array(),
+        reach_mm: found.shape.reach_mm,
+        coefficients_mm: found.shape.coefficients_mm.to_vec(),
+        sd_mm: found.sd_mm.to_vec(),
+        bent_mm: found.bent_mm,
+        stretched_mm: found.stretched_mm,
+        f_ratio: found.f_ratio,
+        significant: found.is_significant(),
+    }
+}
+
+/// The diagnoses but those that are findings, which files tell by themselves.
+pub(super) fn diagnoses<'a>(
+    estimate: &'a Estimate,
+    diagnoses: &'a [Diagnosis],
+    print_scale: Option<[f64; 2]>,
+) -> Vec<DiagnosisRecord<'a>> {
+    let words = Words { estimate, print_scale };
+    let name = |camera: usize| match estimate.cameras.as_slice() {
+        [_] => None,
+        cameras => cameras.get(camera).map(|camera| camera.name.as_str()),
+    };
+    let record = |diagnosis: &'a Diagnosis| {
+        let text =
+            DiagnosisRecord { text: words.sentence(diagnosis), ..DiagnosisRecord::default() };
+        Some(match diagnosis {
+            Diagnosis::ForeignCamera { camera, rms_px } => DiagnosisRecord {
+                kind: "foreign_camera",
+                camera: name(*camera),
+                rms_px: Some(*rms_px),
+                ..text
+            },
+            Diagnosis::LensEnds { camera, end: LensEnd { steady_px, .. } } => DiagnosisRecord {
+                kind: "lens_ends",
+                camera: name(*camera),
+                steady_px: Some(*steady_px),
+                ..text
+            },
+            Diagnosis::Remedied { camera, remedy } => DiagnosisRecord {
+                kind: "remedy",
+                camera: name(*camera),
+                rms_px: Some(remedy.from_px),
+                rms_px_then: Some(remedy.to_px),
+                instead: Some(match remedy.instead {
+                    Instead::Model(model) => model.to_string(),
+                    Instead::Shape => "board_shape".to_owned(),
+                    Instead::Panels => "panels".to_owned(),
+                    Instead::Camera => "camera".to_owned(),
+                }),
+                ..text
+            },
+            Diagnosis::LackOfFit(LackOfFit::Lens { camera, rms_px }) => DiagnosisRecord {
+                kind: "pattern_over_image",
+                camera: name(*camera),
+                rms_px: Some(*rms_px),
+                ..text
+            },
+            Diagnosis::LackOfFit(LackOfFit::Target { panel, rms_px, rms_mm }) => DiagnosisRecord {
+                kind: "pattern_over_target",
+                panel: Some(*panel),
+                rms_px: Some(*rms_px),
+                rms_mm: Some(*rms_mm),
+                ..text
+            },
+            Diagnosis::PoorFit { camera, rms_px } => DiagnosisRecord {
+                kind: "poor_fit",
+                camera: name(*camera),
+                rms_px: Some(*rms_px),
+                ..text
+            },
+            Diagnosis::IllConditioned { camera, parameters, sufficient } => DiagnosisRecord {
+                kind: "ill_conditioned",
+                camera: name(*camera),
+                parameters,
+                sufficient: sufficient.map(|model| model.to_string()),
+                ..text
+            },
+            _ => return None,
+        })
+    };
+    diagnoses.iter().filter_map(record).collect()
+}

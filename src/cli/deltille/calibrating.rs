@@ -1,0 +1,202 @@
+//! What commands that calibrate have in common: how they solve, what they tell, and the page.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow, bail, ensure};
+use clap::ValueEnum;
+
+use crate::calibrate::{
+    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Loss, View, Weights, Words,
+};
+use crate::cli::output::{self, Overwrite, tell};
+use crate::export::calibration::Print;
+use crate::name::is_within;
+use crate::photograph;
+use crate::raster::AnyGray;
+use crate::report::{Report, thumbnail};
+use crate::words::counted;
+
+/// How a calibration is solved, and the page about it.
+#[derive(clap::Args)]
+pub struct SolveArgs {
+    /// Keep every N-th view (the N-th, 2N-th, …), of a rig every N-th frame, out of the calibration and tell
+    /// the error there, where only poses are found
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    holdout: Option<u32>,
+    /// How corners far off their prediction count
+    #[arg(long, value_name = "LOSS", default_value = "huber")]
+    robust: Robust,
+    /// How corners are weighted
+    #[arg(long, value_name = "BY", default_value = "covariance")]
+    weights: Weighting,
+    /// Find how the sheet of the board is bent, stretched and sheared, too, and whether that is more
+    /// than chance
+    #[arg(long, conflicts_with = "shape")]
+    board_shape: bool,
+    /// Write a page that shows what the calibration is worth, and what would make it better
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+}
+
+/// How corners far off count.
+#[derive(Clone, Copy, ValueEnum)]
+enum Robust {
+    /// In full: least squares
+    None,
+    /// Beyond three standard deviations with a constant force
+    Huber,
+    /// Beyond three standard deviations hardly
+    Cauchy,
+}
+
+/// How corners are weighted.
+#[derive(Clone, Copy, ValueEnum)]
+enum Weighting {
+    /// All corners alike
+    Equal,
+    /// By the detections' covariances, with a common deviation found beside them
+    Covariance,
+}
+
+/// What came of a calibration.
+pub struct Calibrated {
+    pub estimate: Estimate,
+    pub diagnoses: Vec<Diagnosis>,
+    pub print: Print,
+}
+
+impl SolveArgs {
+    /// Solves, and says what is to be said about it.
+    pub fn solve(&self, calibration: Calibration, print: Print) -> anyhow::Result<Calibrated> {
+        let loss = match self.robust {
+            Robust::None => Loss::Squared,
+            Robust::Huber => Loss::Huber,
+            Robust::Cauchy => Loss::Cauchy,
+        };
+        let weights = match self.weights {
+            Weighting::Equal => Weights::Equal,
+            Weighting::Covariance => Weights::Covariance,
+        };
+        let calibration = calibration
+            .loss(loss)
+            .weights(weights)
+            .board_shape(self.board_shape)
+            .hold_out(self.holdout.map(|every| every as usize));
+        let estimate = calibration.solve().map_err(|error| {
+            let option = match error {
+                CalibrationError::NothingHeldOut { .. } => Some("--holdout"),
+                CalibrationError::ShapeOfMany { .. } => Some("--board-shape"),
+                CalibrationError::ForeignCameras { .. } => Some("--known"),
+                _ => None,
+            };
+            match option {
+                Some(option) => anyhow!(error).context(option),
+                None => anyhow!(error),
+            }
+        })?;
+        let diagnoses = calibration.diagnose(&estimate);
+        Ok(Calibrated { estimate, diagnoses, print })
+    }
+
+    /// Where the page goes, `<stem>-report.html` in a folder.
+    pub fn page(&self, stem: &str) -> anyhow::Result<Option<PathBuf>> {
+        let Some(page) = &self.report else { return Ok(None) };
+        let is_page = page.is_dir() || page.extension().is_some_and(|end| end == "html");
+        ensure!(is_page, "--report: {} must end in .html, or be a folder", page.display());
+        let page = output::file(page, &format!("{stem}-report"), "html")?;
+        output::check_writable("--report", &page)?;
+        Ok(Some(page))
+    }
+}
+
+impl Calibrated {
+    /// Tells the diagnoses on standard error; an error where a known camera did not take its pictures.
+    pub fn tell(&self) -> anyhow::Result<()> {
+        let words = Words { estimate: &self.estimate, print_scale: self.print.scale };
+        for diagnosis in &self.diagnoses {
+            let text = words.sentence(diagnosis);
+            if matches!(diagnosis, Diagnosis::ForeignCamera { .. }) {
+                bail!("{text}; nothing was written");
+            }
+            tell!("warning: {text}");
+        }
+        Ok(())
+    }
+
+    /// What is known of the print and the sheet, a line each.
+    pub fn lines(&self) -> Vec<String> {
+        let shape = self.estimate.shape.as_ref().map(told);
+        let ink = self.print.ink.filter(|ink| ink.used);
+        let ink = ink.map(|ink| format!("ink: {ink}, which the corners allow for"));
+        shape.into_iter().chain(ink).collect()
+    }
+
+    /// Writes the page; `folders` are those of each camera's photographs.
+    pub fn write_page(
+        &self,
+        page: &Path,
+        title: &str,
+        folders: &[Option<&Path>],
+        overwrite: Overwrite,
+    ) -> anyhow::Result<()> {
+        let mut thumbnails = BTreeMap::new();
+        for (index, (camera, folder)) in self.estimate.cameras.iter().zip(folders).enumerate() {
+            for view in &camera.views {
+                let Some(folder) = folder else { break };
+                // A picture that is not there leaves its place to the corners.
+                let picture =
+                    picture_of(&view.image, folder).and_then(|path| photograph::read(&path).ok());
+                let picture = picture.and_then(|image| match image {
+                    AnyGray::U8(image) => thumbnail(&image),
+                    AnyGray::U16(image) => thumbnail(&image.map(|v| (v >> 8) as u8)),
+                });
+                thumbnails.extend(picture.map(|picture| ((index, view.name.clone()), picture)));
+            }
+        }
+        let Self { estimate, diagnoses, print } = self;
+        let report = Report { title, estimate, diagnoses, print: *print, thumbnails };
+        output::write(page, report.html().as_bytes(), overwrite).context("--report")
+    }
+}
+
+/// The picture of a view in a folder, or in one within it. What a file calls the picture leads nowhere else.
+fn picture_of(image: &str, folder: &Path) -> Option<PathBuf> {
+    is_within(image).then(|| folder.join(image)).filter(|path| path.is_file())
+}
+
+/// Refuses what is no folder, and tells which pictures of the views are not in it.
+pub fn check_images(folder: &Path, views: &[View]) -> anyhow::Result<()> {
+    ensure!(folder.is_dir(), "--images: {} is no folder", folder.display());
+    let missing = views.iter().filter(|view| picture_of(&view.image, folder).is_none());
+    let missing: Vec<&str> = missing.map(|view| view.image.as_str()).collect();
+    if let Some(first) = missing.first() {
+        tell!(
+            "warning: --images: {} of {} are not in {}, such as {first}",
+            missing.len(),
+            counted(views.len(), "picture"),
+            folder.display()
+        );
+    }
+    Ok(())
+}
+
+/// The shape of a sheet, and whether it is to be believed.
+fn told(found: &BoardShape) -> String {
+    let significance = match found.is_significant() {
+        true => "more than chance makes",
+        false => "no more than chance makes: take the calibration without",
+    };
+    format!(
+        "sheet: bent by {:.3} mm, corners up to {:.3} mm beside their places, F = {:.1}, {significance}",
+        found.bent_mm, found.stretched_mm, found.f_ratio
+    )
+}
+
+/// What is left where corners are outliers, for the end of a line.
+pub fn without_outliers(outliers: usize, inlier_rms_px: f64) -> String {
+    match outliers {
+        0 => String::new(),
+        n => format!(", {inlier_rms_px:.4} px without {}", counted(n, "outlier")),
+    }
+}
