@@ -30,8 +30,8 @@
 //! images row-major with y down, the board frame right-handed with x right and y up on the print.
 
 pub use deltille_core::{
-    Clock, Name, artwork, calibrate, camera, detect, json, lattice, name, quantity, raster,
-    statistics, synth, targets, words,
+    Clock, Name, artwork, calibrate, camera, detect, glam, json, lattice, nalgebra, name, quantity,
+    raster, statistics, synth, targets, words,
 };
 #[cfg(feature = "photographs")]
 pub use deltille_files::photograph;

@@ -38,3 +38,4 @@ pub mod words;
 
 pub use clock::Clock;
 pub use name::Name;
+pub use {glam, nalgebra};

@@ -133,8 +133,8 @@ pub enum ImageError {
 /// transparency is ignored, depth beyond 8 bits is kept as 16 bits.
 ///
 /// The format is told from the content, not from the name.
-pub fn read(path: &Path) -> Result<AnyGray, ImageError> {
-    read_within(path, &Limits::default())
+pub fn read(path: impl AsRef<Path>) -> Result<AnyGray, ImageError> {
+    read_within(path.as_ref(), &Limits::default())
 }
 
 /// The same within other limits than the default.

@@ -148,6 +148,28 @@ pub enum ArtworkError {
     /// A text holds a character that the built-in font lacks.
     #[error(transparent)]
     Text(#[from] text::MissingGlyph),
+    /// A family that is not shipped, and which are.
+    #[error("{0}")]
+    UnknownFamily(String),
+}
+
+impl Target {
+    /// Draws every sheet of a target whose family is shipped.
+    ///
+    /// # Errors
+    /// Where it is not, or a text has letters that the font lacks.
+    ///
+    /// ```
+    /// use deltille_core::targets::{BoardSpec, Target};
+    ///
+    /// let artwork = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?.draw()?;
+    /// assert_eq!(artwork.sheets.len(), 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn draw(&self) -> Result<Artwork, ArtworkError> {
+        let family = self.family().map_err(|e| ArtworkError::UnknownFamily(e.to_string()))?;
+        draw(self, family.as_ref())
+    }
 }
 
 /// Draws every sheet of a target.

@@ -22,7 +22,7 @@ use super::tile_shape::is_of_squares;
 use super::tiling::{CHECKER, DELTILLE, kind};
 use super::why;
 use crate::Clock;
-use crate::family::Family;
+use crate::family::{Family, FamilyError};
 use crate::lattice::GridKind;
 use crate::raster::{FileNotes, Gray, ImageView, PYRAMID_FULL_SCALE, Pyramid};
 use crate::targets::{Target, least_untagged_corners};
@@ -122,6 +122,25 @@ impl Finder {
 }
 
 impl Detector {
+    /// A detector of a target whose family is shipped.
+    ///
+    /// # Errors
+    /// Where it is not; give the family to [`Self::for_target`] then.
+    ///
+    /// ```
+    /// use deltille_core::detect::Detector;
+    /// use deltille_core::raster::Gray;
+    /// use deltille_core::targets::{BoardSpec, Target};
+    ///
+    /// let board = Target::new("desk", BoardSpec::deltille(10, 11, 20.0))?;
+    /// let detection = Detector::new(&board)?.detect(&Gray::<u8>::new(640, 480), "black.png");
+    /// assert!(detection.grids.is_empty());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn new(target: &Target) -> Result<Self, FamilyError> {
+        Ok(Self::for_target(target, target.family()?.as_ref(), DetectorConfig::default()))
+    }
+
     /// A detector of grids whatever they belong to.
     ///
     /// With `size`, the rows and columns of corners of a zigzag board or of a checkerboard, a grid

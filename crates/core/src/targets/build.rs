@@ -4,9 +4,38 @@ use super::{
     BoardSpec, FamilyRef, Name, Panel, SheetLayout, Target, TargetError, TargetSpec, board,
     face_sheet, net, solid, tag_sheet,
 };
-use crate::family::Family;
+use crate::family::{Family, FamilyError};
 
 impl Target {
+    /// Makes what `spec` asks for with a family that is shipped, laid out on the smallest paper that takes it.
+    ///
+    /// # Errors
+    /// Where the name is no file name, a number is out of its range, the family is not shipped or has too
+    /// few codes, or nothing up to A0 takes the target.
+    ///
+    /// ```
+    /// use deltille_core::targets::{BoardSpec, Target};
+    ///
+    /// let board = Target::new("desk", BoardSpec::deltille(10, 11, 20.0))?;
+    /// assert_eq!(board.panels[0].corners.len(), 110);
+    /// assert_eq!([board.sheets[0].width_mm, board.sheets[0].height_mm], [297.0, 210.0]);
+    /// # Ok::<(), deltille_core::targets::TargetError>(())
+    /// ```
+    pub fn new(name: &str, spec: impl Into<TargetSpec>) -> Result<Target, TargetError> {
+        let spec = spec.into();
+        let family = spec.family().map(Family::shipped).transpose();
+        let family = family.map_err(|error| TargetError::UnknownFamily(error.to_string()))?;
+        Self::build(name, &spec, family.as_ref(), Some(&PaperSpec::default()))
+    }
+
+    /// The family of its tags, where it has tags.
+    ///
+    /// # Errors
+    /// Where that is not a family that is shipped.
+    pub fn family(&self) -> Result<Option<Family>, FamilyError> {
+        self.family.as_ref().map(|family| Family::shipped(&family.name)).transpose()
+    }
+
     /// Makes what `spec` asks for, laid out on `layout`; without a layout there are no sheets.
     ///
     /// `family` holds the codes of the tags; an untagged target needs none.

@@ -3,6 +3,9 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetError {
+    /// A family that is not shipped, and which are.
+    #[error("{0}")]
+    UnknownFamily(String),
     /// A value that is no use by itself.
     #[error("{option}: {problem}")]
     Invalid {

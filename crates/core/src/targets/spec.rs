@@ -291,7 +291,48 @@ impl SolidSpec {
     }
 }
 
+impl From<BoardSpec> for TargetSpec {
+    fn from(spec: BoardSpec) -> Self {
+        Self::Board(spec)
+    }
+}
+
+impl From<SolidSpec> for TargetSpec {
+    fn from(spec: SolidSpec) -> Self {
+        Self::Solid(spec)
+    }
+}
+
+impl From<TagSheetSpec> for TargetSpec {
+    fn from(spec: TagSheetSpec) -> Self {
+        Self::Tags(spec)
+    }
+}
+
+impl TargetSpec {
+    /// The family that its tags are of, by name or path; `None` for an untagged target, and for a listed
+    /// one.
+    pub fn family(&self) -> Option<&str> {
+        match self {
+            Self::Board(board) => board.tags.as_ref().map(|tags| tags.family.as_str()),
+            Self::Solid(solid) => Some(&solid.tags.family),
+            Self::Tags(tags) => Some(&tags.family),
+            Self::Listed(_) => None,
+        }
+    }
+}
+
 impl BoardSpec {
+    /// One deltille board with tags, of so many rows and columns of corners.
+    pub fn deltille(rows: u32, cols: u32, edge_mm: f64) -> Self {
+        Self::new(GridKind::Deltille, rows, cols, edge_mm)
+    }
+
+    /// One checkerboard with AprilTags, of so many rows and columns of corners.
+    pub fn checkerboard(rows: u32, cols: u32, edge_mm: f64) -> Self {
+        Self::new(GridKind::Checker, rows, cols, edge_mm)
+    }
+
     /// One board with tags.
     pub fn new(grid: GridKind, rows: u32, cols: u32, edge_mm: f64) -> Self {
         let tags = Some(match grid {

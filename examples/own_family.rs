@@ -1,0 +1,45 @@
+//! Searches a code family of one's own, proves the distance between its codes, and makes a board with it.
+//!
+//! ```text
+//! cargo run --release --example own_family -- folder
+//! ```
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use deltille::artwork;
+use deltille::export::svg;
+use deltille::family::best::{Best, Budget};
+use deltille::family::{Control, Rules, certify};
+use deltille::lattice::Dimension;
+use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| ".".to_owned()));
+    std::fs::create_dir_all(&folder)?;
+    // 16 bits, any two codes in any turn at least 7 cells apart: three misread cells are mended.
+    let (dimension, distance) = (Dimension::from_bits(16)?, 7);
+    let search = Best {
+        dimension,
+        distance,
+        rules: Rules::published(distance),
+        // So many steps give the same codes on every machine.
+        budget: Budget::Work(1),
+        seed: 7,
+        limit: None,
+        exchange: true,
+    };
+    let family = search.family("own16h7", None, Control::default())?;
+    let certificate = certify(&family);
+    println!("{}: {} codes, proved: {}", family.name(), family.codes().len(), certificate.holds());
+    std::fs::write(folder.join("own16h7.json"), family.to_json())?;
+
+    let tags = TagSpec { family: "own16h7.json".to_owned(), ..TagSpec::default() };
+    let spec = TargetSpec::Board(BoardSpec { tags: Some(tags), ..BoardSpec::deltille(5, 6, 20.0) });
+    let board = Target::build("own", &spec, Some(&family), Some(&PaperSpec::default()))?;
+    let drawn = artwork::draw(&board, Some(&family))?;
+    svg::write(&drawn, 0, &folder.join("own.svg"))?;
+    std::fs::write(folder.join("own.json"), board.to_json())?;
+    println!("{} tags on the board", board.panels[0].tags.len());
+    Ok(())
+}
