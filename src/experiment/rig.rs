@@ -173,6 +173,9 @@ impl World {
 
 /// Renders, detects and calibrates; `None` when it was interrupted. `tick` is called after every
 /// picture, of which there are two for each camera and frame.
+///
+/// # Errors
+/// Where a target cannot be made, or a rig not be found.
 pub fn run(
     setup: Setup,
     interrupted: &AtomicBool,

@@ -56,6 +56,9 @@ pub enum Table2Error {
 
 /// Detects in all images, which are in the order of the sequence, and makes the table. Errors are
 /// plain: all corners count alike and in full.
+///
+/// # Errors
+/// Where a picture cannot be read, too few show the board whole, or the views make no camera.
 pub fn run(images: &[impl AsRef<Path> + Sync]) -> Result<Vec<Row>, Table2Error> {
     let mut rows = Vec::new();
     for refinement in [Refinement::Polynomial, Refinement::Model] {

@@ -29,6 +29,9 @@ pub enum ReadError {
 }
 
 /// Parses JSON; an error that is not one of JSON's grammar names the field.
+///
+/// # Errors
+/// Where it is no JSON, or a field is missing, unknown, or holds what it must not.
 pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> {
     let mut deserializer = serde_json::Deserializer::from_str(json);
     let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
@@ -46,6 +49,9 @@ pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> 
 
 /// The schema that a JSON text names, such as `deltille/target/1`; `None` where it names none, an
 /// error where it is no JSON object.
+///
+/// # Errors
+/// Where it is no JSON object.
 pub fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {
     #[derive(Deserialize)]
     struct Head {

@@ -17,6 +17,9 @@ pub struct Name(String);
 
 impl Name {
     /// This name; what is wrong with it where it is none.
+    ///
+    /// # Errors
+    /// What is wrong with it.
     pub fn new(name: &str) -> Result<Self, String> {
         if name.is_empty() || name.len() > LONGEST {
             return Err(format!("{name:?} must have 1 to {LONGEST} characters"));
@@ -33,6 +36,9 @@ impl Name {
     }
 
     /// This name, if it has no dots either, as names of families have none: they stand before other endings.
+    ///
+    /// # Errors
+    /// What is wrong with it.
     pub fn without_dots(name: &str) -> Result<Self, String> {
         if name.contains('.') {
             return Err(format!("{name:?} may hold only ASCII letters, digits, - and _"));

@@ -65,12 +65,18 @@ impl fmt::Display for Short {
 
 impl Range {
     /// This number, if it is in the range; one that is no number is not.
+    ///
+    /// # Errors
+    /// The number and the range.
     pub fn check(self, value: f64) -> Result<f64, OutOfRange> {
         let inside = (self.least..=self.most).contains(&value);
         inside.then_some(value).ok_or(OutOfRange { value, range: self })
     }
 
     /// Reads a number of this range.
+    ///
+    /// # Errors
+    /// What is wrong with it, and the range.
     pub fn parse(self, text: &str) -> Result<f64, String> {
         let value: Option<f64> = text.trim().parse().ok();
         value.and_then(|value| self.check(value).ok()).ok_or_else(|| format!("it must be {self}"))
@@ -90,6 +96,9 @@ impl Range {
 /// What is made of numbers.
 pub trait Numbers {
     /// Goes through them until one does not pass.
+    ///
+    /// # Errors
+    /// The first that does not pass.
     fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange>;
 }
 
@@ -148,6 +157,9 @@ macro_rules! quantities {
 
             #[allow(dead_code, reason = "one of the two is used where the file is no JSON")]
             /// Reads a number, or lists of them, within the range.
+            ///
+            /// # Errors
+            /// Where it is no number, or not in the range.
             pub fn de<'de, D, T>(deserializer: D) -> Result<T, D::Error>
             where
                 D: Deserializer<'de>,

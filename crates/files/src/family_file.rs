@@ -39,6 +39,9 @@ impl FamilyFileError {
 }
 
 /// A shipped family by its name, or a family file by its path.
+///
+/// # Errors
+/// Where no family of that name is shipped and no file is there, or the file is no family.
 pub fn resolve(name_or_path: &str) -> Result<Family, FamilyFileError> {
     match Family::shipped(name_or_path) {
         Err(FamilyError::Unknown { name }) => {
@@ -53,6 +56,9 @@ pub fn resolve(name_or_path: &str) -> Result<Family, FamilyFileError> {
 }
 
 /// Reads a family file.
+///
+/// # Errors
+/// Where the file cannot be read, or is no family.
 pub fn read(path: &Path) -> Result<Family, FamilyFileError> {
     let json = match limits::read_short_text(path, MAX_FAMILY_BYTES) {
         Err(ReadError::NotText { path }) => return Err(FamilyFileError::NotText { path }),

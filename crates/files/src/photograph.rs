@@ -133,17 +133,27 @@ pub enum ImageError {
 /// transparency is ignored, depth beyond 8 bits is kept as 16 bits.
 ///
 /// The format is told from the content, not from the name.
+///
+/// # Errors
+/// Where the file cannot be read, is no picture, is damaged, or is larger than the usual limits allow.
 pub fn read(path: impl AsRef<Path>) -> Result<AnyGray, ImageError> {
     read_within(path.as_ref(), &Limits::default())
 }
 
 /// The same within other limits than the default.
+///
+/// # Errors
+/// Where the file cannot be read, is no picture, is damaged, or is larger than the limits allow.
 pub fn read_within(path: &Path, limits: &Limits) -> Result<AnyGray, ImageError> {
     Ok(read_with_notes(path, limits, false)?.image)
 }
 
 /// Reads a photograph with what its file says of it. A damaged JPEG is refused unless it is accepted; the pixels that
 /// it does not have are grey then.
+///
+/// # Errors
+/// Where the file cannot be read, is no picture, is larger than the limits allow, or is damaged and that is not
+/// accepted.
 pub fn read_with_notes(
     path: &Path,
     limits: &Limits,

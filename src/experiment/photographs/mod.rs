@@ -137,6 +137,9 @@ pub struct Subject {
 
 impl Subject {
     /// A target that is there already. `family` is the family of its tags.
+    ///
+    /// # Errors
+    /// Where the target has no sheet, or the family is missing.
     pub fn new(
         name: &str,
         target: &Target,
@@ -149,6 +152,9 @@ impl Subject {
     }
 
     /// One of the boards of the experiment; `family` is that of its spec.
+    ///
+    /// # Errors
+    /// Where the board cannot be made.
     pub fn of_kind(kind: Kind, family: Option<&Family>) -> Result<Self, PhotographError> {
         let (spec, paper) = (TargetSpec::Board(kind.spec()), PaperSpec::default());
         let target = Target::build(kind.name(), &spec, family, Some(&paper))
@@ -179,6 +185,9 @@ impl Setup<'_> {
 /// Photographs a subject at every level of the axes; `None` when cancelled.
 ///
 /// But for times, the result depends on the subject and the setup alone.
+///
+/// # Errors
+/// Where a picture cannot be made.
 pub fn run(
     subject: &Subject,
     setup: &Setup,

@@ -56,6 +56,9 @@ pub struct PrintedPage {
 
 impl PrintedPage {
     /// Prints the first page of a target. `family` is the family of its tags.
+    ///
+    /// # Errors
+    /// Where the target has no sheet, or the family is missing.
     pub fn new(target: &Target, family: Option<&Family>) -> Result<Self, PhotographError> {
         let (Some(panel), Some(sheet)) = (target.panels.first(), target.sheets.first()) else {
             return Err(PhotographError::NoSheet);

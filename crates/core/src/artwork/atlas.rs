@@ -28,6 +28,9 @@ pub struct Atlas {
 
 impl Atlas {
     /// Lays out the faces of a target, in the order of its panels.
+    ///
+    /// # Errors
+    /// Where a family is missing, or the texture would be too large.
     pub fn new(
         target: &Target,
         faces: &[Face],

@@ -82,6 +82,9 @@ pub enum CuttingError {
 /// numbers of the face and of its edges to engrave. Edges of the same number meet.
 ///
 /// Panels are whole faces; with a skeleton in the spec they are what its seats take.
+///
+/// # Errors
+/// Where the target is no solid, or its skeleton has no seats for its faces.
 pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     let TargetSpec::Solid(spec) = &target.spec else {
         return Err(CuttingError::NotSolid(target.name.to_string()));
@@ -111,6 +114,9 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
 /// The net of a solid to cut, score and fold, as its sheets have it, however many pages these are
 /// printed on: the outline of each piece with its tabs, the lines to fold, and the numbers of faces
 /// and edges to engrave. Pieces lie side by side.
+///
+/// # Errors
+/// Where the target is no solid that was laid out as a net.
 pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     let no_net = || CuttingError::NotNet(target.name.to_string());
     let mut drawing = CutDrawing::default();

@@ -30,6 +30,9 @@ const GAP: f64 = 0.25;
 /// Draws the tags `ids` of a family, each with its id below, on a page that just holds them.
 ///
 /// Ids that the family does not have are left out; the caller checks them first.
+///
+/// # Errors
+/// Where a name has a letter that the font lacks.
 pub fn tag_gallery(
     family: &Family,
     ids: &[u32],

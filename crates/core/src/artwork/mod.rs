@@ -175,6 +175,9 @@ impl Target {
 /// Draws every sheet of a target.
 ///
 /// `family` holds the codes of the tags; it may be `None` for an untagged target only.
+///
+/// # Errors
+/// Where the family is missing or lacks a code, or a text has a letter that the font lacks.
 pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, ArtworkError> {
     let mut sheets = Vec::with_capacity(target.page_count());
     for (index, layout) in target.sheets.iter().enumerate() {
@@ -191,6 +194,9 @@ pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, Artwork
 }
 
 /// The tiles of one panel in its own frame.
+///
+/// # Errors
+/// Where the family is missing or lacks a code.
 pub fn panel_shapes(
     target: &Target,
     panel: &Panel,
@@ -201,6 +207,9 @@ pub fn panel_shapes(
 }
 
 /// The outline of a text on its page, mm; filled by the even-odd rule.
+///
+/// # Errors
+/// Where the font lacks a letter.
 pub fn text_outline(text: &SheetText) -> Result<BezPath, text::MissingGlyph> {
     board::draw_text(text)
 }

@@ -36,6 +36,9 @@ pub struct MissingGlyph(pub char);
 ///
 /// The text starts at the origin and its base line runs along x; `size_mm` is the em, a capital is
 /// [`CAP_HEIGHT`] times as high. Fill by the non-zero or even-odd rule.
+///
+/// # Errors
+/// Where the font lacks a letter.
 pub fn outline(text: &str, size_mm: f64) -> Result<(BezPath, f64), MissingGlyph> {
     let mut path = BezPath::new();
     let mut advance = 0.0;

@@ -170,6 +170,9 @@ pub struct Shown {
 
 /// The views of all detections, each with its name; an error where most of those that show
 /// something do not belong to the target.
+///
+/// # Errors
+/// Where pictures have different sizes, or most that show something are not of the target.
 pub fn views(
     detections: &[(String, Detection)],
     reference: &Reference,

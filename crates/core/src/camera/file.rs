@@ -164,6 +164,9 @@ impl Model {
 
 impl Camera {
     /// Reads the text of a camera file.
+    ///
+    /// # Errors
+    /// Where it is no YAML, a field is missing or out of its range, or the model is none of those here.
     pub fn from_yaml(text: &str) -> Result<Camera, CameraFileError> {
         check_size(text).map_err(CameraFileError::Yaml)?;
         // OpenCV writes a version directive and a tag that no other reader of YAML knows.

@@ -200,6 +200,9 @@ impl Best {
     }
 
     /// The family that a search starts from.
+    ///
+    /// # Errors
+    /// Where the name speaks of other bits or another distance.
     pub fn family_of(&self, name: &str, start: &Start) -> Result<Family, FamilyError> {
         let construction = Construction::Algebraic(start.construction.clone());
         let (codes, rules) = (start.codes.clone(), self.rules.clone());
@@ -213,6 +216,9 @@ impl Best {
     /// Searches and makes a family of what was found, at least as large as what it starts from. Progress is
     /// reported in thousandths. When it is cancelled, the search is over: the family is the best so far,
     /// and only where nothing was found yet there is none.
+    ///
+    /// # Errors
+    /// Where the rules make no sense, or the search was cancelled before anything was found.
     pub fn family(
         &self,
         name: &str,

@@ -185,6 +185,9 @@ pub(super) fn check_form(
 }
 
 /// A name such as d25h7 or delTag25h7 must not speak of other bits or another distance.
+///
+/// # Errors
+/// What the name says, and what is the case.
 pub fn check_name(name: &str, dimension: Dimension, distance: u32) -> Result<(), FamilyError> {
     let rest = ["delTag", "aprilTag", "d"].iter().find_map(|prefix| name.strip_prefix(prefix));
     let number = |text: &str| text.parse::<u32>().ok();

@@ -80,6 +80,10 @@ impl Family {
     /// Checks the form (name, code width, no code twice in any turn) but not the distance, which
     /// [`certify`] proves. The distance histogram is counted here. A name that speaks of bits and a
     /// distance, such as d25h7 or delTag25h7, must speak of these.
+    ///
+    /// # Errors
+    /// Where the name is no file name or speaks of other bits or another distance, a code is too wide, or stands there
+    /// twice.
     pub fn new(
         name: &str,
         dimension: Dimension,
@@ -111,12 +115,18 @@ impl Family {
     }
 
     /// A family that comes with the crate, by its name.
+    ///
+    /// # Errors
+    /// Where no family of that name is shipped; the message names those that are.
     pub fn shipped(name: &str) -> Result<Self, FamilyError> {
         let unknown = || FamilyError::Unknown { name: name.to_owned() };
         Self::from_json(shipped::json(name).ok_or_else(unknown)?)
     }
 
     /// Reads the text of a family file (FORMATS §9, schema [`SCHEMA`]).
+    ///
+    /// # Errors
+    /// Where it is no family file, a field is wrong, or the codes do not have the stated fingerprint.
     pub fn from_json(json: &str) -> Result<Self, FamilyError> {
         file::from_json(json)
     }

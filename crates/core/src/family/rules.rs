@@ -22,6 +22,9 @@ impl Rules {
     }
 
     /// Checks that the numbers make sense for tags of `bits` cells; names the field that does not.
+    ///
+    /// # Errors
+    /// The first field that does not, and why.
     pub fn check(&self, bits: u32) -> Result<(), FamilyError> {
         if !(0.0..=1.0).contains(&self.min_complexity) {
             let problem = format!("{} is not between 0 and 1", self.min_complexity);

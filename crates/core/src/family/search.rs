@@ -34,6 +34,9 @@ impl Search {
     pub const STEPS: u64 = 200_000;
 
     /// The codes found, in the order of a family.
+    ///
+    /// # Errors
+    /// Where the search was cancelled.
     pub fn codes(&self, screen: &Screen, control: Control) -> Result<Vec<u64>, FamilyError> {
         let mut checkpoint = Checkpoint::default();
         self.resume(screen, &mut checkpoint, &|_| true, control)?;
@@ -42,6 +45,9 @@ impl Search {
 
     /// Does the rounds that a checkpoint lacks; `save` is called after each, and tells whether to
     /// go on. When it is cancelled, the checkpoint holds the rounds that were finished.
+    ///
+    /// # Errors
+    /// Where the checkpoint is of another search, or this one was cancelled.
     pub fn resume(
         &self,
         screen: &Screen,

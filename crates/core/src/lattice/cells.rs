@@ -13,6 +13,9 @@ pub struct DimensionError(pub u32);
 
 impl Dimension {
     /// The dimension of a tag with `bits` = 9, 16, 25, 36 or 49 bits.
+    ///
+    /// # Errors
+    /// Where no tag has so many bits.
     pub fn from_bits(bits: u32) -> Result<Self, DimensionError> {
         let d = bits.isqrt();
         match NonZeroU8::new(d as u8) {

@@ -8,6 +8,9 @@ use crate::targets::{Panel, Target, TargetSpec};
 /// their quiet zone.
 ///
 /// Boards of one target are loose sheets that all lie in its origin; only a single one makes sense.
+///
+/// # Errors
+/// Where the family is missing or lacks a code.
 pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene, ArtworkError> {
     let faces = match &target.spec {
         TargetSpec::Solid(spec) => spec.faces().ok(),

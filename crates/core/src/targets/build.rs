@@ -39,6 +39,10 @@ impl Target {
     /// Makes what `spec` asks for, laid out on `layout`; without a layout there are no sheets.
     ///
     /// `family` holds the codes of the tags; an untagged target needs none.
+    ///
+    /// # Errors
+    /// Where a number is out of its range, the family is another one or has too few codes, or the layout has no room for
+    /// the target.
     pub fn build(
         name: &str,
         spec: &TargetSpec,
@@ -76,6 +80,9 @@ impl Target {
 
     /// Checks that this target can be used together with another one: no tag of the same family
     /// and no board has the same id.
+    ///
+    /// # Errors
+    /// The ids that both have, and the first that is free.
     pub fn check_beside(&self, other: &Target) -> Result<(), TargetError> {
         let overlap = |option, what, own: &[u32], others: &[u32]| {
             let (Some([first, last]), Some([_, high])) = (range(own), range(others)) else {

@@ -107,6 +107,9 @@ impl From<ClosedMesh> for Lists {
 impl ClosedMesh {
     /// Checks a list of triangles. Vertices in the same place become one, those that no triangle
     /// names are left out; a mesh that is wound inside out is turned, and the second value says so.
+    ///
+    /// # Errors
+    /// Where the triangles are not one closed surface, or a coordinate is no number.
     pub fn new(vertices: &[DVec3], faces: &[[usize; 3]]) -> Result<(Self, bool), ClosedMeshError> {
         use ClosedMeshError::*;
         if faces.is_empty() {

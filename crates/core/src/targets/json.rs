@@ -81,6 +81,9 @@ struct TargetFile {
 
 impl Target {
     /// Reads the text of a target file.
+    ///
+    /// # Errors
+    /// Where it is no target file, of another version, or a field is wrong.
     pub fn from_json(text: &str) -> Result<Target, TargetFileError> {
         // The schema is looked at first, so that a file of another version is called just that.
         #[derive(Deserialize)]
@@ -125,6 +128,9 @@ fn problem<T>(field: impl Into<String>, problem: impl Into<String>) -> Result<T,
 }
 
 /// Checks what the types do not say; returns the field at fault and what is wrong with it.
+///
+/// # Errors
+/// The field at fault, and what is wrong with it.
 pub fn check(target: &Target) -> Result<(), Problem> {
     if target.panels.is_empty() {
         return problem("panels", "there is none");

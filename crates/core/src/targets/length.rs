@@ -14,6 +14,9 @@ pub struct LengthError(pub String);
 /// assert_eq!(deltille_core::targets::parse_length_mm("2.5 cm"), Ok(25.0));
 /// assert!(deltille_core::targets::parse_length_mm("20 parsec").is_err());
 /// ```
+///
+/// # Errors
+/// Where it is no number with a known unit.
 pub fn parse_length_mm(text: &str) -> Result<f64, LengthError> {
     let trimmed = text.trim();
     let (number, unit_mm) = UNITS

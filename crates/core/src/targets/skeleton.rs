@@ -70,6 +70,9 @@ pub struct Skeleton {
 
 impl Skeleton {
     /// The frame of a solid; refused where seats, ledges and windows find no room.
+    ///
+    /// # Errors
+    /// Where seats, ledges and windows find no room.
     pub fn new(solid: &Polyhedron, spec: &SkeletonSpec) -> Result<Self, TargetError> {
         let SkeletonSpec { panel_thickness_mm: thickness, wall_mm: wall, rib_mm } = *spec;
         for (option, mm) in [("--panel-thickness", thickness), ("--wall", wall)] {

@@ -34,6 +34,9 @@ impl SolidSpec {
 
     /// Its faces with their boards, in the order of the panels; refused where the margin leaves
     /// no room for tiles.
+    ///
+    /// # Errors
+    /// Where the margin leaves no room for tiles.
     pub fn faces(&self) -> Result<Vec<Face>, TargetError> {
         self.check()?;
         let solid = self.polyhedron();
@@ -48,6 +51,9 @@ impl SolidSpec {
     }
 
     /// The faces as they are cut to panels: whole, or as much as the seats of the skeleton take.
+    ///
+    /// # Errors
+    /// Where the margin leaves no room for tiles, or the seats take more than the margin.
     pub fn panel_faces(&self) -> Result<Vec<Face>, TargetError> {
         let (mut faces, inset_mm) = (self.faces()?, self.panel_inset_mm()?);
         for face in &mut faces {
@@ -60,6 +66,9 @@ impl SolidSpec {
 
     /// A margin with room for numbers and glue: that of [`Self::new`], or more where the panels of
     /// the skeleton need it, in whole millimetres.
+    ///
+    /// # Errors
+    /// Where seats, ledges and windows find no room.
     pub fn comfortable_margin_mm(&self) -> Result<f64, TargetError> {
         let usual = Self::new(self.shape.clone()).margin_mm;
         let Some(skeleton) = &self.skeleton else { return Ok(usual) };
@@ -69,6 +78,9 @@ impl SolidSpec {
 
     /// Distance of the edges of panels from those of their faces, mm: 0 without a skeleton. Refused
     /// where it is more than the margin.
+    ///
+    /// # Errors
+    /// Where it is more than the margin.
     pub fn panel_inset_mm(&self) -> Result<f64, TargetError> {
         let Some(skeleton) = &self.skeleton else { return Ok(0.0) };
         let inset_mm = Skeleton::new(&self.polyhedron(), skeleton)?.panel_inset_mm;

@@ -32,6 +32,9 @@ pub struct WriteError {
 /// Writes a file through `fill`: to a temporary name in the same folder, renamed to `path` once
 /// everything is on the disk. On an error nothing is left behind, and an earlier file stays as it was.
 /// Where `path` is a symbolic link, what it points to is written; a device or a pipe is refused.
+///
+/// # Errors
+/// Where the file cannot be written.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -165,6 +168,9 @@ pub(super) fn sync_folder(folder: &Path) {
 }
 
 /// The file that a path stands for, which a renamed one may take the place of.
+///
+/// # Errors
+/// Where a link leads nowhere, or the path cannot be looked at.
 pub fn place(path: &Path) -> io::Result<PathBuf> {
     match path.symlink_metadata() {
         Err(_) => Ok(path.to_owned()),

@@ -68,6 +68,9 @@ struct StoredShape {
 }
 
 /// Reads the sheet of a calibration that found its shape.
+///
+/// # Errors
+/// Where it is no calibration, a field is wrong, or it found no shape.
 pub fn read_sheet(text: &str) -> Result<Sheet, SheetError> {
     if json::schema(text.as_bytes()).ok().flatten().as_deref() != Some(SCHEMA) {
         return Err(SheetError::Foreign);

@@ -65,6 +65,9 @@ fn refuse<T>(
 }
 
 /// OpenCV's FileStorage YAML.
+///
+/// # Errors
+/// Where OpenCV has no such model.
 pub fn opencv(camera: &Camera) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
     let (model, coefficients) = match Shared::of(camera, &parameters) {
@@ -96,6 +99,9 @@ fn opencv_matrix(rows: usize, cols: usize, data: &[f64]) -> String {
 }
 
 /// The camera file of ROS.
+///
+/// # Errors
+/// Where ROS has no such model.
 pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
     let (model, coefficients) = match Shared::of(camera, &parameters) {
@@ -124,6 +130,9 @@ pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
 }
 
 /// Kalibr's camera chain: cameras, each with its camera_from_rig.
+///
+/// # Errors
+/// Where Kalibr has no such model.
 pub fn kalibr(cameras: &[(&Camera, Pose)]) -> Result<String, FormatError> {
     let mut text = format!("# {GENERATOR}\n");
     for (n, (camera, camera_from_rig)) in cameras.iter().enumerate() {
@@ -170,6 +179,9 @@ fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
 }
 
 /// COLMAP's cameras.txt, of cameras numbered from 1.
+///
+/// # Errors
+/// Where COLMAP has no such model.
 pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
     let mut text = format!("# {GENERATOR}\n# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n");
     for (n, camera) in (1..).zip(cameras) {
@@ -185,6 +197,9 @@ pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
 
 /// COLMAP's rig_config.json: cameras by name, each with its camera_from_rig; pictures lie in a folder
 /// of the camera's name. The first camera is the rig.
+///
+/// # Errors
+/// Where COLMAP has no such model.
 pub fn colmap_rig(cameras: &[(&str, &Camera, Pose)]) -> Result<String, FormatError> {
     let mut entries = Vec::with_capacity(cameras.len());
     for (n, (name, camera, camera_from_rig)) in cameras.iter().enumerate() {
@@ -221,6 +236,9 @@ fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatErro
 
 /// nerfstudio's transforms.json: the camera, and for each image its camera_from_target, with lengths
 /// in mm and axes as OpenGL has them. An image whose name leads out of its folder is called by the end of it.
+///
+/// # Errors
+/// Where nerfstudio has no such model.
 pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
     let (model, names, coefficients) = match Shared::of(camera, &parameters) {

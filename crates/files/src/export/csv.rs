@@ -37,6 +37,9 @@ pub fn write(detection: &Detection) -> String {
 
 /// Reads points, `x,y` a line, in px; a header line and empty lines are skipped. The error names the
 /// line.
+///
+/// # Errors
+/// The line that is no point.
 pub fn read_points(text: &str) -> Result<Vec<[f64; 2]>, String> {
     let mut points = Vec::new();
     for (i, line) in text.lines().enumerate() {

@@ -130,6 +130,9 @@ pub fn is_foreign(text: &str) -> bool {
 }
 
 /// Reads the text of a detection file.
+///
+/// # Errors
+/// Where it is no detection, of another version, or a field is wrong.
 pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     #[derive(Deserialize)]
     struct Head {

@@ -27,6 +27,9 @@ pub const CLAMP_TO_EDGE: u32 = 33071;
 pub const MATERIAL: &str = "print";
 
 /// Writes the mesh as `.glb`.
+///
+/// # Errors
+/// Where the file cannot be written.
 pub fn write(mesh: &TexturedMesh, path: &Path) -> Result<(), atomic::WriteError> {
     let bytes = to_bytes(mesh);
     atomic::write(path, |file| file.write_all(&bytes))

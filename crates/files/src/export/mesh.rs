@@ -95,6 +95,9 @@ pub struct MeshFace {
 
 impl TexturedMesh {
     /// The mesh of a solid. Without a resolution the texture has [`TEXELS_PER_BIT`].
+    ///
+    /// # Errors
+    /// Where the target is no solid, the family is missing, or the texture would be too large.
     pub fn new(
         target: &Target,
         family: Option<&Family>,

@@ -33,6 +33,9 @@ pub enum ObjError {
 
 /// Reads the triangles of all objects and groups of an OBJ as one solid; lines, points, materials
 /// and texture coordinates do not matter. The second value says whether it was inside out.
+///
+/// # Errors
+/// Where it is no OBJ, or its triangles are not one closed surface.
 pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
     let options =
         tobj::LoadOptions { ignore_lines: true, ignore_points: true, ..Default::default() };

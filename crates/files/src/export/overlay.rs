@@ -44,6 +44,9 @@ pub enum OverlayError {
 }
 
 /// The PNG file of a photograph with its detection drawn over it.
+///
+/// # Errors
+/// Where the picture would be too large.
 pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayError> {
     let scale = enlargement(image.width() as u32, image.height() as u32, detection);
     let mut canvas = match image {

@@ -25,6 +25,9 @@ const PT_PER_MM: f64 = 72.0 / 25.4;
 const MAX_PAGE_MM: f64 = 5080.0;
 
 /// Writes all sheets as one PDF.
+///
+/// # Errors
+/// Where a page is larger than PDF allows, or the file cannot be written.
 pub fn write(artwork: &Artwork, path: &Path) -> Result<(), ExportError> {
     let long = |sheet: &&Sheet| sheet.width_mm.max(sheet.height_mm) > MAX_PAGE_MM;
     if let Some(sheet) = artwork.sheets.iter().find(long) {

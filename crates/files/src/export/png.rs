@@ -20,6 +20,9 @@ const STROKE_TOLERANCE_MM: f64 = 1e-4;
 /// PNG states its resolution in whole pixels per metre; the drawing is scaled by exactly the
 /// stated value nearest to `dpi`. The image starts at the upper-left corner of the page; its size
 /// is the page's, rounded to whole pixels.
+///
+/// # Errors
+/// Where the picture would be too large, or the file cannot be written.
 pub fn write(sheet: &Sheet, title: &str, path: &Path, dpi: f64) -> Result<(), ExportError> {
     let raster = Raster::new(sheet, dpi);
     if raster.width as f64 * raster.height as f64 > MAX_PIXELS {
@@ -36,6 +39,9 @@ pub fn write(sheet: &Sheet, title: &str, path: &Path, dpi: f64) -> Result<(), Ex
 }
 
 /// The PNG file in memory; for pages of moderate size.
+///
+/// # Errors
+/// Where the picture is larger than PNG allows.
 pub fn to_bytes(sheet: &Sheet, title: &str, dpi: f64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     Raster::new(sheet, dpi).encode(title, &mut bytes)?;

@@ -38,6 +38,9 @@ pub struct Staging {
 
 impl Staging {
     /// Begins to write files to a folder, which is made where there is none.
+    ///
+    /// # Errors
+    /// Where the folder cannot be made or written to.
     pub fn new(folder: &Path) -> io::Result<Self> {
         let missing = folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists());
         let made: Vec<PathBuf> = missing.map(Path::to_owned).collect();
@@ -66,6 +69,9 @@ impl Staging {
     }
 
     /// Moves all files to their places; a file whose content is there already is left as it is.
+    ///
+    /// # Errors
+    /// Where a file cannot be moved.
     pub fn commit(mut self) -> io::Result<()> {
         let Some(temporary) = self.temporary.take() else { return Ok(()) };
         let files = temporary.path().join(FILES);
@@ -101,6 +107,9 @@ impl Drop for Staging {
 
 /// Brings a folder to where killed runs would have brought it: what was complete is moved to its
 /// places, what was not is removed. What living ones are writing stays.
+///
+/// # Errors
+/// Where the folder cannot be read, or a file cannot be moved.
 pub fn settle(folder: &Path) -> io::Result<()> {
     if temporaries(folder).is_empty() {
         return Ok(());

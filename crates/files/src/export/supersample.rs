@@ -23,6 +23,9 @@ pub struct Block {
 ///
 /// `coverage` draws one block at [`SUBPIXELS`] samples per pixel and axis, row-major, 255 where
 /// fully inked; `sink` receives the grey pixels of each band of full width, in order.
+///
+/// # Errors
+/// The first error of `sink`.
 pub fn render<E>(
     width: usize,
     height: usize,

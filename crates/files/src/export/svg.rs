@@ -21,6 +21,9 @@ pub const HEAD: &str = concat!(
 );
 
 /// Writes one sheet (counted from 0) as SVG.
+///
+/// # Errors
+/// Where the file cannot be written.
 pub fn write(artwork: &Artwork, sheet: usize, path: &Path) -> Result<(), ExportError> {
     let text = to_string(artwork, sheet);
     Ok(atomic::write(path, |file| file.write_all(text.as_bytes()))?)

@@ -38,6 +38,9 @@ pub struct AlgebraicConstruction {
 
 impl AlgebraicConstruction {
     /// Writes down the codes, in the order of the family.
+    ///
+    /// # Errors
+    /// Where the record is not consistent, or its code words break the rules.
     pub fn codes(&self, screen: &Screen) -> Result<Vec<u64>, FamilyError> {
         let dimension = screen.words().dimension();
         let space = CycleSpace::of(dimension);
@@ -113,6 +116,9 @@ impl AlgebraicConstruction {
     /// The basis has to span a code that the turn leaves invariant and whose lightest word weighs
     /// `distance` or more (all are looked at), and each code, arranged back, has to lie in it. Then
     /// any two words are as far apart as some word of the linear code is heavy.
+    ///
+    /// # Errors
+    /// The reason why it is no proof.
     pub fn prove(&self, screen: &Screen, codes: &[u64]) -> Result<(), String> {
         let dimension = screen.words().dimension();
         let space = CycleSpace::of(dimension);

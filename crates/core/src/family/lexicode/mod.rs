@@ -68,12 +68,18 @@ impl Lexicode {
     }
 
     /// Runs the search. Does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// Where the rules make no sense, or the search was cancelled.
     pub fn codes(&self, control: Control) -> Result<Vec<u64>, FamilyError> {
         self.resume(&mut Checkpoint::default(), &|_| {}, control)
     }
 
     /// Runs the search from a checkpoint on, and hands out new ones as it goes on. The codes are
     /// the same as without interruption.
+    ///
+    /// # Errors
+    /// Where the rules make no sense, the checkpoint is of another search, or this one was cancelled.
     pub fn resume(
         &self,
         checkpoint: &mut Checkpoint,
@@ -207,11 +213,17 @@ impl Lexicode {
     }
 
     /// Runs the search and makes a family of the codes.
+    ///
+    /// # Errors
+    /// Where the rules or the name make no sense, or the search was cancelled.
     pub fn family(&self, name: &str, control: Control) -> Result<Family, FamilyError> {
         self.family_of(name, self.codes(control)?)
     }
 
     /// Makes a family of the codes that a search has found.
+    ///
+    /// # Errors
+    /// Where the name speaks of other bits or another distance.
     pub fn family_of(&self, name: &str, codes: Vec<u64>) -> Result<Family, FamilyError> {
         let construction = Construction::Lexicode {
             start: TagWords::new(self.dimension).hex(self.start),

@@ -25,11 +25,17 @@ const KNOWN: [Units; 4] =
 
 /// Reads the text of a `.dsc` in either dialect; corner ids count through the file by board, row
 /// and column.
+///
+/// # Errors
+/// Where it is no list of boards, or does not say what it is.
 pub fn read(text: &str, name: &str) -> Result<Target, DscError> {
     read_in(text, name, &KNOWN)
 }
 
 /// Reads the text of a `.dsc` whose lengths must all be in millimetres, as they are written here.
+///
+/// # Errors
+/// Where it is no such list, or its lengths are in another unit.
 pub fn read_in_mm(text: &str, name: &str) -> Result<Target, DscError> {
     read_in(text, name, &KNOWN[..1])
 }

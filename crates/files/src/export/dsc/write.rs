@@ -5,6 +5,9 @@ use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::targets::{Panel, TagsIn, Target};
 
 /// The text of the `.dsc` of a target; positions are those in the target frame, mm.
+///
+/// # Errors
+/// Where the dialect cannot carry the target.
 pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
     let refused = |reason: &str| DscError::Refused {
         dialect,

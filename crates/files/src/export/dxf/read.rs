@@ -29,6 +29,9 @@ pub enum DxfError {
 }
 
 /// Reads the text of a `.dxf`; lines come as open paths of two points.
+///
+/// # Errors
+/// Where it is no such drawing.
 pub fn read(text: &str) -> Result<CutDrawing, DxfError> {
     let records = records(text)?;
     let mut reader = Reader { records: &records, at: 0 };
