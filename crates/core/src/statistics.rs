@@ -1,6 +1,10 @@
 //! Medians and quantiles.
 
 /// The middle value, of an even number the upper of two; `None` of none. What is no number counts as large.
+///
+/// ```
+/// assert_eq!(deltille_core::statistics::median(vec![3.0, f64::NAN, 1.0]), Some(3.0));
+/// ```
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)

@@ -2,7 +2,13 @@
 
 use std::borrow::Cow;
 
-/// A number of things, in the right number: `1 view`, `2 views`.
+/// A number of things, in the right number.
+///
+/// ```
+/// use deltille_core::words::counted;
+///
+/// assert_eq!([counted(1, "view"), counted(2, "view")], ["1 view", "2 views"]);
+/// ```
 pub fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }

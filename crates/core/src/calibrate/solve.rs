@@ -20,6 +20,31 @@ const LOOSE_FOCAL: f64 = 0.1;
 impl Calibration {
     /// Finds the cameras, where they are to each other, where the target was, and what else was asked for.
     ///
+    /// Of a known camera that is the pose of the target:
+    ///
+    /// ```
+    /// use deltille_core::calibrate::{Calibration, Observation, PanelRef, Sighting, View};
+    /// use deltille_core::camera::{Camera, Pose};
+    /// use glam::DVec3;
+    ///
+    /// let camera = Camera::pinhole(640, 480, 1.0);
+    /// let eye = DVec3::new(30.0, -80.0, 300.0);
+    /// let truth = Pose::looking_at(eye, DVec3::new(40.0, 40.0, 0.0), DVec3::Y);
+    /// let corners = (0..25).map(|i| (i / 5, i % 5)).map(|(row, col)| {
+    ///     let panel_mm = DVec3::new(20.0 * f64::from(col), 20.0 * f64::from(row), 0.0);
+    ///     let pixel = camera.project(truth.apply(panel_mm)).unwrap();
+    ///     Observation { row, col, panel_mm, pixel, cov: None }
+    /// });
+    /// let sighting = Sighting { panel: PanelRef::ONLY, observations: corners.collect() };
+    /// let name = "0".to_owned();
+    /// let image = "0.png".to_owned();
+    /// let view = View { name, image, size_px: [640, 480], sightings: vec![sighting] };
+    /// let estimate = Calibration::new([Pose::IDENTITY]).camera("c", vec![view], camera).solve()?;
+    /// let [turn, step] = estimate.frames[0].rig_from_target.off(&truth);
+    /// assert!(turn.length() < 1e-6 && step.length() < 1e-4);
+    /// # Ok::<(), deltille_core::calibrate::CalibrationError>(())
+    /// ```
+    ///
     /// # Errors
     /// Where views are too few, too much alike, of different sizes, or do not belong together.
     pub fn solve(&self) -> Result<Estimate, CalibrationError> {

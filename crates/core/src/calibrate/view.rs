@@ -171,6 +171,25 @@ pub struct Shown {
 /// The views of all detections, each with its name; an error where most of those that show
 /// something do not belong to the target.
 ///
+/// ```
+/// use deltille_core::calibrate::{Reference, views};
+/// use deltille_core::camera::{Camera, Pose};
+/// use deltille_core::detect::Detector;
+/// use deltille_core::synth::{Light, scene_of_target};
+/// use deltille_core::targets::{BoardSpec, Target};
+/// use glam::DVec3;
+///
+/// let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
+/// let eye = DVec3::new(50.0, -60.0, 200.0);
+/// let pose = Pose::looking_at(eye, board.panels[0].middle_mm(), DVec3::Y);
+/// let scene = scene_of_target(&board, board.family()?.as_ref())?;
+/// let image = scene.render(&Camera::pinhole(640, 480, 1.0), &pose, &Light::default());
+/// let found = Detector::new(&board)?.detect(&image.map(|grey| (255.0 * grey) as u8), "desk.png");
+/// let shown = views(&[("desk".to_owned(), found)], &Reference::Target(&board))?;
+/// assert_eq!(shown.views[0].corner_count(), 20);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// Where pictures have different sizes, or most that show something are not of the target.
 pub fn views(

@@ -107,6 +107,18 @@ impl Camera {
 
     /// Pixel position of a point of the camera frame; `None` where the model does not reach.
     /// The position may lie outside the image.
+    ///
+    /// ```
+    /// use deltille_core::camera::Camera;
+    /// use glam::DVec3;
+    ///
+    /// let camera = Camera::pinhole(640, 480, std::f64::consts::FRAC_PI_2);
+    /// // Half a field of 90° to the right is the middle of the right edge of the image.
+    /// let [x, y] = camera.project(DVec3::new(200.0, 0.0, 200.0)).unwrap();
+    /// assert!((x - 639.5).abs() < 1e-9 && (y - 239.5).abs() < 1e-9);
+    /// let ray = camera.unproject([x, y]).unwrap();
+    /// assert!(ray.direction.angle_between(DVec3::new(1.0, 0.0, 1.0)) < 1e-6);
+    /// ```
     pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
         let projection = self.project_with_derivatives(point)?;
         self.lens.covers(point).then_some(projection.pixel)

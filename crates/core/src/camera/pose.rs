@@ -26,6 +26,17 @@ impl Pose {
     }
 
     /// This motion after `first`.
+    ///
+    /// ```
+    /// use deltille_core::camera::Pose;
+    /// use glam::DVec3;
+    ///
+    /// let camera_from_target = Pose::looking_at(DVec3::new(0.0, 0.0, 500.0), DVec3::ZERO, DVec3::Y);
+    /// let target_from_camera = camera_from_target.inverse();
+    /// let [turn, step] = target_from_camera.after(&camera_from_target).off(&Pose::IDENTITY);
+    /// assert!(turn.length() < 1e-12 && step.length() < 1e-9);
+    /// assert_eq!(camera_from_target.apply(DVec3::ZERO).z, 500.0);
+    /// ```
     pub fn after(&self, first: &Pose) -> Self {
         Self {
             rotation: self.rotation * first.rotation,

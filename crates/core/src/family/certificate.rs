@@ -36,6 +36,14 @@ impl Certificate {
 /// An algebraic construction is written down again and has to give the same codes. So is a lexicode
 /// of up to 25 bits; of a larger one the first candidates are tried again, and have to give the
 /// first codes. A search is not repeated.
+///
+/// ```
+/// use deltille_core::family::{Family, certify};
+///
+/// let certificate = certify(&Family::shipped("delTag16h5")?);
+/// assert!(certificate.holds());
+/// # Ok::<(), deltille_core::family::FamilyError>(())
+/// ```
 pub fn certify(family: &Family) -> Certificate {
     let mut certificate = certify_codes(family);
     let screen = Screen::new(TagWords::new(family.dimension()), family.distance(), family.rules());

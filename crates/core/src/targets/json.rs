@@ -104,6 +104,14 @@ impl Target {
     }
 
     /// The text of the target file, a corner a line.
+    ///
+    /// ```
+    /// use deltille_core::targets::{SolidShape, SolidSpec, Target};
+    ///
+    /// let solid = Target::new("ico", SolidSpec::new(SolidShape::Icosahedron))?;
+    /// assert_eq!(Target::from_json(&solid.to_json())?, solid);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn to_json(&self) -> String {
         let Target { name, spec, family, panels, sheets } = self.clone();
         let file = TargetFile { schema: SCHEMA.to_owned(), name, spec, family, panels, sheets };

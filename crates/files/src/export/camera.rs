@@ -66,6 +66,16 @@ fn refuse<T>(
 
 /// OpenCV's FileStorage YAML.
 ///
+/// ```
+/// use deltille_core::camera::Camera;
+/// use deltille_files::export::camera::opencv;
+///
+/// let camera = Camera::pinhole(640, 480, 1.0);
+/// let text = opencv(&camera)?;
+/// assert_eq!(Camera::from_yaml(&text)?, camera);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// Where OpenCV has no such model.
 pub fn opencv(camera: &Camera) -> Result<String, FormatError> {

@@ -14,6 +14,13 @@ use deltille_core::lattice::GridKind;
 pub const HEADER: &str = "grid,kind,panel,row,col,id,x,y,cov_xx,cov_xy,cov_yy";
 
 /// The text of the CSV file of one image.
+///
+/// ```
+/// use deltille_core::detect::Detection;
+/// use deltille_files::export::csv;
+///
+/// assert_eq!(csv::write(&Detection::default()).lines().next(), Some(csv::HEADER));
+/// ```
 pub fn write(detection: &Detection) -> String {
     let mut text = format!("{HEADER}\n");
     for (index, grid) in detection.grids.iter().enumerate() {

@@ -95,6 +95,15 @@ struct DetectionFile {
 }
 
 /// The text of the JSON file of one image, a corner a line.
+///
+/// ```
+/// use deltille_core::detect::Detection;
+/// use deltille_files::export::detection;
+///
+/// let found = Detection { image: "desk.png".to_owned(), width: 640, height: 480, ..Detection::default() };
+/// assert_eq!(detection::read(&detection::write(&found))?, found);
+/// # Ok::<(), detection::DetectionFileError>(())
+/// ```
 pub fn write(detection: &Detection) -> String {
     deltille_core::json::to_text(&DetectionFile::of(detection), 4)
 }

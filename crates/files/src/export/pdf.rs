@@ -42,7 +42,16 @@ pub fn write(artwork: &Artwork, path: &Path) -> Result<(), ExportError> {
     Ok(atomic::write(path, |file| file.write_all(&bytes))?)
 }
 
-/// All sheets as one PDF.
+/// All sheets as one PDF, the same bytes for the same artwork.
+///
+/// ```
+/// use deltille_core::targets::{BoardSpec, Target};
+/// use deltille_files::export::pdf;
+///
+/// let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
+/// assert!(pdf::to_bytes(&board.draw()?).starts_with(b"%PDF-1.6"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn to_bytes(artwork: &Artwork) -> Vec<u8> {
     let mut document = document(artwork);
     document.compress();

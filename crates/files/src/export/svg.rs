@@ -30,6 +30,15 @@ pub fn write(artwork: &Artwork, sheet: usize, path: &Path) -> Result<(), ExportE
 }
 
 /// One sheet as SVG: a path per shape, named after what it is.
+///
+/// ```
+/// use deltille_core::targets::{BoardSpec, Target};
+/// use deltille_files::export::svg;
+///
+/// let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
+/// assert!(svg::to_string(&board.draw()?, 0).contains("width=\"297mm\""));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn to_string(artwork: &Artwork, sheet: usize) -> String {
     let sheet = &artwork.sheets[sheet];
     let (width, height) = (number(sheet.width_mm), number(sheet.height_mm));
