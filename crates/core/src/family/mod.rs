@@ -116,7 +116,7 @@ impl Family {
         Self::from_json(shipped::json(name).ok_or_else(unknown)?)
     }
 
-    /// Reads the text of a family file (FORMATS §9, schema [`SCHEMA`]).
+    /// Reads the text of a family file (`docs/formats.md`, “Family”, schema [`SCHEMA`]).
     pub fn from_json(json: &str) -> Result<Self, FamilyError> {
         file::from_json(json)
     }
