@@ -19,7 +19,8 @@ pub const SCHEMA: &str = "deltille/family/1";
 #[non_exhaustive]
 pub enum Construction {
     /// Candidates `start`, `start + step`, … modulo 2^bits are taken in turn, and each is kept that
-    /// satisfies the rules and is far enough from all kept before (`docs/families.md`, “The published construction”).
+    /// satisfies the rules and is far enough from all kept before (`docs/families.md`, “The
+    /// published construction”).
     Lexicode {
         /// First candidate, hexadecimal.
         start: String,
