@@ -1,4 +1,4 @@
-//! A corner fitted to raw pixels: the model of METHOD §4, by Levenberg–Marquardt.
+//! A corner fitted to raw pixels by Levenberg–Marquardt, see `docs/formulation.md`, “Measured corners”.
 //!
 //! ```text
 //!     I(u,v) = level + amplitude · T(f(h₁ … h_K)·g + (g − 1)·r),      g = 1 + g_u u + g_v v

@@ -16,7 +16,7 @@
 //! ```
 //!
 //! through the curve at eight places. Between a twentieth of the light and all of it that is within 0.3 % of
-//! gamma 2.6. The constant κ₀ is the κ of METHOD §6, κ₁ its κ₃.
+//! gamma 2.6. The constant κ₀ displaces corners, see `docs/formulation.md`, “Measured corners”.
 
 use std::sync::LazyLock;
 

@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn bounds_are_the_published_ones() {
-        // The last column of the table in FORMATS §4 and, for 25 bits, h = 8.
+        // The last column of the table in `docs/families.md`, “Sizes”, and, for 25 bits, h = 8.
         for (bits, distance, expected) in [
             (16, 5, 141),
             (25, 7, 3478),

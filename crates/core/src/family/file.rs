@@ -1,4 +1,4 @@
-//! The family file (FORMATS §9): reading with every field checked, writing, fingerprint.
+//! The family file (`docs/formats.md`, “Family”): reading with every field checked, writing, fingerprint.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,8 @@ pub const SCHEMA: &str = "deltille/family/1";
 #[non_exhaustive]
 pub enum Construction {
     /// Candidates `start`, `start + step`, … modulo 2^bits are taken in turn, and each is kept that
-    /// satisfies the rules and is far enough from all kept before (FORMATS §3).
+    /// satisfies the rules and is far enough from all kept before (`docs/families.md`, “The
+    /// published construction”).
     Lexicode {
         /// First candidate, hexadecimal.
         start: String,

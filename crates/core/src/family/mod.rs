@@ -123,7 +123,7 @@ impl Family {
         Self::from_json(shipped::json(name).ok_or_else(unknown)?)
     }
 
-    /// Reads the text of a family file (FORMATS §9, schema [`SCHEMA`]).
+    /// Reads the text of a family file (`docs/formats.md`, “Family”, schema [`SCHEMA`]).
     ///
     /// # Errors
     /// Where it is no family file, a field is wrong, or the codes do not have the stated fingerprint.

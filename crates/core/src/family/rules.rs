@@ -16,7 +16,8 @@ pub struct Rules {
 
 impl Rules {
     /// The rules of the published families: half of the pairs differ, and the untagged tile is as
-    /// far as another code (FORMATS §3). The distance from a code to its own turns is always h.
+    /// far as another code (`docs/families.md`, “What a family is”). The distance from a code to its
+    /// own turns is always h.
     pub fn published(distance: u32) -> Self {
         Self { min_complexity: 0.5, black_distance: distance, white_distance: 0 }
     }

@@ -1,4 +1,4 @@
-//! The target file (FORMATS §9): reading with every field checked, and writing.
+//! The target file (`docs/formats.md`, “Target”): reading with every field checked, and writing.
 
 use std::collections::BTreeSet;
 

@@ -132,7 +132,7 @@ pub struct Panel {
     #[serde(default)]
     pub outline: Outline,
     /// Columns and rows of the matrix in which `.dsc` and `.orpc` files number the corners
-    /// (FORMATS §5); it holds every corner.
+    /// (`docs/formats.md`, “.dsc target descriptions”); it holds every corner.
     #[serde(deserialize_with = "quantity::side_of_matrix::de")]
     pub matrix: [u32; 2],
     /// Pose of the panel frame in the target frame.

@@ -174,7 +174,7 @@ pub struct ListedSpec {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ListFormat {
-    /// `.dsc` in the dialect of the reference detector (FORMATS §5).
+    /// `.dsc` in the dialect of the reference detector (`docs/formats.md`, “.dsc target descriptions”).
     DscOriginal,
     /// `.dsc` in the dialect of its fork.
     DscFork,

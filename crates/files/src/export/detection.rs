@@ -1,4 +1,4 @@
-//! Detections as JSON (FORMATS §9, schema `deltille/detection/1`), and back.
+//! Detections as JSON (schema `deltille/detection/1`, `docs/formats.md`, “Detection”), and back.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,5 @@
-//! `.orpc` corner lists, as the reference detector writes them (FORMATS §6).
+//! `.orpc` corner lists, as the reference detector writes them (`docs/formats.md`, “.orpc corner
+//! lists”).
 //!
 //! ```text
 //! filename: photo.png

@@ -2,8 +2,9 @@
 //!
 //! Candidates v(i) = start + i·step mod 2^b are taken in turn; one is kept when it satisfies the
 //! [`Rules`], is at least h from its own turns, and at least h from every turn of every code kept
-//! before (FORMATS §3). This is the AprilTag construction (Olson, "AprilTag: A robust and flexible
-//! visual fiducial system", ICRA 2011) with three turns in place of four.
+//! before (`docs/families.md`, “The published construction”). This is the AprilTag construction
+//! (Olson, "AprilTag: A robust and flexible visual fiducial system", ICRA 2011) with three turns in
+//! place of four.
 //!
 //! Of 2^36 candidates nearly all are excluded by codes found early. So only the first 2^27 are
 //! looked at in turn; then a sweep over all words finds the few that the codes so far leave open

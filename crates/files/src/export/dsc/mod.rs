@@ -1,4 +1,5 @@
-//! `.dsc` target descriptions, as the reference detector and its fork read them (FORMATS §5).
+//! `.dsc` target descriptions, as the reference detector and its fork read them
+//! (`docs/formats.md`, “.dsc target descriptions”).
 //!
 //! ```text
 //! 0,15,10,20.0                      board id, A, B, edge
