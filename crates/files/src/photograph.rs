@@ -452,6 +452,6 @@ mod tests {
         std::fs::write(&text, "no image").unwrap();
         let message = read(&text).unwrap_err().to_string();
         assert!(message.contains("notes.png") && message.contains("not a readable"), "{message}");
-        assert!(read(&dir.path().join("absent.png")).is_err());
+        assert!(read(dir.path().join("absent.png")).is_err());
     }
 }

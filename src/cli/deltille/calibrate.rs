@@ -12,11 +12,11 @@ use super::camera_file;
 use super::files::{File, text_file, write_all};
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Model};
-use crate::camera::Pose;
+use crate::camera::{Camera, Pose};
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
 use crate::export::calibration;
-use crate::export::camera::{colmap, kalibr, nerfstudio, opencv, ros};
+use crate::export::camera::{FormatError, colmap, kalibr, nerfstudio, opencv, ros};
 use crate::words::{counted, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
@@ -73,6 +73,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // Poses of a known camera do not take the place of its calibration.
     let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
     let path = output::file(args.output.as_deref().unwrap_or(Path::new(".")), stem, "yaml")?;
+    let intrinsics = args.intrinsics()?;
+    // What no format can carry is told before the work.
+    let camera = sample(&intrinsics);
+    args.format.iter().try_for_each(|format| format.check(&camera)).context("--format")?;
     let Sightings { views, panels, empty, left_out, print } = args.sightings.read()?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     for picture in &empty {
@@ -83,7 +87,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let page = args.solve.page(&stem)?;
-    let calibration = Calibration::new(panels).camera(&stem, views, args.intrinsics()?);
+    let calibration = Calibration::new(panels).camera(&stem, views, intrinsics);
     let mut solved = args.solve.solve(calibration, print)?;
     ensure!(!solved.estimate.frames.is_empty(), "no view shows the target as this camera sees it");
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
@@ -130,7 +134,32 @@ impl Args {
     }
 }
 
+/// A camera that has all parameters that are found, and none of them zero.
+fn sample(intrinsics: &Intrinsics) -> Camera {
+    match intrinsics {
+        Intrinsics::Unknown(model) => {
+            let camera = Camera::centred(100, 100, 100.0, model.lens());
+            let values = camera.parameters().into_iter().zip(model.free());
+            let values = values.map(|(value, free)| if free { value + 1e-3 } else { value });
+            camera.with_parameters(&values.collect::<Vec<_>>())
+        }
+        Intrinsics::Known(camera) | Intrinsics::Near { camera, .. } => camera.clone(),
+    }
+}
+
 impl Format {
+    /// Refuses a camera that the format cannot carry.
+    fn check(self, camera: &Camera) -> Result<(), FormatError> {
+        match self {
+            Self::Own => Ok(()),
+            Self::Opencv => opencv(camera).map(drop),
+            Self::Ros => ros(camera, "").map(drop),
+            Self::Kalibr => kalibr(&[(camera, Pose::IDENTITY)]).map(drop),
+            Self::Colmap => colmap(&[camera]).map(drop),
+            Self::Nerfstudio => nerfstudio(camera, &[]).map(drop),
+        }
+    }
+
     /// The names and texts of its files.
     fn texts(self, stem: &str, solved: &Calibrated) -> anyhow::Result<Vec<(String, String)>> {
         let Calibrated { estimate, diagnoses, print } = solved;

@@ -9,7 +9,7 @@ use super::images::Images;
 use super::limits::ImageLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
-use crate::calibrate::{Calibration, Reference, Words, views};
+use crate::calibrate::{Calibration, Diagnosis, Reference, Words, views};
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::FAILED;
 use crate::detect::{Detector, DetectorConfig};
@@ -61,20 +61,28 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let image = image?;
         all += 1;
         let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let found = detector.detect(&photograph::read_within(&image, &limits)?, &name);
-        let mut shown = views(&[(name, found)], &reference)?.views;
+        let seen = detector.detect(&photograph::read_within(&image, &limits)?, &name);
+        let reason = seen.reasons.first().map(|reason| reason.to_string());
+        let mut shown = views(&[(name, seen)], &reference)?.views;
         sightings::put_on(&sheet, Some(&target), &mut shown)?;
         let calibration = Calibration::new(panels.clone()).camera("", shown, camera.clone());
         let found = calibration.solve().with_context(|| image.display().to_string())?;
         if found.frames.is_empty() {
             without += 1;
-            let why = found.excluded.first().map(|out| out.reason.to_string());
+            let why = found.excluded.first().map(|out| out.reason.to_string()).or(reason);
             let why = why.as_deref().unwrap_or("no target in it");
             tell!("{}: {why}", image.display());
         }
         let words = Words { estimate: &found, print_scale: None };
-        for finding in &found.findings {
-            tell!("{}: {}", image.display(), words.finding(finding));
+        let said = calibration.inspect(&found);
+        // Where the lens ends is the camera's, and the same for every picture.
+        let is_of_picture = |said: &&Diagnosis| !matches!(said, Diagnosis::LensEnds { .. });
+        for diagnosis in said.iter().filter(is_of_picture) {
+            tell!("{}: {}", image.display(), words.sentence(diagnosis));
+        }
+        if said.iter().any(|said| matches!(said, Diagnosis::ForeignCamera { .. })) {
+            without += 1;
+            continue;
         }
         for view in found.cameras.iter().flat_map(|camera| &camera.views) {
             let line = pose::write_line(&found, view, &target.name);

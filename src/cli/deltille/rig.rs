@@ -81,8 +81,10 @@ fn named(text: &str) -> Result<(String, PathBuf), String> {
 
 /// Calibrates a rig and writes it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    if args.camera.len() < 2 {
-        bail!("--camera: a rig has at least two; `deltille calibrate` takes one");
+    if args.camera.len() < 2 && !args.refine_target {
+        bail!(
+            "--camera: a rig has at least two; `deltille calibrate` takes one, and so does --refine-target"
+        );
     }
     let mut names: Vec<&str> = args.camera.iter().map(|(name, _)| name.as_str()).collect();
     names.sort_unstable();

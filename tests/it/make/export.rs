@@ -126,7 +126,7 @@ fn poppler(pdf: &Path) -> Option<Gray<u8>> {
             return None;
         }
     }
-    match photograph::read(&stem.with_extension("png")).unwrap() {
+    match photograph::read(stem.with_extension("png")).unwrap() {
         // Pure K is not quite black on poppler's screen.
         AnyGray::U8(image) => {
             let black = f64::from(*image.pixels().iter().min()?);

@@ -71,10 +71,20 @@ impl Calibration {
     pub fn diagnose(&self, found: &Estimate) -> Vec<Diagnosis> {
         // What was solved was split before.
         let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
+        let alone = own.each_alone(found);
+        own.said(found, &alone)
+    }
+
+    /// The same as far as the estimate tells it by itself, without trying anything else.
+    pub fn inspect(&self, found: &Estimate) -> Vec<Diagnosis> {
+        self.said(found, &vec![None; found.cameras.len()])
+    }
+
+    fn said(&self, found: &Estimate, alone: &[Option<(Self, Estimate)>]) -> Vec<Diagnosis> {
         let cameras = || found.cameras.iter().enumerate();
         let foreign = cameras().filter(|(index, camera)| {
             let width = f64::from(camera.camera.width);
-            matches!(own.cameras[*index].intrinsics, Intrinsics::Known(_))
+            matches!(self.cameras[*index].intrinsics, Intrinsics::Known(_))
                 && camera.inlier_rms_px() > FOREIGN_PART * width
         });
         let foreign = foreign
@@ -82,14 +92,13 @@ impl Calibration {
         let ends = cameras()
             .filter_map(|(camera, of)| Some(Diagnosis::LensEnds { camera, end: of.lens_end()? }));
         let gross = found.findings.iter().cloned().map(Diagnosis::GrossErrors);
-        let alone = own.each_alone(found);
         let open = cameras().filter(|(_, of)| !of.ill_conditioned.is_empty());
         let open = open.map(|(camera, of)| Diagnosis::IllConditioned {
             camera,
             parameters: of.ill_conditioned.clone(),
             sufficient: alone[camera].as_ref().and_then(|(alone, found)| alone.sufficient(found)),
         });
-        let causes = causes(found, &alone);
+        let causes = causes(found, alone);
         foreign.chain(ends).chain(gross).chain(causes).chain(open).collect()
     }
 

@@ -174,10 +174,11 @@ impl Words<'_> {
 
     fn board(&self, model: Option<Model>) -> String {
         let scale = match self.print_scale {
-            Some([across, up]) => {
+            // The same scale both ways leaves nothing behind.
+            Some([across, up]) if across != up => {
                 format!("--print-scale {across},{up} is not how it was printed, or ")
             }
-            None => String::new(),
+            _ => String::new(),
         };
         let bars = match self.print_scale {
             Some(_) => "measure its check bars again",

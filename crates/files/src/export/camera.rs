@@ -87,7 +87,11 @@ pub fn opencv(camera: &Camera) -> Result<String, FormatError> {
         }
         Shared::Equidistant(k) => ("fisheye", k),
         Shared::Other => {
-            return refuse(camera, "opencv", "radtan, rational, thin-prism, kannala-brandt");
+            return refuse(
+                camera,
+                "opencv",
+                "radtan, radtan5, rational, thin-prism, kannala-brandt",
+            );
         }
     };
     let model = if model == "fisheye" { "distortion_model: fisheye\n" } else { "" };
@@ -118,7 +122,7 @@ pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
         Shared::Perspective(k, 0..=5) => ("plumb_bob", &k[..5]),
         Shared::Perspective(k, 6..=8) => ("rational_polynomial", &k[..8]),
         Shared::Equidistant(k) => ("equidistant", k),
-        _ => return refuse(camera, "ros", "radtan, rational, kannala-brandt"),
+        _ => return refuse(camera, "ros", "radtan, radtan5, rational, kannala-brandt"),
     };
     let [fx, _, cx, _, fy, cy, ..] = matrix(camera);
     let matrix_of = |rows: usize, cols: usize, data: &[f64]| {
@@ -238,7 +242,7 @@ fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatErro
         Shared::Perspective(k, 0..=4) => ("OPENCV", &k[..4]),
         Shared::Perspective(k, 5..=8) => ("FULL_OPENCV", &k[..8]),
         Shared::Equidistant(k) => ("OPENCV_FISHEYE", k),
-        _ => return refuse(camera, "colmap", "radtan, rational, kannala-brandt"),
+        _ => return refuse(camera, "colmap", "radtan, radtan5, rational, kannala-brandt"),
     };
     let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.centre_px.map(|c| c + 0.5));
     Ok((model, [&[fx, fy, cx, cy], coefficients].concat()))

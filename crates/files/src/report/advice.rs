@@ -122,7 +122,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     if report.print.scale.is_none() {
         let text =
             "Distances are as true as the print: measure both check bars of the sheet and give \
-                    --print-scale. Focal lengths and distortion do not depend on it."
+                    --print-scale. Focal lengths and distortion do not depend on it where both are off alike."
                 .to_owned();
         add(Weight::Hint, text);
     }
