@@ -2,9 +2,12 @@
 
 use deltille::calibrate::{
     BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Instead, LackOfFit, Model,
-    Observation, PanelRef, Remedy, Sighting, View,
+    Observation, PanelRef, Reference, Remedy, Sighting, UntaggedGrid, View,
 };
 use deltille::camera::{Camera, Pose};
+use deltille::export::calibration::{self, Print};
+use deltille::export::{rig, saved};
+use deltille::lattice::GridKind;
 use glam::{DQuat, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,7 +15,7 @@ use rand_distr::{Distribution, Normal};
 
 const NOISE_PX: f64 = 0.05;
 
-fn calibration(views: &[View]) -> Calibration {
+fn of(views: &[View]) -> Calibration {
     Calibration::new([Pose::IDENTITY]).camera("", views.to_vec(), Model::Radtan)
 }
 
@@ -71,15 +74,56 @@ fn check_shape(found: &Estimate) {
     }
 }
 
+/// Reads a file back, and compares all that it holds.
+fn check_read_back(found: &Estimate, text: &str) {
+    let board = UntaggedGrid { kind: GridKind::Checker, edge_mm: 20.0, size: None };
+    let read = saved::read(text, &Reference::Grid(board)).unwrap();
+    check_same(found, &read);
+    check_same(found.held_out.as_ref().unwrap(), read.held_out.as_ref().unwrap());
+    assert_eq!(
+        (read.shape, read.sigma, read.common_px),
+        (found.shape, found.sigma, found.common_px)
+    );
+    for (found, read) in found.cameras.iter().zip(&read.cameras) {
+        assert_eq!((found.model, &found.ill_conditioned), (read.model, &read.ill_conditioned));
+        let apart = (&found.covariance - &read.covariance).abs().max();
+        assert!(apart <= 1e-12 * found.covariance.abs().max(), "{apart}");
+        assert_eq!(found.pose_sd, read.pose_sd);
+    }
+}
+
+fn check_same(found: &Estimate, read: &Estimate) {
+    assert!((found.rms_px - read.rms_px).abs() < 1e-12);
+    assert_eq!((found.cameras.len(), found.frames.len()), (read.cameras.len(), read.frames.len()));
+    let is_same = |a: &Pose, b: &Pose| {
+        let [turn, step] = a.off(b);
+        turn.length() < 1e-12 && step.length() < 1e-9
+    };
+    for (found, read) in found.frames.iter().zip(&read.frames) {
+        assert_eq!((&found.name, found.pose_sd), (&read.name, read.pose_sd));
+        assert!(is_same(&found.rig_from_target, &read.rig_from_target));
+    }
+    for (found, read) in found.cameras.iter().zip(&read.cameras) {
+        assert_eq!(found.camera, read.camera);
+        assert!(is_same(&found.camera_from_rig, &read.camera_from_rig));
+        assert_eq!(found.views.len(), read.views.len());
+        for (found, read) in found.views.iter().zip(&read.views) {
+            assert_eq!((&found.corners, found.frame), (&read.corners, read.frame));
+            assert!(is_same(&found.pose, &read.pose));
+        }
+    }
+}
+
 /// Two cameras tell the shape better than one, and frames that took no part are as good with it.
 #[test]
 fn a_rig_finds_the_shape_of_a_sheet() {
     let eye = DVec3::new(60.0, 0.0, 0.0);
     let right = Pose::looking_at(eye, DVec3::new(0.0, 0.0, 350.0), DVec3::NEG_Y);
     let of_right = views_of(&right, bent, 1);
-    let alone = calibration(&views(bent, 1)).board_shape(true).solve().unwrap();
-    let rig = calibration(&views(bent, 1)).camera("right", of_right, Model::Radtan);
-    let found = rig.clone().board_shape(true).hold_out(Some(5)).solve().unwrap();
+    let alone = of(&views(bent, 1)).board_shape(true).hold_out(Some(4)).solve().unwrap();
+    check_read_back(&alone, &calibration::write(&alone, &[], Print::default()).unwrap());
+    let both = of(&views(bent, 1)).camera("right", of_right, Model::Radtan);
+    let found = both.clone().board_shape(true).hold_out(Some(5)).solve().unwrap();
     check_shape(&found);
     let sds = |found: &Estimate| found.shape.unwrap().sd_mm;
     assert!(sds(&found).iter().zip(sds(&alone)).all(|(rig, alone)| *rig < alone));
@@ -90,9 +134,11 @@ fn a_rig_finds_the_shape_of_a_sheet() {
     }
     let [turn, step] = found.cameras[1].camera_from_rig.off(&right);
     assert!(turn.length() < 1e-3 && step.length() < 0.5, "{turn} {step}");
+    let text = rig::write(&found, &[], "radtan", Print::default());
+    check_read_back(&found, &text);
     // Without the shape the board is to blame.
-    let flat = rig.solve().unwrap();
-    let said = rig.diagnose(&flat);
+    let flat = both.solve().unwrap();
+    let said = both.diagnose(&flat);
     let is_of_shape = |said: &Diagnosis| matches!(said, Diagnosis::Remedied { remedy, .. } if remedy.instead == Instead::Shape);
     assert!(said.len() == 1 && said.iter().all(is_of_shape), "{said:?}");
 }
@@ -100,7 +146,7 @@ fn a_rig_finds_the_shape_of_a_sheet() {
 #[test]
 fn a_bent_and_stretched_sheet_is_found() {
     let views = views(bent, 1);
-    let (plain, with_shape) = (calibration(&views), calibration(&views).board_shape(true));
+    let (plain, with_shape) = (of(&views), of(&views).board_shape(true));
     let (flat, found) = (plain.solve().unwrap(), with_shape.solve().unwrap());
     let [LackOfFit::Target { panel: PanelRef::ONLY, rms_mm, .. }] = flat.lack_of_fit[..] else {
         panic!("{:?}", flat.lack_of_fit)
@@ -124,7 +170,7 @@ fn a_bent_and_stretched_sheet_is_found() {
 fn a_flat_sheet_is_called_flat() {
     let significant = (0..10).filter(|&seed| {
         let views = views(|_, _| DVec3::ZERO, 100 + seed);
-        let found = calibration(&views).board_shape(true).solve().unwrap();
+        let found = of(&views).board_shape(true).solve().unwrap();
         found.shape.unwrap().is_significant()
     });
     assert_eq!(significant.count(), 0);

@@ -112,6 +112,17 @@ impl Reference<'_> {
         }
     }
 
+    /// Its panel with an id, which is 0 on an untagged board.
+    pub fn panel(&self, id: u32) -> Option<PanelRef> {
+        match self {
+            Self::Grid(_) => (id == PanelRef::ONLY.id()).then_some(PanelRef::ONLY),
+            Self::Target(target) => {
+                let index = target.panels.iter().position(|panel| panel.id == id)?;
+                Some(PanelRef::new(index, id))
+            }
+        }
+    }
+
     /// Whether its panels are boards that lie about, each for itself.
     fn is_loose(&self) -> bool {
         match self {

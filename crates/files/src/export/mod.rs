@@ -30,6 +30,7 @@ pub mod pdf;
 pub mod png;
 pub mod pose;
 pub mod rig;
+pub mod saved;
 pub mod staging;
 pub mod stl;
 #[cfg(feature = "print")]

@@ -1,0 +1,429 @@
+//! Calibrations and rigs, read back from their JSON.
+//!
+//! What a file does not hold stays empty: findings and patterns of the residuals, which are told there in
+//! words, and where refined panels are, which stands in the refined target. Reasons why views took no
+//! part are the words of the file.
+
+use glam::{DMat3, DQuat, DVec3};
+use nalgebra::DMatrix;
+use serde::Deserialize;
+
+use super::{calibration, rig};
+use deltille_core::calibrate::{
+    BoardShape, CameraEstimate, Corner, Estimate, Excluded, FrameEstimate, Model, PanelRef,
+    Parameter, Reason, Reference, SHAPE_COEFFICIENTS as COUNT, Shape, ViewEstimate,
+};
+use deltille_core::camera::{Camera, Lens, Pose};
+use deltille_core::json::{self, ReadError};
+use deltille_core::quantity;
+
+/// Why a file is no calibration that can be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SavedError {
+    /// Neither that of a camera nor that of a rig.
+    #[error("not the .json that `calibrate` or `rig` writes")]
+    Foreign,
+    /// A field is missing, or holds what it must not.
+    #[error("field `{field}`: {problem}")]
+    Field {
+        /// The field, such as `cameras[1].views[3].rms_px`.
+        field: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A corner on a panel that the target does not have.
+    #[error("panel {0} is not on the target")]
+    Panel(u32),
+}
+
+/// Reads the estimate of a camera or a rig; `reference` is what was photographed.
+///
+/// # Errors
+/// Where it is no such file, a field is wrong, or the target has other panels.
+pub fn read(text: &str, reference: &Reference) -> Result<Estimate, SavedError> {
+    let wrong = |error| match error {
+        ReadError::Json(_) => SavedError::Foreign,
+        ReadError::Field { field, problem } => SavedError::Field { field, problem },
+    };
+    match json::schema(text.as_bytes()).ok().flatten().as_deref() {
+        Some(calibration::SCHEMA) => json::read::<Single>(text).map_err(wrong)?.estimate(reference),
+        Some(rig::SCHEMA) => json::read::<Rig>(text).map_err(wrong)?.estimate(reference),
+        _ => Err(SavedError::Foreign),
+    }
+}
+
+#[derive(Deserialize)]
+struct Single {
+    #[serde(flatten)]
+    camera: SavedCamera,
+    #[serde(flatten)]
+    fit: Fit,
+    held_out: Option<SingleHeldOut>,
+}
+
+#[derive(Deserialize)]
+struct SingleHeldOut {
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    rms_px: f64,
+    views: Vec<SavedView>,
+    excluded: Vec<SavedExcluded>,
+}
+
+#[derive(Deserialize)]
+struct Rig {
+    cameras: Vec<SavedCamera>,
+    frames: Vec<SavedFrame>,
+    #[serde(flatten)]
+    fit: Fit,
+    held_out: Option<RigHeldOut>,
+}
+
+#[derive(Deserialize)]
+struct RigHeldOut {
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    rms_px: f64,
+    cameras: Vec<SavedSeen>,
+    frames: Vec<SavedFrame>,
+    excluded: Vec<SavedExcluded>,
+}
+
+#[derive(Deserialize)]
+struct SavedSeen {
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    rms_px: f64,
+    views: Vec<SavedView>,
+}
+
+/// What files of both kinds tell of the fit as a whole.
+#[derive(Deserialize)]
+struct Fit {
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    sigma: f64,
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    common_px: Option<f64>,
+    board_shape: Option<SavedShape>,
+    excluded: Vec<SavedExcluded>,
+}
+
+#[derive(Deserialize)]
+struct SavedCamera {
+    #[serde(default)]
+    name: String,
+    model: String,
+    width: u32,
+    height: u32,
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    rms_px: f64,
+    parameters: Vec<SavedParameter>,
+    #[serde(deserialize_with = "quantity::figure::de")]
+    correlations: Vec<Vec<f64>>,
+    loose: Vec<String>,
+    camera_from_rig: Option<SavedPose>,
+    views: Vec<SavedView>,
+}
+
+#[derive(Deserialize)]
+struct SavedParameter {
+    name: String,
+    #[serde(deserialize_with = "quantity::figure::de")]
+    value: f64,
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    sd: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct SavedFrame {
+    name: String,
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    rms_px: f64,
+    rig_from_target: SavedPose,
+}
+
+#[derive(Deserialize)]
+struct SavedView {
+    name: String,
+    image: String,
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    rms_px: f64,
+    camera_from_target: SavedPose,
+    corners: Vec<SavedCorner>,
+}
+
+#[derive(Deserialize)]
+struct SavedCorner {
+    panel: u32,
+    row: i32,
+    col: i32,
+    #[serde(deserialize_with = "quantity::figure::de")]
+    x: f64,
+    #[serde(deserialize_with = "quantity::figure::de")]
+    y: f64,
+    #[serde(deserialize_with = "quantity::figure::de")]
+    dx: f64,
+    #[serde(deserialize_with = "quantity::figure::de")]
+    dy: f64,
+    #[serde(default)]
+    outlier: bool,
+}
+
+#[derive(Deserialize)]
+struct SavedPose {
+    #[serde(deserialize_with = "quantity::cosine::de")]
+    rotation: [f64; 9],
+    #[serde(deserialize_with = "quantity::figure::de")]
+    translation_mm: [f64; 3],
+    #[serde(default, deserialize_with = "quantity::deviation::de")]
+    rotation_sd_rad: Option<[f64; 3]>,
+    #[serde(default, deserialize_with = "quantity::deviation::de")]
+    translation_sd_mm: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+struct SavedShape {
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    middle_mm: [f64; 3],
+    #[serde(deserialize_with = "quantity::edge_mm::de")]
+    reach_mm: f64,
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    coefficients_mm: [f64; COUNT],
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    sd_mm: [f64; COUNT],
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    bent_mm: f64,
+    #[serde(deserialize_with = "quantity::deviation::de")]
+    stretched_mm: f64,
+    #[serde(deserialize_with = "quantity::figure::de")]
+    f_ratio: f64,
+}
+
+#[derive(Deserialize)]
+struct SavedExcluded {
+    camera: Option<String>,
+    view: String,
+    image: String,
+    panel: Option<u32>,
+    corners: usize,
+    reason: String,
+}
+
+impl Single {
+    fn estimate(self, reference: &Reference) -> Result<Estimate, SavedError> {
+        let Self { camera, fit, held_out } = self;
+        let (rms_px, views) = (camera.rms_px, &camera.views);
+        let frames = frames_of(views);
+        let found = camera.estimate("", |index, _| Some(index), reference)?;
+        let held_out = held_out.map(|test| -> Result<Estimate, SavedError> {
+            let SingleHeldOut { rms_px, views, excluded } = test;
+            let frames = frames_of(&views);
+            let known = known(&found, rms_px, views, |index, _| Some(index), reference)?;
+            let excluded = excluded.into_iter().map(SavedExcluded::read).collect();
+            Ok(Estimate { cameras: vec![known], frames, rms_px, excluded, ..Estimate::default() })
+        });
+        let held_out = held_out.transpose()?.map(Box::new);
+        Ok(Estimate { cameras: vec![found], frames, rms_px, held_out, ..fit.estimate() })
+    }
+}
+
+impl Rig {
+    fn estimate(self, reference: &Reference) -> Result<Estimate, SavedError> {
+        let Self { cameras, frames, fit, held_out } = self;
+        let place =
+            |frames: &[SavedFrame], name: &str| frames.iter().position(|frame| frame.name == name);
+        let found = cameras.into_iter().map(|camera| {
+            let name = camera.name.clone();
+            camera.estimate(&name, |_, view| place(&frames, view), reference)
+        });
+        let cameras = found.collect::<Result<Vec<_>, _>>()?;
+        let held_out = held_out.map(|test| -> Result<Estimate, SavedError> {
+            let RigHeldOut { rms_px, cameras: seen, frames, excluded } = test;
+            let seen = cameras.iter().zip(seen).map(|(found, SavedSeen { rms_px, views })| {
+                known(found, rms_px, views, |_, view| place(&frames, view), reference)
+            });
+            let cameras = seen.collect::<Result<Vec<_>, _>>()?;
+            let excluded = excluded.into_iter().map(SavedExcluded::read).collect();
+            let frames = frames.into_iter().map(SavedFrame::read).collect();
+            Ok(Estimate { cameras, frames, rms_px, excluded, ..Estimate::default() })
+        });
+        let held_out = held_out.transpose()?.map(Box::new);
+        let frames = frames.into_iter().map(SavedFrame::read).collect();
+        let estimate = Estimate { cameras, frames, held_out, ..fit.estimate() };
+        let (sum, count) = estimate.corners().fold((0.0, 0), |(sum, count), corner| {
+            (sum + corner.residual.iter().map(|r| r * r).sum::<f64>(), count + 2)
+        });
+        Ok(Estimate { rms_px: (sum / f64::from(count.max(1))).sqrt(), ..estimate })
+    }
+}
+
+impl Fit {
+    fn estimate(self) -> Estimate {
+        Estimate {
+            sigma: self.sigma,
+            common_px: self.common_px,
+            shape: self.board_shape.map(SavedShape::read),
+            excluded: self.excluded.into_iter().map(SavedExcluded::read).collect(),
+            ..Estimate::default()
+        }
+    }
+}
+
+/// The frames of a single camera, which are its views.
+fn frames_of(views: &[SavedView]) -> Vec<FrameEstimate> {
+    let frames = views.iter().map(|view| FrameEstimate {
+        name: view.name.clone(),
+        rig_from_target: view.camera_from_target.pose(),
+        pose_sd: view.camera_from_target.sd().unwrap_or_default(),
+        rms_px: view.rms_px,
+    });
+    frames.collect()
+}
+
+/// A camera that was found, with other views.
+fn known(
+    found: &CameraEstimate,
+    rms_px: f64,
+    views: Vec<SavedView>,
+    frame: impl Fn(usize, &str) -> Option<usize>,
+    reference: &Reference,
+) -> Result<CameraEstimate, SavedError> {
+    let kept = |parameter: &Parameter| Parameter { sd: None, ..parameter.clone() };
+    Ok(CameraEstimate {
+        model: None,
+        parameters: found.parameters.iter().map(kept).collect(),
+        covariance: DMatrix::zeros(0, 0),
+        ill_conditioned: Vec::new(),
+        pose_sd: None,
+        rms_px,
+        views: estimates(views, frame, reference)?,
+        ..found.clone()
+    })
+}
+
+fn estimates(
+    views: Vec<SavedView>,
+    frame: impl Fn(usize, &str) -> Option<usize>,
+    reference: &Reference,
+) -> Result<Vec<ViewEstimate>, SavedError> {
+    let read = |(index, view): (usize, SavedView)| {
+        let frame = frame(index, &view.name).ok_or_else(|| SavedError::Field {
+            field: "views".to_owned(),
+            problem: format!("{} is no frame", view.name),
+        })?;
+        let corners = view.corners.iter().map(|corner| {
+            let panel = reference.panel(corner.panel).ok_or(SavedError::Panel(corner.panel))?;
+            Ok(corner.read(panel))
+        });
+        Ok(ViewEstimate {
+            corners: corners.collect::<Result<_, SavedError>>()?,
+            pose: view.camera_from_target.pose(),
+            name: view.name,
+            image: view.image,
+            frame,
+            rms_px: view.rms_px,
+        })
+    };
+    views.into_iter().enumerate().map(read).collect()
+}
+
+impl SavedCamera {
+    fn estimate(
+        self,
+        name: &str,
+        frame: impl Fn(usize, &str) -> Option<usize>,
+        reference: &Reference,
+    ) -> Result<CameraEstimate, SavedError> {
+        let field = |field: &str, problem: &str| SavedError::Field {
+            field: field.to_owned(),
+            problem: problem.to_owned(),
+        };
+        let names: Vec<&str> = self.parameters.iter().map(|p| p.name.as_str()).collect();
+        let blank = lens_of(&names)
+            .map(|lens| Camera::centred(self.width, self.height, 1.0, lens))
+            .ok_or_else(|| field("parameters", "they are those of no lens here"))?;
+        let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
+        let sds: Vec<f64> = self.parameters.iter().filter_map(|p| p.sd).collect();
+        let rows = &self.correlations;
+        if rows.len() != sds.len() || rows.iter().any(|row| row.len() != sds.len()) {
+            return Err(field("correlations", "there is not one for each pair of parameters"));
+        }
+        let parameters = self.parameters.iter();
+        let parameters =
+            parameters.map(|p| Parameter { name: p.name.clone(), value: p.value, sd: p.sd });
+        let place = self.camera_from_rig.as_ref();
+        Ok(CameraEstimate {
+            name: name.to_owned(),
+            camera: blank.with_parameters(&values),
+            model: self.model.parse().ok(),
+            parameters: parameters.collect(),
+            covariance: DMatrix::from_fn(sds.len(), sds.len(), |i, j| rows[i][j] * sds[i] * sds[j]),
+            ill_conditioned: self.loose,
+            camera_from_rig: place.map_or(Pose::IDENTITY, SavedPose::pose),
+            pose_sd: place.and_then(SavedPose::sd),
+            views: estimates(self.views, frame, reference)?,
+            rms_px: self.rms_px,
+        })
+    }
+}
+
+/// The lens whose camera has parameters of these names.
+fn lens_of(names: &[&str]) -> Option<Lens> {
+    let terms = names.len().saturating_sub(4);
+    let models = [
+        Model::Radtan,
+        Model::Eucm,
+        Model::DoubleSphere,
+        Model::Pupil,
+        Model::KannalaBrandt(terms),
+    ];
+    let mut lenses = models.into_iter().map(Model::lens);
+    lenses.find(|lens| Camera::centred(1, 1, 1.0, lens.clone()).parameter_names() == names)
+}
+
+impl SavedPose {
+    fn pose(&self) -> Pose {
+        let rotation = DMat3::from_cols_array(&self.rotation).transpose();
+        Pose {
+            rotation: DQuat::from_mat3(&rotation).normalize(),
+            translation: DVec3::from(self.translation_mm),
+        }
+    }
+
+    fn sd(&self) -> Option<[f64; 6]> {
+        let ([a, b, c], [d, e, f]) = (self.rotation_sd_rad?, self.translation_sd_mm?);
+        Some([a, b, c, d, e, f])
+    }
+}
+
+impl SavedFrame {
+    fn read(self) -> FrameEstimate {
+        FrameEstimate {
+            rig_from_target: self.rig_from_target.pose(),
+            pose_sd: self.rig_from_target.sd().unwrap_or_default(),
+            name: self.name,
+            rms_px: self.rms_px,
+        }
+    }
+}
+
+impl SavedCorner {
+    fn read(&self, panel: PanelRef) -> Corner {
+        let Self { row, col, outlier, .. } = *self;
+        let (pixel, residual) = ([self.x, self.y], [self.dx, self.dy]);
+        Corner { panel, row, col, pixel, residual, outlier }
+    }
+}
+
+impl SavedShape {
+    fn read(self) -> BoardShape {
+        let Self { reach_mm, coefficients_mm, sd_mm, f_ratio, bent_mm, stretched_mm, .. } = self;
+        let shape = Shape { middle_mm: self.middle_mm.into(), reach_mm, coefficients_mm };
+        BoardShape { shape, sd_mm, f_ratio, bent_mm, stretched_mm }
+    }
+}
+
+impl SavedExcluded {
+    fn read(self) -> Excluded {
+        let Self { camera, view, image, panel, corners, reason } = self;
+        Excluded { camera, view, image, panel, corners, reason: Reason::Foreign(reason) }
+    }
+}
