@@ -112,6 +112,8 @@ fn of_rig(report: &Report) -> Vec<Figure> {
 
 fn of_print(report: &Report) -> Option<Figure> {
     let (um, deviation) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_deviation))?;
+    // Adding zero makes a negative zero positive.
+    let um = (10.0 * um).round() / 10.0 + 0.0;
     let growth = format!("{um:.1} ± {deviation:.1} µm").replace('-', "−");
     Some((growth, "growth of what is dark"))
 }
