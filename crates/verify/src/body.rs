@@ -12,6 +12,7 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::model::{Facet, load_stl};
+use super::reader::Reader;
 use super::solid::{is_other_mesh, other_count};
 use super::{BodyVerdict, DocumentError, Finding, Format, MESH_TOLERANCE_MM, Verdict, Verifier};
 use deltille_core::targets::{
@@ -36,15 +37,19 @@ const SAME_MIDDLE: usize = 4;
 /// Places along a side of a face at which it is felt.
 const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
 
-/// Reads an STL from disk and compares it with the target.
-pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
+/// Reads an STL and compares it with the target.
+pub(super) fn verify(
+    verifier: &Verifier,
+    reader: &Reader,
+    path: &Path,
+) -> Result<Verdict, DocumentError> {
     let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
     let target = verifier.target;
     let TargetSpec::Solid(spec) = &target.spec else {
         return Err(unreadable("the target is no solid"));
     };
     let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let facets = load_stl(path, &verifier.limits)?;
+    let facets = load_stl(reader, path)?;
     let solid = spec.polyhedron();
     let mut body = BodyVerdict {
         triangles: facets.len(),

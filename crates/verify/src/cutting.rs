@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use super::reader::Reader;
 use super::{CutVerdict, DocumentError, Finding, Format, Verdict, Verifier, VerifyError};
 use deltille_core::artwork::{self, CutDrawing, CutLayer, CutPath};
 use deltille_files::export::dxf::{self, DxfError};
@@ -13,11 +14,15 @@ const CUT_TOLERANCE_MM: f64 = 0.001;
 /// A path that is nearer to a stated one than this is that path, moved, mm.
 const MOVED_MM: f64 = 20.0;
 
-/// Reads a `.dxf` from disk and compares it with the target's panels or its net, as the name of
+/// Reads a `.dxf` and compares it with the target's panels or its net, as the name of
 /// the file tells.
-pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, VerifyError> {
+pub(super) fn verify(
+    verifier: &Verifier,
+    reader: &Reader,
+    path: &Path,
+) -> Result<Verdict, VerifyError> {
     let stated = stated(verifier, path)?;
-    let text = verifier.limits.read_text(path).map_err(DocumentError::from)?;
+    let text = reader.read_text(path)?;
     let mut cut = CutVerdict::default();
     let findings = match dxf::read(&text) {
         Ok(found) => compare(found, stated, &mut cut),

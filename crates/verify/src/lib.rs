@@ -1,4 +1,8 @@
-//! An artifact read back from disk, seen, detected and compared with its target.
+//! An artifact read back, seen, detected and compared with its target.
+//!
+//! [`verify`] takes files as bytes: it opens none, starts no thread or program of its own and asks for no
+//! time, so that it does where there is no file system. [`Verifier::verify_path`] is the same for files on
+//! disk, which are read within [`Limits`]; code of others then has a thread with an end in time.
 //!
 //! Nothing here knows how a file was drawn: a PDF is rasterised by hayro, an SVG by resvg, and the
 //! picture goes through the detector like a photograph. Then, for each page:
@@ -53,12 +57,13 @@ mod fold;
 mod listing;
 mod marks;
 mod model;
+mod on_disk;
+mod reader;
 mod solid;
 mod tags;
 mod tiles;
 mod verdict;
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -67,14 +72,16 @@ use deltille_core::detect::{Detector, DetectorConfig, Ink, Tone};
 use deltille_core::family::Family;
 use deltille_core::targets::{SheetLayout, SheetPage, Target};
 use deltille_files::export::{obj, sheet_file_name};
-use deltille_files::limits::Limits;
+use deltille_files::limits::{Guard, Limits};
 use fit::AffineMap;
 use fold::Seen;
+use reader::Reader;
 use tiles::PlacedPanel;
 
 pub use document::{Document, DocumentError, Format, Page};
 pub use finding::Finding;
 pub use fold::FOLD_TOLERANCE_MM;
+pub use reader::Artifact;
 pub use solid::MESH_TOLERANCE_MM;
 pub use verdict::{
     BodyVerdict, CutVerdict, FaceVerdict, FoldVerdict, ListVerdict, SheetVerdict, Verdict,
@@ -167,12 +174,52 @@ pub enum VerifyError {
     },
 }
 
+/// Compares the artifact of that name among files in memory with its target, whose family must be
+/// given if it has tags. The extension of the name tells the [`Format`].
+///
+/// An artifact may be several files. Those that belong to it must be among `files`, in any order: the
+/// other pages of a net (`net-1.svg`, `net-2.svg`), the material library and the texture that an OBJ
+/// names. Others are not looked at.
+///
+/// What is wrong is in the [`Verdict`]. An error means that there is nothing to compare: a file that is
+/// not given or cannot be read, or a target that has no such artifact.
+///
+/// ```
+/// use deltille_core::artwork;
+/// use deltille_core::lattice::GridKind;
+/// use deltille_core::targets::{BoardSpec, PaperSpec, Target, TargetSpec};
+/// use deltille_files::export::svg;
+/// use deltille_verify::{Artifact, verify};
+///
+/// let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 4, 5, 20.0) };
+/// let spec = TargetSpec::Board(spec);
+/// let board = Target::build("board", &spec, None, Some(&PaperSpec::default()))?;
+/// let mut artwork = artwork::draw(&board, None)?;
+/// let good = [Artifact::new("board.svg", svg::to_string(&artwork, 0))];
+/// assert!(verify(&board, None, "board.svg", &good)?.passed);
+///
+/// artwork.sheets[0].shapes.remove(0);
+/// let bad = [Artifact::new("board.svg", svg::to_string(&artwork, 0))];
+/// let verdict = verify(&board, None, "board.svg", &bad)?;
+/// assert_eq!(verdict.to_string(), "board.svg: FAILED, tile missing at row 0 col 0");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn verify(
+    target: &Target,
+    family: Option<&Family>,
+    name: &str,
+    files: &[Artifact],
+) -> Result<Verdict, VerifyError> {
+    Verifier::new(target, family)?.verify(name, files)
+}
+
 /// Compares artifacts with their target.
 pub struct Verifier<'a> {
     target: &'a Target,
     family: Option<&'a Family>,
     detector: Detector,
     limits: Limits,
+    guard: Guard,
     cancel: Option<&'a AtomicBool>,
 }
 
@@ -201,12 +248,25 @@ impl<'a> Verifier<'a> {
             family,
             DetectorConfig { tone: Tone::Linear, ink: Ink::Um(0.0), ..DetectorConfig::default() },
         );
-        Ok(Self { target, family, detector, limits: Limits::default(), cancel: None })
+        Ok(Self {
+            target,
+            family,
+            detector,
+            limits: Limits::default(),
+            guard: Guard::default(),
+            cancel: None,
+        })
     }
 
     /// The same, and reading artifacts within other limits than the default.
     pub fn within(self, limits: Limits) -> Self {
         Self { limits, ..self }
+    }
+
+    /// The same, and running code of others so for artifacts in memory: [`Guard::Here`] unless this
+    /// is called. Where there are threads and files come from anybody, take [`Guard::Timed`].
+    pub fn guarded_by(self, guard: Guard) -> Self {
+        Self { guard, ..self }
     }
 
     /// The same, and looking at `flag` before each page: once it is set, [`verify`](Self::verify)
@@ -238,28 +298,6 @@ impl<'a> Verifier<'a> {
         (0..count).map(file).collect()
     }
 
-    /// What is wrong with files that are named together: pages are left out that belong to others.
-    /// One page may be named alone where it can be verified so and `alone` says that it is meant to.
-    pub fn left_out(&self, named: &[PathBuf], alone: bool) -> Vec<Verdict> {
-        // A folder may be named in several ways.
-        let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
-        let named: Vec<PathBuf> = named.iter().map(absolute).collect();
-        let sets: BTreeSet<Vec<PathBuf>> = named.iter().map(|path| self.pages_with(path)).collect();
-        let mut verdicts = Vec::new();
-        for pages in sets {
-            let verified_together = self.set_of(&pages[0]).len() > 1;
-            let missing: Vec<&PathBuf> =
-                pages.iter().filter(|page| !named.contains(page)).collect();
-            let single = alone && missing.len() + 1 == pages.len();
-            if let Some(format) = Format::of(&pages[0])
-                && !(verified_together || single || missing.is_empty())
-            {
-                verdicts.push(Self::without(&pages, format, &missing));
-            }
-        }
-        verdicts
-    }
-
     /// Pages of which some are missing.
     fn without(pages: &[PathBuf], format: Format, missing: &[&PathBuf]) -> Verdict {
         let findings = missing.iter().map(|page| Finding::PageMissing { page: file_name(page) });
@@ -267,9 +305,17 @@ impl<'a> Verifier<'a> {
         Verdict { artifact: of_all(pages), ..verdict }
     }
 
-    /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
-    /// that its name tells; for a page of a net all files of [`set_of`](Self::set_of) are read.
-    pub fn verify(&self, path: &Path) -> Result<Verdict, VerifyError> {
+    /// Compares the artifact of that name among files in memory. A PDF shows all sheets, an SVG or
+    /// PNG the one that its name tells. What belongs to the artifact must be among the files too:
+    /// all pages of [`set_of`](Self::set_of) for one of a net, its material library and texture for
+    /// an OBJ.
+    pub fn verify(&self, name: &str, files: &[Artifact]) -> Result<Verdict, VerifyError> {
+        let reader = Reader { files: &files, limits: self.limits, guard: self.guard };
+        self.verify_by(&reader, Path::new(name))
+    }
+
+    /// Compares an artifact, wherever it is.
+    fn verify_by(&self, reader: &Reader, path: &Path) -> Result<Verdict, VerifyError> {
         let name = file_name(path);
         let of_mesh = [".mtl", &obj::texture_name("")].map(|end| name.strip_suffix(end));
         if let Some(mesh) = of_mesh.into_iter().flatten().next() {
@@ -280,18 +326,20 @@ impl<'a> Verifier<'a> {
             return Err(VerifyError::OtherKind { path: path.to_owned() });
         };
         match format {
-            Format::Dsc => return Ok(listing::verify(self, path)?),
-            Format::Dxf => return cutting::verify(self, path),
-            Format::Pdf | Format::Svg | Format::Png => return self.verify_sheets(path, format),
+            Format::Dsc => return Ok(listing::verify(self, reader, path)?),
+            Format::Dxf => return cutting::verify(self, reader, path),
+            Format::Pdf | Format::Svg | Format::Png => {
+                return self.verify_sheets(reader, path, format);
+            }
             Format::Glb | Format::Obj | Format::Stl => {}
         }
-        let refused = construct::check(path, format, self.target, &self.limits)?;
+        let (refused, parts) = construct::check(reader, path, format, self.target)?;
         if construct::refuse(&refused) {
             return Ok(Verdict::new(path, format, refused));
         }
         let mut verdict = match format {
-            Format::Stl => body::verify(self, path)?,
-            _ => solid::verify(self, path, format)?,
+            Format::Stl => body::verify(self, reader, path)?,
+            _ => solid::verify(self, path, model::load(reader, path, parts)?, format),
         };
         verdict.passed &= refused.is_empty();
         verdict.findings.extend(refused);
@@ -299,26 +347,29 @@ impl<'a> Verifier<'a> {
     }
 
     /// Compares printed pages.
-    fn verify_sheets(&self, path: &Path, format: Format) -> Result<Verdict, VerifyError> {
+    fn verify_sheets(
+        &self,
+        reader: &Reader,
+        path: &Path,
+        format: Format,
+    ) -> Result<Verdict, VerifyError> {
         if self.target.sheets.is_empty() {
             let (path, target) = (path.to_owned(), self.target.name.to_string());
             return Err(VerifyError::NoSheets { path, target });
         }
         let mut findings = Vec::new();
         let files = self.set_of(path);
-        let missing: Vec<&PathBuf> = files.iter().filter(|file| !file.exists()).collect();
-        if path.exists() && !missing.is_empty() {
+        let missing: Vec<&PathBuf> = files.iter().filter(|file| !reader.has(file)).collect();
+        if reader.has(path) && !missing.is_empty() {
             return Ok(Self::without(&files, format, &missing));
         }
-        let refused = self.refused(&files, format)?;
+        let refused = self.refused(reader, &files, format)?;
         if construct::refuse(&refused) {
             return Ok(Verdict::new(path, format, refused));
         }
         findings.extend(refused);
-        let documents: Vec<Document> = files
-            .iter()
-            .map(|file| Document::open_within(file, &self.limits))
-            .collect::<Result<_, _>>()?;
+        let documents: Vec<Document> =
+            files.iter().map(|file| Document::read_by(reader, file)).collect::<Result<_, _>>()?;
         let stated = self.target.page_count();
         // Where each page of the target is to be seen.
         let sources: Vec<Option<Source>> = match format {
@@ -368,10 +419,15 @@ impl<'a> Verifier<'a> {
     }
 
     /// What is not on the list of a format in files that belong together.
-    fn refused(&self, files: &[PathBuf], format: Format) -> Result<Vec<Finding>, DocumentError> {
+    fn refused(
+        &self,
+        reader: &Reader,
+        files: &[PathBuf],
+        format: Format,
+    ) -> Result<Vec<Finding>, DocumentError> {
         let mut refused = Vec::new();
         for file in files {
-            let found = construct::check(file, format, self.target, &self.limits)?;
+            let (found, _) = construct::check(reader, file, format, self.target)?;
             refused.extend(found.into_iter().map(|finding| match files.len() {
                 1 => finding,
                 _ => Finding::OnPage { page: file_name(file), finding: Box::new(finding) },

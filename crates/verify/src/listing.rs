@@ -5,6 +5,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::reader::Reader;
 use super::{DocumentError, Finding, Format, ListVerdict, Verdict, Verifier};
 use deltille_core::targets::{Panel, Target};
 use deltille_files::export::dsc::{self, Dialect};
@@ -12,9 +13,13 @@ use deltille_files::export::dsc::{self, Dialect};
 /// Largest deviation of a position or an edge, mm: what written digits leave.
 const LIST_TOLERANCE_MM: f64 = 1e-6;
 
-/// Reads a `.dsc` from disk and compares it with the target.
-pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
-    let text = &verifier.limits.read_text(path).map_err(DocumentError::from)?;
+/// Reads a `.dsc` and compares it with the target.
+pub(super) fn verify(
+    verifier: &Verifier,
+    reader: &Reader,
+    path: &Path,
+) -> Result<Verdict, DocumentError> {
+    let text = &reader.read_text(path)?;
     if text.lines().next().is_none_or(|head| head.split(',').count() != 4) {
         let problem = "not a .dsc: it does not start with a line `id,A,B,size`";
         return Err(DocumentError::unreadable(path, problem));

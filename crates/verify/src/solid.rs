@@ -10,9 +10,9 @@ use super::board::wrong_tones;
 use super::face_page::face_page;
 use super::fit::AffineMap;
 use super::marks::spots;
-use super::model::{self, Model, View};
+use super::model::{Model, View};
 use super::tiles::PlacedPanel;
-use super::{DocumentError, FaceVerdict, Finding, Format, Verdict, Verifier};
+use super::{FaceVerdict, Finding, Format, Verdict, Verifier};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::detect::Detection;
 use deltille_core::lattice::Vertex;
@@ -57,13 +57,8 @@ pub(super) fn is_other_mesh(found: usize, stated: usize) -> bool {
     found > MOST_TRIANGLES * stated
 }
 
-/// Reads a mesh from disk and compares it with the target.
-pub(super) fn verify(
-    verifier: &Verifier,
-    path: &Path,
-    format: Format,
-) -> Result<Verdict, DocumentError> {
-    let model = model::load(path, &verifier.limits)?;
+/// Compares a loaded mesh with the target.
+pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: Format) -> Verdict {
     let mut findings = Vec::new();
     let mut faces = Vec::new();
     let scale = scale(verifier, &model);
@@ -77,7 +72,7 @@ pub(super) fn verify(
         let [found, stated] = [model.triangles.len(), spec.polyhedron().faces.len()];
         findings.extend(other_count(found, stated));
         if is_other_mesh(found, stated) {
-            return Ok(Verdict::new(path, format, findings));
+            return Verdict::new(path, format, findings);
         }
     }
     let wrong = model.triangles.iter().filter(|triangle| {
@@ -94,7 +89,7 @@ pub(super) fn verify(
     }
     let mut verdict = Verdict::new(path, format, findings);
     verdict.passed &= faces.iter().all(|face| face.findings.is_empty());
-    Ok(Verdict { faces, ..verdict })
+    Verdict { faces, ..verdict }
 }
 
 /// Largest distance from the origin on the mesh over that on the target's solid, and the latter,

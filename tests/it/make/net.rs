@@ -51,7 +51,7 @@ fn verify(target: &Target, artwork: &Artwork, extension: &str) -> Verdict {
         }),
     }
     let first = if extension == "pdf" { folder.path().join("t.pdf") } else { path(0) };
-    Verifier::new(target, Some(&family())).unwrap().verify(&first).unwrap()
+    Verifier::new(target, Some(&family())).unwrap().verify_path(&first).unwrap()
 }
 
 #[track_caller]

@@ -60,7 +60,7 @@ fn verdict(ids: &[u32], edit: impl Fn(&str) -> String) -> deltille::verify::Verd
     let drawn = artwork::draw(&build(ids), Some(&family)).unwrap();
     std::fs::write(&path, edit(&svg::to_string(&drawn, 0))).unwrap();
     let target = build(&[5, 6, 7, 8]);
-    Verifier::new(&target, Some(&family)).unwrap().verify(&path).unwrap()
+    Verifier::new(&target, Some(&family)).unwrap().verify_path(&path).unwrap()
 }
 
 #[test]

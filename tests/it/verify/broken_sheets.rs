@@ -74,7 +74,7 @@ impl Board {
                 path("png")
             }
         };
-        Verifier::new(&self.target, Some(&self.family)).unwrap().verify(&path).unwrap()
+        Verifier::new(&self.target, Some(&self.family)).unwrap().verify_path(&path).unwrap()
     }
 
     /// The first tag's tile.
@@ -354,7 +354,7 @@ fn verify_toned(board: &Board, tone: impl Fn(u8) -> u8) -> Verdict {
     encoder.set_depth(info.bit_depth);
     encoder.set_pixel_dims(info.pixel_dims);
     encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
-    Verifier::new(&board.target, Some(&board.family)).unwrap().verify(&path).unwrap()
+    Verifier::new(&board.target, Some(&board.family)).unwrap().verify_path(&path).unwrap()
 }
 
 #[test]

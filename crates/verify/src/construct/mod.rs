@@ -21,12 +21,11 @@ use std::path::Path;
 use flate2::{Decompress, FlushDecompress, Status};
 use serde_json::Value;
 
-use super::document::bounded;
-use super::{DocumentError, Finding, Format};
+use super::reader::Reader;
+use super::{Artifact, DocumentError, Finding, Format};
 use deltille_core::artwork::subject;
 use deltille_core::targets::Target;
 use deltille_files::export::mesh::extras;
-use deltille_files::limits::Limits;
 
 /// Of marks that a viewer which shows more than the page shows too.
 const OFF_PAGE: &str = "a mark that reaches over the edge of the page";
@@ -130,19 +129,20 @@ fn is_creator(words: &str) -> bool {
 }
 
 /// What of a drawn page, a mesh or a body is not on the list of its format, or says in words
-/// what the target is not. An error means that the file cannot be read at all.
+/// what the target is not; and the files that belong to it, as an OBJ names them. An error means that
+/// a file cannot be read at all.
 pub(super) fn check(
+    reader: &Reader,
     path: &Path,
     format: Format,
     target: &Target,
-    limits: &Limits,
-) -> Result<Vec<Finding>, DocumentError> {
-    let bytes = limits.read(path)?;
-    let (words, limits) = (Words::of(target), *limits);
+) -> Result<(Vec<Finding>, Vec<Artifact>), DocumentError> {
+    let bytes = reader.read(path)?;
+    let (words, limits) = (Words::of(target), reader.limits);
     if format == Format::Obj {
-        return obj::check(path, &bytes, &words, &limits).map(|found| found.0);
+        return obj::check(reader, path, &bytes, &words).map(|(found, parts)| (found.0, parts));
     }
-    let found = bounded(path, &limits, move || match format {
+    let found = reader.run(path, move || match format {
         Format::Svg => svg::check(&bytes, &words, &limits),
         Format::Pdf => pdf::check(&bytes, &words, &limits),
         Format::Png => png::check(&bytes, &words.title, &limits),
@@ -151,7 +151,7 @@ pub(super) fn check(
         // Their readers know nothing but what is written.
         Format::Obj | Format::Dsc | Format::Dxf => Ok(Findings::default()),
     })?;
-    Ok(found.0)
+    Ok((found.0, Vec::new()))
 }
 
 /// The text of a file.
