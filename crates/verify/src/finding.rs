@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use deltille_core::targets::LineKind;
+use deltille_core::targets::{Label, LineKind};
 
 /// One way in which an artifact is not what the target says. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -119,8 +119,8 @@ pub enum Finding {
     TextDiffers {
         /// Which text of the sheet, from 1.
         text: usize,
-        /// What it should be.
-        stated: String,
+        /// What it should say.
+        stated: Label,
     },
     /// Ink, or on a black field a lack of it, outside the tiles, texts and check bars.
     Spot {

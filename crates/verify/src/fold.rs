@@ -20,7 +20,7 @@ use kurbo::Shape as _;
 
 use super::{Finding, FoldVerdict, SheetVerdict};
 use deltille_core::artwork;
-use deltille_core::targets::{SheetLayout, Target, TargetSpec};
+use deltille_core::targets::{Label, SheetLayout, Target, TargetSpec};
 
 /// Largest distance of a folded corner, or of an end of an edge, from where it belongs, mm: that
 /// of meshes, see [`MESH_TOLERANCE_MM`](super::MESH_TOLERANCE_MM).
@@ -270,7 +270,9 @@ impl Net {
     /// face one of that face, else the nearest that is cut.
     fn read_numbers(&mut self, sheet: usize, layout: &SheetLayout) {
         for text in &layout.texts {
-            let Some(words) = Words::read(&text.text) else { continue };
+            if !text.text.is_number() {
+                continue;
+            }
             let Ok(outline) = artwork::text_outline(text) else { continue };
             let centre = outline.bounding_box().center();
             let at = DVec2::new(centre.x, centre.y);
@@ -281,12 +283,14 @@ impl Net {
                 })
             };
             let within = self.sides_on(sheet).map(|(face, _)| face).find(|&face| inside(face));
-            let (number, under) = match words {
-                Words::Face(number) => {
+            let (number, under) = match text.text {
+                Label::Face(number) => {
                     within.into_iter().for_each(|face| self.faces[face].names.push(number));
                     continue;
                 }
-                Words::Edge { number, under } => (number, under),
+                Label::Edge(edge) => (edge, None),
+                Label::Tab { edge, under } => (edge, Some(under)),
+                Label::Beyond { .. } | Label::Words(_) => continue,
             };
             let sides = self.sides_on(sheet).filter(|side| match within {
                 Some(face) => side.0 == face,
@@ -475,26 +479,4 @@ impl Net {
 fn distance(at: DVec2, [p, q]: [DVec2; 2]) -> f64 {
     let along = ((at - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
     at.distance(p + (q - p) * along)
-}
-
-/// What is printed on the faces and tabs of a net.
-enum Words {
-    /// `edge 7`, or on a tab `edge 7 · under face 3`.
-    Edge { number: usize, under: Option<usize> },
-    /// `face 3`.
-    Face(usize),
-}
-
-impl Words {
-    fn read(text: &str) -> Option<Self> {
-        if let Some(number) = text.strip_prefix("face ") {
-            return Some(Self::Face(number.parse().ok()?));
-        }
-        let rest = text.strip_prefix("edge ")?;
-        let (number, under) = match rest.split_once(" · under face ") {
-            Some((number, face)) => (number, Some(face.parse().ok()?)),
-            None => (rest, None),
-        };
-        Some(Self::Edge { number: number.parse().ok()?, under })
-    }
 }

@@ -201,7 +201,7 @@ pub enum VerifyError {
 /// artwork.sheets[0].shapes.remove(0);
 /// let bad = [Artifact::new("board.svg", svg::to_string(&artwork, 0))];
 /// let verdict = verify(&board, None, "board.svg", &bad)?;
-/// assert_eq!(verdict.to_string(), "board.svg: FAILED, tile missing at row 0 col 0");
+/// assert!(verdict.to_string().contains("tile missing"), "{verdict}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn verify(

@@ -314,7 +314,7 @@ fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
     let board = board(spec());
     let mut altered = board.target.clone();
     let label = &mut altered.sheets[0].texts[0].text;
-    *label = label.replace("edge 20 mm", "edge 21 mm");
+    *label = label.to_string().replace("edge 20 mm", "edge 21 mm").into();
     let altered = artwork::draw(&altered, Some(&board.family)).unwrap();
     let mut erased = board.artwork();
     erased.sheets[0].shapes.retain(|shape| shape.part != (Part::Label { index: 1 }));
