@@ -79,7 +79,10 @@ use reader::Reader;
 use tiles::PlacedPanel;
 
 pub use document::{Document, DocumentError, Format, Page};
-pub use finding::Finding;
+pub use finding::{
+    BoardFinding, ConstructFinding, CutFinding, Finding, FoldFinding, ListFinding, MarkFinding,
+    MeshFinding, PageFinding, TileFinding,
+};
 pub use fold::FOLD_TOLERANCE_MM;
 pub use reader::Artifact;
 pub use solid::MESH_TOLERANCE_MM;
@@ -136,7 +139,10 @@ pub enum VerifyError {
         whole: String,
     },
     /// The file name does not tell which sheet is on it.
-    #[error("{}: the target has {sheets} sheets; name the file {example} for the first", path.display())]
+    #[error(
+        "{}: the target has {sheets} sheets; name the file {example} for the first",
+        path.display()
+    )]
     WhichSheet {
         /// The file.
         path: PathBuf,
@@ -300,7 +306,8 @@ impl<'a> Verifier<'a> {
 
     /// Pages of which some are missing.
     fn without(pages: &[PathBuf], format: Format, missing: &[&PathBuf]) -> Verdict {
-        let findings = missing.iter().map(|page| Finding::PageMissing { page: file_name(page) });
+        let findings =
+            missing.iter().map(|page| PageFinding::PageMissing { page: file_name(page) }.into());
         let verdict = Verdict::new(&pages[0], format, findings.collect());
         Verdict { artifact: of_all(pages), ..verdict }
     }
@@ -376,7 +383,7 @@ impl<'a> Verifier<'a> {
             Format::Pdf => {
                 let found = documents[0].pages();
                 if found != stated {
-                    findings.push(Finding::Pages { found, stated });
+                    findings.push(PageFinding::Pages { found, stated }.into());
                 }
                 let source =
                     |page| (page < found).then_some(Source { document: &documents[0], page });
@@ -430,7 +437,7 @@ impl<'a> Verifier<'a> {
             let (found, _) = construct::check(reader, file, format, self.target)?;
             refused.extend(found.into_iter().map(|finding| match files.len() {
                 1 => finding,
-                _ => Finding::OnPage { page: file_name(file), finding: Box::new(finding) },
+                _ => finding.on_page(file_name(file)),
             }));
         }
         Ok(refused)
@@ -504,10 +511,8 @@ impl<'a> Verifier<'a> {
             let mut verdict = SheetVerdict::new(index, &page, wrong);
             check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
             marks::check(&page, marks, &[], Some(*window_mm), &mut verdict);
-            findings.extend(verdict.findings.into_iter().map(|finding| Finding::OnPage {
-                page: label.clone(),
-                finding: Box::new(finding),
-            }));
+            let of_page = verdict.findings.into_iter();
+            findings.extend(of_page.map(|finding| finding.on_page(label.clone())));
             check_bars_mm.extend(verdict.check_bars_mm);
             // Kept no finer than the sheet is looked at.
             pages.push(if wish > most { source.render(marks, most)?.0 } else { page });
@@ -533,8 +538,10 @@ impl<'a> Verifier<'a> {
         } else {
             board::check(self, page, layout, verdict)
         };
-        let toneless =
-            |f: &Finding| matches!(f, Finding::Inverted { .. } | Finding::Contrast { .. });
+        let toneless = |finding: &Finding| {
+            use BoardFinding::{Contrast, Inverted};
+            matches!(finding, Finding::Board(Inverted { .. } | Contrast { .. }))
+        };
         if verdict.findings.iter().any(toneless) {
             return seen;
         }
@@ -581,7 +588,7 @@ impl Source<'_> {
         }
         let mut page = self.document.render(self.page, px_per_mm)?;
         if (0..2).any(|i| (found_mm[i] - stated_mm[i]).abs() > tolerance_mm) {
-            return Ok((page, vec![Finding::PageSize { found_mm, stated_mm }]));
+            return Ok((page, vec![PageFinding::PageSize { found_mm, stated_mm }.into()]));
         }
         // Pictures begin at the upper edge and end with a whole pixel: heights are counted from
         // the true lower edge, not from the end of the last pixel.
@@ -624,7 +631,8 @@ fn check_bars(
             bars::measure(page, [bar.from_mm, bar.to_mm].map(|end| found_from_stated.apply(end)));
         verdict.check_bars_mm.push((stated_mm, found_mm));
         if found_mm.is_none_or(|found| (found - stated_mm).abs() > TOLERANCE_MM) {
-            verdict.findings.push(Finding::CheckBar { bar: index + 1, found_mm, stated_mm });
+            let finding = MarkFinding::CheckBar { bar: index + 1, found_mm, stated_mm };
+            verdict.findings.push(finding.into());
         }
     }
 }

@@ -7,7 +7,7 @@ use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
 use deltille::lattice::{GridKind, Vertex};
 use deltille::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
-use deltille::verify::{Finding, Verdict, Verifier};
+use deltille::verify::{Finding, TileFinding, Verdict, Verifier};
 use kurbo::{Affine, BezPath, Point};
 use tempfile::TempDir;
 
@@ -304,7 +304,9 @@ fn dirt_and_holes_in_tiles_are_found() {
     for format in ALL {
         let verdict = board.verify(&artwork, format);
         let spots = &verdict.sheets[0].findings;
-        let spots = spots.iter().filter(|finding| matches!(finding, Finding::Blemish { .. }));
+        let spots = spots
+            .iter()
+            .filter(|finding| matches!(finding, Finding::Tile(TileFinding::Blemish { .. })));
         assert_eq!(spots.count(), 2, "{verdict}");
     }
 }
