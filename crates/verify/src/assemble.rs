@@ -5,8 +5,8 @@
 
 use rayon::prelude::*;
 
-use super::Finding;
 use super::document::Page;
+use super::{Finding, PageFinding};
 use deltille_core::raster::Gray;
 use deltille_core::targets::{SheetLayout, SheetPage};
 
@@ -82,7 +82,7 @@ pub(super) fn assemble(
             named.push(pages);
             let labels = pages.map(|index| layout.pages[index].label.clone());
             let at_mm = sheet.page_from_px([x as f64, y as f64]);
-            findings.push(Finding::PagesDiffer { pages: labels, at_mm });
+            findings.push(PageFinding::PagesDiffer { pages: labels, at_mm }.into());
         }
     }
     (sheet, findings)

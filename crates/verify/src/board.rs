@@ -2,7 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use serde::Serialize;
+
 use super::document::Page;
+use super::finding::shown;
 use super::fit::AffineMap;
 use super::fold::Seen;
 use super::tiles::PlacedPanel;
@@ -27,6 +30,147 @@ const MAX_TONE_ERROR: f64 = 0.01;
 /// Difference of ink below which a sheet is called blank rather than faint.
 const MIN_CONTRAST: f64 = 0.03;
 
+/// What is wrong with a board, or with its corners. Lengths in mm in the page frame.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum BoardFinding {
+    /// The panel was not recognised.
+    #[error("board {panel} not recognised")]
+    PanelMissing {
+        /// Its id.
+        panel: u32,
+    },
+    /// The picture shows another board: its corners are not those of the target.
+    #[error("shows another board: {found} corners instead of {stated}")]
+    AnotherBoard {
+        /// Corners that were found.
+        found: usize,
+        /// Corners that the target has on the sheet.
+        stated: usize,
+    },
+    /// Black and white are exchanged.
+    #[error("board {panel} is inverted (black and white exchanged)")]
+    Inverted {
+        /// Panel id.
+        panel: u32,
+    },
+    /// Black and white tiles differ too little.
+    #[error(
+        "contrast of board {panel} too low: black tiles have {:.0} % ink, white ones {:.0} %",
+        100.0 * ink[1], 100.0 * ink[0]
+    )]
+    Contrast {
+        /// Panel id.
+        panel: u32,
+        /// Ink of white and black tiles, 0 to 1.
+        ink: [f64; 2],
+    },
+    /// A panel was recognised that belongs on another sheet.
+    #[error("shows board {panel} of another sheet")]
+    PanelForeign {
+        /// Its id.
+        panel: u32,
+    },
+    /// The panel is seen as in a mirror.
+    #[error("board {panel} is mirrored")]
+    Mirrored {
+        /// Its id.
+        panel: u32,
+    },
+    /// The panel is larger or smaller than stated.
+    #[error("scale {scale:.4}")]
+    Scale {
+        /// Its id.
+        panel: u32,
+        /// Found over stated length.
+        scale: f64,
+    },
+    /// The panel is stretched: its scales along the page's axes differ.
+    #[error("stretched: scale {:.4} along x, {:.4} along y", scale[0], scale[1])]
+    Stretched {
+        /// Its id.
+        panel: u32,
+        /// Found over stated length along x and y.
+        scale: [f64; 2],
+    },
+    /// The panel is turned on the page.
+    #[error("turned by {:.3}°", shown_angle(*angle_deg))]
+    Turned {
+        /// Its id.
+        panel: u32,
+        /// Counter-clockwise.
+        angle_deg: f64,
+    },
+    /// The panel lies elsewhere on the page.
+    #[error("shifted by ({:.3}, {:.3}) mm", shown(by_mm[0]), shown(by_mm[1]))]
+    Shifted {
+        /// Its id.
+        panel: u32,
+        /// Found minus stated position of its middle.
+        by_mm: [f64; 2],
+    },
+    /// A corner was not found.
+    #[error("corner {id} at row {row} col {col} not found")]
+    CornerMissing {
+        /// Corner id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+    },
+    /// A corner lies elsewhere, all else being right.
+    #[error(
+        "corner {id} at row {row} col {col} off by ({:.3}, {:.3}) mm",
+        shown(by_mm[0]), shown(by_mm[1])
+    )]
+    CornerOff {
+        /// Corner id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Found minus stated position.
+        by_mm: [f64; 2],
+    },
+    /// A corner was found where the target has none.
+    #[error("a corner at ({:.2}, {:.2}) mm where none should be", at_mm[0], at_mm[1])]
+    CornerExtra {
+        /// Where.
+        at_mm: [f64; 2],
+    },
+    /// The detector reads a tag that the target does not have there.
+    #[error("tag {id} is read at row {row} col {col}, where it should not be")]
+    TagExtra {
+        /// The id that it reads.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+    },
+}
+
+/// An angle in degrees as it is shown: half a turn is that in either direction.
+fn shown_angle(angle_deg: f64) -> f64 {
+    let angle_deg = shown(angle_deg);
+    if angle_deg == -180.0 { 180.0 } else { angle_deg }
+}
+
+impl BoardFinding {
+    /// Whether the board is as stated but for a corner or a tag.
+    pub(super) fn is_local(&self) -> bool {
+        matches!(
+            self,
+            Self::TagExtra { .. }
+                | Self::CornerMissing { .. }
+                | Self::CornerOff { .. }
+                | Self::CornerExtra { .. }
+        )
+    }
+}
+
 /// Compares all panels of a page; tells where on the page the first of them lies, and where the
 /// corners of each were found.
 pub(super) fn check(
@@ -43,7 +187,7 @@ pub(super) fn check(
     for placement in &layout.placements {
         let id = placement.panel;
         let Some(panel) = verifier.target.panels.iter().find(|panel| panel.id == id) else {
-            verdict.findings.push(Finding::PanelMissing { panel: id });
+            verdict.findings.push(BoardFinding::PanelMissing { panel: id }.into());
             continue;
         };
         verdict.corners += panel.corners.len();
@@ -53,7 +197,7 @@ pub(super) fn check(
                 verifier.detector.detect(&page.mirrored().blurred(), "mirror")
             });
             if mirrored.grids.iter().any(|grid| grid.panel == Some(id)) {
-                verdict.findings.push(Finding::Mirrored { panel: id });
+                verdict.findings.push(BoardFinding::Mirrored { panel: id }.into());
                 let linear = [[-1.0, 0.0], [0.0, 1.0]];
                 mirror = Some(AffineMap { linear, shift: [page.width_mm, 0.0] });
                 continue;
@@ -76,7 +220,8 @@ pub(super) fn check(
     let here: BTreeSet<u32> = layout.placements.iter().map(|p| p.panel).collect();
     let foreign: BTreeSet<u32> =
         detection.grids.iter().filter_map(|g| g.panel).filter(|id| !here.contains(id)).collect();
-    verdict.findings.extend(foreign.into_iter().map(|panel| Finding::PanelForeign { panel }));
+    let foreign = foreign.into_iter().map(|panel| BoardFinding::PanelForeign { panel }.into());
+    verdict.findings.extend(foreign);
     if verdict.corners_found > 0 {
         extra_corners(&detection, &placed, verdict);
     }
@@ -90,17 +235,19 @@ pub(super) fn wrong_tones(placed: &PlacedPanel) -> Option<Finding> {
     let panel = placed.panel.id;
     let ink @ [white, black] = placed.tones()?;
     if white - black > 0.5 {
-        return Some(Finding::Inverted { panel });
+        return Some(BoardFinding::Inverted { panel }.into());
     }
     let faint = black < 1.0 - MAX_TONE_ERROR || white > MAX_TONE_ERROR;
-    (faint && black - white > MIN_CONTRAST).then_some(Finding::Contrast { panel, ink })
+    let contrast = BoardFinding::Contrast { panel, ink };
+    (faint && black - white > MIN_CONTRAST).then_some(contrast.into())
 }
 
 /// Says first that the corners found are those of another board, where too few are the stated ones
 /// and their number differs. All corners count, whether or not they are on the stated board.
 fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
     let unknown = verdict.findings.iter().any(|finding| {
-        matches!(finding, Finding::PanelMissing { .. } | Finding::CornerExtra { .. })
+        use BoardFinding::{CornerExtra, PanelMissing};
+        matches!(finding, Finding::Board(PanelMissing { .. } | CornerExtra { .. }))
     });
     let Some(kind) = verifier.target.panels.first().map(|panel| panel.kind).filter(|_| unknown)
     else {
@@ -117,7 +264,7 @@ fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
     let few = (verdict.corners_found as f64) < (1.0 - MAX_MISSING) * stated as f64;
     let more = found as f64 > (1.0 + MAX_MISSING) * stated as f64;
     if found > 0 && found != stated && (few || more) {
-        verdict.findings.insert(0, Finding::AnotherBoard { found, stated });
+        verdict.findings.insert(0, BoardFinding::AnotherBoard { found, stated }.into());
     }
 }
 
@@ -132,12 +279,12 @@ fn check_panel(
     let panel = placed.panel;
     let found = found_corners(detection, placed);
     if found.is_empty() {
-        verdict.findings.push(Finding::PanelMissing { panel: panel.id });
+        verdict.findings.push(BoardFinding::PanelMissing { panel: panel.id }.into());
     } else {
         verdict.corners_found += found.len();
         let missing = panel.corners.iter().filter(|corner| !found.contains_key(&corner.id));
         let missing: Vec<Finding> = missing
-            .map(|&Corner { id, row, col, .. }| Finding::CornerMissing { id, row, col })
+            .map(|&Corner { id, row, col, .. }| BoardFinding::CornerMissing { id, row, col }.into())
             .collect();
         check_positions(placed, &found, verdict);
         verdict.findings.extend(missing);
@@ -145,10 +292,10 @@ fn check_panel(
     let report = placed.check_tiles(verifier.family);
     verdict.tags_exact += report.tags_exact;
     if report.wrong_tiles as f64 <= MAX_WRONG_TILES * report.tiles as f64 {
-        verdict.findings.extend(report.findings);
+        verdict.findings.extend(report.findings.into_iter().map(Finding::from));
         extra_tags(detection, panel, verdict);
     } else if !found.is_empty() {
-        verdict.findings.push(Finding::PanelMissing { panel: panel.id });
+        verdict.findings.push(BoardFinding::PanelMissing { panel: panel.id }.into());
     }
     found
 }
@@ -220,7 +367,7 @@ fn check_positions(
     let map = AffineMap::fit(&pairs).unwrap_or(AffineMap::IDENTITY);
     let causes = causes(panel, &map, &pairs);
     if !causes.is_empty() {
-        verdict.findings.extend(causes);
+        verdict.findings.extend(causes.into_iter().map(Finding::from));
         placed.found_from_stated = map;
     }
     let map = placed.found_from_stated;
@@ -229,14 +376,14 @@ fn check_positions(
         if distance(expected, found) > TOLERANCE_MM {
             let Corner { id, row, col, .. } = *corner;
             let by_mm = [found[0] - expected[0], found[1] - expected[1]];
-            verdict.findings.push(Finding::CornerOff { id, row, col, by_mm });
+            verdict.findings.push(BoardFinding::CornerOff { id, row, col, by_mm }.into());
         }
     }
 }
 
 /// Scale, turn and shift of a whole panel, each where it alone moves a corner by more than the
 /// tolerance.
-fn causes(panel: &Panel, map: &AffineMap, pairs: &[([f64; 2], [f64; 2])]) -> Vec<Finding> {
+fn causes(panel: &Panel, map: &AffineMap, pairs: &[([f64; 2], [f64; 2])]) -> Vec<BoardFinding> {
     let id = panel.id;
     let mean = |at: fn(&([f64; 2], [f64; 2])) -> f64| {
         pairs.iter().map(at).sum::<f64>() / pairs.len() as f64
@@ -250,17 +397,17 @@ fn causes(panel: &Panel, map: &AffineMap, pairs: &[([f64; 2], [f64; 2])]) -> Vec
     let [x, y] = map.scales();
     let scale = (x + y) / 2.0;
     if (x - y).abs() / 2.0 * radius > TOLERANCE_MM {
-        causes.push(Finding::Stretched { panel: id, scale: [x, y] });
+        causes.push(BoardFinding::Stretched { panel: id, scale: [x, y] });
     } else if (scale - 1.0).abs() * radius > TOLERANCE_MM {
-        causes.push(Finding::Scale { panel: id, scale });
+        causes.push(BoardFinding::Scale { panel: id, scale });
     }
     let turn = map.turn_rad();
     if turn.abs() * radius > TOLERANCE_MM {
-        causes.push(Finding::Turned { panel: id, angle_deg: turn.to_degrees() });
+        causes.push(BoardFinding::Turned { panel: id, angle_deg: turn.to_degrees() });
     }
     // A scaled or turned page has its middle elsewhere too.
     if causes.is_empty() && by_mm[0].hypot(by_mm[1]) > TOLERANCE_MM {
-        causes.push(Finding::Shifted { panel: id, by_mm });
+        causes.push(BoardFinding::Shifted { panel: id, by_mm });
     }
     causes
 }
@@ -273,7 +420,7 @@ fn extra_tags(detection: &Detection, panel: &Panel, verdict: &mut SheetVerdict) 
     let extra = grids
         .flat_map(|grid| &grid.tags)
         .filter(|tag| !stated.contains(&(tag.id, tag.row, tag.col)))
-        .map(|tag| Finding::TagExtra { id: tag.id, row: tag.row, col: tag.col });
+        .map(|tag| BoardFinding::TagExtra { id: tag.id, row: tag.row, col: tag.col }.into());
     verdict.findings.extend(extra);
 }
 
@@ -289,7 +436,7 @@ fn extra_corners(detection: &Detection, placed: &[PlacedPanel], verdict: &mut Sh
             near || in_tag(panel, at_mm)
         });
         if !known {
-            verdict.findings.push(Finding::CornerExtra { at_mm });
+            verdict.findings.push(BoardFinding::CornerExtra { at_mm }.into());
         }
     }
 }

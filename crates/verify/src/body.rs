@@ -12,7 +12,8 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::model::{Facet, load_stl};
-use super::solid::{is_other_mesh, other_count};
+use super::reader::Reader;
+use super::solid::{MeshFinding, is_other_mesh, other_count};
 use super::{BodyVerdict, DocumentError, Finding, Format, MESH_TOLERANCE_MM, Verdict, Verifier};
 use deltille_core::targets::{
     ClosedMesh, Incircle, Polyhedron, Skeleton, SkeletonSpec, TargetSpec,
@@ -36,15 +37,19 @@ const SAME_MIDDLE: usize = 4;
 /// Places along a side of a face at which it is felt.
 const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
 
-/// Reads an STL from disk and compares it with the target.
-pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
+/// Reads an STL and compares it with the target.
+pub(super) fn verify(
+    verifier: &Verifier,
+    reader: &Reader,
+    path: &Path,
+) -> Result<Verdict, DocumentError> {
     let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
     let target = verifier.target;
     let TargetSpec::Solid(spec) = &target.spec else {
         return Err(unreadable("the target is no solid"));
     };
     let artifact = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let facets = load_stl(path, &verifier.limits)?;
+    let facets = load_stl(reader, path)?;
     let solid = spec.polyhedron();
     let mut body = BodyVerdict {
         triangles: facets.len(),
@@ -93,7 +98,7 @@ fn check_surface(facets: &[Facet]) -> Vec<Finding> {
         Ok((_, true)) => Some("it is inside out".to_owned()),
         Err(error) => Some(error.to_string()),
     };
-    findings.extend(problem.map(|problem| Finding::Body { problem }));
+    findings.extend(problem.map(|problem| MeshFinding::Body { problem }.into()));
     // A normal that is no number is wrong too.
     let wrong = facets.iter().filter(|facet| {
         let [a, b, c] = facet.vertices_mm;
@@ -102,7 +107,7 @@ fn check_surface(facets: &[Facet]) -> Vec<Finding> {
     });
     let triangles = wrong.count();
     if triangles > 0 {
-        findings.push(Finding::Normals { triangles });
+        findings.push(MeshFinding::Normals { triangles }.into());
     }
     findings
 }
@@ -120,7 +125,7 @@ fn check_triangles(
         let scale = (found / stated).cbrt();
         let problem =
             format!("volume of {found:.1} cm³ instead of {stated:.1} cm³, as of scale {scale:.4}");
-        findings.push(Finding::Body { problem });
+        findings.push(MeshFinding::Body { problem }.into());
         return;
     }
     findings.extend(other_count(facets.len(), stated.len()));
@@ -143,7 +148,7 @@ fn check_triangles(
                 "triangle {index}, around ({x:.2}, {y:.2}, {z:.2}) mm, is not there; the nearest is off by \
                  {nearest:.3} mm"
             );
-            findings.push(Finding::Body { problem });
+            findings.push(MeshFinding::Body { problem }.into());
         } else {
             body.max_deviation_mm = body.max_deviation_mm.max(nearest);
         }
@@ -201,7 +206,7 @@ fn check_seats(
     for (_, off, problem) in faces {
         body.seats += usize::from(problem.is_none());
         body.max_deviation_mm = body.max_deviation_mm.max(off);
-        findings.extend(problem.map(|problem| Finding::Body { problem }));
+        findings.extend(problem.map(|problem| MeshFinding::Body { problem }.into()));
     }
     findings
 }

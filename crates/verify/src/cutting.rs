@@ -3,6 +3,10 @@
 
 use std::path::Path;
 
+use serde::Serialize;
+
+use super::construct::ConstructFinding;
+use super::reader::Reader;
 use super::{CutVerdict, DocumentError, Finding, Format, Verdict, Verifier, VerifyError};
 use deltille_core::artwork::{self, CutDrawing, CutLayer, CutPath};
 use deltille_files::export::dxf::{self, DxfError};
@@ -13,16 +17,58 @@ const CUT_TOLERANCE_MM: f64 = 0.001;
 /// A path that is nearer to a stated one than this is that path, moved, mm.
 const MOVED_MM: f64 = 20.0;
 
-/// Reads a `.dxf` from disk and compares it with the target's panels or its net, as the name of
+/// What is wrong with a drawing for a cutter. Lengths in mm.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum CutFinding {
+    /// A path to cut, fold or engrave lies elsewhere.
+    #[error(
+        "the path on {layer} from ({:.2}, {:.2}) mm is off by {by_mm:.3} mm",
+        at_mm[0], at_mm[1]
+    )]
+    PathOff {
+        /// Its layer.
+        layer: &'static str,
+        /// Where it should begin.
+        at_mm: [f64; 2],
+        /// Largest distance of a point.
+        by_mm: f64,
+    },
+    /// A path to cut, fold or engrave is not there.
+    #[error("the path on {layer} from ({:.2}, {:.2}) mm is missing", at_mm[0], at_mm[1])]
+    PathMissing {
+        /// Its layer.
+        layer: &'static str,
+        /// Where it should begin.
+        at_mm: [f64; 2],
+    },
+    /// A path that the target does not have.
+    #[error(
+        "a path on {layer} from ({:.2}, {:.2}) mm that should not be there",
+        at_mm[0], at_mm[1]
+    )]
+    PathExtra {
+        /// Its layer.
+        layer: &'static str,
+        /// Where it begins.
+        at_mm: [f64; 2],
+    },
+}
+
+/// Reads a `.dxf` and compares it with the target's panels or its net, as the name of
 /// the file tells.
-pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, VerifyError> {
+pub(super) fn verify(
+    verifier: &Verifier,
+    reader: &Reader,
+    path: &Path,
+) -> Result<Verdict, VerifyError> {
     let stated = stated(verifier, path)?;
-    let text = verifier.limits.read_text(path).map_err(DocumentError::from)?;
+    let text = reader.read_text(path)?;
     let mut cut = CutVerdict::default();
     let findings = match dxf::read(&text) {
         Ok(found) => compare(found, stated, &mut cut),
         Err(DxfError::Construct { line, construct }) => {
-            vec![Finding::Construct { place: format!("line {line}"), construct }]
+            vec![ConstructFinding::Construct { place: format!("line {line}"), construct }.into()]
         }
         Err(error @ DxfError::NotDxf) => {
             return Err(DocumentError::unreadable(path, error.to_string()).into());
@@ -66,15 +112,16 @@ fn compare(found: CutDrawing, stated: CutDrawing, cut: &mut CutVerdict) -> Vec<F
         match nearest(&left, &path).filter(|(_, by_mm)| *by_mm < MOVED_MM) {
             Some((index, by_mm)) => {
                 left.remove(index);
-                findings.push(Finding::PathOff { layer, at_mm, by_mm });
+                findings.push(CutFinding::PathOff { layer, at_mm, by_mm }.into());
             }
-            None => findings.push(Finding::PathMissing { layer, at_mm }),
+            None => findings.push(CutFinding::PathMissing { layer, at_mm }.into()),
         }
     }
-    findings.extend(left.into_iter().map(|path| Finding::PathExtra {
+    let extra = left.into_iter().map(|path| CutFinding::PathExtra {
         layer: dxf::layer_name(path.layer),
         at_mm: path.points_mm.first().copied().unwrap_or_default(),
-    }));
+    });
+    findings.extend(extra.map(Finding::from));
     findings
 }
 

@@ -17,10 +17,11 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use glam::{DMat3, DVec2, DVec3};
 use kurbo::Shape as _;
+use serde::Serialize;
 
 use super::{Finding, FoldVerdict, SheetVerdict};
 use deltille_core::artwork;
-use deltille_core::targets::{SheetLayout, Target, TargetSpec};
+use deltille_core::targets::{Label, SheetLayout, Target, TargetSpec};
 
 /// Largest distance of a folded corner, or of an end of an edge, from where it belongs, mm: that
 /// of meshes, see [`MESH_TOLERANCE_MM`](super::MESH_TOLERANCE_MM).
@@ -32,6 +33,109 @@ const COMMON_MM: f64 = 0.2;
 
 /// Roots tried where the first leads to a contradiction: it may be the misprinted face itself.
 const MOST_ROOTS: usize = 32;
+
+/// What is wrong with the fold of a net. Lengths in mm.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum FoldFinding {
+    /// A face of a net hangs on no other.
+    #[error("board {panel} hangs on no other by a fold")]
+    FaceLoose {
+        /// Panel id.
+        panel: u32,
+    },
+    /// A face of a net is printed where another one belongs.
+    #[error("board {panel} is printed where board {instead} belongs")]
+    FaceElsewhere {
+        /// Panel id.
+        panel: u32,
+        /// Panel that belongs there.
+        instead: u32,
+    },
+    /// A face of a net is turned in its place.
+    #[error("board {panel} is turned by {angle_deg:.0}° in its place")]
+    FaceTurned {
+        /// Panel id.
+        panel: u32,
+        /// Counter-clockwise.
+        angle_deg: f64,
+    },
+    /// Corners of a face, folded, are not where they are stated to be.
+    #[error("board {panel}, folded, is off by {by_mm:.3} mm")]
+    FoldOff {
+        /// Panel id.
+        panel: u32,
+        /// Largest deviation.
+        by_mm: f64,
+    },
+    /// Two sides that should meet do not.
+    #[error(
+        "the edges of boards {} and {} are {gap_mm:.3} mm apart when folded",
+        panels[0], panels[1]
+    )]
+    EdgeOpen {
+        /// Panels of the faces.
+        panels: [u32; 2],
+        /// How far they are apart.
+        gap_mm: f64,
+    },
+    /// Two sides that meet do not carry one number, the same.
+    #[error(
+        "the edge between boards {} and {} has {} on the first, {} on the second",
+        panels[0], panels[1], enumerate(&numbers[0]), enumerate(&numbers[1])
+    )]
+    EdgeNumbers {
+        /// Panels of the faces.
+        panels: [u32; 2],
+        /// The numbers found along each.
+        numbers: [Vec<usize>; 2],
+    },
+    /// A face of a net does not carry its number, once.
+    #[error("board {panel} carries {} instead of face {stated}", enumerate(names))]
+    FaceNumber {
+        /// Panel id.
+        panel: u32,
+        /// The numbers found in it.
+        names: Vec<usize>,
+        /// Its number.
+        stated: usize,
+    },
+    /// A tab says that it goes under another face than the one that its edge leads to.
+    #[error("a tab of board {panel} names face {named} instead of {stated}")]
+    TabNames {
+        /// Panel id of the face that it hangs on.
+        panel: u32,
+        /// The face that it names.
+        named: usize,
+        /// The face that it goes under.
+        stated: usize,
+    },
+    /// A cut edge has no tab, or two.
+    #[error(
+        "the edge between boards {} and {} has {tabs} tabs instead of one",
+        panels[0], panels[1]
+    )]
+    EdgeTabs {
+        /// Panels of the faces.
+        panels: [u32; 2],
+        /// How many tabs.
+        tabs: usize,
+    },
+    /// More than two sides carry a number.
+    #[error("edge number {number} is on {sides} sides")]
+    EdgeNumberAgain {
+        /// The number.
+        number: usize,
+        /// How many sides.
+        sides: usize,
+    },
+}
+
+/// Numbers in words.
+fn enumerate(numbers: &[usize]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
+    if numbers.is_empty() { "no number".to_owned() } else { numbers.join(" and ") }
+}
 
 /// Page positions of the corners found on a sheet: by panel, then by corner.
 pub(super) type Seen = BTreeMap<u32, BTreeMap<u32, [f64; 2]>>;
@@ -55,7 +159,7 @@ pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict
         let folded = net.best_fold(&members);
         misplaced |= folded.misplaced;
         deviations[sheet] = folded.deviation_mm;
-        verdicts[sheet].findings.extend(folded.findings);
+        verdicts[sheet].findings.extend(folded.findings.into_iter().map(Finding::from));
         for (face, at) in folded.places {
             carried[face] = Some(at.space_from_page);
         }
@@ -70,13 +174,14 @@ pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict
                     edges[sheet] += 1;
                     deviations[sheet] = deviations[sheet].max(gap_mm);
                 }
-                Err(finding) => verdicts[sheet].findings.push(finding),
+                Err(finding) => verdicts[sheet].findings.push(finding.into()),
             }
         }
         let last = verdicts.len() - 1;
-        verdicts[last].findings.extend(net.numbers_used_twice());
+        verdicts[last].findings.extend(net.numbers_used_twice().into_iter().map(Finding::from));
         for (index, face) in net.faces.iter().enumerate() {
-            verdicts[face.sheet].findings.extend(net.check_words(index));
+            let wrong = net.check_words(index).into_iter().map(Finding::from);
+            verdicts[face.sheet].findings.extend(wrong);
         }
     }
     for (sheet, verdict) in verdicts.iter_mut().enumerate() {
@@ -159,7 +264,7 @@ struct Place {
 
 struct Folded {
     places: Vec<(usize, Place)>,
-    findings: Vec<Finding>,
+    findings: Vec<FoldFinding>,
     misplaced: bool,
     deviation_mm: f64,
 }
@@ -270,7 +375,9 @@ impl Net {
     /// face one of that face, else the nearest that is cut.
     fn read_numbers(&mut self, sheet: usize, layout: &SheetLayout) {
         for text in &layout.texts {
-            let Some(words) = Words::read(&text.text) else { continue };
+            if !text.text.is_number() {
+                continue;
+            }
             let Ok(outline) = artwork::text_outline(text) else { continue };
             let centre = outline.bounding_box().center();
             let at = DVec2::new(centre.x, centre.y);
@@ -281,12 +388,14 @@ impl Net {
                 })
             };
             let within = self.sides_on(sheet).map(|(face, _)| face).find(|&face| inside(face));
-            let (number, under) = match words {
-                Words::Face(number) => {
+            let (number, under) = match text.text {
+                Label::Face(number) => {
                     within.into_iter().for_each(|face| self.faces[face].names.push(number));
                     continue;
                 }
-                Words::Edge { number, under } => (number, under),
+                Label::Edge(edge) => (edge, None),
+                Label::Tab { edge, under } => (edge, Some(under)),
+                Label::Beyond { .. } | Label::Words(_) => continue,
             };
             let sides = self.sides_on(sheet).filter(|side| match within {
                 Some(face) => side.0 == face,
@@ -381,13 +490,13 @@ impl Net {
             let (face, panel) = (&self.faces[index], self.faces[index].panel);
             let Some(place) = places.get(&index) else {
                 misplaced = true;
-                findings.push(Finding::FaceLoose { panel });
+                findings.push(FoldFinding::FaceLoose { panel });
                 continue;
             };
             if place.slot != index {
                 misplaced = true;
                 let instead = self.faces[place.slot].panel;
-                findings.push(Finding::FaceElsewhere { panel, instead });
+                findings.push(FoldFinding::FaceElsewhere { panel, instead });
                 continue;
             }
             if place.vertices != face.vertices {
@@ -395,7 +504,7 @@ impl Net {
                 let turns = (0..3)
                     .find(|&n| (0..3).all(|i| place.vertices[(i + 3 - n) % 3] == face.vertices[i]));
                 let angle_deg = 120.0 * turns.unwrap_or_default() as f64;
-                findings.push(Finding::FaceTurned { panel, angle_deg });
+                findings.push(FoldFinding::FaceTurned { panel, angle_deg });
                 continue;
             }
             let off =
@@ -403,7 +512,7 @@ impl Net {
             let most = face.corners.iter().map(off).fold(0.0, f64::max);
             deviation_mm = deviation_mm.max(most);
             if most > FOLD_TOLERANCE_MM {
-                findings.push(Finding::FoldOff { panel, by_mm: most });
+                findings.push(FoldFinding::FoldOff { panel, by_mm: most });
             }
         }
         Folded { places: places.into_iter().collect(), findings, misplaced, deviation_mm }
@@ -418,7 +527,11 @@ impl Net {
 
     /// How far the two sides of an edge are apart in space, if they belong together: folded
     /// against each other on the page, or cut and carrying the same number, with a tab on one.
-    fn check_edge(&self, edge: &Edge, carried: &[Option<SpaceFromPage>]) -> Result<f64, Finding> {
+    fn check_edge(
+        &self,
+        edge: &Edge,
+        carried: &[Option<SpaceFromPage>],
+    ) -> Result<f64, FoldFinding> {
         let [one, other] = edge.sides;
         let panels = [self.faces[one.0].panel, self.faces[other.0].panel];
         let ends = |side: (usize, usize)| {
@@ -426,11 +539,11 @@ impl Net {
             Some(self.ends(side).map(|end| place.apply(end)))
         };
         let (Some([a, b]), Some([d, c])) = (ends(one), ends(other)) else {
-            return Err(Finding::EdgeOpen { panels, gap_mm: f64::INFINITY });
+            return Err(FoldFinding::EdgeOpen { panels, gap_mm: f64::INFINITY });
         };
         let gap_mm = a.distance(c).max(b.distance(d));
         if gap_mm > FOLD_TOLERANCE_MM {
-            return Err(Finding::EdgeOpen { panels, gap_mm });
+            return Err(FoldFinding::EdgeOpen { panels, gap_mm });
         }
         let numbers = edge.sides.map(|(face, side)| self.faces[face].numbers[side].as_slice());
         let folded = self.folds.get(&one) == Some(&other);
@@ -438,36 +551,36 @@ impl Net {
         match numbers {
             [[], []] if folded => Ok(gap_mm),
             [[a], [b]] if !folded && a == b && tabs == 1 => Ok(gap_mm),
-            [[a], [b]] if !folded && a == b => Err(Finding::EdgeTabs { panels, tabs }),
-            _ => Err(Finding::EdgeNumbers { panels, numbers: numbers.map(<[usize]>::to_vec) }),
+            [[a], [b]] if !folded && a == b => Err(FoldFinding::EdgeTabs { panels, tabs }),
+            _ => Err(FoldFinding::EdgeNumbers { panels, numbers: numbers.map(<[usize]>::to_vec) }),
         }
     }
 
     /// What is wrong with the name of a face and with the names that its tabs carry.
-    fn check_words(&self, index: usize) -> Vec<Finding> {
+    fn check_words(&self, index: usize) -> Vec<FoldFinding> {
         let face = &self.faces[index];
         let mut findings = Vec::new();
         if face.names != [index] {
             let names = face.names.clone();
-            findings.push(Finding::FaceNumber { panel: face.panel, names, stated: index });
+            findings.push(FoldFinding::FaceNumber { panel: face.panel, names, stated: index });
         }
         for &(side, named) in &face.under {
             let [a, b] = [face.vertices[side], face.vertices[(side + 1) % 3]];
             let beyond = self.along.get(&[b, a]).map(|&(other, _)| other);
             if let Some(stated) = beyond.filter(|&other| other != named) {
-                findings.push(Finding::TabNames { panel: face.panel, named, stated });
+                findings.push(FoldFinding::TabNames { panel: face.panel, named, stated });
             }
         }
         findings
     }
 
     /// Numbers that more than two sides carry.
-    fn numbers_used_twice(&self) -> Vec<Finding> {
+    fn numbers_used_twice(&self) -> Vec<FoldFinding> {
         let mut count = BTreeMap::<usize, usize>::new();
         let numbers = self.faces.iter().flat_map(|face| face.numbers.iter().flatten());
         numbers.for_each(|&number| *count.entry(number).or_default() += 1);
         let twice = count.into_iter().filter(|&(_, count)| count > 2);
-        twice.map(|(number, sides)| Finding::EdgeNumberAgain { number, sides }).collect()
+        twice.map(|(number, sides)| FoldFinding::EdgeNumberAgain { number, sides }).collect()
     }
 }
 
@@ -475,26 +588,4 @@ impl Net {
 fn distance(at: DVec2, [p, q]: [DVec2; 2]) -> f64 {
     let along = ((at - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
     at.distance(p + (q - p) * along)
-}
-
-/// What is printed on the faces and tabs of a net.
-enum Words {
-    /// `edge 7`, or on a tab `edge 7 · under face 3`.
-    Edge { number: usize, under: Option<usize> },
-    /// `face 3`.
-    Face(usize),
-}
-
-impl Words {
-    fn read(text: &str) -> Option<Self> {
-        if let Some(number) = text.strip_prefix("face ") {
-            return Some(Self::Face(number.parse().ok()?));
-        }
-        let rest = text.strip_prefix("edge ")?;
-        let (number, under) = match rest.split_once(" · under face ") {
-            Some((number, face)) => (number, Some(face.parse().ok()?)),
-            None => (rest, None),
-        };
-        Some(Self::Edge { number: number.parse().ok()?, under })
-    }
 }

@@ -1,4 +1,8 @@
-//! An artifact read back from disk, seen, detected and compared with its target.
+//! An artifact read back, seen, detected and compared with its target.
+//!
+//! [`verify`] takes files as bytes: it opens none, starts no thread or program of its own and asks for no
+//! time, so that it does where there is no file system. [`Verifier::verify_path`] is the same for files on
+//! disk, which are read within [`Limits`]; code of others then has a thread with an end in time.
 //!
 //! Nothing here knows how a file was drawn: a PDF is rasterised by hayro, an SVG by resvg, and the
 //! picture goes through the detector like a photograph. Then, for each page:
@@ -53,12 +57,13 @@ mod fold;
 mod listing;
 mod marks;
 mod model;
+mod on_disk;
+mod reader;
 mod solid;
 mod tags;
 mod tiles;
 mod verdict;
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -67,14 +72,19 @@ use deltille_core::detect::{Detector, DetectorConfig, Ink, Tone};
 use deltille_core::family::Family;
 use deltille_core::targets::{SheetLayout, SheetPage, Target};
 use deltille_files::export::{obj, sheet_file_name};
-use deltille_files::limits::Limits;
+use deltille_files::limits::{Guard, Limits};
 use fit::AffineMap;
 use fold::Seen;
+use reader::Reader;
 use tiles::PlacedPanel;
 
 pub use document::{Document, DocumentError, Format, Page};
-pub use finding::Finding;
+pub use finding::{
+    BoardFinding, ConstructFinding, CutFinding, Finding, FoldFinding, ListFinding, MarkFinding,
+    MeshFinding, PageFinding, TileFinding,
+};
 pub use fold::FOLD_TOLERANCE_MM;
+pub use reader::Artifact;
 pub use solid::MESH_TOLERANCE_MM;
 pub use verdict::{
     BodyVerdict, CutVerdict, FaceVerdict, FoldVerdict, ListVerdict, SheetVerdict, Verdict,
@@ -129,7 +139,10 @@ pub enum VerifyError {
         whole: String,
     },
     /// The file name does not tell which sheet is on it.
-    #[error("{}: the target has {sheets} sheets; name the file {example} for the first", path.display())]
+    #[error(
+        "{}: the target has {sheets} sheets; name the file {example} for the first",
+        path.display()
+    )]
     WhichSheet {
         /// The file.
         path: PathBuf,
@@ -167,12 +180,52 @@ pub enum VerifyError {
     },
 }
 
+/// Compares the artifact of that name among files in memory with its target, whose family must be
+/// given if it has tags. The extension of the name tells the [`Format`].
+///
+/// An artifact may be several files. Those that belong to it must be among `files`, in any order: the
+/// other pages of a net (`net-1.svg`, `net-2.svg`), the material library and the texture that an OBJ
+/// names. Others are not looked at.
+///
+/// What is wrong is in the [`Verdict`]. An error means that there is nothing to compare: a file that is
+/// not given or cannot be read, or a target that has no such artifact.
+///
+/// ```
+/// use deltille_core::artwork;
+/// use deltille_core::lattice::GridKind;
+/// use deltille_core::targets::{BoardSpec, PaperSpec, Target, TargetSpec};
+/// use deltille_files::export::svg;
+/// use deltille_verify::{Artifact, verify};
+///
+/// let spec = BoardSpec { tags: None, ..BoardSpec::new(GridKind::Deltille, 4, 5, 20.0) };
+/// let spec = TargetSpec::Board(spec);
+/// let board = Target::build("board", &spec, None, Some(&PaperSpec::default()))?;
+/// let mut artwork = artwork::draw(&board, None)?;
+/// let good = [Artifact::new("board.svg", svg::to_string(&artwork, 0))];
+/// assert!(verify(&board, None, "board.svg", &good)?.passed);
+///
+/// artwork.sheets[0].shapes.remove(0);
+/// let bad = [Artifact::new("board.svg", svg::to_string(&artwork, 0))];
+/// let verdict = verify(&board, None, "board.svg", &bad)?;
+/// assert!(verdict.to_string().contains("tile missing"), "{verdict}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn verify(
+    target: &Target,
+    family: Option<&Family>,
+    name: &str,
+    files: &[Artifact],
+) -> Result<Verdict, VerifyError> {
+    Verifier::new(target, family)?.verify(name, files)
+}
+
 /// Compares artifacts with their target.
 pub struct Verifier<'a> {
     target: &'a Target,
     family: Option<&'a Family>,
     detector: Detector,
     limits: Limits,
+    guard: Guard,
     cancel: Option<&'a AtomicBool>,
 }
 
@@ -201,12 +254,25 @@ impl<'a> Verifier<'a> {
             family,
             DetectorConfig { tone: Tone::Linear, ink: Ink::Um(0.0), ..DetectorConfig::default() },
         );
-        Ok(Self { target, family, detector, limits: Limits::default(), cancel: None })
+        Ok(Self {
+            target,
+            family,
+            detector,
+            limits: Limits::default(),
+            guard: Guard::default(),
+            cancel: None,
+        })
     }
 
     /// The same, and reading artifacts within other limits than the default.
     pub fn within(self, limits: Limits) -> Self {
         Self { limits, ..self }
+    }
+
+    /// The same, and running code of others so for artifacts in memory: [`Guard::Here`] unless this
+    /// is called. Where there are threads and files come from anybody, take [`Guard::Timed`].
+    pub fn guarded_by(self, guard: Guard) -> Self {
+        Self { guard, ..self }
     }
 
     /// The same, and looking at `flag` before each page: once it is set, [`verify`](Self::verify)
@@ -238,38 +304,25 @@ impl<'a> Verifier<'a> {
         (0..count).map(file).collect()
     }
 
-    /// What is wrong with files that are named together: pages are left out that belong to others.
-    /// One page may be named alone where it can be verified so and `alone` says that it is meant to.
-    pub fn left_out(&self, named: &[PathBuf], alone: bool) -> Vec<Verdict> {
-        // A folder may be named in several ways.
-        let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
-        let named: Vec<PathBuf> = named.iter().map(absolute).collect();
-        let sets: BTreeSet<Vec<PathBuf>> = named.iter().map(|path| self.pages_with(path)).collect();
-        let mut verdicts = Vec::new();
-        for pages in sets {
-            let verified_together = self.set_of(&pages[0]).len() > 1;
-            let missing: Vec<&PathBuf> =
-                pages.iter().filter(|page| !named.contains(page)).collect();
-            let single = alone && missing.len() + 1 == pages.len();
-            if let Some(format) = Format::of(&pages[0])
-                && !(verified_together || single || missing.is_empty())
-            {
-                verdicts.push(Self::without(&pages, format, &missing));
-            }
-        }
-        verdicts
-    }
-
     /// Pages of which some are missing.
     fn without(pages: &[PathBuf], format: Format, missing: &[&PathBuf]) -> Verdict {
-        let findings = missing.iter().map(|page| Finding::PageMissing { page: file_name(page) });
+        let findings =
+            missing.iter().map(|page| PageFinding::PageMissing { page: file_name(page) }.into());
         let verdict = Verdict::new(&pages[0], format, findings.collect());
         Verdict { artifact: of_all(pages), ..verdict }
     }
 
-    /// Reads an artifact from disk and compares it. A PDF shows all sheets, an SVG or PNG the one
-    /// that its name tells; for a page of a net all files of [`set_of`](Self::set_of) are read.
-    pub fn verify(&self, path: &Path) -> Result<Verdict, VerifyError> {
+    /// Compares the artifact of that name among files in memory. A PDF shows all sheets, an SVG or
+    /// PNG the one that its name tells. What belongs to the artifact must be among the files too:
+    /// all pages of [`set_of`](Self::set_of) for one of a net, its material library and texture for
+    /// an OBJ.
+    pub fn verify(&self, name: &str, files: &[Artifact]) -> Result<Verdict, VerifyError> {
+        let reader = Reader { files: &files, limits: self.limits, guard: self.guard };
+        self.verify_by(&reader, Path::new(name))
+    }
+
+    /// Compares an artifact, wherever it is.
+    fn verify_by(&self, reader: &Reader, path: &Path) -> Result<Verdict, VerifyError> {
         let name = file_name(path);
         let of_mesh = [".mtl", &obj::texture_name("")].map(|end| name.strip_suffix(end));
         if let Some(mesh) = of_mesh.into_iter().flatten().next() {
@@ -280,18 +333,20 @@ impl<'a> Verifier<'a> {
             return Err(VerifyError::OtherKind { path: path.to_owned() });
         };
         match format {
-            Format::Dsc => return Ok(listing::verify(self, path)?),
-            Format::Dxf => return cutting::verify(self, path),
-            Format::Pdf | Format::Svg | Format::Png => return self.verify_sheets(path, format),
+            Format::Dsc => return Ok(listing::verify(self, reader, path)?),
+            Format::Dxf => return cutting::verify(self, reader, path),
+            Format::Pdf | Format::Svg | Format::Png => {
+                return self.verify_sheets(reader, path, format);
+            }
             Format::Glb | Format::Obj | Format::Stl => {}
         }
-        let refused = construct::check(path, format, self.target, &self.limits)?;
+        let (refused, parts) = construct::check(reader, path, format, self.target)?;
         if construct::refuse(&refused) {
             return Ok(Verdict::new(path, format, refused));
         }
         let mut verdict = match format {
-            Format::Stl => body::verify(self, path)?,
-            _ => solid::verify(self, path, format)?,
+            Format::Stl => body::verify(self, reader, path)?,
+            _ => solid::verify(self, path, model::load(reader, path, parts)?, format),
         };
         verdict.passed &= refused.is_empty();
         verdict.findings.extend(refused);
@@ -299,33 +354,36 @@ impl<'a> Verifier<'a> {
     }
 
     /// Compares printed pages.
-    fn verify_sheets(&self, path: &Path, format: Format) -> Result<Verdict, VerifyError> {
+    fn verify_sheets(
+        &self,
+        reader: &Reader,
+        path: &Path,
+        format: Format,
+    ) -> Result<Verdict, VerifyError> {
         if self.target.sheets.is_empty() {
             let (path, target) = (path.to_owned(), self.target.name.to_string());
             return Err(VerifyError::NoSheets { path, target });
         }
         let mut findings = Vec::new();
         let files = self.set_of(path);
-        let missing: Vec<&PathBuf> = files.iter().filter(|file| !file.exists()).collect();
-        if path.exists() && !missing.is_empty() {
+        let missing: Vec<&PathBuf> = files.iter().filter(|file| !reader.has(file)).collect();
+        if reader.has(path) && !missing.is_empty() {
             return Ok(Self::without(&files, format, &missing));
         }
-        let refused = self.refused(&files, format)?;
+        let refused = self.refused(reader, &files, format)?;
         if construct::refuse(&refused) {
             return Ok(Verdict::new(path, format, refused));
         }
         findings.extend(refused);
-        let documents: Vec<Document> = files
-            .iter()
-            .map(|file| Document::open_within(file, &self.limits))
-            .collect::<Result<_, _>>()?;
+        let documents: Vec<Document> =
+            files.iter().map(|file| Document::read_by(reader, file)).collect::<Result<_, _>>()?;
         let stated = self.target.page_count();
         // Where each page of the target is to be seen.
         let sources: Vec<Option<Source>> = match format {
             Format::Pdf => {
                 let found = documents[0].pages();
                 if found != stated {
-                    findings.push(Finding::Pages { found, stated });
+                    findings.push(PageFinding::Pages { found, stated }.into());
                 }
                 let source =
                     |page| (page < found).then_some(Source { document: &documents[0], page });
@@ -368,13 +426,18 @@ impl<'a> Verifier<'a> {
     }
 
     /// What is not on the list of a format in files that belong together.
-    fn refused(&self, files: &[PathBuf], format: Format) -> Result<Vec<Finding>, DocumentError> {
+    fn refused(
+        &self,
+        reader: &Reader,
+        files: &[PathBuf],
+        format: Format,
+    ) -> Result<Vec<Finding>, DocumentError> {
         let mut refused = Vec::new();
         for file in files {
-            let found = construct::check(file, format, self.target, &self.limits)?;
+            let (found, _) = construct::check(reader, file, format, self.target)?;
             refused.extend(found.into_iter().map(|finding| match files.len() {
                 1 => finding,
-                _ => Finding::OnPage { page: file_name(file), finding: Box::new(finding) },
+                _ => finding.on_page(file_name(file)),
             }));
         }
         Ok(refused)
@@ -448,10 +511,8 @@ impl<'a> Verifier<'a> {
             let mut verdict = SheetVerdict::new(index, &page, wrong);
             check_bars(&page, marks, &AffineMap::IDENTITY, &mut verdict);
             marks::check(&page, marks, &[], Some(*window_mm), &mut verdict);
-            findings.extend(verdict.findings.into_iter().map(|finding| Finding::OnPage {
-                page: label.clone(),
-                finding: Box::new(finding),
-            }));
+            let of_page = verdict.findings.into_iter();
+            findings.extend(of_page.map(|finding| finding.on_page(label.clone())));
             check_bars_mm.extend(verdict.check_bars_mm);
             // Kept no finer than the sheet is looked at.
             pages.push(if wish > most { source.render(marks, most)?.0 } else { page });
@@ -477,8 +538,10 @@ impl<'a> Verifier<'a> {
         } else {
             board::check(self, page, layout, verdict)
         };
-        let toneless =
-            |f: &Finding| matches!(f, Finding::Inverted { .. } | Finding::Contrast { .. });
+        let toneless = |finding: &Finding| {
+            use BoardFinding::{Contrast, Inverted};
+            matches!(finding, Finding::Board(Inverted { .. } | Contrast { .. }))
+        };
         if verdict.findings.iter().any(toneless) {
             return seen;
         }
@@ -525,7 +588,7 @@ impl Source<'_> {
         }
         let mut page = self.document.render(self.page, px_per_mm)?;
         if (0..2).any(|i| (found_mm[i] - stated_mm[i]).abs() > tolerance_mm) {
-            return Ok((page, vec![Finding::PageSize { found_mm, stated_mm }]));
+            return Ok((page, vec![PageFinding::PageSize { found_mm, stated_mm }.into()]));
         }
         // Pictures begin at the upper edge and end with a whole pixel: heights are counted from
         // the true lower edge, not from the end of the last pixel.
@@ -568,7 +631,8 @@ fn check_bars(
             bars::measure(page, [bar.from_mm, bar.to_mm].map(|end| found_from_stated.apply(end)));
         verdict.check_bars_mm.push((stated_mm, found_mm));
         if found_mm.is_none_or(|found| (found - stated_mm).abs() > TOLERANCE_MM) {
-            verdict.findings.push(Finding::CheckBar { bar: index + 1, found_mm, stated_mm });
+            let finding = MarkFinding::CheckBar { bar: index + 1, found_mm, stated_mm };
+            verdict.findings.push(finding.into());
         }
     }
 }

@@ -4,7 +4,10 @@
 use std::path::Path;
 
 use glam::DVec3;
+use serde::Serialize;
 
+use super::construct::ConstructFinding;
+use super::reader::Reader;
 use super::{DocumentError, Finding, Format, ListVerdict, Verdict, Verifier};
 use deltille_core::targets::{Panel, Target};
 use deltille_files::export::dsc::{self, Dialect};
@@ -12,9 +15,25 @@ use deltille_files::export::dsc::{self, Dialect};
 /// Largest deviation of a position or an edge, mm: what written digits leave.
 const LIST_TOLERANCE_MM: f64 = 1e-6;
 
-/// Reads a `.dsc` from disk and compares it with the target.
-pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, DocumentError> {
-    let text = &verifier.limits.read_text(path).map_err(DocumentError::from)?;
+/// What is wrong with a list for other detectors.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum ListFinding {
+    /// A list for other detectors is not that of the target.
+    #[error("{problem}")]
+    Listed {
+        /// What differs.
+        problem: String,
+    },
+}
+
+/// Reads a `.dsc` and compares it with the target.
+pub(super) fn verify(
+    verifier: &Verifier,
+    reader: &Reader,
+    path: &Path,
+) -> Result<Verdict, DocumentError> {
+    let text = &reader.read_text(path)?;
     if text.lines().next().is_none_or(|head| head.split(',').count() != 4) {
         let problem = "not a .dsc: it does not start with a line `id,A,B,size`";
         return Err(DocumentError::unreadable(path, problem));
@@ -27,7 +46,7 @@ pub(super) fn verify(verifier: &Verifier, path: &Path) -> Result<Verdict, Docume
                 findings = compare(&listed, verifier.target, &mut list);
                 findings.extend(written_otherwise(text, &listed).filter(|_| findings.is_empty()));
             }
-            Err(error) => findings.push(Finding::Listed { problem: error.to_string() }),
+            Err(error) => findings.push(ListFinding::Listed { problem: error.to_string() }.into()),
         }
     }
     Ok(Verdict { list: Some(list), ..Verdict::new(path, Format::Dsc, findings) })
@@ -38,11 +57,12 @@ fn unlisted(text: &str) -> Vec<Finding> {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, ',' | '.' | '-');
     let lines = text.split_terminator('\n').enumerate();
     let odd = lines.filter(|(_, line)| line.is_empty() || !line.chars().all(plain));
-    odd.map(|(index, _)| Finding::Construct {
+    let construct = "a blank or a character other than of words and numbers";
+    let finding = |index| ConstructFinding::Construct {
         place: format!("line {}", index + 1),
-        construct: "a blank or a character other than of words and numbers".to_owned(),
-    })
-    .collect()
+        construct: construct.to_owned(),
+    };
+    odd.map(|(index, _)| finding(index).into()).collect()
 }
 
 /// The first line that is not written as what is read of it is: readers take numbers, and the order of
@@ -55,7 +75,7 @@ fn written_otherwise(text: &str, listed: &Target) -> Option<Finding> {
     }
     let same = text.lines().zip(anew.lines()).take_while(|(found, anew)| found == anew).count();
     let construct = "a number or an order that is written otherwise".to_owned();
-    Some(Finding::Construct { place: format!("line {}", same + 1), construct })
+    Some(ConstructFinding::Construct { place: format!("line {}", same + 1), construct }.into())
 }
 
 fn compare(listed: &Target, target: &Target, list: &mut ListVerdict) -> Vec<Finding> {
@@ -80,7 +100,7 @@ fn compare(listed: &Target, target: &Target, list: &mut ListVerdict) -> Vec<Find
             problems.push(format!("board {} is listed, which the target does not have", panel.id));
         }
     }
-    problems.into_iter().map(|problem| Finding::Listed { problem }).collect()
+    problems.into_iter().map(|problem| ListFinding::Listed { problem }.into()).collect()
 }
 
 /// Compares a board; the number of columns and rows is only in one dialect that of the corners.

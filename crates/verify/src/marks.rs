@@ -10,6 +10,7 @@ use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape};
 use rayon::prelude::*;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
+use serde::Serialize;
 
 use super::document::{MAX_INK_ERROR, Page};
 use super::tiles::{EDGE_PX, PROBES, PlacedPanel};
@@ -17,7 +18,7 @@ use super::{Finding, SheetVerdict};
 use deltille_core::artwork;
 use deltille_core::lattice::Tile;
 use deltille_core::raster::{Coverage, Gray};
-use deltille_core::targets::{CHECK_BAR_STROKE_MM, SheetLayout};
+use deltille_core::targets::{CHECK_BAR_STROKE_MM, Label, LineKind, SheetLayout};
 
 /// Ink of a mark and of its outline, each the mean of 3 × 3 pixels, may differ by this. An edge
 /// that lies 0.02 mm off at 300 dpi changes a mean by 0.08, a missing stroke by more than 0.5.
@@ -38,6 +39,70 @@ const MOST_SPOTS: usize = 200;
 
 /// How finely curves are turned into lines, mm.
 const FLATNESS_MM: f64 = 0.002;
+
+/// What is wrong beside the tiles of a sheet. Lengths in mm in the page frame.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum MarkFinding {
+    /// A check bar has another length, or is not there.
+    #[error("check bar {bar} {}", measured(*found_mm, *stated_mm))]
+    CheckBar {
+        /// Which bar, from 1.
+        bar: usize,
+        /// Measured; `None` when an end was not found.
+        found_mm: Option<f64>,
+        /// Stated.
+        stated_mm: f64,
+    },
+    /// A check bar of the stated length is drawn otherwise.
+    #[error("check bar {bar} differs from the description")]
+    CheckBarDiffers {
+        /// Which bar, from 1.
+        bar: usize,
+    },
+    /// A text is not there, or reads otherwise.
+    #[error("label {text} differs from the description")]
+    TextDiffers {
+        /// Which text of the sheet, from 1.
+        text: usize,
+        /// What it should say.
+        stated: Label,
+    },
+    /// A line is not there, or drawn otherwise.
+    #[error("line {line}, to {}, differs from the description", purpose.name())]
+    LineDiffers {
+        /// Which line of the sheet, from 1.
+        line: usize,
+        /// What it is for.
+        purpose: LineKind,
+    },
+    /// Ink, or on a black field a lack of it, outside the tiles, texts and check bars.
+    #[error("spot of {area_mm2:.3} mm² at ({:.2}, {:.2}) mm", at_mm[0], at_mm[1])]
+    Spot {
+        /// The middle of the spot.
+        at_mm: [f64; 2],
+        /// Its area, mm².
+        area_mm2: f64,
+    },
+}
+
+impl MarkFinding {
+    /// The same with its place told in another frame.
+    pub(super) fn moved(self, place: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+        match self {
+            Self::Spot { at_mm, area_mm2 } => Self::Spot { at_mm: place(at_mm), area_mm2 },
+            other => other,
+        }
+    }
+}
+
+/// What was measured of a check bar.
+fn measured(found_mm: Option<f64>, stated_mm: f64) -> String {
+    match found_mm {
+        Some(found_mm) => format!("measures {found_mm:.3} mm instead of {stated_mm:.3} mm"),
+        None => "not found".to_owned(),
+    }
+}
 
 /// Compares the marks, and looks for ink where none should be. What is in `window`
 /// (left, lower, right, upper end, mm), the part of a larger sheet, is left to others.
@@ -65,24 +130,25 @@ pub(super) fn check(
         (!is_right).then(|| mark.what.differs(layout))
     }));
     // Of a bar of another length there is no more to say.
-    let is_said = |differs: &Finding| {
+    let is_said = |differs: &MarkFinding| {
         let is_same = |found: &Finding| match (found, differs) {
-            (Finding::CheckBar { bar, .. }, Finding::CheckBarDiffers { bar: other }) => {
-                bar == other
-            }
+            (
+                Finding::Mark(MarkFinding::CheckBar { bar, .. }),
+                MarkFinding::CheckBarDiffers { bar: other },
+            ) => bar == other,
             _ => false,
         };
         verdict.findings.iter().any(is_same)
     };
     findings.retain(|finding| !is_said(finding));
-    verdict.findings.extend(findings);
+    verdict.findings.extend(findings.into_iter().map(Finding::from));
     let width = page.image.width();
     let mut known = vec![false; page.image.pixels().len()];
     if let Some([x0, y0, x1, y1]) = window {
         (y0..y1).for_each(|y| known[y * width + x0..y * width + x1].fill(true));
     }
     marks.iter().flat_map(|mark| &mark.areas).for_each(|area| area.cover(page, &mut known));
-    verdict.findings.extend(spots(page, &known, panels));
+    verdict.findings.extend(spots(page, &known, panels).into_iter().map(Finding::from));
 }
 
 /// What a mark is, with its index.
@@ -95,13 +161,15 @@ enum What {
 
 impl What {
     /// That a mark is not as the layout has it.
-    fn differs(self, layout: &SheetLayout) -> Finding {
+    fn differs(self, layout: &SheetLayout) -> MarkFinding {
         match self {
             Self::Text(i) => {
-                Finding::TextDiffers { text: i + 1, stated: layout.texts[i].text.clone() }
+                MarkFinding::TextDiffers { text: i + 1, stated: layout.texts[i].text.clone() }
             }
-            Self::CheckBar(i) => Finding::CheckBarDiffers { bar: i + 1 },
-            Self::Line(i) => Finding::LineDiffers { line: i + 1, purpose: layout.lines[i].kind },
+            Self::CheckBar(i) => MarkFinding::CheckBarDiffers { bar: i + 1 },
+            Self::Line(i) => {
+                MarkFinding::LineDiffers { line: i + 1, purpose: layout.lines[i].kind }
+            }
         }
     }
 }
@@ -124,7 +192,7 @@ struct Area {
 }
 
 /// All marks of a layout; of texts that cannot be drawn it is said that they differ.
-fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<Finding>) {
+fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
     let (mut marks, mut findings) = (Vec::new(), Vec::new());
     for (index, text) in layout.texts.iter().enumerate() {
         match artwork::text_outline(text) {
@@ -299,7 +367,7 @@ fn pixels(page: &Page, [x0, y0, x1, y1]: [f64; 4], blank: f64) -> [usize; 4] {
 }
 
 /// Names each connected spot of wrong pixels outside the tiles and the `known` marks.
-pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<Finding> {
+pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<MarkFinding> {
     let (width, height) = (page.image.width(), page.image.height());
     let grounds: Vec<Ground> = panels.iter().map(Ground::new).collect();
     let mut wrong = vec![false; width * height];
@@ -344,7 +412,7 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
             }
         }
         let at_mm = page.page_from_px(moment.map(|m| m / count));
-        spots.push(Finding::Spot { at_mm, area_mm2: count / page.px_per_mm.powi(2) });
+        spots.push(MarkFinding::Spot { at_mm, area_mm2: count / page.px_per_mm.powi(2) });
     }
     spots
 }

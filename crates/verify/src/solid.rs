@@ -5,19 +5,21 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+use serde::Serialize;
 
-use super::board::wrong_tones;
+use super::board::{BoardFinding, wrong_tones};
 use super::face_page::face_page;
+use super::finding::shown;
 use super::fit::AffineMap;
 use super::marks::spots;
-use super::model::{self, Model, View};
+use super::model::{Model, View};
 use super::tiles::PlacedPanel;
-use super::{DocumentError, FaceVerdict, Finding, Format, Verdict, Verifier};
+use super::{FaceVerdict, Finding, Format, Verdict, Verifier};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::detect::Detection;
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::Gray;
-use deltille_core::targets::{Panel, TargetSpec};
+use deltille_core::targets::{Corner, Panel, TargetSpec};
 
 /// Largest deviation of a corner of a mesh, mm: a tenth of what a well glued panel is off.
 pub const MESH_TOLERANCE_MM: f64 = 0.05;
@@ -46,10 +48,63 @@ const MAX_SCALE_ERROR: f64 = 0.05;
 /// A mesh with so many times the stated triangles is not looked at any further either.
 const MOST_TRIANGLES: usize = 2;
 
+/// What is wrong with a mesh or a body to print. Lengths in mm.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum MeshFinding {
+    /// A corner of a mesh lies elsewhere.
+    #[error(
+        "corner {id} at row {row} col {col} off by ({:.3}, {:.3}, {:.3}) mm",
+        shown(by_mm[0]), shown(by_mm[1]), shown(by_mm[2])
+    )]
+    CornerOff3d {
+        /// Corner id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Found minus stated position in the target frame.
+        by_mm: [f64; 3],
+    },
+    /// The surface of a body is not the stated one.
+    #[error("{problem}")]
+    Body {
+        /// In which way.
+        problem: String,
+    },
+    /// Triangles of a mesh whose normals are not theirs.
+    #[error("{triangles} triangles with wrong normals")]
+    Normals {
+        /// How many.
+        triangles: usize,
+    },
+    /// A tag of a mesh is not read, or with wrong bits.
+    #[error("tag {id} at row {row} col {col} {}", how_read(*errors))]
+    TagInexact {
+        /// Stated id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Wrong bits; `None` when it was not read.
+        errors: Option<u32>,
+    },
+}
+
+/// How a tag was read.
+fn how_read(errors: Option<u32>) -> String {
+    match errors {
+        Some(errors) => format!("read with {errors} wrong bits"),
+        None => "not read".to_owned(),
+    }
+}
+
 /// What there is to say of a mesh that has not the stated number of triangles.
 pub(super) fn other_count(found: usize, stated: usize) -> Option<Finding> {
     let problem = || format!("{found} triangles instead of {stated}");
-    (found != stated).then(|| Finding::Body { problem: problem() })
+    (found != stated).then(|| MeshFinding::Body { problem: problem() }.into())
 }
 
 /// Whether a mesh has so many triangles that it is another one.
@@ -57,27 +112,22 @@ pub(super) fn is_other_mesh(found: usize, stated: usize) -> bool {
     found > MOST_TRIANGLES * stated
 }
 
-/// Reads a mesh from disk and compares it with the target.
-pub(super) fn verify(
-    verifier: &Verifier,
-    path: &Path,
-    format: Format,
-) -> Result<Verdict, DocumentError> {
-    let model = model::load(path, &verifier.limits)?;
+/// Compares a loaded mesh with the target.
+pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: Format) -> Verdict {
     let mut findings = Vec::new();
     let mut faces = Vec::new();
     let scale = scale(verifier, &model);
     if let Some((scale, radius_mm)) = scale
         && (scale - 1.0).abs() * radius_mm > MESH_TOLERANCE_MM
     {
-        findings.push(Finding::Scale { panel: verifier.target.panels[0].id, scale });
+        findings.push(BoardFinding::Scale { panel: verifier.target.panels[0].id, scale }.into());
     }
     if let TargetSpec::Solid(spec) = &verifier.target.spec {
         // As many as there are faces, all of which are looked at: there is nothing else.
         let [found, stated] = [model.triangles.len(), spec.polyhedron().faces.len()];
         findings.extend(other_count(found, stated));
         if is_other_mesh(found, stated) {
-            return Ok(Verdict::new(path, format, findings));
+            return Verdict::new(path, format, findings);
         }
     }
     let wrong = model.triangles.iter().filter(|triangle| {
@@ -86,7 +136,7 @@ pub(super) fn verify(
     });
     let wrong = wrong.count();
     if wrong > 0 {
-        findings.push(Finding::Normals { triangles: wrong });
+        findings.push(MeshFinding::Normals { triangles: wrong }.into());
     }
     if scale.is_none_or(|(scale, _)| (scale - 1.0).abs() < MAX_SCALE_ERROR) {
         let panels = verifier.target.panels.par_iter();
@@ -94,7 +144,7 @@ pub(super) fn verify(
     }
     let mut verdict = Verdict::new(path, format, findings);
     verdict.passed &= faces.iter().all(|face| face.findings.is_empty());
-    Ok(Verdict { faces, ..verdict })
+    Verdict { faces, ..verdict }
 }
 
 /// Largest distance from the origin on the mesh over that on the target's solid, and the latter,
@@ -157,13 +207,18 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
     if !sees(&detection, panel.id) {
         let mirrored = sees(&verifier.detector.detect(&mirror(image), "mirror"), panel.id);
         let panel = panel.id;
-        let finding =
-            if mirrored { Finding::Mirrored { panel } } else { Finding::PanelMissing { panel } };
-        verdict.findings.push(finding);
+        let finding = if mirrored {
+            BoardFinding::Mirrored { panel }
+        } else {
+            BoardFinding::PanelMissing { panel }
+        };
+        verdict.findings.push(finding.into());
         return verdict;
     }
     check_corners(verifier, model, panel, &view, &detection, &mut verdict);
-    if verdict.findings.iter().any(|finding| matches!(finding, Finding::CornerOff3d { .. })) {
+    let is_off =
+        |finding: &Finding| matches!(finding, Finding::Mesh(MeshFinding::CornerOff3d { .. }));
+    if verdict.findings.iter().any(is_off) {
         // What else is wrong follows from that.
         return verdict;
     }
@@ -182,7 +237,7 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
             verdict.tags_exact += 1;
         } else {
             let (id, row, col) = (tag.id, tag.row, tag.col);
-            verdict.findings.push(Finding::TagInexact { id, row, col, errors });
+            verdict.findings.push(MeshFinding::TagInexact { id, row, col, errors }.into());
         }
     }
     verdict
@@ -212,18 +267,9 @@ fn check_print(
     let known = vec![false; page.image.pixels().len()];
     let marks = spots(&page, &known, &[placed]);
     let on_panel = |[x, y]: [f64; 2]| [x + area_mm[0], y + area_mm[1]];
-    verdict.findings.extend(report.findings.into_iter().chain(marks).map(
-        |finding| match finding {
-            Finding::Blemish { row, col, at_mm, area_mm2 } => {
-                Finding::Blemish { row, col, at_mm: on_panel(at_mm), area_mm2 }
-            }
-            Finding::EdgeMoved { row, col, at_mm, by_mm } => {
-                Finding::EdgeMoved { row, col, at_mm: on_panel(at_mm), by_mm }
-            }
-            Finding::Spot { at_mm, area_mm2 } => Finding::Spot { at_mm: on_panel(at_mm), area_mm2 },
-            other => other,
-        },
-    ));
+    let of_tiles = report.findings.into_iter().map(|finding| finding.moved(on_panel).into());
+    verdict.findings.extend(of_tiles);
+    verdict.findings.extend(marks.into_iter().map(|spot| spot.moved(on_panel).into()));
 }
 
 impl Verifier<'_> {
@@ -278,17 +324,17 @@ fn check_corners(
             // A ray that misses the mesh counts as off.
             if deviation_mm.is_nan() || deviation_mm > tolerance_mm {
                 let (id, row, col) = (stated.id, stated.row, stated.col);
-                verdict.findings.push(Finding::CornerOff3d { id, row, col, by_mm });
+                verdict.findings.push(MeshFinding::CornerOff3d { id, row, col, by_mm }.into());
             }
         }
     }
     verdict.corners_found = found.len();
     let missing = panel.corners.iter().filter(|corner| !found.contains(&corner.id));
-    verdict.findings.extend(missing.map(|corner| Finding::CornerMissing {
-        id: corner.id,
-        row: corner.row,
-        col: corner.col,
-    }));
+    let finding = |corner: &Corner| {
+        let Corner { id, row, col, .. } = *corner;
+        BoardFinding::CornerMissing { id, row, col }.into()
+    };
+    verdict.findings.extend(missing.map(finding));
 }
 
 fn sees(detection: &Detection, panel: u32) -> bool {

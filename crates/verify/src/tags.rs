@@ -1,5 +1,6 @@
 //! A page of single tags: no corners to detect, so each tag is compared where it is stated.
 
+use super::tiles::TileFinding;
 use super::{Finding, SheetVerdict, Verifier};
 use crate::document::Page;
 use deltille_core::targets::SheetLayout;
@@ -16,9 +17,9 @@ pub(super) fn check(
         let report = placed.check_tiles(verifier.family);
         verdict.tags_exact += report.tags_exact;
         if report.wrong_tiles > 0 {
-            verdict.findings.push(Finding::TagMissing { id: placed.panel.id });
+            verdict.findings.push(TileFinding::TagMissing { id: placed.panel.id }.into());
         } else {
-            verdict.findings.extend(report.findings);
+            verdict.findings.extend(report.findings.into_iter().map(Finding::from));
         }
     }
 }

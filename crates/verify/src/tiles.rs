@@ -7,7 +7,8 @@ use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
-use super::Finding;
+use serde::Serialize;
+
 use super::document::{MAX_INK_ERROR, Page};
 use super::fit::AffineMap;
 use deltille_core::family::{Decoder, Family};
@@ -33,6 +34,136 @@ const TONE_SPREAD: f64 = 0.1;
 /// drawn (0.02 mm at 300 dpi), and on those that are put together from pixels of others.
 const MOVED_EDGE_PX: f64 = 0.25;
 const SMEARED_MOVED_EDGE_PX: f64 = 0.5;
+
+/// What is wrong with a tile or the tag in it. Lengths in mm in the page frame.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum TileFinding {
+    /// A tile has the wrong colour.
+    #[error("{}", tile_differs(*row, *col, *should_be_black))]
+    TileColour {
+        /// Row of its lower-left vertex.
+        row: i32,
+        /// Column of its lower-left vertex.
+        col: i32,
+        /// Whether it should be black.
+        should_be_black: bool,
+    },
+    /// Part of a tile has the wrong colour.
+    #[error(
+        "spot of {area_mm2:.3} mm² at ({:.2}, {:.2}) mm in the tile at row {row} col {col}",
+        at_mm[0], at_mm[1]
+    )]
+    Blemish {
+        /// Row of the tile's lower-left vertex.
+        row: i32,
+        /// Column of the tile's lower-left vertex.
+        col: i32,
+        /// The middle of the spot.
+        at_mm: [f64; 2],
+        /// Its area, mm².
+        area_mm2: f64,
+    },
+    /// An edge of a tile, or of a cell in it, lies elsewhere than stated.
+    #[error(
+        "an edge at ({:.2}, {:.2}) mm in the tile at row {row} col {col} is {:.3} mm beside its \
+         place, towards {}",
+        at_mm[0], at_mm[1], by_mm.abs(), lighter_or_darker(*by_mm)
+    )]
+    EdgeMoved {
+        /// Row of the tile's lower-left vertex.
+        row: i32,
+        /// Column of the tile's lower-left vertex.
+        col: i32,
+        /// Where.
+        at_mm: [f64; 2],
+        /// How far, mm, positive where more is black.
+        by_mm: f64,
+    },
+    /// A tag reads as another one of its family.
+    #[error("tag {id} at row {row} col {col} {}", what_reads(*id, *reads))]
+    TagReads {
+        /// Stated id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// The id that it reads.
+        reads: u32,
+        /// By how many thirds of a turn it is turned counter-clockwise.
+        turns: u8,
+    },
+    /// A tag has too many wrong cells to be corrected.
+    #[error("tag {id} at row {row} col {col} unreadable: {} bits differ", bits.len())]
+    TagUnreadable {
+        /// Stated id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Wrong cells, by bit.
+        bits: Vec<u32>,
+    },
+    /// A tag has wrong cells that decoding would correct.
+    #[error("tag {id} at row {row} col {col} damaged: {}", bits_differ(bits.len()))]
+    TagDamaged {
+        /// Stated id.
+        id: u32,
+        /// Lattice row.
+        row: i32,
+        /// Lattice column.
+        col: i32,
+        /// Wrong cells, by bit.
+        bits: Vec<u32>,
+    },
+    /// A tag that stands alone is not where it should be.
+    #[error("tag {id} is not where it should be")]
+    TagMissing {
+        /// Stated id.
+        id: u32,
+    },
+}
+
+impl TileFinding {
+    /// The same with its place told in another frame.
+    pub(super) fn moved(self, place: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+        match self {
+            Self::Blemish { row, col, at_mm, area_mm2 } => {
+                Self::Blemish { row, col, at_mm: place(at_mm), area_mm2 }
+            }
+            Self::EdgeMoved { row, col, at_mm, by_mm } => {
+                Self::EdgeMoved { row, col, at_mm: place(at_mm), by_mm }
+            }
+            other => other,
+        }
+    }
+}
+
+/// What a tag reads that is not as stated.
+fn what_reads(id: u32, reads: u32) -> String {
+    if id == reads { "is turned".to_owned() } else { format!("reads {reads}") }
+}
+
+/// How many bits differ.
+fn bits_differ(bits: usize) -> String {
+    let differ = if bits == 1 { "bit differs" } else { "bits differ" };
+    format!("{bits} {differ}")
+}
+
+/// In which way a tile has the wrong colour.
+fn tile_differs(row: i32, col: i32, should_be_black: bool) -> String {
+    match should_be_black {
+        true => format!("tile missing at row {row} col {col}"),
+        false => format!("tile at row {row} col {col} is black instead of white"),
+    }
+}
+
+/// To which side an edge lies that is so far beside its place, positive where more is black.
+fn lighter_or_darker(by_mm: f64) -> &'static str {
+    if by_mm > 0.0 { "white" } else { "black" }
+}
 
 /// Counted pixels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -132,7 +263,7 @@ impl TagLooks {
 /// The outcome for one panel.
 #[derive(Debug, Default)]
 pub(super) struct TileReport {
-    pub findings: Vec<Finding>,
+    pub findings: Vec<TileFinding>,
     pub tags_exact: usize,
     pub tiles: usize,
     /// Tiles of the wrong colour.
@@ -225,7 +356,7 @@ impl PlacedPanel<'_> {
             let is_smeared = self.page.smear_px > 0.0;
             let tolerance_px = if is_smeared { SMEARED_MOVED_EDGE_PX } else { MOVED_EDGE_PX };
             let moved = self.moved_edges(&expected, tolerance_px);
-            report.findings.extend(moved.into_iter().map(|moved| Finding::EdgeMoved {
+            report.findings.extend(moved.into_iter().map(|moved| TileFinding::EdgeMoved {
                 row: moved.tile.anchor.row,
                 col: moved.tile.anchor.col,
                 at_mm: moved.at_mm,
@@ -325,7 +456,11 @@ impl PlacedPanel<'_> {
         let plain = tallies.get(&None).copied().unwrap_or_default();
         if plain.mostly_wrong() {
             report.wrong_tiles += 1;
-            report.findings.push(Finding::TileColour { row, col, should_be_black: expected.black });
+            report.findings.push(TileFinding::TileColour {
+                row,
+                col,
+                should_be_black: expected.black,
+            });
             return;
         }
         let flipped: Vec<u32> = tallies
@@ -347,7 +482,7 @@ impl PlacedPanel<'_> {
         });
         if spot.wrong > 0 {
             let n = spot.wrong as f64;
-            report.findings.push(Finding::Blemish {
+            report.findings.push(TileFinding::Blemish {
                 row,
                 col,
                 at_mm: self.page.page_from_px(spot.moment.map(|m| m / n)),
@@ -363,7 +498,7 @@ fn read_tag(
     flipped: &[u32],
     family: Option<&Family>,
     decoder: &OnceCell<Decoder>,
-) -> Option<Finding> {
+) -> Option<TileFinding> {
     let TagPlacement { id, row, col } = tag.placement;
     if flipped.is_empty() {
         return None;
@@ -375,9 +510,9 @@ fn read_tag(
     let decoded = decoder.decode(word, family.correctable());
     Some(match decoded {
         Some(read) if (read.id, read.turns) != (id, 0) => {
-            Finding::TagReads { id, row, col, reads: read.id, turns: read.turns }
+            TileFinding::TagReads { id, row, col, reads: read.id, turns: read.turns }
         }
-        Some(_) => Finding::TagDamaged { id, row, col, bits },
-        None => Finding::TagUnreadable { id, row, col, bits },
+        Some(_) => TileFinding::TagDamaged { id, row, col, bits },
+        None => TileFinding::TagUnreadable { id, row, col, bits },
     })
 }

@@ -140,7 +140,7 @@ pub fn solid(file: File) -> bool {
 
 fn verify(target: &Target, path: &Path) -> bool {
     let verifier = Verifier::new(target, Some(&FAMILY)).expect("it was built with this family");
-    let Ok(verdict) = verifier.within(limits()).verify(path) else { return false };
+    let Ok(verdict) = verifier.within(limits()).verify_path(path) else { return false };
     let sheets = verdict.sheets.iter().flat_map(|sheet| &sheet.findings);
     let faces = verdict.faces.iter().flat_map(|face| &face.findings);
     let findings = verdict.findings.iter().chain(sheets).chain(faces).count();

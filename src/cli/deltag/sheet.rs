@@ -126,7 +126,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let verifier = verifier.within(Limits::NONE).stopped_by(interrupt::flag());
     let mut passed = true;
     for path in &written {
-        let verdict = match verifier.verify(path) {
+        let verdict = match verifier.verify_path(path) {
             Err(VerifyError::Cancelled) => {
                 return Err(Interrupted(
                     "the files are whole, but were not all compared".to_owned(),

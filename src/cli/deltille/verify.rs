@@ -91,7 +91,7 @@ pub fn verify(
             continue;
         }
         done.extend(verifier.set_of(path));
-        match verifier.verify(path) {
+        match verifier.verify_path(path) {
             Ok(verdict) => {
                 say!("{verdict}");
                 verdicts.push(verdict);

@@ -8,7 +8,7 @@ use deltille::artwork::{self, Artwork, Part};
 use deltille::export::{pdf, png, sheet_file_name, svg};
 use deltille::family::Family;
 use deltille::targets::{
-    LineKind, PaperSpec, Placement, SheetText, SolidShape, SolidSpec, Target, TargetSpec,
+    Label, LineKind, PaperSpec, Placement, SheetText, SolidShape, SolidSpec, Target, TargetSpec,
 };
 use deltille::verify::{Finding, Verdict, Verifier};
 use kurbo::Affine;
@@ -51,7 +51,7 @@ fn verify(target: &Target, artwork: &Artwork, extension: &str) -> Verdict {
         }),
     }
     let first = if extension == "pdf" { folder.path().join("t.pdf") } else { path(0) };
-    Verifier::new(target, Some(&family())).unwrap().verify(&first).unwrap()
+    Verifier::new(target, Some(&family())).unwrap().verify_path(&first).unwrap()
 }
 
 #[track_caller]
@@ -102,6 +102,11 @@ fn turn(target: &mut Target, at: usize) {
     };
 }
 
+/// Whether a text is the number of an edge.
+fn is_of_edge(text: &SheetText) -> bool {
+    matches!(text.text, Label::Edge(_) | Label::Tab { .. })
+}
+
 /// Description and print agree, and are both wrong: only the fold tells.
 #[test]
 fn a_wrong_layout_does_not_fold_into_the_solid() {
@@ -117,23 +122,30 @@ fn a_wrong_layout_does_not_fold_into_the_solid() {
 
     let mut renumbered = whole.clone();
     let texts = &mut renumbered.sheets[0].texts;
-    let text = texts.iter_mut().find(|text| text.text.starts_with("edge ")).unwrap();
-    text.text = "edge 9".to_owned();
+    let text = texts.iter_mut().find(|text| is_of_edge(text)).unwrap();
+    text.text = Label::Edge(9);
     assert_fails(&verify(&renumbered, &draw(&renumbered), "pdf"), &["9 on the "]);
 
-    for (from, to, said) in [
-        ("face 1", "face 2", "carries 2 instead of face 1"),
-        (" · under face 2", " · under face 0", "names face 0 instead of 2"),
-    ] {
+    type Rename = fn(&Label) -> Option<Label>;
+    let cases: [(Rename, &str); 2] = [
+        (
+            |label| (*label == Label::Face(1)).then_some(Label::Face(2)),
+            "carries 2 instead of face 1",
+        ),
+        (
+            |label| match *label {
+                Label::Tab { edge, under: 2 } => Some(Label::Tab { edge, under: 0 }),
+                _ => None,
+            },
+            "names face 0 instead of 2",
+        ),
+    ];
+    for (rename, said) in cases {
         let mut misnamed = whole.clone();
         let texts = &mut misnamed.sheets[0].texts;
-        // A tab that goes under face 1 ends with that, too.
-        let is_it = |text: &&mut SheetText| match from.starts_with("face") {
-            true => text.text == from,
-            false => text.text.ends_with(from),
-        };
-        let text = texts.iter_mut().find(is_it).unwrap();
-        text.text = text.text.replace(from, to);
+        let (label, text) =
+            texts.iter_mut().find_map(|text| Some((rename(&text.text)?, text))).unwrap();
+        text.text = label;
         assert_fails(&verify(&misnamed, &draw(&misnamed), "pdf"), &[said]);
     }
     let folds = whole.sheets[0].lines.iter().enumerate();
@@ -168,8 +180,8 @@ fn a_wrong_print_is_told_from_its_description() {
 
     let mut renumbered = whole.clone();
     let texts = &mut renumbered.sheets[0].texts;
-    let text = texts.iter_mut().position(|text| text.text.starts_with("edge ")).unwrap();
-    texts[text].text = texts[text].text.replace("edge ", "edge 1");
+    let text = texts.iter().position(is_of_edge).unwrap();
+    texts[text].text = Label::Edge(19);
     let reason = format!("label {} differs", text + 1);
     assert_fails(&verify(&whole, &draw(&renumbered), "pdf"), &[&reason]);
 

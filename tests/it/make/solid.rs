@@ -195,7 +195,7 @@ fn a_tetrahedron_with_each_face_cut_in_four_is_sixteen_faces() {
     let count = |kind| lines().filter(|line| line.kind == kind).count();
     assert_eq!((count(LineKind::Flat), count(LineKind::Fold)), (12, 12));
     let words = || sheets.iter().flat_map(|sheet| &sheet.texts);
-    assert!(words().any(|text| text.text.contains("Do not fold dotted lines.")));
+    assert!(words().any(|text| text.text.to_string().contains("Do not fold dotted lines.")));
     let dxf = std::fs::read_to_string(path.join("flat-net.dxf")).unwrap();
     assert_eq!(dxf.matches("LINE\n  8\nFOLD\n").count(), 12);
     let material = std::fs::read_to_string(path.join("t.mtl")).unwrap();
@@ -462,7 +462,7 @@ fn single_faces_are_cut_to_the_seats_of_the_skeleton() {
     let edge = length(outline[0], outline[1]);
     // Marks begin 3 mm beyond the vertices.
     assert!((between - edge - 6.0).abs() < 1e-4, "{between} {edge}");
-    assert!(sheet.texts.iter().any(|text| text.text == "edge 0 · face 3"));
+    assert!(sheet.texts.iter().any(|text| text.text.to_string() == "edge 0 · face 3"));
 }
 
 /// The net is one outline around all faces and tabs, with a line to fold for each edge between two

@@ -7,7 +7,7 @@ use deltille::artwork;
 use deltille::export::svg;
 use deltille::family::Family;
 use deltille::targets::{PaperSpec, TagSheetSpec, Target, TargetSpec};
-use deltille::verify::{Finding, Verifier};
+use deltille::verify::{Finding, MarkFinding, TileFinding, Verifier};
 use predicates::prelude::*;
 use predicates::str::contains;
 
@@ -60,7 +60,7 @@ fn verdict(ids: &[u32], edit: impl Fn(&str) -> String) -> deltille::verify::Verd
     let drawn = artwork::draw(&build(ids), Some(&family)).unwrap();
     std::fs::write(&path, edit(&svg::to_string(&drawn, 0))).unwrap();
     let target = build(&[5, 6, 7, 8]);
-    Verifier::new(&target, Some(&family)).unwrap().verify(&path).unwrap()
+    Verifier::new(&target, Some(&family)).unwrap().verify_path(&path).unwrap()
 }
 
 #[test]
@@ -70,10 +70,9 @@ fn a_wrong_sheet_is_refused_with_the_reason() {
 
     let exchanged = verdict(&[5, 7, 6, 8], same);
     assert!(!exchanged.passed && exchanged.sheets[0].tags_exact == 2, "{exchanged}");
-    let reads = exchanged.sheets[0]
-        .findings
-        .iter()
-        .any(|finding| matches!(finding, Finding::TagReads { id: 6, reads: 7, .. }));
+    let reads = exchanged.sheets[0].findings.iter().any(|finding| {
+        matches!(finding, Finding::Tile(TileFinding::TagReads { id: 6, reads: 7, .. }))
+    });
     assert!(reads, "{exchanged}");
 
     let without = |svg: &str, id: &str| {
@@ -84,9 +83,12 @@ fn a_wrong_sheet_is_refused_with_the_reason() {
     };
     let cut = |svg: &str| without(svg, "tile-8-r0-c0");
     let missing = verdict(&[5, 6, 7, 8], cut);
-    assert_eq!(missing.sheets[0].findings, [Finding::TagMissing { id: 8 }], "{missing}");
+    assert_eq!(missing.sheets[0].findings, [TileFinding::TagMissing { id: 8 }.into()], "{missing}");
 
     let text = |svg: &str| without(svg, "label-4");
     let nameless = verdict(&[5, 6, 7, 8], text);
-    assert!(matches!(nameless.sheets[0].findings[..], [Finding::TextDiffers { .. }]), "{nameless}");
+    assert!(
+        matches!(nameless.sheets[0].findings[..], [Finding::Mark(MarkFinding::TextDiffers { .. })]),
+        "{nameless}"
+    );
 }

@@ -7,7 +7,7 @@ use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
 use deltille::lattice::{GridKind, Vertex};
 use deltille::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
-use deltille::verify::{Finding, Verdict, Verifier};
+use deltille::verify::{Finding, TileFinding, Verdict, Verifier};
 use kurbo::{Affine, BezPath, Point};
 use tempfile::TempDir;
 
@@ -74,7 +74,7 @@ impl Board {
                 path("png")
             }
         };
-        Verifier::new(&self.target, Some(&self.family)).unwrap().verify(&path).unwrap()
+        Verifier::new(&self.target, Some(&self.family)).unwrap().verify_path(&path).unwrap()
     }
 
     /// The first tag's tile.
@@ -304,7 +304,9 @@ fn dirt_and_holes_in_tiles_are_found() {
     for format in ALL {
         let verdict = board.verify(&artwork, format);
         let spots = &verdict.sheets[0].findings;
-        let spots = spots.iter().filter(|finding| matches!(finding, Finding::Blemish { .. }));
+        let spots = spots
+            .iter()
+            .filter(|finding| matches!(finding, Finding::Tile(TileFinding::Blemish { .. })));
         assert_eq!(spots.count(), 2, "{verdict}");
     }
 }
@@ -314,7 +316,7 @@ fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
     let board = board(spec());
     let mut altered = board.target.clone();
     let label = &mut altered.sheets[0].texts[0].text;
-    *label = label.replace("edge 20 mm", "edge 21 mm");
+    *label = label.to_string().replace("edge 20 mm", "edge 21 mm").into();
     let altered = artwork::draw(&altered, Some(&board.family)).unwrap();
     let mut erased = board.artwork();
     erased.sheets[0].shapes.retain(|shape| shape.part != (Part::Label { index: 1 }));
@@ -354,7 +356,7 @@ fn verify_toned(board: &Board, tone: impl Fn(u8) -> u8) -> Verdict {
     encoder.set_depth(info.bit_depth);
     encoder.set_pixel_dims(info.pixel_dims);
     encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
-    Verifier::new(&board.target, Some(&board.family)).unwrap().verify(&path).unwrap()
+    Verifier::new(&board.target, Some(&board.family)).unwrap().verify_path(&path).unwrap()
 }
 
 #[test]

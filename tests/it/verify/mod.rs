@@ -1,3 +1,4 @@
 mod broken_sheets;
 mod commands;
 mod damaged;
+mod in_memory;

@@ -185,7 +185,7 @@ pub(super) fn tag_outlines(
 /// A text on its page, set smaller where it would be too long.
 pub(super) fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph> {
     let size = label.cap_height_mm / text::CAP_HEIGHT;
-    let (path, width) = text::outline(&label.text, size)?;
+    let (path, width) = text::outline(&label.text.to_string(), size)?;
     let fit = (label.max_width_mm / width).min(1.0);
     let [x, y] = label.at_mm;
     let place = Affine::translate((x, y)) * Affine::rotate(label.angle_rad);

@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::atlas::Packing;
 use super::text::MissingGlyph;
 use crate::targets::{
-    LineKind, Placement, SheetLayout, Target, TargetError, TargetSpec, edge_numbers, edge_text,
-    upright_number,
+    Label, LineKind, Placement, SheetLayout, Target, TargetError, TargetSpec, edge_numbers,
+    edge_text, upright_number,
 };
 
 /// Blank between panels, mm: more than any cutter is wide.
@@ -102,7 +102,12 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
         let mut texts = vec![face_number(&placement, outline, index)];
         for (i, number) in numbers.into_iter().enumerate() {
             let ends = [outline[i], outline[(i + 1) % 3]];
-            texts.push(edge_text(&placement, ends, upright_number(number), EDGE_GAP_MM));
+            texts.push(edge_text(
+                &placement,
+                ends,
+                Label::Words(upright_number(number)),
+                EDGE_GAP_MM,
+            ));
         }
         for text in texts {
             drawing.engrave(super::text_outline(&text)?);
@@ -136,8 +141,7 @@ pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
             piece.paths.push(CutPath { layer, closed: false, points_mm });
         }
         // Instructions and the label stay on the paper.
-        let names = ["face ", "edge "];
-        for text in sheet.texts.iter().filter(|t| names.iter().any(|n| t.text.starts_with(n))) {
+        for text in sheet.texts.iter().filter(|text| text.text.is_number()) {
             piece.engrave(super::text_outline(text)?);
         }
         let [left, lower, right, _] = piece.bounds_mm().ok_or_else(no_net)?;
@@ -201,7 +205,7 @@ fn face_number(
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
     let at = [circle.centre.x - width / 2.0, circle.centre.y - cap / 2.0];
     crate::targets::SheetText {
-        text,
+        text: Label::Words(text),
         at_mm: placement.page_from_panel(at),
         angle_rad: placement.angle_rad,
         cap_height_mm: cap,

@@ -22,7 +22,7 @@ use super::net::{Side, Sides};
 use super::paper::PaperSpec;
 use super::polyhedron::Face;
 use super::{
-    FamilyRef, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine, SheetText,
+    FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine, SheetText,
     SolidSpec, TargetError,
 };
 
@@ -71,8 +71,8 @@ pub(super) fn sheets(
             let numbers = edge_numbers(&solid, &edges, index);
             let edge_words = [0, 1, 2].map(|side| {
                 let beyond = sides.partner(Side { face: index, side }).map(|other| other.face);
-                let beyond = beyond.map_or(String::new(), |face| format!(" · face {face}"));
-                format!("edge {}{beyond}", numbers[side])
+                let edge = numbers[side];
+                beyond.map_or(Label::Edge(edge), |face| Label::Beyond { edge, face })
             });
             mark(&mut sheet, spec, &face, index, edge_words);
             sheet.texts.extend(inner_number(&sheet.placements[0], margin_mm, &face, index));
@@ -139,7 +139,7 @@ fn arrange(
 }
 
 /// Adds cutting marks, numbers and instructions.
-fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, edges: [String; 3]) {
+fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, edges: [Label; 3]) {
     let placement = sheet.placements[0];
     for (i, text) in edges.into_iter().enumerate() {
         let (a, b) = (face.outline_mm[i], face.outline_mm[(i + 1) % 3]);
@@ -165,17 +165,17 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
     }
     let [left, _, _, upper] = bounds(face);
     let max_width_mm = spec.edge_mm / 4.0;
-    let mut add = |text: String, y: f64, cap_height_mm: f64| {
+    let mut add = |text: Label, y: f64, cap_height_mm: f64| {
         let at_mm = placement.page_from_panel([left, y]);
         let angle_rad = placement.angle_rad;
         sheet.texts.push(SheetText { text, at_mm, angle_rad, cap_height_mm, max_width_mm });
     };
     let mut y = upper - FACE_CAP_MM;
-    add(format!("face {index}"), y, FACE_CAP_MM);
+    add(Label::Face(index), y, FACE_CAP_MM);
     y -= WORDS_MM[0] / 2.0;
     for words in WORDS {
         y -= WORDS_MM[1];
-        add(words.to_owned(), y, WORDS_MM[0]);
+        add(Label::Words(words.to_owned()), y, WORDS_MM[0]);
     }
 }
 
@@ -203,7 +203,7 @@ fn inner_number(
     let reach = INNER_PLACE * margin_mm / length;
     let at = [ax + sum[0] * reach - width / 2.0, ay + sum[1] * reach - cap / 2.0];
     Some(SheetText {
-        text,
+        text: Label::Words(text),
         at_mm: placement.page_from_panel(at),
         angle_rad: placement.angle_rad,
         cap_height_mm: cap,
@@ -222,12 +222,12 @@ pub fn upright_number(number: usize) -> String {
 pub fn edge_text(
     placement: &Placement,
     [a, b]: [[f64; 2]; 2],
-    text: String,
+    text: Label,
     inwards: f64,
 ) -> SheetText {
     let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
     let length = dx.hypot(dy);
-    let width = (text.chars().count() as f64 * ADVANCE_CAPS * EDGE_CAP_MM).min(length);
+    let width = (text.characters() as f64 * ADVANCE_CAPS * EDGE_CAP_MM).min(length);
     let middle = along(a, b, a, (length - width) / 2.0);
     let at = [middle[0] - dy / length * inwards, middle[1] + dx / length * inwards];
     SheetText {

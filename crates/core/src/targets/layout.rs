@@ -16,8 +16,8 @@ use std::f64::consts::FRAC_PI_2;
 use super::length::format_mm;
 use super::paper::{Orientation, PaperSize, PaperSpec};
 use super::{
-    BoardSpec, CheckBar, FamilyRef, GridKind, Panel, Placement, SheetLayout, SheetText, TagsIn,
-    TargetError, board,
+    BoardSpec, CheckBar, FamilyRef, GridKind, Label, Panel, Placement, SheetLayout, SheetText,
+    TagsIn, TargetError, board,
 };
 
 /// Capital height of the words on a check bar, mm: 7 pt, small print that is still easy to read.
@@ -234,14 +234,14 @@ impl Arrangement {
         };
         let strips = [(lower, lower_marks), (right, right_marks)];
         let label = strips.iter().filter(|(_, marks)| marks.label).map(|(strip, _)| SheetText {
-            text: label.clone(),
+            text: Label::Words(label.clone()),
             at_mm: strip.at(0.0, Marks::LABEL),
             angle_rad: strip.angle(),
             cap_height_mm: LABEL_CAP_MM,
             max_width_mm: strip.length,
         });
         let words = strips.iter().map(|(strip, marks)| SheetText {
-            text: bar_words(strip.bar_mm()),
+            text: Label::Words(bar_words(strip.bar_mm())),
             at_mm: strip.at(BAR_INDENT_MM, marks.words()),
             angle_rad: strip.angle(),
             cap_height_mm: BAR_CAP_MM,

@@ -14,6 +14,7 @@ mod closed_mesh;
 mod error;
 mod face_sheet;
 pub mod json;
+mod label;
 mod layout;
 mod length;
 mod net;
@@ -38,6 +39,7 @@ pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
 pub use error::TargetError;
 pub use face_sheet::{edge_numbers, edge_text, upright_number};
 pub use json::{SCHEMA, TargetFileError};
+pub use label::Label;
 pub use layout::CHECK_BAR_STROKE_MM;
 pub use layout::id_range;
 pub use length::{LengthError, parse_length_mm};
@@ -375,8 +377,8 @@ impl CheckBar {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SheetText {
-    /// The words: ASCII and `° ± · × – −`.
-    pub text: String,
+    /// What it says.
+    pub text: Label,
     /// Left end of the base line on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
     pub at_mm: [f64; 2],

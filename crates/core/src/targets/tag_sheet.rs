@@ -12,7 +12,7 @@ use super::length::format_mm;
 use super::paper::{Orientation, PaperSize, PaperSpec};
 use super::spec::BORDER_BITS;
 use super::{
-    FamilyRef, GridKind, Outline, Panel, PanelPose, Placement, SheetLayout, SheetText,
+    FamilyRef, GridKind, Label, Outline, Panel, PanelPose, Placement, SheetLayout, SheetText,
     TagPlacement, TagSheetSpec, TagsIn, TargetError,
 };
 use crate::family::Family;
@@ -206,7 +206,7 @@ fn page(
         let text = id.to_string();
         let wide = (text.len() as f64 * ADVANCE_CAPS * blanks.id_cap).min(blanks.edge);
         sheet.texts.push(SheetText {
-            text,
+            text: Label::Words(text),
             at_mm: [x + (blanks.edge - wide) / 2.0, y - blanks.quiet - blanks.id_cap],
             angle_rad: 0.0,
             cap_height_mm: blanks.id_cap,

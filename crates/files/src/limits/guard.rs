@@ -2,7 +2,7 @@ use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::{Once, mpsc};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Stack of a thread that runs code of others, bytes: their readers call themselves for each level
 /// of a file. Only what is used of it is memory.
@@ -57,6 +57,39 @@ pub fn bounded<T: Send + 'static>(
     receiver.recv_timeout(time).map_err(|_| Broken::Time)?
 }
 
+/// Where code of others runs, which may panic or never end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Guard {
+    /// On the thread of the caller, without a clock, as [`caught`] does: where there are no threads,
+    /// as in a browser. Endless work is not noticed, nor is there a deeper stack.
+    #[default]
+    Here,
+    /// On a thread of its own, and only for so long, as [`bounded`] does.
+    Timed,
+}
+
+impl Guard {
+    /// Runs code of others, for at most `time` where there is a clock.
+    pub fn run<T: Send + 'static>(
+        self,
+        time: Duration,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Broken> {
+        match self {
+            Self::Here => caught(work),
+            Self::Timed => bounded(time, work),
+        }
+    }
+
+    /// When a time that begins now is over; never where there is no clock.
+    pub fn end(self, time: Duration) -> Option<Instant> {
+        match self {
+            Self::Here => None,
+            Self::Timed => Instant::now().checked_add(time),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,6 +101,14 @@ mod tests {
         let second = Duration::from_secs(10);
         assert_eq!(bounded(second, || 1), Ok(1));
         assert_eq!(bounded(second, || -> u8 { panic!("not to be seen") }), Err(Broken::Panic));
+        assert_eq!(Guard::Here.run(Duration::ZERO, || 1), Ok(1));
+        assert_eq!(Guard::Here.end(second), None);
+        for guard in [Guard::Here, Guard::Timed] {
+            assert_eq!(
+                guard.run(second, || -> u8 { panic!("not to be seen") }),
+                Err(Broken::Panic)
+            );
+        }
         let sleep = || thread::sleep(Duration::from_secs(60));
         assert_eq!(bounded(Duration::from_millis(20), sleep), Err(Broken::Time));
     }

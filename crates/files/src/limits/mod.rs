@@ -23,7 +23,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-pub use guard::{Broken, bounded, caught};
+pub use guard::{Broken, Guard, bounded, caught};
 
 /// Most bytes of a file of settings: a camera, a template, rules. A hundredth of it is more than
 /// most have, and readers of YAML take time with the square of it.

@@ -19,14 +19,14 @@ mod svg;
 use std::path::Path;
 
 use flate2::{Decompress, FlushDecompress, Status};
+use serde::Serialize;
 use serde_json::Value;
 
-use super::document::bounded;
-use super::{DocumentError, Finding, Format};
+use super::reader::Reader;
+use super::{Artifact, DocumentError, Finding, Format, PageFinding};
 use deltille_core::artwork::subject;
 use deltille_core::targets::Target;
 use deltille_files::export::mesh::extras;
-use deltille_files::limits::Limits;
 
 /// Of marks that a viewer which shows more than the page shows too.
 const OFF_PAGE: &str = "a mark that reaches over the edge of the page";
@@ -37,6 +37,29 @@ const MOST_DIGITS: usize = 40;
 /// More than this of a file is not listed.
 const MOST_LISTED: usize = 64;
 
+/// What is wrong with what a file is built of.
+#[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum ConstructFinding {
+    /// The file has something that not every viewer shows alike, so that what is seen here need
+    /// not be what is seen elsewhere.
+    #[error("{place}: {construct}: not every viewer shows that alike")]
+    Construct {
+        /// Where it is, in the words of the format.
+        place: String,
+        /// What it is.
+        construct: String,
+    },
+    /// What no picture of the page shows: words that are not those of the target, or marks beside the page.
+    #[error("{place}: {problem}")]
+    Unseen {
+        /// Where it is, in the words of the format.
+        place: String,
+        /// What it is.
+        problem: String,
+    },
+}
+
 /// What is not on the list, as it is met on the way through a file.
 #[derive(Default)]
 struct Findings(Vec<Finding>);
@@ -46,7 +69,7 @@ impl Findings {
     fn add(&mut self, place: impl Into<String>, construct: impl Into<String>) {
         if !self.is_full() {
             let (place, construct) = (place.into(), construct.into());
-            self.0.push(Finding::Construct { place, construct });
+            self.0.push(ConstructFinding::Construct { place, construct }.into());
         }
     }
 
@@ -61,7 +84,7 @@ impl Findings {
     fn unseen_unless(&mut self, holds: bool, place: impl Into<String>, problem: impl Into<String>) {
         if !holds && !self.is_full() {
             let (place, problem) = (place.into(), problem.into());
-            self.0.push(Finding::Unseen { place, problem });
+            self.0.push(ConstructFinding::Unseen { place, problem }.into());
         }
     }
 
@@ -79,10 +102,10 @@ impl Findings {
     fn add_of(&mut self, file: &str, other: Findings) {
         for finding in other.0 {
             match finding {
-                Finding::Construct { place, construct } => {
+                Finding::Construct(ConstructFinding::Construct { place, construct }) => {
                     self.add(format!("{file}, {place}"), construct);
                 }
-                Finding::Unseen { place, problem } => {
+                Finding::Construct(ConstructFinding::Unseen { place, problem }) => {
                     self.unseen_unless(false, format!("{file}, {place}"), problem);
                 }
                 other => self.0.push(other),
@@ -93,9 +116,12 @@ impl Findings {
 
 /// Whether there is something in a file that not every viewer shows alike, so that it is not drawn.
 pub(super) fn refuse(findings: &[Finding]) -> bool {
+    let refuses = |finding: &Finding| {
+        matches!(finding, Finding::Construct(ConstructFinding::Construct { .. }))
+    };
     findings.iter().any(|finding| match finding {
-        Finding::OnPage { finding, .. } => matches!(**finding, Finding::Construct { .. }),
-        finding => matches!(finding, Finding::Construct { .. }),
+        Finding::Page(PageFinding::OnPage { finding, .. }) => refuses(finding),
+        finding => refuses(finding),
     })
 }
 
@@ -130,19 +156,20 @@ fn is_creator(words: &str) -> bool {
 }
 
 /// What of a drawn page, a mesh or a body is not on the list of its format, or says in words
-/// what the target is not. An error means that the file cannot be read at all.
+/// what the target is not; and the files that belong to it, as an OBJ names them. An error means that
+/// a file cannot be read at all.
 pub(super) fn check(
+    reader: &Reader,
     path: &Path,
     format: Format,
     target: &Target,
-    limits: &Limits,
-) -> Result<Vec<Finding>, DocumentError> {
-    let bytes = limits.read(path)?;
-    let (words, limits) = (Words::of(target), *limits);
+) -> Result<(Vec<Finding>, Vec<Artifact>), DocumentError> {
+    let bytes = reader.read(path)?;
+    let (words, limits) = (Words::of(target), reader.limits);
     if format == Format::Obj {
-        return obj::check(path, &bytes, &words, &limits).map(|found| found.0);
+        return obj::check(reader, path, &bytes, &words).map(|(found, parts)| (found.0, parts));
     }
-    let found = bounded(path, &limits, move || match format {
+    let found = reader.run(path, move || match format {
         Format::Svg => svg::check(&bytes, &words, &limits),
         Format::Pdf => pdf::check(&bytes, &words, &limits),
         Format::Png => png::check(&bytes, &words.title, &limits),
@@ -151,7 +178,7 @@ pub(super) fn check(
         // Their readers know nothing but what is written.
         Format::Obj | Format::Dsc | Format::Dxf => Ok(Findings::default()),
     })?;
-    Ok(found.0)
+    Ok((found.0, Vec::new()))
 }
 
 /// The text of a file.

@@ -7,56 +7,67 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::{Findings, Words, decimal, is_creator, is_plain_file_name, mtl, png, start, text};
-use crate::DocumentError;
-use deltille_files::limits::Limits;
+use crate::reader::Reader;
+use crate::{Artifact, DocumentError};
 
-/// Goes through an OBJ, its material library and its texture.
+/// Goes through an OBJ, its material library and its texture, and returns these two where they
+/// were come to.
 pub(super) fn check(
+    reader: &Reader,
     path: &Path,
     bytes: &[u8],
     words: &Words,
-    limits: &Limits,
-) -> Result<Findings, DocumentError> {
+) -> Result<(Findings, Vec<Artifact>), DocumentError> {
     let text = text(bytes).map_err(|problem| DocumentError::unreadable(path, problem))?;
-    let lines = text.lines().count();
-    limits.check_nodes(lines).map_err(|e| DocumentError::unreadable(path, e.to_string()))?;
-    let mut reader = Reader::default();
-    for (index, line) in text.split_terminator('\n').enumerate() {
-        let place = format!("line {}", index + 1);
-        match line.strip_prefix("# ") {
-            Some(comment) => reader.comment(comment, index, words, &place),
-            None => reader.line(line, &place),
-        }
-    }
-    for (used, (what, count)) in
-        reader.used.iter().zip(["v", "vt", "vn"].into_iter().zip(reader.counts))
-    {
-        reader.found.unless(used.len() == count, "the file", format!("a line {what} of no use"));
-    }
-    let named = reader.object.as_deref() == Some(&*words.title);
-    reader.found.unseen_unless(named, "the file", "an object other than the target's name");
-    let mut found = reader.found;
-    let Some(library) = reader.library.filter(|_| !found.refuse()) else {
+    let count = text.lines().count();
+    let few = reader.limits.check_nodes(count);
+    few.map_err(|exceeded| DocumentError::unreadable(path, exceeded.to_string()))?;
+    let Lines { mut found, library, material: used, .. } = lines(text, words);
+    let mut parts = Vec::new();
+    let Some(library) = library.filter(|_| !found.refuse()) else {
         found.unless(found.refuse(), "the file", "no material library");
-        return Ok(found);
+        return Ok((found, parts));
     };
-    let file = path.with_file_name(&library);
-    let (material, of_library) = mtl::check(&limits.read_text(&file)?);
+    let written = reader.read_text(&path.with_file_name(&library))?;
+    let (material, of_library) = mtl::check(&written);
     found.add_of(&library, of_library);
-    let known = material.name.is_some() && material.name == reader.material;
+    parts.push(Artifact::new(library, written));
+    let known = material.name.is_some() && material.name == used;
     found.unless(known, "the file", "a material other than that of its library");
     if let Some(texture) = material.texture.filter(|_| !found.refuse()) {
         let file = path.with_file_name(&texture);
-        let picture = png::check(&limits.read(&file)?, &words.title, limits)
+        let picture = reader.read(&file)?;
+        let of_texture = png::check(&picture, &words.title, &reader.limits)
             .map_err(|problem| DocumentError::unreadable(&file, problem))?;
-        found.add_of(&texture, picture);
+        found.add_of(&texture, of_texture);
+        parts.push(Artifact::of(texture, picture));
     }
-    Ok(found)
+    Ok((found, parts))
+}
+
+/// Goes through the lines of an OBJ.
+fn lines(text: &str, words: &Words) -> Lines {
+    let mut lines = Lines::default();
+    for (index, line) in text.split_terminator('\n').enumerate() {
+        let place = format!("line {}", index + 1);
+        match line.strip_prefix("# ") {
+            Some(comment) => lines.comment(comment, index, words, &place),
+            None => lines.line(line, &place),
+        }
+    }
+    for (used, (what, count)) in
+        lines.used.iter().zip(["v", "vt", "vn"].into_iter().zip(lines.counts))
+    {
+        lines.found.unless(used.len() == count, "the file", format!("a line {what} of no use"));
+    }
+    let named = lines.object.as_deref() == Some(&*words.title);
+    lines.found.unseen_unless(named, "the file", "an object other than the target's name");
+    lines
 }
 
 /// What was read so far.
 #[derive(Default)]
-struct Reader {
+struct Lines {
     found: Findings,
     library: Option<String>,
     object: Option<String>,
@@ -67,7 +78,7 @@ struct Reader {
     used: [BTreeSet<usize>; 3],
 }
 
-impl Reader {
+impl Lines {
     /// The first two lines say what wrote the file, and of what target.
     fn comment(&mut self, comment: &str, index: usize, words: &Words, place: &str) {
         let holds = match index {

@@ -1,4 +1,4 @@
-//! Artifacts read back from disk as pictures, by other code than wrote them: hayro for PDF, resvg
+//! Artifacts read back as pictures, by other code than wrote them: hayro for PDF, resvg
 //! for SVG, the image crates for PNG.
 
 mod pdf;
@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::reader::{self, Artifact, Reader};
 use deltille_core::raster::Gray;
-use deltille_files::limits::{self, Broken, Kind, Limits, ReadError};
+use deltille_files::limits::{Guard, Limits, ReadError};
 
 /// Largest picture that is drawn for a check, px.
 pub(super) const MAX_PIXELS: f64 = 60.0e6;
@@ -75,6 +76,12 @@ pub enum DocumentError {
     /// The file cannot be opened.
     #[error(transparent)]
     Read(#[from] ReadError),
+    /// A file that belongs to the artifact is not among those in memory.
+    #[error("{}: not among the files that are given", path.display())]
+    Absent {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file is not what its name says, has no size in units of length, or takes more than the
     /// [`Limits`].
     #[error("{}: {problem}", path.display())]
@@ -93,27 +100,13 @@ impl DocumentError {
     }
 }
 
-/// Reads or draws a file by code of others, which may panic, or never end.
-pub(super) fn bounded<T: Send + 'static>(
-    path: &Path,
-    limits: &Limits,
-    work: impl FnOnce() -> Result<T, String> + Send + 'static,
-) -> Result<T, DocumentError> {
-    let problem = match limits::bounded(limits.time(), work) {
-        Ok(Ok(result)) => return Ok(result),
-        Ok(Err(problem)) => problem,
-        Err(Broken::Time) => limits.exceeded(Kind::Seconds).to_string(),
-        Err(broken) => broken.to_string(),
-    };
-    Err(DocumentError::unreadable(path, problem))
-}
-
 /// An opened artifact.
 pub struct Document {
     path: PathBuf,
     content: Arc<Content>,
     format: Format,
     limits: Limits,
+    guard: Guard,
 }
 
 enum Content {
@@ -146,26 +139,28 @@ impl Page {
 }
 
 impl Document {
-    /// Opens a `.pdf`, `.svg` or `.png` file.
-    pub fn open(path: &Path) -> Result<Self, DocumentError> {
-        Self::open_within(path, &Limits::default())
+    /// Reads a `.pdf`, `.svg` or `.png` file that is in memory.
+    pub fn read(artifact: &Artifact, limits: &Limits) -> Result<Self, DocumentError> {
+        let files = std::slice::from_ref(artifact);
+        let reader = Reader { files: &files, limits: *limits, guard: Guard::Here };
+        Self::read_by(&reader, Path::new(artifact.name()))
     }
 
-    /// The same within other limits than the default.
-    pub fn open_within(path: &Path, limits: &Limits) -> Result<Self, DocumentError> {
+    /// Reads a file.
+    pub(super) fn read_by(reader: &Reader, path: &Path) -> Result<Self, DocumentError> {
         let unreadable = |problem: String| DocumentError::unreadable(path, problem);
         let Some(format) = Format::of(path).filter(|format| format.is_document()) else {
             return Err(unreadable("not a .pdf, .svg or .png file".to_owned()));
         };
-        let (bytes, limits) = (limits.read(path)?, *limits);
-        let content = bounded(path, &limits, move || {
+        let (bytes, limits, guard) = (reader.read(path)?, reader.limits, reader.guard);
+        let content = reader.run(path, move || {
             Ok(match format {
                 Format::Pdf => Content::Pdf(pdf::Pdf::parse(bytes)?),
                 Format::Svg => Content::Svg(Box::new(svg::Svg::parse(&bytes)?)),
                 _ => Content::Png(png::Png::parse(&bytes, &limits)?),
             })
         })?;
-        Ok(Self { path: path.to_owned(), content: Arc::new(content), format, limits })
+        Ok(Self { path: path.to_owned(), content: Arc::new(content), format, limits, guard })
     }
 
     /// Kind of the file.
@@ -229,8 +224,8 @@ impl Document {
                     let problem = format!("a page of {width_mm} x {height_mm} mm cannot be drawn");
                     return Err(DocumentError::unreadable(&self.path, problem));
                 }
-                let end = Instant::now().checked_add(self.limits.time());
-                bounded(&self.path, &self.limits, move || match &*content {
+                let end = self.guard.end(self.limits.time());
+                reader::run(&self.path, &self.limits, self.guard, move || match &*content {
                     Content::Pdf(pdf) => Ok(pdf.render(page, px_per_mm, end)),
                     Content::Svg(svg) => svg.render(px_per_mm, end),
                     Content::Png(png) => Ok(png.image().clone()),

@@ -1,3 +1,4 @@
+use std::sync::Arc;
 use std::time::Instant;
 
 use hayro::hayro_interpret::InterpreterSettings;
@@ -19,7 +20,7 @@ const BAND: usize = 1024;
 pub(super) struct Pdf(hayro_syntax::Pdf);
 
 impl Pdf {
-    pub fn parse(bytes: Vec<u8>) -> Result<Self, String> {
+    pub fn parse(bytes: Arc<Vec<u8>>) -> Result<Self, String> {
         let pdf = hayro_syntax::Pdf::new(bytes)
             .map_err(|_| "not a readable PDF; it may be truncated".to_owned())?;
         if pdf.pages().is_empty() { Err("a PDF without pages".to_owned()) } else { Ok(Self(pdf)) }

@@ -1,23 +1,27 @@
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{DMat4, DVec3, Vec3};
 use image::ImageDecoder as _;
 
 use super::{Model, Triangle};
-use crate::DocumentError;
-use crate::document::bounded;
+use crate::reader::Reader;
+use crate::{Artifact, DocumentError};
 use deltille_core::raster::Gray;
 use deltille_files::limits::Limits;
 
-/// Loads a `.glb` or an `.obj` with its material and texture.
-pub(crate) fn load(path: &Path, limits: &Limits) -> Result<Model, DocumentError> {
+/// Loads a `.glb`, or an `.obj` with its `parts`: material library and texture.
+pub(crate) fn load(
+    reader: &Reader,
+    path: &Path,
+    parts: Vec<Artifact>,
+) -> Result<Model, DocumentError> {
     let unreadable = |problem: String| DocumentError::unreadable(path, problem);
     let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-    let (bytes, file, within) = (limits.read(path)?, path.to_owned(), *limits);
-    let model = bounded(path, limits, move || match is_obj {
-        true => obj(&bytes, &file, &within),
-        false => glb(&bytes, &within),
+    let (bytes, limits) = (reader.read(path)?, reader.limits);
+    let model = reader.run(path, move || match is_obj {
+        true => obj(&bytes, &parts, &limits),
+        false => glb(&bytes, &limits),
     })?;
     if model.triangles.is_empty() {
         return Err(unreadable("it has no triangles".to_owned()));
@@ -79,17 +83,17 @@ fn visit<'a>(
     Ok(here)
 }
 
-fn obj(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model, String> {
+fn obj(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, String> {
+    let part = |name: &Path| parts.iter().find(|part| Path::new(part.name()) == name);
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
     let (models, materials) = tobj::load_obj_buf(&mut &*bytes, &options, |library| {
-        let library = limits.read(&path.with_file_name(library));
-        let library = library.map_err(|_| tobj::LoadError::OpenFileFailed)?;
-        tobj::load_mtl_buf(&mut &library[..])
+        let library = part(library).ok_or(tobj::LoadError::OpenFileFailed)?;
+        tobj::load_mtl_buf(&mut library.bytes())
     })
     .map_err(|error| error.to_string())?;
     let materials = materials.map_err(|error| format!("its material library: {error}"))?;
     let mut triangles = Vec::new();
-    let mut texture: Option<PathBuf> = None;
+    let mut texture: Option<String> = None;
     for mesh in models.iter().map(|model| &model.mesh) {
         let points = |values: &[f64]| -> Vec<DVec3> {
             values.as_chunks::<3>().0.iter().copied().map(DVec3::from).collect()
@@ -105,12 +109,10 @@ fn obj(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model, String> {
             (&mesh.texcoord_indices, &uvs),
         )?;
         let material = mesh.material_id.and_then(|id| materials.get(id));
-        let name = material.and_then(|material| material.diffuse_texture.as_ref());
-        texture = name.map(|name| path.with_file_name(name)).or(texture);
+        texture = material.and_then(|material| material.diffuse_texture.clone()).or(texture);
     }
-    let texture = texture.ok_or("it has no texture")?;
-    let bytes = limits.read(&texture).map_err(|error| error.to_string())?;
-    Ok(Model { triangles, texture: image(&bytes, limits)? })
+    let texture = texture.and_then(|name| part(Path::new(&name))).ok_or("it has no texture")?;
+    Ok(Model { triangles, texture: image(texture.bytes(), limits)? })
 }
 
 /// Adds triangles from indexed lists.

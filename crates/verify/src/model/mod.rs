@@ -1,4 +1,4 @@
-//! Meshes read back from disk as their users read them, through the gltf and tobj crates.
+//! Meshes read back as their users read them, through the gltf and tobj crates.
 
 mod load;
 mod stl;

@@ -3,7 +3,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 
 use crate::DocumentError;
-use deltille_files::limits::Limits;
+use crate::reader::Reader;
 
 /// Bytes before the triangles of a binary STL, and of a triangle.
 const HEAD: usize = 84;
@@ -16,9 +16,9 @@ pub(crate) struct Facet {
 }
 
 /// Loads a binary STL.
-pub(crate) fn load_stl(path: &Path, limits: &Limits) -> Result<Vec<Facet>, DocumentError> {
+pub(crate) fn load_stl(reader: &Reader, path: &Path) -> Result<Vec<Facet>, DocumentError> {
     let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
-    let bytes = limits.read(path)?;
+    let bytes = reader.read(path)?;
     let (Some(head), Some(body)) = (bytes.get(..HEAD), bytes.get(HEAD..)) else {
         return Err(unreadable("too short for a binary STL"));
     };

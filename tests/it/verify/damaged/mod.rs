@@ -117,7 +117,7 @@ impl Artifacts {
 
     fn verify(&self, path: &Path) -> Result<Verdict, String> {
         let verifier = Verifier::new(&self.target, Some(&self.family)).unwrap();
-        verifier.verify(path).map_err(|error| error.to_string())
+        verifier.verify_path(path).map_err(|error| error.to_string())
     }
 
     /// What is said of a damaged file; `None` if it passes.

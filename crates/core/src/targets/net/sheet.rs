@@ -14,8 +14,8 @@ use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use crate::targets::length::format_mm;
 use crate::targets::paper::{PaperSize, PaperSpec};
 use crate::targets::{
-    Face, FamilyRef, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine, SheetText,
-    SolidSpec, TargetError,
+    Face, FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine,
+    SheetText, SolidSpec, TargetError,
 };
 
 /// Faces that rise or fall from one plane by less than this are not folded, radians (a tenth of a
@@ -281,18 +281,18 @@ impl<'a> Drawing<'a> {
                     }
                     (None, None) => {
                         sheet.lines.push(line(LineKind::Cut, ends));
-                        sheet.texts.push(self.margin_words(ends, format!("edge {number}"), 0.5));
+                        sheet.texts.push(self.margin_words(ends, Label::Edge(number), 0.5));
                     }
                 }
                 // The name of the face stands where no number of an edge does.
                 if !named && (hinge.is_some() || tab.is_some()) {
                     named = true;
-                    sheet.texts.push(self.margin_words(ends, format!("face {index}"), 0.5));
+                    sheet.texts.push(self.margin_words(ends, Label::Face(index), 0.5));
                 }
             }
             if !named {
                 let ends = [corners[0], corners[1]];
-                sheet.texts.push(self.margin_words(ends, format!("face {index}"), 0.25));
+                sheet.texts.push(self.margin_words(ends, Label::Face(index), 0.25));
             }
         }
     }
@@ -313,18 +313,15 @@ impl<'a> Drawing<'a> {
         let under = self.sides.partner(tab.side)?.face;
         let room = far_a.distance(far_b) - 2.0 * TAB_INDENT_MM;
         let cap = (TAB_CAP.0 * tab.depth_mm).min(TAB_CAP.1);
-        let long = format!("edge {number} · under face {under}");
-        let text = if width(&long, LEGIBLE_CAP_MM.min(cap)) <= room {
-            long
-        } else {
-            format!("edge {number}")
-        };
+        let long = Label::Tab { edge: number, under };
+        let text =
+            if width(&long, LEGIBLE_CAP_MM.min(cap)) <= room { long } else { Label::Edge(number) };
         let cap = cap.min(cap * room / width(&text, cap));
         Some(words([far_a, far_b], text, cap, 0.5, (tab.depth_mm - cap) / 2.0, room))
     }
 
     /// Words in the margin of a face along one of its sides, centred at a part of its length.
-    fn margin_words(&self, ends: [DVec2; 2], text: String, part: f64) -> SheetText {
+    fn margin_words(&self, ends: [DVec2; 2], text: Label, part: f64) -> SheetText {
         let margin = self.spec.margin_mm;
         let cap = (NUMBER_CAP.0 * margin).min(NUMBER_CAP.1);
         let room = (ends[0].distance(ends[1]) - 4.0 * margin).max(cap);
@@ -380,7 +377,7 @@ pub(super) fn instructions(lines: &[SheetLine], at: [f64; 2], room: f64) -> [She
     [folds, glue].map(|text| {
         y -= WORDS_STEP_MM;
         SheetText {
-            text,
+            text: Label::Words(text),
             at_mm: [at[0], y],
             angle_rad: 0.0,
             cap_height_mm: WORDS_CAP_MM,
@@ -395,15 +392,15 @@ fn line(kind: LineKind, [from, to]: [DVec2; 2]) -> SheetLine {
 }
 
 /// Estimated width of a text, mm.
-fn width(text: &str, cap: f64) -> f64 {
-    text.chars().count() as f64 * ADVANCE_CAPS * cap
+fn width(text: &Label, cap: f64) -> f64 {
+    text.characters() as f64 * ADVANCE_CAPS * cap
 }
 
 /// Words along the line between two points, centred at a part of it, their base line `inwards`
 /// (to the left) of it.
 fn words(
     [from, to]: [DVec2; 2],
-    text: String,
+    text: Label,
     cap: f64,
     part: f64,
     inwards: f64,

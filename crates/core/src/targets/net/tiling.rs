@@ -16,7 +16,7 @@ use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use crate::targets::length::format_mm;
 use crate::targets::paper::{Orientation, PaperSize, PaperSpec};
 use crate::targets::{
-    LineKind, SheetLayout, SheetLine, SheetPage, SheetText, SolidSpec, TargetError,
+    Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText, SolidSpec, TargetError,
 };
 
 /// Width of what neighbouring windows share, mm.
@@ -237,7 +237,7 @@ impl Tiling {
         let start = left + width + 3.0;
         let room = right - overview - 3.0 * BLANK_MM - start;
         let text = |text: String, at_mm, cap_height_mm, max_width_mm| SheetText {
-            text,
+            text: Label::Words(text),
             at_mm,
             angle_rad: 0.0,
             cap_height_mm,
@@ -301,7 +301,7 @@ fn obstacles(sheet: &SheetLayout, faces: &[(u32, [[f64; 2]; 3])]) -> Vec<Vec<DVe
     });
     let lines = sheet.lines.iter().map(|l| vec![DVec2::from(l.from_mm), DVec2::from(l.to_mm)]);
     let texts = sheet.texts.iter().map(|text| {
-        let width = text.text.chars().count() as f64 * ADVANCE_CAPS * text.cap_height_mm;
+        let width = text.text.characters() as f64 * ADVANCE_CAPS * text.cap_height_mm;
         let width = width.min(text.max_width_mm);
         let along = DVec2::from_angle(text.angle_rad);
         let (at, up) = (DVec2::from(text.at_mm), along.perp() * text.cap_height_mm);
