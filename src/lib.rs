@@ -50,6 +50,7 @@ pub mod family {
 }
 
 #[cfg(feature = "cli")]
+#[allow(clippy::missing_errors_doc, reason = "programs tell their errors to people")]
 pub mod cli;
 #[cfg(feature = "experiment")]
 pub mod experiment;

@@ -190,6 +190,10 @@ pub enum VerifyError {
 /// What is wrong is in the [`Verdict`]. An error means that there is nothing to compare: a file that is
 /// not given or cannot be read, or a target that has no such artifact.
 ///
+/// # Errors
+/// Where the family is another one, the name tells no format or sheet, or a file is missing or cannot be read at all.
+/// What is wrong with an artifact is its verdict.
+///
 /// ```
 /// use deltille_core::artwork;
 /// use deltille_core::lattice::GridKind;
@@ -231,6 +235,9 @@ pub struct Verifier<'a> {
 
 impl<'a> Verifier<'a> {
     /// A verifier for the artifacts of `target`, whose family must be given if it has tags.
+    ///
+    /// # Errors
+    /// Where the target needs another family.
     pub fn new(target: &'a Target, family: Option<&'a Family>) -> Result<Self, VerifyError> {
         if let Some(needed) = &target.family {
             // A .dsc file names its family without a fingerprint.
@@ -316,6 +323,9 @@ impl<'a> Verifier<'a> {
     /// PNG the one that its name tells. What belongs to the artifact must be among the files too:
     /// all pages of [`set_of`](Self::set_of) for one of a net, its material library and texture for
     /// an OBJ.
+    ///
+    /// # Errors
+    /// Where the name tells no format or sheet, or a file is missing or cannot be read at all.
     pub fn verify(&self, name: &str, files: &[Artifact]) -> Result<Verdict, VerifyError> {
         let reader = Reader { files: &files, limits: self.limits, guard: self.guard };
         self.verify_by(&reader, Path::new(name))

@@ -24,11 +24,17 @@ impl Files for OnDisk {
 
 impl Document {
     /// Opens a `.pdf`, `.svg` or `.png` file.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, or is not of this format.
     pub fn open(path: &Path) -> Result<Self, DocumentError> {
         Self::open_within(path, &Limits::default())
     }
 
     /// The same within other limits than the default.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, is not of this format, or passes a limit.
     pub fn open_within(path: &Path, limits: &Limits) -> Result<Self, DocumentError> {
         let files = OnDisk(*limits);
         Self::read_by(&Reader { files: &files, limits: *limits, guard: Guard::Timed }, path)
@@ -39,6 +45,9 @@ impl Verifier<'_> {
     /// Reads an artifact from disk, with the files beside it that belong to it, and compares it as
     /// [`verify`](Self::verify) does. Readers of others have their own thread and, for each step,
     /// [`Limits::max_seconds`].
+    ///
+    /// # Errors
+    /// Where the name tells no format or sheet, or a file is missing or cannot be read at all.
     pub fn verify_path(&self, path: &Path) -> Result<Verdict, VerifyError> {
         let files = OnDisk(self.limits);
         self.verify_by(&Reader { files: &files, limits: self.limits, guard: Guard::Timed }, path)

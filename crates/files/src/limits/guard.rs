@@ -24,6 +24,9 @@ thread_local! {
 }
 
 /// Runs code of others; a panic within is an error, and nothing is printed of it.
+///
+/// # Errors
+/// The words of the panic.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Broken> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -43,6 +46,9 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Broken> {
 
 /// Runs code of others as [`caught`] does, on a thread with a deep stack, for so long. After that
 /// it goes on unheard, until it or the program ends.
+///
+/// # Errors
+/// The words of the panic, or that the time is over.
 pub fn bounded<T: Send + 'static>(
     time: Duration,
     work: impl FnOnce() -> T + Send + 'static,
@@ -70,6 +76,9 @@ pub enum Guard {
 
 impl Guard {
     /// Runs code of others, for at most `time` where there is a clock.
+    ///
+    /// # Errors
+    /// The words of the panic, or that the time is over.
     pub fn run<T: Send + 'static>(
         self,
         time: Duration,

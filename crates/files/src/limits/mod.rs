@@ -176,6 +176,9 @@ impl Limits {
     };
 
     /// The bytes of a regular file.
+    ///
+    /// # Errors
+    /// Where it cannot be read, is no regular file, or is larger than the limit.
     pub fn read(&self, path: &Path) -> Result<Vec<u8>, ReadError> {
         let exceeded = self.exceeded(Kind::Bytes);
         read_up_to(path, self.max_bytes)?
@@ -183,6 +186,9 @@ impl Limits {
     }
 
     /// The text of a regular file.
+    ///
+    /// # Errors
+    /// Where it cannot be read, is no regular file, is larger than the limit, or is no text.
     pub fn read_text(&self, path: &Path) -> Result<String, ReadError> {
         text(path, self.read(path)?)
     }
@@ -201,11 +207,17 @@ impl Limits {
     }
 
     /// Refuses a picture of too many pixels.
+    ///
+    /// # Errors
+    /// The limit that it passes.
     pub fn check_pixels(&self, width: u32, height: u32) -> Result<(), Exceeded> {
         self.check(Kind::Pixels, u64::from(width) * u64::from(height), self.max_pixels)
     }
 
     /// Refuses a photograph of too many pixels, or of too many for a file of so many bytes.
+    ///
+    /// # Errors
+    /// The limit that it passes.
     pub fn check_photograph(&self, width: u32, height: u32, bytes: u64) -> Result<(), Exceeded> {
         self.check_pixels(width, height)?;
         let pixels = u64::from(width) * u64::from(height);
@@ -214,11 +226,17 @@ impl Limits {
     }
 
     /// Refuses so many parts.
+    ///
+    /// # Errors
+    /// The limit that they pass.
     pub fn check_nodes(&self, nodes: usize) -> Result<(), Exceeded> {
         self.check(Kind::Nodes, nodes as u64, self.max_nodes)
     }
 
     /// Refuses parts that lie so deep.
+    ///
+    /// # Errors
+    /// The limit that they pass.
     pub fn check_depth(&self, depth: usize) -> Result<(), Exceeded> {
         self.check(Kind::Depth, depth as u64, self.max_depth as u64)
     }
@@ -239,12 +257,18 @@ impl Limits {
 }
 
 /// The text of a regular file of a kind that has at most so many bytes.
+///
+/// # Errors
+/// Where it cannot be read, is no regular file, is too long, or is no text.
 pub fn read_short_text(path: &Path, most: usize) -> Result<String, ReadError> {
     let bytes = read_up_to(path, most as u64)?;
     text(path, bytes.ok_or_else(|| ReadError::TooLong { path: path.to_owned(), most })?)
 }
 
 /// Refuses what is no regular file. A pipe is not even opened, as that may wait for ever.
+///
+/// # Errors
+/// Where it cannot be looked at, or is no regular file.
 pub fn check_file(path: &Path) -> Result<(), ReadError> {
     let io = |source| ReadError::Io { path: path.to_owned(), source };
     let metadata = path.metadata().map_err(io)?;

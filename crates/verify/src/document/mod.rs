@@ -140,6 +140,9 @@ impl Page {
 
 impl Document {
     /// Reads a `.pdf`, `.svg` or `.png` file that is in memory.
+    ///
+    /// # Errors
+    /// Where it is not of this format, is damaged, or passes a limit.
     pub fn read(artifact: &Artifact, limits: &Limits) -> Result<Self, DocumentError> {
         let files = std::slice::from_ref(artifact);
         let reader = Reader { files: &files, limits: *limits, guard: Guard::Here };
@@ -207,6 +210,9 @@ impl Document {
 
     /// A page as a picture, on white. `px_per_mm` is a wish: a PNG has its own resolution, and
     /// large pages are drawn coarser to bound the memory.
+    ///
+    /// # Errors
+    /// Where the page cannot be drawn, or passes a limit.
     pub fn render(&self, page: usize, px_per_mm: f64) -> Result<Page, DocumentError> {
         let [width_mm, height_mm] = self.size_mm(page);
         let most = (MAX_PIXELS / (width_mm * height_mm)).sqrt();
