@@ -22,7 +22,7 @@
 //! | 6 | [`photograph`] | photographs of any common format | |
 //! | 6 | [`export`] | artwork, targets and results to files and back | |
 //! | 6 | [`report`] | a calibration as a page to look at | |
-//! | 7 | [`verify`] | an artifact read back from disk and compared with its target | `deltille-verify` |
+//! | 7 | [`verify`] | an artifact read back and compared with its target | `deltille-verify` |
 //! | 8 | [`experiment`] | simulations that measure the library itself | `deltille` |
 //! | 9 | `cli` | the programs' arguments, progress and messages | |
 //!

@@ -1,7 +1,7 @@
 //! An artifact read back, seen, detected and compared with its target.
 //!
-//! [`verify`] takes files as bytes: it opens none, starts no thread or program of its own and asks for no
-//! time, so that it does where there is no file system. [`Verifier::verify_path`] is the same for files on
+//! [`verify`] takes files as bytes: it opens none, starts no program and asks for no time (threads
+//! are those of the pool at hand, if there is one), so that it does where there is no file system. [`Verifier::verify_path`] is the same for files on
 //! disk, which are read within [`Limits`]; code of others then has a thread with an end in time.
 //!
 //! Nothing here knows how a file was drawn: a PDF is rasterised by hayro, an SVG by resvg, and the
