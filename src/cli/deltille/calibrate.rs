@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
-use super::calibrating::{Calibrated, SolveArgs, check_images, without_outliers};
+use super::calibrating::{Calibrated, SolveArgs, check_images, sample, without_outliers};
 use super::camera_file;
 use super::files::{File, text_file, write_all};
 use super::sightings::{Sightings, SightingsArgs};
@@ -86,7 +86,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         check_images(folder, &views)?;
     }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let page = args.solve.page(&stem)?;
+    let page = args.solve.page(&stem, args.overwrite)?;
     let calibration = Calibration::new(panels).camera(&stem, views, intrinsics);
     let mut solved = args.solve.solve(calibration, print)?;
     ensure!(!solved.estimate.frames.is_empty(), "no view shows the target as this camera sees it");
@@ -131,19 +131,6 @@ impl Args {
         let known = known.map(|path| camera_file::read("--fixed-intrinsics", path)).transpose()?;
         let known = known.map(Intrinsics::Known).or(self.model.map(Intrinsics::Unknown));
         known.context("give --model, or --fixed-intrinsics")
-    }
-}
-
-/// A camera that has all parameters that are found, and none of them zero.
-fn sample(intrinsics: &Intrinsics) -> Camera {
-    match intrinsics {
-        Intrinsics::Unknown(model) => {
-            let camera = Camera::centred(100, 100, 100.0, model.lens());
-            let values = camera.parameters().into_iter().zip(model.free());
-            let values = values.map(|(value, free)| if free { value + 1e-3 } else { value });
-            camera.with_parameters(&values.collect::<Vec<_>>())
-        }
-        Intrinsics::Known(camera) | Intrinsics::Near { camera, .. } => camera.clone(),
     }
 }
 

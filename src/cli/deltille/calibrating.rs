@@ -7,14 +7,17 @@ use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use crate::calibrate::{
-    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Loss, View, Weights, Words,
+    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, Loss, View,
+    Weights, Words,
 };
+use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
 use crate::export::calibration::Print;
+use crate::export::kind::Kind;
 use crate::name::is_within;
 use crate::photograph;
 use crate::raster::AnyGray;
-use crate::report::{Report, thumbnail};
+use crate::report::{PAGE_START, Report, thumbnail};
 use crate::words::counted;
 
 /// How a calibration is solved, and the page about it.
@@ -99,13 +102,15 @@ impl SolveArgs {
         Ok(Calibrated { estimate, diagnoses, print })
     }
 
-    /// Where the page goes, `<stem>-report.html` in a folder.
-    pub fn page(&self, stem: &str) -> anyhow::Result<Option<PathBuf>> {
+    /// Where the page goes, `<stem>-report.html` in a folder. What would be refused is refused here, before the
+    /// work.
+    pub fn page(&self, stem: &str, overwrite: Overwrite) -> anyhow::Result<Option<PathBuf>> {
         let Some(page) = &self.report else { return Ok(None) };
         let is_page = page.is_dir() || page.extension().is_some_and(|end| end == "html");
         ensure!(is_page, "--report: {} must end in .html, or be a folder", page.display());
         let page = output::file(page, &format!("{stem}-report"), "html")?;
         output::check_writable("--report", &page)?;
+        overwrite.check(&page, &Kind::of(PAGE_START.as_bytes())).context("--report")?;
         Ok(Some(page))
     }
 }
@@ -142,21 +147,60 @@ impl Calibrated {
     ) -> anyhow::Result<()> {
         let mut thumbnails = BTreeMap::new();
         for (index, (camera, folder)) in self.estimate.cameras.iter().zip(folders).enumerate() {
-            for view in &camera.views {
-                let Some(folder) = folder else { break };
-                // A picture that is not there leaves its place to the corners.
-                let picture =
-                    picture_of(&view.image, folder).and_then(|path| photograph::read(&path).ok());
-                let picture = picture.and_then(|image| match image {
-                    AnyGray::U8(image) => thumbnail(&image),
-                    AnyGray::U16(image) => thumbnail(&image.map(|v| (v >> 8) as u8)),
-                });
+            let Some(folder) = folder else { continue };
+            let held_out = self.estimate.held_out.iter().flat_map(|test| test.cameras.get(index));
+            let views = camera.views.iter().chain(held_out.flat_map(|camera| &camera.views));
+            for view in views {
+                let size_px = [camera.camera.width, camera.camera.height];
+                let picture = small_picture(&view.image, folder, size_px);
                 thumbnails.extend(picture.map(|picture| ((index, view.name.clone()), picture)));
             }
         }
         let Self { estimate, diagnoses, print } = self;
         let report = Report { title, estimate, diagnoses, print: *print, thumbnails };
         output::write(page, report.html().as_bytes(), overwrite).context("--report")
+    }
+}
+
+/// A camera that has all parameters that are found, and none of them zero: what a format cannot carry of it is
+/// told before the work.
+pub fn sample(intrinsics: &Intrinsics) -> Camera {
+    match intrinsics {
+        Intrinsics::Unknown(model) => {
+            let camera = Camera::centred(100, 100, 100.0, model.lens());
+            let values = camera.parameters().into_iter().zip(model.free());
+            let values = values.map(|(value, free)| if free { value + 1e-3 } else { value });
+            camera.with_parameters(&values.collect::<Vec<_>>())
+        }
+        Intrinsics::Known(camera) | Intrinsics::Near { camera, .. } => camera.clone(),
+    }
+}
+
+/// The small picture of a view. One that is not there leaves its place to the corners, as does one that cannot be
+/// read or is not of the size that the camera has, which is told.
+fn small_picture(image: &str, folder: &Path, size_px: [u32; 2]) -> Option<Vec<u8>> {
+    let path = picture_of(image, folder)?;
+    let picture = match photograph::read(&path) {
+        Ok(picture) => picture,
+        Err(error) => {
+            tell!("warning: --images: {error}");
+            return None;
+        }
+    };
+    if [picture.width(), picture.height()] != size_px.map(|side| side as usize) {
+        tell!(
+            "warning: --images: {} has {} × {} px, the camera {} × {}",
+            path.display(),
+            picture.width(),
+            picture.height(),
+            size_px[0],
+            size_px[1]
+        );
+        return None;
+    }
+    match picture {
+        AnyGray::U8(image) => thumbnail(&image),
+        AnyGray::U16(image) => thumbnail(&image.map(|v| (v >> 8) as u8)),
     }
 }
 

@@ -56,12 +56,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
-    let (mut lines, mut all, mut without) = (String::new(), 0, 0);
+    let (mut lines, mut all, mut without, mut unread) = (String::new(), 0, 0, 0);
     for image in Images::of(&args.images)?.iter() {
         let image = image?;
         all += 1;
         let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let seen = detector.detect(&photograph::read_within(&image, &limits)?, &name);
+        let picture = match photograph::read_within(&image, &limits) {
+            Ok(picture) => picture,
+            Err(error) => {
+                tell!("error: {error}");
+                (without, unread) = (without + 1, unread + 1);
+                continue;
+            }
+        };
+        let seen = detector.detect(&picture, &name);
         let reason = seen.reasons.first().map(|reason| reason.to_string());
         let mut shown = views(&[(name, seen)], &reference)?.views;
         sightings::put_on(&sheet, Some(&target), &mut shown)?;
@@ -77,12 +85,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let said = calibration.inspect(&found);
         // Where the lens ends is the camera's, and the same for every picture.
         let is_of_picture = |said: &&Diagnosis| !matches!(said, Diagnosis::LensEnds { .. });
-        for diagnosis in said.iter().filter(is_of_picture) {
-            tell!("{}: {}", image.display(), words.sentence(diagnosis));
-        }
-        if said.iter().any(|said| matches!(said, Diagnosis::ForeignCamera { .. })) {
+        if let Some(foreign) =
+            said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }))
+        {
+            tell!("{}: {}", image.display(), words.sentence(foreign));
             without += 1;
             continue;
+        }
+        for diagnosis in said.iter().filter(is_of_picture) {
+            tell!("{}: {}", image.display(), words.sentence(diagnosis));
         }
         for view in found.cameras.iter().flat_map(|camera| &camera.views) {
             let line = pose::write_line(&found, view, &target.name);
@@ -94,6 +105,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if all == 0 {
         bail!("there is no image");
+    }
+    if unread == all {
+        bail!("no image could be read");
     }
     if let Some(path) = &path {
         output::write(path, lines.as_bytes(), args.overwrite)?;

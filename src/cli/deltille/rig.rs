@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 
-use super::calibrating::{Calibrated, SolveArgs, check_images, without_outliers};
+use super::calibrating::{Calibrated, SolveArgs, check_images, sample, without_outliers};
 use super::files::{File, same_file, text_file, write_all};
 use super::limits::FileLimits;
 use super::sightings::SheetArgs;
@@ -17,9 +17,9 @@ use crate::calibrate::{
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{Overwrite, check_folder, fixed, say};
 use crate::cli::run::{FAILED, report};
-use crate::detect::InkEstimate;
+use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::Print;
-use crate::export::camera::{colmap, colmap_rig, kalibr};
+use crate::export::camera::{FormatError, colmap, colmap_rig, kalibr};
 use crate::export::rig;
 use crate::targets::Name;
 use crate::words::{counted, shown};
@@ -104,15 +104,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let reference = Reference::Target(&target);
     let sheet = args.sheet.read(&limits)?;
     let scale = sightings::solid_scale(&sheet, &target)?;
-    let page = args.solve.page("rig")?;
+    let page = args.solve.page("rig", args.overwrite)?;
     let mut panels = reference.panels();
     panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
     let mut calibration = Calibration::new(panels).refine_panels(args.refine_target);
-    let (mut left_out, mut ink) = (Vec::new(), Vec::new());
+    let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
     for (name, folder) in &args.camera {
         let read = sightings::read(std::slice::from_ref(folder), &reference, &limits);
-        let sightings::Read { mut views, left_out: out, ink: of_camera, .. } =
+        let sightings::Read { mut views, left_out: out, ink: of_camera, detections, .. } =
             read.with_context(|| format!("--camera {name}"))?;
+        check_own(name, &detections, &seen)?;
+        seen.push((name, detections));
         sightings::put_on(&sheet, Some(&target), &mut views)?;
         left_out.extend(out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }));
         ink.extend(of_camera);
@@ -122,6 +124,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let known = of_name(&args.known, name).map(|path| camera_file::read("--known", path));
         let known = known.transpose()?.map(Intrinsics::Known);
         let intrinsics = known.unwrap_or(Intrinsics::Unknown(args.model));
+        let camera = sample(&intrinsics);
+        args.format.iter().try_for_each(|format| format.check(&camera)).context("--format")?;
         calibration = calibration.with(CameraViews::new(name, views, intrinsics));
     }
     let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
@@ -182,6 +186,23 @@ fn check_folders(cameras: &[(String, PathBuf)]) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Refuses pictures that another camera has too: of the same size, but of two cameras never the same corners.
+fn check_own(
+    name: &str,
+    detections: &[(String, Detection)],
+    others: &[(&String, Vec<(String, Detection)>)],
+) -> anyhow::Result<()> {
+    for (other, theirs) in others {
+        let is_theirs = |own: &&(String, Detection)| {
+            theirs.iter().any(|(_, of_other)| sightings::is_same(&own.1, of_other))
+        };
+        if let Some((picture, _)) = detections.iter().find(is_theirs) {
+            bail!("--camera {name}: {picture} has the same corners as a picture of {other}");
+        }
+    }
+    Ok(())
+}
+
 /// Refuses names that are no camera's, or given twice.
 fn check_named(option: &str, given: &[(String, PathBuf)], cameras: &[&str]) -> anyhow::Result<()> {
     for (index, (name, _)) in given.iter().enumerate() {
@@ -201,6 +222,14 @@ fn of_name<'a>(given: &'a [(String, PathBuf)], name: &str) -> Option<&'a Path> {
 }
 
 impl Format {
+    /// Refuses a camera that the format cannot carry.
+    fn check(self, camera: &Camera) -> Result<(), FormatError> {
+        match self {
+            Self::Kalibr => kalibr(&[(camera, Pose::IDENTITY)]).map(drop),
+            Self::Colmap => colmap(&[camera]).map(drop),
+        }
+    }
+
     fn files(self, estimate: &Estimate) -> anyhow::Result<Vec<File>> {
         let cameras = estimate.cameras.iter();
         let cameras: Vec<(&str, &Camera, Pose)> =

@@ -119,7 +119,8 @@ impl SightingsArgs {
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
-        let Read { mut views, empty, left_out, ink } = read(&self.detections, &reference, &limits)?;
+        let Read { mut views, empty, left_out, ink, .. } =
+            read(&self.detections, &reference, &limits)?;
         let sheet = self.sheet.read(&limits)?;
         put_on(&sheet, target.as_ref(), &mut views)?;
         let mut panels = reference.panels();
@@ -212,6 +213,8 @@ pub struct Read {
     pub left_out: Vec<Excluded>,
     /// What the pictures say together of the ink on the print.
     pub ink: Option<InkEstimate>,
+    /// The detections.
+    pub detections: Vec<(String, Detection)>,
 }
 
 /// The views that detections show, files or folders of them. What does not belong to the target is
@@ -259,7 +262,8 @@ pub fn read(paths: &[PathBuf], reference: &Reference, limits: &Limits) -> anyhow
     }
     let empty = empty.into_iter().map(|index| files[index].clone()).collect();
     let left_out = left_out.into_iter().map(|(_, out)| out).collect();
-    Ok(Read { views, empty, left_out, ink: ink_of(&detections, reference) })
+    let ink = ink_of(&detections, reference);
+    Ok(Read { views, empty, left_out, ink, detections })
 }
 
 /// What detections say together of the ink; pictures that do not allow for it are told on standard error.
@@ -283,7 +287,7 @@ fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<I
 }
 
 /// Whether two detections are of one picture, whatever it is called: noise makes no corners twice.
-fn is_same(one: &Detection, other: &Detection) -> bool {
+pub fn is_same(one: &Detection, other: &Detection) -> bool {
     !one.grids.is_empty() && one.grids == other.grids
 }
 

@@ -232,7 +232,7 @@ impl Calibration {
             _ => (names.len(), false),
         };
         if every > count {
-            return Err(CalibrationError::NothingHeldOut { every, all: count });
+            return Err(CalibrationError::NothingHeldOut { is_rig: !is_single, every, all: count });
         }
         let is_held_out = |(index, view): (usize, &View)| {
             let of_rig = || names.partition_point(|name| *name < view.name.as_str());

@@ -17,6 +17,19 @@ pub enum CalibrationError {
         /// Its size.
         other_px: [u32; 2],
     },
+    /// Pictures of another size than the camera that is given for them.
+    #[error(
+        "the camera is of {} × {} px, {view} has {} × {} px: it is another camera's, or of another mode",
+        camera_px[0], camera_px[1], view_px[0], view_px[1]
+    )]
+    OtherSize {
+        /// Width and height that the camera has.
+        camera_px: [u32; 2],
+        /// A view.
+        view: String,
+        /// Its width and height.
+        view_px: [u32; 2],
+    },
     /// A detection of another target, or with labels that run the wrong way round.
     #[error("{view}: {problem}")]
     WrongDetection {
@@ -44,8 +57,13 @@ pub enum CalibrationError {
         error: Box<CalibrationError>,
     },
     /// More frames than there are would have to be held out.
-    #[error("there are only {all} views, so that none is the {every}-th")]
+    #[error(
+        "there are only {all} {}, so that none is the {every}-th",
+        if *is_rig { "frames" } else { "views" }
+    )]
     NothingHeldOut {
+        /// Whether frames of several cameras are meant.
+        is_rig: bool,
         /// Every how many-th was to be held out.
         every: usize,
         /// How many there are.

@@ -35,7 +35,7 @@ pub struct Print {
 #[derive(Debug, thiserror::Error)]
 pub enum SheetError {
     /// Not the file of a calibration.
-    #[error("not the .json that `calibrate` writes")]
+    #[error("not the .json that `calibrate` or `rig` writes")]
     Foreign,
     /// A field is missing, or holds what it must not.
     #[error("field `{field}`: {problem}; make it anew with `calibrate --board-shape`")]
@@ -72,7 +72,8 @@ struct StoredShape {
 /// # Errors
 /// Where it is no calibration, a field is wrong, or it found no shape.
 pub fn read_sheet(text: &str) -> Result<Sheet, SheetError> {
-    if json::schema(text.as_bytes()).ok().flatten().as_deref() != Some(SCHEMA) {
+    let schema = json::schema(text.as_bytes()).ok().flatten();
+    if !schema.is_some_and(|schema| [SCHEMA, super::rig::SCHEMA].contains(&schema.as_str())) {
         return Err(SheetError::Foreign);
     }
     let file: SheetOfFile = json::read(text).map_err(|error| match error {

@@ -93,6 +93,11 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
         residuals(report, index, survey, &mut add);
     }
     let mut add = |weight, text: String| found.push(Advice { weight, text });
+    if report.estimate.shape.is_some_and(|shape| !shape.is_significant()) {
+        let text =
+            "The sheet's shape is no more than chance makes: take the calibration without it.";
+        add(Weight::Hint, text.to_owned());
+    }
     if let Some(shape) = report.estimate.shape.filter(|shape| shape.is_significant()) {
         let text = format!(
             "The sheet is bent by {:.2} mm and its corners lie up to {:.2} mm beside their places; that \
@@ -235,7 +240,7 @@ fn coverage(camera: &CameraEstimate, survey: &Survey, add: &mut impl FnMut(Weigh
     if covered < COVERED {
         let text = format!(
             "Corners cover {:.0} % of the {of_what}: bring the board to the empty cells of the map, \
-             its rim may be cut off.",
+             parts of it may lie outside.",
             100.0 * covered
         );
         add(Weight::Hint, text);
@@ -248,7 +253,7 @@ fn coverage(camera: &CameraEstimate, survey: &Survey, add: &mut impl FnMut(Weigh
             None => ("in the corners of the image", "half diagonal"),
         };
         let text = format!(
-            "No corner lies {place}: beyond {:.0} % of its {length} the distortion is extrapolated.",
+            "No corner was seen {place}: beyond {:.0} % of its {length} the distortion is extrapolated.",
             100.0 * reach
         );
         add(Weight::Hint, text);

@@ -6,6 +6,7 @@ use base64::Engine as _;
 
 use super::{Report, Survey, SurveyedView, Weight, advice, plots};
 use deltille_core::calibrate::{CameraEstimate, Excluded, Parameter, ViewEstimate};
+use deltille_core::camera::Pose;
 
 /// Views in the table: all, or where there are more the worst ones.
 const MOST_VIEWS: usize = 300;
@@ -15,12 +16,15 @@ const STRONG: f64 = 0.85;
 
 const STYLE: &str = include_str!("page.css");
 
+/// What a page begins with.
+pub const START: &str = "<!DOCTYPE html>\n<!-- deltille ";
+
 pub(super) fn html(report: &Report) -> String {
     let cameras = &report.estimate.cameras;
     let surveys: Vec<Survey> = cameras.iter().map(Survey::new).collect();
     let title = escaped(report.title);
     let mut page = format!(
-        "<!DOCTYPE html>\n<!-- deltille {} -->\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+        "{START}{} -->\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{title} – camera calibration</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <header><h1>{title}</h1>{}</header>\n",
@@ -115,7 +119,7 @@ fn of_print(report: &Report) -> Option<Figure> {
     // Adding zero makes a negative zero positive.
     let um = (10.0 * um).round() / 10.0 + 0.0;
     let growth = format!("{um:.1} ± {deviation:.1} µm").replace('-', "−");
-    Some((growth, "growth of what is dark"))
+    Some((growth, "ink spread"))
 }
 
 fn figures(cells: &[Figure]) -> String {
@@ -132,11 +136,14 @@ fn places(report: &Report) -> String {
         // Adding zero makes a negative zero positive.
         let at = at.to_array().map(|mm| (100.0 * mm).round() / 100.0 + 0.0);
         let at = at.map(|mm| format!("{mm:.2}").replace('-', "−")).join(", ");
+        let [turn, _] = camera.camera_from_rig.off(&Pose::IDENTITY);
+        let turned = turn.length().to_degrees();
         let sd = camera.pose_sd.map_or("–".to_owned(), |sd| {
             format!("{:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
         });
         format!(
-            "<tr><td>{}</td><td class=\"number\">{at}</td><td class=\"number\">{sd}</td>\
+            "<tr><td>{}</td><td class=\"number\">{at}</td><td class=\"number\">{turned:.3}°</td>\
+             <td class=\"number\">{sd}</td>\
              <td class=\"number\">{:.4}</td><td class=\"number\">{}</td></tr>",
             escaped(&camera.name),
             camera.rms_px,
@@ -145,12 +152,12 @@ fn places(report: &Report) -> String {
     });
     let rows: String = rows.collect();
     let frames = report.estimate.excluded.iter().filter(|out| out.camera.is_none());
-    let frames = frames.map(|out| format!("<tr>{}", out_row(out, 4)));
+    let frames = frames.map(|out| format!("<tr>{}", out_row(out, 5)));
     let frames: String = frames.collect();
     format!(
         "<section><h2>Relative camera poses</h2><table class=\"plain\"><tr><th>camera</th>\
-         <th>place, mm</th><th>± standard deviation</th><th>rms, px</th><th>corners</th></tr>{rows}\
-         {frames}</table><p class=\"note\">Places are those of the cameras' optical centres in the frame of \
+         <th>place, mm</th><th>turned by</th><th>± standard deviation</th><th>rms, px</th><th>corners</th></tr>{rows}\
+         {frames}</table><p class=\"note\">Places of the optical centres, and angles of rotation, relative to \
          camera {}.</p></section>\n",
         escaped(first)
     )

@@ -104,11 +104,10 @@ impl<'a> Search<'a> {
     ) -> Result<Self, CalibrationError> {
         let size_px = [camera.width, camera.height];
         if let Some(view) = views.iter().find(|view| view.size_px != size_px) {
-            return Err(CalibrationError::MixedSizes {
-                first: "the camera".to_owned(),
-                first_px: size_px,
-                other: view.name.clone(),
-                other_px: view.size_px,
+            return Err(CalibrationError::OtherSize {
+                camera_px: size_px,
+                view: view.name.clone(),
+                view_px: view.size_px,
             });
         }
         let views: Vec<View> = views.iter().map(agreeing).collect();
