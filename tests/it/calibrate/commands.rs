@@ -579,7 +579,7 @@ fn a_rig_is_calibrated_from_pictures() {
     let page = std::fs::read_to_string(at.join("held/rig-report.html")).unwrap();
     let of_cameras = page.match_indices("class=\"camera\">").count();
     let pictures = page.matches("data:image/png").count();
-    assert_eq!((of_cameras, pictures), (2, 4), "sections of cameras and pictures of the left one");
+    assert_eq!((of_cameras, pictures), (2, 5), "sections of cameras and pictures of the left one");
 
     let wrong = refused(at, &format!("rig {cameras} --camera third=nowhere --target ico.json"));
     assert!(wrong.contains("third") && wrong.contains("nowhere"), "{wrong}");
