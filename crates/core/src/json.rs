@@ -33,6 +33,7 @@ pub enum ReadError {
 /// # Errors
 /// Where it is no JSON, or a field is missing, unknown, or holds what it must not.
 pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> {
+    check_object(json.as_bytes()).map_err(ReadError::Json)?;
     let mut deserializer = serde_json::Deserializer::from_str(json);
     let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         let field = error.path().to_string();
@@ -57,7 +58,16 @@ pub fn schema(text: &[u8]) -> serde_json::Result<Option<String>> {
     struct Head {
         schema: Option<String>,
     }
+    check_object(text)?;
     serde_json::from_slice::<Head>(text).map(|head| head.schema)
+}
+
+/// Refuses a list, whose values would be taken for the fields in their order.
+fn check_object(text: &[u8]) -> serde_json::Result<()> {
+    match text.trim_ascii_start().first() {
+        Some(b'[') => Err(serde::de::Error::custom("a list, where an object belongs")),
+        _ => Ok(()),
+    }
 }
 
 /// What a schema describes: all but its version.
@@ -167,6 +177,13 @@ impl Formatter for Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_list_is_no_object() {
+        let said = schema(b" [\"deltille/target/1\"]").unwrap_err();
+        assert_eq!(said.to_string(), "a list, where an object belongs");
+        assert_eq!(schema(b"{\"schema\": \"x/1\"}").unwrap().as_deref(), Some("x/1"));
+    }
 
     #[test]
     fn deep_records_stay_on_their_line() {

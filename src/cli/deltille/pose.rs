@@ -1,6 +1,6 @@
 //! `deltille pose`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
@@ -9,12 +9,16 @@ use super::images::Images;
 use super::limits::ImageLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
-use crate::calibrate::{Calibration, Diagnosis, Reference, Words, views};
+use crate::calibrate::{Calibration, Diagnosis, Estimate, PanelPlace, Reference, Words, views};
+use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::FAILED;
 use crate::detect::{Detector, DetectorConfig};
+use crate::export::calibration::Sheet;
 use crate::export::pose;
+use crate::limits::Limits;
 use crate::photograph;
+use crate::targets::Target;
 
 /// Arguments of `deltille pose`.
 #[derive(clap::Args)]
@@ -33,6 +37,9 @@ pub struct Args {
     /// Family file, where the target names a family that is not shipped
     #[arg(long)]
     family: Option<String>,
+    /// Write a line for every picture: where there is no pose, camera_from_target is null, and reason says why
+    #[arg(long)]
+    every_picture: bool,
     /// Write the lines to a file instead of standard output
     #[arg(short, long, value_name = "FILE.ndjson")]
     output: Option<PathBuf>,
@@ -47,13 +54,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
     let target = target_file::read(&args.target, &limits).context("--target")?;
     let family = target_file::family(&target, args.family.as_deref())?;
-    let camera = camera_file::read("--camera", &args.camera)?;
-    let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
-    let reference = Reference::Target(&target);
     let sheet = args.sheet.read(&limits)?;
     let scale = sightings::solid_scale(&sheet, &target)?;
-    let mut panels = reference.panels();
+    let mut panels = Reference::Target(&target).panels();
     panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
+    let finder = Finder {
+        detector: Detector::for_target(&target, family.as_ref(), DetectorConfig::default()),
+        camera: camera_file::read("--camera", &args.camera)?,
+        target: &target,
+        sheet,
+        panels,
+        limits,
+    };
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
     let (mut lines, mut all, mut without, mut unread) = (String::new(), 0, 0, 0);
@@ -61,46 +73,26 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let image = image?;
         all += 1;
         let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let picture = match photograph::read_within(&image, &limits) {
-            Ok(picture) => picture,
-            Err(error) => {
-                tell!("error: {error}");
-                (without, unread) = (without + 1, unread + 1);
-                continue;
+        let of_image = match finder.find(&image, &name)? {
+            Found::Pose(found) => {
+                let views = found.cameras.iter().flat_map(|camera| &camera.views);
+                views.map(|view| pose::write_line(&found, view, &target.name) + "\n").collect()
+            }
+            Found::Nothing { why, is_unread } => {
+                match is_unread {
+                    true => tell!("error: {why}"),
+                    false => tell!("{}: {why}", image.display()),
+                }
+                (without, unread) = (without + 1, unread + usize::from(is_unread));
+                match args.every_picture {
+                    true => pose::write_none(&name, &target.name, &why) + "\n",
+                    false => String::new(),
+                }
             }
         };
-        let seen = detector.detect(&picture, &name);
-        let reason = seen.reasons.first().map(|reason| reason.to_string());
-        let mut shown = views(&[(name, seen)], &reference)?.views;
-        sightings::put_on(&sheet, Some(&target), &mut shown)?;
-        let calibration = Calibration::new(panels.clone()).camera("", shown, camera.clone());
-        let found = calibration.solve().with_context(|| image.display().to_string())?;
-        if found.frames.is_empty() {
-            without += 1;
-            let why = found.excluded.first().map(|out| out.reason.to_string()).or(reason);
-            let why = why.as_deref().unwrap_or("no target in it");
-            tell!("{}: {why}", image.display());
-        }
-        let words = Words { estimate: &found, print_scale: None };
-        let said = calibration.inspect(&found);
-        // Where the lens ends is the camera's, and the same for every picture.
-        let is_of_picture = |said: &&Diagnosis| !matches!(said, Diagnosis::LensEnds { .. });
-        if let Some(foreign) =
-            said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }))
-        {
-            tell!("{}: {}", image.display(), words.sentence(foreign));
-            without += 1;
-            continue;
-        }
-        for diagnosis in said.iter().filter(is_of_picture) {
-            tell!("{}: {}", image.display(), words.sentence(diagnosis));
-        }
-        for view in found.cameras.iter().flat_map(|camera| &camera.views) {
-            let line = pose::write_line(&found, view, &target.name);
-            match path {
-                Some(_) => lines += &(line + "\n"),
-                None => output::print(&(line + "\n"))?,
-            }
+        match path {
+            Some(_) => lines += &of_image,
+            None => output::print(&of_image)?,
         }
     }
     if all == 0 {
@@ -114,4 +106,56 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         say!("{}: {} of {all} images show the target", path.display(), all - without);
     }
     Ok(if without > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
+}
+
+/// Finds a target in pictures of a known camera.
+struct Finder<'a> {
+    detector: Detector,
+    camera: Camera,
+    target: &'a Target,
+    sheet: Sheet,
+    panels: Vec<PanelPlace>,
+    limits: Limits,
+}
+
+/// What was found in a picture.
+enum Found {
+    Pose(Box<Estimate>),
+    Nothing { why: String, is_unread: bool },
+}
+
+impl Finder<'_> {
+    fn find(&self, image: &Path, name: &str) -> anyhow::Result<Found> {
+        let picture = match photograph::read_within(image, &self.limits) {
+            Ok(picture) => picture,
+            Err(error) => return Ok(Found::Nothing { why: error.to_string(), is_unread: true }),
+        };
+        let seen = self.detector.detect(&picture, name);
+        let reason = seen.reasons.first().map(|reason| reason.to_string());
+        let shown = views(&[(name.to_owned(), seen)], &Reference::Target(self.target));
+        let mut views = shown?.views;
+        sightings::put_on(&self.sheet, Some(self.target), &mut views)?;
+        let calibration =
+            Calibration::new(self.panels.iter().copied()).camera("", views, self.camera.clone());
+        let found = calibration.solve().with_context(|| image.display().to_string())?;
+        let words = Words { estimate: &found, print_scale: None };
+        let said = calibration.inspect(&found);
+        let foreign = said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
+        let why = match foreign {
+            Some(foreign) => Some(words.sentence(foreign)),
+            None if found.frames.is_empty() => {
+                let excluded = found.excluded.first().map(|out| out.reason.to_string());
+                Some(excluded.or(reason).unwrap_or_else(|| "no target in it".to_owned()))
+            }
+            None => None,
+        };
+        if let Some(why) = why {
+            return Ok(Found::Nothing { why, is_unread: false });
+        }
+        // Where the lens ends is the camera's, and the same for every picture.
+        for diagnosis in said.iter().filter(|said| !matches!(said, Diagnosis::LensEnds { .. })) {
+            tell!("{}: {}", image.display(), words.sentence(diagnosis));
+        }
+        Ok(Found::Pose(Box::new(found)))
+    }
 }

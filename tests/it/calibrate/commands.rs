@@ -542,6 +542,21 @@ fn a_rig_is_calibrated_from_pictures() {
         let [turn, step] = found.off(&truth);
         assert!(turn.length() < 1e-3 && step.length() < 0.5, "{found:?} {truth:?}");
     }
+    // A picture that cannot be read ends nothing, and has a line where each has one.
+    std::fs::write(at.join("broken.png"), "no picture").unwrap();
+    let args = "pose left/0.png broken.png left/1.png --target ico.json --camera true.yaml";
+    for (option, count) in [("", 2), (" --every-picture", 3)] {
+        let output = output(at, &format!("{args}{option}"));
+        assert_eq!(output.status.code(), Some(1));
+        let said = String::from_utf8(output.stdout).unwrap();
+        let lines: Vec<Value> =
+            said.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        assert_eq!(lines.len(), count, "{said}");
+        assert_eq!(
+            lines.iter().filter(|line| line["camera_from_target"].is_null()).count(),
+            count - 2
+        );
+    }
     // A net printed at 101 % makes a larger solid, so much farther away.
     let pose = "pose left/0.png --target ico.json --camera true.yaml --print-scale";
     let line: Value = serde_json::from_str(&done(at, &format!("{pose} 1.01"))).unwrap();

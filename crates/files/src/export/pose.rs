@@ -20,6 +20,21 @@ struct PoseLine<'a> {
     camera_from_target: Motion,
 }
 
+#[derive(Serialize)]
+struct NoPoseLine<'a> {
+    schema: &'static str,
+    image: &'a str,
+    target: &'a str,
+    camera_from_target: Option<Motion>,
+    reason: &'a str,
+}
+
+/// The line of a picture in which there is no pose, and why, without its end.
+pub fn write_none(image: &str, target: &str, reason: &str) -> String {
+    let line = NoPoseLine { schema: SCHEMA, image, target, camera_from_target: None, reason };
+    serde_json::to_string(&line).expect("plain data has a JSON form")
+}
+
 /// The line of a view of a single camera, without its end.
 pub fn write_line(estimate: &Estimate, view: &ViewEstimate, target: &str) -> String {
     let line = PoseLine {

@@ -26,7 +26,7 @@ thread_local! {
 /// Runs code of others; a panic within is an error, and nothing is printed of it.
 ///
 /// # Errors
-/// The words of the panic.
+/// [`Broken::Panic`].
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Broken> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -48,7 +48,7 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Broken> {
 /// it goes on unheard, until it or the program ends.
 ///
 /// # Errors
-/// The words of the panic, or that the time is over.
+/// [`Broken::Panic`], or [`Broken::Time`].
 pub fn bounded<T: Send + 'static>(
     time: Duration,
     work: impl FnOnce() -> T + Send + 'static,
@@ -78,7 +78,7 @@ impl Guard {
     /// Runs code of others, for at most `time` where there is a clock.
     ///
     /// # Errors
-    /// The words of the panic, or that the time is over.
+    /// [`Broken::Panic`], or [`Broken::Time`].
     pub fn run<T: Send + 'static>(
         self,
         time: Duration,
