@@ -17,7 +17,7 @@ use crate::export::kind::Kind;
 use crate::name::is_within;
 use crate::photograph;
 use crate::raster::AnyGray;
-use crate::report::{PAGE_START, Report, thumbnail};
+use crate::report::{Report, thumbnail};
 use crate::words::counted;
 
 /// How a calibration is solved, and the page about it.
@@ -110,7 +110,7 @@ impl SolveArgs {
         ensure!(is_page, "--report: {} must end in .html, or be a folder", page.display());
         let page = output::file(page, &format!("{stem}-report"), "html")?;
         output::check_writable("--report", &page)?;
-        overwrite.check(&page, &Kind::of(PAGE_START.as_bytes())).context("--report")?;
+        overwrite.check(&page, &Kind::own_page()).context("--report")?;
         Ok(Some(page))
     }
 }

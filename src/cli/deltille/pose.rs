@@ -15,6 +15,7 @@ use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::FAILED;
 use crate::detect::{Detector, DetectorConfig};
 use crate::export::calibration::Sheet;
+use crate::export::kind::Kind;
 use crate::export::pose;
 use crate::limits::Limits;
 use crate::photograph;
@@ -55,9 +56,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let target = target_file::read(&args.target, &limits).context("--target")?;
     let family = target_file::family(&target, args.family.as_deref())?;
     let sheet = args.sheet.read(&limits)?;
-    let scale = sightings::solid_scale(&sheet, &target)?;
-    let mut panels = Reference::Target(&target).panels();
-    panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
+    let panels = sightings::panels(&Reference::Target(&target), &sheet)?;
     let finder = Finder {
         detector: Detector::for_target(&target, family.as_ref(), DetectorConfig::default()),
         camera: camera_file::read("--camera", &args.camera)?,
@@ -68,6 +67,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
+    if let Some(path) = &path {
+        args.overwrite.check(path, &Kind::of_schema(pose::SCHEMA))?;
+    }
     let (mut lines, mut all, mut without, mut unread) = (String::new(), 0, 0, 0);
     for image in Images::of(&args.images)?.iter() {
         let image = image?;
@@ -139,7 +141,7 @@ impl Finder<'_> {
             Calibration::new(self.panels.iter().copied()).camera("", views, self.camera.clone());
         let found = calibration.solve().with_context(|| image.display().to_string())?;
         let words = Words { estimate: &found, print_scale: None };
-        let said = calibration.inspect(&found);
+        let said = found.inspect();
         let foreign = said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
         let why = match foreign {
             Some(foreign) => Some(words.sentence(foreign)),

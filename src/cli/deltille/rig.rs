@@ -103,10 +103,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let target = target_file::read(&args.target, &limits).context("--target")?;
     let reference = Reference::Target(&target);
     let sheet = args.sheet.read(&limits)?;
-    let scale = sightings::solid_scale(&sheet, &target)?;
+    let panels = sightings::panels(&reference, &sheet)?;
     let page = args.solve.page("rig", args.overwrite)?;
-    let mut panels = reference.panels();
-    panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
     let mut calibration = Calibration::new(panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
     for (name, folder) in &args.camera {

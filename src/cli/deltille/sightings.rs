@@ -123,11 +123,7 @@ impl SightingsArgs {
             read(&self.detections, &reference, &limits)?;
         let sheet = self.sheet.read(&limits)?;
         put_on(&sheet, target.as_ref(), &mut views)?;
-        let mut panels = reference.panels();
-        if let Some(target) = &target {
-            let scale = solid_scale(&sheet, target)?;
-            panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
-        }
+        let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };
         Ok(Sightings { panels, views, empty, left_out, print })
     }
@@ -145,8 +141,19 @@ impl SheetArgs {
     }
 }
 
+/// Where the panels of what was photographed are, on a solid as large as its net was printed.
+pub fn panels(reference: &Reference, sheet: &Sheet) -> anyhow::Result<Vec<PanelPlace>> {
+    let scale = match reference {
+        Reference::Target(target) => solid_scale(sheet, target)?,
+        Reference::Grid(_) => 1.0,
+    };
+    let mut panels = reference.panels();
+    panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
+    Ok(panels)
+}
+
 /// How much larger than planned a solid is whose net was printed like this; 1 for a board.
-pub fn solid_scale(sheet: &Sheet, target: &Target) -> anyhow::Result<f64> {
+fn solid_scale(sheet: &Sheet, target: &Target) -> anyhow::Result<f64> {
     let Some([across, up]) = sheet.print_scale.filter(|_| is_solid(target)) else {
         return Ok(1.0);
     };

@@ -1,6 +1,6 @@
 //! What is to be said about an estimate: what is wrong with it, what that comes from, and what helps.
 
-use super::calibration::{Calibration, Intrinsics};
+use super::calibration::Calibration;
 use super::estimate::{CameraEstimate, Estimate};
 use super::finding::Finding;
 use super::lack_of_fit::LackOfFit;
@@ -72,39 +72,12 @@ impl Calibration {
         // What was solved was split before.
         let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
         let alone = own.each_alone(found);
-        own.said(found, &alone)
-    }
-
-    /// The same as far as the estimate tells it by itself, without trying anything else.
-    pub fn inspect(&self, found: &Estimate) -> Vec<Diagnosis> {
-        self.said(found, &vec![None; found.cameras.len()])
-    }
-
-    fn said(&self, found: &Estimate, alone: &[Option<(Self, Estimate)>]) -> Vec<Diagnosis> {
-        let cameras = || found.cameras.iter().enumerate();
-        let foreign = cameras().filter(|(index, camera)| {
-            let width = f64::from(camera.camera.width);
-            matches!(self.cameras[*index].intrinsics, Intrinsics::Known(_))
-                && camera.inlier_rms_px() > FOREIGN_PART * width
-        });
-        let foreign = foreign
-            .map(|(camera, of)| Diagnosis::ForeignCamera { camera, rms_px: of.inlier_rms_px() });
-        let ends = cameras()
-            .filter_map(|(camera, of)| Some(Diagnosis::LensEnds { camera, end: of.lens_end()? }));
-        let gross = found.findings.iter().cloned().map(Diagnosis::GrossErrors);
-        let open = cameras().filter(|(_, of)| !of.ill_conditioned.is_empty());
-        let open = open.map(|(camera, of)| Diagnosis::IllConditioned {
-            camera,
-            parameters: of.ill_conditioned.clone(),
-            sufficient: alone[camera].as_ref().and_then(|(alone, found)| alone.sufficient(found)),
-        });
-        let causes = causes(found, alone);
-        foreign.chain(ends).chain(gross).chain(causes).chain(open).collect()
+        said(found, &alone)
     }
 
     /// Every camera by itself, and what its views say; `None` where they say nothing, or where there is nothing
     /// to ask.
-    fn each_alone(&self, found: &Estimate) -> Vec<Option<(Self, Estimate)>> {
+    fn each_alone(&self, found: &Estimate) -> Vec<Alone> {
         let is_good = is_explained(found);
         let alone = found.cameras.iter().enumerate().map(|(index, camera)| {
             let has_question = !is_good || !camera.ill_conditioned.is_empty();
@@ -114,18 +87,51 @@ impl Calibration {
     }
 
     /// A camera by itself, with panels where they were found, and what its views say.
-    pub(super) fn and_alone(&self, camera: usize, found: &Estimate) -> Option<(Self, Estimate)> {
+    pub(super) fn and_alone(&self, camera: usize, found: &Estimate) -> Alone {
         if self.is_single() {
             return Some((self.clone(), found.clone()));
         }
+        self.cameras.get(camera)?;
         let alone = self.alone(camera, &found.panels);
         let found = alone.adjusted().ok()?;
         Some((alone, found))
     }
 }
 
+impl Estimate {
+    /// What is to be said about it as far as it tells that by itself, without trying anything else; see
+    /// [`Calibration::diagnose`].
+    pub fn inspect(&self) -> Vec<Diagnosis> {
+        said(self, &vec![None; self.cameras.len()])
+    }
+}
+
+/// A camera by itself, and what its views say.
+type Alone = Option<(Calibration, Estimate)>;
+
+fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
+    let cameras = || found.cameras.iter().enumerate();
+    let foreign = cameras().filter(|(_, camera)| {
+        let is_known = camera.model.is_none() && camera.found().next().is_none();
+        is_known && camera.inlier_rms_px() > FOREIGN_PART * f64::from(camera.camera.width)
+    });
+    let foreign =
+        foreign.map(|(camera, of)| Diagnosis::ForeignCamera { camera, rms_px: of.inlier_rms_px() });
+    let ends = cameras()
+        .filter_map(|(camera, of)| Some(Diagnosis::LensEnds { camera, end: of.lens_end()? }));
+    let gross = found.findings.iter().cloned().map(Diagnosis::GrossErrors);
+    let open = cameras().zip(alone).filter(|((_, of), _)| !of.ill_conditioned.is_empty());
+    let open = open.map(|((camera, of), alone)| Diagnosis::IllConditioned {
+        camera,
+        parameters: of.ill_conditioned.clone(),
+        sufficient: alone.as_ref().and_then(|(alone, found)| alone.sufficient(found)),
+    });
+    let causes = causes(found, alone);
+    foreign.chain(ends).chain(gross).chain(causes).chain(open).collect()
+}
+
 /// Why residuals are not noise.
-fn causes(found: &Estimate, alone: &[Option<(Calibration, Estimate)>]) -> Vec<Diagnosis> {
+fn causes(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     let remedies = alone.iter().enumerate().filter_map(|(camera, alone)| {
         let (alone, found) = alone.as_ref()?;
         Some((camera, alone.remedy(found)?))
@@ -137,14 +143,13 @@ fn causes(found: &Estimate, alone: &[Option<(Calibration, Estimate)>]) -> Vec<Di
         remedies.retain(of(Instead::Camera));
     }
     // There is one board, and one target.
-    for shared in [Instead::Shape, Instead::Panels] {
-        let first = remedies.iter().position(of(shared));
-        let mut index = 0;
-        remedies.retain(|remedy| {
-            index += 1;
-            !of(shared)(remedy) || first == Some(index - 1)
-        });
-    }
+    let mut told = Vec::new();
+    remedies.retain(|(_, Remedy { instead, .. })| {
+        let is_shared = matches!(instead, Instead::Shape | Instead::Panels);
+        let is_first = !told.contains(instead);
+        told.push(*instead);
+        is_first || !is_shared
+    });
     let is_of_target = |misfit: &&LackOfFit| matches!(misfit, LackOfFit::Target { .. });
     let of_target: Vec<&LackOfFit> = found.lack_of_fit.iter().filter(is_of_target).collect();
     // Where panels are moved their corners tell most of it.

@@ -160,6 +160,12 @@ impl Estimate {
         rms_px(self.corners().filter(|corner| !corner.outlier))
     }
 
+    /// The name of a camera where there are several, by which it is told from the others.
+    pub fn camera_name(&self, camera: usize) -> Option<&str> {
+        let cameras = &self.cameras;
+        cameras.get(camera).filter(|_| cameras.len() > 1).map(|camera| camera.name.as_str())
+    }
+
     /// Whether panels were to be found.
     pub fn has_refined_panels(&self) -> bool {
         self.panels.iter().any(|panel| panel.covariance.is_some())

@@ -34,8 +34,10 @@ pub(super) fn estimate_pose(
     let mut best: Option<(f64, Pose)> = None;
     for largest in by_size.into_iter().take(STARTS) {
         let Some(pose) = pose_from(camera, panels, sightings, largest) else { continue };
-        let medians: Vec<f64> =
-            sightings.iter().map(|s| median_off_px(camera, panels, s, &pose)).collect();
+        let medians: Vec<f64> = sightings
+            .iter()
+            .map(|s| median_off_px(camera, panels, std::slice::from_ref(s), &pose))
+            .collect();
         let (least, most) = medians
             .iter()
             .fold((f64::INFINITY, 0.0), |(least, most), &off| (off.min(least), off.max(most)));
@@ -50,12 +52,19 @@ pub(super) fn estimate_pose(
     best.map(|(_, pose)| pose)
 }
 
-/// The median error of a panel's corners, px.
-fn median_off_px(camera: &Camera, panels: &[Pose], sighting: &Sighting, pose: &Pose) -> f64 {
-    let camera_from_panel = pose.after(&panels[sighting.panel.index()]);
-    let off = sighting.observations.iter().map(|seen| {
-        let at = camera.project(camera_from_panel.apply(seen.panel_mm));
-        at.map_or(f64::INFINITY, |[x, y]| (seen.pixel[0] - x).hypot(seen.pixel[1] - y))
+/// The median error of the corners of panels, px; infinite where most are out of the camera's reach.
+pub(super) fn median_off_px(
+    camera: &Camera,
+    panels: &[Pose],
+    sightings: &[Sighting],
+    pose: &Pose,
+) -> f64 {
+    let off = sightings.iter().flat_map(|sighting| {
+        let camera_from_panel = pose.after(&panels[sighting.panel.index()]);
+        sighting.observations.iter().map(move |seen| {
+            let at = camera.project(camera_from_panel.apply(seen.panel_mm));
+            at.map_or(f64::INFINITY, |[x, y]| (seen.pixel[0] - x).hypot(seen.pixel[1] - y))
+        })
     });
     median(off.collect()).unwrap_or(0.0)
 }

@@ -56,7 +56,7 @@ impl Words<'_> {
     /// What outliers share.
     pub fn finding(&self, finding: &Finding) -> String {
         let Finding { shared, outliers, corners, left_out } = finding;
-        let of = |camera: &usize, what: String| match self.name(*camera) {
+        let of = |camera: &usize, what: String| match self.estimate.camera_name(*camera) {
             Some(name) => format!("camera {name}, {what}"),
             None => what,
         };
@@ -213,14 +213,8 @@ impl Words<'_> {
         self.estimate.cameras.get(camera)?.model
     }
 
-    /// Name of a camera where there are several.
-    fn name(&self, camera: usize) -> Option<&str> {
-        let cameras = &self.estimate.cameras;
-        cameras.get(camera).filter(|_| cameras.len() > 1).map(|camera| camera.name.as_str())
-    }
-
     fn of_camera(&self, camera: usize, text: String) -> String {
-        match self.name(camera) {
+        match self.estimate.camera_name(camera) {
             Some(name) => format!("camera {name}: {text}"),
             None => text,
         }

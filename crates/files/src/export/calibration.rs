@@ -57,14 +57,22 @@ struct SheetOfFile {
     board_shape: Option<StoredShape>,
 }
 
+/// A shape as files of both kinds have it.
 #[derive(Deserialize)]
-struct StoredShape {
+pub(super) struct StoredShape {
     #[serde(deserialize_with = "quantity::place_mm::de")]
     middle_mm: [f64; 3],
     #[serde(deserialize_with = "quantity::edge_mm::de")]
     reach_mm: f64,
     #[serde(deserialize_with = "quantity::place_mm::de")]
     coefficients_mm: [f64; COUNT],
+}
+
+impl StoredShape {
+    pub(super) fn shape(self) -> Shape {
+        let Self { middle_mm, reach_mm, coefficients_mm } = self;
+        Shape { middle_mm: middle_mm.into(), reach_mm, coefficients_mm }
+    }
 }
 
 /// Reads the sheet of a calibration that found its shape.
@@ -80,9 +88,7 @@ pub fn read_sheet(text: &str) -> Result<Sheet, SheetError> {
         ReadError::Json(_) => SheetError::Foreign,
         ReadError::Field { field, problem } => SheetError::Field { field, problem },
     })?;
-    let StoredShape { middle_mm, reach_mm, coefficients_mm } =
-        file.board_shape.ok_or(SheetError::Flat)?;
-    let shape = Shape { middle_mm: middle_mm.into(), reach_mm, coefficients_mm };
+    let shape = file.board_shape.ok_or(SheetError::Flat)?.shape();
     Ok(Sheet { print_scale: file.print_scale, shape: Some(shape) })
 }
 
@@ -154,7 +160,7 @@ pub fn write(found: &Estimate, said: &[Diagnosis], print: Print) -> Option<Strin
             excluded: &test.excluded,
         }),
         excluded: &found.excluded,
-        findings: records(&found.findings, &[]),
+        findings: records(found),
         diagnoses: diagnoses(found, said, print.scale),
     };
     Some(json::to_text(&file, 4))

@@ -137,10 +137,7 @@ pub(super) fn diagnoses<'a>(
     print_scale: Option<[f64; 2]>,
 ) -> Vec<DiagnosisRecord<'a>> {
     let words = Words { estimate, print_scale };
-    let name = |camera: usize| match estimate.cameras.as_slice() {
-        [_] => None,
-        cameras => cameras.get(camera).map(|camera| camera.name.as_str()),
-    };
+    let name = |camera: usize| estimate.camera_name(camera);
     let record = |diagnosis: &'a Diagnosis| {
         let text =
             DiagnosisRecord { text: words.sentence(diagnosis), ..DiagnosisRecord::default() };

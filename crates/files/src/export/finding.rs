@@ -1,6 +1,6 @@
 use serde::Serialize;
 
-use deltille_core::calibrate::{Finding, PanelRef, Shared};
+use deltille_core::calibrate::{Estimate, Finding, PanelRef, Shared};
 
 /// What outliers share, as files have it; `panel` is an id, `camera` a name.
 #[derive(Debug, Default, Serialize)]
@@ -26,10 +26,10 @@ pub(super) struct FindingRecord {
     turned_rad: Option<f64>,
 }
 
-/// The records of findings, with the names of a rig's cameras.
-pub(super) fn records(findings: &[Finding], cameras: &[&str]) -> Vec<FindingRecord> {
+/// The records of an estimate's findings.
+pub(super) fn records(estimate: &Estimate) -> Vec<FindingRecord> {
     let record = |finding: &Finding| {
-        let name = |camera: usize| cameras.get(camera).map(|name| (*name).to_owned());
+        let name = |camera: usize| estimate.camera_name(camera).map(str::to_owned);
         let counts = FindingRecord {
             outliers: finding.outliers,
             corners: finding.corners,
@@ -77,5 +77,5 @@ pub(super) fn records(findings: &[Finding], cameras: &[&str]) -> Vec<FindingReco
             }
         }
     };
-    findings.iter().map(record).collect()
+    estimate.findings.iter().map(record).collect()
 }

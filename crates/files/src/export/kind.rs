@@ -89,6 +89,11 @@ impl Kind {
         Self::of(&[b"%PDF-", PDF_CREATOR].concat())
     }
 
+    /// That of the pages written here.
+    pub fn own_page() -> Self {
+        Self::of(b"<!DOCTYPE html>\n<!-- deltille ")
+    }
+
     /// That of the PNG files written here to be looked at: overlays, renderings, plots.
     pub fn own_png() -> Self {
         Self::words("a PNG of deltille")

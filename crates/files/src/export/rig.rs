@@ -82,7 +82,6 @@ struct Seen<'a> {
 
 /// The text of a rig's file; `model` is that of its cameras, if nothing else was said of them.
 pub fn write(found: &Estimate, said: &[Diagnosis], model: &str, print: Print) -> String {
-    let names: Vec<&str> = found.cameras.iter().map(|camera| camera.name.as_str()).collect();
     let held_out = found.held_out.as_deref().map(|test| HeldOut {
         rms_px: test.rms_px,
         cameras: test.cameras.iter().map(|camera| seen(test, camera)).collect(),
@@ -103,7 +102,7 @@ pub fn write(found: &Estimate, said: &[Diagnosis], model: &str, print: Print) ->
         frames: frames(found),
         held_out,
         excluded: &found.excluded,
-        findings: records(&found.findings, &names),
+        findings: records(found),
         diagnoses: diagnoses(found, said, print.scale),
     };
     json::to_text(&file, 4)

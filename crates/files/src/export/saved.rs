@@ -8,10 +8,11 @@ use glam::{DMat3, DQuat, DVec3};
 use nalgebra::DMatrix;
 use serde::Deserialize;
 
-use super::{calibration, rig};
+use super::calibration::{self, StoredShape};
+use super::rig;
 use deltille_core::calibrate::{
     BoardShape, CameraEstimate, Corner, Estimate, Excluded, FrameEstimate, Model, PanelRef,
-    Parameter, Reason, Reference, SHAPE_COEFFICIENTS as COUNT, Shape, ViewEstimate,
+    Parameter, Reason, Reference, SHAPE_COEFFICIENTS as COUNT, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::json::{self, ReadError};
@@ -181,12 +182,8 @@ struct SavedPose {
 
 #[derive(Deserialize)]
 struct SavedShape {
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    middle_mm: [f64; 3],
-    #[serde(deserialize_with = "quantity::edge_mm::de")]
-    reach_mm: f64,
-    #[serde(deserialize_with = "quantity::place_mm::de")]
-    coefficients_mm: [f64; COUNT],
+    #[serde(flatten)]
+    shape: StoredShape,
     #[serde(deserialize_with = "quantity::deviation::de")]
     sd_mm: [f64; COUNT],
     #[serde(deserialize_with = "quantity::deviation::de")]
@@ -415,9 +412,8 @@ impl SavedCorner {
 
 impl SavedShape {
     fn read(self) -> BoardShape {
-        let Self { reach_mm, coefficients_mm, sd_mm, f_ratio, bent_mm, stretched_mm, .. } = self;
-        let shape = Shape { middle_mm: self.middle_mm.into(), reach_mm, coefficients_mm };
-        BoardShape { shape, sd_mm, f_ratio, bent_mm, stretched_mm }
+        let Self { shape, sd_mm, f_ratio, bent_mm, stretched_mm } = self;
+        BoardShape { shape: shape.shape(), sd_mm, f_ratio, bent_mm, stretched_mm }
     }
 }
 

@@ -22,7 +22,6 @@ use crate::export::calibration::Print;
 use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Words};
 
 pub use advice::{Advice, Weight, advice};
-pub use page::START as PAGE_START;
 pub use survey::{Survey, SurveyedView};
 pub use thumbnail::thumbnail;
 

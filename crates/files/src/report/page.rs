@@ -16,15 +16,12 @@ const STRONG: f64 = 0.85;
 
 const STYLE: &str = include_str!("page.css");
 
-/// What a page begins with.
-pub const START: &str = "<!DOCTYPE html>\n<!-- deltille ";
-
 pub(super) fn html(report: &Report) -> String {
     let cameras = &report.estimate.cameras;
     let surveys: Vec<Survey> = cameras.iter().map(Survey::new).collect();
     let title = escaped(report.title);
     let mut page = format!(
-        "{START}{} -->\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+        "<!DOCTYPE html>\n<!-- deltille {} -->\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{title} – camera calibration</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <header><h1>{title}</h1>{}</header>\n",

@@ -9,7 +9,7 @@ use super::super::excluded::Reason;
 use super::super::loss::Loss;
 use super::super::minimise::{Until, minimise};
 use super::super::model::Model;
-use super::super::pose::{blocks, estimate_pose, fixed};
+use super::super::pose::{blocks, estimate_pose, fixed, median_off_px};
 use super::super::problem::{CameraUnknowns, Problem};
 use super::super::reweighting::scale;
 use super::super::view::View;
@@ -161,7 +161,7 @@ impl<'a> Search<'a> {
             let again = estimate_pose(&self.camera, self.panels, &view.sightings);
             let error = |pose: &Option<Pose>| {
                 pose.map_or(f64::INFINITY, |pose| {
-                    view_error_px(&self.camera, self.panels, view, pose)
+                    median_off_px(&self.camera, self.panels, &view.sightings, &pose)
                 })
             };
             if error(&again) < error(pose) {
@@ -174,24 +174,12 @@ impl<'a> Search<'a> {
     fn error_px(&self) -> f64 {
         let views = self.views.iter().zip(&self.poses);
         let error = |(view, pose): (&View, &Option<Pose>)| {
-            pose.map_or(f64::INFINITY, |pose| view_error_px(&self.camera, self.panels, view, pose))
+            pose.map_or(f64::INFINITY, |pose| {
+                median_off_px(&self.camera, self.panels, &view.sightings, &pose)
+            })
         };
         median(views.map(error).collect()).unwrap_or(0.0)
     }
-}
-
-/// Median error of a view's corners at a pose, px.
-fn view_error_px(camera: &Camera, panels: &[Pose], view: &View, pose: Pose) -> f64 {
-    let errors = view.sightings.iter().flat_map(|sighting| {
-        let camera_from_panel = pose.after(&panels[sighting.panel.index()]);
-        sighting.observations.iter().map(move |seen| {
-            match camera.project(camera_from_panel.apply(seen.panel_mm)) {
-                Some([x, y]) => (seen.pixel[0] - x).hypot(seen.pixel[1] - y),
-                None => f64::INFINITY,
-            }
-        })
-    });
-    median(errors.collect()).unwrap_or(0.0)
 }
 
 /// Refuses views of a board that was never tilted.
