@@ -3,6 +3,7 @@
 pub mod command;
 pub mod folder;
 pub mod glb;
+pub mod page;
 pub mod png;
 pub mod view;
 

@@ -3,7 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::common::command::{deltille, refused};
+use crate::common::command::deltille;
+use crate::common::page::Page;
 use crate::common::view::tilted;
 use deltille::artwork;
 use deltille::camera::{Camera, KannalaBrandt, Lens, Pose};
@@ -15,7 +16,6 @@ use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Truth, scene_of_sheet};
 use deltille::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
 use glam::DVec3;
-use predicates::str::contains;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -241,50 +241,39 @@ proptest! {
 #[test]
 fn a_checkerboard_is_written_verified_and_found_again() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |args: &str| {
-        let result = deltille(folder.path(), args).success();
-        String::from_utf8(result.get_output().stdout.clone()).unwrap()
-    };
-    let said = run("checkerboard --rows 5 --cols 6 --edge 20mm --pdf --save-template t.toml");
-    assert!(said.contains("checkerboard.pdf: verified, 30 corners within 0.00"), "{said}");
-    let said = run("checkerboard --template t.toml --tags t36h11 --name tags --svg --png --dsc");
-    assert!(said.contains("tags.svg: verified") && said.contains("tags.png: verified"), "{said}");
-    let odd = "checkerboard --template t.toml --tags t36h11 --tag-spacing 3 -o odd";
-    let odd = deltille(folder.path(), odd).success();
-    odd.stderr(contains("warning: --tag-spacing 3: with an odd number only every second"));
-    let other = refused(folder.path(), "board --template t.toml");
-    assert!(other.contains("t.toml was made for `checkerboard`, not `board`"), "{other}");
-    let said = run("detect --target tags.json tags.png --format orpc,json -o found");
-    assert!(said.contains("30 corners, 6 tags"), "{said}");
-    let orpc = std::fs::read_to_string(folder.path().join("found/tags.orpc")).unwrap();
-    assert!(orpc.contains("num_corners: 30") && orpc.contains("\n0,29,1,"), "{orpc}");
-    let said = run("detect --target tags.dsc tags.png -o found");
-    assert!(said.contains("30 corners, 6 tags"), "{said}");
-    run("verify tags.json");
-}
-
-#[test]
-fn what_a_checkerboard_cannot_have_is_refused_in_one_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let cases = [
-        ("checkerboard --rows 5 --cols 6 --tags delTag25h7", "--family: delTag25h7 has triangular"),
-        (
-            "checkerboard --rows 5 --cols 6 --tags 16h5",
-            "--tags: no family of square tags is called `16h5`: give aprilTag16h5 (t16h5)",
-        ),
-        ("board --rows 5 --cols 6 --family t36h11", "--family: aprilTag36h11 has square tags"),
-        ("board --rows 5 --cols 6 --tags-in white", "--tags-in: the tags of a deltille board"),
-        ("checkerboard --rows 5 --cols 6 --tag-spacing 2", "--tag-spacing: there are no tags"),
-        ("checkerboard --rows 2 --cols 4", "--rows: 2 × 4 corners without tags"),
-        ("checkerboard --rows 5 --cols 6 --tags t36h11 --tag-border 0.8", "--tag-border: 0.8"),
-        ("checkerboard --rows 5 --cols 6 --tags t36h11 --tags-in white --dsc", "--dsc: "),
-        ("checkerboard --rows 5 --cols 6 --tags t16h5 --tag-spacing 1 --boards 9", "--first-id: "),
-    ];
-    for (args, reason) in cases {
-        let said = refused(folder.path(), args);
-        assert!(said.starts_with(&format!("error: {reason}")), "{args}: {said}");
+    let at = folder.path();
+    let mut page = Page::default();
+    for args in [
+        "--rows 5 --cols 6 --edge 20mm --pdf --save-template t.toml",
+        "--template t.toml --tags t36h11 --name tags --svg --png --dsc",
+        "--template t.toml --tags t36h11 --tag-spacing 3 -o odd",
+    ] {
+        assert!(page.run(at, &format!("deltille checkerboard {args}")).status.success(), "{args}");
     }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    for target in ["tags.json", "tags.dsc"] {
+        deltille(at, &format!("detect --target {target} tags.png --format orpc,json -o found"))
+            .success();
+        let read = |name: &str| std::fs::read_to_string(at.join("found").join(name)).unwrap();
+        let found = deltille::export::detection::read(&read("tags.json")).unwrap();
+        assert_eq!((found.grids[0].corners.len(), found.grids[0].tags.len()), (30, 6), "{target}");
+        let orpc = read("tags.orpc");
+        assert!(orpc.contains("num_corners: 30") && orpc.contains("\n0,29,1,"), "{orpc}");
+    }
+    deltille(at, "verify tags.json").success();
+
+    page.title("What cannot be made");
+    for args in [
+        "--tags delTag25h7",
+        "--tags 16h5",
+        "--tag-spacing 2",
+        "--tags t36h11 --tag-border 0.8",
+        "--tags t36h11 --tags-in white --dsc",
+        "--tags t16h5 --tag-spacing 1 --boards 9",
+    ] {
+        page.refused(at, &format!("deltille checkerboard --rows 5 --cols 6 -o out {args}"));
+    }
+    page.refused(at, "deltille checkerboard --rows 2 --cols 4 -o out");
+    page.is("checkerboard");
 }
 
 /// Reads the tags of the sheets with another program: OpenCV those in white squares from the whole

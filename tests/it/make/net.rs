@@ -2,8 +2,9 @@
 //! fail for the right reason.
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
-use crate::common::command::{deltille, refused};
+use crate::common::command::deltille;
 use deltille::artwork::{self, Artwork, Part};
 use deltille::export::{pdf, png, sheet_file_name, svg};
 use deltille::family::Family;
@@ -12,8 +13,7 @@ use deltille::targets::{
 };
 use deltille::verify::{Finding, Verdict, Verifier};
 use kurbo::Affine;
-use predicates::prelude::PredicateBooleanExt;
-use predicates::str::contains;
+use serde_json::Value;
 
 fn family() -> Family {
     Family::shipped("delTag25h7").unwrap()
@@ -216,49 +216,47 @@ fn pages_that_do_not_join_are_found() {
     assert_fails(&verify(&target, &unnamed, "svg"), &["page B1: label 1 differs"]);
 }
 
+/// The report of `verify` on a file.
+fn report(folder: &Path, args: &str, code: i32) -> Value {
+    deltille(folder, &format!("verify {args} --report r.json")).code(code);
+    serde_json::from_slice(&std::fs::read(folder.join("r.json")).unwrap()).unwrap()
+}
+
 #[test]
 fn every_solid_prints_as_a_net() {
     for (solid, edges, corners) in
         [("tetrahedron", 6, 60), ("octahedron", 12, 120), ("icosahedron", 30, 300)]
     {
         let folder = tempfile::tempdir().unwrap();
-        let args = format!("{solid} --edge 60mm --tiles 7 --face-margin 4mm --pdf --svg");
-        let said = format!("{edges} edges matched");
-        let found = format!("{corners} corners within");
-        deltille(folder.path(), &args)
-            .success()
-            .stdout(contains("verified: 2 files").and(contains(found)).and(contains(said)));
+        let args =
+            format!("{solid} --edge 60mm --tiles 7 --face-margin 4mm --pdf --svg --no-verify");
+        deltille(folder.path(), &args).success();
+        let report = report(folder.path(), &format!("{solid}.json"), 0);
+        let artifacts = report["artifacts"].as_array().unwrap();
+        assert_eq!(artifacts.len(), 2);
+        for artifact in artifacts {
+            let sheet = &artifact["sheets"][0];
+            assert_eq!(
+                (&sheet["corners_found"], &sheet["fold"]["edges"]),
+                (&corners.into(), &edges.into())
+            );
+        }
     }
 }
 
 #[test]
 fn a_net_larger_than_the_paper_takes_several_pages() {
     let folder = tempfile::tempdir().unwrap();
-    let args = "octahedron --edge 130mm --tiles 7 --pdf --svg --paper A4";
-    deltille(folder.path(), args)
-        .success()
-        .stdout(contains("octahedron-1.svg to octahedron-3.svg: verified, 3 pages, 120 corners"));
+    let at = folder.path();
+    deltille(at, "octahedron --edge 130mm --tiles 7 --pdf --svg --paper A4").success();
     // Any of the files stands for all; one that is missing is named.
-    deltille(folder.path(), "verify octahedron.json octahedron-3.svg").success();
-    std::fs::remove_file(folder.path().join("octahedron-2.svg")).unwrap();
-    deltille(folder.path(), "verify octahedron.json octahedron-3.svg")
-        .code(1)
-        .stdout(contains("octahedron-2.svg is missing"));
-}
-
-#[test]
-fn nets_that_cannot_be_made_are_refused_in_one_line() {
-    let folder = tempfile::tempdir().unwrap();
-    for (args, said) in [
-        ("icosahedron --pdf --edge 3m", "an --edge of at most "),
-        ("icosahedron --pdf --paper A5 --edge 440mm", "or larger --paper"),
-        ("icosahedron --pdf --face-margin 1mm", "--per-face"),
-        ("icosahedron --pdf --paper 50x60mm", "--paper"),
-    ] {
-        let stderr = refused(folder.path(), args);
-        assert!(stderr.contains(said), "{args}: {stderr}");
-    }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let whole = report(at, "octahedron.json octahedron-3.svg", 0);
+    let sheet = &whole["artifacts"][0]["sheets"][0];
+    assert_eq!((&sheet["pages"], &sheet["corners_found"]), (&3.into(), &120.into()));
+    std::fs::remove_file(at.join("octahedron-2.svg")).unwrap();
+    let cut = report(at, "octahedron.json octahedron-3.svg", 1);
+    let missing = serde_json::json!({ "kind": "page_missing", "page": "octahedron-2.svg" });
+    assert_eq!(cut["artifacts"][0]["findings"], serde_json::json!([missing]));
 }
 
 /// An octahedron of unit edges with a tetrahedron on each face, as OBJ: 24 equilateral triangles,
@@ -295,11 +293,10 @@ fn a_concave_mesh_prints_as_a_net_and_as_single_faces() {
     // A name that is no name of a shape.
     std::fs::write(folder.path().join("icosahedron.obj"), spikes()).unwrap();
     let mesh = "solid --mesh icosahedron.obj --edge 60mm --tiles 7 --face-margin 4mm";
-    let said = "folds into the solid within";
-    deltille(folder.path(), &format!("{mesh} --pdf --dxf"))
-        .success()
-        .stdout(contains("360 corners within"))
-        .stdout(contains(said).and(contains("36 edges matched")));
+    deltille(folder.path(), &format!("{mesh} --pdf --dxf")).success();
+    let report = report(folder.path(), "icosahedron.json icosahedron.pdf", 0);
+    let sheet = &report["artifacts"][0]["sheets"][0];
+    assert_eq!((&sheet["corners_found"], &sheet["fold"]["edges"]), (&360.into(), &36.into()));
     let json = std::fs::read_to_string(folder.path().join("icosahedron.json")).unwrap();
     let target = Target::from_json(&json).unwrap();
     let count = |kind| {
@@ -313,7 +310,7 @@ fn a_concave_mesh_prints_as_a_net_and_as_single_faces() {
     let lines = |layer: &str| dxf.matches(&format!("\nLINE\n  8\n{layer}\n")).count();
     assert_eq!((lines("FOLD"), lines("VALLEY")), (folds, valleys));
 
-    deltille(folder.path(), &format!("{mesh} --pdf --per-face --name faces"))
-        .success()
-        .stdout(contains("faces.pdf: verified, 24 pages"));
+    deltille(folder.path(), &format!("{mesh} --pdf --per-face --name faces")).success();
+    let report = self::report(folder.path(), "faces.json faces.pdf", 0);
+    assert_eq!(report["artifacts"][0]["sheets"].as_array().unwrap().len(), 24);
 }

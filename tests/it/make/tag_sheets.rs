@@ -1,49 +1,53 @@
 //! `deltag sheet`: tags to true scale, read back from what was written.
 
-use std::path::Path;
-
-use assert_cmd::Command;
+use crate::common::folder::names;
+use crate::common::page::Page;
 use deltille::artwork;
 use deltille::export::svg;
 use deltille::family::Family;
 use deltille::targets::{PaperSpec, TagSheetSpec, Target, TargetSpec};
 use deltille::verify::{Finding, MarkFinding, TileFinding, Verifier};
-use predicates::prelude::*;
-use predicates::str::contains;
-
-fn sheet(family: &str, arguments: &[&str], folder: &Path) -> assert_cmd::assert::Assert {
-    let mut command = Command::cargo_bin("deltag").unwrap();
-    command.arg("sheet").arg(family).args(arguments).arg("-o").arg(folder).assert()
-}
 
 #[test]
-fn every_format_is_written_and_every_cell_verified() {
+fn sheets_are_written_in_every_format_and_verified() {
     let folder = tempfile::tempdir().unwrap();
-    let all = ["--pdf", "--svg", "--png", "--dpi", "200", "--ids", "0-2,9,30-33", "--name", "few"];
-    sheet("d16h5", &all, folder.path())
-        .success()
-        .stdout(contains("8 tags exact, check bars").count(3).and(contains("page size exact")));
-    for extension in ["pdf", "svg", "png"] {
-        assert!(folder.path().join(format!("few.{extension}")).is_file());
+    let at = folder.path();
+    let mut page = Page::default();
+    for (args, files) in [
+        (
+            "--pdf --svg --png --dpi 200 --ids 0-2,9,30-33 --name few",
+            &["few.pdf", "few.png", "few.svg"][..],
+        ),
+        ("--svg --name all", &["all-1.svg", "all-2.svg", "all-3.svg"]),
+        ("--edge 15mm", &["d16h5-sheet.pdf"]),
+    ] {
+        let out = at.join(files[0]);
+        page.run(
+            at,
+            &format!("deltag sheet d16h5 {args} -o {}", files[0].split('.').next().unwrap()),
+        );
+        assert_eq!(names(&out.with_extension("")), files);
     }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
-}
-
-#[test]
-fn a_whole_family_takes_several_pages() {
-    let folder = tempfile::tempdir().unwrap();
-    sheet("d16h5", &["--svg"], folder.path())
-        .success()
-        .stdout(contains("d16h5-sheet-3.svg: verified").and(contains("tags exact").count(3)));
-    let text = std::fs::read_to_string(folder.path().join("d16h5-sheet-1.svg")).unwrap();
+    let text = std::fs::read_to_string(at.join("all-1/all-1.svg")).unwrap();
     assert!(text.contains("fingerprint"), "the fingerprint is in the metadata");
-    let nowhere = folder.path().join("nowhere");
-    sheet("d16h5", &["--png", "--paper", "3000x3000mm", "--dpi", "2400"], &nowhere)
-        .code(2)
-        .stderr(contains("--dpi").and(contains(".deltille-").not()));
-    assert!(!nowhere.exists());
-    let pdf = tempfile::tempdir().unwrap();
-    sheet("d16h5", &["--edge", "15mm"], pdf.path()).success().stdout(contains("78 tags exact"));
+    page.title("What cannot be made");
+    for args in [
+        "d36h9",
+        "d16h5 --edge 1mm",
+        "d16h5 --edge wide",
+        "d16h5 --edge 400mm",
+        "d16h5 --paper A9",
+        "d16h5 --png --paper 3000x3000mm --dpi 2400 -o nowhere",
+        "d16h5 --margin -1mm",
+        "d16h5 --orientation up",
+        "d16h5 --tag-border 0",
+        "d16h5 --ids 5-3",
+        "d16h5 --ids 99",
+        "d16h5 -o x.pdf",
+    ] {
+        page.refused(at, &format!("deltag sheet {args}"));
+    }
+    page.is("deltag-sheet");
 }
 
 /// A sheet of four tags, after an edit of its tags' codes or of its SVG.

@@ -1,0 +1,112 @@
+//! What commands print, word by word: a page for each command in `tests/snapshots`, to be read as a user would read
+//! it. `INSTA_UPDATE=always cargo test --release --test it` makes all of them anew.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::SystemTime;
+
+/// Commands, each with what it printed on both outputs and its exit code.
+#[derive(Default)]
+pub struct Page(String);
+
+impl Page {
+    /// What the commands that follow have in common.
+    pub fn title(&mut self, title: &str) {
+        self.0 += &format!("\n# {title}\n");
+    }
+
+    /// Runs a command, between whose words there are blanks, in a folder; `''` is an empty word.
+    #[track_caller]
+    pub fn run(&mut self, folder: &Path, command: &str) -> Output {
+        self.write(folder, command, |output| vec![&output.stdout, &output.stderr])
+    }
+
+    /// The same without what is on standard output.
+    #[track_caller]
+    pub fn warned(&mut self, folder: &Path, command: &str) -> Output {
+        self.write(folder, command, |output| vec![&output.stderr])
+    }
+
+    #[track_caller]
+    fn write(
+        &mut self,
+        folder: &Path,
+        command: &str,
+        shown: fn(&Output) -> Vec<&Vec<u8>>,
+    ) -> Output {
+        let mut words = command.split_whitespace().map(|word| word.replace("''", ""));
+        let program = match &*words.next().unwrap() {
+            "deltag" => env!("CARGO_BIN_EXE_deltag"),
+            "deltille" => env!("CARGO_BIN_EXE_deltille"),
+            other => panic!("{other}"),
+        };
+        let mut process = Command::new(program);
+        process
+            .current_dir(folder)
+            .args(words)
+            .env_remove("COLUMNS")
+            .stdin(std::process::Stdio::null());
+        let output = process.output().unwrap();
+        self.0 += &format!("\n$ {}\n", command.trim_end());
+        for printed in shown(&output) {
+            let printed = std::str::from_utf8(printed).unwrap();
+            assert!(!printed.contains('\u{1b}'), "{command}: {printed}");
+            printed.lines().for_each(|line| self.0 += &(same_everywhere(line) + "\n"));
+        }
+        if output.status.code() != Some(0) {
+            self.0 += &format!("[{}]\n", output.status.code().expect("killed"));
+        }
+        output
+    }
+
+    /// Runs what has to be refused: in one line, with exit code 2, and without a trace in the folder.
+    #[track_caller]
+    pub fn refused(&mut self, folder: &Path, command: &str) {
+        let before = files(folder);
+        let Output { status, stdout, stderr } = self.run(folder, command);
+        let said = String::from_utf8_lossy(&stderr);
+        assert_eq!((status.code(), &*stdout), (Some(2), &b""[..]), "{command}: {said}");
+        assert!(said.starts_with("error: ") && said.lines().count() == 1, "{command}: {said}");
+        assert!(files(folder) == before, "{command}: files were changed");
+    }
+
+    /// Compares the page with the one in `tests/snapshots`.
+    #[track_caller]
+    pub fn is(self, name: &str) {
+        let mut settings = insta::Settings::new();
+        settings.set_snapshot_path(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/snapshots"));
+        settings.set_prepend_module_to_snapshot(false);
+        settings.set_omit_expression(true);
+        settings.bind(|| insta::assert_snapshot!(name, self.0.trim_start()));
+    }
+}
+
+/// A line without what depends on the system, and without how exact what was verified is.
+fn same_everywhere(line: &str) -> String {
+    let line =
+        if cfg!(windows) { line.replace('\\', "/").replace(".exe", "") } else { line.to_owned() };
+    if line.contains(": verified, ") {
+        let digits = |c: char| c.is_ascii_digit() || c == '.';
+        let mut parts = line.split(" within ");
+        let first = parts.next().unwrap().to_owned();
+        return parts.fold(first, |all, part| all + " within …" + part.trim_start_matches(digits));
+    }
+    let Some(end) = line.find(" (os error ") else { return line };
+    let begin = line[..end].rfind(": ").map_or(0, |colon| colon + 2);
+    line[..begin].to_owned() + "[what the system says]"
+}
+
+/// All files below a folder with their sizes and times.
+fn files(folder: &Path) -> BTreeMap<std::path::PathBuf, (u64, Option<SystemTime>)> {
+    let mut all = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        match path.metadata() {
+            Ok(about) if about.is_dir() => all.extend(files(&path)),
+            Ok(about) => drop(all.insert(path, (about.len(), about.modified().ok()))),
+            Err(_) => {}
+        }
+    }
+    all
+}
