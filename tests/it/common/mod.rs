@@ -5,6 +5,7 @@ pub mod folder;
 pub mod glb;
 pub mod page;
 pub mod png;
+pub mod verdict;
 pub mod view;
 
 use std::path::{Path, PathBuf};

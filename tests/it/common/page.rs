@@ -52,12 +52,23 @@ impl Page {
         for printed in shown(&output) {
             let printed = std::str::from_utf8(printed).unwrap();
             assert!(!printed.contains('\u{1b}'), "{command}: {printed}");
-            printed.lines().for_each(|line| self.0 += &(same_everywhere(line) + "\n"));
+            self.line(printed);
         }
         if output.status.code() != Some(0) {
             self.0 += &format!("[{}]\n", output.status.code().expect("killed"));
         }
         output
+    }
+
+    /// A line, or more, by itself.
+    pub fn line(&mut self, said: &str) {
+        said.lines().for_each(|line| self.0 += &(same_everywhere(line) + "\n"));
+    }
+
+    /// What was said otherwise than by a command that is run here.
+    pub fn said(&mut self, what: &str, said: &str) {
+        self.title(what);
+        self.line(said);
     }
 
     /// Runs what has to be refused: in one line, with exit code 2, and without a trace in the folder.

@@ -1,5 +1,6 @@
 //! `deltille refine`: a table of refined positions, and clear words on bad input.
 
+use crate::common::page::Page;
 use assert_cmd::Command;
 use deltille::synth::SimulatedCorner;
 
@@ -50,15 +51,15 @@ fn seeds_are_refined_by_either_method() {
 #[test]
 fn bad_input_is_named_in_one_line() {
     let folder = folder();
-    for (args, named) in [
-        ("--kind deltille --seeds bad.csv deltille.pgm", "bad.csv: line 2"),
-        ("--kind deltille --seeds none.csv deltille.pgm", "none.csv"),
-        ("--kind deltille --seeds seeds.csv none.pgm", "none.pgm"),
-        ("--kind deltille --seeds seeds.csv deltille.pgm --window 20", "--window"),
-        ("--kind squares --seeds seeds.csv deltille.pgm", "--kind"),
+    let mut page = Page::default();
+    for args in [
+        "--kind deltille --seeds bad.csv deltille.pgm",
+        "--kind deltille --seeds none.csv deltille.pgm",
+        "--kind deltille --seeds seeds.csv none.pgm",
+        "--kind deltille --seeds seeds.csv deltille.pgm --window 20",
+        "--kind squares --seeds seeds.csv deltille.pgm",
     ] {
-        let (code, table, errors) = refine(folder.path(), args);
-        assert_eq!((code, table.as_str(), errors.lines().count()), (Some(2), "", 1), "{errors}");
-        assert!(errors.starts_with("error: ") && errors.contains(named), "{errors}");
+        page.refused(folder.path(), &format!("deltille refine {args}"));
     }
+    page.is("refine");
 }

@@ -5,6 +5,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::folder::names;
+use crate::common::page::Page;
 
 /// Longer than any of these searches needs on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -116,7 +117,9 @@ fn without_a_checkpoint_an_interrupted_lexicode_leaves_nothing() {
     wait_for("the signal handler", || handles_interrupts(&mut child));
     let output = interrupt(child);
     assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
-    assert!(text(&output.stderr).contains("--resume FILE"));
+    let mut page = Page::default();
+    page.said("deltag gen-family d36h9 --method lexicode, interrupted", &text(&output.stderr));
+    page.is("deltag-gen-family-interrupted");
     assert_eq!(names(folder.path()), [""; 0]);
 }
 
@@ -140,7 +143,6 @@ fn an_interrupted_best_search_keeps_the_best_so_far() {
         assert!(said.len() == 1 && said[0].starts_with("interrupted: "), "{stderr}");
         assert_eq!(stderr.lines().count(), 1 + usize::from(from.is_none()), "{stderr}");
         if code == Some(0) {
-            assert!(stderr.contains("kept the best family so far"));
             assert_eq!(names(folder.path()), ["d16h5.json"]);
             assert!(verified(&folder.path().join("d16h5.json")));
         } else {

@@ -74,7 +74,7 @@ fn a_jpeg_of_which_a_part_is_missing_is_not_read_unless_that_is_accepted() {
     for damaged in places.map(cut).chain(holes).chain(ended) {
         let of = format!("{} of {} bytes", damaged.len(), whole.len());
         let error = folder.read(&damaged, false).expect_err(&of);
-        assert!(error.to_string().contains("damaged JPEG"), "{of}: {error}");
+        assert!(matches!(error, ImageError::Damaged { .. }), "{of}: {error}");
         assert!(!error.to_string().contains(['\n', '"']), "{of}: {error}");
         let accepted = folder.read(&damaged, true).expect(&of);
         assert!(accepted.notes.damage.is_some(), "{of}");
@@ -99,7 +99,7 @@ fn a_jpeg_that_makes_more_pixels_than_it_has_is_damaged() {
     too_low[frame + 5..frame + 7].copy_from_slice(&height.to_be_bytes());
     for damaged in [with(&whole[scan..scan + 100]), twice, too_low] {
         let error = folder.read(&damaged, false).unwrap_err();
-        assert!(error.to_string().contains("go on after the last pixel"), "{error}");
+        assert!(matches!(error, ImageError::Damaged { .. }), "{error}");
         assert!(folder.read(&damaged, true).unwrap().notes.damage.is_some());
     }
     // Cameras fill up what they send in whole words.
@@ -202,8 +202,8 @@ fn a_tiff_has_one_page() {
         let read = folder.read(&tiff_of(pages), false).unwrap();
         assert_eq!(gray(read).pixels(), picture().as_raw());
     }
-    let error = folder.read(&tiff_of(&[0, 0, 1, 0]), false).unwrap_err().to_string();
-    assert!(error.contains("3 pages in one TIFF"), "{error}");
+    let error = folder.read(&tiff_of(&[0, 0, 1, 0]), false).unwrap_err();
+    assert!(matches!(error, ImageError::Pages { pages: 3, .. }), "{error}");
 }
 
 #[cfg(unix)]

@@ -128,6 +128,7 @@ fn what_cannot_be_made_is_refused_with_the_option_to_change() {
         "--name ../up",
         "--dsc --untagged",
         "--dsc --invert",
+        "--dsc --family d25h7",
         "--dsc --dsc-dialect original",
         "--dsc --dsc-dialect klingon",
         "--dsc-dialect fork",

@@ -10,6 +10,7 @@ use deltille::targets::{
 use proptest::prelude::*;
 
 use crate::common::data;
+use crate::common::page::Page;
 
 fn board(rows: u32, cols: u32, edge_mm: f64, boards: u32) -> Target {
     let plain = BoardSpec::new(GridKind::Deltille, rows, cols, edge_mm);
@@ -156,18 +157,22 @@ fn squares_are_counted_from_the_top_in_the_original_dialect() {
 
 #[test]
 fn what_a_dialect_cannot_say_is_refused() {
-    let reason = |target: &Target, dialect| dsc::write(target, dialect).unwrap_err().to_string();
-    let zigzag = board(4, 4, 20.0, 1);
-    assert!(reason(&zigzag, Dialect::Original).contains("--dsc-dialect fork"));
-    let mut untagged = zigzag.clone();
-    untagged.family = None;
-    assert!(reason(&untagged, Dialect::Fork).contains("needs tags"));
-    let mut foreign = zigzag.clone();
-    foreign.family.as_mut().unwrap().name = "d25h7".to_owned();
-    assert!(reason(&foreign, Dialect::Fork).contains("codes of delTag16h5"));
-    let mut inverted = zigzag;
-    inverted.panels[0].inverted = true;
-    assert!(reason(&inverted, Dialect::Fork).contains("inverted"));
+    let whole = board(4, 4, 20.0, 1);
+    let but = |change: fn(&mut Target)| {
+        let mut target = whole.clone();
+        change(&mut target);
+        target
+    };
+    let cases = [
+        (Dialect::Original, but(|_| {})),
+        (Dialect::Fork, but(|target| target.family = None)),
+        (Dialect::Fork, but(|target| target.family.as_mut().unwrap().name = "d25h7".to_owned())),
+        (Dialect::Fork, but(|target| target.panels[0].inverted = true)),
+    ];
+    for (dialect, target) in cases {
+        let error = dsc::write(&target, dialect).unwrap_err();
+        assert!(matches!(error, DscError::Refused { .. }), "{error}");
+    }
 }
 
 #[test]
@@ -175,37 +180,39 @@ fn bad_files_are_refused_with_the_line() {
     let good = "0,3,3,20\ndelTag25h7,1.5\n0,0,0,0,0,0\n-1,1,0,20,0,0\n-1,0,1,10,17.3,0\n";
     assert!(dsc::read(good, "x").is_ok());
     let cases = [
-        ("", "empty", 0),
-        ("\n\n", "empty", 0),
-        ("0,3,3\n", "id,A,B,size", 1),
-        ("0,3,3,NaN\nx,1\n", "size NaN is not between", 1),
-        ("0,3,3,0\nx,1\n", "size 0 is not between", 1),
-        ("0,3,3,20\n", "family,border", 1),
-        ("0,3,3,20\ndelTag49h12,1\n", "none of", 2),
-        ("0,3,3,20\ndelTag25h7,-1\n", "border -1 is not between", 2),
-        ("0,3,3,20\ndelTag25h7,1.5\n", "no corners", 1),
-        ("0,8,0,20\nt25h7,1.5\n-1,0,0,0,0,0\n", "21 corners", 1),
-        ("0,4294967295,9,20\nt25h7,1.5\n-1,0,0,0,0,0\n", "at most", 1),
+        ("", 0),
+        ("\n\n", 0),
+        ("0,3,3\n", 1),
+        ("0,3,3,NaN\nx,1\n", 1),
+        ("0,3,3,0\nx,1\n", 1),
+        ("0,3,3,20\n", 1),
+        ("0,3,3,20\ndelTag49h12,1\n", 2),
+        ("0,3,3,20\ndelTag25h7,-1\n", 2),
+        ("0,3,3,20\ndelTag25h7,1.5\n", 1),
+        ("0,8,0,20\nt25h7,1.5\n-1,0,0,0,0,0\n", 1),
+        ("0,4294967295,9,20\nt25h7,1.5\n-1,0,0,0,0,0\n", 1),
     ];
     let edits = [
-        ("-1,1,0,20,0,0", "-1,3,0,20,0,0", "outside", 4),
-        ("-1,1,0,20,0,0", "-1,0,0,20,0,0", "twice", 4),
-        ("-1,1,0,20,0,0", "-1,1,0,inf,0,0", "x inf is not between", 4),
-        ("-1,1,0,20,0,0", "-1,1,0,27,0,0", "no units", 1),
-        ("0,0,0,0,0,0", "343,0,0,0,0,0", "343 codes", 3),
-        ("0,0,0,0,0,0", "-2,0,0,0,0,0", "no tag", 3),
-        ("-1,0,1,10,17.3,0", "-1,0,1,10,27.3,0", "1 %", 0),
+        ("-1,1,0,20,0,0", "-1,3,0,20,0,0", 4),
+        ("-1,1,0,20,0,0", "-1,0,0,20,0,0", 4),
+        ("-1,1,0,20,0,0", "-1,1,0,inf,0,0", 4),
+        ("-1,1,0,20,0,0", "-1,1,0,27,0,0", 1),
+        ("0,0,0,0,0,0", "343,0,0,0,0,0", 3),
+        ("0,0,0,0,0,0", "-2,0,0,0,0,0", 3),
+        ("-1,0,1,10,17.3,0", "-1,0,1,10,27.3,0", 0),
     ];
-    let cases = cases.map(|(text, reason, line)| (text.to_owned(), reason, line)).into_iter();
-    let edits = edits.map(|(from, to, reason, line)| (good.replace(from, to), reason, line));
-    for (text, reason, line) in cases.chain(edits) {
+    let cases = cases.map(|(text, line)| (text.to_owned(), line)).into_iter();
+    let edits = edits.map(|(from, to, line)| (good.replace(from, to), line));
+    let mut page = Page::default();
+    for (text, line) in cases.chain(edits) {
         let error = dsc::read(&text, "x").unwrap_err();
-        assert!(error.to_string().contains(reason), "{text}: {error}");
+        page.said(&format!("{text:?}"), &error.to_string());
         match error {
             DscError::Line { line: at, .. } => assert_eq!(at, line, "{text}: {error}"),
             _ => assert_eq!(line, 0, "{text}: {error}"),
         }
     }
+    page.is("dsc");
 }
 
 #[test]

@@ -5,15 +5,16 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use crate::common::command::deltille;
+use crate::common::verdict::{assert_found, findings};
 use deltille::artwork::{self, Artwork, Part};
 use deltille::export::{pdf, png, sheet_file_name, svg};
 use deltille::family::Family;
 use deltille::targets::{
     Label, LineKind, PaperSpec, Placement, SheetText, SolidShape, SolidSpec, Target, TargetSpec,
 };
-use deltille::verify::{Finding, Verdict, Verifier};
+use deltille::verify::{Finding, FoldFinding, Verdict, Verifier};
 use kurbo::Affine;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 fn family() -> Family {
     Family::shipped("delTag25h7").unwrap()
@@ -52,16 +53,6 @@ fn verify(target: &Target, artwork: &Artwork, extension: &str) -> Verdict {
     }
     let first = if extension == "pdf" { folder.path().join("t.pdf") } else { path(0) };
     Verifier::new(target, Some(&family())).unwrap().verify_path(&first).unwrap()
-}
-
-#[track_caller]
-fn assert_fails(verdict: &Verdict, reasons: &[&str]) {
-    let all = verdict.findings.iter().chain(verdict.sheets.iter().flat_map(|s| &s.findings));
-    let all: Vec<String> = all.map(Finding::to_string).collect();
-    assert!(!verdict.passed && verdict.to_string().contains("FAILED"), "{verdict}");
-    for reason in reasons {
-        assert!(all.iter().any(|finding| finding.contains(reason)), "no {reason:?} in {all:#?}");
-    }
 }
 
 #[test]
@@ -113,40 +104,44 @@ fn a_wrong_layout_does_not_fold_into_the_solid() {
     let whole = net(&PaperSpec::default());
     let mut swapped = whole.clone();
     swap(&mut swapped, 0, 2);
-    assert_fails(&verify(&swapped, &draw(&swapped), "svg"), &["is printed where board"]);
+    let elsewhere = json!({ "kind": "face_elsewhere" });
+    assert_found(&verify(&swapped, &draw(&swapped), "svg"), [elsewhere]);
     let mut turned = whole.clone();
     turn(&mut turned, 1);
     let board = turned.sheets[0].placements[1].panel;
-    let reason = format!("board {board} is turned by 120° in its place");
-    assert_fails(&verify(&turned, &draw(&turned), "pdf"), &[&reason]);
+    let in_its_place = json!({ "kind": "face_turned", "panel": board });
+    assert_found(&verify(&turned, &draw(&turned), "pdf"), [in_its_place]);
 
     let mut renumbered = whole.clone();
     let texts = &mut renumbered.sheets[0].texts;
     let text = texts.iter_mut().find(|text| is_of_edge(text)).unwrap();
     text.text = Label::Edge(9);
-    assert_fails(&verify(&renumbered, &draw(&renumbered), "pdf"), &["9 on the "]);
+    assert_found(
+        &verify(&renumbered, &draw(&renumbered), "pdf"),
+        [json!({ "kind": "edge_numbers" })],
+    );
 
     type Rename = fn(&Label) -> Option<Label>;
-    let cases: [(Rename, &str); 2] = [
+    let cases: [(Rename, Value); 2] = [
         (
             |label| (*label == Label::Face(1)).then_some(Label::Face(2)),
-            "carries 2 instead of face 1",
+            json!({ "kind": "face_number", "names": [2], "stated": 1 }),
         ),
         (
             |label| match *label {
                 Label::Tab { edge, under: 2 } => Some(Label::Tab { edge, under: 0 }),
                 _ => None,
             },
-            "names face 0 instead of 2",
+            json!({ "kind": "tab_names", "named": 0, "stated": 2 }),
         ),
     ];
-    for (rename, said) in cases {
+    for (rename, finding) in cases {
         let mut misnamed = whole.clone();
         let texts = &mut misnamed.sheets[0].texts;
         let (label, text) =
             texts.iter_mut().find_map(|text| Some((rename(&text.text)?, text))).unwrap();
         text.text = label;
-        assert_fails(&verify(&misnamed, &draw(&misnamed), "pdf"), &[said]);
+        assert_found(&verify(&misnamed, &draw(&misnamed), "pdf"), [finding]);
     }
     let folds = whole.sheets[0].lines.iter().enumerate();
     let folds: Vec<usize> =
@@ -156,9 +151,12 @@ fn a_wrong_layout_does_not_fold_into_the_solid() {
         let mut unhinged = whole.clone();
         unhinged.sheets[0].lines[fold].kind = LineKind::Cut;
         let verdict = verify(&unhinged, &draw(&unhinged), "pdf");
-        let said = verdict.to_string();
-        assert!(!verdict.passed, "{verdict}");
-        assert!(said.contains("hangs on no other") || said.contains("0 tabs"), "{verdict}");
+        let is_it = |finding: &Finding| match finding {
+            Finding::Fold(FoldFinding::FaceLoose { .. }) => true,
+            Finding::Fold(FoldFinding::EdgeTabs { tabs, .. }) => *tabs == 0,
+            _ => false,
+        };
+        assert!(!verdict.passed && findings(&verdict).any(is_it), "{verdict}");
     }
 }
 
@@ -169,36 +167,33 @@ fn a_wrong_print_is_told_from_its_description() {
     let mut swapped = whole.clone();
     swap(&mut swapped, 0, 2);
     let [a, b] = [0, 2].map(|at| whole.sheets[0].placements[at].panel);
-    let reasons = [
-        format!("board {a} is printed where board {b} belongs"),
-        format!("board {b} is printed where board {a} belongs"),
-    ];
-    assert_fails(&verify(&whole, &draw(&swapped), "svg"), &[&reasons[0], &reasons[1]]);
+    let elsewhere = |a, b| json!({ "kind": "face_elsewhere", "panel": a, "instead": b });
+    assert_found(&verify(&whole, &draw(&swapped), "svg"), [elsewhere(a, b), elsewhere(b, a)]);
     let mut turned = whole.clone();
     turn(&mut turned, 1);
-    assert_fails(&verify(&whole, &draw(&turned), "png"), &["turned by 120° in its place"]);
+    assert_found(&verify(&whole, &draw(&turned), "png"), [json!({ "kind": "face_turned" })]);
 
     let mut renumbered = whole.clone();
     let texts = &mut renumbered.sheets[0].texts;
     let text = texts.iter().position(is_of_edge).unwrap();
     texts[text].text = Label::Edge(19);
-    let reason = format!("label {} differs", text + 1);
-    assert_fails(&verify(&whole, &draw(&renumbered), "pdf"), &[&reason]);
+    let differs = json!({ "kind": "text_differs", "text": text + 1 });
+    assert_found(&verify(&whole, &draw(&renumbered), "pdf"), [differs]);
 
-    let kinds = [("to fold", LineKind::Fold), ("to cut", LineKind::Cut)];
-    for (reason, kind) in kinds {
+    let line = |kind: LineKind| json!({ "kind": "line_differs", "purpose": kind });
+    for kind in [LineKind::Fold, LineKind::Cut] {
         let mut erased = draw(&whole);
         let shapes = &mut erased.sheets[0].shapes;
         let is_it = |part: Part| matches!(part, Part::Line { kind: k, .. } if k == kind);
         let first = shapes.iter().position(|shape| is_it(shape.part)).unwrap();
         shapes.remove(first);
-        assert_fails(&verify(&whole, &erased, "pdf"), &[reason]);
+        assert_found(&verify(&whole, &erased, "pdf"), [line(kind)]);
     }
     // A fold drawn through would be cut.
     let mut through = whole.clone();
     let lines = &mut through.sheets[0].lines;
     lines.iter_mut().find(|line| line.kind == LineKind::Fold).unwrap().kind = LineKind::Cut;
-    assert_fails(&verify(&whole, &draw(&through), "pdf"), &["to fold, differs"]);
+    assert_found(&verify(&whole, &draw(&through), "pdf"), [line(LineKind::Fold)]);
 }
 
 #[test]
@@ -208,12 +203,14 @@ fn pages_that_do_not_join_are_found() {
     for shape in &mut shifted.sheets[1].shapes {
         shape.path = Affine::translate((0.4, 0.0)) * &shape.path;
     }
-    assert_fails(&verify(&target, &shifted, "pdf"), &["differ where they overlap"]);
+    assert_found(&verify(&target, &shifted, "pdf"), [json!({ "kind": "pages_differ" })]);
     let mut unnamed = draw(&target);
     let texts = target.sheets[0].texts.len();
     let own = |part: Part| matches!(part, Part::Label { index } if index >= texts);
     unnamed.sheets[2].shapes.retain(|shape| !own(shape.part));
-    assert_fails(&verify(&target, &unnamed, "svg"), &["page B1: label 1 differs"]);
+    let finding = json!({ "kind": "text_differs", "text": 1 });
+    let on_page = json!({ "kind": "on_page", "page": "B1", "finding": finding });
+    assert_found(&verify(&target, &unnamed, "svg"), [on_page]);
 }
 
 /// The report of `verify` on a file.

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::common::verdict::assert_found;
 use deltille::artwork::{self, Artwork, Paint, Part, Shape, Sheet};
 use deltille::export::{pdf, png, svg};
 use deltille::family::Family;
@@ -9,6 +10,7 @@ use deltille::lattice::{GridKind, Vertex};
 use deltille::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
 use deltille::verify::{Finding, TileFinding, Verdict, Verifier};
 use kurbo::{Affine, BezPath, Point};
+use serde_json::json;
 use tempfile::TempDir;
 
 /// Resolution of the PNG files, dpi.
@@ -120,17 +122,6 @@ fn about_centre(sheet: &Sheet, affine: Affine) -> Affine {
     Affine::translate(centre) * affine * Affine::translate((-centre.0, -centre.1))
 }
 
-#[track_caller]
-fn assert_fails(verdict: &Verdict, reasons: &[&str]) {
-    let line = verdict.to_string();
-    assert!(!verdict.passed && line.contains("FAILED"), "{line}");
-    let all = verdict.findings.iter().chain(verdict.sheets.iter().flat_map(|s| &s.findings));
-    let all: Vec<String> = all.map(Finding::to_string).collect();
-    for reason in reasons {
-        assert!(all.iter().any(|finding| finding.contains(reason)), "no {reason:?} in {all:#?}");
-    }
-}
-
 #[test]
 fn whole_sheets_pass_in_every_format() {
     for spec in all_specs() {
@@ -158,9 +149,14 @@ fn swapped_tags_are_named() {
         (tags[0].id, tags[1].id) = (tags[1].id, tags[0].id);
         let artwork = artwork::draw(&swapped, Some(&board.family)).unwrap();
         let (row, col) = board.tag(0);
-        let reason = format!("tag 17 at row {row} col {col} reads 18");
+        let exchanged =
+            json!({ "kind": "tag_reads", "id": 17, "row": row, "col": col, "reads": 18 });
         for format in ALL {
-            assert_fails(&board.verify(&artwork, format), &[&reason, "reads 17"]);
+            let verdict = board.verify(&artwork, format);
+            assert_found(
+                &verdict,
+                [exchanged.clone(), json!({ "kind": "tag_reads", "id": 18, "reads": 17 })],
+            );
         }
     }
 }
@@ -173,8 +169,8 @@ fn a_flipped_cell_is_found_although_decoding_would_correct_it() {
             let mut artwork = board.artwork();
             flip(&board, &mut artwork, at, bit);
             for format in ALL {
-                let reason = format!("tag 18 at row {} col {} damaged: 1 bit differs", at.0, at.1);
-                assert_fails(&board.verify(&artwork, format), &[&reason]);
+                let damaged = json!({ "kind": "tag_damaged", "id": 18, "row": at.0, "col": at.1, "bits": [bit] });
+                assert_found(&board.verify(&artwork, format), [damaged]);
             }
         }
     }
@@ -186,18 +182,20 @@ fn cells_flipped_beyond_correction_make_a_tag_unreadable() {
     let at = board.tag(0);
     let mut artwork = board.artwork();
     (4..8).for_each(|bit| flip(&board, &mut artwork, at, bit));
-    assert_fails(&board.verify(&artwork, Format::Pdf), &["tag 17", "unreadable: 4 bits differ"]);
+    let unreadable = json!({ "kind": "tag_unreadable", "id": 17, "bits": [4, 5, 6, 7] });
+    assert_found(&board.verify(&artwork, Format::Pdf), [unreadable]);
 }
 
 #[test]
 fn a_scale_is_named_with_its_value() {
     let board = board(spec());
-    for (scale, reason) in [(0.99, "scale 0.9900"), (1.0005, "scale 1.0005")] {
+    for scale in [0.99, 1.0005] {
         let mut artwork = board.artwork();
         transform(&mut artwork, |sheet| about_centre(sheet, Affine::scale(scale)));
         for format in ALL {
             let verdict = board.verify(&artwork, format);
-            assert_fails(&verdict, &[reason, "check bar 1 measures", "check bar 2 measures"]);
+            let bar = |bar| json!({ "kind": "check_bar", "bar": bar });
+            assert_found(&verdict, [json!({ "kind": "scale", "scale": scale }), bar(1), bar(2)]);
             let findings = &verdict.sheets[0].findings;
             assert_eq!(findings.len(), 3, "one cause, not its consequences: {findings:?}");
         }
@@ -208,14 +206,17 @@ fn a_scale_is_named_with_its_value() {
 fn stretching_turning_and_shifting_are_told_apart() {
     let board = board(spec());
     let changes = [
-        (Affine::scale_non_uniform(1.0, 0.998), "stretched: scale 1.0000 along x, 0.9980 along y"),
-        (Affine::rotate(0.002), "turned by 0.115°"),
-        (Affine::translate((0.0, 0.3)), "shifted by (0.000, 0.300) mm"),
+        (
+            Affine::scale_non_uniform(1.0, 0.998),
+            json!({ "kind": "stretched", "scale": [1.0, 0.998] }),
+        ),
+        (Affine::rotate(0.002), json!({ "kind": "turned", "angle_deg": 0.002f64.to_degrees() })),
+        (Affine::translate((0.0, 0.3)), json!({ "kind": "shifted", "by_mm": [0.0, 0.3] })),
     ];
-    for (change, reason) in changes {
+    for (change, finding) in changes {
         let mut artwork = board.artwork();
         transform(&mut artwork, |sheet| about_centre(sheet, change));
-        assert_fails(&board.verify(&artwork, Format::Pdf), &[reason]);
+        assert_found(&board.verify(&artwork, Format::Pdf), [finding]);
     }
 }
 
@@ -227,7 +228,8 @@ fn a_mirrored_page_is_named() {
         let mirror = Affine::scale_non_uniform(-1.0, 1.0);
         transform(&mut artwork, |sheet| about_centre(sheet, mirror));
         for format in ALL {
-            assert_fails(&board.verify(&artwork, format), &["board 3 is mirrored"]);
+            let mirrored = json!({ "kind": "mirrored", "panel": 3 });
+            assert_found(&board.verify(&artwork, format), [mirrored]);
         }
     }
 }
@@ -242,7 +244,8 @@ fn a_deleted_tile_is_named() {
         artwork.sheets[0].shapes.retain(|shape| !shape.path.is_empty());
         for format in ALL {
             let verdict = board.verify(&artwork, format);
-            assert_fails(&verdict, &["tile missing at row 1 col 3", "at row 1 col 3 not found"]);
+            let at = |kind| json!({ "kind": kind, "row": 1, "col": 3 });
+            assert_found(&verdict, [at("tile_colour"), at("corner_missing")]);
         }
     }
 }
@@ -257,7 +260,7 @@ fn a_short_check_bar_is_measured() {
     let length = bar.to_mm[0] - bar.from_mm[0];
     for format in ALL {
         let verdict = board.verify(&artwork, format);
-        assert_fails(&verdict, &["check bar 1 measures"]);
+        assert_found(&verdict, [json!({ "kind": "check_bar", "bar": 1 })]);
         assert_eq!(verdict.sheets[0].findings.len(), 1);
         let (stated, found) = verdict.sheets[0].check_bars_mm[0];
         assert!((stated - length).abs() < 1e-9);
@@ -267,7 +270,8 @@ fn a_short_check_bar_is_measured() {
     }
     let mut none = board.artwork();
     none.sheets[0].shapes.retain(|shape| shape.part != (Part::CheckBar { index: 1 }));
-    assert_fails(&board.verify(&none, Format::Pdf), &["check bar 2 not found"]);
+    let missing = json!({ "kind": "check_bar", "bar": 2, "found_mm": null });
+    assert_found(&board.verify(&none, Format::Pdf), [missing]);
 }
 
 #[test]
@@ -276,11 +280,12 @@ fn another_page_size_or_number_is_named() {
     let mut artwork = board.artwork();
     artwork.sheets[0].width_mm += 0.2;
     for format in ALL {
-        assert_fails(&board.verify(&artwork, format), &["page of "]);
+        assert_found(&board.verify(&artwork, format), [json!({ "kind": "page_size" })]);
     }
     let mut artwork = board.artwork();
     artwork.sheets.push(artwork.sheets[0].clone());
-    assert_fails(&board.verify(&artwork, Format::Pdf), &["2 pages instead of 1"]);
+    let pages = json!({ "kind": "pages", "found": 2, "stated": 1 });
+    assert_found(&board.verify(&artwork, Format::Pdf), [pages]);
 }
 
 #[test]
@@ -326,14 +331,14 @@ fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
     let path = kurbo::Shape::to_path(&at, 0.001);
     blot.sheets[0].shapes.push(Shape { part: Part::Label { index: 9 }, paint: Paint::Fill, path });
     let cases = [
-        (altered, "label 1 differs from the description"),
-        (erased, "label 2 differs from the description"),
-        (blot, "spot of 0."),
+        (altered, json!({ "kind": "text_differs", "text": 1 })),
+        (erased, json!({ "kind": "text_differs", "text": 2 })),
+        (blot, json!({ "kind": "spot" })),
     ];
-    for (artwork, reason) in cases {
+    for (artwork, finding) in cases {
         for format in ALL {
             let verdict = board.verify(&artwork, format);
-            assert_fails(&verdict, &[reason]);
+            assert_found(&verdict, [finding.clone()]);
             assert_eq!(verdict.sheets[0].findings.len(), 1, "{verdict}");
         }
     }
@@ -362,12 +367,12 @@ fn verify_toned(board: &Board, tone: impl Fn(u8) -> u8) -> Verdict {
 #[test]
 fn wrong_tones_and_other_boards_are_called_that() {
     let whole = board(spec());
-    assert_fails(&verify_toned(&whole, |v| 255 - v), &["inverted (black and white exchanged)"]);
-    assert_fails(&verify_toned(&whole, |v| 170 + v / 3), &["contrast of board 3 too low"]);
+    let is = |kind| json!({ "kind": kind, "panel": 3 });
+    assert_found(&verify_toned(&whole, |v| 255 - v), [is("inverted")]);
+    assert_found(&verify_toned(&whole, |v| 170 + v / 3), [is("contrast")]);
     let other = board(BoardSpec { rows: 4, cols: 5, ..spec() });
     let verdict = whole.verify(&other.artwork(), Format::Png);
-    assert_fails(&verdict, &["shows another board: 20 corners instead of 35"]);
-    assert!(verdict.to_string().contains("another board"), "{verdict}");
+    assert_found(&verdict, [json!({ "kind": "another_board", "found": 20, "stated": 35 })]);
 }
 
 #[test]
@@ -378,7 +383,7 @@ fn a_bar_much_shorter_than_stated_is_measured() {
     let printed = bar.length_mm();
     bar.to_mm[0] += 10.0;
     let verdict = board.verify(&artwork, Format::Png);
-    assert_fails(&verdict, &["check bar 1 measures"]);
+    assert_found(&verdict, [json!({ "kind": "check_bar", "bar": 1 })]);
     let (_, found) = verdict.sheets[0].check_bars_mm[0];
     assert!((found.unwrap() - printed).abs() < 0.02, "{verdict}");
 }
