@@ -1,3 +1,4 @@
+mod help;
 mod hostile;
 #[cfg(unix)]
 mod interrupt;

@@ -1205,3 +1205,116 @@ fn half_products(
     }
     [ac, ad, ae, af, bc, bd, be, bf]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::Gray;
+
+    /// A corner aside of its window's centre, in slanting light, whose edges are bent.
+    fn corner<const K: usize>(amplitude: f64) -> Corner<K> {
+        Corner {
+            position: [0.3, -0.2],
+            blur_px: 1.1,
+            amplitude,
+            level: 0.5,
+            slope: [0.0004, -0.0002],
+            angles: std::array::from_fn(|k| 0.4 + 1.1 * k as f64),
+            bends: std::array::from_fn(|k| 0.004 * k as f64 - 0.003),
+            across_px: std::array::from_fn(|k| 20.0 + k as f64),
+        }
+    }
+
+    /// A picture as it is, and one that is blurred unevenly, with a halo and ink.
+    fn optics() -> [Optics; 2] {
+        let mut all = Optics::default();
+        (all.astigmatism, all.halo, all.ink) = ([0.2, -0.15], [0.3, 2.5], 0.4);
+        [Optics::default(), all]
+    }
+
+    /// What the model shows of a corner at the pixels of a window.
+    fn shown<const K: usize>(window: &Window, corner: &Corner<K>, optics: &Optics) -> Vec<f32> {
+        let mut fitter = CornerFitter::default();
+        let piece = optics.piece(corner.level, corner.amplitude);
+        fitter.fill::<K, false>(window, corner, (optics, piece));
+        fitter.columns[PARAMS][..window.count].iter().map(|residual| -residual).collect()
+    }
+
+    #[test]
+    fn derivatives_are_those_of_what_is_shown() {
+        fn check<const K: usize>(corner: &Corner<K>, optics: &Optics) {
+            let window = Window::new(8);
+            let mut fitter = CornerFitter::default();
+            let piece = optics.piece(corner.level, corner.amplitude);
+            fitter.fill::<K, false>(&window, corner, (optics, piece));
+            for parameter in 0..ANGLE + K {
+                let size = if (SLOPE..ANGLE).contains(&parameter) { 1e-3 } else { 4e-3 };
+                let [after, before] = [size, -size].map(|by| {
+                    let mut step = SVector::zeros();
+                    step[parameter] = by;
+                    shown(&window, &corner.moved(&step, window.radius).unwrap(), optics)
+                });
+                let column = &fitter.columns[parameter][..window.count];
+                let scale = column.iter().fold(0.0f32, |most, by| most.max(by.abs()));
+                for ((by, after), before) in column.iter().zip(after).zip(before) {
+                    let quotient = (after - before) / (2.0 * size as f32);
+                    let off = (by - quotient).abs() / scale;
+                    // Turns leave out what they do to a bend, κth; and what ink leaves between three edges is told by
+                    // difference quotients itself.
+                    let most = match optics.ink == 0.0 {
+                        true if parameter < ANGLE => 1e-3,
+                        true => 1e-2,
+                        false => 2e-2,
+                    };
+                    assert!(off < most, "{K} edges, parameter {parameter}: {by} {quotient}");
+                }
+            }
+        }
+        for (optics, amplitude) in optics().iter().zip([0.35, -0.35]) {
+            check::<2>(&corner(amplitude), optics);
+            check::<3>(&corner(amplitude), optics);
+        }
+    }
+
+    /// Of what the model shows the fit leaves nothing, and finds every parameter, from a start beside it.
+    #[test]
+    fn a_corner_is_found_in_its_own_picture() {
+        fn check<const K: usize>(truth: &Corner<K>, optics: &Optics) {
+            const MIDDLE: usize = 12;
+            let window = Window::new(9);
+            let whole = Window::new(MIDDLE);
+            let pixels = shown(&whole, truth, optics);
+            let side = 2 * MIDDLE + 1;
+            let picture = Gray::from_fn(side, side, |x, y| pixels[y * side + x]);
+            let position = truth.position.map(|c| c + MIDDLE as f64);
+            let start = Corner {
+                position: [position[0] - 0.4, position[1] + 0.3],
+                blur_px: 0.8 * truth.blur_px,
+                amplitude: 0.8 * truth.amplitude,
+                slope: [0.0; 2],
+                angles: truth.angles.map(|angle| angle + 0.05),
+                ..*truth
+            };
+            let mut fitter = CornerFitter::default();
+            let with = (optics, Accuracy::Full);
+            let found = fitter.fit((&picture).into(), &window, &start, with).expect("a corner");
+            assert!(found.noise < 1e-3 * truth.amplitude.abs(), "{K} edges: {found:?}");
+            let found = found.corner;
+            let off = [0, 1].map(|i| found.position[i] - position[i]);
+            assert!(off[0].hypot(off[1]) < 1e-3, "{K} edges: {off:?}");
+            let pairs = [
+                (found.blur_px, truth.blur_px),
+                (found.amplitude, truth.amplitude),
+                (found.level, truth.level),
+            ];
+            let angles = found.angles.into_iter().zip(truth.angles);
+            for (found, truth) in pairs.into_iter().chain(angles) {
+                assert!((found - truth).abs() < 3e-3, "{K} edges: {found} {truth}");
+            }
+        }
+        for (optics, amplitude) in optics().iter().zip([0.35, -0.35]) {
+            check::<2>(&corner(amplitude), optics);
+            check::<3>(&corner(amplitude), optics);
+        }
+    }
+}

@@ -499,6 +499,10 @@ fn parallel_to_neighbours<const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use proptest::bool::weighted;
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
     use super::super::tiling::{CHECKER, DELTILLE};
     use super::*;
     use crate::lattice::GridKind;
@@ -530,6 +534,92 @@ mod tests {
         }
         check::<DELTILLE>(GridKind::Deltille);
         check::<CHECKER>(GridKind::Checker);
+    }
+
+    /// A vertex turned about the origin by so many steps.
+    fn turned<const N: usize>(vertex: Vertex, by: usize) -> Vertex {
+        let [along, up] = [by, by + 1].map(step::<N>);
+        let sum = |a: i32, b: i32| vertex.col * a + vertex.row * b;
+        Vertex::new(sum(along.row, up.row), sum(along.col, up.col))
+    }
+
+    /// Links between the corners of a lattice of which some are missing, each with its rays counted from anywhere.
+    fn linked<const N: usize>(
+        vertices: &[Vertex],
+        turns: &[usize],
+        lost: &[bool],
+    ) -> Vec<Links<N>> {
+        let mut links = vec![[None; N]; vertices.len()];
+        let mut lost = lost.iter().cycle();
+        for a in 0..vertices.len() {
+            for k in 0..N / 2 {
+                let there = vertices[a] + step::<N>(k);
+                let Some(b) = vertices.iter().position(|&v| v == there) else { continue };
+                if *lost.next().unwrap() {
+                    continue;
+                }
+                let ray = |corner: usize, k: usize| (k + N - turns[corner]) % N;
+                let [out, back] = [ray(a, k), ray(b, k + N / 2)];
+                links[a][out] = Some(Link { corner: b, ray: back });
+                links[b][back] = Some(Link { corner: a, ray: out });
+            }
+        }
+        links
+    }
+
+    /// Grids are parts of the lattice, turned and shifted, in which no corner has two places and no place two corners;
+    /// without holes it is one grid of all corners.
+    fn grids_are_the_lattice<const N: usize>(holes: &[bool], lost: &[bool], seed: usize) {
+        let mut vertices: Vec<Vertex> = (0..49)
+            .map(|i| Vertex::new(i / 7, i % 7))
+            .zip(holes)
+            .filter(|(_, hole)| !**hole)
+            .map(|(v, _)| v)
+            .collect();
+        let middle = seed % vertices.len().max(1);
+        vertices.rotate_left(middle);
+        // Even rays begin dark sectors: on a checkerboard the colours alternate from corner to corner.
+        let parity =
+            |v: Vertex| if N == CHECKER { (v.row + v.col).rem_euclid(2) as usize } else { 0 };
+        let turns: Vec<usize> = vertices
+            .iter()
+            .enumerate()
+            .map(|(i, &v)| (2 * (i * seed % N) + parity(v)) % N)
+            .collect();
+        let links = linked::<N>(&vertices, &turns, lost);
+        let (mut growth, mut seen) = (Growth::new(&links), BTreeSet::new());
+        for seed in seeds(&links) {
+            if seed.iter().any(|&(corner, _)| growth.taken[corner]) {
+                continue;
+            }
+            let root = seed[0].0;
+            let grid = growth.grow(&seed);
+            let places: BTreeSet<Vertex> = grid.iter().map(|(_, place)| place.vertex).collect();
+            assert_eq!(places.len(), grid.len());
+            for (corner, place) in grid {
+                growth.taken[corner] = true;
+                assert!(seen.insert(corner), "corner {corner} has two places");
+                let truth = vertices[root] + turned::<N>(place.vertex, turns[root]);
+                assert_eq!(truth, vertices[corner]);
+                assert_eq!((place.turn + turns[root]) % N, turns[corner]);
+            }
+        }
+        if !holes.contains(&true) && !lost.contains(&true) {
+            assert_eq!(seen.len(), vertices.len());
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_grows_is_the_lattice(
+            holes in vec(weighted(0.15), 49), lost in vec(weighted(0.05), 100), seed in 0..1000usize,
+        ) {
+            let none = [false; 49];
+            for (holes, lost) in [(&holes[..], &lost[..]), (&none, &none)] {
+                grids_are_the_lattice::<DELTILLE>(holes, lost, seed);
+                grids_are_the_lattice::<CHECKER>(holes, lost, seed);
+            }
+        }
     }
 
     #[test]

@@ -766,6 +766,25 @@ mod tests {
         labels_are_those_of_the_print(usize::MAX);
     }
 
+    /// The same board with other ids of the family is none of the target's.
+    #[test]
+    fn boards_of_other_ids_get_no_labels() {
+        for name in shipped_names().into_iter().chain(square_names()) {
+            let family = Family::shipped(name).unwrap();
+            let asked = board(&family, 0).unwrap();
+            let count = asked.panels[0].tags.len() as u32;
+            for first_id in [count, 2 * count] {
+                let Some(shown) = board(&family, first_id) else {
+                    continue;
+                };
+                for flopped in [false, true] {
+                    let found = found_in(&family, &asked, &shown, flopped).found;
+                    assert!(found.is_empty(), "{name}, first id {first_id}, {flopped}: {found:?}");
+                }
+            }
+        }
+    }
+
     /// Boards of the same family and the same ids, but with other distances between the tags or of another size: where
     /// they agree in some tags, other tiles tell.
     #[test]

@@ -127,3 +127,38 @@ impl TargetWords {
         self.frequencies.iter().map(of_turn).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+
+    /// Whatever a tile shows, the mean of e^Λ over words drawn by the cells' frequencies is 1, so that chance has e^Λ
+    /// above n less often than once in n (Markov). Λ of all words together is that of each.
+    #[test]
+    fn the_mean_evidence_of_drawn_words_is_one() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+        let family = Family::shipped("d16h5").unwrap();
+        let words = TargetWords::new(&family, vec![0, 2, 5]);
+        let bits = family.dimension().bits();
+        for strength in [0.2, 1.0, 2.6] {
+            let half_odds: Vec<f32> =
+                (0..bits).map(|_| strength * rng.random_range(-1.0..1.0)).collect();
+            let chance = |word: u64| -> f64 {
+                let cells = words.frequencies[0].iter().enumerate();
+                let of = |(bit, &p): (usize, &f32)| if word >> bit & 1 == 1 { p } else { 1.0 - p };
+                cells.map(|cell| f64::from(of(cell))).product()
+            };
+            let evidence = |word| f64::from(words.evidence_of(word, &half_odds));
+            let mean: f64 = (0..1u64 << bits).map(|word| chance(word) * evidence(word).exp()).sum();
+            assert!((mean - 1.0).abs() < 1e-3, "{strength}: {mean}");
+            let all = words.evidence(&half_odds);
+            for code in 0..words.ids.len() {
+                let index = code * words.turns();
+                let single = words.evidence_of(words.word(index), &half_odds);
+                assert!((all[index] - single).abs() < 1e-4, "{strength}, code {code}");
+            }
+        }
+    }
+}
