@@ -1,14 +1,28 @@
-//! Tells the tests whether the photographs are there that they are to be run on.
+//! Tells the tests what is there that they are to be run on: photographs, and other programs. What is not is reported
+//! as an ignored test with its reason.
 
+use std::env::{consts::EXE_SUFFIX, split_paths, var_os};
 use std::path::{Path, PathBuf};
 
 fn main() {
-    println!("cargo::rustc-check-cfg=cfg(has_data)");
+    println!("cargo::rustc-check-cfg=cfg(has_data, has_opencv, has_gcc, has_poppler, has_python)");
     println!("cargo::rerun-if-env-changed=DELTILLE_DATA");
+    println!("cargo::rerun-if-env-changed=DELTILLE_PYTHON");
     println!("cargo::rerun-if-changed=build.rs");
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    let root = std::env::var_os("DELTILLE_DATA").map_or_else(beside, PathBuf::from);
-    if root.join("robot-hand").is_dir() {
-        println!("cargo::rustc-cfg=has_data");
+    let root = var_os("DELTILLE_DATA").map_or_else(beside, PathBuf::from);
+    let path = var_os("PATH").unwrap_or_default();
+    let is_program =
+        |name: &str| split_paths(&path).any(|at| at.join(format!("{name}{EXE_SUFFIX}")).is_file());
+    for (name, is_there) in [
+        ("data", root.join("robot-hand").is_dir()),
+        ("opencv", var_os("DELTILLE_PYTHON").is_some()),
+        ("gcc", is_program("gcc") && is_program("g++")),
+        ("poppler", is_program("pdftoppm")),
+        ("python", is_program("python3")),
+    ] {
+        if is_there {
+            println!("cargo::rustc-cfg=has_{name}");
+        }
     }
 }

@@ -273,24 +273,13 @@ fn exports_list_every_code() {
     }
 }
 
-/// The tool chains decide whether an export is of use; those that are not installed are skipped.
-#[test]
-fn exports_compile() {
+/// A folder with exports of 49-bit codes, under a name that is no identifier.
+fn exports() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("families/d49h12.json");
-    // A name that is no identifier, and 49-bit codes.
-    let family = folder.path().join("family.json");
     let text = std::fs::read_to_string(shipped).unwrap();
-    std::fs::write(&family, text.replace("\"name\": \"d49h12\"", "\"name\": \"4-tags\"")).unwrap();
-    let export = |format: &str, file: &str| {
-        deltag()
-            .arg("export")
-            .arg(&family)
-            .args(["--format", format, "-o"])
-            .arg(folder.path().join(file))
-            .assert()
-            .success();
-    };
+    let named = text.replace("\"name\": \"d49h12\"", "\"name\": \"4-tags\"");
+    std::fs::write(folder.path().join("family.json"), named).unwrap();
     for (format, file) in [
         ("c", "tags.h"),
         ("rust", "tags.rs"),
@@ -298,50 +287,63 @@ fn exports_compile() {
         ("json", "tags.json"),
         ("opencv", "tags.yml"),
     ] {
-        export(format, file);
+        let args = ["export", "family.json", "--format", format, "-o", file];
+        deltag().current_dir(folder.path()).args(args).assert().success();
     }
-    let c = "#include \"tags.h\"\n#include \"tags.h\"\nint main(void) { return \
-             family_4_tags_codes[FAMILY_4_TAGS_SIZE - 1] >> FAMILY_4_TAGS_BITS ? 1 : 0; }\n";
-    std::fs::write(folder.path().join("main.c"), c).unwrap();
-    std::fs::write(folder.path().join("main.cpp"), c).unwrap();
-    let rust = "mod tags;\nfn main() { assert!(tags::CODES.iter().all(|c| c >> tags::BITS == 0)); \
+    folder
+}
+
+/// Runs another program in a folder.
+#[track_caller]
+fn assert_runs(folder: &Path, program: impl AsRef<std::ffi::OsStr>, args: &[&str]) {
+    let output = std::process::Command::new(program).args(args).current_dir(folder).output();
+    let output = output.unwrap();
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+#[cfg_attr(not(has_gcc), ignore = "no gcc and g++ on the path")]
+fn exports_compile_in_c() {
+    let folder = exports();
+    let text = "#include \"tags.h\"\n#include \"tags.h\"\nint main(void) { return \
+                family_4_tags_codes[FAMILY_4_TAGS_SIZE - 1] >> FAMILY_4_TAGS_BITS ? 1 : 0; }\n";
+    for name in ["main.c", "main.cpp"] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-o", "main", "main.c"];
+    assert_runs(folder.path(), "gcc", &strict);
+    assert_runs(folder.path(), "g++", &["-Wall", "-Werror", "-o", "main", "main.cpp"]);
+}
+
+#[test]
+fn exports_compile_in_rust() {
+    let folder = exports();
+    let text = "mod tags;\nfn main() { assert!(tags::CODES.iter().all(|c| c >> tags::BITS == 0)); \
                 assert_eq!(tags::DISTANCE, 12); }\n";
-    std::fs::write(folder.path().join("main.rs"), rust).unwrap();
-    let python = "import tags, json\nassert len(tags.CODES) == 20000 and tags.BITS == 49\n\
-                  listed = json.load(open('tags.json'))['codes']\n\
-                  assert [int(c, 16) for c in listed] == list(tags.CODES)\n";
-    let yaml = "import cv2\nf = cv2.FileStorage('tags.yml', cv2.FILE_STORAGE_READ)\n\
+    std::fs::write(folder.path().join("main.rs"), text).unwrap();
+    let args = ["--edition", "2021", "-Dwarnings", "-o", "main-rs", "main.rs"];
+    assert_runs(folder.path(), "rustc", &args);
+}
+
+#[test]
+#[cfg_attr(not(has_python), ignore = "no python3 on the path")]
+fn exports_are_read_by_python() {
+    let text = "import tags, json\nassert len(tags.CODES) == 20000 and tags.BITS == 49\n\
+                listed = json.load(open('tags.json'))['codes']\n\
+                assert [int(c, 16) for c in listed] == list(tags.CODES)\n";
+    assert_runs(exports().path(), "python3", &["-c", text]);
+}
+
+#[test]
+#[cfg_attr(not(has_opencv), ignore = "no OpenCV: set DELTILLE_PYTHON to a Python that has it")]
+fn exports_are_read_by_opencv() {
+    let text = "import cv2\nf = cv2.FileStorage('tags.yml', cv2.FILE_STORAGE_READ)\n\
                 assert f.getNode('name').string() == '4-tags'\n\
                 assert [f.getNode(n).real() for n in ('bits', 'distance', 'size')] == \
                 [49, 12, 20000]\n\
                 import tags\ncodes = f.getNode('codes')\n\
                 assert [int(codes.at(i).string(), 16) for i in range(codes.size())] == \
                 list(tags.CODES)\n";
-    let has_cv = std::process::Command::new("python3").args(["-c", "import cv2"]).output();
-    let has_cv = has_cv.is_ok_and(|o| o.status.success());
-    let strict = ["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-o", "main", "main.c"];
-    let mut runs: Vec<(&str, Vec<&str>)> = vec![
-        ("gcc", [&["-std=c99"][..], &strict].concat()),
-        ("g++", vec!["-Wall", "-Werror", "-o", "main", "main.cpp"]),
-        ("rustc", vec!["--edition", "2021", "-Dwarnings", "-o", "main-rs", "main.rs"]),
-        ("python3", vec!["-c", python]),
-    ];
-    if has_cv {
-        runs.push(("python3", vec!["-c", yaml]));
-    } else {
-        println!("skipped: OpenCV's python module is not installed");
-    }
-    for (program, arguments) in runs {
-        match std::process::Command::new(program)
-            .args(arguments)
-            .current_dir(folder.path())
-            .output()
-        {
-            Err(_) => println!("skipped: {program} is not installed"),
-            Ok(output) => {
-                let errors = String::from_utf8_lossy(&output.stderr);
-                assert!(output.status.success(), "{program}: {errors}");
-            }
-        }
-    }
+    let python = std::env::var_os("DELTILLE_PYTHON").expect("it was set when this was built");
+    assert_runs(exports().path(), python, &["-c", text]);
 }

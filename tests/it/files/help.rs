@@ -12,7 +12,8 @@ fn help_texts() {
         // Names of commands are what begins, two blanks in, the lines below this one.
         let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1);
         let commands = lines.map_while(|line| line.strip_prefix("  ")?.split(' ').next());
-        let commands: Vec<&str> = commands.filter(|name| !name.is_empty() && *name != "help").collect();
+        let commands: Vec<&str> =
+            commands.filter(|name| !name.is_empty() && *name != "help").collect();
         assert!(commands.contains(&first), "{commands:?}");
         for command in commands {
             page.run(folder.path(), &format!("{program} {command} --help"));
