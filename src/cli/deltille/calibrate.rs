@@ -15,6 +15,7 @@ use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Model}
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
+use crate::cli::wording::in_options;
 use crate::export::calibration;
 use crate::export::camera::{FormatError, colmap, kalibr, nerfstudio, opencv, ros};
 use crate::words::{counted, shown};
@@ -157,7 +158,7 @@ impl Format {
             Self::Own => {
                 let yaml = (format!("{stem}.yaml"), camera.to_yaml());
                 let json = calibration::write(estimate, diagnoses, *print);
-                let json = json.map(|json| (format!("{stem}.json"), json));
+                let json = json.map(|json| (format!("{stem}.json"), in_options(&json)));
                 [Some(yaml), json].into_iter().flatten().collect()
             }
             Self::Opencv => one("-opencv.yaml", opencv(camera)?),

@@ -12,6 +12,7 @@ use crate::calibrate::{
 };
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
+use crate::cli::wording::in_options;
 use crate::export::calibration::Print;
 use crate::export::kind::Kind;
 use crate::name::is_within;
@@ -158,7 +159,7 @@ impl Calibrated {
         }
         let Self { estimate, diagnoses, print } = self;
         let report = Report { title, estimate, diagnoses, print: *print, thumbnails };
-        output::write(page, report.html().as_bytes(), overwrite).context("--report")
+        output::write(page, in_options(&report.html()).as_bytes(), overwrite).context("--report")
     }
 }
 

@@ -17,6 +17,7 @@ use crate::calibrate::{
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{Overwrite, check_folder, fixed, say};
 use crate::cli::run::{FAILED, report};
+use crate::cli::wording::in_options;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::Print;
 use crate::export::camera::{FormatError, colmap, colmap_rig, kalibr};
@@ -136,7 +137,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     solved.estimate.excluded.splice(0..0, left_out);
     let Calibrated { estimate, diagnoses, print } = &solved;
     let json = rig::write(estimate, diagnoses, &args.model.to_string(), *print);
-    let mut files = vec![text_file("rig.json".to_owned(), json)];
+    let mut files = vec![text_file("rig.json".to_owned(), in_options(&json))];
     for camera in &estimate.cameras {
         files.push(text_file(format!("{}.yaml", camera.name), camera.camera.to_yaml()));
     }

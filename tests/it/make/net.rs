@@ -250,7 +250,7 @@ fn a_net_larger_than_the_paper_takes_several_pages() {
 fn nets_that_cannot_be_made_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     for (args, said) in [
-        ("icosahedron --pdf --edge 3m", "an --edge of at most "),
+        ("icosahedron --pdf --edge 3m", "--edge of at most "),
         ("icosahedron --pdf --paper A5 --edge 440mm", "or larger --paper"),
         ("icosahedron --pdf --face-margin 1mm", "--per-face"),
         ("icosahedron --pdf --paper 50x60mm", "--paper"),

@@ -522,7 +522,7 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     for (args, said) in [
         ("dodecahedron", "unrecognized subcommand"),
-        ("icosahedron --edge 20mm", "an --edge of at least 28 mm"),
+        ("icosahedron --edge 20mm", "--edge of at least 28 mm"),
         ("icosahedron --edge NaN", "--edge"),
         ("icosahedron --edge -150mm", "--edge"),
         ("icosahedron --tiles 3", "--tiles"),
@@ -531,7 +531,7 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
         ("icosahedron --texture-dpi 100", "--texture-dpi"),
         ("icosahedron --texture-dpi 9000", "lower --texture-dpi"),
         ("icosahedron --pdf --per-face --edge 3m", "even A0"),
-        ("icosahedron --pdf --per-face --paper A5", "an --edge of at most "),
+        ("icosahedron --pdf --per-face --paper A5", "--edge of at most "),
         ("icosahedron -o /proc/nowhere", "-o: cannot write"),
         ("icosahedron --skeleton --rib 1mm", "--rib: 1 mm leaves no foot"),
         ("icosahedron --skeleton --panel-thickness 12mm --face-margin 5mm", "--face-margin"),

@@ -19,7 +19,7 @@ pub const MAX_TEXTURE_PX: u32 = 16_384;
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
     /// A flat target, or one known by its corners only.
-    #[error("{0} is no solid made by `deltille`: it has no mesh")]
+    #[error("{0} was not made as a solid: it has no mesh")]
     NotSolid(String),
     /// The texture would be too large.
     #[error(
@@ -35,7 +35,7 @@ pub enum MeshError {
     },
     /// The resolution asked for leaves the tags unsharp.
     #[error(
-        "--texture-dpi: {dpi} dpi are {texels:.1} texels per tag bit, at least {TEXELS_PER_BIT} are \
+        "{dpi} dpi are {texels:.1} texels per tag bit, at least {TEXELS_PER_BIT} are \
          needed: give {least} or more"
     )]
     Unsharp {
@@ -123,10 +123,8 @@ impl TexturedMesh {
         let [width, height] = atlas.size_px;
         if width.max(height) > MAX_TEXTURE_PX {
             let instead = match dpi {
-                Some(_) => "lower --texture-dpi".to_owned(),
-                None => {
-                    "take fewer --tiles, a family of fewer bits, or no --gltf and --obj".to_owned()
-                }
+                Some(_) => "choose a lower resolution".to_owned(),
+                None => "take fewer `SolidSpec::tiles`, or a family of fewer bits".to_owned(),
             };
             return Err(MeshError::Texture { width, height, instead });
         }

@@ -23,7 +23,7 @@ use deltille_core::quantity;
 #[non_exhaustive]
 pub enum SavedError {
     /// Neither that of a camera nor that of a rig.
-    #[error("not the .json that `calibrate` or `rig` writes")]
+    #[error("not what `calibration::write` or `rig::write` made")]
     Foreign,
     /// A field is missing, or holds what it must not.
     #[error("field `{field}`: {problem}")]

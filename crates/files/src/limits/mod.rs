@@ -8,7 +8,7 @@
 //! let error = small.read("Cargo.toml".as_ref()).unwrap_err();
 //! assert_eq!(
 //!     error.to_string(),
-//!     "Cargo.toml: more than 10 bytes; --max-bytes sets how many are read"
+//!     "Cargo.toml: more than 10 bytes; `Limits::max_bytes` sets how many are read"
 //! );
 //! ```
 //!
@@ -101,21 +101,34 @@ impl fmt::Display for Exceeded {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let limit = self.limit;
         match self.kind {
-            Kind::Bytes => write!(f, "more than {limit} bytes; --max-bytes sets how many are read"),
+            Kind::Bytes => {
+                write!(f, "more than {limit} bytes; `Limits::max_bytes` sets how many are read")
+            }
             Kind::Pixels => {
                 let mega = limit / 1e6;
-                write!(f, "more than {mega} megapixels; --max-pixels sets how many are read")
+                write!(
+                    f,
+                    "more than {mega} megapixels; `Limits::max_pixels` sets how many are read"
+                )
             }
             Kind::PixelsPerByte => {
                 write!(f, "more than {limit} pixels for each byte, as no photograph has; ")?;
-                write!(f, "--max-pixels-per-byte sets how many are read")
+                write!(f, "`Limits::max_pixels_per_byte` sets how many are read")
             }
-            Kind::Nodes => write!(f, "more than {limit} parts; --max-nodes sets how many are read"),
+            Kind::Nodes => {
+                write!(f, "more than {limit} parts; `Limits::max_nodes` sets how many are read")
+            }
             Kind::Depth => {
-                write!(f, "parts more than {limit} deep; --max-depth sets how deep they may be")
+                write!(
+                    f,
+                    "parts more than {limit} deep; `Limits::max_depth` sets how deep they may be"
+                )
             }
             Kind::Seconds => {
-                write!(f, "not done after {limit} s; --max-seconds sets how long it may take")
+                write!(
+                    f,
+                    "not done after {limit} s; `Limits::max_seconds` sets how long it may take"
+                )
             }
         }
     }

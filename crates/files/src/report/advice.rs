@@ -127,7 +127,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     if report.print.scale.is_none() {
         let text =
             "Distances are as true as the print: measure both check bars of the sheet and give \
-                    --print-scale. Focal lengths and distortion do not depend on it where both are off alike."
+                    `Print::scale`. Focal lengths and distortion do not depend on it where both are off alike."
                 .to_owned();
         add(Weight::Hint, text);
     }
@@ -329,7 +329,7 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
             format!(
                 "Residuals leave a pattern over the image, {pattern:.1} times what chance makes and \
                  {size:.3} px strong: less than noise, but the model does not describe this lens \
-                 wholly, or the board is not flat. Try a richer model, or --board-shape."
+                 wholly, or the board is not flat. Try a richer model, or `Calibration::board_shape`."
             ),
         ),
         Some(_) => {
