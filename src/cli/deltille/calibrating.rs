@@ -7,8 +7,8 @@ use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use crate::calibrate::{
-    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, Loss, View,
-    Weights, Words,
+    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, Loss, PanelPlace,
+    View, Weights, Words,
 };
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
@@ -67,6 +67,8 @@ enum Weighting {
 pub struct Calibrated {
     pub estimate: Estimate,
     pub diagnoses: Vec<Diagnosis>,
+    /// Where the target's file has its panels.
+    pub stated: Vec<PanelPlace>,
     pub print: Print,
 }
 
@@ -100,7 +102,8 @@ impl SolveArgs {
             }
         })?;
         let diagnoses = calibration.diagnose(&estimate);
-        Ok(Calibrated { estimate, diagnoses, print })
+        let stated = calibration.panels().to_vec();
+        Ok(Calibrated { estimate, diagnoses, stated, print })
     }
 
     /// Where the page goes, `<stem>-report.html` in a folder. What would be refused is refused here, before the
@@ -157,8 +160,8 @@ impl Calibrated {
                 thumbnails.extend(picture.map(|picture| ((index, view.name.clone()), picture)));
             }
         }
-        let Self { estimate, diagnoses, print } = self;
-        let report = Report { title, estimate, diagnoses, print: *print, thumbnails };
+        let Self { estimate, diagnoses, stated, print } = self;
+        let report = Report { title, estimate, diagnoses, stated, print: *print, thumbnails };
         output::write(page, in_options(&report.html()).as_bytes(), overwrite).context("--report")
     }
 }

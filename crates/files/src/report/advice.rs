@@ -377,6 +377,7 @@ mod tests {
             title: "camera",
             estimate: &estimate,
             diagnoses: &[],
+            stated: &[],
             print: Print { scale: Some([1.0; 2]), ink: None },
             thumbnails: BTreeMap::new(),
         };

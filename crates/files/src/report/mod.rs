@@ -13,13 +13,14 @@ mod advice;
 mod axes;
 mod page;
 mod plots;
+mod rig;
 mod survey;
 mod thumbnail;
 
 use std::collections::BTreeMap;
 
 use crate::export::calibration::Print;
-use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Words};
+use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, PanelPlace, Words};
 
 pub use advice::{Advice, Weight, advice};
 pub use survey::{Survey, SurveyedView};
@@ -34,6 +35,8 @@ pub struct Report<'a> {
     pub estimate: &'a Estimate,
     /// What is to be said about it.
     pub diagnoses: &'a [Diagnosis],
+    /// Where the target's file has its panels.
+    pub stated: &'a [PanelPlace],
     /// What is known of the print.
     pub print: Print,
     /// Small pictures of the views, by camera and name, as PNG; see [`thumbnail`].
