@@ -64,6 +64,7 @@ pub struct Photograph {
 
 /// An image file that cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImageError {
     /// The file cannot be opened.
     #[error("{}: {source}", path.display())]

@@ -122,7 +122,7 @@ impl SolveArgs {
 impl Calibrated {
     /// Tells the diagnoses on standard error; an error where a known camera did not take its pictures.
     pub fn tell(&self) -> anyhow::Result<()> {
-        let words = Words { estimate: &self.estimate, print_scale: self.print.scale };
+        let words = Words::new(&self.estimate, self.print.scale);
         for diagnosis in &self.diagnoses {
             let text = words.sentence(diagnosis);
             if matches!(diagnosis, Diagnosis::ForeignCamera { .. }) {
@@ -161,7 +161,9 @@ impl Calibrated {
             }
         }
         let Self { estimate, diagnoses, stated, print } = self;
-        let report = Report { title, estimate, diagnoses, stated, print: *print, thumbnails };
+        let mut report = Report::new(title, estimate);
+        (report.diagnoses, report.stated) = (diagnoses, stated);
+        (report.print, report.thumbnails) = (*print, thumbnails);
         output::write(page, in_options(&report.html()).as_bytes(), overwrite).context("--report")
     }
 }

@@ -141,7 +141,7 @@ impl Finder<'_> {
         let calibration =
             Calibration::new(self.panels.iter().copied()).camera("", views, self.camera.clone());
         let found = calibration.solve().with_context(|| image.display().to_string())?;
-        let words = Words { estimate: &found, print_scale: None };
+        let words = Words::new(&found, None);
         let said = found.inspect();
         let foreign = said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
         let why = match foreign {

@@ -171,6 +171,7 @@ impl Reference<'_> {
 
 /// The views of detections.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Shown {
     /// One for each picture, or for each board in it where several lie about.
     pub views: Vec<View>,

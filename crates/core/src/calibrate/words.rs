@@ -17,6 +17,7 @@ const GIVEN_CAMERA: &str =
 
 /// Tells what is to be said about an estimate, in sentences without capital and full stop.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Words<'a> {
     /// What it is said about.
     pub estimate: &'a Estimate,
@@ -24,7 +25,12 @@ pub struct Words<'a> {
     pub print_scale: Option<[f64; 2]>,
 }
 
-impl Words<'_> {
+impl<'a> Words<'a> {
+    /// What is to be said about an estimate, of a print that came out like this where that was given.
+    pub fn new(estimate: &'a Estimate, print_scale: Option<[f64; 2]>) -> Self {
+        Self { estimate, print_scale }
+    }
+
     /// A diagnosis.
     pub fn sentence(&self, diagnosis: &Diagnosis) -> String {
         match diagnosis {

@@ -38,6 +38,7 @@ impl std::str::FromStr for Ink {
 /// The growth of what is dark that was found in a picture, on every side.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct InkEstimate {
     /// In edges of a tile; less than 0 where it has shrunk.
     #[serde(deserialize_with = "quantity::figure::de")]

@@ -1,5 +1,6 @@
 /// What is wrong with a family, its text or its name.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FamilyError {
     /// No shipped family and no file of this name.
     #[error(

@@ -57,6 +57,7 @@ impl Default for SkeletonSpec {
 
 /// The frame of a solid.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Skeleton {
     /// Its surface, mm.
     pub triangles_mm: Vec<[DVec3; 3]>,

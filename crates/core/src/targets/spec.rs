@@ -151,6 +151,7 @@ pub struct SolidSpec {
 /// The solids; see [`Polyhedron`](super::Polyhedron) for the order of the faces of regular ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum SolidShape {
     /// Four faces.
     Tetrahedron,
@@ -173,6 +174,7 @@ pub struct ListedSpec {
 /// Formats that list a target's corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum ListFormat {
     /// `.dsc` in the dialect of the reference detector (`docs/formats.md`, “.dsc target descriptions”).
     DscOriginal,

@@ -33,6 +33,7 @@ pub struct Print {
 
 /// Why a file tells of no sheet.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SheetError {
     /// Not the file of a calibration.
     #[error("not what `calibration::write` or `rig::write` made")]

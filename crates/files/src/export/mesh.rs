@@ -17,6 +17,7 @@ pub const MAX_TEXTURE_PX: u32 = 16_384;
 
 /// Why a target has no mesh.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// A flat target, or one known by its corners only.
     #[error("{0} was not made as a solid: it has no mesh")]
@@ -69,6 +70,7 @@ pub fn extras(target: &Target) -> serde_json::Value {
 
 /// Triangles with a texture, in the target frame.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TexturedMesh {
     /// Name of the target.
     pub name: String,
@@ -84,6 +86,7 @@ pub struct TexturedMesh {
 
 /// A plane face.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct MeshFace {
     /// Vertices, mm, counter-clockwise from outside.
     pub vertices_mm: [DVec3; 3],

@@ -4,7 +4,8 @@
 //! ```
 //! use deltille_files::limits::Limits;
 //!
-//! let small = Limits { max_bytes: 10, ..Limits::default() };
+//! let mut small = Limits::default();
+//! small.max_bytes = 10;
 //! let error = small.read("Cargo.toml".as_ref()).unwrap_err();
 //! assert_eq!(
 //!     error.to_string(),
@@ -41,6 +42,7 @@ const BYTES_PER_PIXEL: u64 = 4;
 
 /// What a reader takes before it gives up.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Limits {
     /// Bytes of a file, and of what is unpacked from it; pictures go by their pixels.
     pub max_bytes: u64,
@@ -73,6 +75,7 @@ impl Default for Limits {
 
 /// One of the [`Limits`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kind {
     /// [`Limits::max_bytes`]
     Bytes,
@@ -136,6 +139,7 @@ impl fmt::Display for Exceeded {
 
 /// A file that is not read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be opened or read.
     #[error("cannot read {}: {source}", path.display())]

@@ -132,12 +132,13 @@ fn ticks([low, high]: [f64; 2], length: f64, room: impl Fn(&str) -> f64) -> Vec<
     let decade = rough.log10().floor() as i32;
     let decades = decade..decade.saturating_add(DECADES);
     let steps = decades.flat_map(|n| [1.0, 2.0, 5.0].map(|first| (first * 10f64.powi(n), n)));
-    let mut ticks = steps.filter(|(step, _)| *step >= rough * (1.0 - 1e-9)).map(|(step, decade)| {
-        let first = (low / step - 1e-9).ceil() as i64;
-        let last = (high / step + 1e-9).floor() as i64;
-        let values = (first..=last).map(|n| n as f64 * step);
-        (step, values.map(|value| (value, number(value, decade))).collect::<Vec<_>>())
-    });
+    let mut ticks =
+        steps.filter(|(step, _)| *step >= rough * (1.0 - 1e-9)).map(|(step, decade)| {
+            let first = (low / step - 1e-9).ceil() as i64;
+            let last = (high / step + 1e-9).floor() as i64;
+            let values = (first..=last).map(|n| n as f64 * step);
+            (step, values.map(|value| (value, number(value, decade))).collect::<Vec<_>>())
+        });
     let fitting = ticks.find(|(step, ticks)| {
         let apart = step / (high - low) * length;
         ticks.len() < 2 || ticks.iter().all(|(_, text)| room(text) <= apart)

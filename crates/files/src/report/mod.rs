@@ -28,6 +28,7 @@ pub use thumbnail::thumbnail;
 
 /// What a page tells.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Report<'a> {
     /// Its headline, such as the name of the camera.
     pub title: &'a str,
@@ -43,7 +44,13 @@ pub struct Report<'a> {
     pub thumbnails: BTreeMap<(usize, String), Vec<u8>>,
 }
 
-impl Report<'_> {
+impl<'a> Report<'a> {
+    /// A page of an estimate of which nothing else is known.
+    pub fn new(title: &'a str, estimate: &'a Estimate) -> Self {
+        let (diagnoses, stated, print) = (&[], &[], Print::default());
+        Self { title, estimate, diagnoses, stated, print, thumbnails: BTreeMap::new() }
+    }
+
     /// The page.
     pub fn html(&self) -> String {
         page::html(self)
@@ -55,7 +62,7 @@ impl Report<'_> {
     }
 
     fn words(&self) -> Words<'_> {
-        Words { estimate: self.estimate, print_scale: self.print.scale }
+        Words::new(self.estimate, self.print.scale)
     }
 
     /// A camera on views that were held out.
