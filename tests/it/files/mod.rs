@@ -7,3 +7,4 @@ mod readers;
 mod reproducible;
 mod robustness;
 mod sets;
+mod settings;

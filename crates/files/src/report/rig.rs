@@ -109,7 +109,7 @@ pub(super) fn frames(report: &Report) -> String {
     let excluded = estimate.excluded.iter().filter(|out| out.camera.is_none());
     let excluded = excluded.map(|out| format!("<tr>{}", out_row(out, 3)));
     format!(
-        "<section><h2 class=\"camera\">Frames</h2>{note}<table class=\"plain\"><tr><th>frame</th>\
+        "<section><h2 class=\"frames\">Frames</h2>{note}<table class=\"plain\"><tr><th>frame</th>\
          <th>cameras</th><th>corners</th><th>rms, px</th></tr>{}</table></section>\n",
         rows.chain(excluded).collect::<String>()
     )
