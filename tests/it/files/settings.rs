@@ -48,7 +48,8 @@ fn what_would_be_written_over_a_foreign_file_is_refused_before_anything_is_read(
     let at = folder.path();
     deltille(at, "board --rows 8 --cols 9 --name board").success();
     let calibrate = "calibrate nowhere --target board.json --model radtan -o";
-    let rig = "rig --camera left=here --camera right=there --target board.json --format kalibr -o out";
+    let rig =
+        "rig --camera left=here --camera right=there --target board.json --format kalibr -o out";
     fs::create_dir(at.join("out")).unwrap();
     for (file, text, args) in [
         ("notes.yaml", "milk: 1\n", format!("{calibrate} notes.yaml")),

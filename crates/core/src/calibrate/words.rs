@@ -191,15 +191,17 @@ impl<'a> Words<'a> {
         };
         match (self.estimate.shape, model) {
             (Some(_), _) => format!(
-                "{scale}the board is bent in more ways than `Calibration::board_shape` describes, or not the same in \
-                 all views: glue it on something flat, {bars}"
+                "{scale}the board is bent in more ways than `Calibration::board_shape` describes, or not \
+                 the same in all views: glue it on something flat, {bars}"
             ),
             (None, Some(_)) => format!(
-                "{scale}the board is not flat or not printed as stated: try `Calibration::board_shape`, {bars}"
+                "{scale}the board is not flat or not printed as stated: try \
+                 `Calibration::board_shape`, {bars}"
             ),
             (None, None) => format!(
                 "{scale}the board is not flat or not printed as stated, or the camera that was given is \
-                 another one: find its shape by a calibration with `Calibration::board_shape`, and give it by `Sighting::bend`, {bars}"
+                 another one: find its shape by a calibration with `Calibration::board_shape`, \
+                 and give it by `Sighting::bend`, {bars}"
             ),
         }
     }
