@@ -14,7 +14,7 @@ fn messages_of_the_library_name_options_of_the_command_that_runs() {
     fs::write(at.join("none.json"), "{").unwrap();
     for (args, option) in [
         ("board --rows 2 --cols 2 --untagged", "--untagged: "),
-        ("board --rows 99 --cols 99 --edge 20mm --paper A4", "fewer --rows or --cols, or --edge"),
+        ("board --rows 30 --cols 30 --edge 20mm --paper A4", "fewer --rows or --cols, or --edge"),
         ("board --rows 9 --cols 9 --boards 99 --first-id 9", "raise --tag-spacing to at least "),
         ("board --rows 9 --cols 9 --boards 99 --first-id 9", "take --family d25h7 with its "),
         ("board --rows 9 --cols 9 --family t36h11", "take one of `deltag list`"),
@@ -25,10 +25,6 @@ fn messages_of_the_library_name_options_of_the_command_that_runs() {
         ("icosahedron --skeleton --wall 99mm", "--wall: "),
         ("icosahedron --texture-dpi 9", "--texture-dpi: "),
         ("icosahedron --pdf --edge 3m", "take --per-face, or --edge of at most "),
-        (
-            "calibrate nowhere --target board.json --model radtan --shape flat.json",
-            "by a calibration with --board-shape",
-        ),
         (
             "pose nowhere --target board.json --camera none.json --shape flat.json",
             "by a calibration with `deltille calibrate --board-shape`",
