@@ -37,7 +37,7 @@ fn detect(criterion: &mut Criterion) {
     let (target, family, image) = photograph();
     for (name, refinement) in [("polynomial", Refinement::Polynomial), ("model", Refinement::Model)]
     {
-        let config = DetectorConfig { refinement, ..DetectorConfig::default() };
+        let config = DetectorConfig::default().refinement(refinement);
         let detector = Detector::for_target(&target, Some(&family), config).with_clock(clock::now);
         let stages: Vec<String> = detector.detect(&image, "").timing_ms.into_keys().collect();
         let mut group = criterion.benchmark_group(format!("detect, {name}"));

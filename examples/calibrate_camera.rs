@@ -5,12 +5,10 @@
 //! cargo run --release --example calibrate_camera -- desk.json photos/*.png
 //! ```
 
-use std::collections::BTreeMap;
 use std::error::Error;
 
 use deltille::calibrate::{Calibration, Model, Reference, Words, views};
 use deltille::detect::Detector;
-use deltille::export::calibration::Print;
 use deltille::photograph;
 use deltille::report::Report;
 use deltille::targets::Target;
@@ -43,18 +41,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(held_out) = &estimate.held_out {
         println!("rms {:.4} px in {} views held out", held_out.rms_px, held_out.frames.len());
     }
-    let words = Words { estimate: &estimate, print_scale: None };
+    let words = Words::new(&estimate, None);
     for diagnosis in &diagnoses {
         println!("warning: {}", words.sentence(diagnosis));
     }
     std::fs::write("camera.yaml", camera.camera.to_yaml())?;
-    let report = Report {
-        title: "camera",
-        estimate: &estimate,
-        diagnoses: &diagnoses,
-        print: Print::default(),
-        thumbnails: BTreeMap::new(),
-    };
+    let mut report = Report::new("camera", &estimate);
+    report.diagnoses = &diagnoses;
     std::fs::write("camera.html", report.html())?;
     Ok(())
 }

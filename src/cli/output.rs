@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 
+use crate::cli::wording::in_options;
 use crate::export::kind::Kind;
 use crate::export::{atomic, staging};
 use crate::limits::{Limits, ReadError};
+use crate::words::shown;
 
 /// The file that `-o` means: itself when it ends in the extension, else `<stem>.<extension>` in
 /// that folder. A path that ends in another extension is no folder, unless it is there as one.
@@ -63,24 +65,26 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Prints a line, [`shown`], and returns from the function where that fails.
+/// A line as a terminal shows it, in the words of its user.
+pub(crate) fn line(text: &str) -> String {
+    format!("{}\n", shown(&in_options(text)))
+}
+
+/// Prints a [`line`], and returns from the function where that fails.
 macro_rules! say {
     ($($argument:tt)*) => {
-        $crate::cli::output::print(&format!(
-            "{}\n",
-            $crate::words::shown(&format!($($argument)*))
-        ))?
+        $crate::cli::output::print(&$crate::cli::output::line(&format!($($argument)*)))?
     };
 }
 pub(crate) use say;
 
-/// Prints a line on standard error, [`shown`].
+/// Prints a [`line`] on standard error.
 macro_rules! tell {
     ($($argument:tt)*) => {{
         // Nobody may be left to read it.
-        let _ = ::std::io::Write::write_fmt(
+        let _ = ::std::io::Write::write_all(
             &mut ::std::io::stderr(),
-            format_args!("{}\n", $crate::words::shown(&format!($($argument)*))),
+            $crate::cli::output::line(&format!($($argument)*)).as_bytes(),
         );
     }};
 }

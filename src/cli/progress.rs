@@ -44,7 +44,7 @@ impl SearchProgress {
 
     /// Shows how far the search has come.
     pub fn show(&self, progress: Progress) {
-        let Progress { done, total, codes } = progress;
+        let Progress { done, total, codes, .. } = progress;
         let before = self.codes.fetch_max(codes, Ordering::Relaxed);
         let codes = counted(codes.max(before), "code");
         let Some(last) = &self.last else {

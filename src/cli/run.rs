@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Parser;
 
-use crate::cli::interrupt;
 use crate::cli::output::tell;
+use crate::cli::{interrupt, wording};
 
 /// Exit code for bad input of every kind.
 pub const BAD_INPUT: u8 = 2;
@@ -25,7 +25,12 @@ pub struct Interrupted(pub String);
 /// Parses the arguments and runs a program; errors become one line on standard error.
 pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> ExitCode {
     interrupt::listen();
-    let result = match A::try_parse() {
+    let mut command = A::command();
+    let arguments = command.try_get_matches_from_mut(std::env::args_os()).and_then(|matches| {
+        wording::runs(&command, &matches);
+        A::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+    });
+    let result = match arguments {
         Ok(arguments) => program(arguments),
         Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error))),
         Err(help_or_version) => {

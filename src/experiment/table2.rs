@@ -93,7 +93,7 @@ fn detect(
     images: &[impl AsRef<Path> + Sync],
     refinement: Refinement,
 ) -> Result<Vec<View>, Table2Error> {
-    let config = DetectorConfig { refinement, ..DetectorConfig::default() };
+    let config = DetectorConfig::default().refinement(refinement);
     let detector = Detector::for_grid(GridKind::Deltille, Some((SIZE[0], SIZE[1])), config);
     let found = images.par_iter().map(|path| {
         let name = path.as_ref().file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -13,6 +13,17 @@ pub fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
+/// How many places two digits of a standard deviation need, and so the value that it belongs to.
+///
+/// ```
+/// use deltille_core::words::places;
+///
+/// assert_eq!([places(0.00031), places(0.12), places(7.0), places(450.0)], [5, 2, 1, 0]);
+/// ```
+pub fn places(deviation: f64) -> usize {
+    (1.0 - deviation.log10().floor()).clamp(0.0, 12.0) as usize
+}
+
 /// A line with words that may come from a file or its name, as it is shown: what would end the line, move the cursor,
 /// change colours or turn the direction of writing is escaped; tabs stay.
 pub fn shown(text: &str) -> Cow<'_, str> {

@@ -8,6 +8,7 @@ use crate::limits::{self, MAX_FAMILY_BYTES, ReadError};
 
 /// A family that is not there, or whose file is not read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FamilyFileError {
     /// No shipped family has this name.
     #[error(transparent)]

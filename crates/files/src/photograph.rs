@@ -64,6 +64,7 @@ pub struct Photograph {
 
 /// An image file that cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImageError {
     /// The file cannot be opened.
     #[error("{}: {source}", path.display())]
@@ -93,7 +94,7 @@ pub enum ImageError {
         exceeded: Exceeded,
     },
     /// Not all pixels are in the file.
-    #[error("{}: a damaged JPEG ({problem}): take it anew, or give --accept-damaged", path.display())]
+    #[error("{}: a damaged JPEG ({problem}): take it anew, or accept it by `photograph::read_with_notes`", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -110,7 +111,7 @@ pub enum ImageError {
     },
     /// Its pixels are deep, so that they take more memory than those of a larger image may.
     #[error(
-        "{}: takes more than {bytes} bytes of memory; --max-pixels sets how many, 4 for each",
+        "{}: takes more than {bytes} bytes of memory; `Limits::max_pixels` sets how many, 4 for each",
         path.display()
     )]
     Memory {

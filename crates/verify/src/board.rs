@@ -33,6 +33,7 @@ const MIN_CONTRAST: f64 = 0.03;
 /// What is wrong with a board, or with its corners. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum BoardFinding {
     /// The panel was not recognised.
     #[error("board {panel} not recognised")]
@@ -256,7 +257,7 @@ fn another_board(verifier: &Verifier, page: &Page, verdict: &mut SheetVerdict) {
     let any_grid = Detector::for_grid(
         kind,
         None,
-        DetectorConfig { tone: Tone::Linear, ink: Ink::Um(0.0), ..DetectorConfig::default() },
+        DetectorConfig::default().tone(Tone::Linear).ink(Ink::Um(0.0)),
     );
     let grids = any_grid.detect(&page.blurred(), "page").grids;
     let found: usize = grids.iter().map(|grid| grid.corners.len()).sum();

@@ -20,6 +20,7 @@ const MOVED_MM: f64 = 20.0;
 /// What is wrong with a drawing for a cutter. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum CutFinding {
     /// A path to cut, fold or engrave lies elsewhere.
     #[error(
@@ -70,7 +71,7 @@ pub(super) fn verify(
         Err(DxfError::Construct { line, construct }) => {
             vec![ConstructFinding::Construct { place: format!("line {line}"), construct }.into()]
         }
-        Err(error @ DxfError::NotDxf) => {
+        Err(error) => {
             return Err(DocumentError::unreadable(path, error.to_string()).into());
         }
     };

@@ -16,6 +16,7 @@ pub use super::tiles::TileFinding;
 /// found.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(untagged)]
+#[non_exhaustive]
 pub enum Finding {
     /// Of what the file is built.
     #[error(transparent)]
@@ -49,6 +50,7 @@ pub enum Finding {
 /// What is wrong with the pages of a file. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum PageFinding {
     /// The file has too many or too few pages.
     #[error("{found} pages instead of {stated}")]

@@ -37,6 +37,7 @@ const MOST_ROOTS: usize = 32;
 /// What is wrong with the fold of a net. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum FoldFinding {
     /// A face of a net hangs on no other.
     #[error("board {panel} hangs on no other by a fold")]

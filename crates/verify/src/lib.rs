@@ -105,6 +105,7 @@ const MOST_ENLARGED: f64 = 10.0;
 
 /// Why an artifact cannot be compared.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum VerifyError {
     /// The artifact cannot be read.
     #[error(transparent)]
@@ -259,7 +260,7 @@ impl<'a> Verifier<'a> {
         let detector = Detector::for_target(
             target,
             family,
-            DetectorConfig { tone: Tone::Linear, ink: Ink::Um(0.0), ..DetectorConfig::default() },
+            DetectorConfig::default().tone(Tone::Linear).ink(Ink::Um(0.0)),
         );
         Ok(Self {
             target,

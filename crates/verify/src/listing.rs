@@ -18,6 +18,7 @@ const LIST_TOLERANCE_MM: f64 = 1e-6;
 /// What is wrong with a list for other detectors.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum ListFinding {
     /// A list for other detectors is not that of the target.
     #[error("{problem}")]

@@ -43,6 +43,7 @@ const FLATNESS_MM: f64 = 0.002;
 /// What is wrong beside the tiles of a sheet. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum MarkFinding {
     /// A check bar has another length, or is not there.
     #[error("check bar {bar} {}", measured(*found_mm, *stated_mm))]

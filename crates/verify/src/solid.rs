@@ -51,6 +51,7 @@ const MOST_TRIANGLES: usize = 2;
 /// What is wrong with a mesh or a body to print. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum MeshFinding {
     /// A corner of a mesh lies elsewhere.
     #[error(

@@ -38,6 +38,7 @@ const SMEARED_MOVED_EDGE_PX: f64 = 0.5;
 /// What is wrong with a tile or the tag in it. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum TileFinding {
     /// A tile has the wrong colour.
     #[error("{}", tile_differs(*row, *col, *should_be_black))]

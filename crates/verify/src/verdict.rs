@@ -10,6 +10,7 @@ use super::finding::Finding;
 
 /// What was found in one artifact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Verdict {
     /// File name of the artifact.
     pub artifact: String,
@@ -38,6 +39,7 @@ pub struct Verdict {
 
 /// What was found in a list of boards.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ListVerdict {
     /// Boards of the target that are listed.
     pub boards: usize,
@@ -51,6 +53,7 @@ pub struct ListVerdict {
 
 /// What was found in a drawing for a cutter.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct CutVerdict {
     /// Outlines that were found in their places.
     pub outlines: usize,
@@ -64,6 +67,7 @@ pub struct CutVerdict {
 
 /// What was found of a body to print.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct BodyVerdict {
     /// Triangles of its surface.
     pub triangles: usize,
@@ -77,6 +81,7 @@ pub struct BodyVerdict {
 
 /// What was found on one face of a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct FaceVerdict {
     /// Panel id.
     pub panel: u32,
@@ -98,6 +103,7 @@ pub struct FaceVerdict {
 
 /// What was found on one page.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct SheetVerdict {
     /// Sheet of the target, counted from 1.
     pub sheet: usize,
@@ -128,6 +134,7 @@ pub struct SheetVerdict {
 
 /// What folding the faces found on one sheet of a net shows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct FoldVerdict {
     /// Largest distance of a folded corner from its stated position in space, and of the ends of
     /// the two sides of an edge from each other, mm.

@@ -9,15 +9,16 @@ use clap::ValueEnum;
 
 use super::calibrating::{Calibrated, SolveArgs, check_images, sample, without_outliers};
 use super::camera_file;
-use super::files::{File, text_file, write_all};
+use super::files::{File, check_places, sample_of, text_file, write_all};
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Model};
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
+use crate::cli::wording::in_options;
 use crate::export::calibration;
 use crate::export::camera::{FormatError, colmap, kalibr, nerfstudio, opencv, ros};
-use crate::words::{counted, shown};
+use crate::words::{counted, places, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
 const STRONG_CORRELATION: f64 = 0.98;
@@ -73,10 +74,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // Poses of a known camera do not take the place of its calibration.
     let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
     let path = output::file(args.output.as_deref().unwrap_or(Path::new(".")), stem, "yaml")?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let intrinsics = args.intrinsics()?;
-    // What no format can carry is told before the work.
-    let camera = sample(&intrinsics);
-    args.format.iter().try_for_each(|format| format.check(&camera)).context("--format")?;
+    let folder = output::folder_of(&path);
+    let planned = args.files(&stem, &sample(&intrinsics), &[], &sample_of(calibration::SCHEMA))?;
+    check_places(folder, &planned, args.overwrite)?;
+    let page = args.solve.page(&stem, args.overwrite)?;
     let Sightings { views, panels, empty, left_out, print } = args.sightings.read()?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     for picture in &empty {
@@ -85,8 +88,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(folder) = &args.images {
         check_images(folder, &views)?;
     }
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let page = args.solve.page(&stem, args.overwrite)?;
     let calibration = Calibration::new(panels).camera(&stem, views, intrinsics);
     let mut solved = args.solve.solve(calibration, print)?;
     ensure!(!solved.estimate.frames.is_empty(), "no view shows the target as this camera sees it");
@@ -100,11 +101,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         report(&foreign.context(format!("--fixed-intrinsics: {}", camera.display())));
         return Ok(ExitCode::from(FAILED));
     }
-    let texts = args.format.iter().map(|&format| format.texts(&stem, &solved));
-    let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
-    let files = texts.into_iter().flatten().map(|(name, text)| text_file(name, text));
-    let files: Vec<File> = files.collect();
-    let mut written = write_all(output::folder_of(&path), &files, args.overwrite)?;
+    let Calibrated { estimate, diagnoses, print, .. } = &solved;
+    let mut files = Vec::new();
+    for camera in &estimate.cameras {
+        let views = camera.views.iter().map(|view| (view.image.as_str(), view.pose));
+        let json = calibration::write(estimate, diagnoses, *print).unwrap_or_default();
+        files =
+            args.files(&stem, &camera.camera, &views.collect::<Vec<_>>(), &in_options(&json))?;
+    }
+    let mut written = write_all(folder, &files, args.overwrite)?;
     if let Some(page) = page {
         solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;
         written.push(page);
@@ -132,43 +137,42 @@ impl Args {
         let known = known.map(Intrinsics::Known).or(self.model.map(Intrinsics::Unknown));
         known.context("give --model, or --fixed-intrinsics")
     }
+
+    /// The files of a camera in all formats asked for; `json` is the text that tells all.
+    fn files(
+        &self,
+        stem: &str,
+        camera: &Camera,
+        views: &[(&str, Pose)],
+        json: &str,
+    ) -> anyhow::Result<Vec<File>> {
+        let texts = self.format.iter().map(|format| format.texts(stem, camera, views, json));
+        let texts = texts.collect::<Result<Vec<_>, FormatError>>().context("--format")?;
+        Ok(texts.into_iter().flatten().map(|(name, text)| text_file(name, text)).collect())
+    }
 }
 
 impl Format {
-    /// Refuses a camera that the format cannot carry.
-    fn check(self, camera: &Camera) -> Result<(), FormatError> {
-        match self {
-            Self::Own => Ok(()),
-            Self::Opencv => opencv(camera).map(drop),
-            Self::Ros => ros(camera, "").map(drop),
-            Self::Kalibr => kalibr(&[(camera, Pose::IDENTITY)]).map(drop),
-            Self::Colmap => colmap(&[camera]).map(drop),
-            Self::Nerfstudio => nerfstudio(camera, &[]).map(drop),
-        }
-    }
-
     /// The names and texts of its files.
-    fn texts(self, stem: &str, solved: &Calibrated) -> anyhow::Result<Vec<(String, String)>> {
-        let Calibrated { estimate, diagnoses, print } = solved;
-        let [found] = estimate.cameras.as_slice() else { return Ok(Vec::new()) };
-        let camera = &found.camera;
-        let one = |end: &str, text: String| vec![(format!("{stem}{end}"), text)];
+    fn texts(
+        self,
+        stem: &str,
+        camera: &Camera,
+        views: &[(&str, Pose)],
+        json: &str,
+    ) -> Result<Vec<(String, String)>, FormatError> {
+        let named = |end: &str, text: String| (format!("{stem}{end}"), text);
         Ok(match self {
             Self::Own => {
-                let yaml = (format!("{stem}.yaml"), camera.to_yaml());
-                let json = calibration::write(estimate, diagnoses, *print);
-                let json = json.map(|json| (format!("{stem}.json"), json));
-                [Some(yaml), json].into_iter().flatten().collect()
+                vec![named(".yaml", camera.to_yaml()), named(".json", json.to_owned())]
             }
-            Self::Opencv => one("-opencv.yaml", opencv(camera)?),
-            Self::Ros => one("-ros.yaml", ros(camera, stem)?),
-            Self::Kalibr => one("-camchain.yaml", kalibr(&[(camera, Pose::IDENTITY)])?),
-            Self::Colmap => one("-cameras.txt", colmap(&[camera])?),
-            Self::Nerfstudio => {
-                let views = found.views.iter().map(|view| (view.image.as_str(), view.pose));
-                let views: Vec<_> = views.collect();
-                one("-transforms.json", nerfstudio(camera, &views)?)
+            Self::Opencv => vec![named("-opencv.yaml", opencv(camera)?)],
+            Self::Ros => vec![named("-ros.yaml", ros(camera, stem)?)],
+            Self::Kalibr => {
+                vec![named("-camchain.yaml", kalibr(&[(camera, Pose::IDENTITY)])?)]
             }
+            Self::Colmap => vec![named("-cameras.txt", colmap(&[camera])?)],
+            Self::Nerfstudio => vec![named("-transforms.json", nerfstudio(camera, views)?)],
         })
     }
 }
@@ -182,8 +186,7 @@ fn of_camera(camera: &CameraEstimate) -> String {
     let mut text = String::new();
     for parameter in camera.parameters.iter() {
         let Some(sd) = parameter.sd else { continue };
-        // As many places as two digits of the deviation need.
-        let places = (1.0 - sd.log10().floor()).clamp(1.0, 12.0) as usize;
+        let places = places(sd).max(1);
         let _ =
             writeln!(text, "{:5} {:>14.places$} ± {sd:.places$}", parameter.name, parameter.value);
     }

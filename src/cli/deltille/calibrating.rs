@@ -7,11 +7,12 @@ use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use crate::calibrate::{
-    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, Loss, View,
-    Weights, Words,
+    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, Loss, PanelPlace,
+    View, Weights, Words,
 };
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
+use crate::cli::wording::in_options;
 use crate::export::calibration::Print;
 use crate::export::kind::Kind;
 use crate::name::is_within;
@@ -66,6 +67,8 @@ enum Weighting {
 pub struct Calibrated {
     pub estimate: Estimate,
     pub diagnoses: Vec<Diagnosis>,
+    /// Where the target's file has its panels.
+    pub stated: Vec<PanelPlace>,
     pub print: Print,
 }
 
@@ -99,7 +102,8 @@ impl SolveArgs {
             }
         })?;
         let diagnoses = calibration.diagnose(&estimate);
-        Ok(Calibrated { estimate, diagnoses, print })
+        let stated = calibration.panels().to_vec();
+        Ok(Calibrated { estimate, diagnoses, stated, print })
     }
 
     /// Where the page goes, `<stem>-report.html` in a folder. What would be refused is refused here, before the
@@ -118,7 +122,7 @@ impl SolveArgs {
 impl Calibrated {
     /// Tells the diagnoses on standard error; an error where a known camera did not take its pictures.
     pub fn tell(&self) -> anyhow::Result<()> {
-        let words = Words { estimate: &self.estimate, print_scale: self.print.scale };
+        let words = Words::new(&self.estimate, self.print.scale);
         for diagnosis in &self.diagnoses {
             let text = words.sentence(diagnosis);
             if matches!(diagnosis, Diagnosis::ForeignCamera { .. }) {
@@ -156,9 +160,11 @@ impl Calibrated {
                 thumbnails.extend(picture.map(|picture| ((index, view.name.clone()), picture)));
             }
         }
-        let Self { estimate, diagnoses, print } = self;
-        let report = Report { title, estimate, diagnoses, print: *print, thumbnails };
-        output::write(page, report.html().as_bytes(), overwrite).context("--report")
+        let Self { estimate, diagnoses, stated, print } = self;
+        let mut report = Report::new(title, estimate);
+        (report.diagnoses, report.stated) = (diagnoses, stated);
+        (report.print, report.thumbnails) = (*print, thumbnails);
+        output::write(page, in_options(&report.html()).as_bytes(), overwrite).context("--report")
     }
 }
 

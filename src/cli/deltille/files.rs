@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow, ensure};
 
 use crate::artwork::Artwork;
 use crate::cli::interrupt;
@@ -90,6 +90,24 @@ pub fn same_file(written: &Path, other: &Path) -> bool {
     written.is_some() && written == other
 }
 
+/// A JSON of a schema in place of one that is still to be made, for [`check_places`].
+pub fn sample_of(schema: &str) -> String {
+    format!("{{\"schema\": \"{schema}\"}}")
+}
+
+/// Refuses files that would be written over a folder, or over a file of another kind. A command that
+/// works long asks before, with samples.
+pub fn check_places(folder: &Path, files: &[File], overwrite: Overwrite) -> anyhow::Result<()> {
+    output::check_folder(folder).context("-o")?;
+    files.iter().try_for_each(|file| {
+        let path = folder.join(&file.name);
+        let show = || format!("cannot write {}", path.display());
+        let path = atomic::place(&path).with_context(show)?;
+        ensure!(!path.is_dir(), "{}: there is a folder of that name", show());
+        overwrite.check(&path, &file.kind)
+    })
+}
+
 /// Writes all files, all or none, and returns where they are, by the names that were asked for: see
 /// [`staging`](crate::export::staging).
 pub fn write_all(
@@ -98,20 +116,7 @@ pub fn write_all(
     overwrite: Overwrite,
 ) -> anyhow::Result<Vec<PathBuf>> {
     let context = || format!("-o: cannot write to {}", folder.display());
-    output::check_folder(folder).context("-o")?;
-    let place = |file: &File| {
-        let path = folder.join(&file.name);
-        atomic::place(&path).with_context(|| format!("cannot write {}", path.display()))
-    };
-    let paths = files.iter().map(place).collect::<anyhow::Result<Vec<PathBuf>>>()?;
-    if let Some(path) = paths.iter().find(|path| path.is_dir()) {
-        bail!("cannot write {}: there is a folder of that name", path.display());
-    }
-    let check_kinds = || {
-        let mut places = files.iter().zip(&paths);
-        places.try_for_each(|(file, path)| overwrite.check(path, &file.kind))
-    };
-    check_kinds()?;
+    check_places(folder, files, overwrite)?;
     interrupt::stands("nothing was written");
     let staging = Staging::new(folder).with_context(context)?;
     let staged = staging.files();
@@ -125,7 +130,7 @@ pub fn write_all(
     }
     check_interrupt()?;
     // Drawing takes a while, and what is there may have changed.
-    check_kinds()?;
+    check_places(folder, files, overwrite)?;
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     let replaced = files.iter().filter_map(|file| file.replaced(folder, &staged, &names));
     let replaced: Vec<String> = replaced.collect();

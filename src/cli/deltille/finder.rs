@@ -85,13 +85,12 @@ impl FinderArgs {
         if self.allow_mirrored && self.target.is_none() && self.rows.is_none() {
             bail!("--allow-mirrored needs labels: give --target FILE, or --rows and --cols");
         }
-        let config = DetectorConfig {
-            max_bit_errors: self.max_errors,
-            allow_mirrored: self.allow_mirrored,
-            refinement: self.refine.into(),
-            tone: self.tone,
-            ink: self.ink,
-        };
+        let config = DetectorConfig::default()
+            .max_bit_errors(self.max_errors)
+            .allow_mirrored(self.allow_mirrored)
+            .refinement(self.refine.into())
+            .tone(self.tone)
+            .ink(self.ink);
         let Some(path) = &self.target else {
             if matches!(self.ink, Ink::Um(um) if um != 0.0) {
                 bail!("--ink: µm need the size of the tiles: give --target FILE, or --ink none");

@@ -45,31 +45,35 @@ pub struct AllLimits {
 
 impl FileLimits {
     pub fn limits(&self) -> Limits {
-        let default = Limits::default();
-        Limits { max_bytes: self.max_bytes.unwrap_or(default.max_bytes), ..default }
+        let mut limits = Limits::default();
+        set(&mut limits.max_bytes, self.max_bytes);
+        limits
     }
 }
 
 impl ImageLimits {
     pub fn limits(&self) -> Limits {
-        let files = self.files.limits();
-        Limits {
-            max_pixels: self.max_pixels.unwrap_or(files.max_pixels),
-            max_pixels_per_byte: self.max_pixels_per_byte.unwrap_or(files.max_pixels_per_byte),
-            ..files
-        }
+        let mut limits = self.files.limits();
+        set(&mut limits.max_pixels, self.max_pixels);
+        set(&mut limits.max_pixels_per_byte, self.max_pixels_per_byte);
+        limits
     }
 }
 
 impl AllLimits {
     pub fn limits(&self) -> Limits {
-        let images = self.images.limits();
-        Limits {
-            max_nodes: self.max_nodes.unwrap_or(images.max_nodes),
-            max_depth: self.max_depth.map_or(images.max_depth, usize::from),
-            max_seconds: self.max_seconds.map_or(images.max_seconds, f64::from),
-            ..images
-        }
+        let mut limits = self.images.limits();
+        set(&mut limits.max_nodes, self.max_nodes);
+        set(&mut limits.max_depth, self.max_depth.map(usize::from));
+        set(&mut limits.max_seconds, self.max_seconds.map(f64::from));
+        limits
+    }
+}
+
+/// Sets what is given.
+fn set<T>(limit: &mut T, given: Option<T>) {
+    if let Some(given) = given {
+        *limit = given;
     }
 }
 

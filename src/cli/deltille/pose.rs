@@ -13,6 +13,7 @@ use crate::calibrate::{Calibration, Diagnosis, Estimate, PanelPlace, Reference, 
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::FAILED;
+use crate::cli::wording::in_options;
 use crate::detect::{Detector, DetectorConfig};
 use crate::export::calibration::Sheet;
 use crate::export::kind::Kind;
@@ -87,7 +88,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 }
                 (without, unread) = (without + 1, unread + usize::from(is_unread));
                 match args.every_picture {
-                    true => pose::write_none(&name, &target.name, &why) + "\n",
+                    true => pose::write_none(&name, &target.name, &in_options(&why)) + "\n",
                     false => String::new(),
                 }
             }
@@ -140,7 +141,7 @@ impl Finder<'_> {
         let calibration =
             Calibration::new(self.panels.iter().copied()).camera("", views, self.camera.clone());
         let found = calibration.solve().with_context(|| image.display().to_string())?;
-        let words = Words { estimate: &found, print_scale: None };
+        let words = Words::new(&found, None);
         let said = found.inspect();
         let foreign = said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
         let why = match foreign {

@@ -107,7 +107,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// The results as CSV; covariances in px², empty where the method gives none.
 fn table(refined: &[Refined]) -> String {
     let mut text = "x,y,cov_xx,cov_xy,cov_yy,status\n".to_owned();
-    for Refined { position: [x, y], cov, status } in refined {
+    for Refined { position: [x, y], cov, status, .. } in refined {
         let cov = cov.map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
         let status = match status {
             RefineStatus::Ok => "ok",

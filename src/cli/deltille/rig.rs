@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
 use super::calibrating::{Calibrated, SolveArgs, check_images, sample, without_outliers};
-use super::files::{File, same_file, text_file, write_all};
+use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::limits::FileLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
@@ -15,14 +15,15 @@ use crate::calibrate::{
     Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference,
 };
 use crate::camera::{Camera, Pose};
-use crate::cli::output::{Overwrite, check_folder, fixed, say};
+use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
 use crate::cli::run::{FAILED, report};
+use crate::cli::wording::in_options;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::Print;
 use crate::export::camera::{FormatError, colmap, colmap_rig, kalibr};
 use crate::export::rig;
-use crate::targets::Name;
-use crate::words::{counted, shown};
+use crate::targets::{Name, Target};
+use crate::words::counted;
 
 /// Arguments of `deltille rig`.
 #[derive(clap::Args)]
@@ -86,15 +87,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             "--camera: a rig has at least two; `deltille calibrate` takes one, and so does --refine-target"
         );
     }
-    let mut names: Vec<&str> = args.camera.iter().map(|(name, _)| name.as_str()).collect();
-    names.sort_unstable();
-    if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-        bail!("--camera: {} is named twice", twice[0]);
-    }
-    let bad = |name: &str| name.contains(['/', '\\']) || name.starts_with('.') || name == "rig";
-    if let Some(name) = names.iter().find(|name| bad(name)) {
-        bail!("--camera: {name} cannot be the name of a file");
-    }
+    let names: Vec<&str> = args.camera.iter().map(|(name, _)| name.as_str()).collect();
+    check_names(&names)?;
     check_named("--known", &args.known, &names)?;
     check_named("--images", &args.images, &names)?;
     check_folders(&args.camera)?;
@@ -104,10 +98,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let reference = Reference::Target(&target);
     let sheet = args.sheet.read(&limits)?;
     let panels = sightings::panels(&reference, &sheet)?;
+    let cameras = args.camera.iter().map(|(name, _)| args.intrinsics(name));
+    let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
+    args.check_files(&cameras, &target)?;
     let page = args.solve.page("rig", args.overwrite)?;
     let mut calibration = Calibration::new(panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
-    for (name, folder) in &args.camera {
+    for ((name, folder), intrinsics) in args.camera.iter().zip(cameras) {
         let read = sightings::read(std::slice::from_ref(folder), &reference, &limits);
         let sightings::Read { mut views, left_out: out, ink: of_camera, detections, .. } =
             read.with_context(|| format!("--camera {name}"))?;
@@ -119,41 +116,26 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         if let Some(folder) = of_name(&args.images, name) {
             check_images(folder, &views)?;
         }
-        let known = of_name(&args.known, name).map(|path| camera_file::read("--known", path));
-        let known = known.transpose()?.map(Intrinsics::Known);
-        let intrinsics = known.unwrap_or(Intrinsics::Unknown(args.model));
-        let camera = sample(&intrinsics);
-        args.format.iter().try_for_each(|format| format.check(&camera)).context("--format")?;
         calibration = calibration.with(CameraViews::new(name, views, intrinsics));
     }
     let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
     let mut solved = args.solve.solve(calibration, print)?;
+    let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
+    for out in solved.estimate.excluded.iter().chain(of_test) {
+        tell!("{}: left out: {}", out.shown(), out.reason);
+    }
     if let Err(foreign) = solved.tell() {
         report(&foreign.context("--known"));
         return Ok(ExitCode::from(FAILED));
     }
     let text = summary(&solved);
     solved.estimate.excluded.splice(0..0, left_out);
-    let Calibrated { estimate, diagnoses, print } = &solved;
+    let Calibrated { estimate, diagnoses, print, .. } = &solved;
     let json = rig::write(estimate, diagnoses, &args.model.to_string(), *print);
-    let mut files = vec![text_file("rig.json".to_owned(), json)];
-    for camera in &estimate.cameras {
-        files.push(text_file(format!("{}.yaml", camera.name), camera.camera.to_yaml()));
-    }
-    for format in &args.format {
-        files.extend(format.files(estimate).context("--format")?);
-    }
-    if args.refine_target {
-        let refined = estimate.refined(&target);
-        let place = args.output.join(format!("{}.json", refined.name));
-        if same_file(&place, &args.target) {
-            bail!(
-                "-o: {} would overwrite the target that was given: choose another folder",
-                place.display()
-            );
-        }
-        files.push(text_file(format!("{}.json", refined.name), refined.to_json()));
-    }
+    let cameras = estimate.cameras.iter();
+    let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
+    let refined = args.refine_target.then(|| estimate.refined(&target));
+    let files = args.files(&cameras.collect::<Vec<_>>(), &in_options(&json), refined)?;
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
         let folder = |(name, _): &(String, PathBuf)| of_name(&args.images, name);
@@ -168,6 +150,72 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         say!("wrote {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+impl Args {
+    /// What is known of a camera.
+    fn intrinsics(&self, name: &str) -> anyhow::Result<Intrinsics> {
+        let known = of_name(&self.known, name).map(|path| camera_file::read("--known", path));
+        let known = known.transpose()?.map(Intrinsics::Known);
+        Ok(known.unwrap_or(Intrinsics::Unknown(self.model)))
+    }
+
+    /// Refuses before the work what could not be written after it.
+    fn check_files(&self, cameras: &[Intrinsics], target: &Target) -> anyhow::Result<()> {
+        let samples: Vec<Camera> = cameras.iter().map(sample).collect();
+        let cameras = self.camera.iter().zip(&samples);
+        let cameras = cameras.map(|((name, _), camera)| (name.as_str(), camera, Pose::IDENTITY));
+        let refined = self.refine_target.then(|| Estimate::default().refined(target));
+        let files = self.files(&cameras.collect::<Vec<_>>(), &sample_of(rig::SCHEMA), refined)?;
+        check_places(&self.output, &files, self.overwrite)
+    }
+
+    /// All files; `json` is the text that tells all.
+    fn files(
+        &self,
+        cameras: &[(&str, &Camera, Pose)],
+        json: &str,
+        refined: Option<Target>,
+    ) -> anyhow::Result<Vec<File>> {
+        let mut files = vec![text_file("rig.json".to_owned(), json.to_owned())];
+        for (name, camera, _) in cameras {
+            files.push(text_file(format!("{name}.yaml"), camera.to_yaml()));
+        }
+        for format in &self.format {
+            files.extend(format.files(cameras).context("--format")?);
+        }
+        if let Some(refined) = refined {
+            let name = format!("{}.json", refined.name);
+            let place = self.output.join(&name);
+            ensure!(
+                !same_file(&place, &self.target),
+                "-o: {} would overwrite the target that was given: choose another folder",
+                place.display()
+            );
+            files.push(text_file(name, refined.to_json()));
+        }
+        Ok(files)
+    }
+}
+
+/// Refuses names of cameras that cannot be names of files, or not of different ones.
+fn check_names(names: &[&str]) -> anyhow::Result<()> {
+    for (index, name) in names.iter().enumerate() {
+        let is_same = |other: &&&str| other.to_lowercase() == name.to_lowercase();
+        let is_taken = ["rig", "camchain"].iter().any(|own| is_same(&own));
+        if is_taken || name.contains(['/', '\\']) || name.starts_with('.') {
+            bail!("--camera: {name} cannot be the name of a file");
+        }
+        match names[..index].iter().find(is_same) {
+            Some(other) if other == name => bail!("--camera: {name} is named twice"),
+            Some(other) => bail!(
+                "--camera: {other} and {name} differ in case only, and some systems take their files \
+                 for one"
+            ),
+            None => {}
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a folder that is given for two cameras.
@@ -220,25 +268,14 @@ fn of_name<'a>(given: &'a [(String, PathBuf)], name: &str) -> Option<&'a Path> {
 }
 
 impl Format {
-    /// Refuses a camera that the format cannot carry.
-    fn check(self, camera: &Camera) -> Result<(), FormatError> {
-        match self {
-            Self::Kalibr => kalibr(&[(camera, Pose::IDENTITY)]).map(drop),
-            Self::Colmap => colmap(&[camera]).map(drop),
-        }
-    }
-
-    fn files(self, estimate: &Estimate) -> anyhow::Result<Vec<File>> {
-        let cameras = estimate.cameras.iter();
-        let cameras: Vec<(&str, &Camera, Pose)> =
-            cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig)).collect();
+    fn files(self, cameras: &[(&str, &Camera, Pose)]) -> Result<Vec<File>, FormatError> {
         let alone: Vec<&Camera> = cameras.iter().map(|(_, camera, _)| *camera).collect();
         let placed: Vec<(&Camera, Pose)> = cameras.iter().map(|(_, c, pose)| (*c, *pose)).collect();
         Ok(match self {
             Self::Kalibr => vec![text_file("camchain.yaml".to_owned(), kalibr(&placed)?)],
             Self::Colmap => vec![
                 text_file("cameras.txt".to_owned(), colmap(&alone)?),
-                text_file("rig_config.json".to_owned(), colmap_rig(&cameras)?),
+                text_file("rig_config.json".to_owned(), colmap_rig(cameras)?),
             ],
         })
     }
@@ -274,11 +311,5 @@ fn summary(solved: &Calibrated) -> String {
     }
     lines.extend(solved.lines());
     lines.extend(estimate.held_out.iter().map(|test| format!("held out: {}", headline(test))));
-    let of_test = estimate.held_out.iter().flat_map(|test| &test.excluded);
-    let excluded = estimate.excluded.iter().chain(of_test);
-    lines.extend(
-        excluded
-            .map(|out| shown(&format!("left out {}: {}", out.shown(), out.reason)).into_owned()),
-    );
     lines.join("\n")
 }

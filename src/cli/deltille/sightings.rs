@@ -263,7 +263,7 @@ pub fn read(paths: &[PathBuf], reference: &Reference, limits: &Limits) -> anyhow
             first.display()
         );
     }
-    let Shown { views, empty, left_out } = views(&detections, reference)?;
+    let Shown { views, empty, left_out, .. } = views(&detections, reference)?;
     for (index, out) in &left_out {
         tell!("warning: left out: {}: {}", files[*index].display(), out.reason);
     }

@@ -309,7 +309,11 @@ impl Args {
             files.push(text_file(format!("{name}-net.dxf"), text));
         }
         if with_gltf || self.obj {
-            let mesh = TexturedMesh::new(target, Some(family), self.texture_dpi)?;
+            let mesh = TexturedMesh::new(target, Some(family), self.texture_dpi);
+            let mesh = mesh.map_err(|error| match self.texture_dpi {
+                Some(_) => anyhow!(error).context("--texture-dpi"),
+                None => anyhow!(error),
+            })?;
             if with_gltf {
                 files.push(bytes_file(format!("{name}.glb"), gltf::to_bytes(&mesh)));
             }

@@ -305,6 +305,7 @@ fn check_named(found: &Estimate, target: &Target, wrong: Wrong, case: &str) {
                     outliers,
                     corners,
                     left_out: true,
+                    ..
                 },
             ] = found.findings.as_slice()
             else {

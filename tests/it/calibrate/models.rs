@@ -26,6 +26,7 @@ fn camera(model: Model) -> Camera {
         Model::Eucm => &[0.6, 1.1],
         Model::DoubleSphere => &[-0.2, 0.6],
         Model::Pupil => &[-0.005, 0.002, -4e-4, 2e-5, -1e-5, 2e-4, -2e-4, 1.3, 0.05, 0.05],
+        _ => panic!("{model}: no lens as it is known from cameras"),
     };
     let lens = model.lens();
     let mut all = lens.parameters();
@@ -318,7 +319,7 @@ fn what_makes_a_calibration_fit_is_found() {
             Diagnosis::Remedied { camera: 0, remedy } => Some(*remedy),
             _ => None,
         });
-        let [Remedy { instead, from_px, to_px }] = remedies.collect::<Vec<_>>()[..] else {
+        let [Remedy { instead, from_px, to_px, .. }] = remedies.collect::<Vec<_>>()[..] else {
             panic!("{model}: {said:?}")
         };
         assert_eq!(instead, Instead::Model(better), "{model}");

@@ -8,3 +8,4 @@ mod readers;
 mod reproducible;
 mod robustness;
 mod sets;
+mod settings;

@@ -63,6 +63,7 @@ pub struct CutDrawing {
 
 /// Why there is nothing to cut.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CuttingError {
     /// No solid.
     #[error("{0} is no solid made by `deltille`: it has no panels to cut")]

@@ -119,6 +119,7 @@ pub enum Part {
 
 /// Why a target cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ArtworkError {
     /// The target has tags and no family was given.
     #[error("the target has tags of family {0}: the family is needed to draw them")]

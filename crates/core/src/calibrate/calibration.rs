@@ -196,6 +196,11 @@ impl Calibration {
         &self.cameras
     }
 
+    /// The panels as they were given.
+    pub fn panels(&self) -> &[PanelPlace] {
+        &self.panels
+    }
+
     /// Target_from_panel of every panel.
     pub(super) fn panel_poses(&self) -> Vec<Pose> {
         self.panels.iter().map(|panel| panel.target_from_panel).collect()

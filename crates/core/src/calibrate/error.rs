@@ -141,7 +141,7 @@ pub enum CalibrationError {
     /// The shape of a target of several panels.
     #[error(
         "the target has {panels} panels: the shape of a sheet is found for one board; the places of \
-         the panels are found by `rig --refine-target`"
+         the panels are found by `Calibration::refine_panels`"
     )]
     ShapeOfMany {
         /// How many.

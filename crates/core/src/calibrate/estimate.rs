@@ -22,6 +22,7 @@ use crate::targets::{Name, PanelPose, Target};
 ///
 /// One camera is a rig of one: the rig frame is that of the camera, and a frame a view.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Estimate {
     /// The cameras, in the order given.
     pub cameras: Vec<CameraEstimate>,
@@ -55,6 +56,7 @@ pub struct Estimate {
 
 /// A camera as its views have it.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct CameraEstimate {
     /// Its name.
     pub name: String,
@@ -193,6 +195,24 @@ impl Estimate {
 }
 
 impl CameraEstimate {
+    /// A camera that was given, in the place of the rig, without views.
+    pub fn given(name: &str, camera: Camera) -> Self {
+        let values = camera.parameter_names().into_iter().zip(camera.parameters());
+        let parameter = |(name, value)| Parameter { name, value, sd: None };
+        Self {
+            name: name.to_owned(),
+            parameters: values.map(parameter).collect(),
+            camera,
+            model: None,
+            covariance: DMatrix::zeros(0, 0),
+            ill_conditioned: Vec::new(),
+            camera_from_rig: Pose::IDENTITY,
+            pose_sd: None,
+            views: Vec::new(),
+            rms_px: 0.0,
+        }
+    }
+
     /// All its corners, by view.
     pub fn corners(&self) -> impl Iterator<Item = &Corner> {
         self.views.iter().flat_map(|view| &view.corners)

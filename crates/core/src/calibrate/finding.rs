@@ -5,6 +5,7 @@ use super::problem::Problem;
 
 /// Corners that are wrong together, and what they share.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Finding {
     /// What they share.
     pub shared: Shared,
@@ -18,6 +19,7 @@ pub struct Finding {
 
 /// What outliers have in common.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Shared {
     /// They lie far beyond the picture that they were seen in.
     Beyond {
@@ -69,6 +71,7 @@ pub enum Shared {
 
 /// How far a panel is from its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Moved {
     /// How far its middle is, mm.
     pub by_mm: f64,

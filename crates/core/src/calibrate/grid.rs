@@ -44,7 +44,9 @@ impl UntaggedGrid {
             return Ok(());
         }
         Err(if labels == self.labels(cols, rows) {
-            format!("it has {cols} rows × {rows} columns: --rows and --cols are exchanged")
+            format!(
+                "it has {cols} rows × {rows} columns: those of `UntaggedGrid::size` are exchanged"
+            )
         } else {
             format!("its rows and columns are not those of a board of {rows} × {cols} corners")
         })

@@ -46,6 +46,7 @@ const LEAST_VIEWS: usize = 3;
 
 /// A pattern that noise does not make, and that matters beside the noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum LackOfFit {
     /// Residuals depend on the place in the image: the lens is not what the model says.
     Lens {

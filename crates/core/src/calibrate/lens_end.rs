@@ -6,6 +6,7 @@ use crate::camera::Camera;
 /// A lens whose curve turns back or runs away within the image, as polynomials and quotients do where
 /// no corner holds them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LensEnd {
     /// Radius from the principal point up to which the lens is good, px.
     pub steady_px: f64,

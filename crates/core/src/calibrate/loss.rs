@@ -8,6 +8,7 @@ const SCALE_SIGMA: f64 = 3.0;
 ///     squared  e²          Huber  e² up to c, then 2ce − c²          Cauchy  c² ln(1 + e²/c²)
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Loss {
     /// Every corner in full: least squares.
     Squared,

@@ -18,6 +18,7 @@ const VALLEYS: [f64; 2] = [-0.3, 0.3];
 
 /// What is to be found of a camera, beside fx, fy, cx and cy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Model {
     /// Perspective with k1, k2, p1, p2.
     Radtan,

@@ -26,6 +26,7 @@ const TRIAL_VIEWS: usize = 12;
 
 /// What makes the residuals of a calibration smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Remedy {
     /// What was found that had been given.
     pub instead: Instead,
@@ -37,6 +38,7 @@ pub struct Remedy {
 
 /// What is to be found instead of taken for given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Instead {
     /// A lens of another model.
     Model(Model),

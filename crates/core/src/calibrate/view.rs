@@ -25,7 +25,8 @@ const MIRRORED_MOST: f64 = 0.5;
 const MIRRORED_SURE: f64 = 3.09;
 
 /// What is wrong with a board of the other tiling.
-const OTHER_KIND: &str = "the board in it has the other tiling: give --grid that of the board";
+const OTHER_KIND: &str =
+    "the board in it has the other tiling: give `UntaggedGrid::kind` that of the board";
 
 /// What follows from labels that are not on the target.
 const OTHER_TARGET: &str = "; the target does not belong to this detection";
@@ -170,6 +171,7 @@ impl Reference<'_> {
 
 /// The views of detections.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Shown {
     /// One for each picture, or for each board in it where several lie about.
     pub views: Vec<View>,

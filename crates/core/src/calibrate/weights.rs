@@ -19,6 +19,7 @@ pub(super) const OUTLIER_SIGMA: f64 = 5.0;
 
 /// What is known of the corners' precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Weights {
     /// All corners alike.
     Equal,

@@ -17,6 +17,7 @@ const GIVEN_CAMERA: &str =
 
 /// Tells what is to be said about an estimate, in sentences without capital and full stop.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Words<'a> {
     /// What it is said about.
     pub estimate: &'a Estimate,
@@ -24,7 +25,12 @@ pub struct Words<'a> {
     pub print_scale: Option<[f64; 2]>,
 }
 
-impl Words<'_> {
+impl<'a> Words<'a> {
+    /// What is to be said about an estimate, of a print that came out like this where that was given.
+    pub fn new(estimate: &'a Estimate, print_scale: Option<[f64; 2]>) -> Self {
+        Self { estimate, print_scale }
+    }
+
     /// A diagnosis.
     pub fn sentence(&self, diagnosis: &Diagnosis) -> String {
         match diagnosis {
@@ -80,7 +86,7 @@ impl Words<'_> {
                         };
                         format!(
                             "it seems displaced by {by_mm:.2} mm{turned} from where the target's file has \
-                             it (`deltille rig --refine-target` finds where panels are)"
+                             it (`Calibration::refine_panels` finds where panels are)"
                         )
                     }
                     None => {
@@ -124,7 +130,7 @@ impl Words<'_> {
             Instead::Model(other) => (
                 match model {
                     Some(model) => {
-                        format!("the lens is not one of `{model}`: take --model {other}")
+                        format!("the lens is not one of `{model}`: take `calibrate::Model` {other}")
                     }
                     None => GIVEN_CAMERA.to_owned(),
                 },
@@ -165,36 +171,37 @@ impl Words<'_> {
         if self.estimate.has_refined_panels() {
             return format!("panels are not flat or not printed as stated{most}");
         }
-        let advice = match self.estimate.cameras.len() {
-            1 => "`deltille rig --refine-target` finds where they are",
-            _ => "try --refine-target",
-        };
-        format!("panels are not where the target's file has them{most}: {advice}")
+        format!(
+            "panels are not where the target's file has them{most}: `Calibration::refine_panels` finds \
+             where they are"
+        )
     }
 
     fn board(&self, model: Option<Model>) -> String {
         let scale = match self.print_scale {
             // The same scale both ways leaves nothing behind.
             Some([across, up]) if across != up => {
-                format!("--print-scale {across},{up} is not how it was printed, or ")
+                format!("`Sighting::stretch` {across},{up} is not how it was printed, or ")
             }
             _ => String::new(),
         };
         let bars = match self.print_scale {
             Some(_) => "measure its check bars again",
-            None => "measure its check bars for --print-scale",
+            None => "measure its check bars for `Sighting::stretch`",
         };
         match (self.estimate.shape, model) {
             (Some(_), _) => format!(
-                "{scale}the board is bent in more ways than --board-shape describes, or not the same in \
-                 all views: glue it on something flat, {bars}"
+                "{scale}the board is bent in more ways than `Calibration::board_shape` describes, or not \
+                 the same in all views: glue it on something flat, {bars}"
             ),
             (None, Some(_)) => format!(
-                "{scale}the board is not flat or not printed as stated: try --board-shape, {bars}"
+                "{scale}the board is not flat or not printed as stated: try \
+                 `Calibration::board_shape`, {bars}"
             ),
             (None, None) => format!(
                 "{scale}the board is not flat or not printed as stated, or the camera that was given is \
-                 another one: take the .json of `calibrate --board-shape` as --shape, {bars}"
+                 another one: find its shape by a calibration with `Calibration::board_shape`, \
+                 and give it by `Sighting::bend`, {bars}"
             ),
         }
     }
@@ -225,7 +232,7 @@ impl Words<'_> {
 /// the lens as well.
 fn cannot_tell_apart(parameters: &[String], sufficient: Option<Model>) -> String {
     let advice = match sufficient {
-        Some(model) => format!("take --model {model}, which holds this lens as well"),
+        Some(model) => format!("take `calibrate::Model` {model}, which holds this lens as well"),
         None => "fill the corners of the image, or choose a model with fewer parameters".to_owned(),
     };
     format!(
@@ -241,6 +248,9 @@ fn other_lens(model: Option<Model>) -> String {
     };
     match model.richer().iter().map(|model| format!("`{model}`")).collect::<Vec<_>>().as_slice() {
         [] => format!("the lens is not one of `{model}`, nor of any richer model here"),
-        models => format!("the lens is not one of `{model}`: try --model {}", models.join(" or ")),
+        models => format!(
+            "the lens is not one of `{model}`: try `calibrate::Model` {}",
+            models.join(" or ")
+        ),
     }
 }

@@ -26,6 +26,7 @@ use crate::quantity;
 
 /// The tone curve of a camera, as the user tells it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Tone {
     /// Estimated from the corners of each picture.
     #[default]
@@ -72,6 +73,7 @@ impl std::str::FromStr for Tone {
 /// The tone curve that was found in a picture, over the median black and white of its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ToneEstimate {
     /// Median black of the corners, of full scale.
     #[serde(deserialize_with = "quantity::figure::de")]

@@ -58,6 +58,7 @@ const LEAST_OTHER_CORNERS: usize = 20;
 
 /// Options of a detector.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct DetectorConfig {
     /// Most bits of a tag that may be corrected; `None` for ⌊(h − 1)/2⌋ of its family.
     pub max_bit_errors: Option<u32>,
@@ -70,6 +71,38 @@ pub struct DetectorConfig {
     pub tone: Tone,
     /// Growth of what is dark on the print.
     pub ink: Ink,
+}
+
+impl DetectorConfig {
+    /// With as many bits of a tag corrected, at most; see [`Self::max_bit_errors`].
+    #[must_use]
+    pub fn max_bit_errors(self, max_bit_errors: Option<u32>) -> Self {
+        Self { max_bit_errors, ..self }
+    }
+
+    /// With labels for grids seen as in a mirror, or without; see [`Self::allow_mirrored`].
+    #[must_use]
+    pub fn allow_mirrored(self, allow_mirrored: bool) -> Self {
+        Self { allow_mirrored, ..self }
+    }
+
+    /// With positions of corners refined like this.
+    #[must_use]
+    pub fn refinement(self, refinement: Refinement) -> Self {
+        Self { refinement, ..self }
+    }
+
+    /// With the camera's tone curve.
+    #[must_use]
+    pub fn tone(self, tone: Tone) -> Self {
+        Self { tone, ..self }
+    }
+
+    /// With the growth of what is dark on the print.
+    #[must_use]
+    pub fn ink(self, ink: Ink) -> Self {
+        Self { ink, ..self }
+    }
 }
 
 /// Radius of the polynomial that refines, px: the reference detector's.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::quantity;
 use crate::statistics::median;
+use crate::words::places;
 
 /// How far what is dark has grown, as the user tells it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,6 +38,7 @@ impl std::str::FromStr for Ink {
 /// The growth of what is dark that was found in a picture, on every side.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct InkEstimate {
     /// In edges of a tile; less than 0 where it has shrunk.
     #[serde(deserialize_with = "quantity::figure::de")]
@@ -120,17 +122,15 @@ impl InkEstimate {
 impl std::fmt::Display for InkEstimate {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let grown = if self.edges < 0.0 { "shrunk" } else { "grown" };
-        match (self.um, self.um_deviation) {
-            (Some(um), Some(deviation)) => {
-                write!(f, "what is dark has {grown} by {:.1} ± {deviation:.1} µm", um.abs())?;
-            }
-            _ => {
-                let [edges, deviation] =
-                    [self.edges.abs(), self.edges_deviation].map(|e| 100.0 * e);
-                write!(f, "what is dark has {grown} by {edges:.3} ± {deviation:.3} % of an edge")?;
-            }
-        }
-        write!(f, " on every side")
+        let (by, deviation, unit) = match self.um.zip(self.um_deviation) {
+            Some((um, deviation)) => (um.abs(), deviation, "µm"),
+            None => (100.0 * self.edges.abs(), 100.0 * self.edges_deviation, "% of an edge"),
+        };
+        let places = places(deviation);
+        write!(
+            f,
+            "what is dark has {grown} by {by:.places$} ± {deviation:.places$} {unit} on every side"
+        )
     }
 }
 
@@ -166,7 +166,9 @@ mod tests {
     #[test]
     fn ink_is_told_in_words_that_a_printer_understands() {
         let text = seen(-0.00305, 2e-5).to_string();
-        assert_eq!(text, "what is dark has shrunk by 61.0 ± 0.4 µm on every side");
+        assert_eq!(text, "what is dark has shrunk by 61.00 ± 0.40 µm on every side");
+        let edges = InkEstimate { um: None, ..seen(0.00305, 2e-6) }.to_string();
+        assert_eq!(edges, "what is dark has grown by 0.30500 ± 0.00020 % of an edge on every side");
         assert!(
             "none".parse::<Ink>() == Ok(Ink::Um(0.0)) && "-20".parse::<Ink>() == Ok(Ink::Um(-20.0))
         );

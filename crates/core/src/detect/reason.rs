@@ -11,6 +11,7 @@ use crate::words::counted;
 /// Why something has no labels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Reason {
     /// What is the matter.
     pub kind: ReasonKind,
@@ -29,6 +30,7 @@ pub struct Reason {
 /// What may be the matter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum ReasonKind {
     /// Nothing in the picture looks like a corner, and nothing tells why: `corners`.
     NoCorners,

@@ -60,6 +60,7 @@ pub enum RefineStatus {
 
 /// A refined position.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Refined {
     /// Position, px.
     pub position: [f64; 2],

@@ -49,6 +49,7 @@ pub struct Best {
 
 /// How long a search goes on.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub enum Budget {
     /// So long by a clock; how much is found depends on the machine.
     Time(Duration, Clock),

@@ -17,6 +17,7 @@ use crate::lattice::Dimension;
 
 /// Upper bounds on the number of tags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Bounds {
     /// Delsarte's bound, a third of it.
     pub linear_programming: u64,

@@ -7,6 +7,7 @@ use crate::lattice::TagCells;
 
 /// What was found out about a family from nothing but its codes.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Certificate {
     /// Smallest distance between any two words, among the codes compared and their turns.
     pub min_distance: u32,

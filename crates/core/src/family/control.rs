@@ -4,6 +4,7 @@ use super::FamilyError;
 
 /// How far a long search has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Progress {
     /// Units of work done.
     pub done: u64,

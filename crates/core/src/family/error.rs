@@ -1,5 +1,6 @@
 /// What is wrong with a family, its text or its name.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FamilyError {
     /// No shipped family and no file of this name.
     #[error(
@@ -11,12 +12,12 @@ pub enum FamilyError {
         name: String,
     },
     /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
-    #[error("not a family file ({}); generate it anew with `deltag gen-family`", plain(.0))]
+    #[error("not a family file ({}); generate it anew with `Family::to_json`", plain(.0))]
     Json(#[from] serde_json::Error),
     /// Another schema, or another version of it.
     #[error(
         "field `schema` is `{found}`, this version reads `{}`: generate the file anew with \
-         `deltag gen-family`",
+         `Family::to_json`",
         super::SCHEMA
     )]
     Schema {

@@ -6,6 +6,7 @@ use super::{Family, TagWords};
 
 /// A target language or format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ExportFormat {
     /// A C header with an array of `uint64_t`.
     C,

@@ -112,7 +112,7 @@ pub(super) fn panels(
     let instead = |available: u64| {
         let wider = wider_spacing(tags, available, |spacing| boards * on_each(spacing));
         let fewer = available / on_each(tags.spacing).max(1);
-        let fewer = (fewer > 0).then(|| format!("make at most {fewer} --boards"));
+        let fewer = (fewer > 0).then(|| format!("make at most {fewer} `BoardSpec::boards`"));
         wider.into_iter().chain(fewer).collect()
     };
     let needed = boards * on_each(tags.spacing);

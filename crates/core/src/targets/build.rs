@@ -49,7 +49,8 @@ impl Target {
         family: Option<&Family>,
         layout: Option<&PaperSpec>,
     ) -> Result<Target, TargetError> {
-        let name = Name::new(name).map_err(|problem| TargetError::invalid("--name", problem))?;
+        let name =
+            Name::new(name).map_err(|problem| TargetError::invalid("Target::name", problem))?;
         let (panels, family, sheets) = match spec {
             TargetSpec::Board(board) => board_parts(&name, board, family, layout)?,
             TargetSpec::Solid(spec) => {
@@ -71,8 +72,7 @@ impl Target {
                 (panels, Some(family), sheets)
             }
             TargetSpec::Listed(_) => {
-                let problem = "a listed target is read from its list, it cannot be made anew";
-                return Err(TargetError::invalid("kind", problem));
+                return Err(TargetError::Listed);
             }
         };
         Ok(Target { name, spec: spec.clone(), family, panels, sheets })
@@ -84,7 +84,7 @@ impl Target {
     /// # Errors
     /// The ids that both have, and the first that is free.
     pub fn check_beside(&self, other: &Target) -> Result<(), TargetError> {
-        let overlap = |option, what, own: &[u32], others: &[u32]| {
+        let overlap = |setting, what, own: &[u32], others: &[u32]| {
             let (Some([first, last]), Some([_, high])) = (range(own), range(others)) else {
                 return Ok(());
             };
@@ -92,16 +92,20 @@ impl Target {
                 return Ok(());
             }
             let (other, free) = (other.name.to_string(), u64::from(high) + 1);
-            Err(TargetError::Overlap { option, what, first, last, other, free })
+            Err(TargetError::Overlap { setting, what, first, last, other, free })
         };
         let tags = |target: &Target| -> Vec<u32> {
             target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
         };
         let boards = |target: &Target| target.panels.iter().map(|p| p.id).collect::<Vec<_>>();
         if self.family.is_some() && self.family == other.family {
-            overlap("--first-id", "tag ids", &tags(self), &tags(other))?;
+            overlap("TagSpec::first_id", "tag ids", &tags(self), &tags(other))?;
         }
-        overlap("--board-id", "board ids", &boards(self), &boards(other))
+        let board_id = match self.spec {
+            TargetSpec::Solid(_) => "SolidSpec::board_id",
+            _ => "BoardSpec::board_id",
+        };
+        overlap(board_id, "board ids", &boards(self), &boards(other))
     }
 }
 

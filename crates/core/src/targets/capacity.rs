@@ -24,14 +24,17 @@ pub(super) fn check_family(
         let problem = match kind {
             GridKind::Deltille => {
                 "has square tags, deltille tiles need triangular ones: take one \
-                                   of `deltag list`"
+                                   of `family::shipped_names`"
             }
             GridKind::Checker => {
                 "has triangular tags, squares need one of aprilTag36h11, \
                                   aprilTag25h9, aprilTag16h5"
             }
         };
-        return Err(TargetError::invalid("--family", format!("{} {problem}", family.name())));
+        return Err(TargetError::invalid(
+            "TagSpec::family",
+            format!("{} {problem}", family.name()),
+        ));
     }
     let there = family.len() as u64;
     let first = u64::from(tags.first_id);
@@ -46,7 +49,7 @@ pub(super) fn check_family(
     proposals.extend(instead(there.saturating_sub(first)));
     if let Some(larger) = smallest_shipped(kind, first + needed, 0) {
         let (name, len) = (larger.name(), larger.len());
-        proposals.push(format!("take --family {name} with its {len} codes"));
+        proposals.push(format!("take `TagSpec::family` {name} with its {len} codes"));
     }
     Err(TargetError::IdsRunOut {
         first: tags.first_id,
@@ -64,5 +67,5 @@ pub(super) fn wider_spacing(
     count: impl Fn(u32) -> u64,
 ) -> Option<String> {
     let spacing = (tags.spacing + 1..=SPARSEST).find(|&spacing| count(spacing) <= available)?;
-    Some(format!("raise --tag-spacing to at least {spacing}"))
+    Some(format!("raise `TagSpec::spacing` to at least {spacing}"))
 }

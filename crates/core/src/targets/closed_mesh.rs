@@ -57,7 +57,7 @@ pub enum ClosedMeshError {
     Pinched(DVec3),
     /// More than one solid.
     #[error(
-        "it has {0} separate pieces: make a target of each, with --first-id and --board-id so that \
+        "it has {0} separate pieces: make a target of each, with `TagSpec::first_id` and `SolidSpec::board_id` so that \
          no id is used twice"
     )]
     Pieces(usize),

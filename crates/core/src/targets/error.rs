@@ -1,21 +1,23 @@
-/// Why a target cannot be made. Messages name the option of `deltille` to change; a template has
-/// the same names without the dashes.
+/// Why a target cannot be made. Messages name the setting to change, such as `BoardSpec::rows`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetError {
     /// A family that is not shipped, and which are.
     #[error("{0}")]
     UnknownFamily(String),
+    /// A target that is known by its corners only has nothing to be made from.
+    #[error("a listed target is read from its list, it cannot be made anew")]
+    Listed,
     /// A value that is no use by itself.
-    #[error("{option}: {problem}")]
+    #[error("`{setting}`: {problem}")]
     Invalid {
-        /// The option.
-        option: &'static str,
+        /// The field or variant, such as `BoardSpec::rows`.
+        setting: &'static str,
         /// What is wrong and what would do.
         problem: String,
     },
     /// Tags are asked for and no family was given, or another one.
-    #[error("--family: the target carries tags of {wanted}, {given}")]
+    #[error("`TagSpec::family`: the target carries tags of {wanted}, {given}")]
     Family {
         /// The family asked for.
         wanted: String,
@@ -24,7 +26,7 @@ pub enum TargetError {
     },
     /// More tags than codes.
     #[error(
-        "--first-id: tags {first} to {last} are needed, but family {family} ends at {end}: {instead}"
+        "`TagSpec::first_id`: tags {first} to {last} are needed, but family {family} ends at {end}: {instead}"
     )]
     IdsRunOut {
         /// First id needed.
@@ -39,10 +41,10 @@ pub enum TargetError {
         instead: String,
     },
     /// Targets to be used together share ids.
-    #[error("{option}: {what} {first} to {last} overlap those of `{other}`: start at {free}")]
+    #[error("`{setting}`: {what} {first} to {last} overlap those of `{other}`: start at {free}")]
     Overlap {
-        /// The option to change.
-        option: &'static str,
+        /// The field to change, such as `TagSpec::first_id`.
+        setting: &'static str,
         /// Ids of what.
         what: &'static str,
         /// Lowest id.
@@ -56,11 +58,11 @@ pub enum TargetError {
     },
     /// The board is too large for the paper.
     #[error(
-        "--paper: {rows} × {cols} corners with {edge} edges and what is printed around them do \
-         not fit {paper}: take larger paper, fewer --rows or --cols, or {}",
+        "`PaperSpec::size`: {rows} × {cols} corners with {edge} edges and what is printed around them do \
+         not fit {paper}: take larger paper, fewer `BoardSpec::rows` or `BoardSpec::cols`, or {}",
         match fitting_edge_mm {
-            Some(mm) => format!("an --edge of at most {mm} mm"),
-            None => "a smaller --margin".to_owned(),
+            Some(mm) => format!("`BoardSpec::edge_mm` of at most {mm} mm"),
+            None => "a smaller `PaperSpec::margin_mm`".to_owned(),
         }
     )]
     DoesNotFit {
@@ -78,7 +80,7 @@ pub enum TargetError {
 }
 
 impl TargetError {
-    pub(super) fn invalid(option: &'static str, problem: impl Into<String>) -> Self {
-        Self::Invalid { option, problem: problem.into() }
+    pub(super) fn invalid(setting: &'static str, problem: impl Into<String>) -> Self {
+        Self::Invalid { setting, problem: problem.into() }
     }
 }

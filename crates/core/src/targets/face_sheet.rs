@@ -130,12 +130,12 @@ fn arrange(
     }
     let paper = paper.size.as_ref().map_or("even A0".to_owned(), ToString::to_string);
     let instead = fitting.map_or("larger paper".to_owned(), |mm| {
-        format!("larger paper, or an --edge of at most {mm} mm")
+        format!("larger paper, or `SolidSpec::edge_mm` of at most {mm} mm")
     });
     let edge = format_mm(spec.edge_mm);
     let problem =
         format!("a face with {edge} edges and its marks do not fit {paper}: take {instead}");
-    Err(TargetError::invalid("--paper", problem))
+    Err(TargetError::invalid("PaperSpec::size", problem))
 }
 
 /// Adds cutting marks, numbers and instructions.

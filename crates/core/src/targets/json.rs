@@ -41,7 +41,7 @@ const COVARIANCE_SLACK: f64 = 1e-6;
 #[non_exhaustive]
 pub enum TargetFileError {
     /// Not JSON, or cut off.
-    #[error("not a target file: {0}; make it anew with `deltille board`")]
+    #[error("not a target file: {0}; make it anew with `Target::to_json`")]
     Json(serde_json::Error),
     /// A file of something else.
     #[error(

@@ -166,7 +166,7 @@ pub(super) fn check_margin(paper: &PaperSpec) -> Result<f64, TargetError> {
     let margin = paper.margin_mm;
     if !(0.0..=100.0).contains(&margin) {
         let problem = format!("{} is not between 0 mm and 100 mm", format_mm(margin));
-        return Err(TargetError::invalid("--margin", problem));
+        return Err(TargetError::invalid("PaperSpec::margin_mm", problem));
     }
     Ok(margin.max(LEAST_MARGIN_MM))
 }
@@ -426,7 +426,7 @@ mod tests {
     fn what_does_not_fit_is_refused_with_an_edge_that_does() {
         let paper = on("A4", Orientation::Auto);
         let error = build(&spec(10, 11, 30.0), &paper).unwrap_err();
-        assert!(error.to_string().contains("an --edge of at most 20 mm"), "{error}");
+        assert!(error.to_string().contains("`BoardSpec::edge_mm` of at most 20 mm"), "{error}");
         assert!(build(&spec(10, 11, 20.0), &paper).is_ok());
         let error = build(&spec(200, 300, 30.0), &PaperSpec::default()).unwrap_err();
         assert!(error.to_string().contains("even A0"), "{error}");

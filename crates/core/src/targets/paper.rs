@@ -40,6 +40,7 @@ pub struct PaperSpec {
 
 /// How the faces of a solid are printed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SolidSheets {
     /// As a net, to be folded.
     #[default]
@@ -94,6 +95,7 @@ pub struct PaperSize {
 
 /// A text that names no paper, or no orientation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PaperError {
     /// Neither a name nor two lengths.
     #[error(

@@ -57,6 +57,7 @@ impl Default for SkeletonSpec {
 
 /// The frame of a solid.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Skeleton {
     /// Its surface, mm.
     pub triangles_mm: Vec<[DVec3; 3]>,
@@ -75,10 +76,12 @@ impl Skeleton {
     /// Where seats, ledges and windows find no room.
     pub fn new(solid: &Polyhedron, spec: &SkeletonSpec) -> Result<Self, TargetError> {
         let SkeletonSpec { panel_thickness_mm: thickness, wall_mm: wall, rib_mm } = *spec;
-        for (option, mm) in [("--panel-thickness", thickness), ("--wall", wall)] {
+        let thicknesses =
+            [("SkeletonSpec::panel_thickness_mm", thickness), ("SkeletonSpec::wall_mm", wall)];
+        for (setting, mm) in thicknesses {
             if !THICKNESS_MM.contains(&mm) {
                 let problem = format!("{} is not between 0.2 mm and 50 mm", format_mm(mm));
-                return Err(TargetError::invalid(option, problem));
+                return Err(TargetError::invalid(setting, problem));
             }
         }
         // What lies h below two faces that meet at θ is h cot(θ/2) inside their edge.
@@ -94,7 +97,7 @@ impl Skeleton {
                 sharpest.to_degrees(),
                 (least_rib * 10.0).ceil() / 10.0
             );
-            return Err(TargetError::invalid("--rib", problem));
+            return Err(TargetError::invalid("SkeletonSpec::rib_mm", problem));
         }
         let window = (rib + wall).max(inside(thickness + wall) + wall);
         let faces = || (0..solid.faces.len()).map(|face| solid.triangle_mm(face));
@@ -102,11 +105,11 @@ impl Skeleton {
         if window + LEAST_WINDOW_MM > inradius {
             let problem = format!(
                 "seats and ledges take {:.1} mm from the edges, but the smallest face has its \
-                 middle {inradius:.1} mm from them: take thinner --wall or panels, or a larger \
-                 --edge",
+                 middle {inradius:.1} mm from them: take thinner `SkeletonSpec::wall_mm` or panels, or \
+                 a larger `SolidSpec::edge_mm`",
                 window + LEAST_WINDOW_MM
             );
-            return Err(TargetError::invalid("--skeleton", problem));
+            return Err(TargetError::invalid("SolidSpec::skeleton", problem));
         }
         let inner = inner_vertices(solid, thickness + wall);
         let mut triangles_mm = Vec::new();
@@ -134,8 +137,9 @@ impl Skeleton {
         match ClosedMesh::new(&vertices, &indices) {
             Ok((_, false)) => {}
             _ => {
-                let problem = "the frame would cut through itself: take thinner --wall or panels";
-                return Err(TargetError::invalid("--skeleton", problem));
+                let problem = "the frame would cut through itself: take thinner \
+                               `SkeletonSpec::wall_mm` or panels";
+                return Err(TargetError::invalid("SolidSpec::skeleton", problem));
             }
         }
         Ok(Self { triangles_mm, panel_inset_mm: rib + PLAY_MM, rib_mm: rib, window_mm: window })
@@ -262,9 +266,14 @@ mod tests {
         };
         let spec = SkeletonSpec::default();
         let thin = SkeletonSpec { rib_mm: Some(1.0), ..spec };
-        assert!(said(Polyhedron::icosahedron(150.0), thin).contains("--rib: 1 mm leaves no foot"));
-        assert!(said(Polyhedron::tetrahedron(50.0), spec).contains("a larger --edge"));
+        assert!(
+            said(Polyhedron::icosahedron(150.0), thin)
+                .contains("`SkeletonSpec::rib_mm`: 1 mm leaves no foot")
+        );
+        assert!(
+            said(Polyhedron::tetrahedron(50.0), spec).contains("a larger `SolidSpec::edge_mm`")
+        );
         let none = SkeletonSpec { wall_mm: 0.0, ..spec };
-        assert!(said(Polyhedron::icosahedron(150.0), none).contains("--wall"));
+        assert!(said(Polyhedron::icosahedron(150.0), none).contains("`SkeletonSpec::wall_mm`"));
     }
 }

@@ -91,7 +91,7 @@ impl SolidSpec {
                 format_mm(self.margin_mm),
                 (inset_mm * 10.0).ceil() / 10.0
             );
-            return Err(TargetError::invalid("--face-margin", problem));
+            return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
         }
         Ok(inset_mm)
     }
@@ -114,14 +114,15 @@ impl SolidSpec {
         });
         let least = needed.fold(Self::LEAST_EDGE_MM, f64::max).ceil();
         let problem = format!(
-            "{} leaves no room for {} tiles of at least {} a side within margins of {}: take an \
-             --edge of at least {least} mm, fewer --tiles, or a smaller --face-margin",
+            "{} leaves no room for {} tiles of at least {} a side within margins of {}: take \
+             `SolidSpec::edge_mm` of at least {least} mm, fewer `SolidSpec::tiles`, or a smaller \
+             `SolidSpec::margin_mm`",
             format_mm(self.edge_mm),
             self.tiles,
             format_mm(Self::FINEST_TILE_MM),
             format_mm(self.margin_mm),
         );
-        TargetError::invalid("--edge", problem)
+        TargetError::invalid("SolidSpec::edge_mm", problem)
     }
 }
 
@@ -155,7 +156,7 @@ pub(super) fn panels(
         let fewer = (SolidSpec::FEWEST_TILES..spec.tiles)
             .rev()
             .find(|&tiles| needed(tiles, spec.tags.spacing) <= available)
-            .map(|tiles| format!("take at most {tiles} --tiles"));
+            .map(|tiles| format!("take at most {tiles} `SolidSpec::tiles`"));
         wider.into_iter().chain(fewer).collect()
     };
     let tags = needed(spec.tiles, spec.tags.spacing);
@@ -239,16 +240,18 @@ mod tests {
         spec.tags.family = "delTag16h5".to_owned();
         let said = build(&spec).unwrap_err().to_string();
         // Twenty faces with a tag each are more than are left of the family.
-        assert!(said.contains("take --family d25h7 with its"), "{said}");
+        assert!(said.contains("take `TagSpec::family` d25h7 with its"), "{said}");
         spec.tags.first_id = 0;
         let said = build(&spec).unwrap_err().to_string();
         assert!(
-            said.contains("raise --tag-spacing to at least 10, or take at most 6 --tiles"),
+            said.contains(
+                "raise `TagSpec::spacing` to at least 10, or take at most 6 `SolidSpec::tiles`"
+            ),
             "{said}"
         );
         let small = SolidSpec { edge_mm: 20.0, ..SolidSpec::new(SolidShape::Icosahedron) };
         let said = build(&small).unwrap_err().to_string();
-        assert!(said.contains("an --edge of at least "), "{said}");
+        assert!(said.contains("`SolidSpec::edge_mm` of at least "), "{said}");
     }
 
     proptest! {

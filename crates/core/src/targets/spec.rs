@@ -151,6 +151,7 @@ pub struct SolidSpec {
 /// The solids; see [`Polyhedron`](super::Polyhedron) for the order of the faces of regular ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum SolidShape {
     /// Four faces.
     Tetrahedron,
@@ -173,6 +174,7 @@ pub struct ListedSpec {
 /// Formats that list a target's corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum ListFormat {
     /// `.dsc` in the dialect of the reference detector (`docs/formats.md`, “.dsc target descriptions”).
     DscOriginal,
@@ -250,17 +252,19 @@ impl SolidSpec {
             let edge = format_mm(self.edge_mm);
             let problem = match &self.shape {
                 SolidShape::Mesh(_) => {
-                    format!("the mean is {edge}, not between 10 mm and 5000 mm: is --scale right?")
+                    format!(
+                        "the mean is {edge}, not between 10 mm and 5000 mm: set it, or scale the mesh to mm"
+                    )
                 }
                 _ => format!("{edge} is not between 10 mm and 5000 mm"),
             };
-            return Err(TargetError::invalid("--edge", problem));
+            return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
         }
         if let SolidShape::Mesh(mesh) = &self.shape
             && mesh.faces().len() > MOST_FACES as usize
         {
             let problem = format!("{} faces are more than {MOST_FACES}", mesh.faces().len());
-            return Err(TargetError::invalid("--mesh", problem));
+            return Err(TargetError::invalid("SolidShape::Mesh", problem));
         }
         if let SolidShape::Mesh(mesh) = &self.shape {
             let scale = self.edge_mm / mesh.mean_edge();
@@ -272,20 +276,20 @@ impl SolidSpec {
                     format_mm(farthest),
                     format_mm(FARTHEST_MM)
                 );
-                return Err(TargetError::invalid("--mesh", problem));
+                return Err(TargetError::invalid("SolidShape::Mesh", problem));
             }
         }
         if !FACE_TILES.contains(&self.tiles) {
             let problem = format!("{} is not between 6 and 200", self.tiles);
-            return Err(TargetError::invalid("--tiles", problem));
+            return Err(TargetError::invalid("SolidSpec::tiles", problem));
         }
         if !(0.0..=SOLID_EDGE_MM.end() / 4.0).contains(&self.margin_mm) {
             let problem = format!("{} is no margin of a face", format_mm(self.margin_mm));
-            return Err(TargetError::invalid("--face-margin", problem));
+            return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
         }
         if self.board_id.checked_add(MOST_FACES).is_none() {
             let problem = format!("{} leaves no ids for the faces after it", self.board_id);
-            return Err(TargetError::invalid("--board-id", problem));
+            return Err(TargetError::invalid("SolidSpec::board_id", problem));
         }
         self.tags.check()
     }
@@ -344,29 +348,29 @@ impl BoardSpec {
 
     /// Checks every number by itself.
     pub(super) fn check(&self) -> Result<(), TargetError> {
-        for (option, value) in [("--rows", self.rows), ("--cols", self.cols)] {
+        for (setting, value) in [("BoardSpec::rows", self.rows), ("BoardSpec::cols", self.cols)] {
             if !SIDES.contains(&value) {
                 let problem = format!("{value} is not between 2 and {MOST_ROWS}");
-                return Err(TargetError::invalid(option, problem));
+                return Err(TargetError::invalid(setting, problem));
             }
         }
         if !EDGE_MM.contains(&self.edge_mm) {
             let problem = format!("{} is not between 1 mm and 1000 mm", format_mm(self.edge_mm));
-            return Err(TargetError::invalid("--edge", problem));
+            return Err(TargetError::invalid("BoardSpec::edge_mm", problem));
         }
         if !(1..=MOST_ROWS).contains(&self.boards) {
             let problem = format!("{} is not between 1 and {MOST_ROWS}", self.boards);
-            return Err(TargetError::invalid("--boards", problem));
+            return Err(TargetError::invalid("BoardSpec::boards", problem));
         }
         let corners =
             [self.rows, self.cols, self.boards].into_iter().map(u64::from).product::<u64>();
         if corners > MOST_CORNERS {
             let problem = format!("{corners} corners are more than {MOST_CORNERS} in one target");
-            return Err(TargetError::invalid("--boards", problem));
+            return Err(TargetError::invalid("BoardSpec::boards", problem));
         }
         if self.board_id.checked_add(self.boards).is_none() {
             let problem = format!("{} leaves no ids for the boards after it", self.board_id);
-            return Err(TargetError::invalid("--board-id", problem));
+            return Err(TargetError::invalid("BoardSpec::board_id", problem));
         }
         let least = least_untagged_corners(self.grid);
         if self.tags.is_none() && self.rows * self.cols < least {
@@ -375,17 +379,17 @@ impl BoardSpec {
                  {least} corners, or tags",
                 self.rows, self.cols
             );
-            let option = match self.grid {
-                GridKind::Deltille => "--untagged",
-                GridKind::Checker => "--rows",
+            let setting = match self.grid {
+                GridKind::Deltille => "BoardSpec::tags",
+                GridKind::Checker => "BoardSpec::rows",
             };
-            return Err(TargetError::invalid(option, problem));
+            return Err(TargetError::invalid(setting, problem));
         }
         match &self.tags {
             Some(tags) => {
                 if self.grid == GridKind::Deltille && tags.tags_in == TagsIn::White {
                     let problem = "the tags of a deltille board are in its black tiles";
-                    return Err(TargetError::invalid("--tags-in", problem));
+                    return Err(TargetError::invalid("TagSpec::tags_in", problem));
                 }
                 let least = LEAST_SQUARE_BORDER_BITS;
                 if self.grid == GridKind::Checker && tags.border_bits < least {
@@ -393,19 +397,19 @@ impl BoardSpec {
                         "{} is too narrow, a square tag has a border of at least {least} bit-width",
                         tags.border_bits
                     );
-                    return Err(TargetError::invalid("--tag-border", problem));
+                    return Err(TargetError::invalid("TagSpec::border_bits", problem));
                 }
                 if (self.grid, self.rows, self.cols, tags.tags_in)
                     == (GridKind::Checker, 2, 2, TagsIn::White)
                 {
                     let problem = "the one square between 2 × 2 corners is black";
-                    return Err(TargetError::invalid("--tags-in", problem));
+                    return Err(TargetError::invalid("TagSpec::tags_in", problem));
                 }
                 tags.check()
             }
             None if self.boards > 1 => {
                 let problem = "untagged boards cannot be told apart: give them tags, or make one";
-                Err(TargetError::invalid("--boards", problem))
+                Err(TargetError::invalid("BoardSpec::boards", problem))
             }
             None => Ok(()),
         }
@@ -416,11 +420,11 @@ impl TagSpec {
     fn check(&self) -> Result<(), TargetError> {
         if !(1..=MOST_ROWS).contains(&self.spacing) {
             let problem = format!("{} is not between 1 and {MOST_ROWS}", self.spacing);
-            return Err(TargetError::invalid("--tag-spacing", problem));
+            return Err(TargetError::invalid("TagSpec::spacing", problem));
         }
         if !BORDER_BITS.contains(&self.border_bits) {
             let problem = format!("{} is not between 0.6 and 10 bit-widths", self.border_bits);
-            return Err(TargetError::invalid("--tag-border", problem));
+            return Err(TargetError::invalid("TagSpec::border_bits", problem));
         }
         Ok(())
     }

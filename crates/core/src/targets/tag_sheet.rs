@@ -97,23 +97,23 @@ pub(super) fn panels(spec: &TagSheetSpec) -> Vec<Panel> {
 fn check(spec: &TagSheetSpec, family: &Family) -> Result<(), TargetError> {
     if family.kind() != GridKind::Deltille {
         let problem = format!("{} has square tags, a sheet takes triangular ones", family.name());
-        return Err(TargetError::invalid("--family", problem));
+        return Err(TargetError::invalid("TagSheetSpec::family", problem));
     }
     if !EDGE_MM.contains(&spec.edge_mm) {
         let problem = format!("{} is not between 5 mm and 2000 mm", format_mm(spec.edge_mm));
-        return Err(TargetError::invalid("--edge", problem));
+        return Err(TargetError::invalid("TagSheetSpec::edge_mm", problem));
     }
     if !BORDER_BITS.contains(&spec.border_bits) {
         let problem = format!("{} is not between 0.6 and 10 bit-widths", spec.border_bits);
-        return Err(TargetError::invalid("--tag-border", problem));
+        return Err(TargetError::invalid("TagSheetSpec::border_bits", problem));
     }
     if spec.ids.is_empty() {
-        return Err(TargetError::invalid("--ids", "there is no tag to print"));
+        return Err(TargetError::invalid("TagSheetSpec::ids", "there is no tag to print"));
     }
     if let Some(id) = spec.ids.iter().find(|&&id| family.code(id).is_none()) {
         let last = family.len() - 1;
         let problem = format!("{} has no tag {id}, its ids run from 0 to {last}", family.name());
-        return Err(TargetError::invalid("--ids", problem));
+        return Err(TargetError::invalid("TagSheetSpec::ids", problem));
     }
     Ok(())
 }
@@ -146,7 +146,7 @@ fn arrange(
     let margin = check_margin(paper)?;
     let size = paper.size.clone().or_else(|| PaperSize::automatic().next());
     let Some(size) = size else {
-        return Err(TargetError::invalid("--paper", "none is named"));
+        return Err(TargetError::invalid("PaperSpec::size", "none is named"));
     };
     let pages = match paper.orientation {
         Orientation::Portrait => vec![size.portrait_mm()],
@@ -176,13 +176,13 @@ fn arrange(
             pages.iter().any(|&page| on_page(&footprint, page, margin, false).is_some())
         };
         let instead = match (*EDGE_MM.start() as u32..spec.edge_mm.ceil() as u32).rev().find(fits) {
-            Some(mm) => format!("larger paper, or an --edge of at most {mm} mm"),
-            None => "larger paper, or a smaller --margin".to_owned(),
+            Some(mm) => format!("larger paper, or `TagSheetSpec::edge_mm` of at most {mm} mm"),
+            None => "larger paper, or a smaller `PaperSpec::margin_mm`".to_owned(),
         };
         let problem = format!(
             "a tag with {edge} edges, its id and the check bars do not fit {size}: take {instead}"
         );
-        TargetError::invalid("--paper", problem)
+        TargetError::invalid("PaperSpec::size", problem)
     })
 }
 
@@ -294,14 +294,24 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused() {
         let error = build(vec![0], 250.0, "A4").unwrap_err().to_string();
-        assert!(error.starts_with("--paper: a tag"), "{error}");
+        assert!(error.starts_with("`PaperSpec::size`: a tag"), "{error}");
         let largest = error.split("at most ").nth(1).and_then(|e| e.split(' ').next()).unwrap();
         let largest: f64 = largest.parse().unwrap();
         assert!(
             build(vec![0], largest, "A4").is_ok() && build(vec![0], largest + 1.0, "A4").is_err()
         );
-        assert!(build(vec![0], 4.0, "A4").unwrap_err().to_string().starts_with("--edge: 4 mm"));
-        assert!(build(vec![99_999], 30.0, "A4").unwrap_err().to_string().starts_with("--ids"));
+        assert!(
+            build(vec![0], 4.0, "A4")
+                .unwrap_err()
+                .to_string()
+                .starts_with("`TagSheetSpec::edge_mm`: 4 mm")
+        );
+        assert!(
+            build(vec![99_999], 30.0, "A4")
+                .unwrap_err()
+                .to_string()
+                .starts_with("`TagSheetSpec::ids`")
+        );
     }
 
     #[test]

@@ -33,12 +33,15 @@ pub struct Print {
 
 /// Why a file tells of no sheet.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SheetError {
     /// Not the file of a calibration.
-    #[error("not the .json that `calibrate` or `rig` writes")]
+    #[error("not what `calibration::write` or `rig::write` made")]
     Foreign,
     /// A field is missing, or holds what it must not.
-    #[error("field `{field}`: {problem}; make it anew with `calibrate --board-shape`")]
+    #[error(
+        "field `{field}`: {problem}; make it anew by a calibration with `Calibration::board_shape`"
+    )]
     Field {
         /// The field, such as `board_shape.reach_mm`.
         field: String,
@@ -46,7 +49,7 @@ pub enum SheetError {
         problem: String,
     },
     /// A calibration without shape.
-    #[error("no `board_shape` in it: make it with `calibrate --board-shape`")]
+    #[error("no `board_shape` in it: make it by a calibration with `Calibration::board_shape`")]
     Flat,
 }
 

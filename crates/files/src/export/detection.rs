@@ -17,7 +17,7 @@ pub const SCHEMA: &str = "deltille/detection/1";
 #[non_exhaustive]
 pub enum DetectionFileError {
     /// Not JSON, or cut off.
-    #[error("not a detection file: {0}; make it anew with `deltille detect`")]
+    #[error("not a detection file: {0}; make it anew with `detection::write`")]
     Json(serde_json::Error),
     /// Another schema, or another version of it.
     #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
@@ -26,13 +26,13 @@ pub enum DetectionFileError {
         found: String,
     },
     /// A file of something else.
-    #[error("this is a {found} file, not a detection: give what `deltille detect` wrote")]
+    #[error("this is a {found} file, not a detection: give what `detection::write` made")]
     Kind {
         /// The schema that the file names.
         found: String,
     },
     /// A field is missing, unknown, or holds what it must not.
-    #[error("field `{field}`: {problem}; make the file anew with `deltille detect`")]
+    #[error("field `{field}`: {problem}; make the file anew with `detection::write`")]
     Field {
         /// The field, such as `grids[0].corners[3].x`.
         field: String,

@@ -136,7 +136,7 @@ pub(super) fn diagnoses<'a>(
     diagnoses: &'a [Diagnosis],
     print_scale: Option<[f64; 2]>,
 ) -> Vec<DiagnosisRecord<'a>> {
-    let words = Words { estimate, print_scale };
+    let words = Words::new(estimate, print_scale);
     let name = |camera: usize| estimate.camera_name(camera);
     let record = |diagnosis: &'a Diagnosis| {
         let text =
@@ -164,6 +164,7 @@ pub(super) fn diagnoses<'a>(
                     Instead::Shape => "board_shape".to_owned(),
                     Instead::Panels => "panels".to_owned(),
                     Instead::Camera => "camera".to_owned(),
+                    _ => return None,
                 }),
                 ..text
             },

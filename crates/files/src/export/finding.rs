@@ -36,7 +36,7 @@ pub(super) fn records(estimate: &Estimate) -> Vec<FindingRecord> {
             left_out: finding.left_out,
             ..FindingRecord::default()
         };
-        match &finding.shared {
+        Some(match &finding.shared {
             Shared::Beyond { camera, view } => FindingRecord {
                 kind: "outside_picture",
                 camera: name(*camera),
@@ -75,7 +75,8 @@ pub(super) fn records(estimate: &Estimate) -> Vec<FindingRecord> {
             Shared::Camera { camera } => {
                 FindingRecord { kind: "camera", camera: name(*camera), ..counts }
             }
-        }
+            _ => return None,
+        })
     };
-    estimate.findings.iter().map(record).collect()
+    estimate.findings.iter().filter_map(record).collect()
 }

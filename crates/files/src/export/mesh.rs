@@ -17,9 +17,10 @@ pub const MAX_TEXTURE_PX: u32 = 16_384;
 
 /// Why a target has no mesh.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// A flat target, or one known by its corners only.
-    #[error("{0} is no solid made by `deltille`: it has no mesh")]
+    #[error("{0} was not made as a solid: it has no mesh")]
     NotSolid(String),
     /// The texture would be too large.
     #[error(
@@ -35,7 +36,7 @@ pub enum MeshError {
     },
     /// The resolution asked for leaves the tags unsharp.
     #[error(
-        "--texture-dpi: {dpi} dpi are {texels:.1} texels per tag bit, at least {TEXELS_PER_BIT} are \
+        "{dpi} dpi are {texels:.1} texels per tag bit, at least {TEXELS_PER_BIT} are \
          needed: give {least} or more"
     )]
     Unsharp {
@@ -69,6 +70,7 @@ pub fn extras(target: &Target) -> serde_json::Value {
 
 /// Triangles with a texture, in the target frame.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TexturedMesh {
     /// Name of the target.
     pub name: String,
@@ -84,6 +86,7 @@ pub struct TexturedMesh {
 
 /// A plane face.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct MeshFace {
     /// Vertices, mm, counter-clockwise from outside.
     pub vertices_mm: [DVec3; 3],
@@ -123,10 +126,8 @@ impl TexturedMesh {
         let [width, height] = atlas.size_px;
         if width.max(height) > MAX_TEXTURE_PX {
             let instead = match dpi {
-                Some(_) => "lower --texture-dpi".to_owned(),
-                None => {
-                    "take fewer --tiles, a family of fewer bits, or no --gltf and --obj".to_owned()
-                }
+                Some(_) => "choose a lower resolution".to_owned(),
+                None => "take fewer `SolidSpec::tiles`, or a family of fewer bits".to_owned(),
             };
             return Err(MeshError::Texture { width, height, instead });
         }

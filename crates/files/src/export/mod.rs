@@ -46,6 +46,7 @@ pub use supersample::{Block, SUBPIXELS, render as supersample};
 
 /// Why an artifact was not written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExportError {
     /// The file could not be written.
     #[error(transparent)]

@@ -11,6 +11,7 @@ use deltille_core::targets::{ClosedMesh, ClosedMeshError, is_coordinate};
 
 /// Why an OBJ is not taken for a solid.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ObjError {
     /// Not an OBJ.
     #[error("not a readable OBJ: {0}")]

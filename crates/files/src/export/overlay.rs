@@ -34,6 +34,7 @@ const RING_EDGES: f64 = 0.09;
 
 /// A picture that cannot be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum OverlayError {
     /// More pixels than there is memory.
     #[error("an image of {0} × {1} pixels is too large to draw on")]

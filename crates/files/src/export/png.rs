@@ -30,9 +30,7 @@ pub fn write(sheet: &Sheet, title: &str, path: &Path, dpi: f64) -> Result<(), Ex
             path: path.to_owned(),
             width_mm: sheet.width_mm,
             height_mm: sheet.height_mm,
-            limit: format!(
-                "at {dpi} dpi it has more than 2 gigapixels: choose a lower resolution (--dpi)"
-            ),
+            limit: format!("at {dpi} dpi it has more than 2 gigapixels: choose a lower resolution"),
         });
     }
     Ok(atomic::write(path, |file| raster.encode(title, file))?)

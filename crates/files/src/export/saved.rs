@@ -23,7 +23,7 @@ use deltille_core::quantity;
 #[non_exhaustive]
 pub enum SavedError {
     /// Neither that of a camera nor that of a rig.
-    #[error("not the .json that `calibrate` or `rig` writes")]
+    #[error("not what `calibration::write` or `rig::write` made")]
     Foreign,
     /// A field is missing, or holds what it must not.
     #[error("field `{field}`: {problem}")]
@@ -215,10 +215,16 @@ impl Single {
             let frames = frames_of(&views);
             let known = known(&found, rms_px, views, |index, _| Some(index), reference)?;
             let excluded = excluded.into_iter().map(SavedExcluded::read).collect();
-            Ok(Estimate { cameras: vec![known], frames, rms_px, excluded, ..Estimate::default() })
+            let mut estimate = Estimate::default();
+            estimate.cameras = vec![known];
+            (estimate.frames, estimate.rms_px, estimate.excluded) = (frames, rms_px, excluded);
+            Ok(estimate)
         });
-        let held_out = held_out.transpose()?.map(Box::new);
-        Ok(Estimate { cameras: vec![found], frames, rms_px, held_out, ..fit.estimate() })
+        let mut estimate = fit.estimate();
+        estimate.held_out = held_out.transpose()?.map(Box::new);
+        estimate.cameras = vec![found];
+        (estimate.frames, estimate.rms_px) = (frames, rms_px);
+        Ok(estimate)
     }
 }
 
@@ -240,27 +246,30 @@ impl Rig {
             let cameras = seen.collect::<Result<Vec<_>, _>>()?;
             let excluded = excluded.into_iter().map(SavedExcluded::read).collect();
             let frames = frames.into_iter().map(SavedFrame::read).collect();
-            Ok(Estimate { cameras, frames, rms_px, excluded, ..Estimate::default() })
+            let mut estimate = Estimate::default();
+            (estimate.cameras, estimate.frames) = (cameras, frames);
+            (estimate.rms_px, estimate.excluded) = (rms_px, excluded);
+            Ok(estimate)
         });
-        let held_out = held_out.transpose()?.map(Box::new);
-        let frames = frames.into_iter().map(SavedFrame::read).collect();
-        let estimate = Estimate { cameras, frames, held_out, ..fit.estimate() };
+        let mut estimate = fit.estimate();
+        estimate.held_out = held_out.transpose()?.map(Box::new);
+        estimate.frames = frames.into_iter().map(SavedFrame::read).collect();
+        estimate.cameras = cameras;
         let (sum, count) = estimate.corners().fold((0.0, 0), |(sum, count), corner| {
             (sum + corner.residual.iter().map(|r| r * r).sum::<f64>(), count + 2)
         });
-        Ok(Estimate { rms_px: (sum / f64::from(count.max(1))).sqrt(), ..estimate })
+        estimate.rms_px = (sum / f64::from(count.max(1))).sqrt();
+        Ok(estimate)
     }
 }
 
 impl Fit {
     fn estimate(self) -> Estimate {
-        Estimate {
-            sigma: self.sigma,
-            common_px: self.common_px,
-            shape: self.board_shape.map(SavedShape::read),
-            excluded: self.excluded.into_iter().map(SavedExcluded::read).collect(),
-            ..Estimate::default()
-        }
+        let mut estimate = Estimate::default();
+        (estimate.sigma, estimate.common_px) = (self.sigma, self.common_px);
+        estimate.shape = self.board_shape.map(SavedShape::read);
+        estimate.excluded = self.excluded.into_iter().map(SavedExcluded::read).collect();
+        estimate
     }
 }
 
@@ -283,17 +292,11 @@ fn known(
     frame: impl Fn(usize, &str) -> Option<usize>,
     reference: &Reference,
 ) -> Result<CameraEstimate, SavedError> {
-    let kept = |parameter: &Parameter| Parameter { sd: None, ..parameter.clone() };
-    Ok(CameraEstimate {
-        model: None,
-        parameters: found.parameters.iter().map(kept).collect(),
-        covariance: DMatrix::zeros(0, 0),
-        ill_conditioned: Vec::new(),
-        pose_sd: None,
-        rms_px,
-        views: estimates(views, frame, reference)?,
-        ..found.clone()
-    })
+    let mut camera = CameraEstimate::given(&found.name, found.camera.clone());
+    camera.camera_from_rig = found.camera_from_rig;
+    camera.views = estimates(views, frame, reference)?;
+    camera.rms_px = rms_px;
+    Ok(camera)
 }
 
 fn estimates(
@@ -347,18 +350,17 @@ impl SavedCamera {
         let parameters =
             parameters.map(|p| Parameter { name: p.name.clone(), value: p.value, sd: p.sd });
         let place = self.camera_from_rig.as_ref();
-        Ok(CameraEstimate {
-            name: name.to_owned(),
-            camera: blank.with_parameters(&values),
-            model: self.model.parse().ok(),
-            parameters: parameters.collect(),
-            covariance: DMatrix::from_fn(sds.len(), sds.len(), |i, j| rows[i][j] * sds[i] * sds[j]),
-            ill_conditioned: self.loose,
-            camera_from_rig: place.map_or(Pose::IDENTITY, SavedPose::pose),
-            pose_sd: place.and_then(SavedPose::sd),
-            views: estimates(self.views, frame, reference)?,
-            rms_px: self.rms_px,
-        })
+        let mut camera = CameraEstimate::given(name, blank.with_parameters(&values));
+        camera.model = self.model.parse().ok();
+        camera.parameters = parameters.collect();
+        camera.covariance =
+            DMatrix::from_fn(sds.len(), sds.len(), |i, j| rows[i][j] * sds[i] * sds[j]);
+        camera.ill_conditioned = self.loose;
+        camera.camera_from_rig = place.map_or(Pose::IDENTITY, SavedPose::pose);
+        camera.pose_sd = place.and_then(SavedPose::sd);
+        camera.views = estimates(self.views, frame, reference)?;
+        camera.rms_px = self.rms_px;
+        Ok(camera)
     }
 }
 

@@ -10,6 +10,7 @@ const STACK_BYTES: usize = 256 << 20;
 
 /// Why there is no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Broken {
     /// The code panicked.
     #[error("its reader failed within; the file is damaged, or made to do that")]

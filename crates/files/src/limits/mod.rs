@@ -4,11 +4,12 @@
 //! ```
 //! use deltille_files::limits::Limits;
 //!
-//! let small = Limits { max_bytes: 10, ..Limits::default() };
+//! let mut small = Limits::default();
+//! small.max_bytes = 10;
 //! let error = small.read("Cargo.toml".as_ref()).unwrap_err();
 //! assert_eq!(
 //!     error.to_string(),
-//!     "Cargo.toml: more than 10 bytes; --max-bytes sets how many are read"
+//!     "Cargo.toml: more than 10 bytes; `Limits::max_bytes` sets how many are read"
 //! );
 //! ```
 //!
@@ -41,6 +42,7 @@ const BYTES_PER_PIXEL: u64 = 4;
 
 /// What a reader takes before it gives up.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Limits {
     /// Bytes of a file, and of what is unpacked from it; pictures go by their pixels.
     pub max_bytes: u64,
@@ -73,6 +75,7 @@ impl Default for Limits {
 
 /// One of the [`Limits`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kind {
     /// [`Limits::max_bytes`]
     Bytes,
@@ -101,21 +104,34 @@ impl fmt::Display for Exceeded {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let limit = self.limit;
         match self.kind {
-            Kind::Bytes => write!(f, "more than {limit} bytes; --max-bytes sets how many are read"),
+            Kind::Bytes => {
+                write!(f, "more than {limit} bytes; `Limits::max_bytes` sets how many are read")
+            }
             Kind::Pixels => {
                 let mega = limit / 1e6;
-                write!(f, "more than {mega} megapixels; --max-pixels sets how many are read")
+                write!(
+                    f,
+                    "more than {mega} megapixels; `Limits::max_pixels` sets how many are read"
+                )
             }
             Kind::PixelsPerByte => {
                 write!(f, "more than {limit} pixels for each byte, as no photograph has; ")?;
-                write!(f, "--max-pixels-per-byte sets how many are read")
+                write!(f, "`Limits::max_pixels_per_byte` sets how many are read")
             }
-            Kind::Nodes => write!(f, "more than {limit} parts; --max-nodes sets how many are read"),
+            Kind::Nodes => {
+                write!(f, "more than {limit} parts; `Limits::max_nodes` sets how many are read")
+            }
             Kind::Depth => {
-                write!(f, "parts more than {limit} deep; --max-depth sets how deep they may be")
+                write!(
+                    f,
+                    "parts more than {limit} deep; `Limits::max_depth` sets how deep they may be"
+                )
             }
             Kind::Seconds => {
-                write!(f, "not done after {limit} s; --max-seconds sets how long it may take")
+                write!(
+                    f,
+                    "not done after {limit} s; `Limits::max_seconds` sets how long it may take"
+                )
             }
         }
     }
@@ -123,6 +139,7 @@ impl fmt::Display for Exceeded {
 
 /// A file that is not read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be opened or read.
     #[error("cannot read {}: {source}", path.display())]

@@ -7,6 +7,7 @@ use deltille_core::words::counted;
 
 /// How much a piece of advice matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Weight {
     /// Something is as it should be.
     Good,
@@ -18,6 +19,7 @@ pub enum Weight {
 
 /// A piece of advice.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Advice {
     /// How much it matters.
     pub weight: Weight,
@@ -127,7 +129,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     if report.print.scale.is_none() {
         let text =
             "Distances are as true as the print: measure both check bars of the sheet and give \
-                    --print-scale. Focal lengths and distortion do not depend on it where both are off alike."
+                    `Print::scale`. Focal lengths and distortion do not depend on it where both are off alike."
                 .to_owned();
         add(Weight::Hint, text);
     }
@@ -329,7 +331,7 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
             format!(
                 "Residuals leave a pattern over the image, {pattern:.1} times what chance makes and \
                  {size:.3} px strong: less than noise, but the model does not describe this lens \
-                 wholly, or the board is not flat. Try a richer model, or --board-shape."
+                 wholly, or the board is not flat. Try a richer model, or `Calibration::board_shape`."
             ),
         ),
         Some(_) => {
@@ -341,14 +343,11 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::export::calibration::Print;
     use deltille_core::calibrate::{Estimate, Model};
-    use deltille_core::camera::{Camera, Pose};
+    use deltille_core::camera::Camera;
 
     /// What is advised where no parameter of the lens is told from zero.
     fn advised(model: Model) -> String {
@@ -359,27 +358,14 @@ mod tests {
             .map(|((name, value), free)| Parameter { name, value, sd: free.then_some(1.0) })
             .collect();
         let count = model.free().into_iter().filter(|free| *free).count();
-        let camera = CameraEstimate {
-            name: "camera".to_owned(),
-            camera,
-            model: Some(model),
-            parameters,
-            covariance: DMatrix::identity(count, count),
-            ill_conditioned: Vec::new(),
-            camera_from_rig: Pose::IDENTITY,
-            pose_sd: None,
-            views: Vec::new(),
-            rms_px: 0.1,
-        };
+        let mut camera = CameraEstimate::given("camera", camera);
+        (camera.model, camera.parameters) = (Some(model), parameters);
+        camera.covariance = DMatrix::identity(count, count);
+        camera.rms_px = 0.1;
         let surveys = [Survey::new(&camera)];
-        let estimate = Estimate { cameras: vec![camera], ..Estimate::default() };
-        let report = Report {
-            title: "camera",
-            estimate: &estimate,
-            diagnoses: &[],
-            print: Print { scale: Some([1.0; 2]), ink: None },
-            thumbnails: BTreeMap::new(),
-        };
+        let mut estimate = Estimate::default();
+        estimate.cameras = vec![camera];
+        let report = Report::new("camera", &estimate);
         let advice = advice(&report, &surveys);
         advice.into_iter().map(|advice| advice.text + "\n").collect()
     }

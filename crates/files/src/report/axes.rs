@@ -8,6 +8,17 @@ const BELOW: f64 = 40.0;
 const ABOVE: f64 = 10.0;
 const RIGHT: f64 = 12.0;
 
+/// Width of a digit, room between numbers side by side, and height of a line.
+const DIGIT: f64 = 7.0;
+const APART: f64 = 8.0;
+const LINE: f64 = 16.0;
+
+/// Most steps between the ticks of an axis.
+const STEPS: f64 = 7.0;
+
+/// Steps are tried over so many powers of ten.
+const DECADES: i32 = 4;
+
 /// A frame with axes, to draw into.
 pub(super) struct Axes {
     x: [f64; 2],
@@ -72,27 +83,26 @@ impl Axes {
         let mut marks = format!(
             "<rect class=\"frame\" x=\"{LEFT}\" y=\"{ABOVE}\" width=\"{w}\" height=\"{h}\"/>"
         );
-        for value in ticks(self.x) {
+        let side_by_side = |text: &str| DIGIT * text.chars().count() as f64 + APART;
+        for (value, text) in ticks(self.x, w, side_by_side) {
             let [x, y] = self.at(value, self.y[0]);
             let _ = write!(
                 marks,
                 "<line class=\"tick\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{y:.1}\" y2=\"{:.1}\"/>\
-                 <text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+                 <text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{text}</text>",
                 y + 4.0,
-                y + 16.0,
-                number(value)
+                y + 16.0
             );
         }
-        for value in ticks(self.y) {
+        for (value, text) in ticks(self.y, h, |_| LINE) {
             let [x, y] = self.at(self.x[0], value);
             let _ = write!(
                 marks,
                 "<line class=\"tick\" x1=\"{:.1}\" x2=\"{x:.1}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>\
-                 <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                 <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{text}</text>",
                 x - 4.0,
                 x - 7.0,
-                y + 4.0,
-                number(value)
+                y + 4.0
             );
         }
         let _ = write!(
@@ -114,34 +124,55 @@ impl Axes {
     }
 }
 
-/// Round numbers in a range, three to eight of them.
-fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
+/// Round numbers in a range and their texts, as close as the room for the texts allows; `length` is
+/// that of the range, and `room` what a text needs of it.
+fn ticks([low, high]: [f64; 2], length: f64, room: impl Fn(&str) -> f64) -> Vec<(f64, String)> {
     let (low, high) = (low.min(high), low.max(high));
-    let rough = (high - low) / 7.0;
-    let decade = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|n| n * decade).into_iter().find(|step| *step >= rough);
-    let step = step.unwrap_or(decade);
-    let first = (low / step - 1e-9).ceil() as i64;
-    let last = (high / step + 1e-9).floor() as i64;
-    (first..=last).map(|n| n as f64 * step).collect()
+    let rough = (high - low) / STEPS;
+    let decade = rough.log10().floor() as i32;
+    let decades = decade..decade.saturating_add(DECADES);
+    let steps = decades.flat_map(|n| [1.0, 2.0, 5.0].map(|first| (first * 10f64.powi(n), n)));
+    let mut ticks =
+        steps.filter(|(step, _)| *step >= rough * (1.0 - 1e-9)).map(|(step, decade)| {
+            let first = (low / step - 1e-9).ceil() as i64;
+            let last = (high / step + 1e-9).floor() as i64;
+            let values = (first..=last).map(|n| n as f64 * step);
+            (step, values.map(|value| (value, number(value, decade))).collect::<Vec<_>>())
+        });
+    let fitting = ticks.find(|(step, ticks)| {
+        let apart = step / (high - low) * length;
+        ticks.len() < 2 || ticks.iter().all(|(_, text)| room(text) <= apart)
+    });
+    fitting.map_or_else(Vec::new, |(_, ticks)| ticks)
 }
 
-/// A tick's number, without the noise of its computation.
-fn number(value: f64) -> String {
-    let text = format!("{value:.4}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.replace('-', "−") }
+/// A tick's number, with the places that a step of this decade needs.
+fn number(value: f64, decade: i32) -> String {
+    let places = (-decade).max(0) as usize;
+    let text = format!("{value:.places$}");
+    if value == 0.0 { "0".to_owned() } else { text.replace('-', "−") }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn texts(range: [f64; 2], length: f64) -> Vec<String> {
+        let room = |text: &str| DIGIT * text.chars().count() as f64 + APART;
+        ticks(range, length, room).into_iter().map(|(_, text)| text).collect()
+    }
+
     #[test]
     fn ticks_are_round_and_within_the_range() {
-        assert_eq!(ticks([0.0, 1600.0]), [0.0, 500.0, 1000.0, 1500.0]);
-        assert_eq!(ticks([-0.3, 0.3]).len(), 7);
-        assert_eq!(ticks([0.0, 62.0]), [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0]);
-        assert_eq!(number(ticks([-0.3, 0.3])[3]), "0");
+        assert_eq!(texts([0.0, 1600.0], 430.0), ["0", "500", "1000", "1500"]);
+        assert_eq!(texts([-0.3, 0.3], 400.0), ["−0.3", "−0.2", "−0.1", "0", "0.1", "0.2", "0.3"]);
+        assert_eq!(texts([0.0, 62.0], 330.0), ["0", "10", "20", "30", "40", "50", "60"]);
+        assert_eq!(texts([0.0, 3e-5], 330.0), ["0", "0.00001", "0.00002", "0.00003"]);
+    }
+
+    #[test]
+    fn numbers_beside_each_other_do_not_touch() {
+        assert_eq!(texts([-0.07, 0.07], 250.0), ["−0.05", "0", "0.05"]);
+        assert_eq!(texts([-0.0035, 0.0035], 250.0), ["−0.002", "0", "0.002"]);
     }
 }

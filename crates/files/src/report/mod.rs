@@ -13,13 +13,14 @@ mod advice;
 mod axes;
 mod page;
 mod plots;
+mod rig;
 mod survey;
 mod thumbnail;
 
 use std::collections::BTreeMap;
 
 use crate::export::calibration::Print;
-use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Words};
+use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, PanelPlace, Words};
 
 pub use advice::{Advice, Weight, advice};
 pub use survey::{Survey, SurveyedView};
@@ -27,6 +28,7 @@ pub use thumbnail::thumbnail;
 
 /// What a page tells.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Report<'a> {
     /// Its headline, such as the name of the camera.
     pub title: &'a str,
@@ -34,13 +36,21 @@ pub struct Report<'a> {
     pub estimate: &'a Estimate,
     /// What is to be said about it.
     pub diagnoses: &'a [Diagnosis],
+    /// Where the target's file has its panels.
+    pub stated: &'a [PanelPlace],
     /// What is known of the print.
     pub print: Print,
     /// Small pictures of the views, by camera and name, as PNG; see [`thumbnail`].
     pub thumbnails: BTreeMap<(usize, String), Vec<u8>>,
 }
 
-impl Report<'_> {
+impl<'a> Report<'a> {
+    /// A page of an estimate of which nothing else is known.
+    pub fn new(title: &'a str, estimate: &'a Estimate) -> Self {
+        let (diagnoses, stated, print) = (&[], &[], Print::default());
+        Self { title, estimate, diagnoses, stated, print, thumbnails: BTreeMap::new() }
+    }
+
     /// The page.
     pub fn html(&self) -> String {
         page::html(self)
@@ -52,7 +62,7 @@ impl Report<'_> {
     }
 
     fn words(&self) -> Words<'_> {
-        Words { estimate: self.estimate, print_scale: self.print.scale }
+        Words::new(self.estimate, self.print.scale)
     }
 
     /// A camera on views that were held out.

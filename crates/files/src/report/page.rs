@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 
-use super::{Report, Survey, SurveyedView, Weight, advice, plots};
+use super::{Report, Survey, SurveyedView, Weight, advice, plots, rig};
 use deltille_core::calibrate::{CameraEstimate, Excluded, Parameter, ViewEstimate};
-use deltille_core::camera::Pose;
+use deltille_core::words::places;
 
 /// Views in the table: all, or where there are more the worst ones.
-const MOST_VIEWS: usize = 300;
+pub(super) const MOST_VIEWS: usize = 300;
 
 /// Correlations from here on are drawn in a blue on which white is read better than ink.
 const STRONG: f64 = 0.85;
@@ -46,8 +46,9 @@ pub(super) fn html(report: &Report) -> String {
     }
     page += "</ul></section>\n";
     if report.is_rig() {
-        page += &places(report);
+        page += &rig::places(report);
     }
+    page += &rig::panels(report);
     for (index, (camera, survey)) in cameras.iter().zip(&surveys).enumerate() {
         if report.is_rig() {
             let figures = figures(&of_camera(report, index, camera));
@@ -56,6 +57,9 @@ pub(super) fn html(report: &Report) -> String {
         page += &parameters(camera);
         page += &drawings(camera, survey);
         page += &views(report, index, survey);
+    }
+    if report.is_rig() {
+        page += &rig::frames(report);
     }
     let _ = write!(
         page,
@@ -113,10 +117,8 @@ fn of_rig(report: &Report) -> Vec<Figure> {
 
 fn of_print(report: &Report) -> Option<Figure> {
     let (um, deviation) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_deviation))?;
-    // Adding zero makes a negative zero positive.
-    let um = (10.0 * um).round() / 10.0 + 0.0;
-    let growth = format!("{um:.1} ± {deviation:.1} µm").replace('-', "−");
-    Some((growth, "ink spread"))
+    let (um, deviation) = rounded(um, Some(deviation));
+    Some((format!("{um} ± {deviation} µm"), "ink spread"))
 }
 
 fn figures(cells: &[Figure]) -> String {
@@ -124,44 +126,8 @@ fn figures(cells: &[Figure]) -> String {
     format!("<div class=\"figures\">{}</div>", cells.collect::<String>())
 }
 
-/// Where the cameras are to each other, and the frames that took no part.
-fn places(report: &Report) -> String {
-    let first = report.estimate.cameras.first().map_or("", |camera| camera.name.as_str());
-    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
-    let rows = report.estimate.cameras.iter().map(|camera| {
-        let at = camera.camera_from_rig.inverse().translation;
-        // Adding zero makes a negative zero positive.
-        let at = at.to_array().map(|mm| (100.0 * mm).round() / 100.0 + 0.0);
-        let at = at.map(|mm| format!("{mm:.2}").replace('-', "−")).join(", ");
-        let [turn, _] = camera.camera_from_rig.off(&Pose::IDENTITY);
-        let turned = turn.length().to_degrees();
-        let sd = camera.pose_sd.map_or("–".to_owned(), |sd| {
-            format!("{:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
-        });
-        format!(
-            "<tr><td>{}</td><td class=\"number\">{at}</td><td class=\"number\">{turned:.3}°</td>\
-             <td class=\"number\">{sd}</td>\
-             <td class=\"number\">{:.4}</td><td class=\"number\">{}</td></tr>",
-            escaped(&camera.name),
-            camera.rms_px,
-            camera.corner_count()
-        )
-    });
-    let rows: String = rows.collect();
-    let frames = report.estimate.excluded.iter().filter(|out| out.camera.is_none());
-    let frames = frames.map(|out| format!("<tr>{}", out_row(out, 5)));
-    let frames: String = frames.collect();
-    format!(
-        "<section><h2>Relative camera poses</h2><table class=\"plain\"><tr><th>camera</th>\
-         <th>place, mm</th><th>turned by</th><th>± standard deviation</th><th>rms, px</th><th>corners</th></tr>{rows}\
-         {frames}</table><p class=\"note\">Places of the optical centres, and angles of rotation, relative to \
-         camera {}.</p></section>\n",
-        escaped(first)
-    )
-}
-
 /// What took no part, over so many columns beside its name.
-fn out_row(out: &Excluded, columns: usize) -> String {
+pub(super) fn out_row(out: &Excluded, columns: usize) -> String {
     format!(
         "<td class=\"name\">{}</td><td colspan=\"{columns}\" class=\"out\">left out: {}</td></tr>",
         escaped(&out.view),
@@ -212,12 +178,14 @@ fn parameters(camera: &CameraEstimate) -> String {
 }
 
 /// A value with two digits of its deviation, and the deviation.
-fn rounded(value: f64, sd: Option<f64>) -> (String, String) {
+pub(super) fn rounded(value: f64, sd: Option<f64>) -> (String, String) {
     let sign = |text: String| text.replace('-', "−");
     match sd {
         Some(sd) if sd > 0.0 && sd.is_finite() => {
-            let digits = (1.0 - sd.log10().floor()).clamp(0.0, 12.0) as usize;
-            (sign(format!("{value:.digits$}")), format!("{sd:.digits$}"))
+            let places = places(sd);
+            // Nothing but zeros has no sign.
+            let value = if 2.0 * value.abs() < 0.1_f64.powi(places as i32) { 0.0 } else { value };
+            (sign(format!("{value:.places$}")), format!("{sd:.places$}"))
         }
         _ => (sign(value.to_string()), "kept".to_owned()),
     }
@@ -354,6 +322,6 @@ fn picture(report: &Report, index: usize, view: &ViewEstimate) -> String {
 }
 
 /// A text as it stands in HTML.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

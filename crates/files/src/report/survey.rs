@@ -8,6 +8,7 @@ const CELLS: usize = 16;
 
 /// What the views of a camera cover and show.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Survey {
     /// Width and height of the image, px.
     pub size_px: [f64; 2],
@@ -28,6 +29,7 @@ pub struct Survey {
 
 /// The mean residual of a cell, outliers left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct CellMean {
     /// Mean, px.
     pub mean_px: [f64; 2],
@@ -37,6 +39,7 @@ pub struct CellMean {
 
 /// How a view stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SurveyedView {
     /// Angle between the board's normal and the line of sight to the middle of its corners, rad;
     /// `None` for solids.

@@ -40,6 +40,7 @@ const MOST_LISTED: usize = 64;
 /// What is wrong with what a file is built of.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum ConstructFinding {
     /// The file has something that not every viewer shows alike, so that what is seen here need
     /// not be what is seen elsewhere.

@@ -26,6 +26,7 @@ pub(super) const SMEARED_INK_ERROR: f64 = 0.3;
 /// Which kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Format {
     /// Portable Document Format.
     Pdf,
@@ -72,6 +73,7 @@ impl Format {
 
 /// Why an artifact cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DocumentError {
     /// The file cannot be opened.
     #[error(transparent)]

@@ -11,6 +11,7 @@ use crate::lattice::GridKind;
 
 /// A word recognised as a tag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Decoded {
     /// Id of the tag.
     pub id: u32,

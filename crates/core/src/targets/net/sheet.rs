@@ -73,11 +73,11 @@ pub fn sheets(
     if spec.margin_mm < LEAST_MARGIN_MM {
         let problem = format!(
             "a net has its numbers in the margins of the faces: take at least {} instead of {}, \
-             or --per-face",
+             or `SolidSheets::PerFace`",
             format_mm(LEAST_MARGIN_MM),
             format_mm(spec.margin_mm)
         );
-        return Err(TargetError::invalid("--face-margin", problem));
+        return Err(TargetError::invalid("SolidSpec::margin_mm", problem));
     }
     let (solid, faces) = (spec.polyhedron(), spec.faces()?);
     let sides = Sides::new(&solid);
@@ -103,8 +103,8 @@ pub fn sheets(
         return Ok(sheets);
     }
     let [net, ..] = &nets[..] else {
-        let problem = "the faces leave no room for glue tabs: take --per-face".to_owned();
-        return Err(TargetError::invalid("--edge", problem));
+        let problem = "the faces leave no room for glue tabs: take `SolidSheets::PerFace`";
+        return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
     };
     let tiles: Vec<(u32, [[f64; 2]; 3])> =
         panels.iter().map(|panel| (panel.id, tiles_outline(panel))).collect();

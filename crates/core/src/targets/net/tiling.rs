@@ -97,7 +97,7 @@ impl Tiling {
         }
         let Some(tiling) = best else {
             let problem = format!("{size} is too small for pages of a net: take larger paper");
-            return Err(TargetError::invalid("--paper", problem));
+            return Err(TargetError::invalid("PaperSpec::size", problem));
         };
         tiling.check(spec, &size)?;
         Ok(tiling)
@@ -132,11 +132,12 @@ impl Tiling {
         let edge = (spec.edge_mm / too_large.sqrt() * 0.95).floor();
         let problem = format!(
             "the net of a solid with {} edges takes {pages} pages of {size}, more than can be \
-             assembled and verified: take --per-face, or an --edge of at most {edge} mm{}",
+             assembled and verified: take `SolidSheets::PerFace`, or \
+             `SolidSpec::edge_mm` of at most {edge} mm{}",
             format_mm(spec.edge_mm),
-            if area <= MOST_AREA_MM2 { ", or larger --paper" } else { "" }
+            if area <= MOST_AREA_MM2 { ", or larger `PaperSpec::size`" } else { "" }
         );
-        Err(TargetError::invalid("--edge", problem))
+        Err(TargetError::invalid("SolidSpec::edge_mm", problem))
     }
 
     /// Where the net lies on the sheet.

@@ -51,6 +51,7 @@ use deltille_core::targets::{ListFormat, ListedSpec, Panel, Target, TargetSpec};
 
 /// Who reads the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Dialect {
     /// The reference detector.
     Original,

@@ -23,7 +23,7 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
         let names = FAMILIES.map(|f| format!("delTag{f}"));
         refused(&format!(
             "its readers have the codes of {} only, not those of {name}: choose one of them with \
-             --family, or leave --dsc out",
+             `TagSpec::family`",
             names.join(", ")
         ))
     })?;
@@ -38,7 +38,7 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
         }
         if panel.tags_in == TagsIn::White {
             return Err(refused(
-                "its readers look for tags in black squares: take --tags-in black, or leave --dsc out",
+                "its readers look for tags in black squares: take `TagsIn::Black`",
             ));
         }
         let [a, b] = header(panel, dialect).map_err(|reason| refused(&reason))?;
@@ -75,7 +75,7 @@ fn header(panel: &Panel, dialect: Dialect) -> Result<[u32; 2], String> {
                 Ok([side as u32 + 2, 0])
             } else {
                 let reason = "it knows triangular boards with an equilateral outline only; use \
-                              --dsc-dialect fork";
+                              `Dialect::Fork`";
                 Err(reason.to_owned())
             }
         }

@@ -14,6 +14,7 @@ const EXTENT_SLACK_MM: f64 = 2e-6;
 
 /// Why a `.dxf` is not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DxfError {
     /// Not a DXF as text.
     #[error("not a DXF of release 12 as text")]

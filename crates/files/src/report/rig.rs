@@ -1,0 +1,134 @@
+//! What a rig has that a single camera has not: places of cameras and panels, and frames.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use super::Report;
+use super::page::{MOST_VIEWS, escaped, out_row, rounded};
+use deltille_core::calibrate::{FrameEstimate, PanelPlace};
+use deltille_core::camera::Pose;
+
+/// Where the cameras are to each other.
+pub(super) fn places(report: &Report) -> String {
+    let first = report.estimate.cameras.first().map_or("", |camera| camera.name.as_str());
+    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
+    let rows = report.estimate.cameras.iter().map(|camera| {
+        let at = camera.camera_from_rig.inverse().translation;
+        // Adding zero makes a negative zero positive.
+        let at = at.to_array().map(|mm| (100.0 * mm).round() / 100.0 + 0.0);
+        let at = at.map(|mm| format!("{mm:.2}").replace('-', "−")).join(", ");
+        let [turn, _] = camera.camera_from_rig.off(&Pose::IDENTITY);
+        let turned = turn.length().to_degrees();
+        let sd = camera.pose_sd.map_or("–".to_owned(), |sd| {
+            format!("{:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
+        });
+        format!(
+            "<tr><td>{}</td><td class=\"number\">{at}</td><td class=\"number\">{turned:.3}°</td>\
+             <td class=\"number\">{sd}</td>\
+             <td class=\"number\">{:.4}</td><td class=\"number\">{}</td></tr>",
+            escaped(&camera.name),
+            camera.rms_px,
+            camera.corner_count()
+        )
+    });
+    format!(
+        "<section><h2>Relative camera poses</h2><table class=\"plain\"><tr><th>camera</th>\
+         <th>place, mm</th><th>turned by</th><th>± standard deviation</th><th>rms, px</th><th>corners</th></tr>{}\
+         </table><p class=\"note\">Places of the optical centres, and angles of rotation, relative to \
+         camera {}.</p></section>\n",
+        rows.collect::<String>(),
+        escaped(first)
+    )
+}
+
+/// How far the panels of the target are from where its file has them, where that was found.
+pub(super) fn panels(report: &Report) -> String {
+    let seen = report.estimate.corners().map(|corner| (corner.panel.index(), corner.panel.id()));
+    let ids: BTreeMap<usize, u32> = seen.collect();
+    let found = report.estimate.panels.iter().zip(report.stated).enumerate();
+    let rows = found.filter_map(|(index, (found, stated))| {
+        let ([turn, shift], covariance) = (off(found, stated), found.covariance?);
+        let (mm, mm_sd) = rounded(shift.length(), Some(deviation(shift, &covariance, 3)));
+        let [turned, turned_sd] = [turn.length(), deviation(turn, &covariance, 0)];
+        let (turned, turned_sd) = rounded(turned.to_degrees(), Some(turned_sd.to_degrees()));
+        let id = ids.get(&index)?;
+        Some(format!(
+            "<tr><td>{id}</td><td class=\"number\">{mm}</td><td class=\"number\">{mm_sd}</td>\
+             <td class=\"number\">{turned}°</td><td class=\"number\">{turned_sd}°</td></tr>"
+        ))
+    });
+    let rows: String = rows.collect();
+    if rows.is_empty() {
+        return rows;
+    }
+    format!(
+        "<section><h2>Refined panels</h2><table class=\"plain\"><tr><th>panel</th>\
+         <th>moved by, mm</th><th>±</th><th>turned by</th><th>±</th></tr>{rows}</table>\
+         <p class=\"note\">Origins of the panels against where the target's file has them, with standard \
+         deviations. A panel that is not listed stays in place, or was not seen.</p></section>\n"
+    )
+}
+
+/// How far a panel was turned, rad, and moved, mm.
+fn off(found: &PanelPlace, stated: &PanelPlace) -> [DVec3; 2] {
+    found.target_from_panel.off(&stated.target_from_panel)
+}
+
+/// Standard deviation of the length of a vector of which a block of the covariance tells; the largest
+/// of any direction where it has none.
+fn deviation(of: DVec3, covariance: &[[f64; 6]; 6], block: usize) -> f64 {
+    let entry = |i: usize, j: usize| covariance[block + i][block + j];
+    let variance = match of.try_normalize() {
+        Some(along) => {
+            let along = along.to_array();
+            let terms = (0..9).map(|k| along[k / 3] * entry(k / 3, k % 3) * along[k % 3]);
+            terms.sum()
+        }
+        None => (0..3).map(|i| entry(i, i)).fold(0.0, f64::max),
+    };
+    variance.max(0.0).sqrt()
+}
+
+/// The moments, and what of each was seen.
+pub(super) fn frames(report: &Report) -> String {
+    let estimate = report.estimate;
+    let mut order: Vec<usize> = (0..estimate.frames.len()).collect();
+    let rms = |&index: &usize| estimate.frames[index].rms_px;
+    let note = match order.len() > MOST_VIEWS {
+        true => format!("<p>The worst {MOST_VIEWS} of {} frames.</p>", order.len()),
+        false => String::new(),
+    };
+    if order.len() > MOST_VIEWS {
+        order.sort_by(|a, b| rms(b).total_cmp(&rms(a)));
+        order.truncate(MOST_VIEWS);
+        order.sort_unstable();
+    }
+    let worst = order.iter().map(rms).fold(f64::MIN_POSITIVE, f64::max);
+    let rows = order.iter().map(|&index| row(report, index, &estimate.frames[index], worst));
+    let excluded = estimate.excluded.iter().filter(|out| out.camera.is_none());
+    let excluded = excluded.map(|out| format!("<tr>{}", out_row(out, 3)));
+    format!(
+        "<section><h2 class=\"frames\">Frames</h2>{note}<table class=\"plain\"><tr><th>frame</th>\
+         <th>cameras</th><th>corners</th><th>rms, px</th></tr>{}</table></section>\n",
+        rows.chain(excluded).collect::<String>()
+    )
+}
+
+/// A frame in the table; `worst` is the largest rms in it, px.
+fn row(report: &Report, index: usize, frame: &FrameEstimate, worst: f64) -> String {
+    let views = report.estimate.cameras.iter().flat_map(|camera| {
+        let views = camera.views.iter().filter(|view| view.frame == index);
+        views.map(|view| (escaped(&camera.name), view.corners.len()))
+    });
+    let (cameras, corners): (Vec<String>, Vec<usize>) = views.unzip();
+    format!(
+        "<tr><td class=\"name\">{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+         <td class=\"number\">{:.4}<div class=\"meter\" style=\"width:{:.0}%\"></div></td></tr>",
+        escaped(&frame.name),
+        cameras.join(", "),
+        corners.iter().sum::<usize>(),
+        frame.rms_px,
+        100.0 * frame.rms_px / worst
+    )
+}
