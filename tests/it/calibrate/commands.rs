@@ -10,7 +10,7 @@ use deltille::export::detection;
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use predicates::str::contains;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -39,14 +39,14 @@ fn board(rows: u32, cols: u32) -> Target {
 fn camera() -> Camera {
     let radial = [-0.17, 0.02, 0.0];
     let lens = Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() });
-    Camera { centre_px: [804.0, 606.0], ..Camera::centred(1600, 1200, 625.0, lens) }
+    Camera { centre_px: DVec2::new(804.0, 606.0), ..Camera::centred(1600, 1200, 625.0, lens) }
 }
 
 /// What a detector finds of a board of one panel that is seen whole.
 fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8Rng) -> Detection {
     let panel = &target.panels[0];
     let corners = panel.corners.iter().map(|corner| {
-        let [x, y] = camera.project(pose.apply(corner.target_mm.into())).unwrap();
+        let (x, y) = camera.project(pose.apply(corner.target_mm)).unwrap().into();
         let mut off = || random.random_range(-0.1..0.1);
         let (row, col, id) = (corner.row, corner.col, Some(corner.id));
         GridCorner { row, col, id, x: x + off(), y: y + off(), cov: None }
@@ -187,7 +187,7 @@ fn a_camera_that_did_not_take_the_pictures_is_named() {
     let folder = folder(&target, &detections(&target, 10, 0.7));
     let radial = [4.0, 0.0, 0.0];
     let lens = Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() });
-    let other = Camera { focal_px: [200.0; 2], lens, ..camera() };
+    let other = Camera { focal_px: DVec2::splat(200.0), lens, ..camera() };
     std::fs::write(folder.path().join("other.yaml"), other.to_yaml()).unwrap();
     let args = "calibrate corners --target board.json --fixed-intrinsics other.yaml";
     let output = output(folder.path(), args);
@@ -224,8 +224,8 @@ fn a_calibration_that_does_not_fit_says_why_and_so_does_its_page() {
     let flat = board(8, 9);
     let mut bent = flat.clone();
     for corner in &mut bent.panels[0].corners {
-        let [x, _, z] = &mut corner.target_mm;
-        *z += 2.0 * ((*x - 150.0) / 100.0).powi(2);
+        let at = &mut corner.target_mm;
+        at.z += 2.0 * ((at.x - 150.0) / 100.0).powi(2);
     }
     let other = BrownConrady { radial: [-0.12, 0.02, 0.0], ..BrownConrady::default() };
     let other = Camera { lens: Lens::BrownConrady(other), ..camera() };
@@ -258,8 +258,8 @@ fn the_shape_of_a_sheet_is_taken_along() {
     let flat = board(8, 9);
     let mut bent = flat.clone();
     for corner in &mut bent.panels[0].corners {
-        let [x, y, z] = &mut corner.target_mm;
-        *z += 3.0 * ((*x - 150.0) / 100.0).powi(2) - 2.0 * ((*y - 80.0) / 80.0).powi(2);
+        let at = &mut corner.target_mm;
+        at.z += 3.0 * ((at.x - 150.0) / 100.0).powi(2) - 2.0 * ((at.y - 80.0) / 80.0).powi(2);
     }
     let folder = folder(&flat, &detections(&bent, 15, 0.7));
     let at = folder.path();
@@ -691,8 +691,7 @@ fn of_displaced_panel(target: &Target, count: usize, by_mm: DVec3) -> Vec<Detect
             let pose = pose.after(&place);
             let faces = (pose.rotation * DVec3::Z).dot(-pose.translation.normalize()) > 0.4;
             let corners = panel.corners.iter().map(|corner| {
-                let [x, y] = corner.panel_mm;
-                let [x, y] = camera.project(pose.apply(DVec3::new(x, y, 0.0)))?;
+                let (x, y) = camera.project(pose.apply(corner.panel_mm.extend(0.0)))?.into();
                 let mut off = || random.random_range(-0.1..0.1);
                 let (row, col, id) = (corner.row, corner.col, Some(corner.id));
                 Some(GridCorner { row, col, id, x: x + off(), y: y + off(), cov: None })

@@ -95,13 +95,13 @@ fn flip(board: &Board, artwork: &mut Artwork, at: (i32, i32), bit: u32) {
     let (panel, placement) = (&board.target.panels[0], board.target.sheets[0].placements[0]);
     assert_eq!(placement.angle_rad, 0.0);
     let [a, b, c] = panel.kind.tag_tile(Vertex::new(at.0, at.1)).frame().map(|v| {
-        let [x, y] = placement.page_from_panel(panel.lattice_mm(v));
-        Point::new(x, y)
+        let place = placement.page_from_panel(panel.lattice_mm(v));
+        Point::new(place.x, place.y)
     });
     let corners = board.family.cells().corners(bit, panel.tag_inset_bits());
     let mut path = BezPath::new();
-    for (i, [u, v]) in corners.into_iter().enumerate() {
-        let point = a + (b - a) * u + (c - a) * v;
+    for (i, corner) in corners.into_iter().enumerate() {
+        let point = a + (b - a) * corner.x + (c - a) * corner.y;
         if i == 0 { path.move_to(point) } else { path.line_to(point) }
     }
     path.close_path();
@@ -321,8 +321,8 @@ fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
     let mut erased = board.artwork();
     erased.sheets[0].shapes.retain(|shape| shape.part != (Part::Label { index: 1 }));
     let mut blot = board.artwork();
-    let [left, lower] = board.target.sheets[0].placements[0].origin_mm;
-    let at = kurbo::Circle::new((left, lower - 2.5), 0.5);
+    let origin_mm = board.target.sheets[0].placements[0].origin_mm;
+    let at = kurbo::Circle::new((origin_mm.x, origin_mm.y - 2.5), 0.5);
     let path = kurbo::Shape::to_path(&at, 0.001);
     blot.sheets[0].shapes.push(Shape { part: Part::Label { index: 9 }, paint: Paint::Fill, path });
     let cases = [

@@ -1,5 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use glam::DVec2;
 use nalgebra::DMatrix;
 
 use super::calibration::{CameraViews, PanelPlace};
@@ -132,9 +133,9 @@ pub struct Corner {
     /// Lattice column.
     pub col: i32,
     /// Where it was seen, px.
-    pub pixel: [f64; 2],
+    pub pixel: DVec2,
     /// Seen less predicted position, px.
-    pub residual: [f64; 2],
+    pub residual: DVec2,
     /// Whether it is farther off than corners are by chance.
     pub outlier: bool,
 }
@@ -226,7 +227,7 @@ impl CameraEstimate {
 
     /// Where the lens ends to be good, if that is within the image.
     pub fn lens_end(&self) -> Option<LensEnd> {
-        let seen: Vec<[f64; 2]> = self.corners().map(|corner| corner.pixel).collect();
+        let seen: Vec<DVec2> = self.corners().map(|corner| corner.pixel).collect();
         LensEnd::of(&self.camera, &seen)
     }
 }
@@ -242,7 +243,7 @@ impl ViewEstimate {
 fn rms_px<'a>(corners: impl Iterator<Item = &'a Corner>) -> f64 {
     let residuals = corners.map(|corner| corner.residual);
     let (sum, count) =
-        residuals.fold((0.0, 0), |(sum, count), [x, y]| (sum + x * x + y * y, count + 2));
+        residuals.fold((0.0, 0), |(sum, count), r| (sum + r.x * r.x + r.y * r.y, count + 2));
     if count == 0 { 0.0 } else { (sum / f64::from(count)).sqrt() }
 }
 

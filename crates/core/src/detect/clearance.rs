@@ -390,7 +390,7 @@ mod tests {
     fn grid(kind: GridKind, image: impl Fn([f64; 2]) -> [f64; 2]) -> Grid {
         let corners = (0..25).map(|i| {
             let (row, col) = (i / 5, i % 5);
-            let [x, y] = image(kind.position(row.into(), col.into()));
+            let [x, y] = image(kind.position(row.into(), col.into()).to_array());
             GridCorner { row, col, id: None, x, y, cov: None }
         });
         Grid { kind, panel: None, mirrored: false, corners: corners.collect(), tags: Vec::new() }

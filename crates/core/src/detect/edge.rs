@@ -78,8 +78,8 @@ fn is_clean_along<const N: usize>(
     // The coarser of the levels that show the corners sharply shows the edge between them.
     let level = a.level.max(b.level);
     let image = &pyramid.levels()[level];
-    let [ax, ay] = Pyramid::from_level_0(level, a.position);
-    let [bx, by] = Pyramid::from_level_0(level, b.position);
+    let [ax, ay] = Pyramid::from_level_0(level, a.position.into()).to_array();
+    let [bx, by] = Pyramid::from_level_0(level, b.position.into()).to_array();
     let (dx, dy) = (bx - ax, by - ay);
     let length = dx.hypot(dy);
     let chord = dy.atan2(dx);

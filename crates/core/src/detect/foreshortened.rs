@@ -51,7 +51,8 @@ pub fn foreshortened_grids<const N: usize>(
         let saddles = finder.find(&compressed);
         let mut found = grids(finder, &compressed, &saddles);
         for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
-            placed.position = Pyramid::to_level_0(level, view.in_picture(placed.position));
+            placed.position =
+                Pyramid::to_level_0(level, view.in_picture(placed.position).into()).to_array();
         }
         found
     });

@@ -15,6 +15,7 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
 use super::blurred_corner::erf_sqrt_half;
@@ -227,7 +228,7 @@ impl GridLight {
                 [1.0, 1.0]
             }
         };
-        let [mu, mv] = self.kind.middle();
+        let DVec2 { x: mu, y: mv } = self.kind.middle();
         let mut normal = Matrix3::<f64>::zeros();
         let slopes = EDGE_VARIANCE * (self.noise / SLOPE).powi(2);
         (1..3).for_each(|i| normal[(i, i)] = slopes);

@@ -506,7 +506,7 @@ mod tests {
     /// A lattice of rows and columns about a place, with edges of this length, px.
     fn lattice(kind: GridKind, side: i32, [x, y]: [f64; 2], edge_px: f64) -> SaddleGrid {
         let corner = |row: i32, col: i32| {
-            let [u, v] = kind.position(f64::from(row), f64::from(col));
+            let [u, v] = kind.position(f64::from(row), f64::from(col)).to_array();
             let position = [x + edge_px * u, y - edge_px * v];
             (Vertex::new(row, col), PlacedSaddle { position, amplitude: 100.0 })
         };

@@ -915,10 +915,8 @@ mod tests {
                 .vertices()
                 .chain(tile.vertices().flat_map(|v| family.kind().neighbours(v)))
                 .collect();
-            let places: Vec<glam::DVec3> = tile
-                .vertices()
-                .filter_map(|v| Some(panel.corner_at(v)?.target_mm.into()))
-                .collect();
+            let places: Vec<glam::DVec3> =
+                tile.vertices().filter_map(|v| Some(panel.corner_at(v)?.target_mm)).collect();
             let centre = places.iter().sum::<glam::DVec3>() / places.len() as f64;
             let roll: f64 = rng.random_range(0.0..std::f64::consts::TAU);
             let up = glam::DVec3::new(roll.cos(), roll.sin(), 0.0);

@@ -49,8 +49,8 @@ static STEPS: LazyLock<[Vec<(f64, Vertex)>; 2]> = LazyLock::new(|| {
 
 /// Length of a step on the print, in edges.
 fn length(kind: GridKind, step: Vertex) -> f64 {
-    let [x, y] = kind.position(step.row.into(), step.col.into());
-    x.hypot(y)
+    let way = kind.position(step.row.into(), step.col.into());
+    way.x.hypot(way.y)
 }
 
 /// How a grid is bent.
@@ -171,8 +171,8 @@ impl LocalMap {
     /// Distance of a place from the vertex in edges of the print; to first order.
     pub fn distance<const N: usize>(&self, place: [f64; 2]) -> Option<f64> {
         let [col, row] = self.steps_to(place)?;
-        let [x, y] = kind::<N>().position(row, col);
-        Some(x.hypot(y))
+        let way = kind::<N>().position(row, col);
+        Some(way.x.hypot(way.y))
     }
 }
 
@@ -191,7 +191,7 @@ mod tests {
 
     /// A steep view of a lattice.
     fn seen(v: Vertex) -> [f64; 2] {
-        let [x, y] = kind::<6>().position(v.row.into(), v.col.into());
+        let (x, y): (f64, f64) = kind::<6>().position(v.row.into(), v.col.into()).into();
         let depth = 1.0 + 0.05 * x - 0.03 * y;
         [500.0 + 40.0 * x / depth, 400.0 - 40.0 * y / depth]
     }

@@ -175,11 +175,11 @@ fn candidates<const N: usize>(
         let Some([col, row]) = map.and_then(|map| map.steps_to(saddle.position)) else {
             continue;
         };
-        let [x, y] = kind::<N>().position(row, col);
+        let way = kind::<N>().position(row, col);
         let step = Vertex::new(row.round() as i32, col.round() as i32);
         let vertex = nearest + step;
-        if x.hypot(y) <= MAX_REACH && !grid.contains_key(&vertex) {
-            found.push((x.hypot(y), index, vertex));
+        if way.x.hypot(way.y) <= MAX_REACH && !grid.contains_key(&vertex) {
+            found.push((way.x.hypot(way.y), index, vertex));
         }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -264,8 +264,8 @@ fn is_joined<const N: usize>(
 fn contrast_near<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<f64> {
     let far = |v: &Vertex| {
         let step = *v - vertex;
-        let [x, y] = kind::<N>().position(step.row.into(), step.col.into());
-        x.hypot(y)
+        let way = kind::<N>().position(step.row.into(), step.col.into());
+        way.x.hypot(way.y)
     };
     let nearest = grid.iter().min_by(|a, b| far(a.0).total_cmp(&far(b.0)))?;
     Some(nearest.1.saddle.sectors.amplitude)

@@ -101,7 +101,10 @@ impl Rectified {
         let half_side = (FIT_REACH_PX + way_px) as usize + 1;
         let centre = Vector2::repeat(half_side as f64);
         let in_level_0 = |at: Vector2<f64>| self.place + self.image_from_patch * (at - centre);
-        let in_image = |at| Vector2::from(Pyramid::from_level_0(level, in_level_0(at).into()));
+        let in_image = |at| {
+            let at: [f64; 2] = in_level_0(at).into();
+            Vector2::from(Pyramid::from_level_0(level, at.into()).to_array())
+        };
         let side = 2 * half_side + 1;
         let inside = [[0, 0], [side, 0], [0, side], [side, side]].into_iter().all(|[x, y]| {
             let at = in_image(Vector2::new(x as f64, y as f64));

@@ -15,6 +15,8 @@
 
 use std::borrow::Cow;
 
+use glam::DVec2;
+
 use super::clearance::{Edge, NOTHING, Surroundings};
 use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
 use super::corner_start::{start, start_along};
@@ -62,7 +64,7 @@ pub enum RefineStatus {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refined {
     /// Position, px.
-    pub position: [f64; 2],
+    pub position: DVec2,
     /// Covariance xx, xy, yy, px², where the method gives one.
     pub cov: Option<[f64; 3]>,
     /// Which method found it.
@@ -108,7 +110,7 @@ impl<const K: usize> From<Fitted<K>> for ModelFit {
 
 impl From<ModelFit> for Refined {
     fn from(fit: ModelFit) -> Self {
-        Self { position: fit.position(), cov: Some(fit.cov), status: RefineStatus::Ok }
+        Self { position: fit.position().into(), cov: Some(fit.cov), status: RefineStatus::Ok }
     }
 }
 
@@ -210,7 +212,7 @@ impl Refiner {
     /// The corner near `start`, in the whole window.
     ///
     /// An unknown tone curve is estimated from this corner; [`Self::refine_all`] asks all of a picture.
-    pub fn refine<'a>(&self, image: impl Into<ImageView<'a>>, start: [f64; 2]) -> Refined {
+    pub fn refine<'a>(&self, image: impl Into<ImageView<'a>>, start: DVec2) -> Refined {
         self.refine_all(image, &[start])[0]
     }
 
@@ -218,15 +220,16 @@ impl Refiner {
     pub fn refine_all<'a>(
         &self,
         image: impl Into<ImageView<'a>>,
-        starts: &[[f64; 2]],
+        starts: &[DVec2],
     ) -> Vec<Refined> {
         self.refine_view(image.into(), starts)
     }
 
     /// [`Self::refine_all`], compiled here and not in every crate that uses it.
-    fn refine_view(&self, image: ImageView, starts: &[[f64; 2]]) -> Vec<Refined> {
+    fn refine_view(&self, image: ImageView, starts: &[DVec2]) -> Vec<Refined> {
         let mut fitter = CornerFitter::default();
-        let mut fit = |start: &[f64; 2]| self.refine_with(&mut fitter, image, *start, &self.known);
+        let mut fit =
+            |start: &DVec2| self.refine_with(&mut fitter, image, (*start).into(), &self.known);
         let first: Vec<(Refined, Option<Fit>)> = starts.iter().map(&mut fit).collect();
         if self.method == Refinement::Polynomial || self.tone == Tone::Linear {
             return first.into_iter().map(|(refined, _)| refined).collect();
@@ -244,7 +247,7 @@ impl Refiner {
             .collect();
         let optics = self.joint_optics(&mut fitter, image, samples, &self.known);
         let again = |(i, (refined, fit)): (usize, (Refined, Option<_>))| match fit {
-            Some(_) => self.refine_with(&mut fitter, image, starts[i], &optics).0,
+            Some(_) => self.refine_with(&mut fitter, image, starts[i].into(), &optics).0,
             None => refined,
         };
         first.into_iter().enumerate().map(again).collect()
@@ -319,7 +322,7 @@ impl Refiner {
             (Some(_), Refinement::Polynomial) => RefineStatus::Ok,
             (Some(_), Refinement::Model) => RefineStatus::Polynomial,
         };
-        Refined { position: polynomial.unwrap_or(start), cov: None, status }
+        Refined { position: polynomial.unwrap_or(start).into(), cov: None, status }
     }
 
     /// The model of a single corner, in the largest window that lies in the image.
@@ -439,7 +442,7 @@ mod tests {
     const SIDE: usize = 41;
 
     /// A picture of 5 × 5 corners seen from 45°, their light falling to a third, and their places.
-    fn picture(lines: usize, grey: impl Fn(f64) -> f64, noise: f64) -> (Gray<f32>, Vec<[f64; 2]>) {
+    fn picture(lines: usize, grey: impl Fn(f64) -> f64, noise: f64) -> (Gray<f32>, Vec<DVec2>) {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let normal = Normal::new(0.0, noise).unwrap();
         let mut image = Gray::<f32>::new(5 * SIDE, 5 * SIDE);
@@ -447,7 +450,7 @@ mod tests {
         for tile in 0..25 {
             let (left, top) = (tile % 5 * SIDE, tile / 5 * SIDE);
             let mut at = || (SIDE / 2) as f64 + rng.random_range(-0.5..0.5);
-            let position = [at(), at()];
+            let position = DVec2::new(at(), at());
             let axis = rng.random_range(0.0..std::f64::consts::TAU);
             let light = 1.0 - (tile % 5) as f64 / 6.0;
             let corner = SimulatedCorner {
@@ -460,16 +463,16 @@ mod tests {
                 let value = grey(f64::from(shown.at(x, y))) + normal.sample(&mut rng);
                 image.pixels_mut()[(top + y) * 5 * SIDE + left + x] = value as f32;
             }
-            places.push([left as f64 + position[0], top as f64 + position[1]]);
+            places.push(DVec2::new(left as f64, top as f64) + position);
         }
         (image, places)
     }
 
     /// Rms of the errors per coordinate, px, and of what the covariances make of them.
-    fn errors(refined: &[Refined], places: &[[f64; 2]]) -> (f64, f64) {
+    fn errors(refined: &[Refined], places: &[DVec2]) -> (f64, f64) {
         let (mut square, mut normalised) = (0.0, 0.0);
         for (refined, place) in refined.iter().zip(places) {
-            let [dx, dy] = [0, 1].map(|i| refined.position[i] - place[i]);
+            let DVec2 { x: dx, y: dy } = refined.position - place;
             let [xx, xy, yy] = refined.cov.unwrap();
             square += dx * dx + dy * dy;
             normalised += (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
@@ -487,7 +490,7 @@ mod tests {
         for (kind, lines) in [(GridKind::Deltille, 3), (GridKind::Checker, 2)] {
             for (name, curve) in curves {
                 let (image, places) = picture(lines, curve, 0.005);
-                let starts: Vec<[f64; 2]> = places.iter().map(|p| p.map(f64::round)).collect();
+                let starts: Vec<DVec2> = places.iter().map(|place| place.round()).collect();
                 let refiner = Refiner::new(kind, Refinement::Model, 21).with_tone(Tone::Auto);
                 let (rms, normalised) = errors(&refiner.refine_all(&image, &starts), &places);
                 assert!(rms < 0.015, "{lines} edges, {name}: {rms}");

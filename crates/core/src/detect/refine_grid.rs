@@ -8,6 +8,7 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
 use rayon::prelude::*;
 
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
@@ -165,7 +166,7 @@ impl Refiner {
                 let found = smaller.or(fit.filter(|_| around[i].is_inner));
                 (found.map(Refined::from), found)
             };
-            if let Some(Refined { position: [x, y], cov, .. }) = refined {
+            if let Some(Refined { position: DVec2 { x, y }, cov, .. }) = refined {
                 kept.push(GridCorner { x, y, cov, ..*corner });
                 fits.push(fit);
             }
@@ -304,7 +305,7 @@ impl Refiner {
             .collect();
         places.sort_by(|a, b| b.0.total_cmp(&a.0));
         let fits = places.iter().take(BLUR_CORNERS).filter_map(|(clear_px, corner, around)| {
-            let place = Pyramid::from_level_0(level, [corner.x, corner.y]);
+            let place = Pyramid::from_level_0(level, corner.position()).to_array();
             // What is a wave shows in the middle of the tiles.
             let reach_px = clear_px.max(MIN_MODEL_RADIUS as f64).floor();
             let room = Room { around, blur_px: USUAL_BLUR_PX, reach_px, optics: &self.known };

@@ -93,14 +93,14 @@ impl<const N: usize> SaddleFinder<N> {
             for candidate in candidates {
                 let start = [candidate.x as f64, candidate.y as f64];
                 // What lies on a corner of a finer level is that corner.
-                if n > 0 && saddles.is_known(Pyramid::to_level_0(n, start), n) {
+                if n > 0 && saddles.is_known(Pyramid::to_level_0(n, start.into()).to_array(), n) {
                     continue;
                 }
                 let fit = &self.fits[USUAL];
                 let Some(on_level) = fit.find(level.into(), start) else {
                     continue;
                 };
-                let place = Pyramid::to_level_0(n, on_level.position);
+                let place = Pyramid::to_level_0(n, on_level.position.into()).to_array();
                 if !saddles.is_free(place, n) {
                     continue;
                 }
@@ -197,10 +197,10 @@ impl<const N: usize> SaddleFinder<N> {
         reach_px: f64,
         accept: impl Fn(Saddle<N>) -> Option<S>,
     ) -> Option<S> {
-        let on_level = Pyramid::from_level_0(level, place);
+        let on_level = Pyramid::from_level_0(level, place.into()).to_array();
         let reach_px = reach_px / f64::from(1u32 << level);
         self.near_in(&pyramid.levels()[level], on_level, reach_px, |found| {
-            let position = Pyramid::to_level_0(level, found.position);
+            let position = Pyramid::to_level_0(level, found.position.into()).to_array();
             accept(Saddle { position, level, ..found })
         })
     }
@@ -299,7 +299,8 @@ fn strongest(candidates: &mut Vec<Candidate>, count: usize) {
 /// blur closes it, has its own brightness.
 fn is_blurred<const N: usize>(pyramid: &Pyramid, level: usize, position: [f64; 2]) -> bool {
     let contrast = |n: usize| {
-        contrast_around::<N>(pyramid.levels().get(n)?, Pyramid::from_level_0(n, position))
+        let place = Pyramid::from_level_0(n, position.into()).to_array();
+        contrast_around::<N>(pyramid.levels().get(n)?, place)
     };
     contrast(level).zip(contrast(level + 1)).is_some_and(|(fine, coarse)| {
         let further = (level + 2..=level + LEVELS_OF_CONTRAST).map_while(contrast);

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
+
 use super::grid_light::{ClearDepth, GridLight};
 use super::grow::SaddleGrid;
 use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
@@ -173,12 +175,12 @@ impl TagReader {
         let map = TileMap::new(grid, tile)?;
         let levels = light.levels(image, grid, tile, edges)?;
         let middle = self.kind.middle();
-        let [_, contrast] = levels.at(middle);
+        let [_, contrast] = levels.at(middle.to_array());
         if contrast < MIN_CONTRAST * corner_contrast(image, grid, tile) {
             return None;
         }
         let width = self.model.width();
-        let at = |u: f64, v: f64| map.image_from_tile([middle[0] + u, middle[1] + v]);
+        let at = |u: f64, v: f64| map.image_from_tile((middle + DVec2::new(u, v)).to_array());
         let step = |p: [f64; 2], q: [f64; 2]| [0, 1].map(|i| (p[i] - q[i]) / (0.5 * width));
         let along = [step(at(0.25, 0.0), at(-0.25, 0.0)), step(at(0.0, 0.25), at(0.0, -0.25))];
         let (covariance, area_px2) = in_tile(light.blur_px2, along)?;
@@ -191,13 +193,13 @@ impl TagReader {
         let brightest = 1.0 + GLARE + GLARE_NOISE * light.noise;
         let mut samples = Vec::with_capacity(self.model.points().len());
         for &point in self.model.points() {
-            let [x, y] = map.image_from_tile(point);
+            let [x, y] = map.image_from_tile(point.to_array());
             if !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
                 samples.push(Sample::Erased);
                 continue;
             }
             let value = f64::from(image.bilinear(x, y));
-            let [dark, contrast] = levels.at(point);
+            let [dark, contrast] = levels.at(point.to_array());
             let brightness = (value - dark) / contrast;
             let share = light.share(brightness).clamp(-0.5, 1.5) as f32;
             let saturated = value >= full;

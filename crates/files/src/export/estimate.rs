@@ -1,5 +1,6 @@
 //! What files tell of an estimate, of a single camera and of a rig alike.
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::motion::Motion;
@@ -41,7 +42,7 @@ struct CornerRecord {
 
 #[derive(Serialize)]
 pub(super) struct ShapeRecord {
-    middle_mm: [f64; 3],
+    middle_mm: DVec3,
     reach_mm: f64,
     /// b₁ … b₇, a₁, a₂ of [`deltille_core::calibrate::Shape`].
     coefficients_mm: Vec<f64>,
@@ -119,7 +120,7 @@ pub(super) fn views<'a>(estimate: &Estimate, camera: &'a CameraEstimate) -> Vec<
 
 pub(super) fn shape(found: BoardShape) -> ShapeRecord {
     ShapeRecord {
-        middle_mm: found.shape.middle_mm.to_array(),
+        middle_mm: found.shape.middle_mm,
         reach_mm: found.shape.reach_mm,
         coefficients_mm: found.shape.coefficients_mm.to_vec(),
         sd_mm: found.sd_mm.to_vec(),
