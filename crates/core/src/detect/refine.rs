@@ -86,7 +86,7 @@ pub(super) struct ModelFit {
 
 impl ModelFit {
     /// Position, px.
-    pub fn position(&self) -> [f64; 2] {
+    pub fn position(&self) -> DVec2 {
         self.corner.position
     }
 
@@ -110,7 +110,7 @@ impl<const K: usize> From<Fitted<K>> for ModelFit {
 
 impl From<ModelFit> for Refined {
     fn from(fit: ModelFit) -> Self {
-        Self { position: fit.position().into(), cov: Some(fit.cov), status: RefineStatus::Ok }
+        Self { position: fit.position(), cov: Some(fit.cov), status: RefineStatus::Ok }
     }
 }
 
@@ -129,19 +129,19 @@ pub(super) struct Room<'a> {
 
 impl Room<'_> {
     /// The pixels of the image that show nothing but the corner at `position`, within a radius.
-    fn window(&self, image: ImageView, position: [f64; 2], radius: usize) -> Window {
+    fn window(&self, image: ImageView, position: DVec2, radius: usize) -> Window {
         let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 1.0);
-        let pixel = position.map(f64::round);
-        let off = [0, 1].map(|i| pixel[i] - position[i]);
+        let pixel = position.round();
+        let off = pixel - position;
         let span = |v: f64| {
-            if !(0.0..=bottom).contains(&(pixel[1] + v)) {
+            if !(0.0..=bottom).contains(&(pixel.y + v)) {
                 return NOTHING;
             }
-            let [first, last] = self.around.span(v + off[1], self.blur_px);
-            [(first - off[0]).max(-pixel[0]), (last - off[0]).min(right - pixel[0])]
+            let [first, last] = self.around.span(v + off.y, self.blur_px);
+            [(first - off.x).max(-pixel.x), (last - off.x).min(right - pixel.x)]
         };
         let is_off_tags = self.around.off_tags(self.blur_px);
-        Window::within(radius, span, |[u, v]| is_off_tags([u + off[0], v + off[1]]))
+        Window::within(radius, span, |place| is_off_tags(place + off))
     }
 
     /// Half the side of the largest square that shows nothing else, px.
@@ -151,7 +151,7 @@ impl Room<'_> {
 }
 
 /// The window, what the model found in it, and the pixel in its middle.
-type Fit = (Window, ModelFit, [f64; 2]);
+type Fit = (Window, ModelFit, DVec2);
 
 /// Refines corners of one kind.
 #[derive(Clone, Debug)]
@@ -228,8 +228,7 @@ impl Refiner {
     /// [`Self::refine_all`], compiled here and not in every crate that uses it.
     fn refine_view(&self, image: ImageView, starts: &[DVec2]) -> Vec<Refined> {
         let mut fitter = CornerFitter::default();
-        let mut fit =
-            |start: &DVec2| self.refine_with(&mut fitter, image, (*start).into(), &self.known);
+        let mut fit = |start: &DVec2| self.refine_with(&mut fitter, image, *start, &self.known);
         let first: Vec<(Refined, Option<Fit>)> = starts.iter().map(&mut fit).collect();
         if self.method == Refinement::Polynomial || self.tone == Tone::Linear {
             return first.into_iter().map(|(refined, _)| refined).collect();
@@ -247,7 +246,7 @@ impl Refiner {
             .collect();
         let optics = self.joint_optics(&mut fitter, image, samples, &self.known);
         let again = |(i, (refined, fit)): (usize, (Refined, Option<_>))| match fit {
-            Some(_) => self.refine_with(&mut fitter, image, starts[i].into(), &optics).0,
+            Some(_) => self.refine_with(&mut fitter, image, starts[i], &optics).0,
             None => refined,
         };
         first.into_iter().enumerate().map(again).collect()
@@ -271,7 +270,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        start: [f64; 2],
+        start: DVec2,
         optics: &Optics,
     ) -> (Refined, Option<Fit>) {
         let found = self.polynomial.refine(image, start, self.iterations).map(|c| c.position);
@@ -281,9 +280,7 @@ impl Refiner {
             Polynomial::Quadric(_) => self.alone::<2>(fitter, image, position, optics),
         };
         match (self.method == Refinement::Model).then(model).flatten() {
-            Some((window, fit)) => {
-                (fit.into(), Some((window.clone(), fit, position.map(f64::round))))
-            }
+            Some((window, fit)) => (fit.into(), Some((window.clone(), fit, position.round()))),
             None => (self.without_model(start, found), None),
         }
     }
@@ -294,7 +291,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        start: [f64; 2],
+        start: DVec2,
         room: Room,
     ) -> (Refined, Option<ModelFit>) {
         let mut model = |position| {
@@ -316,13 +313,13 @@ impl Refiner {
         }
     }
 
-    fn without_model(&self, start: [f64; 2], polynomial: Option<[f64; 2]>) -> Refined {
+    fn without_model(&self, start: DVec2, polynomial: Option<DVec2>) -> Refined {
         let status = match (polynomial, self.method) {
             (None, _) => RefineStatus::Failed,
             (Some(_), Refinement::Polynomial) => RefineStatus::Ok,
             (Some(_), Refinement::Model) => RefineStatus::Polynomial,
         };
-        Refined { position: polynomial.unwrap_or(start).into(), cov: None, status }
+        Refined { position: polynomial.unwrap_or(start), cov: None, status }
     }
 
     /// The model of a single corner, in the largest window that lies in the image.
@@ -330,7 +327,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        position: [f64; 2],
+        position: DVec2,
         optics: &Optics,
     ) -> Option<(&Window, ModelFit)> {
         let reach = distance_to_rim(image, position);
@@ -345,7 +342,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        position: [f64; 2],
+        position: DVec2,
         room: Room,
         before: Option<&ModelFit>,
     ) -> Option<ModelFit> {
@@ -359,7 +356,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        position: [f64; 2],
+        position: DVec2,
         room: Room,
         before: Option<&ModelFit>,
     ) -> Option<ModelFit> {
@@ -387,12 +384,7 @@ impl Refiner {
     }
 
     /// The pixels of a corner's room.
-    pub(super) fn window(
-        &self,
-        image: ImageView,
-        position: [f64; 2],
-        room: Room,
-    ) -> Cow<'_, Window> {
+    pub(super) fn window(&self, image: ImageView, position: DVec2, room: Room) -> Cow<'_, Window> {
         let radius = room.reach_px.min(self.largest_radius());
         let is_whole = radius <= room.clear_square_px().min(distance_to_rim(image, position));
         let whole = self.windows.iter().find(|w| w.radius() as f64 == radius && is_whole);
@@ -423,7 +415,7 @@ fn edge_along(edges: &[Edge], angle_rad: f64) -> Edge {
 }
 
 /// Pixels between a position and the nearest side of the image, where bilinear samples end.
-fn distance_to_rim(image: ImageView, [x, y]: [f64; 2]) -> f64 {
+fn distance_to_rim(image: ImageView, DVec2 { x, y }: DVec2) -> f64 {
     let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 2.0);
     [x - 1.0, y - 1.0, right - x, bottom - y].into_iter().fold(f64::INFINITY, f64::min)
 }

@@ -316,26 +316,26 @@ fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
 fn parts_of(cell: &[DVec2]) -> Vec<DVec2> {
     let third = 1.0 / (3.0 * DIVISIONS as f64);
     let rows = (0..DIVISIONS).flat_map(|j| (0..DIVISIONS - j).map(move |i| (i, j)));
-    let parts: Vec<[f64; 2]> = rows
+    let parts: Vec<DVec2> = rows
         .flat_map(|(i, j)| {
             let upright = [3 * i + 1, 3 * j + 1];
             let inverted = (i + j + 1 < DIVISIONS).then_some([3 * i + 2, 3 * j + 2]);
             [Some(upright), inverted].into_iter().flatten()
         })
-        .map(|part| part.map(|thirds| thirds as f64 * third))
+        .map(|part| DVec2::from(part.map(|thirds| thirds as f64)) * third)
         .collect();
     let a = cell[0];
     let triangles = cell[1..].windows(2);
     let middles = triangles.flat_map(|bc| {
         let (to_b, to_c) = (bc[0] - a, bc[1] - a);
-        parts.iter().map(move |&[s, t]| a + s * to_b + t * to_c)
+        parts.iter().map(move |part| a + part.x * to_b + part.y * to_c)
     });
     middles.collect()
 }
 
 /// A covariance in px² as that of a tile's coordinates, whose steps along u and v are these vectors, px.
-pub fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [[f64; 2]; 2]) -> Option<([f64; 3], f64)> {
-    let jacobian = Matrix2::new(a[0], b[0], a[1], b[1]);
+pub fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [DVec2; 2]) -> Option<([f64; 3], f64)> {
+    let jacobian = Matrix2::new(a.x, b.x, a.y, b.y);
     let determinant = jacobian.determinant().abs();
     let inverse = jacobian.try_inverse()?;
     let covariance = Matrix2::new(xx, xy, xy, yy);

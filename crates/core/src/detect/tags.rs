@@ -175,14 +175,13 @@ impl TagReader {
         let map = TileMap::new(grid, tile)?;
         let levels = light.levels(image, grid, tile, edges)?;
         let middle = self.kind.middle();
-        let [_, contrast] = levels.at(middle.to_array());
+        let [_, contrast] = levels.at(middle);
         if contrast < MIN_CONTRAST * corner_contrast(image, grid, tile) {
             return None;
         }
         let width = self.model.width();
-        let at = |u: f64, v: f64| map.image_from_tile((middle + DVec2::new(u, v)).to_array());
-        let step = |p: [f64; 2], q: [f64; 2]| [0, 1].map(|i| (p[i] - q[i]) / (0.5 * width));
-        let along = [step(at(0.25, 0.0), at(-0.25, 0.0)), step(at(0.0, 0.25), at(0.0, -0.25))];
+        let at = |by: DVec2| map.image_from_tile(middle + by);
+        let along = [0.25 * DVec2::X, 0.25 * DVec2::Y].map(|by| (at(by) - at(-by)) / (0.5 * width));
         let (covariance, area_px2) = in_tile(light.blur_px2, along)?;
         let noise = light.noise;
         let mixing = self.model.mixing(TileBlur { covariance, area_px2, noise }, mixings)?;
@@ -193,13 +192,13 @@ impl TagReader {
         let brightest = 1.0 + GLARE + GLARE_NOISE * light.noise;
         let mut samples = Vec::with_capacity(self.model.points().len());
         for &point in self.model.points() {
-            let [x, y] = map.image_from_tile(point.to_array());
+            let DVec2 { x, y } = map.image_from_tile(point);
             if !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
                 samples.push(Sample::Erased);
                 continue;
             }
             let value = f64::from(image.bilinear(x, y));
-            let [dark, contrast] = levels.at(point.to_array());
+            let [dark, contrast] = levels.at(point);
             let brightness = (value - dark) / contrast;
             let share = light.share(brightness).clamp(-0.5, 1.5) as f32;
             let saturated = value >= full;
@@ -221,7 +220,7 @@ impl TagReader {
             }
         }
         let half_odds = mixing.half_odds(&samples);
-        let length = |[x, y]: [f64; 2]| x.hypot(y);
+        let length = |step: DVec2| step.x.hypot(step.y);
         Some((Reading { tile, half_odds }, length(along[0]).max(length(along[1]))))
     }
 }
