@@ -123,7 +123,7 @@ fn a_camera_is_calibrated_and_read_back() {
     assert!(said.contains("12 views, 864 corners, rms 0.05"), "{said}");
     assert!(said.contains("held out: 3 views, 216 corners, rms 0.05"), "{said}");
     let found = Camera::from_yaml(&std::fs::read_to_string(at.join("camera.yaml")).unwrap());
-    assert!((found.unwrap().focal_px[0] - 625.0).abs() < 0.5);
+    assert!((found.unwrap().focal_px.x - 625.0).abs() < 0.5);
     for end in ["-opencv.yaml", "-ros.yaml", "-camchain.yaml", "-cameras.txt", "-transforms.json"] {
         assert!(at.join(format!("camera{end}")).exists(), "{end}");
     }

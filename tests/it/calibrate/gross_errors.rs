@@ -54,7 +54,7 @@ fn places(camera: &Camera, target: &Target, count: usize, rng: &mut ChaCha8Rng) 
     let size = corners.iter().map(|c| c.distance(middle)).fold(0.0, f64::max);
     let is_fisheye = !matches!(camera.lens, Lens::BrownConrady(_));
     let reach = if is_fisheye { 1.2 } else { 0.3 };
-    let distance = size * camera.focal_px[0] / if is_fisheye { 250.0 } else { 400.0 };
+    let distance = size * camera.focal_px.x / if is_fisheye { 250.0 } else { 400.0 };
     let mut found = Vec::new();
     while found.len() < count {
         let mut any = |reach: f64| rng.random_range(-reach..reach);
@@ -231,7 +231,7 @@ fn solve(
 
 /// Error of the focal length in deviations, and its deviation, px.
 fn focal(found: &Estimate, model: Model) -> (f64, f64) {
-    let (truth, fx) = (camera(model).focal_px[0], &found.cameras[0].parameters[0]);
+    let (truth, fx) = (camera(model).focal_px.x, &found.cameras[0].parameters[0]);
     let sd = fx.sd.unwrap();
     ((fx.value - truth) / sd, sd)
 }

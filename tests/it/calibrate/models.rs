@@ -248,7 +248,7 @@ fn any_focal_length_is_found() {
             views.extend(view(&truth, &pose, "", &mut noise));
         }
         let found = solved(&views, Model::Radtan);
-        let ratio = found.cameras[0].camera.focal_px[0] / focal;
+        let ratio = found.cameras[0].camera.focal_px.x / focal;
         assert!((ratio - 1.0).abs() < 1e-4, "{focal}: {ratio}");
     }
 }

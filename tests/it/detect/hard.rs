@@ -48,7 +48,7 @@ impl Board {
     /// Seen with `bit_px` pixels to a tag bit in the middle, before the tilt shortens it.
     fn view(&self, rng: &mut ChaCha8Rng, bit_px: f64, tilt_rad: f64) -> (Camera, Pose) {
         let camera = Camera::pinhole(640, 480, 0.5);
-        let distance_mm = camera.focal_px[0] * self.bit_mm / bit_px;
+        let distance_mm = camera.focal_px.x * self.bit_mm / bit_px;
         (camera, tilted(rng, self.centre_mm, distance_mm, tilt_rad))
     }
 

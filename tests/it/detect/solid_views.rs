@@ -300,7 +300,7 @@ fn three_hundred_views_of_an_icosahedron() {
         let camera = Camera::pinhole(1600, 1200, hfov);
         let radius = 143.0;
         // The object takes 60 to 100 % of the height, seen from outside.
-        let half = (rng.random_range(0.6..1.0) * 600.0 / camera.focal_px[0]).atan();
+        let half = (rng.random_range(0.6..1.0) * 600.0 / camera.focal_px.x).atan();
         let distance = radius / half.sin();
         let random = |rng: &mut ChaCha8Rng| {
             DVec3::from_array([0; 3].map(|_| rng.random_range(-1.0..1.0))).normalize()

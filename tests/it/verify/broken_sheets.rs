@@ -251,10 +251,10 @@ fn a_deleted_tile_is_named() {
 fn a_short_check_bar_is_measured() {
     let board = board(spec());
     let mut short = board.target.clone();
-    short.sheets[0].check_bars[0].to_mm[0] -= 0.1;
+    short.sheets[0].check_bars[0].to_mm.x -= 0.1;
     let artwork = artwork::draw(&short, Some(&board.family)).unwrap();
     let bar = &board.target.sheets[0].check_bars[0];
-    let length = bar.to_mm[0] - bar.from_mm[0];
+    let length = bar.to_mm.x - bar.from_mm.x;
     for format in ALL {
         let verdict = board.verify(&artwork, format);
         assert_fails(&verdict, &["check bar 1 measures"]);
@@ -376,7 +376,7 @@ fn a_bar_much_shorter_than_stated_is_measured() {
     let artwork = board.artwork();
     let bar = &mut board.target.sheets[0].check_bars[0];
     let printed = bar.length_mm();
-    bar.to_mm[0] += 10.0;
+    bar.to_mm.x += 10.0;
     let verdict = board.verify(&artwork, Format::Png);
     assert_fails(&verdict, &["check bar 1 measures"]);
     let (_, found) = verdict.sheets[0].check_bars_mm[0];

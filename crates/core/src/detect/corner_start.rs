@@ -125,8 +125,8 @@ pub fn start<const K: usize>(
         let (sin, cos) = direction(i as f64).sin_cos();
         for circle in CIRCLES {
             let (du, dv) = (circle * radius_px * cos, circle * radius_px * sin);
-            let here = f64::from(image.bilinear(position[0] + du, position[1] + dv));
-            let opposite = f64::from(image.bilinear(position[0] - du, position[1] - dv));
+            let here = f64::from(image.bilinear(position.x + du, position.y + dv));
+            let opposite = f64::from(image.bilinear(position.x - du, position.y - dv));
             *value += if odd { here - opposite } else { here + opposite };
             total += here + opposite;
         }

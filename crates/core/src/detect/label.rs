@@ -907,7 +907,7 @@ mod tests {
         let panel = &target.panels[0];
         let camera = crate::camera::Camera::pinhole(160, 160, 0.3);
         let bits_across = 6.0 + 3.0 * panel.border_bits.unwrap();
-        let distance_mm = camera.focal_px[0] * panel.edge_mm / bits_across / 4.0;
+        let distance_mm = camera.focal_px.x * panel.edge_mm / bits_across / 4.0;
         let mut seen = NoisyTags::default();
         for seed in 0..views {
             let tag = &panel.tags[seed as usize % panel.tags.len()];

@@ -7,10 +7,13 @@
 //! use deltille_core::detect::{Refinement, Refiner};
 //! use deltille_core::synth::SimulatedCorner;
 //! use deltille_core::lattice::GridKind;
+//! use glam::DVec2;
 //!
-//! let image = SimulatedCorner::seen_from(2, 0.3, 0.5, [20.2, 19.9], 1.0).render(41, 41);
-//! let refined = Refiner::new(GridKind::Checker, Refinement::Model, 21).refine(&image, [21.0, 20.0]);
-//! assert!((refined.position[0] - 20.2).abs() < 1e-3 && refined.cov.is_some());
+//! let place = DVec2::new(20.2, 19.9);
+//! let image = SimulatedCorner::seen_from(2, 0.3, 0.5, place, 1.0).render(41, 41);
+//! let refiner = Refiner::new(GridKind::Checker, Refinement::Model, 21);
+//! let refined = refiner.refine(&image, DVec2::new(21.0, 20.0));
+//! assert!(refined.position.abs_diff_eq(place, 1e-3) && refined.cov.is_some());
 //! ```
 
 use std::borrow::Cow;

@@ -100,10 +100,10 @@ pub(super) fn views<'a>(estimate: &Estimate, camera: &'a CameraEstimate) -> Vec<
             panel: corner.panel,
             row: corner.row,
             col: corner.col,
-            x: corner.pixel[0],
-            y: corner.pixel[1],
-            dx: corner.residual[0],
-            dy: corner.residual[1],
+            x: corner.pixel.x,
+            y: corner.pixel.y,
+            dx: corner.residual.x,
+            dy: corner.residual.y,
             outlier: corner.outlier,
         });
         ViewRecord {
