@@ -25,8 +25,8 @@ fn sighting(
 ) -> Option<Sighting> {
     let mut observations = Vec::with_capacity(corners.len());
     for &(row, col, panel_mm) in corners {
-        let [x, y] = camera.project(camera_from_panel.apply(panel_mm))?;
-        let pixel = [x, y].map(|v| v + random.random_range(-NOISE_PX..NOISE_PX));
+        let at = camera.project(camera_from_panel.apply(panel_mm))?;
+        let pixel = at.map(|v| v + random.random_range(-NOISE_PX..NOISE_PX));
         let cov = Some([0.003, 0.0, 0.003]);
         observations.push(Observation { row, col, panel_mm, pixel, cov });
     }

@@ -23,18 +23,18 @@ pub fn covariance(
     noise: f64,
     tone: Tone,
 ) -> Option<Matrix2<f64>> {
-    let centre = corner.position.map(|c| c.round() as usize);
+    let centre = corner.position.to_array().map(|c| c.round() as usize);
     // Slopes act about the corner; whence they are counted changes level and contrast alone.
     let local = SimulatedCorner { light_centre: corner.position, ..corner.clone() };
     type Move<'a> = Box<dyn Fn(&mut SimulatedCorner, f64) + 'a>;
     let mut moves: Vec<Move> = vec![
-        Box::new(|c, d| c.position[0] += d),
-        Box::new(|c, d| c.position[1] += d),
+        Box::new(|c, d| c.position.x += d),
+        Box::new(|c, d| c.position.y += d),
         Box::new(|c, d| c.blur_px += d),
         Box::new(|c, d| c.amplitude += d),
         Box::new(|c, d| c.level += d),
-        Box::new(|c, d| c.slope[0] += d),
-        Box::new(|c, d| c.slope[1] += d),
+        Box::new(|c, d| c.slope.x += d),
+        Box::new(|c, d| c.slope.y += d),
     ];
     for k in 0..corner.angles.len() {
         moves.push(Box::new(move |c, d| c.angles[k] += d));

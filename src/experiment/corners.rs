@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use glam::DVec2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -249,7 +250,8 @@ fn sample(
     };
     let tone = if sweep == Sweep::Tone { Tone::Gamma(value) } else { tone };
     let centre = (SIDE / 2) as f64;
-    let truth = [centre + rng.random_range(-0.5..0.5), centre + rng.random_range(-0.5..0.5)];
+    let offset = DVec2::new(rng.random_range(-0.5..0.5), rng.random_range(-0.5..0.5));
+    let truth = centre + offset;
     let lines = match kind {
         GridKind::Deltille => 3,
         GridKind::Checker => 2,
@@ -257,7 +259,7 @@ fn sample(
     let axis = rng.random_range(0.0..TAU);
     let (slope, towards) = (rng.random_range(-MAX_SLOPE..MAX_SLOPE), rng.random_range(0.0..TAU));
     let corner = SimulatedCorner {
-        slope: [slope * towards.cos(), slope * towards.sin()],
+        slope: slope * DVec2::from_angle(towards),
         ..SimulatedCorner::seen_from(lines, axis, tilt_deg.to_radians(), truth, blur_px)
     };
     let mut image = corner.render(SIDE, SIDE);
@@ -265,11 +267,10 @@ fn sample(
         *pixel = tone.grey(f64::from(*pixel)) as f32;
     }
     add_noise(&mut image, noise, rng);
-    let starts = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
-        .map(|[u, v]| [truth[0].floor() + u, truth[1].floor() + v]);
+    let starts = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|corner| truth.floor() + corner);
     let outcome = |refiner: &Refiner, start| {
         let refined = refiner.refine(&image, start);
-        let (dx, dy) = (refined.position[0] - truth[0], refined.position[1] - truth[1]);
+        let DVec2 { x: dx, y: dy } = refined.position - truth;
         let nees = refined.cov.map(|[xx, xy, yy]| {
             (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
         });

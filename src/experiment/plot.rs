@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 
+use glam::DVec2;
 use kurbo::Affine;
 
 use super::corners::{METHODS, Method, Row, Sweep, name};
@@ -12,8 +13,8 @@ use crate::export::kind::signed_png;
 use crate::lattice::GridKind;
 
 /// Size of a panel's axes and the room around it, in user units.
-const PANEL: [f64; 2] = [300.0, 230.0];
-const MARGIN: [f64; 2] = [70.0, 78.0];
+const PANEL: DVec2 = DVec2::new(300.0, 230.0);
+const MARGIN: DVec2 = DVec2::new(70.0, 78.0);
 const HEAD: f64 = 56.0;
 
 /// Range of the vertical axis, px.
@@ -36,28 +37,23 @@ fn colour(method: Method) -> &'static str {
 
 /// The plot as SVG.
 pub fn svg(rows: &[Row]) -> String {
-    let (width, height) = (
-        Sweep::ALL.len() as f64 * (PANEL[0] + MARGIN[0]) + 20.0,
-        HEAD + 2.0 * (PANEL[1] + MARGIN[1]) + 4.0,
-    );
+    let pitch = PANEL + MARGIN;
+    let size = DVec2::new(Sweep::ALL.len() as f64 * pitch.x + 20.0, HEAD + 2.0 * pitch.y + 4.0);
     let mut body = String::new();
     legend(&mut body);
     for (j, kind) in [GridKind::Deltille, GridKind::Checker].into_iter().enumerate() {
         for (i, sweep) in Sweep::ALL.into_iter().enumerate() {
-            let origin = [
-                MARGIN[0] + i as f64 * (PANEL[0] + MARGIN[0]),
-                HEAD + j as f64 * (PANEL[1] + MARGIN[1]),
-            ];
+            let origin = DVec2::new(MARGIN.x, HEAD) + DVec2::new(i as f64, j as f64) * pitch;
             let rows: Vec<&Row> =
                 rows.iter().filter(|row| row.kind == kind && row.sweep == sweep).collect();
             panel(&mut body, origin, kind, sweep, &rows);
         }
     }
-    page([width, height], &body)
+    page(size, &body)
 }
 
 /// Shapes on a white page.
-pub(super) fn page([width, height]: [f64; 2], body: &str) -> String {
+pub(super) fn page(DVec2 { x: width, y: height }: DVec2, body: &str) -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
          viewBox=\"0 0 {width} {height}\">\n<!-- {} -->\n<rect width=\"100%\" height=\"100%\" \
@@ -78,27 +74,30 @@ pub fn png(svg: &str) -> Option<Vec<u8>> {
 }
 
 fn legend(body: &mut String) {
-    let mut x = MARGIN[0];
+    let mut at = DVec2::new(MARGIN.x, 20.0);
     let entries = METHODS.iter().map(|&m| (m.name(), colour(m), ""));
     for (label, colour, dash) in
         entries.chain([("Cramer–Rao bound".to_owned(), BOUND_COLOUR, "6 4")])
     {
-        line(body, &[[x, 20.0], [x + 34.0, 20.0]], colour, 2.5, dash);
-        x += 42.0 + write(body, &label, [x + 42.0, 25.0], 0.0) + 30.0;
+        line(body, &[at, at + DVec2::X * 34.0], colour, 2.5, dash);
+        at.x += 42.0 + write(body, &label, at + DVec2::new(42.0, 5.0), 0.0) + 30.0;
     }
 }
 
-fn panel(body: &mut String, [left, top]: [f64; 2], kind: GridKind, sweep: Sweep, rows: &[&Row]) {
+fn panel(body: &mut String, origin: DVec2, kind: GridKind, sweep: Sweep, rows: &[&Row]) {
+    let DVec2 { x: left, y: top } = origin;
+    let DVec2 { x: right, y: bottom } = origin + PANEL;
     let [low, high] = ERRORS_PX.map(f64::ln);
     let last = sweep.values().last().copied().unwrap_or(1.0);
-    let x = |value: f64| left + value / last * PANEL[0];
+    let x = |value: f64| left + value / last * PANEL.x;
     let y = |error: f64| {
         let part = (error.max(ERRORS_PX[0]).ln() - low) / (high - low);
-        top + (1.0 - part.clamp(0.0, 1.0)) * PANEL[1]
+        top + (1.0 - part.clamp(0.0, 1.0)) * PANEL.y
     };
     for guide in GUIDES_PX {
-        line(body, &[[left, y(guide)], [left + PANEL[0], y(guide)]], "#cccccc", 0.8, "");
-        write(body, &format!("{guide}"), [left - 8.0, y(guide) + 5.0], 1.0);
+        let ends = [left, right].map(|x| DVec2::new(x, y(guide)));
+        line(body, &ends, "#cccccc", 0.8, "");
+        write(body, &format!("{guide}"), ends[0] + DVec2::new(-8.0, 5.0), 1.0);
     }
     let step = match sweep {
         Sweep::Tilt => 15.0,
@@ -106,37 +105,37 @@ fn panel(body: &mut String, [left, top]: [f64; 2], kind: GridKind, sweep: Sweep,
         Sweep::Tone => 0.5,
     };
     for tick in (0..).map(|n| f64::from(n) * step).take_while(|&tick| tick <= last) {
-        let bottom = top + PANEL[1];
-        line(body, &[[x(tick), bottom], [x(tick), bottom + 5.0]], "#444444", 1.0, "");
-        write(body, &format!("{tick}"), [x(tick), bottom + 19.0], 0.5);
+        let foot = DVec2::new(x(tick), bottom);
+        line(body, &[foot, foot + DVec2::Y * 5.0], "#444444", 1.0, "");
+        write(body, &format!("{tick}"), foot + DVec2::Y * 19.0, 0.5);
     }
-    let [right, bottom] = [left + PANEL[0], top + PANEL[1]];
-    line(body, &[[left, top], [left, bottom], [right, bottom]], "#444444", 1.2, "");
+    let corner = DVec2::new(left, bottom);
+    line(body, &[origin, corner, origin + PANEL], "#444444", 1.2, "");
     let axis = match sweep {
         Sweep::Blur => "blur, px",
         Sweep::Noise => "noise, percent",
         Sweep::Tilt => "tilt, °",
         Sweep::Tone => "gamma of the tone curve",
     };
-    write(body, axis, [left + PANEL[0] / 2.0, bottom + 38.0], 0.5);
-    write(body, &format!("{}: mean error, px", name(kind)), [left, top - 8.0], 0.0);
+    write(body, axis, corner + DVec2::new(PANEL.x / 2.0, 38.0), 0.5);
+    write(body, &format!("{}: mean error, px", name(kind)), origin - DVec2::Y * 8.0, 0.0);
     let of = |method| rows.iter().filter(move |row| row.method == method);
     for method in METHODS {
-        let points: Vec<[f64; 2]> =
-            of(method).map(|row| [x(row.value), y(row.error_px[0])]).collect();
+        let points: Vec<DVec2> =
+            of(method).map(|row| DVec2::new(x(row.value), y(row.error_px[0]))).collect();
         line(body, &points, colour(method), 2.2, "");
     }
-    let bound: Vec<[f64; 2]> =
-        of(Method::Model).map(|row| [x(row.value), y(row.bound_px)]).collect();
+    let bound: Vec<DVec2> =
+        of(Method::Model).map(|row| DVec2::new(x(row.value), y(row.bound_px))).collect();
     line(body, &bound, BOUND_COLOUR, 1.6, "6 4");
 }
 
 /// A line through points, in user units.
-pub(super) fn line(body: &mut String, points: &[[f64; 2]], colour: &str, width: f64, dash: &str) {
+pub(super) fn line(body: &mut String, points: &[DVec2], colour: &str, width: f64, dash: &str) {
     let places: Vec<String> = points
         .iter()
-        .filter(|[_, y]| y.is_finite())
-        .map(|[x, y]| format!("{x:.1},{y:.1}"))
+        .filter(|point| point.y.is_finite())
+        .map(|point| format!("{:.1},{:.1}", point.x, point.y))
         .collect();
     // Writing to a String cannot fail.
     let _ = writeln!(
@@ -148,7 +147,7 @@ pub(super) fn line(body: &mut String, points: &[[f64; 2]], colour: &str, width: 
 }
 
 /// Writes text whose given part (0 start, 1 end) lies at a place; returns its width.
-pub(super) fn write(body: &mut String, label: &str, [x, y]: [f64; 2], anchor: f64) -> f64 {
+pub(super) fn write(body: &mut String, label: &str, DVec2 { x, y }: DVec2, anchor: f64) -> f64 {
     const SIZE: f64 = 14.0;
     let Ok((path, width)) = text::outline(label, SIZE) else { return 0.0 };
     let placed = Affine::new([1.0, 0.0, 0.0, -1.0, x - anchor * width, y]) * path;

@@ -146,7 +146,7 @@ impl World {
         let focal = f64::from(width) / 2.0 / (FIELD_RAD / 2.0).tan();
         let lens = BrownConrady { radial: [-0.1, 0.05, 0.0], ..BrownConrady::default() };
         let mut camera = Camera::centred(width, height, focal, Lens::BrownConrady(lens));
-        camera.centre_px = camera.centre_px.map(|c| c + 0.01 * f64::from(width));
+        camera.centre_px += 0.01 * f64::from(width);
         let depth = (DISTANCE_MM * DISTANCE_MM - 2.0 * BASE_MM * BASE_MM).sqrt();
         let camera_from_world = (0..CAMERAS).map(|index| {
             let side = |bit: usize| if index & bit == 0 { -BASE_MM } else { BASE_MM };
@@ -284,7 +284,7 @@ fn misplaced(target: &Target, seed: u64) -> Target {
         let turn = DMat3::from_quat(DQuat::from_scaled_axis(normal(PLACED_RAD)));
         // A panel is turned about its own middle.
         let middle = panel.middle_mm();
-        let arm = DVec3::from(panel.pose.translation_mm) - middle;
+        let arm = panel.pose.translation_mm - middle;
         PanelPose::new(turn * panel.pose.matrix(), middle + turn * arm + normal(PLACED_MM))
     });
     target.with_poses(&poses.collect::<Vec<_>>())
@@ -297,10 +297,8 @@ impl Outcome {
         };
         let truth = &world.camera;
         let cameras = || found.cameras.iter();
-        let focal =
-            cameras().flat_map(|c| [0, 1].map(|i| c.camera.focal_px[i] / truth.focal_px[i] - 1.0));
-        let centre =
-            cameras().flat_map(|c| [0, 1].map(|i| c.camera.centre_px[i] - truth.centre_px[i]));
+        let focal = cameras().flat_map(|c| (c.camera.focal_px / truth.focal_px - 1.0).to_array());
+        let centre = cameras().flat_map(|c| (c.camera.centre_px - truth.centre_px).to_array());
         let off = cameras().enumerate().skip(1).map(|(index, camera)| {
             let truth = world.camera_from_rig(index);
             let place = camera.camera_from_rig.inverse().translation - truth.inverse().translation;

@@ -8,12 +8,13 @@
 //!
 //! ```text
 //! #[serde(deserialize_with = "quantity::place_mm::de")]
-//! pub target_mm: [f64; 3],
+//! pub target_mm: DVec3,
 //! ```
 
 use std::collections::BTreeMap;
 use std::fmt;
 
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Deserializer, de::Error};
 
 /// The range of a quantity, both ends included.
@@ -123,6 +124,18 @@ impl Numbers for u32 {
 impl<T: Numbers, const N: usize> Numbers for [T; N] {
     fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
         self.iter().try_for_each(|number| number.all(pass))
+    }
+}
+
+impl Numbers for DVec2 {
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+        self.to_array().all(pass)
+    }
+}
+
+impl Numbers for DVec3 {
+    fn all(&self, pass: &mut dyn FnMut(f64) -> Result<(), OutOfRange>) -> Result<(), OutOfRange> {
+        self.to_array().all(pass)
     }
 }
 

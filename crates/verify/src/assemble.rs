@@ -3,6 +3,7 @@
 //! Every pixel of the sheet is taken from the page in whose window it lies deepest; what the other
 //! pages show there must be the same.
 
+use glam::DVec2;
 use rayon::prelude::*;
 
 use super::document::Page;
@@ -40,7 +41,7 @@ pub(super) fn assemble(
         image: Gray::from_fn(0, 0, |_, _| 255),
         smear_px: 1.0 + px_per_mm / coarsest,
     };
-    let at_mm = |x: usize, y: usize| sheet.page_from_px([x as f64, y as f64]);
+    let at_mm = |x: usize, y: usize| sheet.page_from_px(DVec2::new(x as f64, y as f64));
     let mut pixels = vec![255u8; size_px[0] * size_px[1]];
     let rows = pixels.par_chunks_mut(size_px[0]).enumerate();
     let differences: Vec<Difference> = rows
@@ -81,7 +82,7 @@ pub(super) fn assemble(
         if !named.contains(&pages) {
             named.push(pages);
             let labels = pages.map(|index| layout.pages[index].label.clone());
-            let at_mm = sheet.page_from_px([x as f64, y as f64]);
+            let at_mm = sheet.page_from_px(DVec2::new(x as f64, y as f64));
             findings.push(PageFinding::PagesDiffer { pages: labels, at_mm }.into());
         }
     }
@@ -89,23 +90,24 @@ pub(super) fn assemble(
 }
 
 /// How deep a position of the sheet lies in the window of a page; negative outside.
-fn depth_mm(page: &SheetPage, [x, y]: [f64; 2]) -> f64 {
+fn depth_mm(page: &SheetPage, place: DVec2) -> f64 {
     let [left, lower, right, upper] = page.window_mm;
-    let (x, y) = (x + page.sheet_at_mm[0], y + page.sheet_at_mm[1]);
+    let DVec2 { x, y } = place + page.sheet_at_mm;
     (x - left).min(right - x).min(y - lower).min(upper - y)
 }
 
 /// The ink of a page at a position of the sheet, as a pixel of the sheet sees it: the mean of as
 /// many samples as the page has pixels there.
-fn ink(page: &Page, window: &SheetPage, [x, y]: [f64; 2], px_per_mm: f64) -> f64 {
-    let [x, y] = page.px_from_page([x + window.sheet_at_mm[0], y + window.sheet_at_mm[1]]);
+fn ink(page: &Page, window: &SheetPage, place: DVec2, px_per_mm: f64) -> f64 {
+    let middle = page.px_from_page(place + window.sheet_at_mm);
     let ratio = page.px_per_mm / px_per_mm;
     let samples = (ratio - 0.2).ceil().max(1.0) as usize;
     if samples == 1 {
-        return page.ink([x, y]);
+        return page.ink(middle);
     }
     let step = ratio / samples as f64;
     let offset = |i: usize| (i as f64 - (samples - 1) as f64 / 2.0) * step;
-    let rows = (0..samples).flat_map(|i| (0..samples).map(move |j| [offset(i), offset(j)]));
-    rows.map(|[dx, dy]| page.ink([x + dx, y + dy])).sum::<f64>() / (samples * samples) as f64
+    let offsets =
+        (0..samples).flat_map(|i| (0..samples).map(move |j| DVec2::new(offset(i), offset(j))));
+    offsets.map(|off| page.ink(middle + off)).sum::<f64>() / (samples * samples) as f64
 }

@@ -1,5 +1,7 @@
 //! Check bars measured in a picture, without knowledge of how they were drawn.
 
+use glam::DVec2;
+
 use super::document::Page;
 
 /// Distances from the line at which the end strokes are met, mm: beyond the line's own thickness
@@ -27,16 +29,16 @@ const LINE_BESIDE_MM: f64 = 0.25;
 
 /// The distance between the outer edges of the end strokes of a bar near `ends_mm` on the page, mm;
 /// `None` where one is missing.
-pub(super) fn measure(page: &Page, ends_mm: [[f64; 2]; 2]) -> Option<f64> {
+pub(super) fn measure(page: &Page, ends_mm: [DVec2; 2]) -> Option<f64> {
     let [from, to] = ends_mm.map(|end| page.px_from_page(end));
-    let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-    let length = dx.hypot(dy);
+    let way = to - from;
+    let length = way.x.hypot(way.y);
     if length < 1.0 {
         return None;
     }
-    let along = [dx / length, dy / length];
+    let along = way / length;
     let reach = [length / 2.0, (REACH_MM * page.px_per_mm).max(REACH * length)];
-    let start = outer_edge(page, from, [-along[0], -along[1]], reach)?;
+    let start = outer_edge(page, from, -along, reach)?;
     let end = outer_edge(page, to, along, reach)?;
     Some((length + start + end) / page.px_per_mm)
 }
@@ -51,15 +53,12 @@ pub(super) fn measure(page: &Page, ends_mm: [[f64; 2]; 2]) -> Option<f64> {
 /// not do: a pixel's ink counts in the pixel's middle, up to ⅛ px² too far out.)
 fn outer_edge(
     page: &Page,
-    end: [f64; 2],
-    outwards: [f64; 2],
+    end: DVec2,
+    outwards: DVec2,
     [inner_reach, outer_reach]: [f64; 2],
 ) -> Option<f64> {
-    let across = [-outwards[1], outwards[0]];
-    let ink = |t: f64, offset: f64| {
-        let at = |i: usize| end[i] + outwards[i] * t + across[i] * offset;
-        page.ink([at(0), at(1)])
-    };
+    let across = outwards.perp();
+    let ink = |t: f64, offset: f64| page.ink(end + outwards * t + across * offset);
     let (near, far) = (OFFSETS_MM.start() * page.px_per_mm, OFFSETS_MM.end() * page.px_per_mm);
     let lines = ((far - near).floor() as usize + 1).max(2);
     let offsets: Vec<f64> = (0..lines)
@@ -69,7 +68,7 @@ fn outer_edge(
     let first = -inner_reach.ceil();
     let count = (inner_reach.ceil() + outer_reach.ceil()) as usize + 1;
     // Along a bar that follows the pixels, their middles.
-    let axis = usize::from(outwards[1].abs() > outwards[0].abs());
+    let axis = usize::from(outwards.y.abs() > outwards.x.abs());
     let to_middle = (end[axis].round() - end[axis]) / outwards[axis];
     let position = |i: usize| first + to_middle + i as f64;
     let least: Vec<f64> = (0..count)
@@ -126,9 +125,10 @@ mod tests {
         };
         let mut coverage = Coverage::new(size[0], size[1]);
         for [x0, y0, x1, y1] in rectangles {
-            let corners = [[x0, y0], [x0, y1], [x1, y1], [x1, y0]].map(|[u, v]| {
+            let corners = [(x0, y0), (x0, y1), (x1, y1), (x1, y0)].map(|(u, v)| {
                 let (u, v) = (u + x, v + 10.0);
-                page.px_from_page(if upright { [20.0 - v, u] } else { [u, v] })
+                let (x, y) = if upright { (20.0 - v, u) } else { (u, v) };
+                page.px_from_page(DVec2::new(x, y))
             });
             coverage.add(&corners, 1.0);
         }
@@ -146,8 +146,9 @@ mod tests {
                     let page = page(px_per_mm, x, upright);
                     // Where the ends are expected lies between pixels as well.
                     for (length, shift) in [(60.0, 0.0), (60.0, 0.013), (50.0, 0.0), (66.0, 0.0)] {
-                        let ends = [[x + shift, 10.0], [x + shift + length, 10.0]];
-                        let ends = ends.map(|[u, v]| if upright { [20.0 - v, u] } else { [u, v] });
+                        let ends = [x + shift, x + shift + length].map(|along| {
+                            DVec2::from(if upright { (10.0, along) } else { (along, 10.0) })
+                        });
                         let found = measure(&page, ends);
                         let off = found.map(|mm| (mm - 60.0).abs());
                         // Within reach beyond the stated end only where the bar is longer.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use glam::DVec2;
 use serde::Serialize;
 
 use super::document::Page;
@@ -103,12 +104,12 @@ pub enum BoardFinding {
         angle_deg: f64,
     },
     /// The panel lies elsewhere on the page.
-    #[error("shifted by ({:.3}, {:.3}) mm", shown(by_mm[0]), shown(by_mm[1]))]
+    #[error("shifted by ({:.3}, {:.3}) mm", shown(by_mm.x), shown(by_mm.y))]
     Shifted {
         /// Its id.
         panel: u32,
         /// Found minus stated position of its middle.
-        by_mm: [f64; 2],
+        by_mm: DVec2,
     },
     /// A corner was not found.
     #[error("corner {id} at row {row} col {col} not found")]
@@ -123,7 +124,7 @@ pub enum BoardFinding {
     /// A corner lies elsewhere, all else being right.
     #[error(
         "corner {id} at row {row} col {col} off by ({:.3}, {:.3}) mm",
-        shown(by_mm[0]), shown(by_mm[1])
+        shown(by_mm.x), shown(by_mm.y)
     )]
     CornerOff {
         /// Corner id.
@@ -133,13 +134,13 @@ pub enum BoardFinding {
         /// Lattice column.
         col: i32,
         /// Found minus stated position.
-        by_mm: [f64; 2],
+        by_mm: DVec2,
     },
     /// A corner was found where the target has none.
-    #[error("a corner at ({:.2}, {:.2}) mm where none should be", at_mm[0], at_mm[1])]
+    #[error("a corner at ({:.2}, {:.2}) mm where none should be", at_mm.x, at_mm.y)]
     CornerExtra {
         /// Where.
-        at_mm: [f64; 2],
+        at_mm: DVec2,
     },
     /// The detector reads a tag that the target does not have there.
     #[error("tag {id} is read at row {row} col {col}, where it should not be")]
@@ -200,7 +201,7 @@ pub(super) fn check(
             if mirrored.grids.iter().any(|grid| grid.panel == Some(id)) {
                 verdict.findings.push(BoardFinding::Mirrored { panel: id }.into());
                 let linear = [[-1.0, 0.0], [0.0, 1.0]];
-                mirror = Some(AffineMap { linear, shift: [page.width_mm, 0.0] });
+                mirror = Some(AffineMap { linear, shift: DVec2::X * page.width_mm });
                 continue;
             }
         }
@@ -276,7 +277,7 @@ fn check_panel(
     detection: &Detection,
     placed: &mut PlacedPanel,
     verdict: &mut SheetVerdict,
-) -> BTreeMap<u32, [f64; 2]> {
+) -> BTreeMap<u32, DVec2> {
     let panel = placed.panel;
     let found = found_corners(detection, placed);
     if found.is_empty() {
@@ -305,13 +306,13 @@ fn check_panel(
 ///
 /// Corners of a tagged panel must be labelled by its tags. An untagged panel has nothing but its
 /// outline, which tells nothing once a corner is missing; then position decides.
-fn found_corners(detection: &Detection, placed: &PlacedPanel) -> BTreeMap<u32, [f64; 2]> {
+fn found_corners(detection: &Detection, placed: &PlacedPanel) -> BTreeMap<u32, DVec2> {
     let (page, panel) = (placed.page, placed.panel);
-    let position = |corner: &GridCorner| page.page_from_px([corner.x, corner.y]);
+    let position = |corner: &GridCorner| page.page_from_px(corner.position());
     let ids: BTreeMap<(i32, i32), u32> =
         panel.corners.iter().map(|c| ((c.row, c.col), c.id)).collect();
     let labelled = detection.grids.iter().filter(|grid| grid.panel == Some(panel.id));
-    let mut found: BTreeMap<u32, [f64; 2]> = labelled
+    let mut found: BTreeMap<u32, DVec2> = labelled
         .flat_map(|grid| &grid.corners)
         .filter_map(|corner| {
             let id = *ids.get(&(corner.row, corner.col))?;
@@ -332,10 +333,10 @@ fn found_corners(detection: &Detection, placed: &PlacedPanel) -> BTreeMap<u32, [
 }
 
 /// The stated corner nearest to a page position, and its distance, mm.
-fn nearest<'a>(placed: &PlacedPanel<'a>, at: [f64; 2]) -> Option<(&'a Corner, f64)> {
+fn nearest<'a>(placed: &PlacedPanel<'a>, at: DVec2) -> Option<(&'a Corner, f64)> {
     let distance = |corner: &Corner| {
         let stated = placed.found_from_stated.apply(placed.page_from_panel(corner.panel_mm));
-        (stated[0] - at[0]).hypot(stated[1] - at[1])
+        stated.distance(at)
     };
     let corners = placed.panel.corners.iter();
     corners.map(|corner| (corner, distance(corner))).min_by(|a, b| a.1.total_cmp(&b.1))
@@ -344,20 +345,18 @@ fn nearest<'a>(placed: &PlacedPanel<'a>, at: [f64; 2]) -> Option<(&'a Corner, f6
 /// Compares positions; where they differ, looks for one cause.
 fn check_positions(
     placed: &mut PlacedPanel,
-    found: &BTreeMap<u32, [f64; 2]>,
+    found: &BTreeMap<u32, DVec2>,
     verdict: &mut SheetVerdict,
 ) {
     let panel = placed.panel;
-    let corners: Vec<(&Corner, [f64; 2], [f64; 2])> = panel
+    let corners: Vec<(&Corner, DVec2, DVec2)> = panel
         .corners
         .iter()
         .filter_map(|c| Some((c, placed.page_from_panel(c.panel_mm), *found.get(&c.id)?)))
         .collect();
-    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let largest = |map: &AffineMap| {
-        let deviations =
-            corners.iter().map(|(_, stated, found)| distance(map.apply(*stated), *found));
-        deviations.fold(0.0, f64::max)
+        let offs = corners.iter().map(|&(_, stated, found)| map.apply(stated) - found);
+        offs.map(|off| off.x.hypot(off.y)).fold(0.0, f64::max)
     };
     let raw = largest(&AffineMap::IDENTITY);
     verdict.max_deviation_mm = verdict.max_deviation_mm.max(raw);
@@ -373,10 +372,9 @@ fn check_positions(
     }
     let map = placed.found_from_stated;
     for (corner, stated, found) in corners {
-        let expected = map.apply(stated);
-        if distance(expected, found) > TOLERANCE_MM {
+        let by_mm = found - map.apply(stated);
+        if by_mm.length() > TOLERANCE_MM {
             let Corner { id, row, col, .. } = *corner;
-            let by_mm = [found[0] - expected[0], found[1] - expected[1]];
             verdict.findings.push(BoardFinding::CornerOff { id, row, col, by_mm }.into());
         }
     }
@@ -384,15 +382,13 @@ fn check_positions(
 
 /// Scale, turn and shift of a whole panel, each where it alone moves a corner by more than the
 /// tolerance.
-fn causes(panel: &Panel, map: &AffineMap, pairs: &[([f64; 2], [f64; 2])]) -> Vec<BoardFinding> {
+fn causes(panel: &Panel, map: &AffineMap, pairs: &[(DVec2, DVec2)]) -> Vec<BoardFinding> {
     let id = panel.id;
-    let mean = |at: fn(&([f64; 2], [f64; 2])) -> f64| {
-        pairs.iter().map(at).sum::<f64>() / pairs.len() as f64
-    };
-    let centre = [mean(|p| p.0[0]), mean(|p| p.0[1])];
-    let by_mm = [mean(|p| p.1[0]) - centre[0], mean(|p| p.1[1]) - centre[1]];
-    let radius =
-        pairs.iter().map(|(p, _)| (p[0] - centre[0]).hypot(p[1] - centre[1])).fold(0.0, f64::max);
+    let mean =
+        |at: fn(&(DVec2, DVec2)) -> DVec2| pairs.iter().map(at).sum::<DVec2>() / pairs.len() as f64;
+    let centre = mean(|(stated, _)| *stated);
+    let by_mm = mean(|(_, found)| *found) - centre;
+    let radius = pairs.iter().map(|(stated, _)| stated.distance(centre)).fold(0.0, f64::max);
 
     let mut causes = Vec::new();
     let [x, y] = map.scales();
@@ -407,7 +403,7 @@ fn causes(panel: &Panel, map: &AffineMap, pairs: &[([f64; 2], [f64; 2])]) -> Vec
         causes.push(BoardFinding::Turned { panel: id, angle_deg: turn.to_degrees() });
     }
     // A scaled or turned page has its middle elsewhere too.
-    if causes.is_empty() && by_mm[0].hypot(by_mm[1]) > TOLERANCE_MM {
+    if causes.is_empty() && by_mm.length() > TOLERANCE_MM {
         causes.push(BoardFinding::Shifted { panel: id, by_mm });
     }
     causes
@@ -430,7 +426,7 @@ fn extra_tags(detection: &Detection, panel: &Panel, verdict: &mut SheetVerdict) 
 fn extra_corners(detection: &Detection, placed: &[PlacedPanel], verdict: &mut SheetVerdict) {
     for corner in detection.grids.iter().flat_map(|grid| &grid.corners) {
         let Some(page) = placed.first().map(|p| p.page) else { return };
-        let at_mm = page.page_from_px([corner.x, corner.y]);
+        let at_mm = page.page_from_px(corner.position());
         let known = placed.iter().any(|panel| {
             let near = nearest(panel, at_mm)
                 .is_some_and(|(_, distance)| distance < MATCH_EDGES * panel.panel.edge_mm);
@@ -443,16 +439,14 @@ fn extra_corners(detection: &Detection, placed: &[PlacedPanel], verdict: &mut Sh
 }
 
 /// Whether a page position lies in a tile that carries a tag.
-fn in_tag(placed: &PlacedPanel, at_mm: [f64; 2]) -> bool {
+fn in_tag(placed: &PlacedPanel, at_mm: DVec2) -> bool {
     let panel = placed.panel;
     panel.tags.iter().any(|tag| {
         let vertices = panel.tag_tile(tag).vertices().map(|v| {
             let stated = placed.page_from_panel(panel.lattice_mm(v));
             placed.found_from_stated.apply(stated)
         });
-        let left = |p: [f64; 2], q: [f64; 2]| {
-            (q[0] - p[0]) * (at_mm[1] - p[1]) - (q[1] - p[1]) * (at_mm[0] - p[0]) > 0.0
-        };
+        let left = |p: DVec2, q: DVec2| (q - p).perp_dot(at_mm - p) > 0.0;
         let next = vertices.clone().cycle().skip(1);
         vertices.zip(next).all(|(p, q)| left(p, q))
     })

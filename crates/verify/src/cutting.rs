@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use glam::DVec2;
 use serde::Serialize;
 
 use super::construct::ConstructFinding;
@@ -25,34 +26,34 @@ pub enum CutFinding {
     /// A path to cut, fold or engrave lies elsewhere.
     #[error(
         "the path on {layer} from ({:.2}, {:.2}) mm is off by {by_mm:.3} mm",
-        at_mm[0], at_mm[1]
+        at_mm.x, at_mm.y
     )]
     PathOff {
         /// Its layer.
         layer: &'static str,
         /// Where it should begin.
-        at_mm: [f64; 2],
+        at_mm: DVec2,
         /// Largest distance of a point.
         by_mm: f64,
     },
     /// A path to cut, fold or engrave is not there.
-    #[error("the path on {layer} from ({:.2}, {:.2}) mm is missing", at_mm[0], at_mm[1])]
+    #[error("the path on {layer} from ({:.2}, {:.2}) mm is missing", at_mm.x, at_mm.y)]
     PathMissing {
         /// Its layer.
         layer: &'static str,
         /// Where it should begin.
-        at_mm: [f64; 2],
+        at_mm: DVec2,
     },
     /// A path that the target does not have.
     #[error(
         "a path on {layer} from ({:.2}, {:.2}) mm that should not be there",
-        at_mm[0], at_mm[1]
+        at_mm.x, at_mm.y
     )]
     PathExtra {
         /// Its layer.
         layer: &'static str,
         /// Where it begins.
-        at_mm: [f64; 2],
+        at_mm: DVec2,
     },
 }
 
@@ -146,7 +147,8 @@ fn nearest(paths: &[CutPath], stated: &CutPath) -> Option<(usize, f64)> {
             continue;
         }
         let pairs = path.points_mm.iter().zip(&stated.points_mm);
-        let by_mm = pairs.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
+        let offs = pairs.map(|(a, b)| a - b);
+        let by_mm = offs.map(|off| off.x.hypot(off.y)).fold(0.0, f64::max);
         if best.is_none_or(|(_, least)| by_mm < least) {
             best = Some((index, by_mm));
         }

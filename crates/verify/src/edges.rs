@@ -25,16 +25,16 @@ const SAMPLES: usize = 4;
 /// An edge that lies elsewhere than stated.
 pub(super) struct MovedEdge {
     pub tile: Tile,
-    pub at_mm: [f64; 2],
+    pub at_mm: DVec2,
     /// Mean over the length looked at.
     pub by_mm: f64,
 }
 
 /// From pixels to positions in the lattice of the panel, in edges.
 struct LatticeFromPx {
-    origin: [f64; 2],
-    right: [f64; 2],
-    down: [f64; 2],
+    origin: DVec2,
+    right: DVec2,
+    down: DVec2,
 }
 
 impl LatticeFromPx {
@@ -42,15 +42,14 @@ impl LatticeFromPx {
         let stated_from_found = placed.found_from_stated.inverse()?;
         let at = |px| {
             let stated = stated_from_found.apply(placed.page.page_from_px(px));
-            placed.panel_from_page(stated).map(|mm| mm / placed.panel.edge_mm)
+            placed.panel_from_page(stated) / placed.panel.edge_mm
         };
-        let origin = at([0.0, 0.0]);
-        let from_origin = |[x, y]: [f64; 2]| [x - origin[0], y - origin[1]];
-        Some(Self { origin, right: from_origin(at([1.0, 0.0])), down: from_origin(at([0.0, 1.0])) })
+        let origin = at(DVec2::ZERO);
+        Some(Self { origin, right: at(DVec2::X) - origin, down: at(DVec2::Y) - origin })
     }
 
-    fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|i| self.origin[i] + x * self.right[i] + y * self.down[i])
+    fn apply(&self, px: DVec2) -> DVec2 {
+        self.origin + px.x * self.right + px.y * self.down
     }
 }
 
@@ -63,7 +62,7 @@ impl PlacedPanel<'_> {
     ) -> Vec<MovedEdge> {
         let Some(lattice_from_px) = LatticeFromPx::new(self) else { return Vec::new() };
         let tile_at = |px| self.panel.kind.tile_at(lattice_from_px.apply(px));
-        let is_black = |px: [f64; 2]| {
+        let is_black = |px: DVec2| {
             let at = lattice_from_px.apply(px);
             let tile = self.panel.kind.tile_at(at);
             let here = expected.get(&tile).map(|expected| expected.is_black_at(uv(tile, at)));
@@ -72,15 +71,15 @@ impl PlacedPanel<'_> {
         let (width, height) = (self.page.image.width(), self.page.image.height());
         let corners = expected.keys().flat_map(|tile| tile.vertices());
         let corners = corners.map(|vertex| self.px_of(vertex));
-        let ([left, upper], [right, lower]) =
-            corners.fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), at| {
-                ([0, 1].map(|i| low[i].min(at[i])), [0, 1].map(|i| high[i].max(at[i])))
+        let (first, last) = corners
+            .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), at| {
+                (low.min(at), high.max(at))
             });
         let squares = |low: f64, high: f64, size: usize| {
             let low = (low - NEAR as f64).max(0.0) as usize / SQUARE;
             low..((high + NEAR as f64).max(0.0) as usize / SQUARE + 1).min(size / SQUARE)
         };
-        let (rows, columns) = (squares(upper, lower, height), squares(left, right, width));
+        let (rows, columns) = (squares(first.y, last.y, height), squares(first.x, last.x, width));
         let of_row = |row: usize| -> Vec<([usize; 2], f64)> {
             let of_square = |column: usize| {
                 let at = [column * SQUARE, row * SQUARE];
@@ -93,9 +92,9 @@ impl PlacedPanel<'_> {
                 .collect()
         };
         let found: Vec<_> = rows.into_par_iter().flat_map_iter(of_row).collect();
-        let mut most = BTreeMap::<Tile, ([f64; 2], f64)>::new();
+        let mut most = BTreeMap::<Tile, (DVec2, f64)>::new();
         for (corner, by) in found {
-            let middle = corner.map(|low| low as f64 + (SQUARE - 1) as f64 / 2.0);
+            let middle = DVec2::from(corner.map(|low| low as f64)) + (SQUARE - 1) as f64 / 2.0;
             let entry = most.entry(tile_at(middle)).or_insert((middle, by));
             if by.abs() > entry.1.abs() {
                 *entry = (middle, by);
@@ -111,11 +110,11 @@ impl PlacedPanel<'_> {
 
     /// How far edges lie beside their place in the square of pixels whose first is `low`, px, positive where there is
     /// too much ink; `None` where there is no edge.
-    fn displaced(&self, low: [usize; 2], is_black: &impl Fn([f64; 2]) -> bool) -> Option<f64> {
+    fn displaced(&self, low: [usize; 2], is_black: &impl Fn(DVec2) -> bool) -> Option<f64> {
         const SIDE: usize = SQUARE + 2 * NEAR;
         // Corner of a pixel, counted from that of the nearest pixel that counts.
         let corner = |x: usize, y: usize| {
-            is_black([(low[0] + x) as f64, (low[1] + y) as f64].map(|v| v - NEAR as f64 - 0.5))
+            is_black(DVec2::new((low[0] + x) as f64, (low[1] + y) as f64) - NEAR as f64 - 0.5)
         };
         let coarse = (0..=SIDE).step_by(SIDE / 3);
         let mut coarse = coarse.clone().flat_map(|y| coarse.clone().map(move |x| corner(x, y)));
@@ -151,18 +150,17 @@ impl PlacedPanel<'_> {
 }
 
 /// Part of a pixel that is black.
-fn covered([x, y]: [usize; 2], is_black: &impl Fn([f64; 2]) -> bool) -> f64 {
+fn covered([x, y]: [usize; 2], is_black: &impl Fn(DVec2) -> bool) -> f64 {
     let sample = |i: usize| (i as f64 + 0.5) / SAMPLES as f64 - 0.5;
     let samples = (0..SAMPLES).flat_map(|j| (0..SAMPLES).map(move |i| (i, j)));
-    let black = samples.filter(|&(i, j)| is_black([x as f64 + sample(i), y as f64 + sample(j)]));
+    let middle = DVec2::new(x as f64, y as f64);
+    let black = samples.filter(|&(i, j)| is_black(middle + DVec2::new(sample(i), sample(j))));
     black.count() as f64 / (SAMPLES * SAMPLES) as f64
 }
 
 /// Tile coordinates of a position in the lattice, in edges.
-fn uv(tile: Tile, at: [f64; 2]) -> [f64; 2] {
+fn uv(tile: Tile, at: DVec2) -> DVec2 {
     let [a, b, c] = tile.frame().map(|v| tile.kind().position(v.row.into(), v.col.into()));
-    let from_a = |p: [f64; 2]| DVec2::from(p) - DVec2::from(a);
-    let (ab, ac, p) = (from_a(b), from_a(c), from_a(at));
-    let det = ab.perp_dot(ac);
-    [p.perp_dot(ac) / det, ab.perp_dot(p) / det]
+    let (ab, ac, p) = (b - a, c - a, at - a);
+    DVec2::new(p.perp_dot(ac), ab.perp_dot(p)) / ab.perp_dot(ac)
 }

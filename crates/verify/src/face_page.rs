@@ -53,7 +53,7 @@ pub(super) fn face_page(
         if area >= 0.0 {
             continue;
         }
-        let [p, q, r] = triangle.uv.map(|uv| DVec2::from(uv) * size);
+        let [p, q, r] = triangle.uv.map(|uv| uv * size);
         let texels = (q - p).perp_dot(r - p).abs();
         texel_px = texel_px.max((area.abs() / texels).sqrt() / SAMPLES as f64);
         let low = a.min(b).min(c).ceil().max(DVec2::ZERO);
@@ -68,7 +68,7 @@ pub(super) fn face_page(
                     (a - p).perp_dot(b - p) / area,
                 ];
                 if weights.iter().all(|&w| w >= 0.0) {
-                    let uv: DVec2 = (0..3).map(|i| DVec2::from(triangle.uv[i]) * weights[i]).sum();
+                    let uv: DVec2 = (0..3).map(|i| triangle.uv[i] * weights[i]).sum();
                     let at = uv * size - DVec2::splat(0.5);
                     shades[y * width + x] = texture.bilinear(at.x, at.y).round() as u8;
                 }
@@ -81,5 +81,5 @@ pub(super) fn face_page(
         (sum / (SAMPLES * SAMPLES) as u32) as u8
     });
     let page = Page { width_mm, height_mm, px_per_mm, image, smear_px: 1.0 + texel_px };
-    (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [-left, -lower] })
+    (page, Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::new(-left, -lower) })
 }

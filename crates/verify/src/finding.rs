@@ -1,6 +1,7 @@
 //! What can be wrong with an artifact, each named with its place and its figures: typed where it is
 //! found, and put together here.
 
+use glam::DVec2;
 use serde::Serialize;
 
 pub use super::board::BoardFinding;
@@ -69,13 +70,13 @@ pub enum PageFinding {
     /// The page has another size.
     #[error(
         "page of {:.3} x {:.3} mm instead of {:.3} x {:.3} mm",
-        found_mm[0], found_mm[1], stated_mm[0], stated_mm[1]
+        found_mm.x, found_mm.y, stated_mm.x, stated_mm.y
     )]
     PageSize {
         /// Width and height in the file.
-        found_mm: [f64; 2],
+        found_mm: DVec2,
         /// Width and height in the target.
-        stated_mm: [f64; 2],
+        stated_mm: DVec2,
     },
     /// Something is wrong on one of the pages that a sheet is printed on.
     #[error("page {page}: {finding}")]
@@ -88,13 +89,13 @@ pub enum PageFinding {
     /// Two pages show different things where they overlap.
     #[error(
         "pages {} and {} differ where they overlap, at ({:.2}, {:.2}) mm",
-        pages[0], pages[1], at_mm[0], at_mm[1]
+        pages[0], pages[1], at_mm.x, at_mm.y
     )]
     PagesDiffer {
         /// Labels of the pages.
         pages: [String; 2],
         /// Where on the sheet.
-        at_mm: [f64; 2],
+        at_mm: DVec2,
     },
 }
 

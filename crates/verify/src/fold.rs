@@ -139,7 +139,7 @@ fn enumerate(numbers: &[usize]) -> String {
 }
 
 /// Page positions of the corners found on a sheet: by panel, then by corner.
-pub(super) type Seen = BTreeMap<u32, BTreeMap<u32, [f64; 2]>>;
+pub(super) type Seen = BTreeMap<u32, BTreeMap<u32, DVec2>>;
 
 /// Whether a target's sheets are those of a net.
 pub(super) fn is_net(target: &Target) -> bool {
@@ -306,8 +306,7 @@ impl Net {
             let (sheet, found) =
                 seen.iter().enumerate().find_map(|(n, seen)| Some((n, seen.get(&panel.id)?)))?;
             let corner = |c: &deltille_core::targets::Corner| {
-                let at = DVec2::from(*found.get(&c.id)?);
-                Some((DVec2::from(c.panel_mm), at, DVec3::from(c.target_mm)))
+                Some((c.panel_mm, *found.get(&c.id)?, c.target_mm))
             };
             let corners: Vec<_> = panel.corners.iter().filter_map(corner).collect();
             let pairs: Vec<_> = corners.iter().map(|&(flat, at, _)| (flat, at)).collect();
@@ -317,16 +316,16 @@ impl Net {
                 net.along.insert([vertices[side], vertices[(side + 1) % 3]], (index, side));
             }
             for (vertex, corner) in vertices.into_iter().zip(face.outline_mm) {
-                net.vertices_mm.insert(vertex, panel.pose.target_from_panel(corner).into());
+                net.vertices_mm.insert(vertex, panel.pose.target_from_panel(corner));
             }
             net.poses.push(SpaceFromPage {
                 linear: panel.pose.matrix(),
-                shift: panel.pose.translation_mm.into(),
+                shift: panel.pose.translation_mm,
             });
             net.faces.push(PrintedFace {
                 panel: panel.id,
                 sheet,
-                outline_mm: face.outline_mm.map(|p| page_from_panel.apply(p.into())),
+                outline_mm: face.outline_mm.map(|p| page_from_panel.apply(p)),
                 page_from_panel,
                 vertices,
                 corners: corners.into_iter().map(|(_, at, space)| (at, space)).collect(),

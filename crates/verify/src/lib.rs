@@ -67,6 +67,8 @@ mod verdict;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use glam::DVec2;
+
 use deltille_core::artwork::CuttingError;
 use deltille_core::detect::{Detector, DetectorConfig, Ink, Tone};
 use deltille_core::family::Family;
@@ -592,13 +594,13 @@ impl Source<'_> {
         px_per_mm: f64,
     ) -> Result<(Page, Vec<Finding>), DocumentError> {
         let tolerance_mm = self.document.size_tolerance_mm();
-        let stated_mm = [layout.width_mm, layout.height_mm];
+        let stated_mm = DVec2::new(layout.width_mm, layout.height_mm);
         let found_mm = self.document.size_mm(self.page);
-        if (0..2).any(|i| found_mm[i] > MOST_ENLARGED * stated_mm[i]) {
+        if found_mm.cmpgt(MOST_ENLARGED * stated_mm).any() {
             return Err(self.document.too_large(found_mm, stated_mm));
         }
         let mut page = self.document.render(self.page, px_per_mm)?;
-        if (0..2).any(|i| (found_mm[i] - stated_mm[i]).abs() > tolerance_mm) {
+        if (found_mm - stated_mm).abs().max_element() > tolerance_mm {
             return Ok((page, vec![PageFinding::PageSize { found_mm, stated_mm }.into()]));
         }
         // Pictures begin at the upper edge and end with a whole pixel: heights are counted from
@@ -614,7 +616,7 @@ impl SheetVerdict {
         Self {
             sheet: index + 1,
             px_per_mm: page.px_per_mm,
-            size_mm: [page.width_mm, page.height_mm],
+            size_mm: DVec2::new(page.width_mm, page.height_mm),
             check_bars_mm: Vec::new(),
             corners: 0,
             corners_found: 0,
@@ -636,8 +638,7 @@ fn check_bars(
     verdict: &mut SheetVerdict,
 ) {
     for (index, bar) in layout.check_bars.iter().enumerate() {
-        let [dx, dy] = [0, 1].map(|i| bar.to_mm[i] - bar.from_mm[i]);
-        let stated_mm = dx.hypot(dy);
+        let stated_mm = bar.length_mm();
         let found_mm =
             bars::measure(page, [bar.from_mm, bar.to_mm].map(|end| found_from_stated.apply(end)));
         verdict.check_bars_mm.push((stated_mm, found_mm));

@@ -3,7 +3,6 @@
 
 use std::path::Path;
 
-use glam::DVec3;
 use serde::Serialize;
 
 use super::construct::ConstructFinding;
@@ -147,7 +146,7 @@ fn compare_corners(
             continue;
         };
         list.corners += 1;
-        let off = DVec3::from(listed.target_mm).distance(DVec3::from(corner.target_mm));
+        let off = listed.target_mm.distance(corner.target_mm);
         list.max_deviation_mm = list.max_deviation_mm.max(off);
         if off > LIST_TOLERANCE_MM {
             problems.push(format!("{place} is off by {off:.6} mm"));

@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
+use glam::DVec2;
 use kurbo::{Affine, BezPath, PathEl, Point, Rect, Shape};
 use rayon::prelude::*;
 use rstar::primitives::{GeomWithData, Rectangle};
@@ -78,10 +79,10 @@ pub enum MarkFinding {
         purpose: LineKind,
     },
     /// Ink, or on a black field a lack of it, outside the tiles, texts and check bars.
-    #[error("spot of {area_mm2:.3} mm² at ({:.2}, {:.2}) mm", at_mm[0], at_mm[1])]
+    #[error("spot of {area_mm2:.3} mm² at ({:.2}, {:.2}) mm", at_mm.x, at_mm.y)]
     Spot {
         /// The middle of the spot.
-        at_mm: [f64; 2],
+        at_mm: DVec2,
         /// Its area, mm².
         area_mm2: f64,
     },
@@ -89,7 +90,7 @@ pub enum MarkFinding {
 
 impl MarkFinding {
     /// The same with its place told in another frame.
-    pub(super) fn moved(self, place: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+    pub(super) fn moved(self, place: impl Fn(DVec2) -> DVec2) -> Self {
         match self {
             Self::Spot { at_mm, area_mm2 } => Self::Spot { at_mm: place(at_mm), area_mm2 },
             other => other,
@@ -120,7 +121,7 @@ pub(super) fn check(
     let is_own = |x: usize, y: usize| {
         let in_window =
             |[x0, y0, x1, y1]: [usize; 4]| (x0..x1).contains(&x) && (y0..y1).contains(&y);
-        let at = [x as f64, y as f64];
+        let at = DVec2::new(x as f64, y as f64);
         let is_beside = |ground: &Ground| ground.expected(page, at, EDGE_PX).is_none();
         !window.is_some_and(in_window) && grounds.iter().all(is_beside)
     };
@@ -179,7 +180,7 @@ impl What {
 struct Mark {
     what: What,
     /// What is black, on the page, mm.
-    outlines: Vec<Vec<[f64; 2]>>,
+    outlines: Vec<Vec<DVec2>>,
     /// What belongs to it, in pieces.
     areas: Vec<Area>,
 }
@@ -214,12 +215,10 @@ fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
     }
     for (index, line) in artwork::drawn_lines(layout) {
         let areas = pieces([line.from_mm, line.to_mm], line.width_mm);
-        let stroke = |[from, to]: [[f64; 2]; 2]| {
-            let length = distance(from, to).max(f64::MIN_POSITIVE);
-            let across =
-                [from[1] - to[1], to[0] - from[0]].map(|d| d / length * line.width_mm / 2.0);
-            let beside = |p: [f64; 2], side: f64| [0, 1].map(|i| p[i] + side * across[i]);
-            vec![beside(from, 1.0), beside(from, -1.0), beside(to, -1.0), beside(to, 1.0)]
+        let stroke = |[from, to]: [DVec2; 2]| {
+            let length = from.distance(to).max(f64::MIN_POSITIVE);
+            let across = (to - from).perp() / length * line.width_mm / 2.0;
+            vec![from + across, from - across, to - across, to + across]
         };
         let outlines = artwork::strokes_mm(line).into_iter().map(stroke).collect();
         marks.push(Mark { what: What::Line(index), outlines, areas });
@@ -228,21 +227,20 @@ fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
 }
 
 /// A path as polygons.
-fn polygons(path: &BezPath) -> Vec<Vec<[f64; 2]>> {
-    let mut polygons: Vec<Vec<[f64; 2]>> = Vec::new();
+fn polygons(path: &BezPath) -> Vec<Vec<DVec2>> {
+    let mut polygons: Vec<Vec<DVec2>> = Vec::new();
     kurbo::flatten(path, FLATNESS_MM, |element| match (element, polygons.last_mut()) {
-        (PathEl::MoveTo(p), _) => polygons.push(vec![[p.x, p.y]]),
-        (PathEl::LineTo(p), Some(polygon)) => polygon.push([p.x, p.y]),
+        (PathEl::MoveTo(p), _) => polygons.push(vec![DVec2::new(p.x, p.y)]),
+        (PathEl::LineTo(p), Some(polygon)) => polygon.push(DVec2::new(p.x, p.y)),
         _ => {}
     });
     polygons
 }
 
 /// Pieces of the area of a straight mark.
-fn pieces([from, to]: [[f64; 2]; 2], width_mm: f64) -> Vec<Area> {
-    let length = distance(from, to);
-    let along = Affine::rotate(-(to[1] - from[1]).atan2(to[0] - from[0]))
-        * Affine::translate((-from[0], -from[1]));
+fn pieces([from, to]: [DVec2; 2], width_mm: f64) -> Vec<Area> {
+    let length = from.distance(to);
+    let along = Affine::rotate(-(to - from).to_angle()) * Affine::translate((-from.x, -from.y));
     let count = (length / PIECE_MM).ceil().max(1.0);
     let piece = |n: usize| {
         let [start, end] = [n, n + 1].map(|n| n as f64 / count * length);
@@ -260,9 +258,9 @@ impl Area {
 
     /// Whether a pixel belongs to it, with `blank` around.
     fn contains(&self, page: &Page, x: usize, y: usize, blank_px: f64) -> bool {
-        let [x, y] = page.page_from_px([x as f64, y as f64]);
+        let place = page.page_from_px(DVec2::new(x as f64, y as f64));
         let blank = blank_px / page.px_per_mm;
-        self.bounds.inflate(blank, blank).contains(self.along * Point::new(x, y))
+        self.bounds.inflate(blank, blank).contains(self.along * Point::new(place.x, place.y))
     }
 
     /// Marks its pixels.
@@ -277,7 +275,7 @@ impl Area {
 }
 
 /// An outline in the picture, by the rectangle around it, and whether it is of a letter.
-type Outline = GeomWithData<Rectangle<[f64; 2]>, (Vec<[f64; 2]>, bool)>;
+type Outline = GeomWithData<Rectangle<[f64; 2]>, (Vec<DVec2>, bool)>;
 
 /// What a page should show of marks.
 struct Drawn<'a> {
@@ -289,13 +287,11 @@ impl<'a> Drawn<'a> {
     fn new(page: &'a Page, marks: &[Mark]) -> Self {
         let of_mark = |mark: &Mark| {
             let is_text = matches!(mark.what, What::Text(_));
-            let of = move |polygon: &Vec<[f64; 2]>| {
-                let polygon: Vec<[f64; 2]> =
-                    polygon.iter().map(|&p| page.px_from_page(p)).collect();
-                let end = |of: fn(f64, f64) -> f64| {
-                    polygon.iter().copied().reduce(|a, b| [of(a[0], b[0]), of(a[1], b[1])])
-                };
-                let around = Rectangle::from_corners(end(f64::min)?, end(f64::max)?);
+            let of = move |polygon: &Vec<DVec2>| {
+                let polygon: Vec<DVec2> = polygon.iter().map(|&p| page.px_from_page(p)).collect();
+                let end = |of: fn(DVec2, DVec2) -> DVec2| polygon.iter().copied().reduce(of);
+                let (least, most) = (end(DVec2::min)?, end(DVec2::max)?);
+                let around = Rectangle::from_corners(least.to_array(), most.to_array());
                 Some(GeomWithData::new(around, (polygon, is_text)))
             };
             mark.outlines.iter().filter_map(of).collect::<Vec<_>>()
@@ -328,13 +324,13 @@ impl<'a> Drawn<'a> {
 
     /// The ink of the marks in a part of the picture.
     fn stated(&self, [x0, y0]: [usize; 2], [width, height]: [usize; 2]) -> Gray<f32> {
-        let first = [x0 as f64 - 0.5, y0 as f64 - 0.5];
-        let part = AABB::from_corners(first, [first[0] + width as f64, first[1] + height as f64]);
+        let origin = DVec2::new(x0 as f64, y0 as f64);
+        let (first, size) = (origin - 0.5, DVec2::new(width as f64, height as f64));
+        let part = AABB::from_corners(first.to_array(), (first + size).to_array());
         let [mut letters, mut strokes] = [0, 1].map(|_| Coverage::new(width, height));
         for outline in self.outlines.locate_in_envelope_intersecting(part) {
             let (polygon, is_text) = &outline.data;
-            let polygon: Vec<[f64; 2]> =
-                polygon.iter().map(|[x, y]| [x - x0 as f64, y - y0 as f64]).collect();
+            let polygon: Vec<DVec2> = polygon.iter().map(|&p| p - origin).collect();
             // Which way outlines of letters run is the font's business; those of strokes cross each other.
             match is_text {
                 true => letters.add(&polygon, 1.0),
@@ -347,24 +343,19 @@ impl<'a> Drawn<'a> {
 }
 
 /// Positive where a polygon runs clockwise on the screen.
-fn signed_area(polygon: &[[f64; 2]]) -> f64 {
+fn signed_area(polygon: &[DVec2]) -> f64 {
     let next = polygon.iter().cycle().skip(1);
-    polygon.iter().zip(next).map(|([x, y], [u, v])| x * v - y * u).sum()
-}
-
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    polygon.iter().zip(next).map(|(p, &q)| p.perp_dot(q)).sum()
 }
 
 /// The pixels of a rectangle of the page (mm) with `blank` more on every side: first and
 /// past-the-end column and row, as left, upper, right, lower.
 fn pixels(page: &Page, [x0, y0, x1, y1]: [f64; 4], blank: f64) -> [usize; 4] {
-    let (least, most) = (page.px_from_page([x0, y1]), page.px_from_page([x1, y0]));
-    let (width, height) = (page.image.width() as f64, page.image.height() as f64);
-    let [left, upper] = least.map(|v| (v - blank).floor().max(0.0));
-    let [right, lower] = most.map(|v| (v + blank).ceil() + 1.0);
-    let (right, lower) = (right.clamp(0.0, width), lower.clamp(0.0, height));
-    [left.min(right), upper.min(lower), right, lower].map(|v| v as usize)
+    let [least, most] = [(x0, y1), (x1, y0)].map(|place| page.px_from_page(place.into()));
+    let size = DVec2::new(page.image.width() as f64, page.image.height() as f64);
+    let last = ((most + blank).ceil() + 1.0).clamp(DVec2::ZERO, size);
+    let first = (least - blank).floor().max(DVec2::ZERO).min(last);
+    [first.x, first.y, last.x, last.y].map(|v| v as usize)
 }
 
 /// Names each connected spot of wrong pixels outside the tiles and the `known` marks.
@@ -382,8 +373,9 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
             }
             // Where this far from edges.
             let is_off = |most: f64, near_px: f64| {
-                let expected =
-                    |ground: &Ground| ground.expected(page, [x as f64, y as f64], near_px);
+                let expected = |ground: &Ground| {
+                    ground.expected(page, DVec2::new(x as f64, y as f64), near_px)
+                };
                 let expected = grounds.iter().find_map(expected).unwrap_or(Some(0.0));
                 expected.is_some_and(|expected| (ink - expected).abs() > most)
             };
@@ -399,11 +391,11 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
         if !std::mem::take(&mut wrong[start]) {
             continue;
         }
-        let (mut stack, mut count, mut moment) = (vec![start], 0.0, [0.0; 2]);
+        let (mut stack, mut count, mut moment) = (vec![start], 0.0, DVec2::ZERO);
         while let Some(at) = stack.pop() {
             let (x, y) = (at % width, at / width);
             count += 1.0;
-            moment = [moment[0] + x as f64, moment[1] + y as f64];
+            moment += DVec2::new(x as f64, y as f64);
             for y in y.saturating_sub(1)..(y + 2).min(height) {
                 for x in x.saturating_sub(1)..(x + 2).min(width) {
                     if std::mem::take(&mut wrong[y * width + x]) {
@@ -412,7 +404,7 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
                 }
             }
         }
-        let at_mm = page.page_from_px(moment.map(|m| m / count));
+        let at_mm = page.page_from_px(moment / count);
         spots.push(MarkFinding::Spot { at_mm, area_mm2: count / page.px_per_mm.powi(2) });
     }
     spots
@@ -433,13 +425,12 @@ impl<'a> Ground<'a> {
         let panel = placed.panel;
         let field = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
         let [left, lower, right, upper] = field;
-        let ends = [[left, lower], [right, lower], [right, upper], [left, upper]];
-        let ends = ends.map(|p| placed.page.px_from_page(placed.page_from_panel(p)));
+        let ends = [(left, lower), (right, lower), (right, upper), (left, upper)];
+        let [a, b, c, d] = ends.map(|p| placed.page.px_from_page(placed.page_from_panel(p.into())));
         let reach_px = 2.0 * EDGE_PX + placed.page.smear_px;
-        let most = |i: usize, sign: f64| {
-            ends.map(|p| sign * p[i]).into_iter().fold(f64::MIN, f64::max) + reach_px
-        };
-        let around_px = [-most(0, -1.0), -most(1, -1.0), most(0, 1.0), most(1, 1.0)];
+        let first = a.min(b).min(c).min(d) - reach_px;
+        let last = a.max(b).max(c).max(d) + reach_px;
+        let around_px = [first.x, first.y, last.x, last.y];
         Self { placed, tiles: panel.tiles(), field, around_px }
     }
 
@@ -450,12 +441,13 @@ impl<'a> Ground<'a> {
     /// What a pixel of the panel's area should be; `Some(None)` in and beside the tiles, which are
     /// compared by themselves, and at the edge of the field, `near_px` to either side. Between the tiles of a panel
     /// that is not inverted there may be another one.
-    fn expected(&self, page: &Page, [x, y]: [f64; 2], near_px: f64) -> Option<Option<f64>> {
+    fn expected(&self, page: &Page, pixel: DVec2, near_px: f64) -> Option<Option<f64>> {
         let [left, upper, right, lower] = self.around_px;
-        if x < left || x > right || y < upper || y > lower {
+        if pixel.x < left || pixel.x > right || pixel.y < upper || pixel.y > lower {
             return None;
         }
-        let [u, v] = self.placed.panel_from_page(page.page_from_px([x, y]));
+        let place = self.placed.panel_from_page(page.page_from_px(pixel));
+        let DVec2 { x: u, y: v } = place;
         let [left, lower, right, upper] = self.field;
         let inside = (u - left).min(right - u).min(v - lower).min(upper - v) * page.px_per_mm;
         if inside < -near_px {
@@ -463,14 +455,13 @@ impl<'a> Ground<'a> {
         }
         let edge_mm = self.placed.panel.edge_mm;
         let near = near_px / page.px_per_mm;
-        let reaches = |[du, dv]: [f64; 2]| {
-            let at = [(u + du) / edge_mm, (v + dv) / edge_mm];
-            self.tiles.contains(&self.placed.panel.kind.tile_at(at))
+        let reaches = |off: DVec2| {
+            self.tiles.contains(&self.placed.panel.kind.tile_at((place + off) / edge_mm))
         };
         // Fine enough that no tip of a tile, also a lone one, slips between two directions.
         let around = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
-        let in_tile = reaches([0.0, 0.0])
-            || around.into_iter().any(|angle| reaches([near * angle.cos(), near * angle.sin()]));
+        let in_tile = reaches(DVec2::ZERO)
+            || around.into_iter().any(|angle| reaches(near * DVec2::from_angle(angle)));
         let undecided = in_tile || (self.inverted() && inside < near_px);
         if undecided { Some(None) } else { self.inverted().then_some(Some(1.0)) }
     }

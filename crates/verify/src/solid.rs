@@ -56,7 +56,7 @@ pub enum MeshFinding {
     /// A corner of a mesh lies elsewhere.
     #[error(
         "corner {id} at row {row} col {col} off by ({:.3}, {:.3}, {:.3}) mm",
-        shown(by_mm[0]), shown(by_mm[1]), shown(by_mm[2])
+        shown(by_mm.x), shown(by_mm.y), shown(by_mm.z)
     )]
     CornerOff3d {
         /// Corner id.
@@ -66,7 +66,7 @@ pub enum MeshFinding {
         /// Lattice column.
         col: i32,
         /// Found minus stated position in the target frame.
-        by_mm: [f64; 3],
+        by_mm: DVec3,
     },
     /// The surface of a body is not the stated one.
     #[error("{problem}")]
@@ -163,7 +163,7 @@ fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
 /// nothing hides the face, if there is one.
 fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
     let centre = panel.middle_mm();
-    let corners = || panel.corners.iter().map(|c| DVec3::from(c.target_mm));
+    let corners = || panel.corners.iter().map(|c| c.target_mm);
     let radius = corners().map(|c| c.distance(centre)).fold(0.0, f64::max) + 2.0 * panel.edge_mm;
     let rows = verifier.family.map_or(0, |family| family.dimension().rows());
     let cell_mm = panel.edge_mm / (f64::from(rows) + 3.0 * panel.border_bits.unwrap_or_default());
@@ -173,7 +173,7 @@ fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
     let from = |aside: DVec3| {
         let eye = centre + radius * (DISTANCE * z + ASIDE * aside);
         let mut camera = Camera::pinhole(side, side, 1.0);
-        camera.focal_px = [px_per_mm * eye.distance(centre); 2];
+        camera.focal_px = DVec2::splat(px_per_mm * eye.distance(centre));
         View { camera, camera_from_target: Pose::looking_at(eye, centre, y) }
     };
     let open = |view: &View| {
@@ -267,7 +267,7 @@ fn check_print(
     verdict.tags_exact = report.tags_exact;
     let known = vec![false; page.image.pixels().len()];
     let marks = spots(&page, &known, &[placed]);
-    let on_panel = |[x, y]: [f64; 2]| [x + area_mm[0], y + area_mm[1]];
+    let on_panel = |place: DVec2| place + DVec2::new(area_mm[0], area_mm[1]);
     let of_tiles = report.findings.into_iter().map(|finding| finding.moved(on_panel).into());
     verdict.findings.extend(of_tiles);
     verdict.findings.extend(marks.into_iter().map(|spot| spot.moved(on_panel).into()));
@@ -315,9 +315,9 @@ fn check_corners(
             let Some(stated) = seen.corner_at(vertex).filter(|c| corner.id == Some(c.id)) else {
                 continue;
             };
-            let at = view.meet(model, [corner.x, corner.y]).unwrap_or(DVec3::NAN);
-            let by_mm = (at - DVec3::from(stated.target_mm)).to_array();
-            let deviation_mm = DVec3::from(by_mm).length();
+            let at = view.meet(model, corner.position()).unwrap_or(DVec3::NAN);
+            let by_mm = at - stated.target_mm;
+            let deviation_mm = by_mm.length();
             if own {
                 found.insert(stated.id);
                 verdict.max_deviation_mm = verdict.max_deviation_mm.max(deviation_mm);

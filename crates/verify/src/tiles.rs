@@ -7,6 +7,7 @@ use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
+use glam::DVec2;
 use serde::Serialize;
 
 use super::document::{MAX_INK_ERROR, Page};
@@ -53,7 +54,7 @@ pub enum TileFinding {
     /// Part of a tile has the wrong colour.
     #[error(
         "spot of {area_mm2:.3} mm² at ({:.2}, {:.2}) mm in the tile at row {row} col {col}",
-        at_mm[0], at_mm[1]
+        at_mm.x, at_mm.y
     )]
     Blemish {
         /// Row of the tile's lower-left vertex.
@@ -61,7 +62,7 @@ pub enum TileFinding {
         /// Column of the tile's lower-left vertex.
         col: i32,
         /// The middle of the spot.
-        at_mm: [f64; 2],
+        at_mm: DVec2,
         /// Its area, mm².
         area_mm2: f64,
     },
@@ -69,7 +70,7 @@ pub enum TileFinding {
     #[error(
         "an edge at ({:.2}, {:.2}) mm in the tile at row {row} col {col} is {:.3} mm beside its \
          place, towards {}",
-        at_mm[0], at_mm[1], by_mm.abs(), lighter_or_darker(*by_mm)
+        at_mm.x, at_mm.y, by_mm.abs(), lighter_or_darker(*by_mm)
     )]
     EdgeMoved {
         /// Row of the tile's lower-left vertex.
@@ -77,7 +78,7 @@ pub enum TileFinding {
         /// Column of the tile's lower-left vertex.
         col: i32,
         /// Where.
-        at_mm: [f64; 2],
+        at_mm: DVec2,
         /// How far, mm, positive where more is black.
         by_mm: f64,
     },
@@ -129,7 +130,7 @@ pub enum TileFinding {
 
 impl TileFinding {
     /// The same with its place told in another frame.
-    pub(super) fn moved(self, place: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+    pub(super) fn moved(self, place: impl Fn(DVec2) -> DVec2) -> Self {
         match self {
             Self::Blemish { row, col, at_mm, area_mm2 } => {
                 Self::Blemish { row, col, at_mm: place(at_mm), area_mm2 }
@@ -172,7 +173,7 @@ struct Tally {
     checked: usize,
     wrong: usize,
     /// Sum of the positions of wrong pixels.
-    moment: [f64; 2],
+    moment: DVec2,
 }
 
 impl Tally {
@@ -192,7 +193,7 @@ pub(super) struct Expected<'a> {
 
 impl Expected<'_> {
     /// Whether the tile is black at tile coordinates.
-    pub fn is_black_at(&self, p: [f64; 2]) -> bool {
+    pub fn is_black_at(&self, p: DVec2) -> bool {
         let Some(tag) = &self.tag else { return self.black };
         match tag.looks.region(p) {
             Region::Margin => self.black,
@@ -238,21 +239,21 @@ impl TagLooks {
     }
 
     /// What is at tile coordinates.
-    fn region(&self, [u, v]: [f64; 2]) -> Region {
-        if let Some(bit) = self.bit([u, v]) {
+    fn region(&self, p: DVec2) -> Region {
+        if let Some(bit) = self.bit(p) {
             return Region::Cell(bit);
         }
         // Only squares have a margin.
         let margin = self.margin / self.width;
-        match [u, v].into_iter().all(|t| (margin..=1.0 - margin).contains(&t)) {
+        match p.min_element() >= margin && p.max_element() <= 1.0 - margin {
             true => Region::Border,
             false => Region::Margin,
         }
     }
 
     /// The bit of the cell at tile coordinates (u, v); `None` beside the cells.
-    fn bit(&self, [u, v]: [f64; 2]) -> Option<u32> {
-        let (u, v) = (u * self.width - self.inset, v * self.width - self.inset);
+    fn bit(&self, p: DVec2) -> Option<u32> {
+        let DVec2 { x: u, y: v } = p * self.width - self.inset;
         if u < 0.0 || v < 0.0 {
             return None;
         }
@@ -282,18 +283,13 @@ pub(super) struct PlacedPanel<'a> {
 
 impl PlacedPanel<'_> {
     /// Stated page position of a point of the panel.
-    pub fn page_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let (sin, cos) = self.placement.angle_rad.sin_cos();
-        let [ox, oy] = self.placement.origin_mm;
-        [cos * x - sin * y + ox, sin * x + cos * y + oy]
+    pub fn page_from_panel(&self, point: DVec2) -> DVec2 {
+        DVec2::from_angle(self.placement.angle_rad).rotate(point) + self.placement.origin_mm
     }
 
     /// Stated panel position of a point of the page.
-    pub fn panel_from_page(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let (sin, cos) = self.placement.angle_rad.sin_cos();
-        let [ox, oy] = self.placement.origin_mm;
-        let (x, y) = (x - ox, y - oy);
-        [cos * x + sin * y, cos * y - sin * x]
+    pub fn panel_from_page(&self, point: DVec2) -> DVec2 {
+        DVec2::from_angle(-self.placement.angle_rad).rotate(point - self.placement.origin_mm)
     }
 
     /// The ink of the tiles that should be white and black, in the middle of plain tiles; `None`
@@ -307,8 +303,8 @@ impl PlacedPanel<'_> {
                 continue;
             }
             let [a, b, c] = self.frame_px(tile);
-            let [u, v] = self.panel.kind.middle();
-            let centre = [0, 1].map(|i| a[i] + u * (b[i] - a[i]) + v * (c[i] - a[i]));
+            let DVec2 { x: u, y: v } = self.panel.kind.middle();
+            let centre = a + u * (b - a) + v * (c - a);
             inks[usize::from(tile.is_dark() != self.panel.inverted)].push(self.page.ink(centre));
         }
         let tone = |inks: &Vec<f64>| {
@@ -321,12 +317,12 @@ impl PlacedPanel<'_> {
     }
 
     /// Picture positions of a tile's A, B and C.
-    fn frame_px(&self, tile: Tile) -> [[f64; 2]; 3] {
+    fn frame_px(&self, tile: Tile) -> [DVec2; 3] {
         tile.frame().map(|vertex| self.px_of(vertex))
     }
 
     /// Picture position of a vertex.
-    pub fn px_of(&self, vertex: Vertex) -> [f64; 2] {
+    pub fn px_of(&self, vertex: Vertex) -> DVec2 {
         let stated = self.page_from_panel(self.panel.lattice_mm(vertex));
         self.page.px_from_page(self.found_from_stated.apply(stated))
     }
@@ -370,38 +366,37 @@ impl PlacedPanel<'_> {
     /// Counts wrong pixels, by cell; the key `None` is what is around the cells, or a plain tile.
     fn compare(&self, tile: Tile, expected: &Expected) -> BTreeMap<Option<u32>, Tally> {
         let [a, b, c] = self.frame_px(tile);
-        let (ab, ac) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
-        let det = ab[0] * ac[1] - ab[1] * ac[0];
-        let uv = |[x, y]: [f64; 2]| [(x * ac[1] - y * ac[0]) / det, (y * ab[0] - x * ab[1]) / det];
-        let circle = |radius_px: f64| -> Vec<[f64; 2]> {
+        let (ab, ac) = (b - a, c - a);
+        let det = ab.perp_dot(ac);
+        let uv = |p: DVec2| DVec2::new(p.perp_dot(ac), ab.perp_dot(p)) / det;
+        let circle = |radius_px: f64| -> Vec<DVec2> {
             (0..PROBES)
                 .map(|i| f64::from(i) * TAU / f64::from(PROBES))
-                .map(|angle| uv([radius_px * angle.cos(), radius_px * angle.sin()]))
+                .map(|angle| uv(radius_px * DVec2::from_angle(angle)))
                 .collect()
         };
         let (around, further) = (circle(EDGE_PX), circle(EDGE_PX + self.page.smear_px));
         let most_at_edges = self.page.max_ink_error_at_edges();
-        let bit = |p: [f64; 2]| expected.tag.as_ref().and_then(|tag| tag.looks.bit(p));
-        let black_at = |p: [f64; 2]| expected.is_black_at(p);
-        let inside = |[u, v]: [f64; 2]| match self.panel.kind {
+        let bit = |p: DVec2| expected.tag.as_ref().and_then(|tag| tag.looks.bit(p));
+        let black_at = |p: DVec2| expected.is_black_at(p);
+        let inside = |DVec2 { x: u, y: v }: DVec2| match self.panel.kind {
             GridKind::Deltille => u >= 0.0 && v >= 0.0 && u + v <= 1.0,
             GridKind::Checker => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
         };
-        let fourth = [0, 1].map(|i| match self.panel.kind {
-            GridKind::Deltille => c[i],
-            GridKind::Checker => b[i] + c[i] - a[i],
-        });
+        let fourth = match self.panel.kind {
+            GridKind::Deltille => c,
+            GridKind::Checker => b + c - a,
+        };
 
         let mut tallies = BTreeMap::<Option<u32>, Tally>::new();
         let image = &self.page.image;
-        let low = |i: usize| a[i].min(b[i]).min(c[i]).min(fourth[i]).ceil().max(0.0) as usize;
-        let high = |i: usize, size: usize| {
-            ((a[i].max(b[i]).max(c[i]).max(fourth[i]).floor() + 1.0).max(0.0) as usize).min(size)
-        };
-        for y in low(1)..high(1, image.height()) {
-            for x in low(0)..high(0, image.width()) {
-                let position = [x as f64, y as f64];
-                let p = uv([position[0] - a[0], position[1] - a[1]]);
+        let low = a.min(b).min(c).min(fourth).ceil();
+        let high = a.max(b).max(c).max(fourth).floor() + 1.0;
+        let end = |high: f64, size: usize| (high.max(0.0) as usize).min(size);
+        for y in low.y.max(0.0) as usize..end(high.y, image.height()) {
+            for x in low.x.max(0.0) as usize..end(high.x, image.width()) {
+                let position = DVec2::new(x as f64, y as f64);
+                let p = uv(position - a);
                 if !inside(p) {
                     continue;
                 }
@@ -409,9 +404,9 @@ impl PlacedPanel<'_> {
                 let black = black_at(p);
                 let found = 1.0 - f64::from(image.at(x, y)) / 255.0;
                 let error = (found - f64::from(u8::from(black))).abs();
-                let is_uniform = |around: &[[f64; 2]], step: usize| {
-                    around.iter().step_by(step).all(|d| {
-                        let q = [p[0] + d[0], p[1] + d[1]];
+                let is_uniform = |around: &[DVec2], step: usize| {
+                    around.iter().step_by(step).all(|&off| {
+                        let q = p + off;
                         inside(q) && black_at(q) == black
                     })
                 };
@@ -425,8 +420,7 @@ impl PlacedPanel<'_> {
                 tally.checked += 1;
                 if is_wrong {
                     tally.wrong += 1;
-                    tally.moment[0] += position[0];
-                    tally.moment[1] += position[1];
+                    tally.moment += position;
                 }
             }
         }
@@ -434,9 +428,9 @@ impl PlacedPanel<'_> {
         if let Some(tag) = &expected.tag {
             for bit in 0..tag.looks.cells.dimension().bits() {
                 tallies.entry(Some(bit)).or_insert_with(|| {
-                    let [u, v] = tag.looks.cells.centre(bit, tag.looks.inset);
-                    let at = [0, 1].map(|i| a[i] + u * ab[i] + v * ac[i]);
-                    let wrong = (self.page.ink(at) > 0.5) != black_at([u, v]);
+                    let centre = tag.looks.cells.centre(bit, tag.looks.inset);
+                    let at = a + centre.x * ab + centre.y * ac;
+                    let wrong = (self.page.ink(at) > 0.5) != black_at(centre);
                     Tally { checked: 1, wrong: usize::from(wrong), moment: at }
                 });
             }
@@ -479,14 +473,14 @@ impl PlacedPanel<'_> {
         let spot = spots.fold(Tally::default(), |sum, t| Tally {
             checked: sum.checked + t.checked,
             wrong: sum.wrong + t.wrong,
-            moment: [sum.moment[0] + t.moment[0], sum.moment[1] + t.moment[1]],
+            moment: sum.moment + t.moment,
         });
         if spot.wrong > 0 {
             let n = spot.wrong as f64;
             report.findings.push(TileFinding::Blemish {
                 row,
                 col,
-                at_mm: self.page.page_from_px(spot.moment.map(|m| m / n)),
+                at_mm: self.page.page_from_px(spot.moment / n),
                 area_mm2: n / self.page.px_per_mm.powi(2),
             });
         }

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
+use glam::DVec2;
 use serde::Serialize;
 
 use super::document::Format;
@@ -110,7 +111,7 @@ pub struct SheetVerdict {
     /// Resolution at which it was looked at, px/mm.
     pub px_per_mm: f64,
     /// Page size as the file states it, mm.
-    pub size_mm: [f64; 2],
+    pub size_mm: DVec2,
     /// Lengths of the check bars, mm: stated, and measured where both ends were found.
     pub check_bars_mm: Vec<(f64, Option<f64>)>,
     /// Corners that the target has on this sheet.

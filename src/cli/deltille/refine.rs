@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail};
 use clap::ValueEnum;
+use glam::DVec2;
 
 use super::limits::ImageLimits;
 use crate::cli::output::{self, Overwrite};
@@ -107,7 +108,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// The results as CSV; covariances in px², empty where the method gives none.
 fn table(refined: &[Refined]) -> String {
     let mut text = "x,y,cov_xx,cov_xy,cov_yy,status\n".to_owned();
-    for Refined { position: [x, y], cov, status, .. } in refined {
+    for Refined { position: DVec2 { x, y }, cov, status, .. } in refined {
         let cov = cov.map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
         let status = match status {
             RefineStatus::Ok => "ok",
@@ -120,7 +121,7 @@ fn table(refined: &[Refined]) -> String {
     text
 }
 
-fn read_seeds(path: &Path, limits: &Limits) -> anyhow::Result<Vec<[f64; 2]>> {
+fn read_seeds(path: &Path, limits: &Limits) -> anyhow::Result<Vec<DVec2>> {
     let text = limits.read_text(path)?;
     let seeds = csv::read_points(&text);
     let seeds = seeds.map_err(|problem| anyhow!("{}: {problem}", path.display()))?;

@@ -92,15 +92,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let light = Light {
         blur_px: in_range("--blur", args.blur, 100.0)?,
         noise: in_range("--noise", args.noise, 100.0)? / 100.0,
-        gradient: args.gradient,
+        gradient: args.gradient.into(),
         seed: args.seed,
         ..Light::default()
     };
-    if light.gradient.iter().any(|g| !(-2.0..=2.0).contains(g)) {
+    if args.gradient.iter().any(|g| !(-2.0..=2.0).contains(g)) {
         bail!("--gradient: it must be between -2 and 2");
     }
     let corners = || target.panels.iter().flat_map(|panel| &panel.corners);
-    let middle = corners().map(|c| DVec3::from(c.target_mm)).sum::<DVec3>();
+    let middle = corners().map(|c| c.target_mm).sum::<DVec3>();
     let pose = args.camera_from_target(middle / corners().count() as f64)?;
 
     let scene = scene_of_target(&target, family.as_ref())?;

@@ -294,7 +294,7 @@ fn summary(solved: &Calibrated) -> String {
     let mut lines =
         vec![format!("{}, {}", counted(estimate.cameras.len(), "camera"), headline(estimate))];
     for camera in &estimate.cameras {
-        let [fx, fy] = camera.camera.focal_px;
+        let (fx, fy) = camera.camera.focal_px.into();
         let at = camera.camera_from_rig.inverse().translation;
         let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
         let deviation = camera.pose_sd.map_or(String::new(), |sd| {

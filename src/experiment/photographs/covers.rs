@@ -30,16 +30,16 @@ const MOST_THINGS: usize = 500;
 impl Covers {
     /// Covers that lie over so large a part of some places: hands that come in from the sides, or,
     /// with `scattered`, things lying about.
-    pub fn over(places: &[[f64; 2]], part: f64, scattered: bool, rng: &mut ChaCha8Rng) -> Self {
+    pub fn over(places: &[DVec2], part: f64, scattered: bool, rng: &mut ChaCha8Rng) -> Self {
         if part <= 0.0 || places.is_empty() {
             return Self::default();
         }
-        let places: Vec<DVec2> = places.iter().map(|&place| place.into()).collect();
+
         let middle = places.iter().sum::<DVec2>() / places.len() as f64;
         let reach = places.iter().map(|place| place.distance(middle)).fold(0.0, f64::max);
         let mut covers = Self::default();
         let enough = |covers: &Self, part: f64| {
-            let hidden = places.iter().filter(|place| covers.distance(place.to_array()) < 0.0);
+            let hidden = places.iter().filter(|&&place| covers.distance(place) < 0.0);
             hidden.count() as f64 >= part * places.len() as f64
         };
         if scattered {
@@ -83,18 +83,18 @@ impl Covers {
     }
 
     /// Distance from the nearest cover's outline, px, negative inside.
-    pub fn distance(&self, place: [f64; 2]) -> f64 {
+    pub fn distance(&self, place: DVec2) -> f64 {
         self.nearest(place).map_or(f64::INFINITY, |(distance, _)| distance)
     }
 
-    fn nearest(&self, place: [f64; 2]) -> Option<(f64, &Stroke)> {
-        let distances = self.0.iter().map(|stroke| (stroke.distance(place.into()), stroke));
+    fn nearest(&self, place: DVec2) -> Option<(f64, &Stroke)> {
+        let distances = self.0.iter().map(|stroke| (stroke.distance(place), stroke));
         distances.min_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 
     /// How much light a cover sends back at a place, darker towards its outline as round things are;
     /// `None` beside all covers.
-    pub fn tone(&self, place: [f64; 2]) -> Option<f64> {
+    pub fn tone(&self, place: DVec2) -> Option<f64> {
         let (distance, stroke) = self.nearest(place).filter(|(distance, _)| *distance < 0.0)?;
         let rim = 1.0 + distance / stroke.radius;
         Some(stroke.tone * (1.0 - 0.45 * rim.powi(4)))
@@ -148,8 +148,8 @@ mod tests {
 
     #[test]
     fn so_much_is_covered_as_was_asked_for() {
-        let places: Vec<[f64; 2]> =
-            (0..400).map(|i| [f64::from(i % 20) * 10.0, f64::from(i / 20) * 10.0]).collect();
+        let places: Vec<DVec2> =
+            (0..400).map(|i| 10.0 * DVec2::new(f64::from(i % 20), f64::from(i / 20))).collect();
         for seed in 0..10 {
             for (part, scattered) in [(0.2, false), (0.4, false), (0.6, false), (0.4, true)] {
                 let mut rng = ChaCha8Rng::seed_from_u64(seed);

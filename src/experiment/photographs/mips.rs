@@ -1,5 +1,7 @@
 //! A picture at all its sizes, each half of the one before, to be looked at from any distance.
 
+use glam::DVec2;
+
 use crate::raster::Gray;
 
 /// What lies beyond the borders of a picture.
@@ -30,23 +32,19 @@ impl Mips {
         Self { levels, beyond }
     }
 
-    /// The mean over a parallelogram around (x, y), in pixels of the first level, whose sides are
-    /// `across` and `down`.
+    /// The mean over a parallelogram around a place, in pixels of the first level.
     ///
     /// The level is the first whose pixels are no smaller than the parallelogram's narrow side: samples that lie
     /// farther apart than pixels would displace edges along the rows by a sixteenth of that side. Along
     /// the other as many are taken as it is longer.
-    pub fn area(&self, [x, y]: [f64; 2], footprint: &Footprint) -> f32 {
+    pub fn area(&self, middle: DVec2, footprint: &Footprint) -> f32 {
         let scale = footprint.scale;
         let level = &self.levels[footprint.level.min(self.levels.len() - 1)];
         let mut sum = 0.0;
         for k in 0..footprint.samples {
             let t = (f64::from(k) + 0.5) / f64::from(footprint.samples) - 0.5;
-            let at = [0, 1].map(|i| {
-                let full = [x, y][i] + t * footprint.long[i];
-                // Pixel centres at integers on every level.
-                (full + 0.5) * scale - 0.5
-            });
+            // Pixel centres at integers on every level.
+            let at = (middle + t * footprint.long + 0.5) * scale - 0.5;
             sum += match self.beyond {
                 Beyond::Border => clamped(level, at),
                 Beyond::Again => wrapped(level, at),
@@ -56,7 +54,7 @@ impl Mips {
     }
 
     /// How an area of the first level is to be sampled, whose sides are `across` and `down`, px.
-    pub fn footprint(&self, across: [f64; 2], down: [f64; 2]) -> Footprint {
+    pub fn footprint(&self, across: DVec2, down: DVec2) -> Footprint {
         Footprint::new(across, down, self.levels.len())
     }
 }
@@ -67,16 +65,16 @@ pub(super) struct Footprint {
     scale: f64,
     samples: u32,
     /// Its long axis, px of the first level.
-    long: [f64; 2],
+    long: DVec2,
 }
 
 /// Most samples along the long axis: a tilt of more than 85°.
 const MOST_SAMPLES: u32 = 12;
 
 impl Footprint {
-    fn new(across: [f64; 2], down: [f64; 2], levels: usize) -> Self {
+    fn new(across: DVec2, down: DVec2, levels: usize) -> Self {
         // Singular values and the long axis of the 2 × 2 matrix with these columns.
-        let ([a, c], [b, d]) = (across, down);
+        let (DVec2 { x: a, y: c }, DVec2 { x: b, y: d }) = (across, down);
         let (xx, xy, yy) = (a * a + b * b, a * c + b * d, c * c + d * d);
         let mean = 0.5 * (xx + yy);
         let spread = (0.5 * (xx - yy)).hypot(xy);
@@ -85,7 +83,7 @@ impl Footprint {
         let level = (short.max(1.0).log2().ceil() as usize).min(levels - 1);
         let texel = (1u32 << level) as f64;
         let samples = ((long / texel).ceil() as u32).clamp(1, MOST_SAMPLES);
-        Self { level, scale: 1.0 / texel, samples, long: [long * angle.cos(), long * angle.sin()] }
+        Self { level, scale: 1.0 / texel, samples, long: long * DVec2::from_angle(angle) }
     }
 }
 
@@ -96,26 +94,26 @@ fn half(picture: &Gray<u8>) -> Gray<u8> {
     })
 }
 
-fn clamped(picture: &Gray<u8>, [x, y]: [f64; 2]) -> f32 {
+fn clamped(picture: &Gray<u8>, at: DVec2) -> f32 {
     let (width, height) = (picture.width(), picture.height());
-    let x = x.clamp(0.0, (width - 1) as f64);
-    let y = y.clamp(0.0, (height - 1) as f64);
-    let (left, top) = ((x as usize).min(width - 2), (y as usize).min(height - 2));
-    blend(picture, [left, left + 1], [top, top + 1], [x - left as f64, y - top as f64])
+    let at = at.clamp(DVec2::ZERO, DVec2::new((width - 1) as f64, (height - 1) as f64));
+    let (left, top) = ((at.x as usize).min(width - 2), (at.y as usize).min(height - 2));
+    let part = at - DVec2::new(left as f64, top as f64);
+    blend(picture, [left, left + 1], [top, top + 1], part)
 }
 
-fn wrapped(picture: &Gray<u8>, [x, y]: [f64; 2]) -> f32 {
+fn wrapped(picture: &Gray<u8>, at: DVec2) -> f32 {
     let (width, height) = (picture.width(), picture.height());
-    let (floor_x, floor_y) = (x.floor(), y.floor());
-    let left = (floor_x as i64).rem_euclid(width as i64) as usize;
-    let top = (floor_y as i64).rem_euclid(height as i64) as usize;
+    let floor = at.floor();
+    let left = (floor.x as i64).rem_euclid(width as i64) as usize;
+    let top = (floor.y as i64).rem_euclid(height as i64) as usize;
     let columns = [left, if left + 1 == width { 0 } else { left + 1 }];
     let rows = [top, if top + 1 == height { 0 } else { top + 1 }];
-    blend(picture, columns, rows, [x - floor_x, y - floor_y])
+    blend(picture, columns, rows, at - floor)
 }
 
-fn blend(picture: &Gray<u8>, [x0, x1]: [usize; 2], [y0, y1]: [usize; 2], part: [f64; 2]) -> f32 {
-    let (fx, fy) = (part[0] as f32, part[1] as f32);
+fn blend(picture: &Gray<u8>, [x0, x1]: [usize; 2], [y0, y1]: [usize; 2], part: DVec2) -> f32 {
+    let (fx, fy) = (part.x as f32, part.y as f32);
     let (upper, lower) = (picture.row(y0), picture.row(y1));
     let mix = |row: &[u8]| f32::from(row[x0]) * (1.0 - fx) + f32::from(row[x1]) * fx;
     mix(upper) * (1.0 - fy) + mix(lower) * fy
@@ -130,9 +128,10 @@ mod tests {
     fn the_mean_of_a_ramp_is_its_middle() {
         let ramp = Mips::new(Gray::from_fn(256, 256, |x, _| x as u8), Beyond::Border);
         for (across, down) in
-            [([0.3, 0.0], [0.0, 0.3]), ([4.0, 1.0], [-1.0, 4.0]), ([9.0, 2.0], [0.5, 2.0])]
+            [((0.3, 0.0), (0.0, 0.3)), ((4.0, 1.0), (-1.0, 4.0)), ((9.0, 2.0), (0.5, 2.0))]
         {
-            let mean = ramp.area([100.25, 90.0], &ramp.footprint(across, down));
+            let footprint = ramp.footprint(across.into(), down.into());
+            let mean = ramp.area(DVec2::new(100.25, 90.0), &footprint);
             // Each level is rounded to whole grey values.
             assert!((mean - 100.25).abs() < 0.6, "{mean}");
         }

@@ -33,6 +33,7 @@ pub mod view;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use glam::DVec2;
 use rayon::prelude::*;
 
 use self::axes::{Axis, Level};
@@ -60,12 +61,12 @@ pub enum PhotographError {
     #[error("the target's sheet is printed on several pages: choose paper that holds it")]
     SeveralPages,
     /// No paths meet where a corner should be.
-    #[error("the paths of the PDF do not meet at {at_mm:?} mm, where corner {id} should be")]
+    #[error("the paths of the PDF do not meet at {at_mm} mm, where corner {id} should be")]
     NoCorner {
         /// Which corner.
         id: u32,
         /// Where it is stated, mm.
-        at_mm: [f64; 2],
+        at_mm: DVec2,
     },
     /// The PDF's content cannot be followed.
     #[error("the PDF's paths cannot be read: {0}")]
@@ -293,9 +294,10 @@ mod tests {
             errors.extend(score.errors_px);
         }
         let n = errors.len() as f64;
-        let mean = [0, 1].map(|i| errors.iter().map(|e| e[i]).sum::<f64>() / n);
-        let rms = (errors.iter().flatten().map(|e| e * e).sum::<f64>() / (2.0 * n)).sqrt();
-        assert!(mean.iter().all(|m| m.abs() < 0.001) && rms < 0.01, "{mean:?} {rms}");
+        let mean = errors.iter().sum::<DVec2>() / n;
+        let squares = errors.iter().map(|error| error.length_squared());
+        let rms = (squares.sum::<f64>() / (2.0 * n)).sqrt();
+        assert!(mean.abs().max_element() < 0.001 && rms < 0.01, "{mean} {rms}");
     }
 
     /// A box along the way is no Gaussian; taken for one, it leaves covariances four times too large.
@@ -312,9 +314,9 @@ mod tests {
                     score(&found, &photograph, 1.0, false)
                 })
                 .collect();
-            let squares = || scores.iter().flat_map(|score| score.errors_px.iter().flatten());
-            let count = squares().count() as f64;
-            let rms = (squares().map(|e| e * e).sum::<f64>() / count).sqrt();
+            let errors = || scores.iter().flat_map(|score| &score.errors_px);
+            let squares = errors().map(|error| error.length_squared()).sum::<f64>();
+            let rms = (squares / (2 * errors().count()) as f64).sqrt();
             let normalised: Vec<f64> = scores.iter().flat_map(|s| s.normalised.clone()).collect();
             // A corner has two coordinates.
             let mean = normalised.iter().sum::<f64>() / (2 * normalised.len()) as f64;

@@ -83,16 +83,16 @@ impl Spot {
 
 impl Light {
     /// Light that falls on a place of the picture, relative to its middle.
-    pub fn even_part(&self, place: [f64; 2], size_px: [usize; 2]) -> f64 {
+    pub fn even_part(&self, place: DVec2, size_px: [usize; 2]) -> f64 {
         let half = DVec2::new(size_px[0] as f64, size_px[1] as f64) / 2.0;
-        let off = DVec2::from(place) - half;
+        let off = place - half;
         let r2 = off.length_squared() / half.length_squared();
         (1.0 + off.dot(self.slope)).max(0.0) * (1.0 - self.vignetting * r2)
     }
 
     /// Light that glare adds at a place.
-    pub fn glare(&self, place: [f64; 2]) -> f64 {
-        self.spots.iter().map(|spot| spot.light(place.into())).sum()
+    pub fn glare(&self, place: DVec2) -> f64 {
+        self.spots.iter().map(|spot| spot.light(place)).sum()
     }
 }
 
@@ -106,7 +106,7 @@ pub(super) fn expose(setting: &Setting, scene: &Scene) -> Gray<f32> {
     let moved = moved(&still, setting.light.motion * scene.motion_px, margin, [width, height]);
     let light = setting.light;
     Gray::from_fn(width, height, |x, y| {
-        let place = [x as f64, y as f64];
+        let place = DVec2::new(x as f64, y as f64);
         let even = light.even_part(place, [width, height]);
         (f64::from(moved.at(x, y)) * even + light.glare(place)) as f32
     })
@@ -171,20 +171,19 @@ fn sample_row(
     let mut samples = Vec::with_capacity(count);
     let mut areas: Option<(Footprint, Footprint)> = None;
     for k in 0..count {
-        let at = [place(k), y];
+        let at = DVec2::new(place(k), y);
         if k % BLOCK == 0 {
             let x = place((k + BLOCK / 2).min(count - 1));
-            areas = sides(view, [x, y], step).map(|[across, down]| {
-                let texels = |side: [f64; 2]| side.map(|v| v * TEXELS_PER_MM);
-                (page.footprint(across, down), background.footprint(texels(across), texels(down)))
+            areas = sides(view, DVec2::new(x, y), step).map(|[across, down]| {
+                let [right, below] = [across, down].map(|side| side * TEXELS_PER_MM);
+                (page.footprint(across, down), background.footprint(right, below))
             });
         }
         if !covers.is_empty()
             && let Some(tone) = covers.tone(at)
         {
             // The skin has its grain in the picture, not on the page.
-            let grain =
-                skin.area([at[0] * 2.0, at[1] * 2.0], &skin.footprint([0.5, 0.0], [0.0, 0.5]));
+            let grain = skin.area(at * 2.0, &skin.footprint(DVec2::X * 0.5, DVec2::Y * 0.5));
             samples.push((tone as f32) * white * grain / 128.0);
             continue;
         }
@@ -197,8 +196,7 @@ fn sample_row(
             Some(whiteness) => black + (white - black) * whiteness,
             None => {
                 let table = if view.curl.is_none() { seen } else { view.table_from_px(at) };
-                let [u, v] = table.unwrap_or([0.0; 2]);
-                let texel = [u * TEXELS_PER_MM + shift.x, v * TEXELS_PER_MM + shift.y];
+                let texel = table.unwrap_or(DVec2::ZERO) * TEXELS_PER_MM + shift;
                 background.area(texel, around) / 255.0 * white
             }
         };
@@ -208,10 +206,11 @@ fn sample_row(
 }
 
 /// What a step to the right and a step down are on the page, mm.
-fn sides(view: &View, [x, y]: [f64; 2], step: f64) -> Option<[[f64; 2]; 2]> {
+fn sides(view: &View, px: DVec2, step: f64) -> Option<[DVec2; 2]> {
     let look = |at| view.page_from_px(at).or_else(|| view.table_from_px(at));
-    let (here, right, below) = (look([x, y])?, look([x + step, y])?, look([x, y + step])?);
-    Some([right, below].map(|[u, v]| [u - here[0], v - here[1]]))
+    let (here, right, below) =
+        (look(px)?, look(px + DVec2::X * step)?, look(px + DVec2::Y * step)?);
+    Some([right - here, below - here])
 }
 
 /// The mean of a picture along a straight move, with its margin cut off.

@@ -3,6 +3,8 @@
 //! The PDF is written, drawn by hayro, and its corners are the vertices of its own paths: the
 //! description of the target only says which of them are corners, and what they are called.
 
+use glam::DVec2;
+
 use super::PhotographError;
 use super::mips::{Beyond, Footprint, Mips};
 use super::paths::Vertices;
@@ -35,13 +37,13 @@ pub struct PageCorner {
     /// Lattice column.
     pub col: i32,
     /// Where it is, mm from the lower left corner of the page, y up.
-    pub page_mm: [f64; 2],
+    pub page_mm: DVec2,
 }
 
 /// A printed page.
 pub struct PrintedPage {
     /// Width and height, mm.
-    pub size_mm: [f64; 2],
+    pub size_mm: DVec2,
     /// All corners on it.
     pub corners: Vec<PageCorner>,
     /// Length of a tile's edge, mm.
@@ -98,7 +100,7 @@ impl PrintedPage {
             .map_or(UNTAGGED_BITS, |family| family.cells().width(panel.tag_inset_bits()));
         let [cols, rows] = panel.matrix;
         Ok(Self {
-            size_mm: [page.width_mm, page.height_mm],
+            size_mm: DVec2::new(page.width_mm, page.height_mm),
             corners,
             edge_mm: panel.edge_mm,
             bit_mm: panel.edge_mm / bits,
@@ -111,29 +113,26 @@ impl PrintedPage {
     }
 
     /// The middle of the box around all corners, mm, and the box's size.
-    pub fn board_mm(&self) -> ([f64; 2], [f64; 2]) {
-        let bounds = |axis: usize| {
-            let places = self.corners.iter().map(|corner| corner.page_mm[axis]);
-            places.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| [lo.min(v), hi.max(v)])
-        };
-        let boxed = [bounds(0), bounds(1)];
-        (boxed.map(|[lo, hi]| 0.5 * (lo + hi)), boxed.map(|[lo, hi]| hi - lo))
+    pub fn board_mm(&self) -> (DVec2, DVec2) {
+        let places = || self.corners.iter().map(|corner| corner.page_mm);
+        let least = places().fold(DVec2::INFINITY, DVec2::min);
+        let most = places().fold(DVec2::NEG_INFINITY, DVec2::max);
+        (least.midpoint(most), most - least)
     }
 
     /// How white a small parallelogram of the page is on the average, 0 on ink to 1 on bare paper;
     /// `None` beside the page. Its sides are in mm.
-    pub(super) fn whiteness(&self, [x, y]: [f64; 2], footprint: &Footprint) -> Option<f32> {
-        let [width, height] = self.size_mm;
-        let on_page = (0.0..=width).contains(&x) && (0.0..=height).contains(&y);
+    pub(super) fn whiteness(&self, place: DVec2, footprint: &Footprint) -> Option<f32> {
+        let on_page = place.cmpge(DVec2::ZERO).all() && place.cmple(self.size_mm).all();
         on_page.then(|| {
-            let px = [x * self.px_per_mm - 0.5, (height - y) * self.px_per_mm - 0.5];
-            self.brightness.area(px, footprint) / 255.0
+            let from_top = DVec2::new(place.x, self.size_mm.y - place.y);
+            self.brightness.area(from_top * self.px_per_mm - 0.5, footprint) / 255.0
         })
     }
 
     /// How a parallelogram with these sides, mm, is sampled.
-    pub(super) fn footprint(&self, across: [f64; 2], down: [f64; 2]) -> Footprint {
-        let px = |[x, y]: [f64; 2]| [x * self.px_per_mm, -y * self.px_per_mm];
+    pub(super) fn footprint(&self, across: DVec2, down: DVec2) -> Footprint {
+        let px = |side: DVec2| side * DVec2::new(1.0, -1.0) * self.px_per_mm;
         self.brightness.footprint(px(across), px(down))
     }
 }

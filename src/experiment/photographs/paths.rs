@@ -3,6 +3,7 @@
 //! Only what filled paths need is understood: the graphics state's matrix, moves, lines, curves,
 //! rectangles and the closing of contours. Text, images and nested forms are passed over.
 
+use glam::DVec2;
 use lopdf::content::Content;
 use lopdf::{Document, Object};
 use rstar::primitives::GeomWithData;
@@ -43,17 +44,15 @@ impl Vertices {
     }
 
     /// The mean of the vertices within `radius_mm` of a place, and of how many contours they are.
-    pub fn meeting(&self, [x, y]: [f64; 2], radius_mm: f64) -> Option<([f64; 2], usize)> {
-        let around =
-            AABB::from_corners([x - radius_mm, y - radius_mm], [x + radius_mm, y + radius_mm]);
+    pub fn meeting(&self, place: DVec2, radius_mm: f64) -> Option<(DVec2, usize)> {
+        let [least, most] = [place - radius_mm, place + radius_mm];
+        let around = AABB::from_corners(least.to_array(), most.to_array());
         let near: Vec<_> = self.0.locate_in_envelope(around).collect();
         let mut contours: Vec<usize> = near.iter().map(|vertex| vertex.data).collect();
         contours.sort_unstable();
         contours.dedup();
-        let n = near.len() as f64;
-        let mean =
-            [0, 1].map(|axis| near.iter().map(|vertex| vertex.geom()[axis]).sum::<f64>() / n);
-        (!near.is_empty()).then_some((mean, contours.len()))
+        let sum: DVec2 = near.iter().map(|vertex| DVec2::from(*vertex.geom())).sum();
+        (!near.is_empty()).then(|| (sum / near.len() as f64, contours.len()))
     }
 }
 
@@ -124,11 +123,12 @@ mod tests {
     fn matrices_are_followed_and_contours_counted() {
         let stream = b"q 2 0 0 2 72 0 cm 0 0 m 36 0 l 36 36 l h f Q 72 0 m 144 72 l 72 72 l f";
         let vertices = Vertices::of(&Content::decode(stream).unwrap());
-        let (place, contours) = vertices.meeting([25.4, 0.0], 0.01).unwrap();
-        assert!((place[0] - 25.4).abs() < 1e-9 && place[1].abs() < 1e-9, "{place:?}");
+        let meeting = |x: f64, y: f64| vertices.meeting(DVec2::new(x, y), 0.01);
+        let (place, contours) = meeting(25.4, 0.0).unwrap();
+        assert!(place.abs_diff_eq(DVec2::new(25.4, 0.0), 1e-9), "{place:?}");
         assert_eq!(contours, 2);
-        assert_eq!(vertices.meeting([50.8, 25.4], 0.01).unwrap().1, 2);
-        assert_eq!(vertices.meeting([50.8, 0.0], 0.01).unwrap().1, 1);
-        assert!(vertices.meeting([40.0, 0.0], 0.01).is_none());
+        assert_eq!(meeting(50.8, 25.4).unwrap().1, 2);
+        assert_eq!(meeting(50.8, 0.0).unwrap().1, 1);
+        assert!(meeting(40.0, 0.0).is_none());
     }
 }

@@ -99,12 +99,12 @@ pub fn take(page: &PrintedPage, studio: &Studio, scene: &Scene, view: u64) -> Ph
     let seed = studio.seed;
     let rng = |of| chance(seed, view, of);
     let camera = pose(page, scene, &mut rng(Chance::Pose));
-    let seen: Vec<(&PageCorner, [f64; 2])> = page
+    let seen: Vec<(&PageCorner, DVec2)> = page
         .corners
         .iter()
         .filter_map(|corner| Some((corner, camera.px_from_page(corner.page_mm)?)))
         .collect();
-    let places: Vec<[f64; 2]> = seen.iter().map(|(_, place)| *place).collect();
+    let places: Vec<DVec2> = seen.iter().map(|(_, place)| *place).collect();
     let covers = Covers::over(&places, scene.covered, view % 2 == 1, &mut rng(Chance::Covers));
     let light = light(scene, &places, &mut rng(Chance::Light));
     let mut around = rng(Chance::Background);
@@ -124,13 +124,13 @@ pub fn take(page: &PrintedPage, studio: &Studio, scene: &Scene, view: u64) -> Ph
     let scale = scene.scale();
     let corners = seen
         .into_iter()
-        .filter(|(_, [x, y])| {
+        .filter(|(_, place)| {
             let within = |v: f64, size: usize| (-0.5..size as f64 - 0.5).contains(&v);
-            within(*x, size_px[0]) && within(*y, size_px[1])
+            within(place.x, size_px[0]) && within(place.y, size_px[1])
         })
         .map(|(&PageCorner { id, panel, row, col, .. }, place)| {
             let sight = sight(place, scene, size_px, &covers, &light);
-            let [x, y] = place.map(|v| (v + 0.5) * scale - 0.5);
+            let DVec2 { x, y } = (place + 0.5) * scale - 0.5;
             TrueCorner { id, panel, row, col, x, y, sight }
         })
         .collect();
@@ -157,8 +157,7 @@ fn pose(page: &PrintedPage, scene: &Scene, rng: &mut ChaCha8Rng) -> View {
     let off_mm = offset * OFF_CENTRE * height * distance_mm / focal_px;
     let curl = (scene.curl > 0.0).then(|| {
         // Sag h over the width w: ρ = w² / 8h.
-        let width_mm = board_mm[0].max(board_mm[1]);
-        let radius_mm = width_mm / (8.0 * scene.curl);
+        let radius_mm = board_mm.max_element() / (8.0 * scene.curl);
         let radius_mm = if bent_up { radius_mm } else { -radius_mm };
         Curl { radius_mm, along: DVec2::from_angle(bent_along) }
     });
@@ -172,13 +171,13 @@ fn pose(page: &PrintedPage, scene: &Scene, rng: &mut ChaCha8Rng) -> View {
     }
 }
 
-fn light(scene: &Scene, places: &[[f64; 2]], rng: &mut ChaCha8Rng) -> Light {
+fn light(scene: &Scene, places: &[DVec2], rng: &mut ChaCha8Rng) -> Light {
     let [width, height] = scene.size_px.map(|size| size as f64);
     let from = DVec2::from_angle(rng.random_range(0.0..TAU));
     let motion = DVec2::from_angle(rng.random_range(0.0..TAU));
     let n = places.len().max(1) as f64;
-    let middle = places.iter().map(|&place| DVec2::from(place)).sum::<DVec2>() / n;
-    let reach = places.iter().map(|&p| DVec2::from(p).distance(middle)).fold(1.0, f64::max);
+    let middle = places.iter().sum::<DVec2>() / n;
+    let reach = places.iter().map(|place| place.distance(middle)).fold(1.0, f64::max);
     let spots = (0..scene.glare)
         .map(|_| {
             let turn = DVec2::from_angle(rng.random_range(0.0..TAU));
@@ -198,7 +197,7 @@ fn light(scene: &Scene, places: &[[f64; 2]], rng: &mut ChaCha8Rng) -> Light {
 
 /// Whether a corner can be seen.
 fn sight(
-    place: [f64; 2],
+    place: DVec2,
     scene: &Scene,
     size_px: [usize; 2],
     covers: &Covers,

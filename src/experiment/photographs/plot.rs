@@ -1,12 +1,14 @@
 //! The plot of the experiment: a row for each axis, columns for recall, error, honesty and time.
 
+use glam::DVec2;
+
 use super::axes::Axis;
 use super::table::Row;
 use crate::experiment::plot::{line, page, write};
 
 /// Size of a panel's axes and the room around it, in user units.
-const PANEL: [f64; 2] = [250.0, 130.0];
-const MARGIN: [f64; 2] = [72.0, 88.0];
+const PANEL: DVec2 = DVec2::new(250.0, 130.0);
+const MARGIN: DVec2 = DVec2::new(72.0, 88.0);
 const HEAD: f64 = 50.0;
 
 /// One colour a subject, in their order.
@@ -67,27 +69,25 @@ pub fn svg(rows: &[Row]) -> String {
         .into_iter()
         .filter(|axis| rows.iter().any(|row| row.axis == axis.name()))
         .collect();
-    let size = [
-        COLUMNS.len() as f64 * (PANEL[0] + MARGIN[0]) + 20.0,
-        HEAD + axes.len() as f64 * (PANEL[1] + MARGIN[1]),
-    ];
+    let pitch = PANEL + MARGIN;
+    let size =
+        DVec2::new(COLUMNS.len() as f64 * pitch.x + 20.0, HEAD + axes.len() as f64 * pitch.y);
     let mut body = String::new();
-    let mut x = MARGIN[0];
+    let mut at = DVec2::new(MARGIN.x, 18.0);
     for (subject, colour) in subjects.iter().zip(COLOURS.iter().cycle()) {
-        line(&mut body, &[[x, 18.0], [x + 34.0, 18.0]], colour, 2.5, "");
-        x += 42.0 + write(&mut body, subject, [x + 42.0, 23.0], 0.0) + 30.0;
+        line(&mut body, &[at, at + DVec2::X * 34.0], colour, 2.5, "");
+        at.x += 42.0 + write(&mut body, subject, at + DVec2::new(42.0, 5.0), 0.0) + 30.0;
     }
     for (j, &axis) in axes.iter().enumerate() {
         for (i, column) in COLUMNS.iter().enumerate() {
-            let left = MARGIN[0] + i as f64 * (PANEL[0] + MARGIN[0]);
-            let top = HEAD + j as f64 * (PANEL[1] + MARGIN[1]);
+            let origin = DVec2::new(MARGIN.x, HEAD) + DVec2::new(i as f64, j as f64) * pitch;
             let of = |subject: &str| -> Vec<&Row> {
                 let wanted = |row: &&Row| row.axis == axis.name() && row.subject == subject;
                 rows.iter().filter(wanted).collect()
             };
             let curves: Vec<(Vec<&Row>, &str)> =
                 subjects.iter().zip(COLOURS.iter().cycle()).map(|(s, c)| (of(s), *c)).collect();
-            panel(&mut body, [left, top], axis, column, &curves);
+            panel(&mut body, origin, axis, column, &curves);
         }
     }
     page(size, &body)
@@ -95,44 +95,48 @@ pub fn svg(rows: &[Row]) -> String {
 
 fn panel(
     body: &mut String,
-    [left, top]: [f64; 2],
+    origin: DVec2,
     axis: Axis,
     column: &Column,
     curves: &[(Vec<&Row>, &str)],
 ) {
-    let [right, bottom] = [left + PANEL[0], top + PANEL[1]];
+    let left = origin.x;
+    let DVec2 { x: right, y: bottom } = origin + PANEL;
     let [low, high] = column.range;
     let y = |value: f64| {
         let part = match low == 0.0 {
             true => value / high,
             false => (value.max(low) / low).ln() / (high / low).ln(),
         };
-        bottom - part.clamp(0.0, 1.0) * PANEL[1]
+        bottom - part.clamp(0.0, 1.0) * PANEL.y
     };
     for &guide in column.guides {
-        line(body, &[[left, y(guide)], [right, y(guide)]], "#cccccc", 0.8, "");
-        write(body, &format!("{guide}"), [left - 8.0, y(guide) + 5.0], 1.0);
+        let ends = [left, right].map(|x| DVec2::new(x, y(guide)));
+        line(body, &ends, "#cccccc", 0.8, "");
+        write(body, &format!("{guide}"), ends[0] + DVec2::new(-8.0, 5.0), 1.0);
     }
     // Levels lie evenly: some have no number, and numbers are seldom evenly spaced.
     let levels = axis.levels();
-    let step = PANEL[0] / levels.len() as f64;
+    let step = PANEL.x / levels.len() as f64;
     let x = |index: usize| left + (index as f64 + 0.5) * step;
     for (index, level) in levels.iter().enumerate() {
-        line(body, &[[x(index), bottom], [x(index), bottom + 4.0]], "#444444", 1.0, "");
+        let foot = DVec2::new(x(index), bottom);
+        line(body, &[foot, foot + DVec2::Y * 4.0], "#444444", 1.0, "");
         // Long names would touch.
         let lower = if levels.len() > 6 && index % 2 == 1 { 13.0 } else { 0.0 };
-        write(body, &level.name, [x(index), bottom + 17.0 + lower], 0.5);
+        write(body, &level.name, foot + DVec2::Y * (17.0 + lower), 0.5);
     }
-    line(body, &[[left, top], [left, bottom], [right, bottom]], "#444444", 1.2, "");
-    write(body, column.label, [left - 40.0, top - 9.0], 0.0);
-    write(body, axis.label(), [left + 0.5 * PANEL[0], bottom + 48.0], 0.5);
+    let corner = DVec2::new(left, bottom);
+    line(body, &[origin, corner, origin + PANEL], "#444444", 1.2, "");
+    write(body, column.label, origin - DVec2::new(40.0, 9.0), 0.0);
+    write(body, axis.label(), corner + DVec2::new(0.5 * PANEL.x, 48.0), 0.5);
     for (rows, colour) in curves {
         let mut curve = |value: fn(&Row) -> Option<f64>, width: f64, dash: &str| {
             let at = |row: &&Row| {
                 let index = levels.iter().position(|level| level.name == row.level)?;
-                Some([x(index), y(value(row)?)])
+                Some(DVec2::new(x(index), y(value(row)?)))
             };
-            let points: Vec<[f64; 2]> = rows.iter().filter_map(at).collect();
+            let points: Vec<DVec2> = rows.iter().filter_map(at).collect();
             line(body, &points, colour, width, dash);
         };
         curve(column.value, 2.2, "");

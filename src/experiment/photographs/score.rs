@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use glam::DVec2;
+
 use super::photograph::{Photograph, Sight, TrueCorner};
 use crate::detect::Detection;
 
@@ -29,7 +31,7 @@ pub struct Score {
     /// Second reports of a corner.
     pub doubled: usize,
     /// Errors of both coordinates of the visible corners that were reported, px.
-    pub errors_px: Vec<[f64; 2]>,
+    pub errors_px: Vec<DVec2>,
     /// Their squares over the reported covariances: eᵀC⁻¹e.
     pub normalised: Vec<f64>,
     /// Time of detection, ms.
@@ -91,8 +93,8 @@ pub fn score(found: &Detection, photograph: &Photograph, scale: f64, half_turn: 
         }
         let Some((t, _)) = seen.filter(|_| first) else { continue };
         score.found += 1;
-        let [dx, dy] = [corner.x - t.x, corner.y - t.y];
-        score.errors_px.push([dx, dy]);
+        let error @ DVec2 { x: dx, y: dy } = corner.position() - DVec2::new(t.x, t.y);
+        score.errors_px.push(error);
         if let Some([xx, xy, yy]) = corner.cov {
             let determinant = xx * yy - xy * xy;
             let square = yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy;
@@ -161,7 +163,7 @@ mod tests {
         );
         assert_eq!((score.visible, score.found, score.labelled, score.wrong), (3, 2, 1, 1));
         assert_eq!((score.hidden, score.nowhere, score.doubled), (1, 1, 1));
-        assert!((score.errors_px[1][0] - 0.1).abs() < 1e-9 || score.errors_px[0][0] == 0.0);
+        assert!((score.errors_px[1].x - 0.1).abs() < 1e-9 || score.errors_px[0].x == 0.0);
         assert!(score.normalised.iter().any(|n| (n - 1.0).abs() < 1e-9));
     }
 

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use glam::DVec2;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use serde::Serialize;
@@ -64,10 +65,10 @@ impl Row {
         let sum = |of: fn(&Score) -> usize| scores.iter().map(of).sum::<usize>();
         let visible = sum(|s| s.visible);
         let part = |count: usize| if visible == 0 { 1.0 } else { count as f64 / visible as f64 };
-        let errors: Vec<[f64; 2]> =
-            scores.iter().flat_map(|s| s.errors_px.iter().copied()).collect();
-        let squares: Vec<f64> = errors.iter().flatten().map(|e| e * e).collect();
-        let mut lengths: Vec<f64> = errors.iter().map(|[dx, dy]| dx.hypot(*dy)).collect();
+        let errors: Vec<DVec2> = scores.iter().flat_map(|s| s.errors_px.iter().copied()).collect();
+        let squares: Vec<f64> =
+            errors.iter().flat_map(|error| error.to_array()).map(|e| e * e).collect();
+        let mut lengths: Vec<f64> = errors.iter().map(|error| error.x.hypot(error.y)).collect();
         let normalised: Vec<f64> =
             scores.iter().flat_map(|s| s.normalised.iter().map(|n| 0.5 * n)).collect();
         let mut times: Vec<f64> = scores.iter().map(|s| s.time_ms).collect();

@@ -29,7 +29,7 @@ pub struct View {
     /// k of the lens.
     pub lens: f64,
     /// Middle of the board on the page, mm.
-    pub middle_mm: [f64; 2],
+    pub middle_mm: DVec2,
     /// How the sheet is bent; `None` for a flat one.
     pub curl: Option<Curl>,
     /// How the camera stands to it.
@@ -67,32 +67,30 @@ pub struct Curl {
 
 impl View {
     /// Where a pixel looks on the page, mm; `None` where it looks past the bent sheet.
-    pub fn page_from_px(&self, px: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn page_from_px(&self, px: DVec2) -> Option<DVec2> {
         let Some(curl) = self.curl else { return self.table_from_px(px) };
         let place = curl.hit(self.place.eye_mm, self.ray(px))?;
-        Some([place.x + self.middle_mm[0], place.y + self.middle_mm[1]])
+        Some(place + self.middle_mm)
     }
 
     /// Where a pixel looks on the plane in which the page would lie were it flat, mm; `None` at and
     /// above its horizon.
-    pub fn table_from_px(&self, px: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn table_from_px(&self, px: DVec2) -> Option<DVec2> {
         let (eye, ray) = (self.place.eye_mm, self.ray(px));
         let s = -eye.z / ray.z;
-        (s > 0.0)
-            .then(|| [eye.x + s * ray.x + self.middle_mm[0], eye.y + s * ray.y + self.middle_mm[1]])
+        (s > 0.0).then(|| (eye + s * ray).truncate() + self.middle_mm)
     }
 
     /// Direction into which a pixel looks, in the frame of the sheet.
-    fn ray(&self, [x, y]: [f64; 2]) -> DVec3 {
-        let [cx, cy] = self.centre_px();
-        let m = DVec2::new(x - cx, y - cy) / self.focal_px;
+    fn ray(&self, px: DVec2) -> DVec3 {
+        let m = (px - self.centre_px()) / self.focal_px;
         let n = m * (1.0 + self.lens * m.length_squared());
         self.place.turn_back * n.extend(1.0)
     }
 
     /// Where a place of the page is seen, px; `None` behind the camera and where the sheet hides it.
-    pub fn px_from_page(&self, page_mm: [f64; 2]) -> Option<[f64; 2]> {
-        let place = DVec2::from(page_mm) - DVec2::from(self.middle_mm);
+    pub fn px_from_page(&self, page_mm: DVec2) -> Option<DVec2> {
+        let place = page_mm - self.middle_mm;
         let on_sheet = self.curl.map_or(place.extend(0.0), |curl| curl.bent(place));
         let p = self.place.rotation * on_sheet + self.place.translation_mm;
         if p.z <= 0.0 {
@@ -106,15 +104,13 @@ impl View {
             r -= (r * (1.0 + self.lens * r * r) - length) / (1.0 + 3.0 * self.lens * r * r);
         }
         let m = if length > 0.0 { n * (r / length) } else { n };
-        let [cx, cy] = self.centre_px();
-        let px = [cx + self.focal_px * m.x, cy + self.focal_px * m.y];
-        let [u, v] = self.page_from_px(px)?;
-        let off_mm = (u - page_mm[0]).hypot(v - page_mm[1]);
+        let px = self.centre_px() + self.focal_px * m;
+        let off_mm = self.page_from_px(px)?.distance(page_mm);
         (off_mm * self.focal_px / p.z < SAME_PX).then_some(px)
     }
 
-    fn centre_px(&self) -> [f64; 2] {
-        self.size_px.map(|size| 0.5 * (size as f64 - 1.0))
+    fn centre_px(&self) -> DVec2 {
+        0.5 * (DVec2::from(self.size_px.map(|size| size as f64)) - 1.0)
     }
 }
 
@@ -163,7 +159,7 @@ mod tests {
             size_px: [640, 480],
             focal_px: 700.0,
             lens: -0.12,
-            middle_mm: [100.0, 75.0],
+            middle_mm: DVec2::new(100.0, 75.0),
             curl,
             place: Place::new(
                 DMat3::from_rotation_x(0.6) * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)),
@@ -179,10 +175,10 @@ mod tests {
             [None, Some(Curl { radius_mm: 300.0, along }), Some(Curl { radius_mm: -300.0, along })]
         {
             let view = view(curl);
-            for place in [[100.0, 75.0], [3.0, 140.0], [190.0, 20.0]] {
-                let [x, y] = view.px_from_page(place).unwrap();
-                let [u, v] = view.page_from_px([x, y]).unwrap();
-                assert!((u - place[0]).hypot(v - place[1]) < 1e-9, "{curl:?} {place:?}");
+            for place in [(100.0, 75.0), (3.0, 140.0), (190.0, 20.0)].map(DVec2::from) {
+                let px = view.px_from_page(place).unwrap();
+                let back = view.page_from_px(px).unwrap();
+                assert!(back.distance(place) < 1e-9, "{curl:?} {place:?}");
             }
         }
     }
@@ -191,9 +187,8 @@ mod tests {
     fn a_slight_bend_is_nearly_flat() {
         let curl = Curl { radius_mm: 1e7, along: DVec2::X };
         let (flat, bent) = (view(None), view(Some(curl)));
-        let place = [20.0, 130.0];
-        let ([x, y], [u, v]) =
-            (flat.px_from_page(place).unwrap(), bent.px_from_page(place).unwrap());
-        assert!((x - u).hypot(y - v) < 0.01);
+        let place = DVec2::new(20.0, 130.0);
+        let [flat, bent] = [flat, bent].map(|view| view.px_from_page(place).unwrap());
+        assert!(flat.distance(bent) < 0.01);
     }
 }

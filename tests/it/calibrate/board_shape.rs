@@ -41,8 +41,8 @@ fn views_of(camera_from_rig: &Pose, offset: impl Fn(f64, f64) -> DVec3, seed: u6
             let (row, col) = (i / 9, i % 9);
             let panel_mm = DVec3::new(20.0 * f64::from(col), 20.0 * f64::from(row), 0.0);
             let [u, v] = [panel_mm.x, panel_mm.y].map(|mm| (mm - 80.0) / reach);
-            let [x, y] = camera.project(pose.apply(panel_mm + offset(u, v))).unwrap();
-            let pixel = [x + noise.sample(&mut noisy), y + noise.sample(&mut noisy)];
+            let at = camera.project(pose.apply(panel_mm + offset(u, v))).unwrap();
+            let pixel = at.map(|v| v + noise.sample(&mut noisy));
             let cov = Some([NOISE_PX * NOISE_PX, 0.0, NOISE_PX * NOISE_PX]);
             Observation { row, col, panel_mm, pixel, cov }
         });

@@ -3,7 +3,7 @@
 use deltille::camera::{
     BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, Pupil,
 };
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
 /// A camera of each model with lenses as they are met, and how far from the axis it is tried, rad.
@@ -37,8 +37,8 @@ fn cameras() -> Vec<(Camera, f64)> {
         (Lens::DoubleSphere(DoubleSphere { xi: 0.3, alpha: 0.3 }), 1.5),
         (Lens::Pupil(pupil), 1.9),
     ];
-    let camera =
-        |lens| Camera { focal_px: [501.0, 497.0], ..Camera::centred(1600, 1200, 1.0, lens) };
+    let focal_px = DVec2::new(501.0, 497.0);
+    let camera = |lens| Camera { focal_px, ..Camera::centred(1600, 1200, 1.0, lens) };
     lenses.into_iter().map(|(lens, reach)| (camera(lens), reach)).collect()
 }
 
@@ -59,9 +59,8 @@ proptest! {
             let at = at.unwrap();
             prop_assert_eq!(Some(at.pixel), camera.project(point));
             // Central differences: an error of h² in the formula, of 1e-13/h in the digits.
-            let differences = |high: Option<[f64; 2]>, low: Option<[f64; 2]>, h: f64| {
-                let (high, low) = (high.unwrap(), low.unwrap());
-                [0, 1].map(|i| (high[i] - low[i]) / (2.0 * h))
+            let differences = |high: Option<DVec2>, low: Option<DVec2>, h: f64| {
+                ((high.unwrap() - low.unwrap()) / (2.0 * h)).to_array()
             };
             for axis in 0..3 {
                 let h = 1e-5 * distance;
@@ -111,7 +110,7 @@ fn what_lies_outside_the_domain_is_not_seen() {
     for (camera, _) in cameras() {
         assert_eq!(camera.project(DVec3::new(0.0, 0.0, -100.0)), None, "{:?}", camera.lens);
         assert!(camera.project(DVec3::new(0.0, 0.0, 100.0)).is_some());
-        assert!(camera.unproject([1e9, 1e9]).is_none_or(|ray| ray.direction.is_finite()));
+        assert!(camera.unproject(DVec2::splat(1e9)).is_none_or(|ray| ray.direction.is_finite()));
     }
 }
 

@@ -11,7 +11,7 @@ use deltille::export::detection;
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -39,14 +39,14 @@ fn board(rows: u32, cols: u32) -> Target {
 fn camera() -> Camera {
     let radial = [-0.17, 0.02, 0.0];
     let lens = Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() });
-    Camera { centre_px: [804.0, 606.0], ..Camera::centred(1600, 1200, 625.0, lens) }
+    Camera { centre_px: DVec2::new(804.0, 606.0), ..Camera::centred(1600, 1200, 625.0, lens) }
 }
 
 /// What a detector finds of a board of one panel that is seen whole.
 fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8Rng) -> Detection {
     let panel = &target.panels[0];
     let corners = panel.corners.iter().map(|corner| {
-        let [x, y] = camera.project(pose.apply(corner.target_mm.into())).unwrap();
+        let (x, y) = camera.project(pose.apply(corner.target_mm)).unwrap().into();
         let mut off = || random.random_range(-0.1..0.1);
         let (row, col, id) = (corner.row, corner.col, Some(corner.id));
         GridCorner { row, col, id, x: x + off(), y: y + off(), cov: None }
@@ -130,7 +130,7 @@ fn a_camera_is_calibrated_and_read_back() {
     views(&written, 12);
     views(&written["held_out"], 3);
     let found = Camera::from_yaml(&std::fs::read_to_string(at.join("camera.yaml")).unwrap());
-    assert!((found.unwrap().focal_px[0] - 625.0).abs() < 0.5);
+    assert!((found.unwrap().focal_px.x - 625.0).abs() < 0.5);
     for end in ["-opencv.yaml", "-ros.yaml", "-camchain.yaml", "-cameras.txt", "-transforms.json"] {
         assert!(at.join(format!("camera{end}")).exists(), "{end}");
     }
@@ -155,7 +155,7 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
     let good = detections(&flat, 15, 0.7);
     let lens = |lens: BrownConrady| Camera { lens: Lens::BrownConrady(lens), ..camera() };
     let radial = |radial: [f64; 3]| BrownConrady { radial, ..BrownConrady::default() };
-    let foreign = Camera { focal_px: [200.0; 2], ..lens(radial([4.0, 0.0, 0.0])) };
+    let foreign = Camera { focal_px: DVec2::splat(200.0), ..lens(radial([4.0, 0.0, 0.0])) };
     let other = lens(radial([-0.12, 0.02, 0.0]));
     // The same lens, its numerator and denominator each with a factor that is zero near r² = 1.44.
     let [k1, k2] = [-0.17, 0.02];
@@ -228,8 +228,8 @@ fn what_is_wrong_is_told_on_the_terminal_in_the_file_and_on_the_page() {
 
     let mut bent = flat.clone();
     for corner in &mut bent.panels[0].corners {
-        let [x, _, z] = &mut corner.target_mm;
-        *z += 2.0 * ((*x - 150.0) / 100.0).powi(2);
+        let at = &mut corner.target_mm;
+        at.z += 2.0 * ((at.x - 150.0) / 100.0).powi(2);
     }
     let bent = detections(&bent, 15, 0.7);
     for (title, seen, args, kind, key, value) in [
@@ -271,8 +271,8 @@ fn the_shape_of_a_sheet_is_taken_along() {
     let flat = board(8, 9);
     let mut bent = flat.clone();
     for corner in &mut bent.panels[0].corners {
-        let [x, y, z] = &mut corner.target_mm;
-        *z += 3.0 * ((*x - 150.0) / 100.0).powi(2) - 2.0 * ((*y - 80.0) / 80.0).powi(2);
+        let at = &mut corner.target_mm;
+        at.z += 3.0 * ((at.x - 150.0) / 100.0).powi(2) - 2.0 * ((at.y - 80.0) / 80.0).powi(2);
     }
     let folder = folder(&flat, &detections(&bent, 15, 0.7));
     let at = folder.path();
@@ -583,8 +583,7 @@ fn of_displaced_panel(target: &Target, count: usize, by_mm: DVec3) -> Vec<Detect
             let pose = pose.after(&place);
             let faces = (pose.rotation * DVec3::Z).dot(-pose.translation.normalize()) > 0.4;
             let corners = panel.corners.iter().map(|corner| {
-                let [x, y] = corner.panel_mm;
-                let [x, y] = camera.project(pose.apply(DVec3::new(x, y, 0.0)))?;
+                let (x, y) = camera.project(pose.apply(corner.panel_mm.extend(0.0)))?.into();
                 let mut off = || random.random_range(-0.1..0.1);
                 let (row, col, id) = (corner.row, corner.col, Some(corner.id));
                 Some(GridCorner { row, col, id, x: x + off(), y: y + off(), cov: None })

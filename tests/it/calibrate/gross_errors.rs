@@ -11,7 +11,7 @@ use deltille::camera::{Camera, Lens, Pose};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -43,18 +43,18 @@ fn camera(model: Model) -> Camera {
     all[..values.len()].copy_from_slice(values);
     let lens = model.lens().with_parameters(&all);
     let [width, height] = SIZE_PX;
-    Camera { centre_px: [804.0, 606.0], ..Camera::centred(width, height, focal, lens) }
+    Camera { centre_px: DVec2::new(804.0, 606.0), ..Camera::centred(width, height, focal, lens) }
 }
 
 /// Poses of the target before a camera, turned and tilted anyhow.
 fn places(camera: &Camera, target: &Target, count: usize, rng: &mut ChaCha8Rng) -> Vec<Pose> {
     let corners: Vec<DVec3> =
-        target.panels.iter().flat_map(|p| &p.corners).map(|c| c.target_mm.into()).collect();
+        target.panels.iter().flat_map(|p| &p.corners).map(|c| c.target_mm).collect();
     let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
     let size = corners.iter().map(|c| c.distance(middle)).fold(0.0, f64::max);
     let is_fisheye = !matches!(camera.lens, Lens::BrownConrady(_));
     let reach = if is_fisheye { 1.2 } else { 0.3 };
-    let distance = size * camera.focal_px[0] / if is_fisheye { 250.0 } else { 400.0 };
+    let distance = size * camera.focal_px.x / if is_fisheye { 250.0 } else { 400.0 };
     let mut found = Vec::new();
     while found.len() < count {
         let mut any = |reach: f64| rng.random_range(-reach..reach);
@@ -86,13 +86,12 @@ fn seen(
     let mut sightings = Vec::new();
     for (index, panel) in target.panels.iter().enumerate() {
         let pose = place.after(&panels[index]);
-        let on_panel = |[x, y]: [f64; 2]| DVec3::new(x, y, 0.0);
-        let away = pose.apply(on_panel(panel.corners[0].panel_mm));
+        let away = pose.apply(panel.corners[0].panel_mm.extend(0.0));
         if target.panels.len() > 1 && (pose.rotation * DVec3::Z).dot(-away.normalize()) < 0.3 {
             continue;
         }
         let corners = panel.corners.iter().filter_map(|corner| {
-            let panel_mm = on_panel(corner.panel_mm);
+            let panel_mm = corner.panel_mm.extend(0.0);
             let at = camera.project(pose.apply(panel_mm)).filter(|&at| camera.sees(at, 5.0))?;
             let pixel = at.map(|v| v + noise.sample(rng));
             let cov = Some([NOISE_PX * NOISE_PX, 0.0, NOISE_PX * NOISE_PX]);
@@ -114,7 +113,7 @@ enum Wrong {
     /// So many of all corners are anywhere in the picture.
     Anywhere(f64),
     /// So many of all corners are off in the same way.
-    Off(f64, [f64; 2]),
+    Off(f64, DVec2),
     /// So many of all corners have the label of their neighbour in the row.
     OneTile(f64),
     /// A view has its labels in any order.
@@ -158,7 +157,7 @@ fn views(model: Model, target: &Target, wrong: Wrong, seed: u64) -> Vec<View> {
     let places = places(&camera, target, 25, &mut rng);
     let camera_of = |view: usize| match wrong {
         Wrong::Zoomed(by) if view == 3 => {
-            Camera { focal_px: camera.focal_px.map(|focal| by * focal), ..camera.clone() }
+            Camera { focal_px: by * camera.focal_px, ..camera.clone() }
         }
         _ => camera.clone(),
     };
@@ -185,12 +184,12 @@ fn views(model: Model, target: &Target, wrong: Wrong, seed: u64) -> Vec<View> {
         }
         Wrong::Mirrored => {
             for sighting in &mut views[3].sightings {
-                sighting.observations.iter_mut().for_each(|s| s.pixel[0] = 1599.0 - s.pixel[0]);
+                sighting.observations.iter_mut().for_each(|s| s.pixel.x = 1599.0 - s.pixel.x);
             }
         }
         Wrong::Endless => {
             for view in [2, 5, 11] {
-                views[view].sightings[0].observations[9].pixel[1] = 1e300;
+                views[view].sightings[0].observations[9].pixel.y = 1e300;
             }
         }
         _ => {}
@@ -200,11 +199,11 @@ fn views(model: Model, target: &Target, wrong: Wrong, seed: u64) -> Vec<View> {
         for seen in &mut sighting.observations {
             match wrong {
                 Wrong::Anywhere(part) if some.random_bool(part) => {
-                    let [width, height] = SIZE_PX.map(f64::from);
-                    seen.pixel = [some.random_range(0.0..width), some.random_range(0.0..height)];
+                    let size = DVec2::from(SIZE_PX.map(f64::from));
+                    seen.pixel = size.map(|side| some.random_range(0.0..side));
                 }
                 Wrong::Off(part, by) if some.random_bool(part) => {
-                    seen.pixel = [seen.pixel[0] + by[0], seen.pixel[1] + by[1]];
+                    seen.pixel += by;
                 }
                 Wrong::OneTile(part) if some.random_bool(part) => {
                     let next = all.iter().find(|o| (o.row, o.col) == (seen.row, seen.col + 1));
@@ -232,7 +231,7 @@ fn solve(
 
 /// Error of the focal length in deviations, and its deviation, px.
 fn focal(found: &Estimate, model: Model) -> (f64, f64) {
-    let (truth, fx) = (camera(model).focal_px[0], &found.cameras[0].parameters[0]);
+    let (truth, fx) = (camera(model).focal_px.x, &found.cameras[0].parameters[0]);
     let sd = fx.sd.unwrap();
     ((fx.value - truth) / sd, sd)
 }
@@ -247,8 +246,7 @@ fn confused(found: &Estimate, model: Model, target: &Target, seed: u64) -> (usiz
             clean.sightings.iter().flat_map(|s| s.observations.iter().map(move |o| (s.panel, o)));
         for (corner, (panel, clean)) in view.corners.iter().zip(clean) {
             assert_eq!((corner.panel, corner.row, corner.col), (panel, clean.row, clean.col));
-            let off = [0, 1].map(|i| corner.pixel[i] - clean.pixel[i]);
-            let is_wrong = off[0].hypot(off[1]) > 10.0 * NOISE_PX;
+            let is_wrong = corner.pixel.distance(clean.pixel) > 10.0 * NOISE_PX;
             innocent += usize::from(corner.outlier && !is_wrong);
             missed += usize::from(!corner.outlier && is_wrong);
         }
@@ -264,8 +262,8 @@ const OF_BOARDS: [Wrong; 10] = [
     Wrong::Nothing,
     Wrong::Anywhere(0.2),
     Wrong::Anywhere(0.4),
-    Wrong::Off(0.4, [3.0, 0.0]),
-    Wrong::Off(0.4, [5.0, 3.0]),
+    Wrong::Off(0.4, DVec2::new(3.0, 0.0)),
+    Wrong::Off(0.4, DVec2::new(5.0, 3.0)),
     Wrong::OneTile(0.4),
     Wrong::Permuted,
     Wrong::Mirrored,
@@ -478,7 +476,7 @@ fn panels_are_not_to_blame_for_a_camera_that_was_moved() {
         let (mut views, panels) = rig(Wrong::Nothing, 20, seed);
         let late = views[1].views.iter_mut().filter(|view| view.name.as_str() >= "10");
         for seen in late.flat_map(|view| &mut view.sightings).flat_map(|s| &mut s.observations) {
-            seen.pixel[0] += 15.0;
+            seen.pixel.x += 15.0;
         }
         let found = solve_rig(&views, &panels).unwrap();
         assert!(found.findings.is_empty(), "seed {seed}: {:?}", found.findings);
@@ -551,7 +549,9 @@ fn a_view_of_another_zoom_is_left_out() {
 
 #[test]
 fn a_pose_holds_with_two_fifths_of_wrong_corners() {
-    for (wrong, model) in [(Wrong::Anywhere(0.4), RADTAN), (Wrong::Off(0.3, [3.0, 0.0]), FISHEYE)] {
+    for (wrong, model) in
+        [(Wrong::Anywhere(0.4), RADTAN), (Wrong::Off(0.3, DVec2::new(3.0, 0.0)), FISHEYE)]
+    {
         let (target, camera) = (board(), camera(model));
         let all = views(model, &target, wrong, 3);
         let clean = views(model, &target, Wrong::Nothing, 3);

@@ -5,7 +5,7 @@ use deltille::calibrate::{
     Model, Observation, PanelRef, Remedy, Sighting, View, Weights,
 };
 use deltille::camera::{Camera, Pose};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -34,7 +34,7 @@ fn camera(model: Model) -> Camera {
     let wide = matches!(lens, deltille::camera::Lens::BrownConrady(_));
     let focal = if wide { 625.0 } else { 297.0 };
     let mut camera = Camera::centred(1600, 1200, focal, lens.with_parameters(&all));
-    camera.centre_px = [804.0, 606.0];
+    camera.centre_px = DVec2::new(804.0, 606.0);
     camera
 }
 
@@ -45,7 +45,7 @@ fn view(camera: &Camera, pose: &Pose, name: &str, noise: &mut impl FnMut() -> f6
         for col in 0..11 {
             let panel_mm = DVec3::new(20.0 * f64::from(col), 20.0 * f64::from(row), 0.0);
             let seen = camera.project(pose.apply(panel_mm)).filter(|&p| camera.sees(p, 5.0))?;
-            let pixel = [seen[0] + noise(), seen[1] + noise()];
+            let pixel = seen.map(|v| v + noise());
             let cov = Some([NOISE_PX * NOISE_PX, 0.0, NOISE_PX * NOISE_PX]);
             observations.push(Observation { row, col, panel_mm, pixel, cov });
         }
@@ -162,10 +162,10 @@ fn wrong_views_and_wrong_corners_are_named_and_do_no_harm() {
         let other = views[(wrong + 5) % 30].sightings[0].observations.clone();
         let rotated = views[wrong].sightings[0].observations.iter_mut().rev().zip(other);
         for (seen, other) in rotated {
-            seen.pixel[0] = other.pixel[0] + 3.0 * f64::from(seen.row);
+            seen.pixel.x = other.pixel.x + 3.0 * f64::from(seen.row);
         }
     }
-    views[6].sightings[0].observations[40].pixel[1] += 2.0;
+    views[6].sightings[0].observations[40].pixel.y += 2.0;
     let found = solved(&views, Model::Radtan);
     let excluded: Vec<&str> = found.excluded.iter().map(|out| out.view.as_str()).collect();
     assert_eq!(excluded, ["3", "11", "20", "21"]);
@@ -249,7 +249,7 @@ fn any_focal_length_is_found() {
             views.extend(view(&truth, &pose, "", &mut noise));
         }
         let found = solved(&views, Model::Radtan);
-        let ratio = found.cameras[0].camera.focal_px[0] / focal;
+        let ratio = found.cameras[0].camera.focal_px.x / focal;
         assert!((ratio - 1.0).abs() < 1e-4, "{focal}: {ratio}");
     }
 }

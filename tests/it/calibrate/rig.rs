@@ -107,13 +107,13 @@ fn simulated(seed: u64, frames: usize) -> Simulated {
                     return None;
                 }
                 let observations = panel.corners.iter().map(|corner| {
-                    let panel_mm = DVec3::new(corner.panel_mm[0], corner.panel_mm[1], 0.0);
-                    let [x, y] = camera.project(pose.apply(panel_mm))?;
-                    camera.sees([x, y], 5.0).then(|| Observation {
+                    let panel_mm = corner.panel_mm.extend(0.0);
+                    let at = camera.project(pose.apply(panel_mm))?;
+                    camera.sees(at, 5.0).then(|| Observation {
                         row: corner.row,
                         col: corner.col,
                         panel_mm,
-                        pixel: [x + noise.sample(&mut random), y + noise.sample(&mut random)],
+                        pixel: at.map(|v| v + noise.sample(&mut random)),
                         cov: Some([NOISE_PX * NOISE_PX, 0.0, NOISE_PX * NOISE_PX]),
                     })
                 });
@@ -258,7 +258,7 @@ fn a_camera_that_is_another_one_is_named() {
     assert_eq!(said(&truth), []);
     // Refocused since: all fits worse.
     let mut refocused = truth.cameras[1].clone();
-    refocused.focal_px = refocused.focal_px.map(|focal| 1.01 * focal);
+    refocused.focal_px *= 1.01;
     truth.views[1].intrinsics = refocused.into();
     let said = said(&truth);
     let is_named = |said: &Diagnosis| {

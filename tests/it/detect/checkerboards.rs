@@ -8,7 +8,7 @@ use deltille::detect::{Detection, Detector, DetectorConfig, Grid};
 use deltille::lattice::GridKind;
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Surface, Truth};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -17,8 +17,8 @@ const COLS: i32 = 9;
 const EDGE_MM: f64 = 20.0;
 
 /// A rectangle, counter-clockwise.
-fn rectangle([left, lower, right, upper]: [f64; 4]) -> Vec<[f64; 2]> {
-    vec![[left, lower], [right, lower], [right, upper], [left, upper]]
+fn rectangle([left, lower, right, upper]: [f64; 4]) -> Vec<DVec2> {
+    [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from).to_vec()
 }
 
 /// A board of 6 × 9 corners whose corner (0, 0) is at the origin. The square up and right of it is
@@ -49,7 +49,7 @@ fn board(inverted: bool) -> Scene {
         black_mm,
         corners: corners
             .map(|(row, col)| {
-                let place = [f64::from(col) * EDGE_MM, f64::from(row) * EDGE_MM];
+                let place = DVec2::new(f64::from(col), f64::from(row)) * EDGE_MM;
                 ((row * COLS + col) as u32, row, col, place)
             })
             .collect(),
@@ -95,13 +95,12 @@ const SIZE: Option<(u32, u32)> = Some((ROWS as u32, COLS as u32));
 
 /// Distance of each corner of a wholly labelled board from the truth; panics on a wrong label.
 fn errors(grid: &Grid, truth: &Truth, inverted: bool) -> Vec<f64> {
-    let at: BTreeMap<(i32, i32), [f64; 2]> =
-        truth.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+    let at: BTreeMap<(i32, i32), DVec2> =
+        truth.corners.iter().map(|c| ((c.row, c.col), DVec2::new(c.x, c.y))).collect();
     let distance = |c: &deltille::detect::GridCorner| {
         // Row 0, column 0 has a dark square: on the inverted board that is half a turn round.
         let label = if inverted { (ROWS - 1 - c.row, COLS - 1 - c.col) } else { (c.row, c.col) };
-        let [x, y] = at[&label];
-        let error = (c.x - x).hypot(c.y - y);
+        let error = c.position().distance(at[&label]);
         assert!(error < 2.0, "corner {label:?} is {error} px off: a wrong label");
         error
     };
@@ -122,7 +121,8 @@ fn whole_boards_are_labelled_from_their_dark_corner_up_to_60_degrees() {
         for view in 0..12u32 {
             let tilt = f64::from(view) / 12.0 * 60f64.to_radians();
             let pose = seen_from(&mut rng, 330.0, tilt);
-            let light = Light { seed: view.into(), gradient: [0.5, -0.3], ..Light::default() };
+            let light =
+                Light { seed: view.into(), gradient: DVec2::new(0.5, -0.3), ..Light::default() };
             let image = scene.render(&camera, &pose, &light);
             let detection = detect(&image, GridKind::Checker, SIZE);
             assert_eq!(detection.grids.len(), 1, "view {view}");
@@ -139,7 +139,7 @@ fn whole_boards_are_labelled_from_their_dark_corner_up_to_60_degrees() {
 #[test]
 fn a_fisheye_lens_bends_the_rows_but_not_the_labels() {
     let mut camera = Camera::pinhole(1600, 1200, 1.2);
-    camera.focal_px = [420.0; 2];
+    camera.focal_px = DVec2::splat(420.0);
     camera.lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![-0.02, 0.002, 0.0, 0.0] });
     let scene = board(false);
     let mut rng = ChaCha8Rng::seed_from_u64(2);
@@ -180,8 +180,7 @@ fn all_that_is_seen_of_a_covered_board_is_found_where_it_is() {
         };
         for lost in &truth.corners {
             let found = corners.iter().any(|c| (c.x - lost.x).hypot(c.y - lost.y) < 0.25);
-            let [x, y] = cover(lost.row);
-            let away = (x - lost.x).hypot(y - lost.y);
+            let away = cover(lost.row).distance(DVec2::new(lost.x, lost.y));
             assert!(found || away < NEAR_COVER_PX, "view {view}: {lost:?}, {away} px away");
         }
         let nearest = |x: f64, y: f64| {

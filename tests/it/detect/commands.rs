@@ -21,9 +21,8 @@ fn board() -> tempfile::TempDir {
 /// Where a corner of the target lies in the image of its sheet, px.
 fn image_of(target: &Target, corner: usize, dpi: f64) -> [f64; 2] {
     let (placement, sheet) = (&target.sheets[0].placements[0], &target.sheets[0]);
-    let [u, v] = target.panels[0].corners[corner].panel_mm;
-    let [x, y] = [placement.origin_mm[0] + u, placement.origin_mm[1] + v];
-    [x / 25.4 * dpi - 0.5, (sheet.height_mm - y) / 25.4 * dpi - 0.5]
+    let place = placement.origin_mm + target.panels[0].corners[corner].panel_mm;
+    [place.x / 25.4 * dpi - 0.5, (sheet.height_mm - place.y) / 25.4 * dpi - 0.5]
 }
 
 #[test]

@@ -89,7 +89,7 @@ fn labelled(boards: u64) -> Vec<String> {
         };
         let camera = Camera::pinhole(640, 480, 0.5);
         let bit_px: f64 = rng.random_range(1.2..5.0);
-        let distance_mm = camera.focal_px[0] * shown.bit_mm / bit_px;
+        let distance_mm = camera.focal_px.x * shown.bit_mm / bit_px;
         let tilt = rng.random_range(0.0..1.0);
         let pose = tilted(&mut rng, shown.centre_mm, distance_mm, tilt);
         let light = Light { noise: rng.random_range(0.002..0.03), seed, ..Light::default() };

@@ -9,6 +9,7 @@ use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::raster::{Coverage, Gray, gaussian};
 use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
+use glam::DVec2;
 use kurbo::{Affine, PathEl};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -392,8 +393,8 @@ fn pages_of_text() {
 fn add(ink: &mut Coverage, path: &kurbo::BezPath) {
     let mut polygon = Vec::new();
     kurbo::flatten(path, 0.05, |element| match element {
-        PathEl::MoveTo(p) => polygon = vec![[p.x, p.y]],
-        PathEl::LineTo(p) => polygon.push([p.x, p.y]),
+        PathEl::MoveTo(p) => polygon = vec![DVec2::new(p.x, p.y)],
+        PathEl::LineTo(p) => polygon.push(DVec2::new(p.x, p.y)),
         PathEl::ClosePath => ink.add(&polygon, 1.0),
         _ => {}
     });

@@ -33,7 +33,7 @@ fn lenses_that_bend_edges_are_found_within_their_deviations() {
     for (model, camera) in cameras {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let seen = (0..14u32).map(|view| {
-            let distance_mm = 0.3 * camera.focal_px[0] + 8.0 * f64::from(view);
+            let distance_mm = 0.3 * camera.focal_px.x + 8.0 * f64::from(view);
             let centre_mm = target.panels[0].middle_mm();
             let pose = tilted(&mut rng, centre_mm, distance_mm, 0.05 * f64::from(view));
             let light = Light { seed: view.into(), ..Light::default() };

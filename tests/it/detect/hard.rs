@@ -12,7 +12,7 @@ use deltille::family::Family;
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Surface, Truth, scene_of_sheet};
 use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use image::ImageFormat;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -48,7 +48,7 @@ impl Board {
     /// Seen with `bit_px` pixels to a tag bit in the middle, before the tilt shortens it.
     fn view(&self, rng: &mut ChaCha8Rng, bit_px: f64, tilt_rad: f64) -> (Camera, Pose) {
         let camera = Camera::pinhole(640, 480, 0.5);
-        let distance_mm = camera.focal_px[0] * self.bit_mm / bit_px;
+        let distance_mm = camera.focal_px.x * self.bit_mm / bit_px;
         (camera, tilted(rng, self.centre_mm, distance_mm, tilt_rad))
     }
 
@@ -147,8 +147,7 @@ fn rates_of_small_tags() {
 #[test]
 fn covered_boards_keep_absolute_labels() {
     let mut board = Board::new(false);
-    let placed: Vec<DVec3> =
-        board.target.panels[0].corners.iter().map(|c| DVec3::from(c.target_mm)).collect();
+    let placed: Vec<DVec3> = board.target.panels[0].corners.iter().map(|c| c.target_mm).collect();
     let low = placed.iter().fold(DVec3::INFINITY, |a, &b| a.min(b));
     let high = placed.iter().fold(DVec3::NEG_INFINITY, |a, &b| a.max(b));
     let (left, right) = (low.x - 200.0, low.x + 0.6 * (high.x - low.x));
@@ -159,10 +158,10 @@ fn covered_boards_keep_absolute_labels() {
             translation: DVec3::new(0.0, 0.0, 0.5),
         },
         paper_mm: vec![
-            [left, low.y - 200.0],
-            [right, low.y - 200.0],
-            [right, high.y + 200.0],
-            [left, high.y + 200.0],
+            DVec2::new(left, low.y - 200.0),
+            DVec2::new(right, low.y - 200.0),
+            DVec2::new(right, high.y + 200.0),
+            DVec2::new(left, high.y + 200.0),
         ],
         black_mm: Vec::new(),
         corners: Vec::new(),
@@ -193,7 +192,7 @@ fn light_of_ten_to_one_across_the_image() {
     // 1 ± 0.82 of the mean: 10 : 1.
     whole_through(
         false,
-        &Light { gradient: [1.636, 0.0], white: 0.5, ..Light::default() },
+        &Light { gradient: DVec2::X * 1.636, white: 0.5, ..Light::default() },
         eight_bits,
     );
 }

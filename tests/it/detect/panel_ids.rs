@@ -32,8 +32,8 @@ fn seen(target: &Target, camera: &Camera, camera_from_target: &Pose, view: u32) 
         let towards = (pose.rotation * DVec3::Z).dot(pose.translation.normalize()) < -0.35;
         let off = if panel.id == MISPLACED { DVec3::new(0.03, -0.02, 0.04) } else { DVec3::ZERO };
         let corner = |corner: &deltille::targets::Corner| {
-            let at = pose.apply(DVec3::new(corner.panel_mm[0], corner.panel_mm[1], 0.0) + off);
-            let [x, y] = camera.project(at)?;
+            let at = pose.apply(corner.panel_mm.extend(0.0) + off);
+            let (x, y) = camera.project(at)?.into();
             let (row, col, id) = (corner.row, corner.col, Some(corner.id));
             let mut noise = || random.random_range(-0.05..0.05);
             Some(GridCorner {
@@ -164,7 +164,7 @@ fn only_ids_are_seen() {
     let refined = Target::from_json(&refined).unwrap();
     let moved = |panel: &Panel| {
         let stated = target.panels.iter().find(|stated| stated.id == panel.id).unwrap();
-        DVec3::from(panel.pose.translation_mm).distance(stated.pose.translation_mm.into())
+        panel.pose.translation_mm.distance(stated.pose.translation_mm)
     };
     let most = refined.panels.iter().max_by(|a, b| moved(a).total_cmp(&moved(b)));
     assert_eq!(most.unwrap().id, MISPLACED);

@@ -3,6 +3,7 @@
 use crate::common::page::Page;
 use assert_cmd::Command;
 use deltille::synth::SimulatedCorner;
+use glam::DVec2;
 
 fn refine(folder: &std::path::Path, args: &str) -> (Option<i32>, String, String) {
     let mut command = Command::cargo_bin("deltille").unwrap();
@@ -16,7 +17,7 @@ fn refine(folder: &std::path::Path, args: &str) -> (Option<i32>, String, String)
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (lines, name) in [(2, "checker.pgm"), (3, "deltille.pgm")] {
-        let corner = SimulatedCorner::seen_from(lines, 0.4, 0.6, [20.3, 19.8], 1.0);
+        let corner = SimulatedCorner::seen_from(lines, 0.4, 0.6, DVec2::new(20.3, 19.8), 1.0);
         let image = corner.render(41, 41);
         let mut pgm = b"P5 41 41 255\n".to_vec();
         pgm.extend(image.pixels().iter().map(|v| (v * 255.0 + 0.5) as u8));

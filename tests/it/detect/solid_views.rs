@@ -78,7 +78,7 @@ fn corners_are_where_the_truth_says_to_a_five_hundredth_of_a_pixel() {
             }
             let pixel = |v: Vertex| {
                 let at = panel.pose.target_from_panel(panel.lattice_mm(v));
-                DVec2::from(camera.project(pose.apply(DVec3::from(at))).unwrap())
+                camera.project(pose.apply(at)).unwrap()
             };
             let tiles = around.iter().map(|tile| tile.frame().map(pixel));
             let tiles: Vec<_> = tiles.collect();
@@ -171,27 +171,25 @@ fn hidden_parts_of_a_concave_solid_are_hidden() {
             scene.truth(&camera, &pose, 0.0).corners.iter().map(|c| c.id).collect();
         for (face, panel) in target.panels.iter().enumerate() {
             for corner in &panel.corners {
-                let seen = nearest(DVec3::from(corner.target_mm) - eye);
+                let seen = nearest(corner.target_mm - eye);
                 let expected = seen.is_some_and(|(_, nearest)| nearest == face);
                 assert_eq!(truth.contains(&corner.id), expected, "{corner:?}");
-                let turned = meet(outline[face], eye, DVec3::from(corner.target_mm) - eye);
+                let turned = meet(outline[face], eye, corner.target_mm - eye);
                 hidden += usize::from(turned.is_some() && !expected);
             }
         }
         let image = scene.render(&camera, &pose, &light);
         let back = pose.inverse().rotation;
         for _ in 0..4000 {
-            let [x, y] = [0; 2].map(|_| rng.random_range(10..890));
+            let [x, y]: [i32; 2] = [0; 2].map(|_| rng.random_range(10..890));
             // Level and place of a pixel's corner; `None` on a tag.
             let level = |dx: f64, dy: f64| {
-                let [u, v] = [f64::from(x) + dx, f64::from(y) + dy];
-                let [fx, fy] = camera.focal_px;
-                let [cx, cy] = camera.centre_px;
-                let ray = back * DVec3::new((u - cx) / fx, (v - cy) / fy, 1.0);
+                let pixel = DVec2::new(f64::from(x) + dx, f64::from(y) + dy);
+                let ray = back * ((pixel - camera.centre_px) / camera.focal_px).extend(1.0);
                 let Some((t, face)) = nearest(ray) else { return Some((light.background, None)) };
                 let panel = &target.panels[face];
                 let r = panel.pose.rotation;
-                let p = eye + ray * t - DVec3::from(panel.pose.translation_mm);
+                let p = eye + ray * t - panel.pose.translation_mm;
                 let along = |i: usize| r[i] * p.x + r[3 + i] * p.y + r[6 + i] * p.z;
                 let row = along(1) / panel.edge_mm / ROW_HEIGHT;
                 let col = along(0) / panel.edge_mm - row / 2.0;
@@ -267,16 +265,15 @@ fn how_seen(panel: &Panel, camera: &Camera, pose: &Pose, bits: f64) -> Option<(f
     let (mut angle, mut least) = (0.0f64, f64::INFINITY);
     for corner in &panel.corners {
         let at = |dx: f64, dy: f64| {
-            let [x, y] = corner.panel_mm;
-            let point = panel.pose.target_from_panel([x + dx, y + dy]);
-            camera.project(pose.apply(DVec3::from(point))).map(DVec2::from)
+            let point = panel.pose.target_from_panel(corner.panel_mm + DVec2::new(dx, dy));
+            camera.project(pose.apply(point))
         };
         let here = at(0.0, 0.0)?;
         // Room for all tiles around.
-        if !camera.sees(here.to_array(), 40.0) {
+        if !camera.sees(here, 40.0) {
             return None;
         }
-        let sight = (eye - DVec3::from(corner.target_mm)).normalize();
+        let sight = (eye - corner.target_mm).normalize();
         angle = angle.max(normal.dot(sight).acos());
         let local = DMat2::from_cols(at(bit_mm, 0.0)? - here, at(0.0, bit_mm)? - here);
         for direction in [DVec2::X, DVec2::new(0.5, ROW_HEIGHT), DVec2::new(-0.5, ROW_HEIGHT)] {
@@ -303,7 +300,7 @@ fn three_hundred_views_of_an_icosahedron() {
         let camera = Camera::pinhole(1600, 1200, hfov);
         let radius = 143.0;
         // The object takes 60 to 100 % of the height, seen from outside.
-        let half = (rng.random_range(0.6..1.0) * 600.0 / camera.focal_px[0]).atan();
+        let half = (rng.random_range(0.6..1.0) * 600.0 / camera.focal_px.x).atan();
         let distance = radius / half.sin();
         let random = |rng: &mut ChaCha8Rng| {
             DVec3::from_array([0; 3].map(|_| rng.random_range(-1.0..1.0))).normalize()

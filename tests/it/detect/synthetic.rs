@@ -11,7 +11,7 @@ use deltille::lattice::GridKind;
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Truth, scene_of_sheet};
 use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -81,7 +81,8 @@ fn every_corner_of_a_tagged_board_is_labelled_up_to_60_degrees() {
     for view in 0..24u32 {
         let tilt = f64::from(view) / 24.0 * 60f64.to_radians();
         let pose = board.seen_from(&mut rng, 330.0, tilt);
-        let light = Light { seed: view.into(), gradient: [0.5, -0.3], ..Light::default() };
+        let light =
+            Light { seed: view.into(), gradient: DVec2::new(0.5, -0.3), ..Light::default() };
         let image = eight_bits(&board.scene.render(&camera, &pose, &light));
         let truth = board.scene.truth(&camera, &pose, 14.0);
         let everything = board.scene.truth(&camera, &pose, 0.0);
@@ -103,7 +104,7 @@ fn every_corner_of_a_tagged_board_is_labelled_up_to_60_degrees() {
 #[test]
 fn a_fisheye_view_and_an_inverted_board_are_labelled_too() {
     let mut camera = Camera::pinhole(1600, 1200, 1.2);
-    camera.focal_px = [420.0; 2];
+    camera.focal_px = DVec2::splat(420.0);
     camera.lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![-0.02, 0.002, 0.0, 0.0] });
     for inverted in [false, true] {
         let board = board(Some(TagSpec::default()), inverted);

@@ -152,7 +152,7 @@ fn pictures(target: &Target) -> Vec<(String, Detection)> {
             let pose = tilted(&mut rng, middle, 260.0, 0.5);
             let panel = &target.panels[0];
             let corner = |corner: &deltille::targets::Corner| {
-                let [x, y] = camera.project(pose.apply(corner.target_mm.into())).unwrap();
+                let (x, y) = camera.project(pose.apply(corner.target_mm)).unwrap().into();
                 let (row, col, id) = (corner.row, corner.col, Some(corner.id));
                 GridCorner { row, col, id, x, y, cov: Some([1e-3, 1e-5, 2e-3]) }
             };
@@ -239,8 +239,8 @@ fn cameras() {
                         is_finite(&found.to_yaml(), &what);
                         for point in [[0.0, 0.0, 300.0], [100.0, -50.0, 200.0], [90.0, 3.0, -4.0]] {
                             let pixel = found.project(point.into());
-                            let finite = |p: [f64; 2]| p.iter().all(|v| v.is_finite());
-                            assert!(pixel.is_none_or(finite), "{what}: {pixel:?}");
+                            let finite = pixel.is_none_or(|pixel| pixel.is_finite());
+                            assert!(finite, "{what}: {pixel:?}");
                         }
                         for write in [camera::opencv, |camera: &Camera| camera::ros(camera, "c")] {
                             write(&found).iter().for_each(|text| is_finite(text, &what));
@@ -307,7 +307,7 @@ fn detections() {
                 is_finite_json(&text, &what);
                 let camera = &found.cameras[0].camera;
                 is_finite(&camera.to_yaml(), &what);
-                let [fx, _] = camera.focal_px;
+                let fx = camera.focal_px.x;
                 assert!((fx / 1100.5 - 1.0).abs() < 0.2, "{what}: fx {fx}");
             }
         }

@@ -3,7 +3,8 @@
 
 use std::fs;
 
-use crate::common::command::{deltille, refused};
+use crate::common::command::deltille;
+use crate::common::page::Page;
 
 #[test]
 fn messages_of_the_library_name_options_of_the_command_that_runs() {
@@ -12,30 +13,27 @@ fn messages_of_the_library_name_options_of_the_command_that_runs() {
     deltille(at, "board --rows 8 --cols 9 --name board").success();
     fs::write(at.join("flat.json"), r#"{"schema": "deltille/calibration/1"}"#).unwrap();
     fs::write(at.join("none.json"), "{").unwrap();
-    for (args, option) in [
-        ("board --rows 2 --cols 2 --untagged", "--untagged: "),
-        ("board --rows 30 --cols 30 --edge 20mm --paper A4", "fewer --rows or --cols, or --edge"),
-        ("board --rows 9 --cols 9 --boards 99 --first-id 9", "raise --tag-spacing to at least "),
-        ("board --rows 9 --cols 9 --boards 99 --first-id 9", "take --family d25h7 with its "),
-        ("board --rows 9 --cols 9 --family t36h11", "take one of `deltag list`"),
-        ("board --rows 9 --cols 9 --dsc --family d25h9", "choose one of them with --family"),
-        ("checkerboard --rows 9 --cols 9 --tags t36h11 --first-id 999", "--first-id: tags "),
-        ("checkerboard --rows 9 --cols 9 --tags t36h11 --tags-in white --dsc", "--tags-in black"),
-        ("icosahedron --edge 20mm", "fewer --tiles, or a smaller --face-margin"),
-        ("icosahedron --skeleton --wall 99mm", "--wall: "),
-        ("icosahedron --texture-dpi 9", "--texture-dpi: "),
-        ("icosahedron --pdf --edge 3m", "take --per-face, or --edge of at most "),
-        (
-            "pose nowhere --target board.json --camera none.json --shape flat.json",
-            "by a calibration with `deltille calibrate --board-shape`",
-        ),
-        ("calibrate none.json --target none.json --model radtan", "with `deltille board`"),
-        ("calibrate none.json --target board.json --model radtan", "with `deltille detect`"),
-        ("detect board.pdf --target board.json --max-bytes 9", "--max-bytes sets how many"),
+    let mut page = Page::default();
+    for args in [
+        "board --rows 2 --cols 2 --untagged",
+        "board --rows 30 --cols 30 --edge 20mm --paper A4",
+        "board --rows 9 --cols 9 --boards 99 --first-id 9",
+        "board --rows 9 --cols 9 --family t36h11",
+        "board --rows 9 --cols 9 --dsc --family d25h9",
+        "checkerboard --rows 9 --cols 9 --tags t36h11 --first-id 999",
+        "checkerboard --rows 9 --cols 9 --tags t36h11 --tags-in white --dsc",
+        "icosahedron --edge 20mm",
+        "icosahedron --skeleton --wall 99mm",
+        "icosahedron --texture-dpi 9",
+        "icosahedron --pdf --edge 3m",
+        "pose nowhere --target board.json --camera none.json --shape flat.json",
+        "calibrate none.json --target none.json --model radtan",
+        "calibrate none.json --target board.json --model radtan",
+        "detect board.pdf --target board.json --max-bytes 9",
     ] {
-        let said = refused(at, args);
-        assert!(said.contains(option) && !said.contains("::"), "{args}: {said}");
+        page.refused(at, &format!("deltille {args}"));
     }
+    page.is("settings");
 }
 
 #[test]
@@ -47,6 +45,7 @@ fn what_would_be_written_over_a_foreign_file_is_refused_before_anything_is_read(
     let rig =
         "rig --camera left=here --camera right=there --target board.json --format kalibr -o out";
     fs::create_dir(at.join("out")).unwrap();
+    let mut page = Page::default();
     for (file, text, args) in [
         ("notes.yaml", "milk: 1\n", format!("{calibrate} notes.yaml")),
         ("own.json", "{\"milk\": 1}", format!("{calibrate} own.yaml")),
@@ -56,23 +55,21 @@ fn what_would_be_written_over_a_foreign_file_is_refused_before_anything_is_read(
         ("out/board-refined.json", "{\"milk\": 1}", format!("{rig} --refine-target")),
     ] {
         fs::write(at.join(file), text).unwrap();
-        let said = refused(at, &args);
-        assert!(said.contains(file) && said.contains("which would be lost"), "{args}: {said}");
-        assert_eq!(fs::read_to_string(at.join(file)).unwrap(), text);
-        assert!(!refused(at, &format!("{args} --force")).contains("lost"), "{args}");
+        page.refused(at, &format!("deltille {args}"));
+        // Then it is the folder that is missing.
+        page.refused(at, &format!("deltille {args} --force"));
         fs::remove_file(at.join(file)).unwrap();
     }
+    page.is("foreign-files");
 }
 
 #[test]
 fn cameras_whose_files_would_be_one_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    for (cameras, problem) in [
-        ("--camera left=a --camera LEFT=b", "--camera: left and LEFT differ in case only"),
-        ("--camera left=a --camera left=b", "--camera: left is named twice"),
-        ("--camera left=a --camera Rig=b", "--camera: Rig cannot be the name of a file"),
-    ] {
-        let said = refused(folder.path(), &format!("rig {cameras} --target board.json"));
-        assert!(said.contains(problem), "{said}");
+    let mut page = Page::default();
+    for second in ["LEFT", "left", "Rig"] {
+        let cameras = format!("--camera left=a --camera {second}=b");
+        page.refused(folder.path(), &format!("deltille rig {cameras} --target board.json"));
     }
+    page.is("names-of-cameras");
 }

@@ -15,7 +15,7 @@ use deltille::lattice::GridKind;
 use deltille::raster::Gray;
 use deltille::synth::{Light, Scene, Truth, scene_of_sheet};
 use deltille::targets::{BoardSpec, PaperSpec, TagSpec, TagsIn, Target, TargetSpec};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -91,7 +91,8 @@ impl Board {
         tilt: f64,
     ) -> (Detection, Truth) {
         let pose = tilted(rng, self.centre_mm, mm, tilt);
-        let light = Light { seed: rng.random(), gradient: [0.5, -0.3], ..Light::default() };
+        let light =
+            Light { seed: rng.random(), gradient: DVec2::new(0.5, -0.3), ..Light::default() };
         let image: Gray<u8> =
             self.scene.render(camera, &pose, &light).map(|v| (v * 255.0 + 0.5) as u8);
         (self.detector.detect(&image, "view"), self.scene.truth(camera, &pose, 0.0))
@@ -128,7 +129,7 @@ fn the_outermost_corners_are_found_through_a_fisheye_lens() {
         let (detection, truth) = board.seen(&mut rng, &camera, mm, tilt);
         let is_outermost = |row: i32, col: i32| row == 0 || row == 7 || col == 0 || col == 10;
         // Windows end at the border of the picture.
-        let seen = truth.corners.iter().filter(|c| camera.sees([c.x, c.y], 8.0));
+        let seen = truth.corners.iter().filter(|c| camera.sees(DVec2::new(c.x, c.y), 8.0));
         let ids: Vec<u32> = seen.filter(|c| is_outermost(c.row, c.col)).map(|c| c.id).collect();
         errors(&detection, &truth);
         let has = |id: &&u32| {

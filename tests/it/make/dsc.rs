@@ -7,6 +7,7 @@ use deltille::targets::{
     BoardSpec, Corner, ListFormat, Outline, Panel, PanelPose, TagPlacement, TagsIn, Target,
     TargetSpec,
 };
+use glam::DVec3;
 use proptest::prelude::*;
 
 use crate::common::data;
@@ -36,7 +37,7 @@ fn face(side: i32, pose: PanelPose) -> Target {
             .flat_map(|row| (0..side - row).map(move |col| (row, col)))
             .enumerate()
             .map(|(id, (row, col))| {
-                let panel_mm = Vertex::new(row, col).position().map(|v| v * 10.0);
+                let panel_mm = Vertex::new(row, col).position() * 10.0;
                 let target_mm = pose.target_from_panel(panel_mm);
                 Corner { id: id as u32, row, col, panel_mm, target_mm }
             })
@@ -118,7 +119,7 @@ proptest! {
 fn faces_come_back_in_both_dialects_from_any_pose() {
     let turned = PanelPose {
         rotation: [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
-        translation_mm: [3.0, -4.0, 5.5],
+        translation_mm: DVec3::new(3.0, -4.0, 5.5),
         covariance: None,
     };
     for pose in [PanelPose::IDENTITY, turned] {

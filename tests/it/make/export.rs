@@ -150,7 +150,7 @@ fn sizes_are_exact() {
         pdf::write(&artwork, &file("t.pdf")).unwrap();
         svg::write(&artwork, 0, &file("t.svg")).unwrap();
         for name in ["t.pdf", "t.svg"] {
-            let [w, h] = Document::open(&file(name)).unwrap().size_mm(0);
+            let (w, h) = Document::open(&file(name)).unwrap().size_mm(0).into();
             assert!((w - width).abs() < 1e-4 && (h - height).abs() < 1e-4, "{name}: {w} x {h}");
         }
     }

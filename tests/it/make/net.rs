@@ -10,9 +10,10 @@ use deltille::artwork::{self, Artwork, Part};
 use deltille::export::{pdf, png, sheet_file_name, svg};
 use deltille::family::Family;
 use deltille::targets::{
-    Label, LineKind, PaperSpec, Placement, SheetText, SolidShape, SolidSpec, Target, TargetSpec,
+    Label, LineKind, PaperSpec, SheetText, SolidShape, SolidSpec, Target, TargetSpec,
 };
 use deltille::verify::{Finding, FoldFinding, Verdict, Verifier};
+use glam::DVec2;
 use kurbo::Affine;
 use serde_json::{Value, json};
 
@@ -83,14 +84,11 @@ fn turn(target: &mut Target, at: usize) {
     let placement = &mut target.sheets[0].placements[at];
     let panel = target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
     let outline = spec.faces().unwrap()[panel].outline_mm;
-    let middle = [0, 1].map(|i| outline.iter().map(|p| p[i]).sum::<f64>() / 3.0);
+    let middle = outline.iter().sum::<DVec2>() / 3.0;
     let kept = placement.page_from_panel(middle);
     placement.angle_rad += TAU / 3.0;
     let moved = placement.page_from_panel(middle);
-    *placement = Placement {
-        origin_mm: [0, 1].map(|i| placement.origin_mm[i] + kept[i] - moved[i]),
-        ..*placement
-    };
+    placement.origin_mm += kept - moved;
 }
 
 /// Whether a text is the number of an edge.

@@ -5,6 +5,7 @@ use crate::common::folder::names;
 use crate::common::page::Page;
 use deltille::export::dsc;
 use deltille::targets::{LineKind, Target};
+use glam::DVec2;
 
 #[test]
 fn an_icosahedron_needs_no_option() {
@@ -416,7 +417,7 @@ fn panels_to_cut_have_their_true_size() {
             let sides: Vec<f64> = (0..3)
                 .map(|i| {
                     let (a, b) = (outline[i], outline[(i + 1) % 3]);
-                    (a[0] - b[0]).hypot(a[1] - b[1])
+                    a.distance(b)
                 })
                 .collect();
             // Ribs of icosahedra: 3 mm below, faces meet at 138.19°; 0.8 mm of foot, 0.15 of play.
@@ -438,11 +439,10 @@ fn single_faces_are_cut_to_the_seats_of_the_skeleton() {
     let sheet = &Target::from_json(&json).unwrap().sheets[0];
     // Two marks at each vertex; the lines through those along an edge make the outline.
     let cuts: Vec<_> = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut).collect();
-    let length = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
-    let between = length(cuts[0].from_mm, cuts[1].from_mm);
+    let between = cuts[0].from_mm.distance(cuts[1].from_mm);
     let text = std::fs::read_to_string(path.join("tetrahedron-panels.dxf")).unwrap();
     let outline = &closed_polylines(&text, "CUT")[0];
-    let edge = length(outline[0], outline[1]);
+    let edge = outline[0].distance(outline[1]);
     // Marks begin 3 mm beyond the vertices.
     assert!((between - edge - 6.0).abs() < 1e-4, "{between} {edge}");
     assert!(sheet.texts.iter().any(|text| text.text.to_string() == "edge 0 · face 3"));
@@ -480,19 +480,19 @@ fn the_net_to_cut_holds_all_faces_and_tabs() {
 }
 
 /// The closed polylines of a layer of a DXF of release 12.
-fn closed_polylines(text: &str, layer: &str) -> Vec<Vec<[f64; 2]>> {
+fn closed_polylines(text: &str, layer: &str) -> Vec<Vec<DVec2>> {
     let lines: Vec<&str> = text.lines().map(str::trim).collect();
-    let (mut outlines, mut entity, mut on_layer) = (Vec::<Vec<[f64; 2]>>::new(), "", false);
+    let (mut outlines, mut entity, mut on_layer) = (Vec::<Vec<DVec2>>::new(), "", false);
     for group in lines.chunks_exact(2) {
         match (group[0], group[1]) {
             ("0", name) => entity = name,
             ("8", name) => on_layer = name == layer,
             ("70", "1") if entity == "POLYLINE" && on_layer => outlines.push(Vec::new()),
             ("10", x) if entity == "VERTEX" && on_layer => {
-                outlines.last_mut().unwrap().push([x.parse().unwrap(), 0.0]);
+                outlines.last_mut().unwrap().push(DVec2::X * x.parse::<f64>().unwrap());
             }
             ("20", y) if entity == "VERTEX" && on_layer => {
-                outlines.last_mut().unwrap().last_mut().unwrap()[1] = y.parse().unwrap();
+                outlines.last_mut().unwrap().last_mut().unwrap().y = y.parse().unwrap();
             }
             _ => {}
         }

@@ -97,13 +97,13 @@ fn flip(board: &Board, artwork: &mut Artwork, at: (i32, i32), bit: u32) {
     let (panel, placement) = (&board.target.panels[0], board.target.sheets[0].placements[0]);
     assert_eq!(placement.angle_rad, 0.0);
     let [a, b, c] = panel.kind.tag_tile(Vertex::new(at.0, at.1)).frame().map(|v| {
-        let [x, y] = placement.page_from_panel(panel.lattice_mm(v));
-        Point::new(x, y)
+        let place = placement.page_from_panel(panel.lattice_mm(v));
+        Point::new(place.x, place.y)
     });
     let corners = board.family.cells().corners(bit, panel.tag_inset_bits());
     let mut path = BezPath::new();
-    for (i, [u, v]) in corners.into_iter().enumerate() {
-        let point = a + (b - a) * u + (c - a) * v;
+    for (i, corner) in corners.into_iter().enumerate() {
+        let point = a + (b - a) * corner.x + (c - a) * corner.y;
         if i == 0 { path.move_to(point) } else { path.line_to(point) }
     }
     path.close_path();
@@ -254,10 +254,10 @@ fn a_deleted_tile_is_named() {
 fn a_short_check_bar_is_measured() {
     let board = board(spec());
     let mut short = board.target.clone();
-    short.sheets[0].check_bars[0].to_mm[0] -= 0.1;
+    short.sheets[0].check_bars[0].to_mm.x -= 0.1;
     let artwork = artwork::draw(&short, Some(&board.family)).unwrap();
     let bar = &board.target.sheets[0].check_bars[0];
-    let length = bar.to_mm[0] - bar.from_mm[0];
+    let length = bar.to_mm.x - bar.from_mm.x;
     for format in ALL {
         let verdict = board.verify(&artwork, format);
         assert_found(&verdict, [json!({ "kind": "check_bar", "bar": 1 })]);
@@ -326,8 +326,8 @@ fn words_erased_or_altered_and_spots_outside_the_board_are_found() {
     let mut erased = board.artwork();
     erased.sheets[0].shapes.retain(|shape| shape.part != (Part::Label { index: 1 }));
     let mut blot = board.artwork();
-    let [left, lower] = board.target.sheets[0].placements[0].origin_mm;
-    let at = kurbo::Circle::new((left, lower - 2.5), 0.5);
+    let origin_mm = board.target.sheets[0].placements[0].origin_mm;
+    let at = kurbo::Circle::new((origin_mm.x, origin_mm.y - 2.5), 0.5);
     let path = kurbo::Shape::to_path(&at, 0.001);
     blot.sheets[0].shapes.push(Shape { part: Part::Label { index: 9 }, paint: Paint::Fill, path });
     let cases = [
@@ -381,7 +381,7 @@ fn a_bar_much_shorter_than_stated_is_measured() {
     let artwork = board.artwork();
     let bar = &mut board.target.sheets[0].check_bars[0];
     let printed = bar.length_mm();
-    bar.to_mm[0] += 10.0;
+    bar.to_mm.x += 10.0;
     let verdict = board.verify(&artwork, Format::Png);
     assert_found(&verdict, [json!({ "kind": "check_bar", "bar": 1 })]);
     let (_, found) = verdict.sheets[0].check_bars_mm[0];

@@ -1,5 +1,7 @@
 use std::f64::consts::PI;
 
+use glam::DVec2;
+
 use super::board::draw_panel;
 use super::{ArtworkError, Sheet};
 use crate::family::Family;
@@ -23,7 +25,7 @@ pub struct Atlas {
     /// Width and height, px.
     pub size_px: [u32; 2],
     /// Vertices of each face on the sheet, mm.
-    pub outlines_mm: Vec<[[f64; 2]; 3]>,
+    pub outlines_mm: Vec<[DVec2; 3]>,
 }
 
 impl Atlas {
@@ -40,8 +42,8 @@ impl Atlas {
         let mm_per_px = 1e3 / f64::from(px_per_m);
         let padding = PADDING_PX * mm_per_px;
         let packing = Packing::tightest(faces, padding);
-        let size_px = packing.size_mm.map(|mm| (mm / mm_per_px).ceil());
-        let [width_mm, height_mm] = size_px.map(|px| px * mm_per_px);
+        let size_px = (packing.size_mm / mm_per_px).ceil();
+        let DVec2 { x: width_mm, y: height_mm } = size_px * mm_per_px;
 
         let mut shapes = Vec::new();
         let mut outlines_mm = Vec::with_capacity(faces.len());
@@ -51,24 +53,24 @@ impl Atlas {
             outlines_mm.push(face.outline_mm.map(|p| placement.page_from_panel(p)));
         }
         let sheet = Sheet { width_mm, height_mm, shapes };
-        Ok(Atlas { sheet, px_per_m, size_px: size_px.map(|px| px as u32), outlines_mm })
+        Ok(Atlas { sheet, px_per_m, size_px: size_px.as_uvec2().to_array(), outlines_mm })
     }
 }
 
 /// Faces in rows of so many, alternately upright and upside down.
 pub(super) struct Packing {
-    pub size_mm: [f64; 2],
+    pub size_mm: DVec2,
     /// Turns of the panels, and places of their origins.
-    places: Vec<(f64, [f64; 2])>,
+    places: Vec<(f64, DVec2)>,
 }
 
 impl Packing {
     /// The rows whose longer side is the shortest.
     pub fn tightest(faces: &[Face], padding: f64) -> Self {
         let packings = (1..=faces.len()).map(|columns| Self::new(faces, columns, padding));
-        let side = |packing: &Self| packing.size_mm[0].max(packing.size_mm[1]);
+        let side = |packing: &Self| packing.size_mm.max_element();
         let tightest = packings.min_by(|a, b| side(a).total_cmp(&side(b)));
-        tightest.unwrap_or(Self { size_mm: [0.0; 2], places: Vec::new() })
+        tightest.unwrap_or(Self { size_mm: DVec2::ZERO, places: Vec::new() })
     }
 
     /// Where the faces lie.
@@ -80,36 +82,39 @@ impl Packing {
     fn new(faces: &[Face], columns: usize, padding: f64) -> Self {
         // Along a row slanted edges keep the padding between them, the flattest one as well.
         let slants = faces.iter().flat_map(|Face { outline_mm: [a, b, c], .. }| {
-            [a, b].map(|end| (c[1] - end[1]) / (c[0] - end[0]).hypot(c[1] - end[1]))
+            [a, b].map(|end| {
+                let slant = c - end;
+                slant.y / slant.x.hypot(slant.y)
+            })
         });
         let gap = padding / slants.fold(1.0, f64::min);
-        let height = |face: &Face| face.outline_mm[2][1] - face.outline_mm[0][1];
+        let height = |face: &Face| face.outline_mm[2].y - face.outline_mm[0].y;
         let row_height = faces.iter().map(height).fold(0.0, f64::max);
-        let mut packing = Self { size_mm: [0.0; 2], places: Vec::with_capacity(faces.len()) };
+        let mut packing = Self { size_mm: DVec2::ZERO, places: Vec::with_capacity(faces.len()) };
         let mut last = None;
         for (index, face) in faces.iter().enumerate() {
             if index.is_multiple_of(columns) {
-                packing.size_mm[1] += if index == 0 { padding } else { row_height + padding };
+                packing.size_mm.y += if index == 0 { padding } else { row_height + padding };
                 last = None;
             }
             let upright = (index % columns).is_multiple_of(2);
             let turn = if upright { 1.0 } else { -1.0 };
             // The lower edge of an upright face, or the apex of the others, starts the row.
-            let lowest = if upright { face.outline_mm[0][1] } else { -face.outline_mm[2][1] };
-            let y = packing.size_mm[1] - lowest;
-            let shape = face.outline_mm.map(|[px, py]| [turn * px, turn * py + y]);
-            let left = shape.iter().map(|p| p[0]).fold(f64::INFINITY, f64::min);
+            let lowest = if upright { face.outline_mm[0].y } else { -face.outline_mm[2].y };
+            let y = packing.size_mm.y - lowest;
+            let shape = face.outline_mm.map(|p| turn * p + DVec2::Y * y);
+            let left = shape.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
             let x = match &last {
                 None => padding - left,
                 Some(before) => shift_beside(before, &shape) + gap,
             };
-            let shape = shape.map(|[px, py]| [px + x, py]);
-            let right = shape.iter().map(|p| p[0]).fold(0.0, f64::max);
-            packing.size_mm[0] = packing.size_mm[0].max(right + padding);
-            packing.places.push((if upright { 0.0 } else { PI }, [x, y]));
+            let shape = shape.map(|p| p + DVec2::X * x);
+            let right = shape.iter().map(|p| p.x).fold(0.0, f64::max);
+            packing.size_mm.x = packing.size_mm.x.max(right + padding);
+            packing.places.push((if upright { 0.0 } else { PI }, DVec2::new(x, y)));
             last = Some(shape);
         }
-        packing.size_mm[1] += row_height + padding;
+        packing.size_mm.y += row_height + padding;
         packing
     }
 }
@@ -118,8 +123,8 @@ impl Packing {
 ///
 /// The right outline of one and the left outline of the other are straight between the vertices of
 /// both, so that they touch at the height of a vertex.
-fn shift_beside(before: &[[f64; 2]; 3], shape: &[[f64; 2]; 3]) -> f64 {
-    let heights = before.iter().chain(shape).map(|p| p[1]);
+fn shift_beside(before: &[DVec2; 3], shape: &[DVec2; 3]) -> f64 {
+    let heights = before.iter().chain(shape).map(|p| p.y);
     let needed = heights.filter_map(|y| {
         let [_, right] = extent_at(before, y)?;
         let [left, _] = extent_at(shape, y)?;
@@ -129,15 +134,15 @@ fn shift_beside(before: &[[f64; 2]; 3], shape: &[[f64; 2]; 3]) -> f64 {
 }
 
 /// Left and right end of a triangle at a height.
-fn extent_at(triangle: &[[f64; 2]; 3], y: f64) -> Option<[f64; 2]> {
+fn extent_at(triangle: &[DVec2; 3], y: f64) -> Option<[f64; 2]> {
     let mut extent: Option<[f64; 2]> = None;
     for i in 0..3 {
-        let ([ax, ay], [bx, by]) = (triangle[i], triangle[(i + 1) % 3]);
-        if y < ay.min(by) || y > ay.max(by) {
+        let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
+        if y < a.y.min(b.y) || y > a.y.max(b.y) {
             continue;
         }
-        let at = |t: f64| ax + (bx - ax) * t;
-        let xs = if ay == by { [ax, bx] } else { [at((y - ay) / (by - ay)); 2] };
+        let at = |t: f64| a.x + (b.x - a.x) * t;
+        let xs = if a.y == b.y { [a.x, b.x] } else { [at((y - a.y) / (b.y - a.y)); 2] };
         let [left, right] = extent.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
         extent = Some([left.min(xs[0]).min(xs[1]), right.max(xs[0]).max(xs[1])]);
     }

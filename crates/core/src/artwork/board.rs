@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 
+use glam::DVec2;
 use kurbo::{Affine, BezPath, Point, Rect};
 
 use super::{ArtworkError, Paint, Part, Shape, Sheet, cells, check_bar, strokes_mm, text, window};
@@ -33,8 +34,7 @@ pub(super) fn page(
     layout: &SheetLayout,
     page: &SheetPage,
 ) -> Result<Sheet, ArtworkError> {
-    let [x, y] = page.sheet_at_mm;
-    let page_from_sheet = Affine::translate((x, y));
+    let page_from_sheet = Affine::translate((page.sheet_at_mm.x, page.sheet_at_mm.y));
     let [x0, y0, x1, y1] = page.window_mm;
     let in_window = sheet.shapes.iter().filter_map(|shape| {
         let path = page_from_sheet * &shape.path;
@@ -65,8 +65,8 @@ fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
     for (index, line) in drawn_lines(layout) {
         let mut path = BezPath::new();
         for [from, to] in strokes_mm(line) {
-            path.move_to(Point::from((from[0], from[1])));
-            path.line_to(Point::from((to[0], to[1])));
+            path.move_to((from.x, from.y));
+            path.line_to((to.x, to.y));
         }
         let part = Part::Line { kind: line.kind, index };
         shapes.push(Shape { part, paint: Paint::Stroke { width_mm: line.width_mm }, path });
@@ -87,9 +87,7 @@ pub fn drawn_lines(layout: &SheetLayout) -> impl Iterator<Item = (usize, &SheetL
 
 /// Whether a line runs where another does, from its end to its beginning.
 fn is_back(line: &SheetLine, other: &SheetLine) -> bool {
-    let near = |p: [f64; 2], q: [f64; 2]| {
-        (p[0] - q[0]).hypot(p[1] - q[1]) < line.width_mm.min(other.width_mm) / 2.0
-    };
+    let near = |p: DVec2, q: DVec2| p.distance(q) < line.width_mm.min(other.width_mm) / 2.0;
     line.kind == other.kind && near(line.from_mm, other.to_mm) && near(line.to_mm, other.from_mm)
 }
 
@@ -100,7 +98,7 @@ pub(super) fn draw_panel(
     placement: &Placement,
     family: Option<&Family>,
 ) -> Result<Vec<Shape>, ArtworkError> {
-    let page_from_panel = Affine::translate((placement.origin_mm[0], placement.origin_mm[1]))
+    let page_from_panel = Affine::translate((placement.origin_mm.x, placement.origin_mm.y))
         * Affine::rotate(placement.angle_rad);
     let mut drawn: BTreeMap<Tile, BezPath> =
         panel.dark_tiles().into_iter().map(|tile| (tile, tile_outline(panel, tile, 0.0))).collect();
@@ -150,22 +148,21 @@ fn tag_word(
 }
 
 /// A polygon given in the coordinates of a tile, in the panel frame, mm.
-fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = [f64; 2]>) -> BezPath {
+fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = DVec2>) -> BezPath {
     let (row, col) = (f64::from(tile.anchor.row), f64::from(tile.anchor.col));
-    polygon(outline.into_iter().map(|[u, v]| {
-        let [x, y] = panel.kind.position(row + v, col + u);
-        Point::new(x * panel.edge_mm, y * panel.edge_mm)
+    polygon(outline.into_iter().map(|DVec2 { x: u, y: v }| {
+        let place = panel.kind.position(row + v, col + u) * panel.edge_mm;
+        Point::new(place.x, place.y)
     }))
 }
 
 /// The outline of a dark tile, or of a square, moved inside by a part of its edge.
 fn tile_outline(panel: &Panel, tile: Tile, inside: f64) -> BezPath {
-    let [u, v] = panel.kind.middle();
+    let middle = panel.kind.middle();
     let left = 1.0 - panel.kind.insets() * inside;
     let corners = tile.vertices().map(|vertex| vertex - tile.anchor);
-    let moved =
-        corners.map(|c| [u + left * (f64::from(c.col) - u), v + left * (f64::from(c.row) - v)]);
-    in_tile(panel, tile, moved)
+    let corners = corners.map(|corner| DVec2::new(corner.col.into(), corner.row.into()));
+    in_tile(panel, tile, corners.map(|corner| middle + left * (corner - middle)))
 }
 
 /// The outlines of a tag's white areas in tile coordinates (u along the lower edge, v along the
@@ -174,12 +171,12 @@ pub(super) fn tag_outlines(
     cells: &TagCells,
     word: u64,
     inset: f64,
-) -> impl Iterator<Item = Vec<[f64; 2]>> {
+) -> impl Iterator<Item = Vec<DVec2>> {
     let width = cells.width(inset);
     let at = move |cell: i32| (inset + f64::from(cell)) / width;
     cells::white_outlines(cells, word)
         .into_iter()
-        .map(move |outline| outline.into_iter().map(|v| [at(v.col), at(v.row)]).collect())
+        .map(move |outline| outline.into_iter().map(|v| DVec2::new(at(v.col), at(v.row))).collect())
 }
 
 /// A text on its page, set smaller where it would be too long.
@@ -187,8 +184,7 @@ pub(super) fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph
     let size = label.cap_height_mm / text::CAP_HEIGHT;
     let (path, width) = text::outline(&label.text.to_string(), size)?;
     let fit = (label.max_width_mm / width).min(1.0);
-    let [x, y] = label.at_mm;
-    let place = Affine::translate((x, y)) * Affine::rotate(label.angle_rad);
+    let place = Affine::translate((label.at_mm.x, label.at_mm.y)) * Affine::rotate(label.angle_rad);
     Ok(place * Affine::scale(fit) * path)
 }
 

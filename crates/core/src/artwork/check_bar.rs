@@ -14,8 +14,7 @@ const LINE_MM: f64 = 0.2;
 ///   from ┃━━━━━━━━━━━━━━━━━━━━━━━━━━━━┃ to
 /// ```
 pub fn outline(bar: &CheckBar) -> BezPath {
-    let [dx, dy] = [bar.to_mm[0] - bar.from_mm[0], bar.to_mm[1] - bar.from_mm[1]];
-    let (length, stroke, line) = (dx.hypot(dy), CHECK_BAR_STROKE_MM / 2.0, LINE_MM / 2.0);
+    let (length, stroke, line) = (bar.length_mm(), CHECK_BAR_STROKE_MM / 2.0, LINE_MM / 2.0);
     let (inner, outer) = (STROKE_WIDTH_MM, length - STROKE_WIDTH_MM);
     let corners = [
         (0.0, -stroke),
@@ -35,7 +34,6 @@ pub fn outline(bar: &CheckBar) -> BezPath {
     path.move_to(corners[0]);
     corners[1..].iter().for_each(|&corner| path.line_to(corner));
     path.close_path();
-    let [x, y] = bar.from_mm;
-    let (cos, sin) = (dx / length, dy / length);
-    Affine::new([cos, sin, -sin, cos, x, y]) * path
+    let (start, along) = (bar.from_mm, (bar.to_mm - bar.from_mm) / length);
+    Affine::new([along.x, along.y, -along.y, along.x, start.x, start.y]) * path
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec3;
+use glam::DVec2;
 
 use super::atlas::Packing;
 use super::text::MissingGlyph;
@@ -51,7 +51,7 @@ pub struct CutPath {
     /// Whether the last point is joined to the first.
     pub closed: bool,
     /// Points, mm, x right, y up.
-    pub points_mm: Vec<[f64; 2]>,
+    pub points_mm: Vec<DVec2>,
 }
 
 /// A drawing for a cutter.
@@ -147,7 +147,7 @@ pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
         }
         let [left, lower, right, _] = piece.bounds_mm().ok_or_else(no_net)?;
         let points = piece.paths.iter_mut().flat_map(|path| &mut path.points_mm);
-        points.for_each(|[x, y]| (*x, *y) = (*x - left + right_mm, *y - lower));
+        points.for_each(|p| *p = *p - DVec2::new(left, lower) + DVec2::X * right_mm);
         right_mm += right - left + GAP_MM;
         drawing.paths.append(&mut piece.paths);
     }
@@ -159,21 +159,21 @@ pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
 /// Every line runs with the paper on its left. Where an outline touches itself more than one line
 /// begins; it goes on with the one that leaves the least angle of paper between, which no other
 /// line can divide.
-fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<[f64; 2]>>> {
+fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
     let cuts = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut);
-    let mut left: Vec<[[f64; 2]; 2]> = cuts.map(|line| [line.from_mm, line.to_mm]).collect();
+    let mut left: Vec<[DVec2; 2]> = cuts.map(|line| [line.from_mm, line.to_mm]).collect();
     let mut outlines = Vec::new();
     while let Some(first) = left.pop() {
         let mut outline = vec![first[0]];
         let mut last = first;
         loop {
-            let paper_rad = |[from, to]: [[f64; 2]; 2]| {
-                let back = (last[0][1] - last[1][1]).atan2(last[0][0] - last[1][0]);
-                let on = (to[1] - from[1]).atan2(to[0] - from[0]);
+            let paper_rad = |[from, to]: [DVec2; 2]| {
+                let back = (last[0] - last[1]).to_angle();
+                let on = (to - from).to_angle();
                 // Lines one on the other leave a whole turn, not none.
                 TAU - (on - back).rem_euclid(TAU)
             };
-            let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < JOIN_MM;
+            let near = |a: DVec2, b: DVec2| a.distance(b) < JOIN_MM;
             let next = (0..left.len())
                 .filter(|&n| near(left[n][0], last[1]))
                 .min_by(|&a, &b| paper_rad(left[a]).total_cmp(&paper_rad(left[b])));
@@ -197,14 +197,14 @@ fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<[f64; 2]>>> {
 /// The number of a face around the middle of its outline.
 fn face_number(
     placement: &Placement,
-    outline: [[f64; 2]; 3],
+    outline: [DVec2; 3],
     index: usize,
 ) -> crate::targets::SheetText {
-    let circle = crate::targets::Incircle::of(outline.map(|[x, y]| DVec3::new(x, y, 0.0)));
+    let circle = crate::targets::Incircle::of(outline.map(|corner| corner.extend(0.0)));
     let text = upright_number(index);
     let cap = (FACE_CAP.0 * circle.radius).min(FACE_CAP.1);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
-    let at = [circle.centre.x - width / 2.0, circle.centre.y - cap / 2.0];
+    let at = circle.centre.truncate() - DVec2::new(width, cap) / 2.0;
     crate::targets::SheetText {
         text: Label::Words(text),
         at_mm: placement.page_from_panel(at),
@@ -217,18 +217,9 @@ fn face_number(
 impl CutDrawing {
     /// Left, lower, right and upper end, mm; `None` when nothing is drawn.
     pub fn bounds_mm(&self) -> Option<[f64; 4]> {
-        let points = || self.paths.iter().flat_map(|path| &path.points_mm);
-        points().next()?;
-        let end = |axis: usize, pick: fn(f64, f64) -> f64, start| {
-            points().map(|p| p[axis]).fold(start, pick)
-        };
-        let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
-        Some([
-            end(0, f64::min, low),
-            end(1, f64::min, low),
-            end(0, f64::max, high),
-            end(1, f64::max, high),
-        ])
+        let points = || self.paths.iter().flat_map(|path| &path.points_mm).copied();
+        let (least, most) = (points().reduce(DVec2::min)?, points().reduce(DVec2::max)?);
+        Some([least.x, least.y, most.x, most.y])
     }
 
     /// Adds the outlines of letters.
@@ -237,11 +228,11 @@ impl CutDrawing {
             kurbo::PathEl::MoveTo(p) => self.paths.push(CutPath {
                 layer: CutLayer::Engrave,
                 closed: true,
-                points_mm: vec![[p.x, p.y]],
+                points_mm: vec![DVec2::new(p.x, p.y)],
             }),
             kurbo::PathEl::LineTo(p) => {
                 if let Some(path) = self.paths.last_mut() {
-                    path.points_mm.push([p.x, p.y]);
+                    path.points_mm.push(DVec2::new(p.x, p.y));
                 }
             }
             _ => {}

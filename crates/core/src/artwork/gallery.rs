@@ -1,3 +1,4 @@
+use glam::DVec2;
 use kurbo::{Affine, Point};
 
 use super::board::{polygon, tag_outlines};
@@ -51,10 +52,10 @@ pub fn tag_gallery(
     for (index, (id, word)) in known.into_iter().enumerate() {
         let x = gap + (index % columns) as f64 * pitch[0];
         let y = height_mm - (index / columns + 1) as f64 * pitch[1] + 1.8 * size;
-        let place = |[u, v]: [f64; 2]| {
+        let place = |DVec2 { x: u, y: v }: DVec2| {
             Point::new(x + (u + v / 2.0) * edge_mm, y + v * ROW_HEIGHT * edge_mm)
         };
-        let mut path = polygon([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(place));
+        let mut path = polygon([DVec2::ZERO, DVec2::X, DVec2::Y].map(place));
         for outline in tag_outlines(&cells, word, border_bits) {
             path.extend(polygon(outline.into_iter().map(place)));
         }

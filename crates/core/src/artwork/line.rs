@@ -1,3 +1,5 @@
+use glam::DVec2;
+
 use crate::targets::{LineKind, SheetLine};
 
 /// Dashes of a fold, and the gaps between them, mm, from one end of the line to the other; both
@@ -19,20 +21,19 @@ const DOT_MM: [f64; 2] = [0.6, 3.0];
 ///
 /// The period of a pattern is stretched so that a whole number of them and a last dash fill the
 /// line.
-pub fn strokes_mm(line: &SheetLine) -> Vec<[[f64; 2]; 2]> {
+pub fn strokes_mm(line: &SheetLine) -> Vec<[DVec2; 2]> {
     let pattern = match line.kind {
         LineKind::Cut | LineKind::Align => return vec![[line.from_mm, line.to_mm]],
         LineKind::Fold => &DASH_MM[..],
         LineKind::Valley => &DASH_DOT_MM[..],
         LineKind::Flat => &DOT_MM[..],
     };
-    let [dx, dy] = [0, 1].map(|i| line.to_mm[i] - line.from_mm[i]);
-    let length = dx.hypot(dy);
+    let way = line.to_mm - line.from_mm;
+    let length = way.x.hypot(way.y);
     let period: f64 = pattern.iter().sum();
     let count = ((length - pattern[0]) / period).round().max(0.0);
     let stretch = length / (count * period + pattern[0]);
-    let at =
-        |mm: f64| [0, 1].map(|i| line.from_mm[i] + [dx, dy][i] * (mm * stretch / length).min(1.0));
+    let at = |mm: f64| line.from_mm + way * (mm * stretch / length).min(1.0);
     let mut strokes = Vec::new();
     for n in 0..=count as usize {
         let mut start = n as f64 * period;
@@ -55,12 +56,13 @@ mod tests {
     fn dashes_begin_and_end_with_the_line() {
         for kind in [LineKind::Fold, LineKind::Valley, LineKind::Flat] {
             for length in [1.0, 3.0, 7.9, 150.0] {
-                let (from_mm, to_mm) = ([2.0, 1.0], [2.0, 1.0 + length]);
+                let from_mm = DVec2::new(2.0, 1.0);
+                let to_mm = from_mm + DVec2::Y * length;
                 let strokes = strokes_mm(&SheetLine { kind, from_mm, to_mm, width_mm: 0.1 });
                 assert_eq!(strokes[0][0], from_mm);
                 let end = strokes[strokes.len() - 1][1];
-                assert!((end[1] - to_mm[1]).abs() < 1e-9, "{kind:?} {length}: {strokes:?}");
-                assert!(strokes.windows(2).all(|pair| pair[0][1][1] < pair[1][0][1]));
+                assert!((end.y - to_mm.y).abs() < 1e-9, "{kind:?} {length}: {strokes:?}");
+                assert!(strokes.windows(2).all(|pair| pair[0][1].y < pair[1][0].y));
             }
         }
     }

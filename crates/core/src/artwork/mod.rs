@@ -21,6 +21,7 @@ mod line;
 pub mod text;
 mod window;
 
+use glam::DVec2;
 use kurbo::BezPath;
 
 use crate::family::Family;
@@ -203,7 +204,7 @@ pub fn panel_shapes(
     panel: &Panel,
     family: Option<&Family>,
 ) -> Result<Vec<Shape>, ArtworkError> {
-    let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: [0.0; 2] };
+    let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: DVec2::ZERO };
     board::draw_panel(target, panel, &placement, family)
 }
 

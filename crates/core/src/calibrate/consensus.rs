@@ -89,10 +89,9 @@ fn agreeing_triples(corners: &[Observation]) -> Vec<[usize; 3]> {
             let step_mm = corners[c].panel_mm.distance(corners[a].panel_mm) / 2.0;
             shortest_mm = shortest_mm.min(step_mm);
             let [a_px, b_px, c_px] = [a, b, c].map(|index| corners[index].pixel);
-            let along = [0, 1].map(|i| c_px[i] - a_px[i]);
-            let uneven = [0, 1].map(|i| a_px[i] - 2.0 * b_px[i] + c_px[i]);
-            let length = along[0].hypot(along[1]);
-            if uneven[0].hypot(uneven[1]) < UNEVEN * length {
+            let (along, uneven) = (c_px - a_px, a_px - 2.0 * b_px + c_px);
+            let length = along.x.hypot(along.y);
+            if uneven.x.hypot(uneven.y) < UNEVEN * length {
                 found.push(([a, b, c], step_mm, length));
             }
         }

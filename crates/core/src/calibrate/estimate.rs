@@ -1,5 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use glam::DVec2;
 use nalgebra::DMatrix;
 
 use super::calibration::{CameraViews, PanelPlace};
@@ -134,9 +135,9 @@ pub struct Corner {
     /// Lattice column.
     pub col: i32,
     /// Where it was seen, px.
-    pub pixel: [f64; 2],
+    pub pixel: DVec2,
     /// Seen less predicted position, px.
-    pub residual: [f64; 2],
+    pub residual: DVec2,
     /// Whether it is farther off than corners are by chance.
     pub outlier: bool,
 }
@@ -246,7 +247,7 @@ impl CameraEstimate {
 
     /// Where the lens ends to be good, if that is within the image.
     pub fn lens_end(&self) -> Option<LensEnd> {
-        let seen: Vec<[f64; 2]> = self.corners().map(|corner| corner.pixel).collect();
+        let seen: Vec<DVec2> = self.corners().map(|corner| corner.pixel).collect();
         LensEnd::of(&self.camera, &seen)
     }
 }
@@ -262,7 +263,7 @@ impl ViewEstimate {
 fn rms_px<'a>(corners: impl Iterator<Item = &'a Corner>) -> f64 {
     let residuals = corners.map(|corner| corner.residual);
     let (sum, count) =
-        residuals.fold((0.0, 0), |(sum, count), [x, y]| (sum + x * x + y * y, count + 2));
+        residuals.fold((0.0, 0), |(sum, count), r| (sum + r.x * r.x + r.y * r.y, count + 2));
     if count == 0 { 0.0 } else { (sum / f64::from(count)).sqrt() }
 }
 

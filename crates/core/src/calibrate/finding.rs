@@ -1,5 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use glam::DVec2;
+
 use super::panel::PanelRef;
 use super::problem::Problem;
 
@@ -58,9 +60,9 @@ pub enum Shared {
         /// Index of the camera.
         camera: usize,
         /// Its upper left, px.
-        from_px: [f64; 2],
+        from_px: DVec2,
         /// Its lower right, px.
-        to_px: [f64; 2],
+        to_px: DVec2,
     },
     /// A camera of a rig.
     Camera {
@@ -157,8 +159,7 @@ pub(super) fn shared_outliers(
             views.entry((block.camera, block.frame)).or_default().add(outlier);
             // Where it should have been seen: wrong places are anywhere.
             let Some(off) = problem.residual(block, corner) else { continue };
-            let at = [0, 1].map(|i| corner.pixel[i] - off[i]);
-            let cell = at.map(|v| (v / cell_px).floor() as i32);
+            let cell = ((corner.pixel - off) / cell_px).floor().as_ivec2().to_array();
             let (count, of_views) = cells.entry((block.camera, cell)).or_default();
             count.add(outlier);
             if outlier {
@@ -196,9 +197,9 @@ pub(super) fn shared_outliers(
         let Some(unknowns) = problem.cameras.get(camera) else { continue };
         let (width, height) = (unknowns.camera.width, unknowns.camera.height);
         let cell_px = f64::from(width.max(height)) / CELLS;
-        let size = [f64::from(width), f64::from(height)];
-        let from_px = from.map(|cell| f64::from(cell.max(0)) * cell_px);
-        let to_px = [0, 1].map(|i| (f64::from(to[i] + 1) * cell_px).min(size[i]));
+        let size = DVec2::new(width.into(), height.into());
+        let from_px = DVec2::from(from.map(|cell| f64::from(cell.max(0)))) * cell_px;
+        let to_px = (DVec2::from(to.map(|cell| f64::from(cell + 1))) * cell_px).min(size);
         found.push(finding(Shared::Region { camera, from_px, to_px }, count));
     }
     found

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 use crate::detect::Grid;
-use crate::lattice::{GridKind, Vertex};
+use crate::lattice::GridKind;
 use crate::targets::zigzag_vertices;
 
 /// An untagged board that no file describes. Its labels may differ between views by a motion of the
@@ -21,11 +21,7 @@ pub struct UntaggedGrid {
 impl UntaggedGrid {
     /// Where a corner is, mm.
     pub(super) fn place(&self, row: i32, col: i32) -> DVec3 {
-        let [x, y] = match self.kind {
-            GridKind::Deltille => Vertex::new(row, col).position(),
-            GridKind::Checker => [f64::from(col), f64::from(row)],
-        };
-        self.edge_mm * DVec3::new(x, y, 0.0)
+        self.edge_mm * self.kind.position(row.into(), col.into()).extend(0.0)
     }
 
     /// Whether a detected grid can be this board; what speaks against it.

@@ -17,7 +17,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::error::CalibrationError;
 use super::finding::{Count, Finding, Moved, Shared, shared_outliers};
@@ -297,8 +297,8 @@ impl Gross {
 }
 
 /// The median error of corners, px.
-fn median_px<'a>(residuals: impl IntoIterator<Item = &'a [f64; 2]>) -> f64 {
-    median(residuals.into_iter().map(|[x, y]| x.hypot(*y)).collect()).unwrap_or(0.0)
+fn median_px<'a>(residuals: impl IntoIterator<Item = &'a DVec2>) -> f64 {
+    median(residuals.into_iter().map(|r| r.x.hypot(r.y)).collect()).unwrap_or(0.0)
 }
 
 /// The median error beyond which corners do not belong with the others, px, from those of all.
@@ -307,8 +307,8 @@ fn limit_px(medians: &[f64]) -> f64 {
 }
 
 /// What a quarter of the corners are off by at most, px: labels that are wrong fit none.
-fn nearest_px(residuals: &[[f64; 2]]) -> f64 {
-    let mut off: Vec<f64> = residuals.iter().map(|[x, y]| x.hypot(*y)).collect();
+fn nearest_px(residuals: &[DVec2]) -> f64 {
+    let mut off: Vec<f64> = residuals.iter().map(|r| r.x.hypot(r.y)).collect();
     off.sort_by(f64::total_cmp);
     off.get(off.len() / 4).copied().unwrap_or(f64::INFINITY)
 }
@@ -373,7 +373,7 @@ fn place_anew(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRef>) {
         let seen =
             blocks.flat_map(|block| block.observations.iter().map(move |seen| (block, seen)));
         let residuals = seen.map(|(block, seen)| problem.residual(block, seen));
-        median(residuals.map(|r| r.map_or(f64::INFINITY, |[x, y]| x.hypot(y))).collect())
+        median(residuals.map(|r| r.map_or(f64::INFINITY, |r| r.x.hypot(r.y))).collect())
             .unwrap_or(0.0)
     };
     let blocks = problem.blocks.iter().filter(is_right);
@@ -517,11 +517,9 @@ fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
 pub(super) fn within_pictures(views: &[View], camera: usize) -> (Vec<View>, Vec<Finding>) {
     let mut found = Vec::new();
     let of_view = |view: &View| {
-        let is_within = |pixel: [f64; 2]| {
-            pixel.iter().zip(view.size_px).all(|(v, size)| {
-                let size = f64::from(size);
-                (-BEYOND * size..=(1.0 + BEYOND) * size).contains(v)
-            })
+        let size = DVec2::from(view.size_px.map(f64::from));
+        let is_within = |pixel: DVec2| {
+            pixel.cmpge(-BEYOND * size).all() && pixel.cmple((1.0 + BEYOND) * size).all()
         };
         let sightings = view.sightings.iter().map(|sighting| {
             let within = sighting.observations.iter().filter(|seen| is_within(seen.pixel));

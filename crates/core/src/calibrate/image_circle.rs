@@ -1,12 +1,14 @@
 use std::f64::consts::TAU;
 
+use glam::DVec2;
+
 use crate::camera::Camera;
 
 /// The image circle of a fisheye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageCircle {
     /// Its middle, px.
-    pub centre_px: [f64; 2],
+    pub centre_px: DVec2,
     /// Its radius, px.
     pub radius_px: f64,
 }
@@ -23,7 +25,7 @@ impl ImageCircle {
     /// The image circle of a camera that saw these corners; `None` where its lens shows all of the
     /// image, as perspective ones do. There is one where corners fill one, and where corners of the
     /// image are beyond what the lens sees.
-    pub fn of(camera: &Camera, seen: &[[f64; 2]]) -> Option<Self> {
+    pub fn of(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
         if camera.lens.is_perspective() {
             return None;
         }
@@ -37,19 +39,19 @@ impl ImageCircle {
 
     /// The circle that corners fill: it reaches the nearest side and leaves the corners of the image
     /// empty.
-    pub(super) fn filled(camera: &Camera, seen: &[[f64; 2]]) -> Option<Self> {
+    pub(super) fn filled(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
         if camera.lens.is_perspective() {
             return None;
         }
         let centre_px = camera.centre_px;
         let mut outermost = [0.0; DIRECTIONS];
-        for &[x, y] in seen {
-            let angle = (y - centre_px[1]).atan2(x - centre_px[0]).rem_euclid(TAU) / TAU;
+        for &pixel in seen {
+            let angle = (pixel - centre_px).to_angle().rem_euclid(TAU) / TAU;
             let direction = (angle * DIRECTIONS as f64) as usize % DIRECTIONS;
-            outermost[direction] = camera.radius_px([x, y]).max(outermost[direction]);
+            outermost[direction] = camera.radius_px(pixel).max(outermost[direction]);
         }
         let farthest = outermost.iter().copied().fold(0.0, f64::max);
-        let [x, y] = centre_px;
+        let DVec2 { x, y } = centre_px;
         let sides = [x, y, f64::from(camera.width) - x, f64::from(camera.height) - y];
         let side = sides.into_iter().fold(f64::INFINITY, f64::min);
         let filled = outermost.iter().all(|&radius| radius >= RIM * farthest);
@@ -59,15 +61,16 @@ impl ImageCircle {
     }
 
     /// Distance of a pixel position from the middle, px.
-    pub fn radius_of(&self, [x, y]: [f64; 2]) -> f64 {
-        (x - self.centre_px[0]).hypot(y - self.centre_px[1])
+    pub fn radius_of(&self, pixel: DVec2) -> f64 {
+        let from_centre = pixel - self.centre_px;
+        from_centre.x.hypot(from_centre.y)
     }
 }
 
 /// How far from the principal point a lens sees towards a corner of the image that it does not see.
-fn seen_towards(camera: &Camera, corner: [f64; 2]) -> Option<f64> {
+fn seen_towards(camera: &Camera, corner: DVec2) -> Option<f64> {
     let centre = camera.centre_px;
-    let at = |part: f64| [0, 1].map(|i| centre[i] + part * (corner[i] - centre[i]));
+    let at = |part: f64| centre + part * (corner - centre);
     if camera.unproject(corner).is_some() {
         return None;
     }
@@ -91,11 +94,11 @@ mod tests {
             let lens = Lens::KannalaBrandt(KannalaBrandt { k: vec![k, 0.0, 0.0, 0.0] });
             Camera::centred(1600, 1200, 380.0, lens)
         };
-        let disc = |camera: &Camera, radius: f64| -> Vec<[f64; 2]> {
-            let [x, y] = camera.centre_px;
+        let disc = |camera: &Camera, radius: f64| -> Vec<DVec2> {
             let at =
                 |i: i32| (radius * f64::from(i / 100) / 10.0, f64::from(i % 100) / 100.0 * TAU);
-            (0..=1099).map(at).map(|(r, a)| [x + r * a.cos(), y + r * a.sin()]).collect()
+            let on_disc = |(r, a): (f64, f64)| camera.centre_px + r * DVec2::from_angle(a);
+            (0..=1099).map(at).map(on_disc).collect()
         };
         let lens = fisheye(-0.01);
         let filled = ImageCircle::of(&lens, &disc(&lens, 590.0)).unwrap();
@@ -103,7 +106,7 @@ mod tests {
         // A small disc says nothing, nor do corners in the corners of the image.
         assert_eq!(ImageCircle::of(&lens, &disc(&lens, 300.0)), None);
         let mut all = disc(&lens, 590.0);
-        all.extend([[20.0, 20.0], [1580.0, 1180.0]]);
+        all.extend([DVec2::new(20.0, 20.0), DVec2::new(1580.0, 1180.0)]);
         assert_eq!(ImageCircle::of(&lens, &all), None);
         // r = θ (1 − θ²/10) ends at 463 px.
         let ends = fisheye(-0.1);

@@ -12,7 +12,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::panel::PanelRef;
@@ -74,7 +74,7 @@ struct Seen {
     cell: [i32; 2],
     label: [i32; 2],
     place_mm: DVec3,
-    residual: [f64; 2],
+    residual: DVec2,
     /// The residual by the corner's place on the panel, 1/mm.
     by_place: [DVec3; 2],
 }
@@ -91,7 +91,7 @@ enum Source {
 #[derive(Default)]
 struct Explained {
     /// By index of the corner.
-    fitted: Vec<(usize, [f64; 2])>,
+    fitted: Vec<(usize, DVec2)>,
     /// Sums of squares: of all, and of the means or moves.
     all: f64,
     explained: f64,
@@ -139,9 +139,8 @@ pub(super) fn lack_of_fit(problem: &Problem, whitening: &Whitening) -> Vec<LackO
                 }
             }
         });
-        for (index, [x, y]) in explained.fitted {
-            let residual = &mut seen[index].residual;
-            *residual = [residual[0] - x, residual[1] - y];
+        for (index, fitted) in explained.fitted {
+            seen[index].residual -= fitted;
         }
     }
 }
@@ -161,20 +160,20 @@ fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
         for (corner, &w) in block.observations.iter().zip(weights) {
             let at = camera.project_with_derivatives(problem.camera_point(block, corner));
             let Some(at) = at else { continue };
-            let residual = [corner.pixel[0] - at.pixel[0], corner.pixel[1] - at.pixel[1]];
+            let residual = corner.pixel - at.pixel;
             if whitening.is_outlier(w, residual) {
                 continue;
             }
             let [x, y] = at.by_point.map(|row| panel_from_camera * DVec3::from(row));
             let [a, b, c] = w;
             let whitened = Whitening::apply(w, residual);
-            px += residual.iter().map(|v| v * v).sum::<f64>();
-            white += whitened.iter().map(|v| v * v).sum::<f64>();
+            px += residual.length_squared();
+            white += whitened.length_squared();
             all.push(Seen {
                 block: index,
                 camera: block.camera,
                 panel: block.panel,
-                cell: corner.pixel.map(|v| (v / cell_px).floor() as i32),
+                cell: (corner.pixel / cell_px).floor().as_ivec2().to_array(),
                 label: [corner.row, corner.col],
                 place_mm: corner.panel_mm,
                 residual: whitened,
@@ -195,23 +194,23 @@ fn over_image(seen: &[Seen], camera: usize) -> Explained {
     }
     let mut found = Explained::default();
     let mean_of = |corners: &mut dyn Iterator<Item = usize>| {
-        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        let (mut sum, mut count) = (DVec2::ZERO, 0.0);
         for index in corners {
-            sum = [0, 1].map(|i| sum[i] + seen[index].residual[i]);
+            sum += seen[index].residual;
             count += 1.0;
         }
-        (sum.map(|v| v / count), count)
+        (sum / count, count)
     };
     for views in cells.values().filter(|views| views.len() > 1) {
         let (mean, count) = mean_of(&mut views.values().flatten().copied());
-        found.explained += count * square(mean);
+        found.explained += count * mean.length_squared();
         found.unknowns += 2.0;
         found.freedom += 2.0 * (views.len() - 1) as f64;
         for corners in views.values() {
             let (of_view, count) = mean_of(&mut corners.iter().copied());
-            found.left += count * square([of_view[0] - mean[0], of_view[1] - mean[1]]);
+            found.left += count * of_view.distance_squared(mean);
             for &index in corners {
-                found.all += square(seen[index].residual);
+                found.all += seen[index].residual.length_squared();
                 found.fitted.push((index, mean));
             }
         }
@@ -295,7 +294,7 @@ fn best_move<const N: usize>(
 ) -> Move<N> {
     let (mut normal, mut right) = (DMatrix::zeros(N, N), DVector::zeros(N));
     for corner in corners.iter().map(|&index| &seen[index]) {
-        for (&by, residual) in corner.by_place.iter().zip(corner.residual) {
+        for (&by, residual) in corner.by_place.iter().zip(corner.residual.to_array()) {
             let by = DVector::from_row_slice(&row(by, corner));
             right.axpy(residual, &by, 1.0);
             normal.ger(1.0, &by, &by, 1.0);
@@ -328,7 +327,7 @@ impl Explained {
         found: &Move<N>,
         moved: impl Fn(&Seen) -> DVec3,
     ) {
-        let all: f64 = corners.iter().map(|&index| square(seen[index].residual)).sum();
+        let all: f64 = corners.iter().map(|&index| seen[index].residual.length_squared()).sum();
         self.all += all;
         self.explained += found.explained;
         self.unknowns += found.unknowns;
@@ -337,7 +336,7 @@ impl Explained {
         *self.by_panel.entry(panel).or_default() += found.explained - found.unknowns;
         let fitted = |&index: &usize| {
             let corner = &seen[index];
-            (index, corner.by_place.map(|by| by.dot(moved(corner))))
+            (index, DVec2::from(corner.by_place.map(|by| by.dot(moved(corner)))))
         };
         self.fitted.extend(corners.iter().map(fitted));
     }
@@ -370,10 +369,6 @@ pub(super) fn deviate_of_f(f_ratio: f64, unknowns: f64, freedom: f64) -> f64 {
     let (a, b) = (2.0 / (9.0 * unknowns), 2.0 / (9.0 * freedom));
     let root = f_ratio.cbrt();
     ((1.0 - b) * root - (1.0 - a)) / (b * root * root + a).sqrt()
-}
-
-fn square([x, y]: [f64; 2]) -> f64 {
-    x * x + y * y
 }
 
 #[cfg(test)]

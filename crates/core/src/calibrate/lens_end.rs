@@ -1,5 +1,7 @@
 use std::fmt;
 
+use glam::DVec2;
+
 use super::image_circle::ImageCircle;
 use crate::camera::Camera;
 
@@ -19,7 +21,7 @@ pub struct LensEnd {
 impl LensEnd {
     /// The end of a camera's lens; `None` where it lies beyond the image, or beyond the image circle
     /// that corners fill. `seen` are the places of all corners.
-    pub fn of(camera: &Camera, seen: &[[f64; 2]]) -> Option<Self> {
+    pub fn of(camera: &Camera, seen: &[DVec2]) -> Option<Self> {
         let (steady_px, farthest_px) = (camera.steady_px()?, camera.farthest_px());
         let rim_px = ImageCircle::filled(camera, seen).map_or(farthest_px, |c| c.radius_px);
         let outermost_px = seen.iter().map(|&at| camera.radius_px(at)).fold(0.0, f64::max);
@@ -52,7 +54,7 @@ mod tests {
         // r (1 − r²/3) turns back at 2/3 of the focal length.
         let lens = BrownConrady { radial: [-1.0 / 3.0, 0.0, 0.0], ..BrownConrady::default() };
         let camera = |focal| Camera::centred(1600, 1200, focal, Lens::BrownConrady(lens));
-        let seen = [[800.0, 600.0], [800.0, 100.0]];
+        let seen = [DVec2::new(800.0, 600.0), DVec2::new(800.0, 100.0)];
         assert_eq!(LensEnd::of(&camera(1600.0), &seen), None);
         let end = LensEnd::of(&camera(900.0), &seen).unwrap();
         assert!((end.steady_px - 600.0).abs() < 1e-6 && end.farthest_px == 1000.0, "{end:?}");

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::calibration::{Calibration, CameraViews, Intrinsics};
-use super::estimate::{Corner, Estimate};
+use super::estimate::Estimate;
 use super::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
 use super::model::Model;
 use super::start::evenly;
@@ -191,8 +191,7 @@ fn best(found: &Estimate, tried: impl Iterator<Item = (Instead, Estimate)>) -> O
 /// one in both, so that wild corners are no gain; nor is it one to call more of them wild.
 fn gain(found: &Estimate, other: &Estimate, instead: Instead) -> Option<f64> {
     let squares = |estimate: &Estimate| -> Vec<f64> {
-        let of = |corner: &Corner| corner.residual.iter().map(|r| r * r).sum::<f64>();
-        estimate.corners().map(of).collect()
+        estimate.corners().map(|corner| corner.residual.length_squared()).collect()
     };
     let variance = median(squares(other)).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2;
     let most = OUTLIER_SIGMA * OUTLIER_SIGMA * variance;
@@ -234,8 +233,8 @@ fn holds_as_well(smaller: &Estimate, found: &Estimate) -> bool {
     for (a, b) in found.corners().zip(smaller.corners()) {
         // An outlier of the smaller model may be what it does not hold.
         if !a.outlier {
-            own += a.residual.iter().map(|r| r * r).sum::<f64>();
-            other += b.residual.iter().map(|r| r * r).sum::<f64>();
+            own += a.residual.length_squared();
+            other += b.residual.length_squared();
             count += 2.0;
         }
     }

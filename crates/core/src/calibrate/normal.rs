@@ -9,7 +9,7 @@
 
 use std::collections::BTreeSet;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
 
@@ -366,8 +366,7 @@ impl Local {
                 };
                 pose(turned_target, by_rig);
             }
-            let residual = [seen.pixel[0] - at.pixel[0], seen.pixel[1] - at.pixel[1]];
-            local.add([&rows[0][..n], &rows[1][..n]], residual, w, loss, sigma);
+            local.add([&rows[0][..n], &rows[1][..n]], seen.pixel - at.pixel, w, loss, sigma);
         }
         Some(local)
     }
@@ -381,19 +380,19 @@ impl Local {
     fn add(
         &mut self,
         [along_x, along_y]: [&[f64]; 2],
-        residual: [f64; 2],
+        residual: DVec2,
         w: [f64; 3],
         loss: Loss,
         sigma: f64,
     ) {
-        let [r0, r1] = Whitening::apply(w, residual);
-        let (cost, weight) = loss.of(r0 * r0 + r1 * r1, sigma);
+        let r = Whitening::apply(w, residual);
+        let (cost, weight) = loss.of(r.length_squared(), sigma);
         self.cost += cost;
         let [a, b, c] = w;
         let mut rest = self.matrix.as_mut_slice();
         for (i, right) in self.right.iter_mut().enumerate() {
             let (x, y) = (weight * a * along_x[i], weight * (b * along_x[i] + c * along_y[i]));
-            *right += x * r0 + y * r1;
+            *right += x * r.x + y * r.y;
             let (by_x, by_y) = (a * x + b * y, c * y);
             let (row, below) = rest.split_at_mut(i + 1);
             for ((value, of_x), of_y) in row.iter_mut().zip(along_x).zip(along_y) {
@@ -491,7 +490,7 @@ mod tests {
                     row: k / 5,
                     col: k % 5,
                     panel_mm: DVec3::new(12.0 * f64::from(k % 5), 11.0 * f64::from(k / 5), 0.0),
-                    pixel: [0.0; 2],
+                    pixel: DVec2::ZERO,
                     cov: None,
                 });
                 let panel = PanelRef::new(panel as usize, panel);
@@ -499,9 +498,9 @@ mod tests {
                     Block { camera: camera as usize, frame, panel, observations: seen.collect() };
                 let residuals = problem.residuals(&block).expect("all corners are in sight");
                 let mut block = block;
-                for (seen, [x, y]) in block.observations.iter_mut().zip(residuals) {
+                for (seen, residual) in block.observations.iter_mut().zip(residuals) {
                     let noise = [0; 2].map(|_| rng.random_range(-0.5..0.5));
-                    seen.pixel = [noise[0] - x, noise[1] - y];
+                    seen.pixel = DVec2::from(noise) - residual;
                 }
                 problem.blocks.push(block);
             }
@@ -521,7 +520,7 @@ mod tests {
         let mut all = Vec::new();
         for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
             for (residual, &w) in problem.residuals(block).unwrap().into_iter().zip(weights) {
-                all.extend(Whitening::apply(w, residual));
+                all.extend(Whitening::apply(w, residual).to_array());
             }
         }
         for panel in &problem.panels {

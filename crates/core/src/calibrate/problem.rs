@@ -1,10 +1,10 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use nalgebra::{Matrix6, Vector6};
 
 use super::panel::PanelRef;
 use super::shape::Shape;
 use super::view::LEAST_CORNERS;
-use crate::camera::{Camera, Pose, Projection};
+use crate::camera::{Camera, Pose};
 
 /// A corner that a camera saw.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub struct Observation {
     /// Its place in the panel frame, mm.
     pub panel_mm: DVec3,
     /// Where it was seen, px.
-    pub pixel: [f64; 2],
+    pub pixel: DVec2,
     /// Covariance xx, xy, yy of that, px²; `None` where it is not known.
     pub cov: Option<[f64; 3]>,
 }
@@ -120,16 +120,15 @@ impl Problem {
 
     /// Seen less predicted positions of a block's corners, px; `None` where one is out of the
     /// model's reach.
-    pub fn residuals(&self, block: &Block) -> Option<Vec<[f64; 2]>> {
+    pub fn residuals(&self, block: &Block) -> Option<Vec<DVec2>> {
         block.observations.iter().map(|seen| self.residual(block, seen)).collect()
     }
 
     /// Seen less predicted position of a corner, px; `None` where it is out of the model's reach.
-    pub(super) fn residual(&self, block: &Block, seen: &Observation) -> Option<[f64; 2]> {
+    pub(super) fn residual(&self, block: &Block, seen: &Observation) -> Option<DVec2> {
         let camera = &self.cameras[block.camera].camera;
-        let Projection { pixel: [x, y], .. } =
-            camera.project_with_derivatives(self.camera_point(block, seen))?;
-        Some([seen.pixel[0] - x, seen.pixel[1] - y])
+        let at = camera.project_with_derivatives(self.camera_point(block, seen))?;
+        Some(seen.pixel - at.pixel)
     }
 
     /// How many corners there are in all.

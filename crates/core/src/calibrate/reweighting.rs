@@ -1,5 +1,7 @@
 use std::collections::BTreeMap;
 
+use glam::DVec2;
+
 use super::error::CalibrationError;
 use super::gross_errors::Kept;
 use super::loss::Loss;
@@ -34,7 +36,7 @@ const LEAST_SMOOTH_SIGMA: f64 = 3.0;
 
 /// Seen less predicted positions; empty blocks where a corner is out of reach, which problems that
 /// were started do not have.
-pub(super) fn residuals(problem: &Problem) -> Vec<Vec<[f64; 2]>> {
+pub(super) fn residuals(problem: &Problem) -> Vec<Vec<DVec2>> {
     problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
 }
 
@@ -159,19 +161,19 @@ fn smooth_neighbours(
     gross: &[bool],
     is_off: impl Fn(usize) -> bool,
 ) -> Vec<[usize; 2]> {
-    let off: Vec<Option<[f64; 2]>> =
+    let off: Vec<Option<DVec2>> =
         block.observations.iter().map(|seen| problem.residual(block, seen)).collect();
     let places: BTreeMap<(i32, i32), usize> =
         block.observations.iter().enumerate().map(|(i, seen)| ((seen.row, seen.col), i)).collect();
     let of_corner = |(index, seen): (usize, &Observation)| {
-        let (true, Some([x, y])) = (gross[index], off[index]) else { return [0, 0] };
+        let (true, Some(own)) = (gross[index], off[index]) else { return [0, 0] };
         let steps = [(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)];
         let neighbours = steps.iter().filter_map(|(rows, cols)| {
             let &neighbour = places.get(&(seen.row + rows, seen.col + cols))?;
             Some((neighbour, off[neighbour]?))
         });
-        neighbours.fold([0, 0], |[alike, count], (neighbour, [u, v])| {
-            let along = (x * u + y * v) / (x * x + y * y);
+        neighbours.fold([0, 0], |[alike, count], (neighbour, other)| {
+            let along = own.dot(other) / own.length_squared();
             [alike + usize::from(along > FALLS_OFF && is_off(neighbour)), count + 1]
         })
     };
@@ -200,8 +202,8 @@ pub(super) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f6
     let weights = whitening.of(problem).blocks;
     let of_block = |(block, weights): (&Block, &Vec<[f64; 3]>)| {
         let off = block.observations.iter().zip(weights).map(|(seen, &w)| {
-            let [x, y] = Whitening::apply(w, problem.residual(block, seen)?);
-            Some(x.hypot(y))
+            let off = Whitening::apply(w, problem.residual(block, seen)?);
+            Some(off.x.hypot(off.y))
         });
         off.map(|off| off.unwrap_or(f64::INFINITY)).collect()
     };

@@ -180,7 +180,7 @@ impl Calibration {
 fn check_focal(found: &CameraEstimate) -> Result<(), CalibrationError> {
     let of_every_lens = &found.parameters[..PROJECTION_PARAMETERS.len()];
     let loose = of_every_lens.iter().filter(|p| {
-        let focal = if p.name.starts_with('f') { p.value } else { found.camera.focal_px[0] };
+        let focal = if p.name.starts_with('f') { p.value } else { found.camera.focal_px.x };
         found.ill_conditioned.contains(&p.name) || p.sd.is_some_and(|sd| sd > LOOSE_FOCAL * focal)
     });
     let loose: Vec<&str> = loose.map(|p| p.name.as_str()).collect();

@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 use super::calibration::PanelPlace;
 use super::error::CalibrationError;
@@ -295,7 +295,7 @@ fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
     let places: BTreeMap<(i32, i32), DVec3> = panel
         .corners
         .iter()
-        .map(|corner| ((corner.row, corner.col), from_target.apply(corner.target_mm.into())))
+        .map(|corner| ((corner.row, corner.col), from_target.apply(corner.target_mm)))
         .collect();
     let mut found = Vec::new();
     for corner in &grid.corners {
@@ -363,7 +363,7 @@ fn observations(grid: &Grid, at: impl Fn(i32, i32) -> DVec3) -> Vec<Observation>
         row: corner.row,
         col: corner.col,
         panel_mm: at(corner.row, corner.col),
-        pixel: [corner.x, corner.y],
+        pixel: corner.position(),
         cov: corner.cov,
     });
     seen.collect()
@@ -380,12 +380,11 @@ fn is_mirrored(sightings: &[Sighting]) -> bool {
 /// Which way corners turn to their neighbours in column and row: 1 where they are mirrored. In a picture, y
 /// down, rows and columns that run as on the print turn clockwise.
 fn turns(sighting: &Sighting) -> Vec<f64> {
-    let places: BTreeMap<(i32, i32), [f64; 2]> =
+    let places: BTreeMap<(i32, i32), DVec2> =
         sighting.observations.iter().map(|o| ((o.row, o.col), o.pixel)).collect();
-    let turn = |(&(row, col), &[x, y]): (&(i32, i32), &[f64; 2])| {
-        let [ax, ay] = places.get(&(row, col + 1))?;
-        let [bx, by] = places.get(&(row + 1, col))?;
-        Some(((ax - x) * (by - y) - (ay - y) * (bx - x)).signum())
+    let turn = |(&(row, col), &here): (&(i32, i32), &DVec2)| {
+        let (right, up) = (places.get(&(row, col + 1))?, places.get(&(row + 1, col))?);
+        Some((right - here).perp_dot(up - here).signum())
     };
     places.iter().filter_map(turn).collect()
 }
@@ -401,11 +400,14 @@ mod tests {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let places = (0..rows).flat_map(|row| (0..8).map(move |col| (row, col)));
         let observations = places.map(|(row, col)| {
-            let [x, y] = [100.0 * f64::from(col), 800.0 - 100.0 * f64::from(row)];
+            let (x, y) = (100.0 * f64::from(col), 800.0 - 100.0 * f64::from(row));
+
             let pixel = match random.random_bool(part_anywhere) {
-                true => [random.random_range(0.0..800.0), random.random_range(0.0..800.0)],
-                false if is_flipped => [800.0 - x, y],
-                false => [x, y],
+                true => {
+                    DVec2::new(random.random_range(0.0..800.0), random.random_range(0.0..800.0))
+                }
+                false if is_flipped => DVec2::new(800.0 - x, y),
+                false => DVec2::new(x, y),
             };
             Observation { row, col, panel_mm: DVec3::new(x, -y, 0.0), pixel, cov: None }
         });

@@ -1,5 +1,7 @@
 //! How far each corner is to be trusted.
 
+use glam::DVec2;
+
 use super::problem::Problem;
 use crate::statistics::median;
 
@@ -42,14 +44,14 @@ pub(super) struct Whitening {
 
 impl Whitening {
     /// W r.
-    pub(super) fn apply([a, b, c]: [f64; 3], [x, y]: [f64; 2]) -> [f64; 2] {
-        [a * x, b * x + c * y]
+    pub(super) fn apply([a, b, c]: [f64; 3], DVec2 { x, y }: DVec2) -> DVec2 {
+        DVec2::new(a * x, b * x + c * y)
     }
 
     /// Whether a corner is farther off than corners are by chance.
-    pub(super) fn is_outlier(&self, weight: [f64; 3], residual: [f64; 2]) -> bool {
-        let [x, y] = Self::apply(weight, residual);
-        x.hypot(y) > self.outlier_limit()
+    pub(super) fn is_outlier(&self, weight: [f64; 3], residual: DVec2) -> bool {
+        let off = Self::apply(weight, residual);
+        off.x.hypot(off.y) > self.outlier_limit()
     }
 
     /// The whitened distance beyond which a corner is an outlier.
@@ -58,14 +60,14 @@ impl Whitening {
     }
 
     /// Every corner alike.
-    fn equal(problem: &Problem, residuals: &[Vec<[f64; 2]>]) -> Self {
+    fn equal(problem: &Problem, residuals: &[Vec<DVec2>]) -> Self {
         let mut whitening = Self { blocks: alike(problem), common_px: None, sigma: 1.0 };
         whitening.sigma = whitening.median_sigma(residuals);
         whitening
     }
 
     /// Weights that fit the residuals at hand.
-    pub(super) fn fit(problem: &Problem, weights: Weights, residuals: &[Vec<[f64; 2]>]) -> Self {
+    pub(super) fn fit(problem: &Problem, weights: Weights, residuals: &[Vec<DVec2>]) -> Self {
         let covariances = match weights {
             Weights::Equal => None,
             Weights::Covariance => covariances(problem),
@@ -100,12 +102,9 @@ impl Whitening {
         Self { blocks, ..*self }
     }
 
-    fn median_sigma(&self, residuals: &[Vec<[f64; 2]>]) -> f64 {
+    fn median_sigma(&self, residuals: &[Vec<DVec2>]) -> f64 {
         let whitened = self.blocks.iter().flatten().zip(residuals.iter().flatten());
-        let squares = whitened.map(|(&w, &r)| {
-            let [x, y] = Self::apply(w, r);
-            x * x + y * y
-        });
+        let squares = whitened.map(|(&w, &r)| Self::apply(w, r).length_squared());
         (median(squares.collect()).unwrap_or(0.0) / MEDIAN_OF_CHI_SQUARED_2).sqrt().max(LEAST_SIGMA)
     }
 }

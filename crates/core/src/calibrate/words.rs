@@ -106,8 +106,9 @@ impl<'a> Words<'a> {
             Shared::View { camera, view } => {
                 format!("{}: {count}: look at the picture", of(camera, format!("view {view}")))
             }
-            Shared::Region { camera, from_px: [left, top], to_px: [right, bottom] } => {
-                let where_ = format!("x {left:.0} to {right:.0}, y {top:.0} to {bottom:.0} px");
+            Shared::Region { camera, from_px: from, to_px: to } => {
+                let where_ =
+                    format!("x {:.0} to {:.0}, y {:.0} to {:.0} px", from.x, to.x, from.y, to.y);
                 format!(
                     "{}: {count}, in several views: the lens is not one of the model there, or \
                      something is before it",

@@ -1,4 +1,4 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::lens::{Imaged, LensLaw, Ray};
 use super::reach::{product, sign_changes, slope_times_q};
@@ -72,14 +72,14 @@ impl BrownConrady {
     }
 
     /// x', y' and ∂(x', y')/∂(x, y).
-    fn distort(&self, [x, y]: [f64; 2], radial: &Radial) -> ([f64; 2], [[f64; 2]; 2]) {
+    fn distort(&self, DVec2 { x, y }: DVec2, radial: &Radial) -> (DVec2, [[f64; 2]; 2]) {
         let q = x * x + y * y;
         let Radial { rho, slope, .. } = *radial;
         let ([p1, p2], [s1, s2, s3, s4]) = (self.tangential, self.prism);
-        let at = [
+        let at = DVec2::new(
             x * rho + 2.0 * p1 * x * y + p2 * (q + 2.0 * x * x) + q * (s1 + q * s2),
             y * rho + p1 * (q + 2.0 * y * y) + 2.0 * p2 * x * y + q * (s3 + q * s4),
-        ];
+        );
         let (along_x, along_y) = (2.0 * (s1 + 2.0 * s2 * q), 2.0 * (s3 + 2.0 * s4 * q));
         let mixed = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
         let by_plane = [
@@ -144,14 +144,14 @@ impl LensLaw for BrownConrady {
         if point.z <= MIN_FORWARD * point.length() {
             return None;
         }
-        let (x, y) = (point.x / point.z, point.y / point.z);
-        let q = x * x + y * y;
+        let plane @ DVec2 { x, y } = point.truncate() / point.z;
+        let q = plane.length_squared();
         let radial = self.radial(q);
         if !(radial.valid || self.is_rational()) {
             return None;
         }
-        let (at, plane) = self.distort([x, y], &radial);
-        let by_point = plane
+        let (at, by_plane) = self.distort(plane, &radial);
+        let by_point = by_plane
             .map(|[by_x, by_y]| [by_x / point.z, by_y / point.z, -(x * by_x + y * by_y) / point.z]);
         let Radial { rho, below, .. } = radial;
         let up = |power: f64| [x * power / below, y * power / below];
@@ -177,27 +177,27 @@ impl LensLaw for BrownConrady {
         self.radial((x * x + y * y) / (z * z)).valid
     }
 
-    fn ray(&self, at: [f64; 2]) -> Option<Ray> {
-        let distorted = at[0].hypot(at[1]);
+    fn ray(&self, at: DVec2) -> Option<Ray> {
+        let distorted = at.x.hypot(at.y);
         if distorted == 0.0 {
             return Ray::central(DVec3::Z);
         }
         let part = self.undistorted_radius(distorted)? / distorted;
-        let mut plane = [at[0] * part, at[1] * part];
+        let mut plane = at * part;
         for _ in 0..ITERATIONS {
-            let radial = self.radial(plane[0] * plane[0] + plane[1] * plane[1]);
+            let radial = self.radial(plane.length_squared());
             if !(radial.valid || self.is_rational()) {
                 return None;
             }
             let (image, by_plane) = self.distort(plane, &radial);
-            let step = solve(by_plane, [at[0] - image[0], at[1] - image[1]])?;
-            plane = [plane[0] + step[0], plane[1] + step[1]];
-            if step[0].hypot(step[1]) <= 1e-15 * (1.0 + distorted) {
+            let step = solve(by_plane, at - image)?;
+            plane += step;
+            if step.length() <= 1e-15 * (1.0 + distorted) {
                 break;
             }
         }
-        let valid = self.radial(plane[0] * plane[0] + plane[1] * plane[1]).valid;
-        Ray::central(DVec3::new(plane[0], plane[1], 1.0)).filter(|_| valid)
+        let valid = self.radial(plane.length_squared()).valid;
+        Ray::central(plane.extend(1.0)).filter(|_| valid)
     }
 
     /// With ρ = A/B and q = r² the image grows with the power
@@ -227,8 +227,9 @@ impl LensLaw for BrownConrady {
 }
 
 /// The solution of two linear equations.
-pub(super) fn solve([[a, b], [c, d]]: [[f64; 2]; 2], [u, v]: [f64; 2]) -> Option<[f64; 2]> {
+pub(super) fn solve([[a, b], [c, d]]: [[f64; 2]; 2], right: DVec2) -> Option<DVec2> {
+    let DVec2 { x: u, y: v } = right;
     let determinant = a * d - b * c;
-    let solution = [(d * u - b * v) / determinant, (a * v - c * u) / determinant];
-    solution.iter().all(|v| v.is_finite()).then_some(solution)
+    let solution = DVec2::new(d * u - b * v, a * v - c * u) / determinant;
+    solution.is_finite().then_some(solution)
 }

@@ -1,4 +1,4 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::extended_unified::{by_height, limit, quotient};
 use super::lens::{Imaged, LensLaw, Ray};
@@ -64,9 +64,9 @@ impl LensLaw for DoubleSphere {
         quotient(point, h, h_point)
     }
 
-    fn ray(&self, [x, y]: [f64; 2]) -> Option<Ray> {
+    fn ray(&self, at: DVec2) -> Option<Ray> {
         let Self { xi, alpha } = *self;
-        let r2 = x * x + y * y;
+        let r2 = at.length_squared();
         let under = 1.0 - (2.0 * alpha - 1.0) * r2;
         if under < 0.0 {
             return None;
@@ -77,6 +77,6 @@ impl LensLaw for DoubleSphere {
             return None;
         }
         let length = (z * xi + root.sqrt()) / (z * z + r2);
-        Ray::central(DVec3::new(length * x, length * y, length * z - xi))
+        Ray::central((length * at).extend(length * z - xi))
     }
 }

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::lens::Imaged;
 use super::reach::sign_changes;
@@ -80,7 +80,7 @@ pub(super) fn image(k: &[f64], point: DVec3, angle: &Angle) -> Option<Imaged> {
     let mixed = cos * sin * (along - across);
     let forward = slope * angle.by_z;
     Some(Imaged {
-        at: [r * cos, r * sin],
+        at: DVec2::new(r * cos, r * sin),
         by_point: [
             [cos * cos * along + sin * sin * across, mixed, cos * forward],
             [mixed, sin * sin * along + cos * cos * across, sin * forward],

@@ -1,4 +1,4 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::lens::{Imaged, LensLaw, Ray};
 
@@ -54,15 +54,15 @@ impl LensLaw for ExtendedUnified {
         quotient(point, h, h_point)
     }
 
-    fn ray(&self, [x, y]: [f64; 2]) -> Option<Ray> {
+    fn ray(&self, at: DVec2) -> Option<Ray> {
         let Self { alpha, beta } = *self;
-        let r2 = x * x + y * y;
+        let r2 = at.length_squared();
         let under = 1.0 - (2.0 * alpha - 1.0) * beta * r2;
         if under < 0.0 {
             return None;
         }
         let z = (1.0 - beta * alpha * alpha * r2) / (alpha * under.sqrt() + 1.0 - alpha);
-        Ray::central(DVec3::new(x, y, z))
+        Ray::central(at.extend(z))
     }
 }
 
@@ -73,8 +73,8 @@ pub(super) fn limit(alpha: f64) -> f64 {
 
 /// (X, Y)/h with its derivatives, from those of h.
 pub(super) fn quotient(point: DVec3, h: f64, h_point: [f64; 3]) -> Option<Imaged> {
-    let at = [point.x / h, point.y / h];
-    let mut by_point = at.map(|v| h_point.map(|h_i| -v * h_i / h));
+    let at = point.truncate() / h;
+    let mut by_point = [at.x, at.y].map(|v| h_point.map(|h_i| -v * h_i / h));
     by_point[0][0] += 1.0 / h;
     by_point[1][1] += 1.0 / h;
     (h > 0.0).then_some(Imaged { at, by_point })

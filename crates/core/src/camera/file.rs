@@ -30,6 +30,7 @@
 //!
 //! Limits: the tilted sensor of OpenCV is refused unless its angles are zero.
 
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::quantity;
@@ -71,8 +72,8 @@ pub enum CameraFileError {
 struct Own {
     width: u32,
     height: u32,
-    focal_px: [f64; 2],
-    centre_px: [f64; 2],
+    focal_px: DVec2,
+    centre_px: DVec2,
     #[serde(default)]
     model: Model,
     #[serde(default)]
@@ -177,8 +178,8 @@ impl Camera {
         let numbers = [
             ("width", vec![f64::from(width)], quantity::side_px::RANGE),
             ("height", vec![f64::from(height)], quantity::side_px::RANGE),
-            ("focal_px", focal_px.to_vec(), quantity::focal_px::RANGE),
-            ("centre_px", centre_px.to_vec(), quantity::place_px::RANGE),
+            ("focal_px", focal_px.to_array().to_vec(), quantity::focal_px::RANGE),
+            ("centre_px", centre_px.to_array().to_vec(), quantity::place_px::RANGE),
             ("distortion", distortion.clone(), quantity::coefficient::RANGE),
         ];
         for (name, numbers, range) in numbers {
@@ -265,8 +266,8 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
     Ok(Own {
         width: file.image_width,
         height: file.image_height,
-        focal_px: [m[0], m[4]],
-        centre_px: [m[2], m[5]],
+        focal_px: DVec2::new(m[0], m[4]),
+        centre_px: DVec2::new(m[2], m[5]),
         model,
         distortion: coefficients.data,
     })

@@ -1,4 +1,4 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::equidistant::{self, Angle};
 use super::lens::{Imaged, LensLaw, Ray};
@@ -48,13 +48,13 @@ impl LensLaw for KannalaBrandt {
         equidistant::image(&self.k, point, &angle)
     }
 
-    fn ray(&self, [x, y]: [f64; 2]) -> Option<Ray> {
-        let r = x.hypot(y);
+    fn ray(&self, at: DVec2) -> Option<Ray> {
+        let r = at.x.hypot(at.y);
         if r == 0.0 {
             return Ray::central(DVec3::Z);
         }
         let (sin, cos) = equidistant::angle(&self.k, r)?.sin_cos();
-        Ray::central(DVec3::new(sin * x / r, sin * y / r, cos))
+        Ray::central((sin * at / r).extend(cos))
     }
 
     fn steady_radius(&self) -> Option<f64> {

@@ -1,4 +1,4 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Pupil};
 
@@ -41,7 +41,7 @@ impl Ray {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imaged {
     /// x', y'.
-    pub at: [f64; 2],
+    pub at: DVec2,
     /// ∂(x', y')/∂(X, Y, Z).
     pub by_point: [[f64; 3]; 2],
 }
@@ -67,7 +67,7 @@ pub trait LensLaw {
     }
 
     /// The ray that is imaged at a point of the normalised plane; `None` where there is none.
-    fn ray(&self, at: [f64; 2]) -> Option<Ray>;
+    fn ray(&self, at: DVec2) -> Option<Ray>;
 
     /// Radius on the normalised plane up to which it grows steadily with the angle, without fold or
     /// pole; `None` where it does so as far as the model sees.
@@ -127,7 +127,7 @@ impl Lens {
     }
 
     /// The ray that is imaged at a point of the normalised plane; `None` where there is none.
-    pub fn ray(&self, at: [f64; 2]) -> Option<Ray> {
+    pub fn ray(&self, at: DVec2) -> Option<Ray> {
         self.law().ray(at)
     }
 

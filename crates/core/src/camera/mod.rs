@@ -17,7 +17,7 @@ mod pose;
 mod pupil;
 mod reach;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 pub use brown_conrady::BrownConrady;
 pub use double_sphere::DoubleSphere;
@@ -43,9 +43,9 @@ pub struct Camera {
     /// Image height, px.
     pub height: u32,
     /// Focal lengths fx, fy, px.
-    pub focal_px: [f64; 2],
+    pub focal_px: DVec2,
     /// Principal point cx, cy, px.
-    pub centre_px: [f64; 2],
+    pub centre_px: DVec2,
     /// The lens.
     pub lens: Lens,
 }
@@ -54,7 +54,7 @@ pub struct Camera {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
     /// Position, px.
-    pub pixel: [f64; 2],
+    pub pixel: DVec2,
     /// By the point of the camera frame, px/mm.
     pub by_point: [[f64; 3]; 2],
     /// By each parameter of the camera, a pair each; only as many as it has are filled.
@@ -74,8 +74,8 @@ impl Camera {
         Self {
             width,
             height,
-            focal_px: [focal_px; 2],
-            centre_px: [f64::from(width) / 2.0 - 0.5, f64::from(height) / 2.0 - 0.5],
+            focal_px: DVec2::splat(focal_px),
+            centre_px: DVec2::new(f64::from(width), f64::from(height)) / 2.0 - 0.5,
             lens,
         }
     }
@@ -88,8 +88,8 @@ impl Camera {
 
     /// The values of all parameters, in the order of [`Self::parameter_names`].
     pub fn parameters(&self) -> Vec<f64> {
-        let [[fx, fy], [cx, cy]] = [self.focal_px, self.centre_px];
-        let mut values = vec![fx, fy, cx, cy];
+        let (focal, centre) = (self.focal_px, self.centre_px);
+        let mut values = vec![focal.x, focal.y, centre.x, centre.y];
         values.extend(self.lens.parameters());
         values
     }
@@ -99,8 +99,8 @@ impl Camera {
         Self {
             width: self.width,
             height: self.height,
-            focal_px: [values[0], values[1]],
-            centre_px: [values[2], values[3]],
+            focal_px: DVec2::new(values[0], values[1]),
+            centre_px: DVec2::new(values[2], values[3]),
             lens: self.lens.with_parameters(&values[4..]),
         }
     }
@@ -110,16 +110,16 @@ impl Camera {
     ///
     /// ```
     /// use deltille_core::camera::Camera;
-    /// use glam::DVec3;
+    /// use glam::{DVec2, DVec3};
     ///
     /// let camera = Camera::pinhole(640, 480, std::f64::consts::FRAC_PI_2);
     /// // Half a field of 90° to the right is the middle of the right edge of the image.
-    /// let [x, y] = camera.project(DVec3::new(200.0, 0.0, 200.0)).unwrap();
-    /// assert!((x - 639.5).abs() < 1e-9 && (y - 239.5).abs() < 1e-9);
-    /// let ray = camera.unproject([x, y]).unwrap();
+    /// let pixel = camera.project(DVec3::new(200.0, 0.0, 200.0)).unwrap();
+    /// assert!(pixel.abs_diff_eq(DVec2::new(639.5, 239.5), 1e-9));
+    /// let ray = camera.unproject(pixel).unwrap();
     /// assert!(ray.direction.angle_between(DVec3::new(1.0, 0.0, 1.0)) < 1e-6);
     /// ```
-    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+    pub fn project(&self, point: DVec3) -> Option<DVec2> {
         let projection = self.project_with_derivatives(point)?;
         self.lens.covers(point).then_some(projection.pixel)
     }
@@ -127,27 +127,25 @@ impl Camera {
     /// Pixel position with the derivatives by the point and by every parameter. Unlike
     /// [`Self::project`] it passes the gaps in the domain of a rational lens, as a search must.
     pub fn project_with_derivatives(&self, point: DVec3) -> Option<Projection> {
-        let ([fx, fy], [cx, cy]) = (self.focal_px, self.centre_px);
+        let focal = self.focal_px;
         let mut by_parameters = [[0.0; 2]; MAX_PARAMETERS];
-        let Imaged { at: [x, y], by_point } = self.lens.image(point, &mut by_parameters[4..])?;
+        let Imaged { at, by_point } = self.lens.image(point, &mut by_parameters[4..])?;
         for [by_x, by_y] in &mut by_parameters[4..] {
-            (*by_x, *by_y) = (fx * *by_x, fy * *by_y);
+            (*by_x, *by_y) = (focal.x * *by_x, focal.y * *by_y);
         }
-        by_parameters[..4].copy_from_slice(&[[x, 0.0], [0.0, y], [1.0, 0.0], [0.0, 1.0]]);
-        let pixel = [fx * x + cx, fy * y + cy];
-        let by_point = [by_point[0].map(|v| fx * v), by_point[1].map(|v| fy * v)];
-        let finite = pixel.iter().all(|v| v.is_finite());
-        finite.then_some(Projection { pixel, by_point, by_parameters })
+        by_parameters[..4].copy_from_slice(&[[at.x, 0.0], [0.0, at.y], [1.0, 0.0], [0.0, 1.0]]);
+        let pixel = focal * at + self.centre_px;
+        let by_point = [by_point[0].map(|v| focal.x * v), by_point[1].map(|v| focal.y * v)];
+        pixel.is_finite().then_some(Projection { pixel, by_point, by_parameters })
     }
 
     /// The ray along which a pixel looks; `None` where the model does not reach.
-    pub fn unproject(&self, [x, y]: [f64; 2]) -> Option<Ray> {
-        let ([fx, fy], [cx, cy]) = (self.focal_px, self.centre_px);
-        self.lens.ray([(x - cx) / fx, (y - cy) / fy])
+    pub fn unproject(&self, pixel: DVec2) -> Option<Ray> {
+        self.lens.ray((pixel - self.centre_px) / self.focal_px)
     }
 
     /// Whether a pixel position lies in the image, `margin` pixels inside its border.
-    pub fn sees(&self, [x, y]: [f64; 2], margin: f64) -> bool {
+    pub fn sees(&self, DVec2 { x, y }: DVec2, margin: f64) -> bool {
         let low = margin - 0.5;
         x >= low
             && y >= low

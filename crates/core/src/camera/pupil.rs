@@ -1,6 +1,6 @@
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::brown_conrady::solve;
 use super::equidistant::{self, Angle};
@@ -68,15 +68,15 @@ impl Pupil {
     }
 
     /// x', y' and ∂(x', y')/∂(u, v).
-    fn tilt(&self, [u, v]: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
+    fn tilt(&self, DVec2 { x: u, y: v }: DVec2) -> (DVec2, [[f64; 2]; 2]) {
         let [p1, p2] = self.tangential;
         let r2 = u * u + v * v;
         let mixed = 2.0 * (p1 * u + p2 * v);
         (
-            [
+            DVec2::new(
                 u + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u),
                 v + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v,
-            ],
+            ),
             [
                 [1.0 + 2.0 * p1 * v + 6.0 * p2 * u, mixed],
                 [mixed, 1.0 + 6.0 * p1 * v + 2.0 * p2 * u],
@@ -102,8 +102,9 @@ impl LensLaw for Pupil {
 
     fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
         let (angle, g_theta) = self.angle(point)?;
-        let Imaged { at: [u, v], by_point } = equidistant::image(&self.k, point, &angle)?;
-        let (at, tilt) = self.tilt([u, v]);
+        let Imaged { at: plane, by_point } = equidistant::image(&self.k, point, &angle)?;
+        let DVec2 { x: u, y: v } = plane;
+        let (at, tilt) = self.tilt(plane);
         let (cos, sin) = equidistant::direction(point);
         let radially = |amount: f64| tilt.map(|[by_u, by_v]| amount * (by_u * cos + by_v * sin));
         let Angle { theta, .. } = angle;
@@ -126,23 +127,23 @@ impl LensLaw for Pupil {
         Some(Imaged { at, by_point })
     }
 
-    fn ray(&self, at: [f64; 2]) -> Option<Ray> {
+    fn ray(&self, at: DVec2) -> Option<Ray> {
         let mut plane = at;
         for _ in 0..ITERATIONS {
             let (image, by_plane) = self.tilt(plane);
-            let step = solve(by_plane, [at[0] - image[0], at[1] - image[1]])?;
-            plane = [plane[0] + step[0], plane[1] + step[1]];
-            if step[0].hypot(step[1]) <= 1e-15 {
+            let step = solve(by_plane, at - image)?;
+            plane += step;
+            if step.length() <= 1e-15 {
                 break;
             }
         }
-        let r = plane[0].hypot(plane[1]);
+        let r = plane.x.hypot(plane.y);
         if r == 0.0 {
             return Ray::central(DVec3::Z);
         }
         let theta = equidistant::angle(&self.k, r)?;
         let (sin, cos) = theta.sin_cos();
-        let direction = DVec3::new(sin * plane[0] / r, sin * plane[1] / r, cos);
+        let direction = (sin * plane / r).extend(cos);
         Some(Ray { origin: DVec3::Z * self.shift(theta).0, direction })
     }
 

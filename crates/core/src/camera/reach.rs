@@ -1,6 +1,8 @@
 //! How far from the axis a lens is what its formula promises: up to the radius at which its curve
 //! turns back (a fold) or runs away (a pole).
 
+use glam::DVec2;
+
 use super::Camera;
 
 /// Halvings of an interval; they reach the last bit.
@@ -20,13 +22,13 @@ impl Camera {
     /// assert!((camera.steady_px().unwrap() - 600.0).abs() < 1e-6);
     /// ```
     pub fn steady_px(&self) -> Option<f64> {
-        let [fx, fy] = self.focal_px;
-        self.lens.steady_radius().map(|radius| radius * fx.min(fy))
+        self.lens.steady_radius().map(|radius| radius * self.focal_px.min_element())
     }
 
     /// Distance of a pixel position from the principal point, px.
-    pub fn radius_px(&self, [x, y]: [f64; 2]) -> f64 {
-        (x - self.centre_px[0]).hypot(y - self.centre_px[1])
+    pub fn radius_px(&self, pixel: DVec2) -> f64 {
+        let from_centre = pixel - self.centre_px;
+        from_centre.x.hypot(from_centre.y)
     }
 
     /// Distance of the image's farthest corner from the principal point, px.
@@ -35,9 +37,9 @@ impl Camera {
     }
 
     /// The corners of the image.
-    pub fn corners_px(&self) -> [[f64; 2]; 4] {
+    pub fn corners_px(&self) -> [DVec2; 4] {
         let [right, low] = [self.width, self.height].map(|side| f64::from(side) - 0.5);
-        [[-0.5, -0.5], [right, -0.5], [-0.5, low], [right, low]]
+        [[-0.5, -0.5], [right, -0.5], [-0.5, low], [right, low]].map(DVec2::from)
     }
 }
 

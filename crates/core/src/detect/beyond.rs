@@ -18,8 +18,10 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
+
 use super::buckets::Buckets;
-use super::checker_tiles::{CheckerTiles, Point, Square, difference, moved};
+use super::checker_tiles::{CheckerTiles, Point, Square, moved};
 use super::detection::Grid;
 use super::tiling::{CHECKER, step};
 use crate::lattice::{GridKind, Vertex};
@@ -52,7 +54,7 @@ pub fn go_on(image: &Gray<i16>, grids: &[&Grid]) -> Vec<bool> {
     let several = if grids.len() > 1 { grids } else { &[] };
     for (i, grid) in several.iter().enumerate() {
         for corner in &grid.corners {
-            corners.insert([corner.x, corner.y]);
+            corners.insert(corner.position());
             owners.push(i);
         }
     }
@@ -115,8 +117,8 @@ impl CheckerTiles<'_> {
                     if vertices.iter().any(|v| self.corners.contains_key(v)) {
                         continue;
                     }
-                    let [out, along] = [f64::from(row) + 0.5, f64::from(side) + 0.5];
-                    let middle = moved(corner, edges, [out, along]);
+                    let by = DVec2::new(f64::from(row), f64::from(side)) + 0.5;
+                    let middle = moved(corner, edges, by);
                     let first = vertices.into_iter().min();
                     let square = Square { middle, edges };
                     squares.entry(first.unwrap_or(near)).or_default().push(square);
@@ -125,11 +127,9 @@ impl CheckerTiles<'_> {
         }
         let value = |(vertex, predicted): (Vertex, Vec<Square>)| {
             let count = predicted.len() as f64;
-            let mean =
-                |i: usize| predicted.iter().map(|square| square.middle[i]).sum::<f64>() / count;
-            let middle = [mean(0), mean(1)];
+            let middle = predicted.iter().map(|square| square.middle).sum::<DVec2>() / count;
             let edges = predicted[0].edges;
-            let reach_px = OTHER_GRID * edges[0][0].hypot(edges[0][1]);
+            let reach_px = OTHER_GRID * edges[0].length();
             let value = self.value(Square { middle, edges })?;
             (!is_others(middle, reach_px)).then_some((vertex, value))
         };
@@ -146,12 +146,12 @@ impl CheckerTiles<'_> {
         }
         let before = at(vertex - way)?;
         let along = match (at(vertex + along_end(k)), at(vertex - along_end(k))) {
-            (Some(next), Some(last)) => difference(next, last).map(|c| c / 2.0),
-            (Some(next), None) => difference(next, corner),
-            (None, Some(last)) => difference(corner, last),
+            (Some(next), Some(last)) => (next - last) / 2.0,
+            (Some(next), None) => next - corner,
+            (None, Some(last)) => corner - last,
             (None, None) => return None,
         };
-        Some([difference(corner, before), along])
+        Some([corner - before, along])
     }
 }
 

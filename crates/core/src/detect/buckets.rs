@@ -1,6 +1,8 @@
 //! Points that come one by one, by their neighbourhood: an image cut into squares, each with a list of
 //! the points in it.
 
+use glam::DVec2;
+
 /// Side of a square, px: corners are a few to a square where there are many.
 const SIDE_PX: f64 = 16.0;
 
@@ -11,56 +13,56 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Debug)]
 pub struct Buckets {
     /// The corner of the first square, and the side of all, px.
-    origin: [f64; 2],
+    origin: DVec2,
     side_px: f64,
     cols: usize,
     rows: usize,
     /// The last point of each square.
     last: Vec<u32>,
     /// The points, each with the one before it in its square.
-    points: Vec<([f64; 2], u32)>,
+    points: Vec<(DVec2, u32)>,
 }
 
 impl Buckets {
     /// No points yet, of an image of some size, px; what lies outside is found too, if less quickly.
     pub fn new(width: usize, height: usize) -> Self {
         let count = |px: usize| (px as f64 / SIDE_PX) as usize + 1;
-        Self::squares([0.0; 2], SIDE_PX, [count(width), count(height)])
+        Self::squares(DVec2::ZERO, SIDE_PX, [count(width), count(height)])
     }
 
     /// These points, wherever they lie, numbered as they come.
-    pub fn of(points: &[[f64; 2]]) -> Self {
-        let along = |axis: usize| points.iter().map(move |point| point[axis]);
-        let least = [0, 1].map(|axis| along(axis).fold(f64::INFINITY, f64::min));
-        let span = [0, 1].map(|axis| along(axis).fold(least[axis], f64::max) - least[axis]);
-        let few = (span[0] * span[1] / points.len() as f64).sqrt();
+    pub fn of(points: &[DVec2]) -> Self {
+        let least = points.iter().copied().fold(DVec2::INFINITY, DVec2::min);
+        let span = points.iter().copied().fold(least, DVec2::max) - least;
+        let few = (span.element_product() / points.len() as f64).sqrt();
         // Points in a line span no area, and equal ones no length.
-        let side = few.max(span[0].max(span[1]) / points.len() as f64).max(1.0);
-        let mut buckets = Self::squares(least, side, span.map(|span| (span / side) as usize + 1));
+        let side = few.max(span.max_element() / points.len() as f64).max(1.0);
+        let counts = (span / side).to_array().map(|count| count as usize + 1);
+        let mut buckets = Self::squares(least, side, counts);
         points.iter().for_each(|&point| buckets.insert(point));
         buckets
     }
 
-    fn squares(origin: [f64; 2], side_px: f64, [cols, rows]: [usize; 2]) -> Self {
+    fn squares(origin: DVec2, side_px: f64, [cols, rows]: [usize; 2]) -> Self {
         Self { origin, side_px, cols, rows, last: vec![NONE; cols * rows], points: Vec::new() }
     }
 
     /// Adds a point; they are numbered from 0 on.
-    pub fn insert(&mut self, point: [f64; 2]) {
+    pub fn insert(&mut self, point: DVec2) {
         let [col, row] = self.square(point);
         let last = &mut self.last[row * self.cols + col];
         self.points.push((point, *last));
         *last = self.points.len() as u32 - 1;
     }
 
-    fn square(&self, [x, y]: [f64; 2]) -> [usize; 2] {
+    fn square(&self, place: DVec2) -> [usize; 2] {
         // Conversions saturate, so points outside fall to the border.
-        let along = |c: f64, count: usize| ((c / self.side_px) as usize).min(count - 1);
-        [along(x - self.origin[0], self.cols), along(y - self.origin[1], self.rows)]
+        let DVec2 { x, y } = (place - self.origin) / self.side_px;
+        [(x as usize).min(self.cols - 1), (y as usize).min(self.rows - 1)]
     }
 
     /// The number of the point nearest to a place; `None` where there are no points.
-    pub fn nearest(&self, place: [f64; 2]) -> Option<usize> {
+    pub fn nearest(&self, place: DVec2) -> Option<usize> {
         let mut reach = self.side_px;
         while reach.is_finite() && !self.points.is_empty() {
             let near = self.within(place, reach).min_by(|a, b| a.1.total_cmp(&b.1));
@@ -73,9 +75,9 @@ impl Buckets {
     }
 
     /// The numbers of the points within a distance of a place, px, and their squared distances.
-    pub fn within(&self, [x, y]: [f64; 2], reach: f64) -> impl Iterator<Item = (usize, f64)> {
-        let [left, top] = self.square([x - reach, y - reach]);
-        let [right, bottom] = self.square([x + reach, y + reach]);
+    pub fn within(&self, place: DVec2, reach: f64) -> impl Iterator<Item = (usize, f64)> {
+        let [left, top] = self.square(place - reach);
+        let [right, bottom] = self.square(place + reach);
         let squares = (top..=bottom)
             .flat_map(move |row| (left..=right).map(move |col| row * self.cols + col));
         squares.flat_map(move |square| {
@@ -85,8 +87,7 @@ impl Buckets {
                 (before != NONE).then_some(before)
             });
             list.filter_map(move |i| {
-                let [u, v] = self.points[i as usize].0;
-                let d2 = (u - x).powi(2) + (v - y).powi(2);
+                let d2 = self.points[i as usize].0.distance_squared(place);
                 (d2 <= reach * reach).then_some((i as usize, d2))
             })
         })
@@ -103,13 +104,14 @@ mod tests {
     fn what_is_within_reach_is_what_a_search_of_all_finds() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(2);
         let mut buckets = Buckets::new(300, 100);
-        let mut points: Vec<[f64; 2]> = Vec::new();
+        let mut points: Vec<DVec2> = Vec::new();
         for reach in (0..200).map(|i| 0.3 * f64::from(i)) {
             // Some lie outside.
-            let point = [random.random_range(-20.0..330.0), random.random_range(-20.0..130.0)];
+            let point =
+                DVec2::new(random.random_range(-20.0..330.0), random.random_range(-20.0..130.0));
             let mut found: Vec<usize> = buckets.within(point, reach).map(|(i, _)| i).collect();
             found.sort_unstable();
-            let distance = |p: &[f64; 2]| (p[0] - point[0]).hypot(p[1] - point[1]);
+            let distance = |p: &DVec2| p.distance(point);
             let near = (0..points.len()).filter(|&i| distance(&points[i]) <= reach);
             assert_eq!(found, near.collect::<Vec<_>>());
             let nearest =

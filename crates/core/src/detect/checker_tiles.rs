@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
+
 use super::detection::Grid;
 use super::tiling::{CHECKER, step};
 use crate::lattice::Vertex;
@@ -17,7 +19,7 @@ const AROUND: f64 = 0.12;
 const COMPACT: f64 = 2.0 / 3.0;
 
 /// A place in the image, px.
-pub type Point = [f64; 2];
+pub type Point = DVec2;
 
 /// A square: its middle, and two of its edges.
 #[derive(Clone, Copy, Debug)]
@@ -39,16 +41,13 @@ impl WholeSquare {
     /// The place at a part of the way to the right and a part of the way up.
     pub fn place(&self, right: f64, up: f64) -> Point {
         let [a, b, c, d] = self.corners;
-        [0, 1].map(|i| {
-            let (low, high) = (a[i] + right * (b[i] - a[i]), c[i] + right * (d[i] - c[i]));
-            low + up * (high - low)
-        })
+        let (low, high) = (a + right * (b - a), c + right * (d - c));
+        low + up * (high - low)
     }
 
     fn square(&self) -> Square {
         let [corner, right, above, _] = self.corners;
-        let edges = [difference(right, corner), difference(above, corner)];
-        Square { middle: self.place(0.5, 0.5), edges }
+        Square { middle: self.place(0.5, 0.5), edges: [right - corner, above - corner] }
     }
 }
 
@@ -66,7 +65,7 @@ pub struct CheckerTiles<'a> {
 
 impl<'a> CheckerTiles<'a> {
     pub fn of(image: ImageView<'a>, grid: &Grid) -> Self {
-        let corner = |c: &super::GridCorner| (Vertex::new(c.row, c.col), [c.x, c.y]);
+        let corner = |c: &super::GridCorner| (Vertex::new(c.row, c.col), c.position());
         Self { image, corners: grid.corners.iter().map(corner).collect() }
     }
 
@@ -117,23 +116,19 @@ impl<'a> CheckerTiles<'a> {
     pub fn value(&self, Square { middle, edges }: Square) -> Option<f64> {
         const PLACES: [[f64; 2]; 5] =
             [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
-        let values = PLACES.map(|place| self.brightness(moved(middle, edges, place)));
+        let values = PLACES.map(|place| self.brightness(moved(middle, edges, place.into())));
         Some(values.into_iter().sum::<Option<f64>>()? / PLACES.len() as f64)
     }
 
     /// Brightness of a place in the picture.
-    pub fn brightness(&self, [x, y]: Point) -> Option<f64> {
+    pub fn brightness(&self, DVec2 { x, y }: Point) -> Option<f64> {
         let (width, height) = (self.image.width() as f64, self.image.height() as f64);
         let inside = x >= 0.0 && y >= 0.0 && x + 1.0 < width && y + 1.0 < height;
         inside.then(|| self.image.bilinear_inside(x, y))
     }
 }
 
-pub fn difference(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
 /// A place moved by multiples of two edges.
-pub fn moved(place: Point, edges: [Point; 2], by: [f64; 2]) -> Point {
-    [0, 1].map(|i| place[i] + by[0] * edges[0][i] + by[1] * edges[1][i])
+pub fn moved(place: Point, edges: [Point; 2], by: DVec2) -> Point {
+    place + by.x * edges[0] + by.y * edges[1]
 }

@@ -125,27 +125,27 @@ impl Surroundings {
     }
 
     /// Tells whether no tag is seen at a place, px from the corner, under a blur of this deviation.
-    pub fn off_tags(&self, blur_px: f64) -> impl Fn([f64; 2]) -> bool {
+    pub fn off_tags(&self, blur_px: f64) -> impl Fn(DVec2) -> bool {
         let margin = BLUR_MARGIN_SIGMAS * blur_px;
-        let circle2 = (self.distance_of_tags([0.0; 2]) - margin).max(0.0).powi(2);
-        move |[u, v]| u * u + v * v < circle2 || self.distance_of_tags([u, v]) >= margin
+        let circle2 = (self.distance_of_tags(DVec2::ZERO) - margin).max(0.0).powi(2);
+        move |place| place.length_squared() < circle2 || self.distance_of_tags(place) >= margin
     }
 
     /// Half the side of the largest clear square around the corner, px.
     pub fn clear_square_px(&self, blur_px: f64) -> f64 {
-        let clear = self.distance([0.0; 2]) - BLUR_MARGIN_SIGMAS * blur_px;
+        let clear = self.distance(DVec2::ZERO) - BLUR_MARGIN_SIGMAS * blur_px;
         clear.max(0.0) * std::f64::consts::FRAC_1_SQRT_2
     }
 
     /// Distance from a point to the nearest thing that is not the corner, or less, px.
-    fn distance(&self, [u, v]: [f64; 2]) -> f64 {
-        let sides = self.sides.iter().map(|[a, b, c]| a * u + b * v + c);
+    fn distance(&self, place: DVec2) -> f64 {
+        let sides = self.sides.iter().map(|[a, b, c]| a * place.x + b * place.y + c);
         let nearest = sides.reduce(f64::min).unwrap_or(0.0);
-        nearest.min(self.distance_of_tags([u, v]))
+        nearest.min(self.distance_of_tags(place))
     }
 
     /// Distance from a point to the nearest tag, or less, px.
-    fn distance_of_tags(&self, [u, v]: [f64; 2]) -> f64 {
+    fn distance_of_tags(&self, DVec2 { x: u, y: v }: DVec2) -> f64 {
         let from = |[a, b, c]: &Line| a * u + b * v + c;
         let outside = |tag: &Vec<Line>| tag.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
         self.tags.iter().map(outside).fold(f64::INFINITY, f64::min)
@@ -169,8 +169,8 @@ pub fn surroundings_of(
     let bend = LazyCell::new(|| places.bend(grid));
     let around = |corner: &GridCorner| {
         let vertex = Vertex::new(corner.row, corner.col);
-        let [x, y] = places.get(vertex)?;
-        let seen = |step: Vertex| places.get(vertex + step).map(|p| [p[0] - x, p[1] - y]);
+        let here = places.get(vertex)?;
+        let seen = |step: Vertex| places.get(vertex + step).map(|place| place - here);
         let near = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))));
         // Of a corner by itself those beyond its neighbours tell where these would be.
         let map = match &near {
@@ -179,7 +179,7 @@ pub fn surroundings_of(
         };
         let usual = |step| match &near {
             Some(near) => near(step),
-            None => map.map_or([0.0; 2], |map| map.along(step)),
+            None => map.map_or(DVec2::ZERO, |map| map.along(step)),
         };
         let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
         let edges = edges(grid, &places, vertex, place);
@@ -187,11 +187,11 @@ pub fn surroundings_of(
         let mut found = Surroundings { edges, is_inner, ..Default::default() };
         for tile in grid.kind.tiles_around(vertex) {
             let corners: Vec<Vertex> = tile.vertices().map(|v| v - vertex).collect();
-            let polygon: Vec<[f64; 2]> = corners.iter().map(|&step| place(step)).collect();
+            let polygon: Vec<DVec2> = corners.iter().map(|&step| place(step)).collect();
             let n = corners.len();
             for (i, j) in (0..n).map(|i| (i, (i + 1) % n)) {
                 if corners[i] != Vertex::new(0, 0) && corners[j] != Vertex::new(0, 0) {
-                    found.sides.push(line(polygon[i], polygon[j], [0.0; 2]));
+                    found.sides.push(line(polygon[i], polygon[j], DVec2::ZERO));
                 }
             }
             if tags.has(grid.panel, tile) {
@@ -205,10 +205,10 @@ pub fn surroundings_of(
 
 /// Where a corner should be that lies beside the lines of its neighbours: where they cross, px. `None`
 /// where it lies as near to them as any lens lets it, and of fewer than two lines.
-pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<[f64; 2]> {
+pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
     let places = Places::of(grid, 1.0);
     let vertex = Vertex::new(corner.row, corner.col);
-    let here = DVec2::new(corner.x, corner.y);
+    let here = corner.position();
     let (mut normal, mut right, mut lines) = (DMat2::ZERO, DVec2::ZERO, 0);
     let mut nearest_px = f64::INFINITY;
     let steps = grid.kind.steps();
@@ -217,22 +217,22 @@ pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<[f64; 2]> {
             [(vertex + s, vertex - s), (vertex + s, vertex + s + s), (vertex - s, vertex - s - s)];
         let ends = ends.into_iter().find_map(|(a, b)| Some((places.get(a)?, places.get(b)?)));
         let Some((a, b)) = ends else { continue };
-        nearest_px = nearest_px.min(here.distance(a.into())).min(here.distance(b.into()));
-        let [a, b, c] = line(a, b, [0.0; 2]);
+        nearest_px = nearest_px.min(here.distance(a)).min(here.distance(b));
+        let [a, b, c] = line(a, b, DVec2::ZERO);
         let n = DVec2::new(a, b);
         normal += DMat2::from_cols(n.x * n, n.y * n);
         right -= c * n;
         lines += 1;
     }
     let crossing = (lines > 1).then(|| normal.inverse() * right)?;
-    (here.distance(crossing) > MOST_SAG * nearest_px).then_some(crossing.to_array())
+    (here.distance(crossing) > MOST_SAG * nearest_px).then_some(crossing)
 }
 
 /// The places of corners in the rectangle of rows and columns that they span.
 struct Places {
     first: Vertex,
     cols: usize,
-    places: Vec<Option<[f64; 2]>>,
+    places: Vec<Option<DVec2>>,
 }
 
 impl Places {
@@ -247,7 +247,7 @@ impl Places {
             Self { first: Vertex::new(row, col), cols, places: vec![None; rows * cols] };
         for corner in &grid.corners {
             if let Some(at) = found.index(Vertex::new(corner.row, corner.col)) {
-                found.places[at] = Some([corner.x / scale, corner.y / scale]);
+                found.places[at] = Some(corner.position() / scale);
             }
         }
         found
@@ -259,7 +259,7 @@ impl Places {
         (col < self.cols).then_some(row * self.cols + col)
     }
 
-    fn get(&self, vertex: Vertex) -> Option<[f64; 2]> {
+    fn get(&self, vertex: Vertex) -> Option<DVec2> {
         *self.places.get(self.index(vertex)?)?
     }
 
@@ -281,16 +281,15 @@ impl Places {
 
 /// Where a vertex lies that is not seen, if the two opposite are: as far as the first of them, or
 /// nearer by as much as that is nearer than the second.
-fn beyond(step: Vertex, seen: impl Fn(Vertex) -> Option<[f64; 2]>) -> Option<[f64; 2]> {
+fn beyond(step: Vertex, seen: impl Fn(Vertex) -> Option<DVec2>) -> Option<DVec2> {
     let back = Vertex::new(-step.row, -step.col);
-    let first = DVec2::from(seen(back)?);
-    let second = DVec2::from(seen(back + back)?);
+    let (first, second) = (seen(back)?, seen(back + back)?);
     let shrinks = first.length() / (second - first).length();
-    Some((-first * shrinks.min(1.0)).to_array())
+    Some(-first * shrinks.min(1.0))
 }
 
 /// The affine map of lattice steps that fits these best; `None` where they lie in one line.
-fn affine(known: impl Iterator<Item = (Vertex, [f64; 2])>) -> Option<impl Fn(Vertex) -> [f64; 2]> {
+fn affine(known: impl Iterator<Item = (Vertex, DVec2)>) -> Option<impl Fn(Vertex) -> DVec2> {
     let (mut normal, mut right) = (DMat2::ZERO, [DVec2::ZERO; 2]);
     for (step, place) in known {
         let step = DVec2::new(step.row.into(), step.col.into());
@@ -298,7 +297,10 @@ fn affine(known: impl Iterator<Item = (Vertex, [f64; 2])>) -> Option<impl Fn(Ver
         right = [0, 1].map(|i| right[i] + place[i] * step);
     }
     let rows = (normal.determinant() > 0.5).then(|| right.map(|r| normal.inverse() * r))?;
-    Some(move |v: Vertex| rows.map(|row| row.dot(DVec2::new(v.row.into(), v.col.into()))))
+    Some(move |v: Vertex| {
+        let v = DVec2::new(v.row.into(), v.col.into());
+        DVec2::from(rows.map(|row| row.dot(v)))
+    })
 }
 
 /// The edges through the corner at `vertex`, along the chords between its neighbours.
@@ -306,13 +308,13 @@ fn edges(
     grid: &Grid,
     places: &Places,
     vertex: Vertex,
-    place: impl Fn(Vertex) -> [f64; 2],
+    place: impl Fn(Vertex) -> DVec2,
 ) -> Vec<Edge> {
     let steps = grid.kind.steps();
-    let at = |v: Vertex| places.get(v).map(DVec2::from);
+    let at = |v: Vertex| places.get(v);
     let bend_at = |v: Vertex, step: Vertex| Some(bend([at(v - step)?, at(v)?, at(v + step)?]));
     let edge = |&step: &Vertex| {
-        let chord = DVec2::from(place(step)) - DVec2::from(place(Vertex::new(0, 0) - step));
+        let chord = place(step) - place(Vertex::new(0, 0) - step);
         // Bends change slowly: three along a line tell more than one, and where the line is too short
         // the next ones are bent like it.
         let along = [vertex, vertex + step, vertex - step].into_iter();
@@ -320,7 +322,7 @@ fn edges(
             .or_else(|| mean(grid.kind.neighbours(vertex).filter_map(|v| bend_at(v, step))))
             .unwrap_or(0.0);
         let along = chord.normalize_or_zero();
-        let off = steps.iter().map(|&other| along.perp_dot(place(other).into()).abs());
+        let off = steps.iter().map(|&other| along.perp_dot(place(other)).abs());
         let across_px = off.sum::<f64>() / rows_apart(grid.kind);
         let angle_rad = chord.to_angle();
         // Turned by half, left is right.
@@ -359,27 +361,26 @@ fn bend([a, b, c]: [DVec2; 3]) -> f64 {
 }
 
 /// The sides of what a tile shows of a tag, positive outside.
-fn outline(tile: &[[f64; 2]], inset: f64) -> Vec<Line> {
+fn outline(tile: &[DVec2], inset: f64) -> Vec<Line> {
     let n = tile.len();
     // Every corner moves along both edges that meet there.
     let corner = |i: usize| {
         let (here, next, last) = (tile[i], tile[(i + 1) % n], tile[(i + n - 1) % n]);
-        [0, 1].map(|k| here[k] + inset * (next[k] + last[k] - 2.0 * here[k]))
+        here + inset * (next + last - 2.0 * here)
     };
-    let corners: Vec<[f64; 2]> = (0..n).map(corner).collect();
-    let middle = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / n as f64);
+    let corners: Vec<DVec2> = (0..n).map(corner).collect();
+    let middle = corners.iter().sum::<DVec2>() / n as f64;
     let sides = (0..n).map(|i| line(corners[i], corners[(i + 1) % n], middle));
     sides.map(|side| side.map(|c| -c)).collect()
 }
 
 /// The line through two points, positive on the side of a third.
-fn line(a: [f64; 2], b: [f64; 2], inside: [f64; 2]) -> Line {
-    let [dx, dy] = [b[0] - a[0], b[1] - a[1]];
-    let length = dx.hypot(dy).max(f64::MIN_POSITIVE);
-    let [nx, ny] = [-dy / length, dx / length];
-    let offset = -(nx * a[0] + ny * a[1]);
-    let sign = (nx * inside[0] + ny * inside[1] + offset).signum();
-    [sign * nx, sign * ny, sign * offset]
+fn line(a: DVec2, b: DVec2, inside: DVec2) -> Line {
+    let way = b - a;
+    let normal = way.perp() / way.x.hypot(way.y).max(f64::MIN_POSITIVE);
+    let offset = -normal.dot(a);
+    let sign = (normal.dot(inside) + offset).signum();
+    [sign * normal.x, sign * normal.y, sign * offset]
 }
 
 #[cfg(test)]
@@ -387,10 +388,10 @@ mod tests {
     use super::*;
 
     /// A grid of 5 × 5 corners in the picture.
-    fn grid(kind: GridKind, image: impl Fn([f64; 2]) -> [f64; 2]) -> Grid {
+    fn grid(kind: GridKind, image: impl Fn(DVec2) -> DVec2) -> Grid {
         let corners = (0..25).map(|i| {
             let (row, col) = (i / 5, i % 5);
-            let [x, y] = image(kind.position(row.into(), col.into()));
+            let DVec2 { x, y } = image(kind.position(row.into(), col.into()));
             GridCorner { row, col, id: None, x, y, cov: None }
         });
         Grid { kind, panel: None, mirrored: false, corners: corners.collect(), tags: Vec::new() }
@@ -398,9 +399,9 @@ mod tests {
 
     #[test]
     fn lines_cross_in_the_corner_under_perspective_and_are_not_bent() {
-        let image = |[x, y]: [f64; 2]| {
+        let image = |DVec2 { x, y }: DVec2| {
             let depth = 1.0 + 0.1 * x - 0.05 * y;
-            [300.0 + 30.0 * (x - 0.2 * y) / depth, 200.0 - 25.0 * y / depth]
+            DVec2::new(300.0 + 30.0 * (x - 0.2 * y) / depth, 200.0 - 25.0 * y / depth)
         };
         for kind in [GridKind::Deltille, GridKind::Checker] {
             let grid = grid(kind, image);
@@ -410,8 +411,8 @@ mod tests {
             for corner in &grid.corners {
                 assert_eq!(crossing(&grid, corner), None);
                 let mistaken = GridCorner { x: corner.x + 4.0, y: corner.y - 6.0, ..*corner };
-                let [x, y] = crossing(&grid, &mistaken).unwrap();
-                assert!((x - corner.x).hypot(y - corner.y) < 1e-9);
+                let found = crossing(&grid, &mistaken).unwrap();
+                assert!(found.distance(corner.position()) < 1e-9);
             }
         }
     }
@@ -419,9 +420,10 @@ mod tests {
     #[test]
     fn lines_on_a_cylinder_are_bent_to_the_left_of_their_direction() {
         // Rows are arcs of radius 400 px that curve towards greater v.
-        let image = |[x, y]: [f64; 2]| {
+        let image = |DVec2 { x, y }: DVec2| {
             let angle = 0.05 * (x - 2.0);
-            [300.0 + 400.0 * angle.sin(), 200.0 - 20.0 * y + 400.0 * (1.0 - angle.cos())]
+            let v = 200.0 - 20.0 * y + 400.0 * (1.0 - angle.cos());
+            DVec2::new(300.0 + 400.0 * angle.sin(), v)
         };
         let grid = grid(GridKind::Checker, image);
         let around = surroundings(&grid, &TagAreas::default(), 1.0);
@@ -432,17 +434,19 @@ mod tests {
 
     #[test]
     fn tags_and_far_sides_are_not_clear_and_what_lies_between_is() {
-        let grid = grid(GridKind::Checker, |[x, y]| [100.0 + 40.0 * x, 300.0 - 40.0 * y]);
+        let grid = grid(GridKind::Checker, |place| {
+            DVec2::new(100.0 + 40.0 * place.x, 300.0 - 40.0 * place.y)
+        });
         let tags = TagAreas { inset: 0.25, tiles: BTreeMap::from([(0, BTreeSet::new())]) };
         let around = &surroundings(&grid, &tags, 1.0)[12];
         // Cells begin 10 px from both edges; the blur reaches 2 px.
         let off_tags = around.off_tags(1.0);
-        let clear = |[u, v]: [f64; 2]| {
+        let clear = |u: f64, v: f64| {
             let [first, last] = around.span(v, 1.0);
-            (first..=last).contains(&u) && off_tags([u, v])
+            (first..=last).contains(&u) && off_tags(DVec2::new(u, v))
         };
-        assert!(clear([7.0, 7.0]) && clear([35.0, 6.0]) && clear([-6.0, 35.0]));
-        assert!(!clear([12.0, 12.0]) && !clear([9.0, 20.0]) && !clear([39.0, 0.0]));
+        assert!(clear(7.0, 7.0) && clear(35.0, 6.0) && clear(-6.0, 35.0));
+        assert!(!clear(12.0, 12.0) && !clear(9.0, 20.0) && !clear(39.0, 0.0));
         let square_px = (10.0 - 2.0) * std::f64::consts::FRAC_1_SQRT_2;
         assert!((around.clear_square_px(1.0) - square_px).abs() < 1e-9);
     }

@@ -4,6 +4,7 @@
 //! paper §3.1). The image is smoothed with a cone before the fit; both maps are linear and are
 //! kept as their product, so a fit over offsets within r + 1 reads (4r + 1)² pixels.
 
+use glam::DVec2;
 use multiversion::multiversion;
 use nalgebra::DMatrix;
 
@@ -62,7 +63,7 @@ impl<const N: usize> ConeFit<N> {
     }
 
     /// The coefficients around a position; `None` where the window leaves the image.
-    pub fn coefficients(&self, image: ImageView, [x, y]: [f64; 2]) -> Option<[f64; N]> {
+    pub fn coefficients(&self, image: ImageView, DVec2 { x, y }: DVec2) -> Option<[f64; N]> {
         let reach = (2 * self.radius) as f64;
         let fits = x >= reach
             && y >= reach

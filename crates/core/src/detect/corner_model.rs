@@ -27,6 +27,7 @@
 //! The covariance is σ² (JᵀJ + prior)⁻¹ with the noise σ estimated from the residuals. It is honest
 //! where the noise is white and the window shows nothing but the corner; JPEG's noise is not white.
 
+use glam::DVec2;
 use multiversion::multiversion;
 use nalgebra::{SMatrix, SVector};
 
@@ -126,7 +127,7 @@ pub enum Accuracy {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner<const K: usize> {
     /// Position, px.
-    pub position: [f64; 2],
+    pub position: DVec2,
     /// Standard deviation of the blur with the pixel's box in it, px.
     pub blur_px: f64,
     /// Half the contrast, of full scale; negative when the sector before the first edge is dark.
@@ -134,7 +135,7 @@ pub struct Corner<const K: usize> {
     /// Half-way between dark and bright, of full scale.
     pub level: f64,
     /// Relative change of the illumination per pixel.
-    pub slope: [f64; 2],
+    pub slope: DVec2,
     /// Image angles of the edges, rising within a half-turn, radians.
     pub angles: [f64; K],
     /// Curvatures of the edges, to the left of their directions (to greater v of u), 1/px.
@@ -177,7 +178,7 @@ impl Window {
     }
 
     /// Those pixels (u, v) of such a window that are `seen`.
-    pub fn of(radius: usize, seen: impl Fn([f64; 2]) -> bool) -> Self {
+    pub fn of(radius: usize, seen: impl Fn(DVec2) -> bool) -> Self {
         Self::within(radius, |_| [f64::NEG_INFINITY, f64::INFINITY], seen)
     }
 
@@ -185,7 +186,7 @@ impl Window {
     pub fn within(
         radius: usize,
         span: impl Fn(f64) -> [f64; 2],
-        seen: impl Fn([f64; 2]) -> bool,
+        seen: impl Fn(DVec2) -> bool,
     ) -> Self {
         let radius = radius.min(MAX_RADIUS);
         let reach = radius as i32;
@@ -202,7 +203,7 @@ impl Window {
             let first = first.max(f64::from(-reach)).ceil() as i32;
             let last = last.min(f64::from(reach)).floor() as i32;
             let mut before = None;
-            for u in (first..=last).filter(|&u| seen([f64::from(u), f64::from(v)])) {
+            for u in (first..=last).filter(|&u| seen(DVec2::new(u.into(), v.into()))) {
                 match window.runs.last_mut() {
                     Some((_, length)) if before == Some(u - 1) => *length += 1,
                     _ => window.runs.push(([u, v], 1)),
@@ -234,13 +235,8 @@ impl Window {
     }
 
     /// Takes the pixels around `centre`, full scale 1; `None` where one lies outside the image.
-    fn read(
-        &self,
-        image: ImageView,
-        centre: [f64; 2],
-        pixels: &mut [f32; MAX_PIXELS],
-    ) -> Option<()> {
-        let [x, y] = centre.map(|c| c as i32);
+    fn read(&self, image: ImageView, centre: DVec2, pixels: &mut [f32; MAX_PIXELS]) -> Option<()> {
+        let [x, y] = centre.as_ivec2().to_array();
         let mut rest = &mut pixels[..];
         for &([u, v], length) in &self.runs {
             let (first, row) = (usize::try_from(x + u).ok()?, usize::try_from(y + v).ok()?);
@@ -496,8 +492,7 @@ impl CornerFitter {
         (optics, accuracy): (&Optics, Accuracy),
     ) -> Option<Fitted<K>> {
         let centre = self.load(image, window, start.position)?;
-        let local = [0, 1].map(|i| start.position[i] - centre[i]);
-        let start = Corner { position: local, ..*start };
+        let start = Corner { position: start.position - centre, ..*start };
         let mut fitted = self.descend(window, &start, (optics, accuracy));
         if fitted.is_none() && self.limits != UNLIMITED {
             // Black and white may lie just there: a drawn page has no others, and nothing but them.
@@ -505,7 +500,7 @@ impl CornerFitter {
             fitted = self.descend(window, &start, (optics, accuracy));
         }
         fitted.map(|fitted| {
-            let position = [0, 1].map(|i| fitted.corner.position[i] + centre[i]);
+            let position = fitted.corner.position + centre;
             Fitted { corner: Corner { position, ..fitted.corner }, ..fitted }
         })
     }
@@ -571,7 +566,7 @@ impl CornerFitter {
             }
             let there = self.normal(window, &moved, (optics, piece));
             let weight = (noise / SLOPE_PRIOR).powi(2);
-            let prior = |c: &Corner<K>| weight * (c.slope[0].powi(2) + c.slope[1].powi(2));
+            let prior = |c: &Corner<K>| weight * c.slope.length_squared();
             if there.cost + prior(&moved) <= normal.cost + prior(&corner) {
                 (corner, normal) = (moved, there);
                 damping = (damping * 0.1).max(1e-6);
@@ -582,8 +577,7 @@ impl CornerFitter {
         let noise = noise(&normal, &corner, freedom);
         let factor = with_prior(&normal, &corner, noise).0.cholesky()?;
         let inverse = factor.solve(&SMatrix::<f64, PARAMS, 2>::identity()) * noise * noise;
-        let way =
-            (corner.position[0] - start.position[0]).hypot(corner.position[1] - start.position[1]);
+        let way = corner.position.distance(start.position);
         let whiteness = self.whiteness(window);
         let trusted = converged
             && way <= MAX_WAY_PX
@@ -602,8 +596,8 @@ impl CornerFitter {
     }
 
     /// Takes the pixels around a position; the centre of the window, or `None` outside the image.
-    fn load(&mut self, image: ImageView, window: &Window, position: [f64; 2]) -> Option<[f64; 2]> {
-        let centre = position.map(f64::round);
+    fn load(&mut self, image: ImageView, window: &Window, position: DVec2) -> Option<DVec2> {
+        let centre = position.round();
         window.read(image, centre, &mut self.pixels)?;
         let (low, high) = ends(&self.pixels[..window.count]);
         self.limits = [
@@ -618,7 +612,7 @@ impl CornerFitter {
         &mut self,
         image: ImageView,
         window: &Window,
-        position: [f64; 2],
+        position: DVec2,
     ) -> Option<&[f32]> {
         self.load(image, window, position)?;
         Some(&self.pixels[..window.count])
@@ -669,14 +663,13 @@ impl CornerFitter {
     pub(super) fn joint<const K: usize>(
         &mut self,
         image: ImageView,
-        (window, centre): (&Window, [f64; 2]),
+        (window, centre): (&Window, DVec2),
         corner: &Corner<K>,
         optics: &Optics,
         common: &[Common],
     ) -> Option<Joint> {
         self.load(image, window, centre)?;
-        let position = [0, 1].map(|i| corner.position[i] - centre[i]);
-        let corner = Corner { position, ..*corner };
+        let corner = Corner { position: corner.position - centre, ..*corner };
         let params = ANGLE + K;
         let toned = |optics: &Optics| optics.piece(corner.level, corner.amplitude);
         let piece = toned(optics);
@@ -720,7 +713,7 @@ impl CornerFitter {
         let noise = (cost / (window.count - params) as f64).sqrt();
         let noise = noise.max(MIN_NOISE * corner.amplitude.abs());
         let weight = (noise / SLOPE_PRIOR).powi(2);
-        for (i, slope) in corner.slope.iter().enumerate() {
+        for (i, slope) in corner.slope.to_array().iter().enumerate() {
             matrix[(SLOPE + i, SLOPE + i)] += weight;
             gradient[SLOPE + i] -= weight * slope;
         }
@@ -732,13 +725,12 @@ impl CornerFitter {
     pub(super) fn influence<const K: usize>(
         &mut self,
         image: ImageView,
-        (window, centre): (&Window, [f64; 2]),
+        (window, centre): (&Window, DVec2),
         corner: &Corner<K>,
         optics: &Optics,
     ) -> Option<Influence> {
         self.load(image, window, centre)?;
-        let position = [0, 1].map(|i| corner.position[i] - centre[i]);
-        let corner = Corner { position, ..*corner };
+        let corner = Corner { position: corner.position - centre, ..*corner };
         let piece = optics.piece(corner.level, corner.amplitude);
         let normal = self.normal(window, &corner, (optics, piece));
         let freedom = (window.count - (ANGLE + K)) as f64;
@@ -759,7 +751,7 @@ impl CornerFitter {
         let places = window.u.iter().zip(&window.v).take(window.count);
         Some(Influence {
             places: places.map(|(&u, &v)| [u as i32, v as i32]).collect(),
-            twice_middle: corner.position.map(|c| (2.0 * c).round() as i32),
+            twice_middle: (2.0 * corner.position).round().as_ivec2().to_array(),
             residuals: self.columns[PARAMS][..window.count].to_vec(),
             on_position: [X, Y].map(|i| column(row(&inverse, i))),
             hat: (0..ANGLE + K).map(|i| column(row(&root, i))).collect(),
@@ -850,28 +842,25 @@ impl<const K: usize> Corner<K> {
 
     /// The corner after a step of its own parameters in the joint equations.
     pub(super) fn stepped(&self, step: &SVector<f64, OWN>) -> Option<Self> {
-        let mut moved = Self { position: [0.0; 2], ..*self }.moved(step, MAX_RADIUS)?;
-        moved.position = [0, 1].map(|i| moved.position[i] + self.position[i]);
+        let mut moved = Self { position: DVec2::ZERO, ..*self }.moved(step, MAX_RADIUS)?;
+        moved.position += self.position;
         Some(moved)
     }
 
     /// The corner after a step; `None` when it leaves what the window can tell.
     fn moved(&self, step: &SVector<f64, PARAMS>, radius: usize) -> Option<Self> {
         let mut corner = *self;
-        corner.position[0] += step[X];
-        corner.position[1] += step[Y];
+        corner.position += DVec2::new(step[X], step[Y]);
         corner.blur_px = (corner.blur_px * step[LN_BLUR].clamp(-1.0, 1.0).exp()).max(MIN_BLUR_PX);
         corner.amplitude += step[AMPLITUDE];
         corner.level += step[LEVEL];
-        for (i, slope) in corner.slope.iter_mut().enumerate() {
-            *slope += step[SLOPE + i];
-        }
+        corner.slope += DVec2::new(step[SLOPE], step[SLOPE + 1]);
         for (k, angle) in corner.angles.iter_mut().enumerate() {
             *angle += step[ANGLE + k];
         }
         let reach = radius as f64;
         let sensible = corner.blur_px <= reach
-            && corner.position.iter().all(|c| c.abs() < reach)
+            && corner.position.abs().max_element() < reach
             && corner.edges_are_apart();
         sensible.then_some(corner)
     }
@@ -1029,7 +1018,7 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
     look: &Look<C>,
     pattern: impl Pattern<K>,
 ) {
-    let [x, y] = corner.position.map(|c| c as f32);
+    let [x, y] = corner.position.as_vec2().to_array();
     // Directions of the edges, in units of the blur across them.
     let sines: [f32; K] =
         std::array::from_fn(|k| (corner.angles[k].sin() * look.sharpness[k]) as f32);
@@ -1048,7 +1037,7 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
     let displaced: [f32; K] = std::array::from_fn(|k| look.displaced[k] as f32);
     let by_ink: [f32; K] = std::array::from_fn(|k| look.by_ink[k] as f32);
     let (amplitude, level) = (corner.amplitude as f32, corner.level as f32);
-    let [gu, gv] = corner.slope.map(|g| g as f32);
+    let [gu, gv] = corner.slope.as_vec2().to_array();
     let (piece, [low, high]) = (look.piece, look.limits);
     let n = window.u.len().min(MAX_PIXELS);
     let (us, vs) = (&window.u[..n], &window.v[..n]);
@@ -1122,7 +1111,7 @@ fn with_prior<const K: usize>(
 ) -> (SMatrix<f64, PARAMS, PARAMS>, SVector<f64, PARAMS>) {
     let weight = (noise / SLOPE_PRIOR).powi(2);
     let (mut matrix, mut gradient) = (normal.matrix, normal.gradient);
-    for (i, slope) in corner.slope.iter().enumerate() {
+    for (i, slope) in corner.slope.to_array().iter().enumerate() {
         matrix[(SLOPE + i, SLOPE + i)] += weight;
         gradient[SLOPE + i] -= weight * slope;
     }
@@ -1214,11 +1203,11 @@ mod tests {
     /// A corner aside of its window's centre, in slanting light, whose edges are bent.
     fn corner<const K: usize>(amplitude: f64) -> Corner<K> {
         Corner {
-            position: [0.3, -0.2],
+            position: DVec2::new(0.3, -0.2),
             blur_px: 1.1,
             amplitude,
             level: 0.5,
-            slope: [0.0004, -0.0002],
+            slope: DVec2::new(0.0004, -0.0002),
             angles: std::array::from_fn(|k| 0.4 + 1.1 * k as f64),
             bends: std::array::from_fn(|k| 0.004 * k as f64 - 0.003),
             across_px: std::array::from_fn(|k| 20.0 + k as f64),
@@ -1286,12 +1275,12 @@ mod tests {
             let pixels = shown(&whole, truth, optics);
             let side = 2 * MIDDLE + 1;
             let picture = Gray::from_fn(side, side, |x, y| pixels[y * side + x]);
-            let position = truth.position.map(|c| c + MIDDLE as f64);
+            let position = truth.position + MIDDLE as f64;
             let start = Corner {
-                position: [position[0] - 0.4, position[1] + 0.3],
+                position: position + DVec2::new(-0.4, 0.3),
                 blur_px: 0.8 * truth.blur_px,
                 amplitude: 0.8 * truth.amplitude,
-                slope: [0.0; 2],
+                slope: DVec2::ZERO,
                 angles: truth.angles.map(|angle| angle + 0.05),
                 ..*truth
             };
@@ -1300,8 +1289,8 @@ mod tests {
             let found = fitter.fit((&picture).into(), &window, &start, with).expect("a corner");
             assert!(found.noise < 1e-3 * truth.amplitude.abs(), "{K} edges: {found:?}");
             let found = found.corner;
-            let off = [0, 1].map(|i| found.position[i] - position[i]);
-            assert!(off[0].hypot(off[1]) < 1e-3, "{K} edges: {off:?}");
+            let off = found.position - position;
+            assert!(off.length() < 1e-3, "{K} edges: {off:?}");
             let pairs = [
                 (found.blur_px, truth.blur_px),
                 (found.amplitude, truth.amplitude),

@@ -7,6 +7,7 @@
 
 use std::f64::consts::PI;
 
+use glam::DVec2;
 use multiversion::multiversion;
 
 use super::corner_model::{Corner, Window};
@@ -30,11 +31,11 @@ const CIRCLES: [f64; 3] = [0.5, 0.7, 0.9];
 pub fn start_along<const K: usize>(
     window: &Window,
     pixels: &[f32],
-    position: [f64; 2],
+    position: DVec2,
     angles: [f64; K],
     blur_px: f64,
 ) -> Option<Corner<K>> {
-    let offset = [0, 1].map(|i| (position[i] - position[i].round()) as f32);
+    let offset = (position - position.round()).as_vec2().to_array();
     let directions = angles.map(|angle| [angle.cos() as f32, angle.sin() as f32]);
     let sums = match K {
         2 => sums_of_two(window.places(), pixels, offset, &directions),
@@ -47,7 +48,7 @@ pub fn start_along<const K: usize>(
         blur_px,
         amplitude,
         level,
-        slope: [0.0; 2],
+        slope: DVec2::ZERO,
         angles,
         bends: [0.0; K],
         across_px: [0.0; K],
@@ -107,14 +108,13 @@ fn sums<const K: usize>(
 /// The start around `position`, from circles; `None` when the circles leave the image or show no contrast.
 pub fn start<const K: usize>(
     image: ImageView,
-    position: [f64; 2],
+    position: DVec2,
     radius: usize,
 ) -> Option<Corner<K>> {
     let radius_px = radius as f64;
-    let inside = position[0] >= radius_px
-        && position[1] >= radius_px
-        && position[0] + radius_px < image.width() as f64
-        && position[1] + radius_px < image.height() as f64;
+    let inside = position.min_element() >= radius_px
+        && position.x + radius_px < image.width() as f64
+        && position.y + radius_px < image.height() as f64;
     if !inside {
         return None;
     }
@@ -125,8 +125,8 @@ pub fn start<const K: usize>(
         let (sin, cos) = direction(i as f64).sin_cos();
         for circle in CIRCLES {
             let (du, dv) = (circle * radius_px * cos, circle * radius_px * sin);
-            let here = f64::from(image.bilinear(position[0] + du, position[1] + dv));
-            let opposite = f64::from(image.bilinear(position[0] - du, position[1] - dv));
+            let here = f64::from(image.bilinear(position.x + du, position.y + dv));
+            let opposite = f64::from(image.bilinear(position.x - du, position.y - dv));
             *value += if odd { here - opposite } else { here + opposite };
             total += here + opposite;
         }
@@ -162,7 +162,7 @@ pub fn start<const K: usize>(
         blur_px: blur.clamp(0.6, 0.5 * radius_px),
         amplitude,
         level: if odd { mean } else { middle },
-        slope: [0.0; 2],
+        slope: DVec2::ZERO,
         angles,
         bends: [0.0; K],
         across_px: [0.0; K],

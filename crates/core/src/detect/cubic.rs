@@ -9,6 +9,7 @@
 //! (see [`super::cone_fit`]). A corner is where all second derivatives vanish (Eq. 3), and a star-shaped umbilic
 //! when J < 0 (Eq. 5), which depends on the cubic terms alone.
 
+use glam::DVec2;
 use nalgebra::{Matrix3x2, Vector3};
 
 use super::cone_fit::{ConeFit, Powers};
@@ -35,13 +36,14 @@ impl CubicSurface {
     }
 
     /// The offset at which all second derivatives vanish, in the least-squares sense (Eq. 3).
-    pub fn umbilic_point(&self) -> Option<[f64; 2]> {
+    pub fn umbilic_point(&self) -> Option<DVec2> {
         let [c1, c2, c3, c4, c5, c6, c7] = self.c;
         let a = Matrix3x2::new(6.0 * c1, 2.0 * c2, 2.0 * c2, 2.0 * c3, 2.0 * c3, 6.0 * c4);
         let b = -Vector3::new(2.0 * c5, c6, 2.0 * c7);
         let normal = a.transpose() * a;
         let point = normal.try_inverse()? * (a.transpose() * b);
-        (point.x.is_finite() && point.y.is_finite()).then_some([point.x, point.y])
+        let point = DVec2::new(point.x, point.y);
+        point.is_finite().then_some(point)
     }
 
     /// The cubic terms c1 … c4.
@@ -65,7 +67,7 @@ pub struct CubicFit {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Umbilic {
     /// Position, px.
-    pub position: [f64; 2],
+    pub position: DVec2,
     /// The last surface, centred one (short) step before `position`.
     pub surface: CubicSurface,
 }
@@ -77,14 +79,14 @@ impl CubicFit {
     }
 
     /// The surface around `position`; `None` where the window leaves the image.
-    pub fn surface(&self, image: ImageView, position: [f64; 2]) -> Option<CubicSurface> {
+    pub fn surface(&self, image: ImageView, position: DVec2) -> Option<CubicSurface> {
         Some(CubicSurface { c: self.fit.coefficients(image, position)? })
     }
 
     /// Iterates from `start`, at most `iterations` times. `None` when the surface is no
     /// star-shaped umbilic, a step or the whole way exceeds the radius, or the window leaves the
     /// image.
-    pub fn refine(&self, image: ImageView, start: [f64; 2], iterations: usize) -> Option<Umbilic> {
+    pub fn refine(&self, image: ImageView, start: DVec2, iterations: usize) -> Option<Umbilic> {
         self.walk(image, start, iterations, CONVERGED_PX)
     }
 
@@ -92,7 +94,7 @@ impl CubicFit {
     pub fn walk(
         &self,
         image: ImageView,
-        start: [f64; 2],
+        start: DVec2,
         iterations: usize,
         converged_px: f64,
     ) -> Option<Umbilic> {
@@ -103,10 +105,9 @@ impl CubicFit {
             if surface.star_discriminant() >= 0.0 {
                 return None;
             }
-            let [dx, dy] = surface.umbilic_point()?;
-            position = [position[0] + dx, position[1] + dy];
-            let way2 = (position[0] - start[0]).powi(2) + (position[1] - start[1]).powi(2);
-            let step2 = dx * dx + dy * dy;
+            let step = surface.umbilic_point()?;
+            position += step;
+            let (way2, step2) = (position.distance_squared(start), step.length_squared());
             if step2.max(way2) > radius * radius {
                 return None;
             }
@@ -119,7 +120,7 @@ impl CubicFit {
     }
 
     /// The way from `start` to the umbilic point of the surface there; `None` when it is not star-shaped.
-    pub fn step(&self, image: ImageView, start: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
         let surface = self.surface(image, start)?;
         (surface.star_discriminant() < 0.0).then(|| surface.umbilic_point()).flatten()
     }
@@ -142,8 +143,9 @@ mod tests {
     fn a_monkey_saddle_is_found_exactly_in_two_steps() {
         for radius in [2, 3, 5] {
             let fit = CubicFit::new(radius);
-            let found = fit.refine((&monkey_saddle(31.4, 29.8)).into(), [31.0, 31.0], 2).unwrap();
-            let error = (found.position[0] - 31.4).hypot(found.position[1] - 29.8);
+            let found =
+                fit.refine((&monkey_saddle(31.4, 29.8)).into(), DVec2::splat(31.0), 2).unwrap();
+            let error = found.position.distance(DVec2::new(31.4, 29.8));
             assert!(error < 2e-3, "radius {radius}: {error}");
             assert!(found.surface.star_discriminant() < 0.0);
         }
@@ -153,9 +155,9 @@ mod tests {
     fn quadrics_planes_and_borders_are_refused() {
         let fit = CubicFit::new(3);
         let saddle = Gray::from_fn(64, 64, |x, y| (x as f32 - 30.0) * (y as f32 - 30.0));
-        let found = fit.refine((&saddle).into(), [30.0, 30.0], 5);
+        let found = fit.refine((&saddle).into(), DVec2::splat(30.0), 5);
         assert!(found.is_none_or(|u| u.surface.star_discriminant().abs() < 1e-6));
-        assert!(fit.refine((&Gray::<u8>::new(64, 64)).into(), [30.0, 30.0], 5).is_none());
-        assert!(fit.refine((&monkey_saddle(3.0, 3.0)).into(), [3.0, 3.0], 5).is_none());
+        assert!(fit.refine((&Gray::<u8>::new(64, 64)).into(), DVec2::splat(30.0), 5).is_none());
+        assert!(fit.refine((&monkey_saddle(3.0, 3.0)).into(), DVec2::splat(3.0), 5).is_none());
     }
 }

@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::curve::ToneEstimate;
@@ -59,11 +60,12 @@ impl Grid {
     /// Median distance of corners that follow each other in a row or column, px; `None` where there
     /// are none such.
     pub fn edge_px(&self) -> Option<f64> {
-        let places: BTreeMap<(i32, i32), [f64; 2]> =
-            self.corners.iter().map(|c| ((c.row, c.col), [c.x, c.y])).collect();
+        let places: BTreeMap<(i32, i32), DVec2> =
+            self.corners.iter().map(|c| ((c.row, c.col), c.position())).collect();
         let edges = self.corners.iter().flat_map(|c| {
             let next = [(c.row, c.col + 1), (c.row + 1, c.col)];
-            next.into_iter().filter_map(|v| places.get(&v)).map(|[x, y]| (c.x - x).hypot(c.y - y))
+            let edges = next.into_iter().filter_map(|v| Some(c.position() - places.get(&v)?));
+            edges.map(|edge| edge.x.hypot(edge.y))
         });
         median(edges.collect())
     }
@@ -71,7 +73,7 @@ impl Grid {
     /// Expresses positions in px of a level of the pyramid.
     pub(super) fn moved_to_level(&mut self, level: usize) {
         for corner in &mut self.corners {
-            [corner.x, corner.y] = Pyramid::from_level_0(level, [corner.x, corner.y]);
+            corner.move_to(Pyramid::from_level_0(level, corner.position()));
         }
     }
 
@@ -79,7 +81,7 @@ impl Grid {
     pub(super) fn moved_from_level(&mut self, level: usize) {
         let area = 4f64.powi(level as i32);
         for corner in &mut self.corners {
-            [corner.x, corner.y] = Pyramid::to_level_0(level, [corner.x, corner.y]);
+            corner.move_to(Pyramid::to_level_0(level, corner.position()));
             corner.cov = corner.cov.map(|cov| cov.map(|entry| area * entry));
         }
     }
@@ -108,6 +110,18 @@ pub struct GridCorner {
     pub y: f64,
     /// Covariance xx, xy, yy, px²; `None` where the method gives none.
     pub cov: Option<[f64; 3]>,
+}
+
+impl GridCorner {
+    /// Position, px; x right, y down, pixel centres at integers.
+    pub fn position(&self) -> DVec2 {
+        DVec2::new(self.x, self.y)
+    }
+
+    /// Changes the position, px.
+    pub(super) fn move_to(&mut self, position: DVec2) {
+        (self.x, self.y) = position.into();
+    }
 }
 
 /// A tag read in the image.

@@ -1,5 +1,7 @@
 //! Whether two corners are joined by an edge of the tiling.
 
+use glam::DVec2;
+
 use super::saddles::Saddle;
 use super::sectors::turn;
 use super::tiling::kind;
@@ -78,11 +80,10 @@ fn is_clean_along<const N: usize>(
     // The coarser of the levels that show the corners sharply shows the edge between them.
     let level = a.level.max(b.level);
     let image = &pyramid.levels()[level];
-    let [ax, ay] = Pyramid::from_level_0(level, a.position);
-    let [bx, by] = Pyramid::from_level_0(level, b.position);
-    let (dx, dy) = (bx - ax, by - ay);
-    let length = dx.hypot(dy);
-    let chord = dy.atan2(dx);
+    let from = Pyramid::from_level_0(level, a.position);
+    let way = Pyramid::from_level_0(level, b.position) - from;
+    let length = way.x.hypot(way.y);
+    let chord = way.to_angle();
     // Slopes of the curve against its chord at the two ends.
     let start = turn(chord, a.sectors.rays[i]).tan();
     let end = turn(chord + std::f64::consts::PI, b.sectors.rays[j]).tan();
@@ -107,18 +108,19 @@ fn is_clean_along<const N: usize>(
     let (lefts, rights) = (((i + 1) % N, (j + N - 1) % N), ((i + N - 1) % N, (j + 1) % N));
     let (left_side, right_side) = (side(lefts.0, lefts.1), side(rights.0, rights.1));
     // Unit vectors along the chord and to its left on the print.
-    let (along, left) = ([dx / length, dy / length], [dy / length, -dx / length]);
+    let along = way / length;
+    let left = -along.perp();
     // How far along the edge the next edges of a tile lead for each step away from it. So the samples stay in
     // a tile that is slanted.
     let next_edges = |(at_a, at_b): (usize, usize)| {
         [a.sectors.rays[at_a], b.sectors.rays[at_b]].map(|ray| {
-            let (sin, cos) = ray.sin_cos();
-            [cos * along[0] + sin * along[1], cos * left[0] + sin * left[1]]
+            let ray = DVec2::from_angle(ray);
+            DVec2::new(ray.dot(along), ray.dot(left))
         })
     };
     let (next_left, next_right) = (next_edges(lefts), next_edges(rights));
-    let lean = |[at_a, at_b]: [[f64; 2]; 2], t: f64| {
-        let [ahead, across] = [0, 1].map(|k| (1.0 - t) * at_a[k] + t * at_b[k]);
+    let lean = |[at_a, at_b]: [DVec2; 2], t: f64| {
+        let DVec2 { x: ahead, y: across } = (1.0 - t) * at_a + t * at_b;
         if across.abs() > LEAST_ACROSS { ahead / across } else { 0.0 }
     };
     let dark_left = i.is_multiple_of(2);
@@ -130,8 +132,7 @@ fn is_clean_along<const N: usize>(
         let offset = length * (-start * t * (1.0 - t) * (1.0 - t) + end * t * t * (1.0 - t));
         let deviation = |away: f64, next| {
             let (ahead, lateral) = (t * length + lean(next, t) * away, offset + away);
-            let x = ax + along[0] * ahead + left[0] * lateral;
-            let y = ay + along[1] * ahead + left[1] * lateral;
+            let DVec2 { x, y } = from + along * ahead + left * lateral;
             let level = a.sectors.level + t * (b.sectors.level - a.sectors.level);
             f64::from(image.bilinear(x, y)) - level
         };
@@ -161,7 +162,7 @@ mod tests {
         });
         let slope = (4.0 * bulge / 60.0).atan();
         let saddle = |x: f64, rays| Saddle {
-            position: [x, 49.5],
+            position: DVec2::new(x, 49.5),
             sectors: Sectors { rays, level: 400.0, amplitude: 250.0 },
             level: 0,
         };

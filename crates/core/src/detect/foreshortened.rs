@@ -11,6 +11,7 @@
 
 use std::f64::consts::PI;
 
+use glam::DVec2;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
@@ -84,9 +85,10 @@ impl View {
         }
     }
 
-    fn in_picture(&self, at: [f64; 2]) -> [f64; 2] {
+    fn in_picture(&self, at: DVec2) -> DVec2 {
         let [picture, view] = self.centres;
-        (picture + self.picture_from_view * (Vector2::from(at) - view)).into()
+        let there = picture + self.picture_from_view * (Vector2::new(at.x, at.y) - view);
+        DVec2::new(there.x, there.y)
     }
 
     /// The picture as the view shows it, grey where it ends. (A pyramid's level is smooth enough to be
@@ -95,11 +97,11 @@ impl View {
         // Steps are rounded: within a row that adds up to less than a tenth of a pixel.
         let last = [image.width() as f64 - 2.1, image.height() as f64 - 2.1];
         let [width, height] = self.size;
-        let step: [f64; 2] = self.picture_from_view.column(0).into_owned().into();
+        let step = DVec2::from_slice(self.picture_from_view.column(0).as_slice());
         let mut drawn = Gray::new(width, height);
         for (y, row) in drawn.pixels_mut().chunks_mut(width).enumerate() {
             row.fill(OUTSIDE);
-            let first = self.in_picture([0.0, y as f64]);
+            let first = self.in_picture(DVec2::new(0.0, y as f64));
             // The part of the row that lies in the picture.
             let (mut from, mut to) = (0.0, width as f64);
             for i in 0..2 {
@@ -113,7 +115,7 @@ impl View {
             }
             let (from, to) = (from.ceil(), to.floor());
             if let Some(seen) = row.get_mut(from as usize..to as usize) {
-                sample(image, [0, 1].map(|i| first[i] + from * step[i]), step, seen);
+                sample(image, first + from * step, step, seen);
             }
         }
         drawn
@@ -121,13 +123,13 @@ impl View {
 }
 
 /// Bilinear samples along a line that lies inside of an image.
-fn sample(image: &Gray<i16>, first: [f64; 2], step: [f64; 2], out: &mut [i16]) {
+fn sample(image: &Gray<i16>, first: DVec2, step: DVec2, out: &mut [i16]) {
     /// Steps of a coordinate in a pixel, and weights of an interpolation.
     const FINE: f64 = 65536.0;
     const WEIGHTS: i32 = 256;
     let (data, width) = (image.pixels(), image.width());
-    let [mut x, mut y] = first.map(|c| (c * FINE).round() as i64);
-    let [dx, dy] = step.map(|c| (c * FINE).round() as i64);
+    let [mut x, mut y] = (first * FINE).round().as_i64vec2().to_array();
+    let [dx, dy] = (step * FINE).round().as_i64vec2().to_array();
     for pixel in out {
         let [col, row] = [x, y].map(|c| (c.max(0) >> 16) as usize);
         let [fx, fy] = [x, y].map(|c| (c >> 8) as i32 & (WEIGHTS - 1));
@@ -153,7 +155,7 @@ mod tests {
         for i in 0..DIRECTIONS {
             let view = View::new(&image, PI * i as f64 / DIRECTIONS as f64);
             let drawn = view.drawn(&image);
-            let (mut sum, mut middle) = (0.0, [0.0; 2]);
+            let (mut sum, mut middle) = (0.0, DVec2::ZERO);
             for y in 0..drawn.height() {
                 for x in 0..drawn.width() {
                     let weight = match drawn.at(x, y) {
@@ -161,11 +163,11 @@ mod tests {
                         value => f64::from(value),
                     };
                     sum += weight;
-                    middle = [middle[0] + weight * x as f64, middle[1] + weight * y as f64];
+                    middle += weight * DVec2::new(x as f64, y as f64);
                 }
             }
-            let [x, y] = view.in_picture(middle.map(|m| m / sum));
-            assert!((x - 120.3).hypot(y - 60.8) < 0.1, "{x} {y}");
+            let found = view.in_picture(middle / sum);
+            assert!(found.distance(DVec2::new(120.3, 60.8)) < 0.1, "{found}");
         }
     }
 }

@@ -15,6 +15,7 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
 use super::blurred_corner::erf_sqrt_half;
@@ -98,7 +99,7 @@ pub struct Levels {
 
 impl Levels {
     /// Black at a point of the tile, and how much brighter white is.
-    pub fn at(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+    pub fn at(&self, DVec2 { x: u, y: v }: DVec2) -> [f64; 2] {
         [self.dark, self.contrast].map(|[a, b, c]| a + b * u + c * v)
     }
 }
@@ -107,7 +108,7 @@ impl Levels {
 struct Profile {
     distances_px: [f64; ACROSS],
     values: [f64; ACROSS],
-    normal: [f64; 2],
+    normal: DVec2,
     saturated: bool,
     /// Variance of a sample by what differs along the edge.
     variance: f64,
@@ -157,7 +158,7 @@ impl GridLight {
             let (sigma_px, _) = best_width(&all, light.clipped_share);
             let mut outer = [0.0; 3];
             for profile in profiles {
-                let [x, y] = profile.normal;
+                let DVec2 { x, y } = profile.normal;
                 let share = 1.0 / profiles.len() as f64;
                 outer = [0, 1, 2].map(|i| outer[i] + share * [x * x, 2.0 * x * y, y * y][i]);
                 if let Some(fit) = profile.fit(sigma_px, light.clipped_share) {
@@ -227,7 +228,7 @@ impl GridLight {
                 [1.0, 1.0]
             }
         };
-        let [mu, mv] = self.kind.middle();
+        let DVec2 { x: mu, y: mv } = self.kind.middle();
         let mut normal = Matrix3::<f64>::zeros();
         let slopes = EDGE_VARIANCE * (self.noise / SLOPE).powi(2);
         (1..3).for_each(|i| normal[(i, i)] = slopes);
@@ -258,7 +259,7 @@ impl GridLight {
 
     /// Black at an edge, and how much brighter white is.
     fn edge_levels(&self, profile: &Profile) -> Option<[f64; 2]> {
-        let [x, y] = profile.normal;
+        let DVec2 { x, y } = profile.normal;
         let [xx, xy, yy] = self.blur_px2;
         let sigma_px = (x * x * xx + 2.0 * x * y * xy + y * y * yy).max(0.0).sqrt();
         let (mut n, mut s1, mut s2, mut v1, mut v2) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -291,18 +292,15 @@ impl GridLight {
         let steps = self.kind.steps();
         let at = |v: Vertex| grid.get(&v).map(|placed| placed.position);
         let (p, q) = (at(vertex)?, at(vertex + steps[k])?);
-        let along = [q[0] - p[0], q[1] - p[1]];
-        let length = along[0].hypot(along[1]);
+        let along = q - p;
         // Left of the edge on the print; y runs down in the image.
-        let left = [along[1] / length, -along[0] / length];
+        let left = -along.perp() / along.x.hypot(along.y);
         let third = match self.kind {
             GridKind::Deltille => 1,
             GridKind::Checker => steps.len() / 4,
         };
         let far = [k + third, k + steps.len() - third].map(|k| at(vertex + steps[k % steps.len()]));
-        let height = |far: Option<[f64; 2]>| {
-            far.map(|f| ((f[0] - p[0]) * left[0] + (f[1] - p[1]) * left[1]).abs())
-        };
+        let height = |far: Option<DVec2>| far.map(|far| (far - p).dot(left).abs());
         let heights = far.map(height);
         let known = heights[0].or(heights[1])?;
         let odd = k + if self.kind == GridKind::Checker {
@@ -314,7 +312,7 @@ impl GridLight {
         let [left_px, right_px] = heights.map(|height| height.unwrap_or(known));
         let (dark_px, bright_px) =
             if dark_left { (left_px, right_px) } else { (right_px, left_px) };
-        let bright = if dark_left { [-left[0], -left[1]] } else { left };
+        let bright = if dark_left { -left } else { left };
         let reach = [-self.clear.dark * dark_px, self.clear.bright * bright_px];
         let (right, lower) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
         let mut saturated = 0;
@@ -327,8 +325,7 @@ impl GridLight {
         for (j, value) in values.iter_mut().enumerate() {
             let mut samples = [0.0; ALONG.len()];
             for (sample, t) in samples.iter_mut().zip(ALONG) {
-                let x = p[0] + t * along[0] + distances_px[j] * bright[0];
-                let y = p[1] + t * along[1] + distances_px[j] * bright[1];
+                let DVec2 { x, y } = p + t * along + distances_px[j] * bright;
                 if !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
                     return None;
                 }

@@ -7,12 +7,13 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 
+use glam::DVec2;
+
 use super::buckets::Buckets;
 use super::edge::{MAX_CHORD_RAD, is_clean_somehow};
 use super::effort::Effort;
 use super::links::{Link, Links, facing_ray, links};
 use super::local_map::{Bend, LocalMap};
-use super::parts::distance;
 use super::parts::join;
 use super::rectified::Rectified;
 use super::saddles::{Saddle, SaddleFinder, merge_px, too_many};
@@ -42,7 +43,7 @@ struct Place {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedSaddle {
     /// Position, px.
-    pub position: [f64; 2],
+    pub position: DVec2,
     /// Half the contrast around it.
     pub amplitude: f64,
 }
@@ -140,15 +141,15 @@ fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
     for grid in grids.iter_mut() {
         let whole = grid.clone();
         grid.retain(|&vertex, placed| {
-            let [x, y] = placed.position;
+            let position = placed.position;
             let neighbours = Vertex::STEPS.iter().filter_map(|&step| whole.get(&(vertex + step)));
             let nearest_px = neighbours
-                .map(|p| (p.position[0] - x).hypot(p.position[1] - y))
+                .map(|neighbour| neighbour.position.distance(position))
                 .reduce(f64::min)
                 .unwrap_or(0.0);
-            let is_new = places.within([x, y], SAME_PART * nearest_px).next().is_none();
+            let is_new = places.within(position, SAME_PART * nearest_px).next().is_none();
             if is_new {
-                places.insert([x, y]);
+                places.insert(position);
             }
             is_new
         });
@@ -166,15 +167,13 @@ fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGr
         .iter()
         .enumerate()
         .flat_map(|(i, grid)| tiles_of::<N>(grid).map(move |tile| (i, tile)));
-    let tiles: Vec<(usize, Vec<[f64; 2]>)> = tiles.collect();
-    let middle = |tile: &[[f64; 2]]| {
-        [0, 1].map(|axis| tile.iter().map(|p| p[axis]).sum::<f64>() / tile.len() as f64)
-    };
-    let middles: Vec<[f64; 2]> = tiles.iter().map(|(_, tile)| middle(tile)).collect();
+    let tiles: Vec<(usize, Vec<DVec2>)> = tiles.collect();
+    let middle = |tile: &[DVec2]| tile.iter().sum::<DVec2>() / tile.len() as f64;
+    let middles: Vec<DVec2> = tiles.iter().map(|(_, tile)| middle(tile)).collect();
     let from_middle = tiles
         .iter()
         .zip(&middles)
-        .flat_map(|((_, tile), &m)| tile.iter().map(move |&p| distance(p, m)));
+        .flat_map(|((_, tile), &middle)| tile.iter().map(move |p| p.distance(middle)));
     let reach_px = from_middle.fold(0.0, f64::max);
     let middles = Buckets::of(&middles);
     let mut index = 0..;
@@ -193,17 +192,17 @@ fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGr
 }
 
 /// The tiles of which all vertices are in a grid.
-fn tiles_of<const N: usize>(grid: &SaddleGrid) -> impl Iterator<Item = Vec<[f64; 2]>> {
+fn tiles_of<const N: usize>(grid: &SaddleGrid) -> impl Iterator<Item = Vec<DVec2>> {
     let place = |v: &Vertex| grid.get(v).map(|p| p.position);
     let tiles = grid.keys().flat_map(|&v| tiles_at::<N>(v));
     tiles.filter_map(move |tile| tile.iter().map(place).collect())
 }
 
 /// Whether a point lies in a tile. Counter-clockwise on the print is clockwise in the image's axes.
-fn is_inside(tile: &[[f64; 2]], p: [f64; 2]) -> bool {
+fn is_inside(tile: &[DVec2], p: DVec2) -> bool {
     (0..tile.len()).all(|i| {
         let (a, b) = (tile[i], tile[(i + 1) % tile.len()]);
-        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) < 0.0
+        (b - a).perp_dot(p - a) < 0.0
     })
 }
 
@@ -402,9 +401,9 @@ fn fill_gaps<const N: usize>(
 
 /// Where the straight (or evenly bent) rows through `vertex` continue to, and the length of an
 /// edge there; `None` unless two rows predict it, or two neighbours and those around them.
-fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<([f64; 2], f64)> {
+fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<(DVec2, f64)> {
     let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
-    let mut sum = [0.0; 2];
+    let mut sum = DVec2::ZERO;
     let (mut count, mut edge) = (0.0, 0.0);
     for step in (0..N).map(step::<N>) {
         let first = vertex + step;
@@ -412,21 +411,20 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<([f64; 2
         let (Some(p), Some(q)) = (at(first), at(second)) else {
             continue;
         };
-        let predicted: [f64; 2] = std::array::from_fn(|k| match at(second + step) {
-            Some(r) => 3.0 * p[k] - 3.0 * q[k] + r[k],
-            None => 2.0 * p[k] - q[k],
-        });
-        sum = [sum[0] + predicted[0], sum[1] + predicted[1]];
-        edge += (p[0] - q[0]).hypot(p[1] - q[1]);
+        sum += match at(second + step) {
+            Some(r) => 3.0 * p - 3.0 * q + r,
+            None => 2.0 * p - q,
+        };
+        edge += (p.x - q.x).hypot(p.y - q.y);
         count += 1.0;
     }
     if count >= 2.0 {
-        return Some(([sum[0] / count, sum[1] / count], edge / count));
+        return Some((sum / count, edge / count));
     }
     // The first quad of a grid has no rows, but two of its corners beside the vertex.
-    let beside: Vec<[f64; 2]> = neighbours::<N>(vertex).into_iter().filter_map(at).collect();
+    let beside: Vec<DVec2> = neighbours::<N>(vertex).into_iter().filter_map(at).collect();
     let map = (beside.len() >= 2).then(|| LocalMap::about::<N>(vertex, at, Bend::usual()))??;
-    let px = |p: &[f64; 2]| (p[0] - map.place[0]).hypot(p[1] - map.place[1]);
+    let px = |p: &DVec2| (p.x - map.place.x).hypot(p.y - map.place.y);
     Some((map.place, beside.iter().map(px).sum::<f64>() / beside.len() as f64))
 }
 
@@ -436,7 +434,7 @@ fn corner_near<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
     grid: &Growing<N>,
-    (vertex, position, edge_px): (Vertex, [f64; 2], f64),
+    (vertex, position, edge_px): (Vertex, DVec2, f64),
     effort: &mut Effort,
 ) -> Option<GrownSaddle<N>> {
     if !effort.spend(LOOKS_FOR_CORNER) {
@@ -450,7 +448,7 @@ fn corner_near<const N: usize>(
     let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);
     finder.near(pyramid, level, position, reach, at_place).or_else(|| {
         let seen = |k: usize| grid.get(&(vertex + step::<N>(k))).map(|g| g.saddle.position);
-        let edge = |k: usize| seen(k).map(|p| [p[0] - position[0], p[1] - position[1]]);
+        let edge = |k: usize| seen(k).map(|place| place - position);
         (0..N).find_map(|k| {
             let edges = [edge(k)?, edge(k + 1)?];
             Rectified::views::<N>(position, k, edges)
@@ -508,10 +506,10 @@ mod tests {
     use crate::lattice::GridKind;
 
     /// A lattice of rows and columns about a place, with edges of this length, px.
-    fn lattice(kind: GridKind, side: i32, [x, y]: [f64; 2], edge_px: f64) -> SaddleGrid {
+    fn lattice(kind: GridKind, side: i32, origin: [f64; 2], edge_px: f64) -> SaddleGrid {
         let corner = |row: i32, col: i32| {
-            let [u, v] = kind.position(f64::from(row), f64::from(col));
-            let position = [x + edge_px * u, y - edge_px * v];
+            let place = kind.position(f64::from(row), f64::from(col));
+            let position = DVec2::from(origin) + edge_px * place * DVec2::new(1.0, -1.0);
             (Vertex::new(row, col), PlacedSaddle { position, amplitude: 100.0 })
         };
         (0..side).flat_map(|row| (0..side).map(move |col| corner(row, col))).collect()

@@ -679,6 +679,8 @@ fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
 
 #[cfg(test)]
 mod tests {
+    use glam::{DVec2, DVec3};
+
     use super::super::grow::PlacedSaddle;
     use super::*;
     use crate::family::{shipped_names, square_names};
@@ -696,7 +698,7 @@ mod tests {
         let labeller = TagLabeller::new(asked, family, None).unwrap();
         let side = |v: Vertex| if flopped { mirrored(v) } else { v };
         let panel = &shown.panels[0];
-        let placed = PlacedSaddle { position: [0.0; 2], amplitude: 1.0 };
+        let placed = PlacedSaddle { position: DVec2::ZERO, amplitude: 1.0 };
         let grid: SaddleGrid =
             panel_vertices(panel).into_iter().map(|v| (side(v), placed)).collect();
         let reader = &labeller.readers[0];
@@ -855,7 +857,7 @@ mod tests {
         let tile = panel.tag_tile(tag);
         let beside = Tile { anchor: tile.anchor + Vertex::new(0, 1), ..tile };
         let foreign = family.code(200).unwrap();
-        let placed = PlacedSaddle { position: [0.0; 2], amplitude: 1.0 };
+        let placed = PlacedSaddle { position: DVec2::ZERO, amplitude: 1.0 };
         for (what, other, labelled) in [
             ("a plain tile", of_code(beside, 0, SURE), true),
             ("nothing clear", of_code(beside, foreign, 0.1), true),
@@ -924,7 +926,7 @@ mod tests {
         let panel = &target.panels[0];
         let camera = crate::camera::Camera::pinhole(160, 160, 0.3);
         let bits_across = 6.0 + 3.0 * panel.border_bits.unwrap();
-        let distance_mm = camera.focal_px[0] * panel.edge_mm / bits_across / 4.0;
+        let distance_mm = camera.focal_px.x * panel.edge_mm / bits_across / 4.0;
         let mut seen = NoisyTags::default();
         for seed in 0..views {
             let tag = &panel.tags[seed as usize % panel.tags.len()];
@@ -934,14 +936,12 @@ mod tests {
                 .vertices()
                 .chain(tile.vertices().flat_map(|v| family.kind().neighbours(v)))
                 .collect();
-            let places: Vec<glam::DVec3> = tile
-                .vertices()
-                .filter_map(|v| Some(panel.corner_at(v)?.target_mm.into()))
-                .collect();
-            let centre = places.iter().sum::<glam::DVec3>() / places.len() as f64;
+            let places: Vec<DVec3> =
+                tile.vertices().filter_map(|v| Some(panel.corner_at(v)?.target_mm)).collect();
+            let centre = places.iter().sum::<DVec3>() / places.len() as f64;
             let roll: f64 = rng.random_range(0.0..std::f64::consts::TAU);
-            let up = glam::DVec3::new(roll.cos(), roll.sin(), 0.0);
-            let eye = centre + distance_mm * glam::DVec3::new(0.1, 0.05, 1.0);
+            let up = DVec3::new(roll.cos(), roll.sin(), 0.0);
+            let eye = centre + distance_mm * DVec3::new(0.1, 0.05, 1.0);
             let pose = crate::camera::Pose::looking_at(eye, centre, up);
             let light = crate::synth::Light { noise, seed, ..Default::default() };
             let image = scene.render(&camera, &pose, &light);
@@ -951,7 +951,8 @@ mod tests {
                 .iter()
                 .filter(|corner| near.contains(&Vertex::new(corner.row, corner.col)))
                 .map(|corner| {
-                    let placed = PlacedSaddle { position: [corner.x, corner.y], amplitude: 1.0 };
+                    let placed =
+                        PlacedSaddle { position: DVec2::new(corner.x, corner.y), amplitude: 1.0 };
                     (Vertex::new(corner.row, corner.col), placed)
                 })
                 .collect();
@@ -1031,7 +1032,7 @@ mod tests {
         let target = board(&family, 0).unwrap();
         let labeller = TagLabeller::new(&target, &family, None).unwrap();
         let panel = &target.panels[0];
-        let placed = PlacedSaddle { position: [0.0; 2], amplitude: 1.0 };
+        let placed = PlacedSaddle { position: DVec2::ZERO, amplitude: 1.0 };
         let grid: SaddleGrid = panel_vertices(panel).into_iter().map(|v| (v, placed)).collect();
         let wrong = (0..1000).filter(|trial| {
             // From a single tile, the hardest to refuse, to many; cells sure, or hardly told.

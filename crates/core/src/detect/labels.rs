@@ -262,7 +262,7 @@ fn relabelled(
         .iter()
         .filter_map(|(&vertex, placed)| {
             let (Vertex { row, col }, id) = label(vertex)?;
-            let [x, y] = placed.position;
+            let (x, y) = placed.position.into();
             Some(GridCorner { row, col, id, x, y, cov: None })
         })
         .collect();

@@ -1,5 +1,7 @@
 //! Which corner follows which along each of the rays.
 
+use glam::DVec2;
+
 use super::edge::{MAX_CHORD_RAD, is_clean};
 use super::places::Places;
 use super::saddles::Saddle;
@@ -33,9 +35,9 @@ pub type Links<const N: usize> = [Option<Link>; N];
 
 /// For every corner the links along its N rays; links are mutual.
 pub fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Links<N>> {
-    let positions: Vec<[f64; 2]> = saddles.iter().map(|saddle| saddle.position).collect();
+    let positions: Vec<DVec2> = saddles.iter().map(|saddle| saddle.position).collect();
     let places = Places::new(&positions);
-    let directions = |saddle: &Saddle<N>| saddle.sectors.rays.map(|ray| [ray.cos(), ray.sin()]);
+    let directions = |saddle: &Saddle<N>| saddle.sectors.rays.map(DVec2::from_angle);
     let directions: Vec<Directions<N>> = saddles.iter().map(directions).collect();
     let corners = Corners { pyramid, saddles, directions: &directions };
     let mut found: Vec<Links<N>> = vec![[None; N]; saddles.len()];
@@ -62,7 +64,7 @@ pub fn links<const N: usize>(pyramid: &Pyramid, saddles: &[Saddle<N>]) -> Vec<Li
 }
 
 /// Unit vectors along rays.
-type Directions<const N: usize> = [[f64; 2]; N];
+type Directions<const N: usize> = [DVec2; N];
 
 /// The corners to be linked.
 struct Corners<'a, const N: usize> {
@@ -104,12 +106,10 @@ impl<const N: usize> Corners<'_, N> {
     }
 
     /// Whether [`is_along`] may say that a place lies along a ray: without angles, and not too strictly.
-    fn may_be_along(&self, index: usize, i: usize, place: [f64; 2]) -> bool {
-        let [x, y] = self.saddles[index].position;
-        let (dx, dy) = (place[0] - x, place[1] - y);
-        let [cos, sin] = self.directions[index][i];
-        let along = dx * cos + dy * sin;
-        along > 0.0 && along * along >= LEAST_ALONG * (dx * dx + dy * dy)
+    fn may_be_along(&self, index: usize, i: usize, place: DVec2) -> bool {
+        let off = place - self.saddles[index].position;
+        let along = off.dot(self.directions[index][i]);
+        along > 0.0 && along * along >= LEAST_ALONG * off.length_squared()
     }
 }
 
@@ -130,7 +130,7 @@ fn are_alike<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> bool {
 
 /// Image angle of the way from one corner to another.
 fn chord_rad<const N: usize>(a: &Saddle<N>, b: &Saddle<N>) -> f64 {
-    (b.position[1] - a.position[1]).atan2(b.position[0] - a.position[0])
+    (b.position - a.position).to_angle()
 }
 
 fn is_along<const N: usize>(saddle: &Saddle<N>, i: usize, chord: f64) -> bool {

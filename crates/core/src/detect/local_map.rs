@@ -14,6 +14,7 @@
 
 use std::sync::LazyLock;
 
+use glam::DVec2;
 use nalgebra::{Matrix6, Vector6};
 
 use super::tiling::kind;
@@ -49,8 +50,8 @@ static STEPS: LazyLock<[Vec<(f64, Vertex)>; 2]> = LazyLock::new(|| {
 
 /// Length of a step on the print, in edges.
 fn length(kind: GridKind, step: Vertex) -> f64 {
-    let [x, y] = kind.position(step.row.into(), step.col.into());
-    x.hypot(y)
+    let way = kind.position(step.row.into(), step.col.into());
+    way.x.hypot(way.y)
 }
 
 /// How a grid is bent.
@@ -71,7 +72,7 @@ impl Bend {
     /// Of a grid of corners with N rays, of which `at` tells the places, found on levels up to this.
     pub fn of<const N: usize>(
         vertices: impl Iterator<Item = Vertex>,
-        at: impl Fn(Vertex) -> Option<[f64; 2]>,
+        at: impl Fn(Vertex) -> Option<DVec2>,
         level: usize,
     ) -> Self {
         let (mut sum, mut count) = (USUAL_WEIGHT * USUAL_BEND * USUAL_BEND, USUAL_WEIGHT);
@@ -81,8 +82,9 @@ impl Bend {
                 let [Some(a), Some(b), Some(c)] = line else {
                     continue;
                 };
-                let edge = (c[0] - a[0]).hypot(c[1] - a[1]) / 2.0;
-                let second = (a[0] - 2.0 * b[0] + c[0]).hypot(a[1] - 2.0 * b[1] + c[1]);
+                let edge = (c.x - a.x).hypot(c.y - a.y) / 2.0;
+                let second = a - 2.0 * b + c;
+                let second = second.x.hypot(second.y);
                 sum += (second / edge).powi(2);
                 count += 1.0;
             }
@@ -95,9 +97,9 @@ impl Bend {
 #[derive(Clone, Copy, Debug)]
 pub struct LocalMap {
     /// Where the vertex lies, px.
-    pub place: [f64; 2],
+    pub place: DVec2,
     /// Derivatives of the place, px per step along a row and from row to row: columns.
-    pub jacobian: [[f64; 2]; 2],
+    pub jacobian: [DVec2; 2],
     /// Deviation of the place, in edges.
     pub sigma: f64,
 }
@@ -107,7 +109,7 @@ impl LocalMap {
     /// one line.
     pub fn about<const N: usize>(
         vertex: Vertex,
-        at: impl Fn(Vertex) -> Option<[f64; 2]>,
+        at: impl Fn(Vertex) -> Option<DVec2>,
         bend: Bend,
     ) -> Option<Self> {
         let steps = match kind::<N>() {
@@ -115,7 +117,7 @@ impl LocalMap {
             GridKind::Checker => &STEPS[1],
         };
         let known = steps.iter().filter_map(|&(far, step)| Some((far, step, at(vertex + step)?)));
-        let known: Vec<(f64, Vertex, [f64; 2])> = known.take(MOST).collect();
+        let known: Vec<(f64, Vertex, DVec2)> = known.take(MOST).collect();
         let edge_px = edge_px(&known, |step| length(kind::<N>(), step))?;
         // The prior of the second derivatives; next to none of the others.
         let mut normal = Matrix6::from_diagonal(&Vector6::from_fn(|i, _| match i {
@@ -147,40 +149,39 @@ impl LocalMap {
             solver.solve(&unit)[i]
         });
         (across.into_iter().all(|variance| variance < 1.0)).then_some(Self {
-            place: [origin[0] + x[0], origin[1] + y[0]],
-            jacobian: [[x[1], y[1]], [x[2], y[2]]],
+            place: origin + DVec2::new(x[0], y[0]),
+            jacobian: [DVec2::new(x[1], y[1]), DVec2::new(x[2], y[2])],
             sigma: variance.sqrt(),
         })
     }
 
     /// The direction of a lattice step, px.
-    pub fn along(&self, step: Vertex) -> [f64; 2] {
+    pub fn along(&self, step: Vertex) -> DVec2 {
         let [col, row] = self.jacobian;
-        [0, 1].map(|k| f64::from(step.col) * col[k] + f64::from(step.row) * row[k])
+        f64::from(step.col) * col + f64::from(step.row) * row
     }
 
     /// Lattice coordinates (col, row) of a place, from the vertex; to first order.
-    pub fn steps_to(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-        let [[a, c], [b, d]] = self.jacobian;
-        let determinant = a * d - b * c;
-        let (dx, dy) = (x - self.place[0], y - self.place[1]);
-        (determinant != 0.0)
-            .then(|| [(d * dx - b * dy) / determinant, (a * dy - c * dx) / determinant])
+    pub fn steps_to(&self, place: DVec2) -> Option<DVec2> {
+        let [col, row] = self.jacobian;
+        let determinant = col.perp_dot(row);
+        let off = place - self.place;
+        (determinant != 0.0).then(|| DVec2::new(off.perp_dot(row), col.perp_dot(off)) / determinant)
     }
 
     /// Distance of a place from the vertex in edges of the print; to first order.
-    pub fn distance<const N: usize>(&self, place: [f64; 2]) -> Option<f64> {
-        let [col, row] = self.steps_to(place)?;
-        let [x, y] = kind::<N>().position(row, col);
-        Some(x.hypot(y))
+    pub fn distance<const N: usize>(&self, place: DVec2) -> Option<f64> {
+        let DVec2 { x: col, y: row } = self.steps_to(place)?;
+        let way = kind::<N>().position(row, col);
+        Some(way.x.hypot(way.y))
     }
 }
 
 /// The mean length of an edge among known corners, px.
-fn edge_px(known: &[(f64, Vertex, [f64; 2])], distance: impl Fn(Vertex) -> f64) -> Option<f64> {
+fn edge_px(known: &[(f64, Vertex, DVec2)], distance: impl Fn(Vertex) -> f64) -> Option<f64> {
     let (_, first, at) = *known.first()?;
     let others = || known.iter().skip(1);
-    let px: f64 = others().map(|(.., p)| (p[0] - at[0]).hypot(p[1] - at[1])).sum();
+    let px: f64 = others().map(|(.., p)| (p.x - at.x).hypot(p.y - at.y)).sum();
     let edges: f64 = others().map(|&(_, v, _)| distance(v - first)).sum();
     (edges > 0.0 && px > 0.0).then(|| px / edges)
 }
@@ -190,13 +191,13 @@ mod tests {
     use super::*;
 
     /// A steep view of a lattice.
-    fn seen(v: Vertex) -> [f64; 2] {
-        let [x, y] = kind::<6>().position(v.row.into(), v.col.into());
+    fn seen(v: Vertex) -> DVec2 {
+        let DVec2 { x, y } = kind::<6>().position(v.row.into(), v.col.into());
         let depth = 1.0 + 0.05 * x - 0.03 * y;
-        [500.0 + 40.0 * x / depth, 400.0 - 40.0 * y / depth]
+        DVec2::new(500.0 + 40.0 * x / depth, 400.0 - 40.0 * y / depth)
     }
 
-    fn bend(known: impl Fn(Vertex) -> Option<[f64; 2]>) -> Bend {
+    fn bend(known: impl Fn(Vertex) -> Option<DVec2>) -> Bend {
         let square = (-5..=5).flat_map(|row| (-5..=5).map(move |col| Vertex::new(row, col)));
         Bend::of::<6>(square, known, 0)
     }

@@ -7,6 +7,7 @@
 //! chance explains is told by the scatter of the corners' gradients, so that pixels which depend on each
 //! other, or a model that holds only nearly, make no evidence.
 
+use glam::DVec2;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::blurred_corner::PLACES_OF_FOUR;
@@ -180,7 +181,7 @@ pub struct Sample {
     /// Pixels that show nothing else.
     pub window: Window,
     /// The pixel in its middle.
-    pub centre: [f64; 2],
+    pub centre: DVec2,
     /// What was found of it.
     pub corner: Corner<3>,
     /// What it leaves, over half the contrast.
@@ -510,7 +511,7 @@ impl Estimate {
 #[derive(Clone)]
 struct Member<const K: usize> {
     window: Window,
-    centre: [f64; 2],
+    centre: DVec2,
     corner: Corner<K>,
 }
 
@@ -874,20 +875,20 @@ mod tests {
         let mut fine = vec![0.0f64; (COUNT * SIDE * FINE).pow(2)];
         let mut corners = Vec::new();
         for tile in 0..COUNT * COUNT {
-            let first = [tile % COUNT, tile / COUNT].map(|c| (c * SIDE) as f64);
+            let first = DVec2::from([tile % COUNT, tile / COUNT].map(|c| (c * SIDE) as f64));
             let position = first.map(|c| c + (SIDE / 2) as f64 + rng.random_range(-0.5..0.5));
             let (turn, roll) = (rng.random_range(0.0..1.0), rng.random_range(0.0..1.0f64));
-            let on_paper = |[x, y]: [f64; 2]| {
-                let [u, v] = [x - position[0], y - position[1]];
-                [u * roll.cos() + v * roll.sin(), (v * roll.cos() - u * roll.sin()) / shrink]
+            let on_paper = |place: DVec2| {
+                let off = DVec2::from_angle(-roll).rotate(place - position);
+                DVec2::new(off.x, off.y / shrink)
             };
             let lines = [0, 1, 2].map(|k| turn + f64::from(k) * PI / 3.0);
             let distances =
-                |paper: [f64; 2]| lines.map(|line| line.cos() * paper[1] - line.sin() * paper[0]);
+                |paper: DVec2| lines.map(|line| DVec2::from_angle(line).perp_dot(paper));
             for y in 0..SIDE * FINE {
                 for x in 0..SIDE * FINE {
                     let place = [x, y].map(|c| (c as f64 + 0.5) / FINE as f64 - 0.5);
-                    let h = distances(on_paper([0, 1].map(|i| place[i] + first[i])));
+                    let h = distances(on_paper(DVec2::from(place) + first));
                     let grown = ink * EDGE_PX;
                     let sides = [h[0] < grown, h[1] > -grown, h[2] < grown];
                     let is_dark = sides.iter().filter(|&&side| side).count() > 1;
@@ -896,15 +897,12 @@ mod tests {
                 }
             }
             let edge = |line: &f64| {
-                let in_picture = |[x, y]: [f64; 2]| {
-                    let y = y * shrink;
-                    [x * roll.cos() - y * roll.sin(), x * roll.sin() + y * roll.cos()]
-                };
-                let along = in_picture([line.cos(), line.sin()]);
-                let across = in_picture([-line.sin(), line.cos()]);
-                let length = along[0].hypot(along[1]);
-                let off = (along[0] * across[1] - along[1] * across[0]).abs() / length;
-                (along[1].atan2(along[0]), EDGE_PX * off)
+                let in_picture =
+                    |way: DVec2| DVec2::from_angle(roll).rotate(DVec2::new(way.x, way.y * shrink));
+                let line = DVec2::from_angle(*line);
+                let (along, across) = (in_picture(line), in_picture(line.perp()));
+                let off = along.perp_dot(across).abs() / along.length();
+                (along.to_angle(), EDGE_PX * off)
             };
             let mut edges: Vec<(f64, f64)> = lines.iter().map(edge).collect();
             // What is before a line lies behind the same line the other way.
@@ -916,7 +914,7 @@ mod tests {
                 blur_px: BLUR_PX,
                 amplitude: if turned % 2 == 0 { 0.35 } else { -0.35 },
                 level: 0.45,
-                slope: [0.0; 2],
+                slope: DVec2::ZERO,
                 angles: [0, 1, 2].map(|k| edges[k].0),
                 bends: [0.0; 3],
                 across_px: [0, 1, 2].map(|k| edges[k].1),
@@ -967,7 +965,7 @@ mod tests {
         corner: &Corner<3>,
         optics: &Optics,
     ) -> Fitted<3> {
-        let start = Corner { position: corner.position.map(f64::round), ..*corner };
+        let start = Corner { position: corner.position.round(), ..*corner };
         fitter.fit(image.into(), &Window::new(9), &start, (optics, Accuracy::Full)).unwrap()
     }
 
@@ -988,7 +986,7 @@ mod tests {
     fn compare_gradients<const K: usize>(image: &Gray<f32>, corner: &Corner<K>, optics: &Optics) {
         /// A corner's black and white, between which a piece of the curve is held.
         const LIGHT: [usize; 2] = [3, 4];
-        let (window, centre) = (Window::new(9), corner.position.map(f64::round));
+        let (window, centre) = (Window::new(9), corner.position.round());
         let common: Vec<Common> = (0..PARAMS).map(|p| optics.common(p)).collect();
         let mut fitter = CornerFitter::default();
         let mut joint = |corner: &Corner<K>, optics: &Optics| {
@@ -1033,7 +1031,7 @@ mod tests {
                     fitted(&mut fitter, &image, corner, &known);
                 Sample {
                     window: Window::new(9),
-                    centre: corner.position.map(f64::round),
+                    centre: corner.position.round(),
                     corner: found,
                     residual: noise / found.amplitude.abs(),
                 }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use glam::DVec2;
+
 use super::grow::SaddleGrid;
 use crate::lattice::{GridKind, LatticeMap, Vertex};
 
@@ -62,8 +64,8 @@ pub fn fit_rectangle(
             // The square that the first row and column span at (0, 0), in the grid's labels.
             let square =
                 (at.row - i32::from(turns >= 2)) + (at.col - i32::from(matches!(turns, 1 | 2)));
-            let [x, y] = grid.get(&at).map_or([0.0; 2], |placed| placed.position);
-            ((square.rem_euclid(2) == 0) != inverted, [y, -x])
+            let place = grid.get(&at).map_or(DVec2::ZERO, |placed| placed.position);
+            ((square.rem_euclid(2) == 0) != inverted, [place.y, -place.x])
         };
         key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
     })?;
@@ -89,7 +91,7 @@ mod tests {
                     2 => (-r, -c),
                     _ => (-c, r),
                 };
-                let position = [f64::from(c), -f64::from(r)];
+                let position = DVec2::new(c.into(), -f64::from(r));
                 (low + Vertex::new(row, col), PlacedSaddle { position, amplitude: 1.0 })
             })
             .collect()

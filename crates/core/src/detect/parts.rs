@@ -9,6 +9,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
+
 use super::buckets::Buckets;
 use super::edge::{MAX_CHORD_RAD, is_clean};
 use super::effort::Effort;
@@ -137,7 +139,7 @@ fn adopt<const N: usize>(
     adopted
 }
 
-fn at<const N: usize>(grid: &Growing<N>) -> impl Fn(Vertex) -> Option<[f64; 2]> + Copy {
+fn at<const N: usize>(grid: &Growing<N>) -> impl Fn(Vertex) -> Option<DVec2> + Copy {
     |v| grid.get(&v).map(|grown| grown.saddle.position)
 }
 
@@ -157,7 +159,7 @@ fn candidates<const N: usize>(
     let Some((middle, reach_px)) = surroundings(grid) else {
         return Vec::new();
     };
-    let corners: Vec<[f64; 2]> = grid.values().map(|grown| grown.saddle.position).collect();
+    let corners: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
     let (vertices, corners): (Vec<Vertex>, _) =
         (grid.keys().copied().collect(), Buckets::of(&corners));
     let mut maps: BTreeMap<Vertex, Option<LocalMap>> = BTreeMap::new();
@@ -172,14 +174,15 @@ fn candidates<const N: usize>(
         };
         let map =
             maps.entry(nearest).or_insert_with(|| LocalMap::about::<N>(nearest, at(grid), bend));
-        let Some([col, row]) = map.and_then(|map| map.steps_to(saddle.position)) else {
+        let Some(DVec2 { x: col, y: row }) = map.and_then(|map| map.steps_to(saddle.position))
+        else {
             continue;
         };
-        let [x, y] = kind::<N>().position(row, col);
+        let way = kind::<N>().position(row, col);
         let step = Vertex::new(row.round() as i32, col.round() as i32);
         let vertex = nearest + step;
-        if x.hypot(y) <= MAX_REACH && !grid.contains_key(&vertex) {
-            found.push((x.hypot(y), index, vertex));
+        if way.x.hypot(way.y) <= MAX_REACH && !grid.contains_key(&vertex) {
+            found.push((way.x.hypot(way.y), index, vertex));
         }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -187,23 +190,17 @@ fn candidates<const N: usize>(
 }
 
 /// A circle around all places that a grid says anything of.
-fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<([f64; 2], f64)> {
-    let places: Vec<[f64; 2]> = grid.values().map(|grown| grown.saddle.position).collect();
+fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<(DVec2, f64)> {
+    let places: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
     let edges_px = grid.iter().flat_map(|(&v, grown)| {
         let neighbours = neighbours::<N>(v).into_iter().filter_map(at(grid));
-        neighbours.map(|p| distance(p, grown.saddle.position))
+        neighbours.map(|place| place.distance(grown.saddle.position))
     });
     let longest_px = edges_px.reduce(f64::max)?;
-    let [lower, upper] = [f64::min, f64::max].map(|end: fn(f64, f64) -> f64| {
-        places.iter().copied().reduce(|a, b| [end(a[0], b[0]), end(a[1], b[1])])
-    });
-    let (lower, upper) = (lower?, upper?);
-    let middle = [0, 1].map(|axis| f64::midpoint(lower[axis], upper[axis]));
-    Some((middle, distance(lower, upper) / 2.0 + NEARER * MAX_REACH * longest_px))
-}
-
-pub(super) fn distance(p: [f64; 2], q: [f64; 2]) -> f64 {
-    (p[0] - q[0]).hypot(p[1] - q[1])
+    let lower = places.iter().copied().reduce(DVec2::min)?;
+    let upper = places.iter().copied().reduce(DVec2::max)?;
+    let reach_px = lower.distance(upper) / 2.0 + NEARER * MAX_REACH * longest_px;
+    Some((lower.midpoint(upper), reach_px))
 }
 
 /// The saddle as a corner of a grid, if it lies at a vertex and looks as the map of the grid says.
@@ -228,10 +225,7 @@ fn belongs<const N: usize>(
         GridKind::Deltille => 0,
         GridKind::Checker => (vertex.row + vertex.col).rem_euclid(2) as usize,
     };
-    let direction = |k: usize| {
-        let [x, y] = map.along(step::<N>(k));
-        y.atan2(x)
-    };
+    let direction = |k: usize| map.along(step::<N>(k)).to_angle();
     let off = |shift: usize| {
         let turns = (0..N).map(|k| turn(saddle.sectors.rays[k], direction(k + shift)).abs());
         turns.fold(0.0, f64::max)
@@ -264,8 +258,8 @@ fn is_joined<const N: usize>(
 fn contrast_near<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<f64> {
     let far = |v: &Vertex| {
         let step = *v - vertex;
-        let [x, y] = kind::<N>().position(step.row.into(), step.col.into());
-        x.hypot(y)
+        let way = kind::<N>().position(step.row.into(), step.col.into());
+        way.x.hypot(way.y)
     };
     let nearest = grid.iter().min_by(|a, b| far(a.0).total_cmp(&far(b.0)))?;
     Some(nearest.1.saddle.sectors.amplitude)

@@ -1,10 +1,12 @@
 //! Points by their neighbourhood: a square of buckets over all of them.
 
+use glam::DVec2;
+
 /// Points in buckets about as many as they are, so that a bucket holds few.
 #[derive(Clone, Debug)]
 pub struct Places<'a> {
-    points: &'a [[f64; 2]],
-    origin: [f64; 2],
+    points: &'a [DVec2],
+    origin: DVec2,
     side_px: f64,
     cols: usize,
     rows: usize,
@@ -16,11 +18,10 @@ pub struct Places<'a> {
 
 impl<'a> Places<'a> {
     /// An index of finite points.
-    pub fn new(points: &'a [[f64; 2]]) -> Self {
-        let bound = |pick: fn(f64, f64) -> f64, i: usize| points.iter().map(|p| p[i]).reduce(pick);
-        let low = [0, 1].map(|i| bound(f64::min, i).unwrap_or(0.0));
-        let high = [0, 1].map(|i| bound(f64::max, i).unwrap_or(0.0));
-        let [width, height] = [0, 1].map(|i| high[i] - low[i]);
+    pub fn new(points: &'a [DVec2]) -> Self {
+        let bound = |pick: fn(DVec2, DVec2) -> DVec2| points.iter().copied().reduce(pick);
+        let low = bound(DVec2::min).unwrap_or_default();
+        let DVec2 { x: width, y: height } = bound(DVec2::max).unwrap_or_default() - low;
         let count = points.len().max(1) as f64;
         // Of points in a line there are as many buckets as points.
         let side_px = (width * height / count).sqrt().max(width.max(height) / count).max(1.0);
@@ -49,13 +50,13 @@ impl<'a> Places<'a> {
         found
     }
 
-    fn cell(&self, point: [f64; 2]) -> [usize; 2] {
+    fn cell(&self, point: DVec2) -> [usize; 2] {
         // Conversions saturate, so points outside fall to the border.
-        let along = |i: usize| ((point[i] - self.origin[i]) / self.side_px) as usize;
-        [along(0).min(self.cols - 1), along(1).min(self.rows - 1)]
+        let DVec2 { x, y } = (point - self.origin) / self.side_px;
+        [(x as usize).min(self.cols - 1), (y as usize).min(self.rows - 1)]
     }
 
-    fn bucket(&self, point: [f64; 2]) -> usize {
+    fn bucket(&self, point: DVec2) -> usize {
         let [col, row] = self.cell(point);
         row * self.cols + col
     }
@@ -87,8 +88,8 @@ impl<'a> Places<'a> {
                     let bucket = y as usize * self.cols + x as usize;
                     let places = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
                     near.extend(self.order[places].iter().map(|&i| i as usize).filter_map(|i| {
-                        let [dx, dy] = [0, 1].map(|k| self.points[i][k] - here[k]);
-                        (i != index && wanted(i)).then_some((dx * dx + dy * dy, i))
+                        let d2 = self.points[i].distance_squared(here);
+                        (i != index && wanted(i)).then_some((d2, i))
                     }));
                 }
             }
@@ -116,15 +117,15 @@ mod tests {
         for (count, [width, height]) in
             [(1, [5.0, 5.0]), (7, [900.0, 0.0]), (40, [3.0, 700.0]), (300, [640.0, 480.0])]
         {
-            let mut point = || [random.random::<f64>() * width, random.random::<f64>() * height];
+            let mut point =
+                || DVec2::new(random.random::<f64>() * width, random.random::<f64>() * height);
             // Some of them crowded, and two in one place.
             let mut points: Vec<_> = (0..count).map(|_| point()).collect();
-            points.extend((0..count / 2).map(|_| point().map(|c| 0.05 * c)));
+            points.extend((0..count / 2).map(|_| 0.05 * point()));
             points.push(points[0]);
             let places = Places::new(&points);
             for i in 0..points.len() {
-                let distance =
-                    |j: usize| (points[i][0] - points[j][0]).hypot(points[i][1] - points[j][1]);
+                let distance = |j: usize| points[i].distance(points[j]);
                 let wanted = |j: usize| j % 3 != i % 3;
                 let mut all: Vec<usize> =
                     (0..points.len()).filter(|&j| j != i && wanted(j)).collect();

@@ -1,6 +1,8 @@
 //! The paper's fit for either tiling: a cubic surface ([`super::cubic`]) or a quadric
 //! ([`super::quadric`]), and the form of its highest degree, whose zeros are the edges.
 
+use glam::DVec2;
+
 use super::cubic::{CubicFit, Umbilic};
 use super::quadric::{QuadricFit, QuadricSaddle};
 use crate::lattice::GridKind;
@@ -39,7 +41,7 @@ pub enum Form {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittedCorner {
     /// Position, px.
-    pub position: [f64; 2],
+    pub position: DVec2,
     /// The form there.
     pub form: Form,
 }
@@ -59,7 +61,7 @@ impl From<QuadricSaddle> for FittedCorner {
 impl Form {
     /// The form along a unit vector: large where the image is bright. That of degree three is zero
     /// along the edges, that of degree two about there.
-    pub fn towards(&self, [u, v]: [f64; 2]) -> f64 {
+    pub fn towards(&self, DVec2 { x: u, y: v }: DVec2) -> f64 {
         match *self {
             Form::Cubic([a, b, c, d]) => {
                 a * u * u * u + b * u * u * v + c * u * v * v + d * v * v * v
@@ -90,7 +92,7 @@ impl Polynomial {
     pub fn refine(
         &self,
         image: ImageView,
-        start: [f64; 2],
+        start: DVec2,
         iterations: usize,
     ) -> Option<FittedCorner> {
         match self {
@@ -100,7 +102,7 @@ impl Polynomial {
     }
 
     /// [`Self::refine`] as closely as a first look needs.
-    pub fn find(&self, image: ImageView, start: [f64; 2]) -> Option<FittedCorner> {
+    pub fn find(&self, image: ImageView, start: DVec2) -> Option<FittedCorner> {
         let (most, found_px) = (FIND_ITERATIONS, FOUND_PX);
         match self {
             Self::Cubic(fit) => fit.walk(image, start, most, found_px).map(FittedCorner::from),
@@ -109,7 +111,7 @@ impl Polynomial {
     }
 
     /// The first step of that fit, px; `None` where it sees no corner.
-    pub fn step(&self, image: ImageView, start: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
         match self {
             Self::Cubic(fit) => fit.step(image, start),
             Self::Quadric(fit) => fit.step(image, start),
@@ -129,18 +131,18 @@ mod tests {
             0.001 * (u * u * u - 3.0 * u * v * v)
         });
         let fit = Polynomial::new(GridKind::Deltille, 3);
-        let form = fit.refine((&monkey).into(), [32.0, 32.0], 5).unwrap().form;
-        assert!(form.towards([1.0, 0.0]) > 0.0 && form.towards([-1.0, 0.0]) < 0.0);
+        let form = fit.refine((&monkey).into(), DVec2::splat(32.0), 5).unwrap().form;
+        assert!(form.towards(DVec2::X) > 0.0 && form.towards(DVec2::NEG_X) < 0.0);
         let saddle = Gray::from_fn(64, 64, |x, y| {
             let (u, v) = (x as f32 - 32.0, y as f32 - 32.0);
             0.01 * (u * u - v * v)
         });
         let fit = Polynomial::new(GridKind::Checker, 3);
-        let form = fit.refine((&saddle).into(), [32.0, 32.0], 5).unwrap().form;
+        let form = fit.refine((&saddle).into(), DVec2::splat(32.0), 5).unwrap().form;
         assert!(
-            form.towards([1.0, 0.0]) > 0.0
-                && form.towards([0.0, 1.0]) < 0.0
-                && form.towards([-1.0, 0.0]) > 0.0
+            form.towards(DVec2::X) > 0.0
+                && form.towards(DVec2::Y) < 0.0
+                && form.towards(DVec2::NEG_X) > 0.0
         );
     }
 }

@@ -7,6 +7,8 @@
 //! The corner is the stationary point, 2c1 u + c2 v + c4 = 0 and c2 u + 2c3 v + c5 = 0, a saddle
 //! where the Hessian's determinant 4 c1 c3 − c2² is negative. The fit is [`super::cone_fit`]'s.
 
+use glam::DVec2;
+
 use super::cone_fit::{ConeFit, Powers};
 use crate::raster::ImageView;
 
@@ -20,7 +22,7 @@ const CONVERGED_PX: f64 = 0.001;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadricSaddle {
     /// Position, px.
-    pub position: [f64; 2],
+    pub position: DVec2,
     /// c1 … c3 of the last surface.
     pub form: [f64; 3],
 }
@@ -42,7 +44,7 @@ impl QuadricFit {
     pub fn refine(
         &self,
         image: ImageView,
-        start: [f64; 2],
+        start: DVec2,
         iterations: usize,
     ) -> Option<QuadricSaddle> {
         self.walk(image, start, iterations, CONVERGED_PX)
@@ -52,7 +54,7 @@ impl QuadricFit {
     pub fn walk(
         &self,
         image: ImageView,
-        start: [f64; 2],
+        start: DVec2,
         iterations: usize,
         converged_px: f64,
     ) -> Option<QuadricSaddle> {
@@ -60,10 +62,9 @@ impl QuadricFit {
         let mut position = start;
         for iteration in 1.. {
             let coefficients = self.fit.coefficients(image, position)?;
-            let [dx, dy] = stationary_point(coefficients)?;
-            position = [position[0] + dx, position[1] + dy];
-            let way2 = (position[0] - start[0]).powi(2) + (position[1] - start[1]).powi(2);
-            let step2 = dx * dx + dy * dy;
+            let step = stationary_point(coefficients)?;
+            position += step;
+            let (way2, step2) = (position.distance_squared(start), step.length_squared());
             if step2.max(way2) > radius * radius {
                 return None;
             }
@@ -76,16 +77,16 @@ impl QuadricFit {
     }
 
     /// The way from `start` to the saddle point of the surface there; `None` when it has none.
-    pub fn step(&self, image: ImageView, start: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn step(&self, image: ImageView, start: DVec2) -> Option<DVec2> {
         stationary_point(self.fit.coefficients(image, start)?)
     }
 }
 
 /// The saddle point of a quadric; `None` for bowls and flat surfaces.
-fn stationary_point([c1, c2, c3, c4, c5]: [f64; 5]) -> Option<[f64; 2]> {
+fn stationary_point([c1, c2, c3, c4, c5]: [f64; 5]) -> Option<DVec2> {
     let determinant = 4.0 * c1 * c3 - c2 * c2;
-    let point = [(c2 * c5 - 2.0 * c3 * c4) / determinant, (c2 * c4 - 2.0 * c1 * c5) / determinant];
-    (determinant < 0.0 && point.iter().all(|c| c.is_finite())).then_some(point)
+    let point = DVec2::new(c2 * c5 - 2.0 * c3 * c4, c2 * c4 - 2.0 * c1 * c5) / determinant;
+    (determinant < 0.0 && point.is_finite()).then_some(point)
 }
 
 #[cfg(test)]
@@ -100,15 +101,18 @@ mod tests {
     #[test]
     fn a_saddle_is_found_exactly_in_two_steps() {
         let saddle = surface(|u, v| 0.01 * (u * u - 2.0 * v * v + 0.5 * u * v) + 3.0);
-        let [x, y] = QuadricFit::new(5).refine((&saddle).into(), [20.0, 20.0], 2).unwrap().position;
-        assert!((x - 20.3).hypot(y - 18.9) < 1e-3, "{x} {y}");
+        let found =
+            QuadricFit::new(5).refine((&saddle).into(), DVec2::splat(20.0), 2).unwrap().position;
+        assert!(found.distance(DVec2::new(20.3, 18.9)) < 1e-3, "{found}");
     }
 
     #[test]
     fn bowls_planes_and_borders_are_refused() {
         let fit = QuadricFit::new(3);
-        assert!(fit.refine((&surface(|u, v| u * u + v * v)).into(), [20.0, 20.0], 5).is_none());
-        assert!(fit.refine((&surface(|_, _| 1.0)).into(), [20.0, 20.0], 5).is_none());
-        assert!(fit.refine((&surface(|u, v| u * v)).into(), [3.0, 20.0], 5).is_none());
+        assert!(
+            fit.refine((&surface(|u, v| u * u + v * v)).into(), DVec2::splat(20.0), 5).is_none()
+        );
+        assert!(fit.refine((&surface(|_, _| 1.0)).into(), DVec2::splat(20.0), 5).is_none());
+        assert!(fit.refine((&surface(|u, v| u * v)).into(), DVec2::new(3.0, 20.0), 5).is_none());
     }
 }

@@ -13,6 +13,7 @@
 
 use std::f64::consts::TAU;
 
+use glam::DVec2;
 use nalgebra::{Matrix2, Vector2};
 
 use super::saddles::{Saddle, SaddleFinder};
@@ -37,7 +38,7 @@ const LEAST_STRETCH: f64 = 1.5;
 
 /// An affine view of the surroundings of a place.
 pub struct Rectified {
-    place: Vector2<f64>,
+    place: DVec2,
     edge_px: f64,
     image_from_patch: Matrix2<f64>,
 }
@@ -46,18 +47,14 @@ impl Rectified {
     /// The views around `place` in which edge `k` of the lattice, seen along `edges[0]`, and the next
     /// one counter-clockwise, along `edges[1]`, lie as on the print, smaller and larger. `None` when they are in
     /// line.
-    pub fn views<const N: usize>(
-        place: [f64; 2],
-        k: usize,
-        edges: [[f64; 2]; 2],
-    ) -> [Option<Self>; 2] {
+    pub fn views<const N: usize>(place: DVec2, k: usize, edges: [DVec2; 2]) -> [Option<Self>; 2] {
         EDGES_PX.map(|edge_px| Self::new::<N>(place, k, edges, edge_px))
     }
 
     fn new<const N: usize>(
-        place: [f64; 2],
+        place: DVec2,
         k: usize,
-        edges: [[f64; 2]; 2],
+        edges: [DVec2; 2],
         edge_px: f64,
     ) -> Option<Self> {
         // Image angles fall counter-clockwise on the print.
@@ -66,14 +63,10 @@ impl Rectified {
             edge_px * Vector2::new(angle.cos(), angle.sin())
         };
         let patch = Matrix2::from_columns(&[direction(k), direction(k + 1)]);
-        let image = Matrix2::from_columns(&edges.map(Vector2::from));
+        let image = Matrix2::from_columns(&edges.map(|edge| edge.to_array().into()));
         let image_from_patch = image * patch.try_inverse()?;
         // A mirrored view is no view of this print.
-        (image_from_patch.determinant() > 0.0).then_some(Self {
-            place: place.into(),
-            edge_px,
-            image_from_patch,
-        })
+        (image_from_patch.determinant() > 0.0).then_some(Self { place, edge_px, image_from_patch })
     }
 
     /// Whether the patch shows more than a level of the pyramid by itself: tiles that are narrow there, or
@@ -99,12 +92,12 @@ impl Rectified {
         // That reach, and the way.
         let way_px = MAX_WAY * self.edge_px;
         let half_side = (FIT_REACH_PX + way_px) as usize + 1;
-        let centre = Vector2::repeat(half_side as f64);
-        let in_level_0 = |at: Vector2<f64>| self.place + self.image_from_patch * (at - centre);
-        let in_image = |at| Vector2::from(Pyramid::from_level_0(level, in_level_0(at).into()));
+        let centre = DVec2::splat(half_side as f64);
+        let in_level_0 = |at: DVec2| self.place + self.way_in_image(at - centre);
+        let in_image = |at: DVec2| Pyramid::from_level_0(level, in_level_0(at));
         let side = 2 * half_side + 1;
         let inside = [[0, 0], [side, 0], [0, side], [side, side]].into_iter().all(|[x, y]| {
-            let at = in_image(Vector2::new(x as f64, y as f64));
+            let at = in_image(DVec2::new(x as f64, y as f64));
             at.x >= 0.0
                 && at.y >= 0.0
                 && at.x < (image.width() - 1) as f64
@@ -113,22 +106,22 @@ impl Rectified {
         if !inside {
             return None;
         }
-        let origin = in_image(Vector2::zeros());
-        let [right, below] =
-            [Vector2::x(), Vector2::y()].map(|step: Vector2<f64>| in_image(step) - origin);
+        let origin = in_image(DVec2::ZERO);
+        let [right, below] = [DVec2::X, DVec2::Y].map(|step| in_image(step) - origin);
         let patch = Gray::from_fn(side, side, |x, y| {
-            let [along, down] = [x as f64, y as f64];
-            let at = [0, 1].map(|i| origin[i] + along * right[i] + down * below[i]);
-            (image.bilinear_inside(at[0], at[1]) + 0.5) as i16
+            let at = origin + x as f64 * right + y as f64 * below;
+            (image.bilinear_inside(at.x, at.y) + 0.5) as i16
         });
-        let turned = |ray: f64| {
-            let along = self.image_from_patch * Vector2::new(ray.cos(), ray.sin());
-            along.y.atan2(along.x)
-        };
-        finder.near_in(&patch, centre.into(), way_px, |found| {
+        let turned = |ray: f64| self.way_in_image(DVec2::from_angle(ray)).to_angle();
+        finder.near_in(&patch, centre, way_px, |found| {
             let sectors = Sectors { rays: found.sectors.rays.map(turned), ..found.sectors };
-            let position = in_level_0(found.position.into()).into();
-            accept(Saddle { position, sectors, level })
+            accept(Saddle { position: in_level_0(found.position), sectors, level })
         })
+    }
+
+    /// A way in the patch as it is in the picture, px.
+    fn way_in_image(&self, way: DVec2) -> DVec2 {
+        let seen = self.image_from_patch * Vector2::new(way.x, way.y);
+        DVec2::new(seen.x, seen.y)
     }
 }

@@ -7,13 +7,18 @@
 //! use deltille_core::detect::{Refinement, Refiner};
 //! use deltille_core::synth::SimulatedCorner;
 //! use deltille_core::lattice::GridKind;
+//! use glam::DVec2;
 //!
-//! let image = SimulatedCorner::seen_from(2, 0.3, 0.5, [20.2, 19.9], 1.0).render(41, 41);
-//! let refined = Refiner::new(GridKind::Checker, Refinement::Model, 21).refine(&image, [21.0, 20.0]);
-//! assert!((refined.position[0] - 20.2).abs() < 1e-3 && refined.cov.is_some());
+//! let place = DVec2::new(20.2, 19.9);
+//! let image = SimulatedCorner::seen_from(2, 0.3, 0.5, place, 1.0).render(41, 41);
+//! let refiner = Refiner::new(GridKind::Checker, Refinement::Model, 21);
+//! let refined = refiner.refine(&image, DVec2::new(21.0, 20.0));
+//! assert!(refined.position.abs_diff_eq(place, 1e-3) && refined.cov.is_some());
 //! ```
 
 use std::borrow::Cow;
+
+use glam::DVec2;
 
 use super::clearance::{Edge, NOTHING, Surroundings};
 use super::corner_model::{Accuracy, Corner, CornerFitter, Fitted, MAX_RADIUS, Window};
@@ -63,7 +68,7 @@ pub enum RefineStatus {
 #[non_exhaustive]
 pub struct Refined {
     /// Position, px.
-    pub position: [f64; 2],
+    pub position: DVec2,
     /// Covariance xx, xy, yy, px², where the method gives one.
     pub cov: Option<[f64; 3]>,
     /// Which method found it.
@@ -85,7 +90,7 @@ pub(super) struct ModelFit {
 
 impl ModelFit {
     /// Position, px.
-    pub fn position(&self) -> [f64; 2] {
+    pub fn position(&self) -> DVec2 {
         self.corner.position
     }
 
@@ -128,19 +133,19 @@ pub(super) struct Room<'a> {
 
 impl Room<'_> {
     /// The pixels of the image that show nothing but the corner at `position`, within a radius.
-    fn window(&self, image: ImageView, position: [f64; 2], radius: usize) -> Window {
+    fn window(&self, image: ImageView, position: DVec2, radius: usize) -> Window {
         let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 1.0);
-        let pixel = position.map(f64::round);
-        let off = [0, 1].map(|i| pixel[i] - position[i]);
+        let pixel = position.round();
+        let off = pixel - position;
         let span = |v: f64| {
-            if !(0.0..=bottom).contains(&(pixel[1] + v)) {
+            if !(0.0..=bottom).contains(&(pixel.y + v)) {
                 return NOTHING;
             }
-            let [first, last] = self.around.span(v + off[1], self.blur_px);
-            [(first - off[0]).max(-pixel[0]), (last - off[0]).min(right - pixel[0])]
+            let [first, last] = self.around.span(v + off.y, self.blur_px);
+            [(first - off.x).max(-pixel.x), (last - off.x).min(right - pixel.x)]
         };
         let is_off_tags = self.around.off_tags(self.blur_px);
-        Window::within(radius, span, |[u, v]| is_off_tags([u + off[0], v + off[1]]))
+        Window::within(radius, span, |place| is_off_tags(place + off))
     }
 
     /// Half the side of the largest square that shows nothing else, px.
@@ -150,7 +155,7 @@ impl Room<'_> {
 }
 
 /// The window, what the model found in it, and the pixel in its middle.
-type Fit = (Window, ModelFit, [f64; 2]);
+type Fit = (Window, ModelFit, DVec2);
 
 /// Refines corners of one kind.
 #[derive(Clone, Debug)]
@@ -211,7 +216,7 @@ impl Refiner {
     /// The corner near `start`, in the whole window.
     ///
     /// An unknown tone curve is estimated from this corner; [`Self::refine_all`] asks all of a picture.
-    pub fn refine<'a>(&self, image: impl Into<ImageView<'a>>, start: [f64; 2]) -> Refined {
+    pub fn refine<'a>(&self, image: impl Into<ImageView<'a>>, start: DVec2) -> Refined {
         self.refine_all(image, &[start])[0]
     }
 
@@ -219,15 +224,15 @@ impl Refiner {
     pub fn refine_all<'a>(
         &self,
         image: impl Into<ImageView<'a>>,
-        starts: &[[f64; 2]],
+        starts: &[DVec2],
     ) -> Vec<Refined> {
         self.refine_view(image.into(), starts)
     }
 
     /// [`Self::refine_all`], compiled here and not in every crate that uses it.
-    fn refine_view(&self, image: ImageView, starts: &[[f64; 2]]) -> Vec<Refined> {
+    fn refine_view(&self, image: ImageView, starts: &[DVec2]) -> Vec<Refined> {
         let mut fitter = CornerFitter::default();
-        let mut fit = |start: &[f64; 2]| self.refine_with(&mut fitter, image, *start, &self.known);
+        let mut fit = |start: &DVec2| self.refine_with(&mut fitter, image, *start, &self.known);
         let first: Vec<(Refined, Option<Fit>)> = starts.iter().map(&mut fit).collect();
         if self.method == Refinement::Polynomial || self.tone == Tone::Linear {
             return first.into_iter().map(|(refined, _)| refined).collect();
@@ -269,7 +274,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        start: [f64; 2],
+        start: DVec2,
         optics: &Optics,
     ) -> (Refined, Option<Fit>) {
         let found = self.polynomial.refine(image, start, self.iterations).map(|c| c.position);
@@ -279,9 +284,7 @@ impl Refiner {
             Polynomial::Quadric(_) => self.alone::<2>(fitter, image, position, optics),
         };
         match (self.method == Refinement::Model).then(model).flatten() {
-            Some((window, fit)) => {
-                (fit.into(), Some((window.clone(), fit, position.map(f64::round))))
-            }
+            Some((window, fit)) => (fit.into(), Some((window.clone(), fit, position.round()))),
             None => (self.without_model(start, found), None),
         }
     }
@@ -292,7 +295,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        start: [f64; 2],
+        start: DVec2,
         room: Room,
     ) -> (Refined, Option<ModelFit>) {
         let mut model = |position| {
@@ -314,7 +317,7 @@ impl Refiner {
         }
     }
 
-    fn without_model(&self, start: [f64; 2], polynomial: Option<[f64; 2]>) -> Refined {
+    fn without_model(&self, start: DVec2, polynomial: Option<DVec2>) -> Refined {
         let status = match (polynomial, self.method) {
             (None, _) => RefineStatus::Failed,
             (Some(_), Refinement::Polynomial) => RefineStatus::Ok,
@@ -328,7 +331,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        position: [f64; 2],
+        position: DVec2,
         optics: &Optics,
     ) -> Option<(&Window, ModelFit)> {
         let reach = distance_to_rim(image, position);
@@ -343,7 +346,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        position: [f64; 2],
+        position: DVec2,
         room: Room,
         before: Option<&ModelFit>,
     ) -> Option<ModelFit> {
@@ -357,7 +360,7 @@ impl Refiner {
         &self,
         fitter: &mut CornerFitter,
         image: ImageView,
-        position: [f64; 2],
+        position: DVec2,
         room: Room,
         before: Option<&ModelFit>,
     ) -> Option<ModelFit> {
@@ -385,12 +388,7 @@ impl Refiner {
     }
 
     /// The pixels of a corner's room.
-    pub(super) fn window(
-        &self,
-        image: ImageView,
-        position: [f64; 2],
-        room: Room,
-    ) -> Cow<'_, Window> {
+    pub(super) fn window(&self, image: ImageView, position: DVec2, room: Room) -> Cow<'_, Window> {
         let radius = room.reach_px.min(self.largest_radius());
         let is_whole = radius <= room.clear_square_px().min(distance_to_rim(image, position));
         let whole = self.windows.iter().find(|w| w.radius() as f64 == radius && is_whole);
@@ -421,7 +419,7 @@ fn edge_along(edges: &[Edge], angle_rad: f64) -> Edge {
 }
 
 /// Pixels between a position and the nearest side of the image, where bilinear samples end.
-fn distance_to_rim(image: ImageView, [x, y]: [f64; 2]) -> f64 {
+fn distance_to_rim(image: ImageView, DVec2 { x, y }: DVec2) -> f64 {
     let [right, bottom] = [image.width(), image.height()].map(|side| side as f64 - 2.0);
     [x - 1.0, y - 1.0, right - x, bottom - y].into_iter().fold(f64::INFINITY, f64::min)
 }
@@ -440,7 +438,7 @@ mod tests {
     const SIDE: usize = 41;
 
     /// A picture of 5 × 5 corners seen from 45°, their light falling to a third, and their places.
-    fn picture(lines: usize, grey: impl Fn(f64) -> f64, noise: f64) -> (Gray<f32>, Vec<[f64; 2]>) {
+    fn picture(lines: usize, grey: impl Fn(f64) -> f64, noise: f64) -> (Gray<f32>, Vec<DVec2>) {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let normal = Normal::new(0.0, noise).unwrap();
         let mut image = Gray::<f32>::new(5 * SIDE, 5 * SIDE);
@@ -448,7 +446,7 @@ mod tests {
         for tile in 0..25 {
             let (left, top) = (tile % 5 * SIDE, tile / 5 * SIDE);
             let mut at = || (SIDE / 2) as f64 + rng.random_range(-0.5..0.5);
-            let position = [at(), at()];
+            let position = DVec2::new(at(), at());
             let axis = rng.random_range(0.0..std::f64::consts::TAU);
             let light = 1.0 - (tile % 5) as f64 / 6.0;
             let corner = SimulatedCorner {
@@ -461,16 +459,16 @@ mod tests {
                 let value = grey(f64::from(shown.at(x, y))) + normal.sample(&mut rng);
                 image.pixels_mut()[(top + y) * 5 * SIDE + left + x] = value as f32;
             }
-            places.push([left as f64 + position[0], top as f64 + position[1]]);
+            places.push(DVec2::new(left as f64, top as f64) + position);
         }
         (image, places)
     }
 
     /// Rms of the errors per coordinate, px, and of what the covariances make of them.
-    fn errors(refined: &[Refined], places: &[[f64; 2]]) -> (f64, f64) {
+    fn errors(refined: &[Refined], places: &[DVec2]) -> (f64, f64) {
         let (mut square, mut normalised) = (0.0, 0.0);
         for (refined, place) in refined.iter().zip(places) {
-            let [dx, dy] = [0, 1].map(|i| refined.position[i] - place[i]);
+            let DVec2 { x: dx, y: dy } = refined.position - place;
             let [xx, xy, yy] = refined.cov.unwrap();
             square += dx * dx + dy * dy;
             normalised += (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
@@ -488,7 +486,7 @@ mod tests {
         for (kind, lines) in [(GridKind::Deltille, 3), (GridKind::Checker, 2)] {
             for (name, curve) in curves {
                 let (image, places) = picture(lines, curve, 0.005);
-                let starts: Vec<[f64; 2]> = places.iter().map(|p| p.map(f64::round)).collect();
+                let starts: Vec<DVec2> = places.iter().map(|place| place.round()).collect();
                 let refiner = Refiner::new(kind, Refinement::Model, 21).with_tone(Tone::Auto);
                 let (rms, normalised) = errors(&refiner.refine_all(&image, &starts), &places);
                 assert!(rms < 0.015, "{lines} edges, {name}: {rms}");

@@ -8,6 +8,7 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
 use rayon::prelude::*;
 
 use super::clearance::{Surroundings, TagAreas, crossing, surroundings, surroundings_of};
@@ -111,12 +112,12 @@ impl Refiner {
         let taken = (0..count.min(SAMPLES)).map(|i| &places[i * count / SAMPLES.min(count)]);
         let samples = taken.filter_map(|(_, _, blur_px, corner, around)| {
             let room = self.near(around, *blur_px, &self.known);
-            let GridCorner { x, y, .. } = *corner;
-            let fit = self.model(fitter, image, [x, y], room, None)?;
-            let window = self.window(image, [x, y], room).into_owned();
+            let place = corner.position();
+            let fit = self.model(fitter, image, place, room, None)?;
+            let window = self.window(image, place, room).into_owned();
             Some(Sample {
                 window,
-                centre: [x.round(), y.round()],
+                centre: place.round(),
                 corner: fit.corner,
                 residual: fit.residual,
             })
@@ -165,7 +166,7 @@ impl Refiner {
                 let found = smaller.or(fit.filter(|_| around[i].is_inner));
                 (found.map(Refined::from), found)
             };
-            if let Some(Refined { position: [x, y], cov, .. }) = refined {
+            if let Some(Refined { position: DVec2 { x, y }, cov, .. }) = refined {
                 kept.push(GridCorner { x, y, cov, ..*corner });
                 fits.push(fit);
             }
@@ -205,7 +206,7 @@ impl Refiner {
             let here = Vertex::new(corner.row, corner.col);
             let around = kind.steps().iter().filter_map(|&step| blurs.get(&(here + step)).copied());
             let usual_px = median(around.collect()).unwrap_or(fit.blur_px());
-            let [x, y] = fit.position();
+            let DVec2 { x, y } = fit.position();
             let cov = fit.cov.map(|c| c * shape_of_residuals(fit, usual));
             let is_known = cov[0] + cov[2] < WORST_SIGMA_PX * WORST_SIGMA_PX;
             let is_corner = is_known && fit.blur_px() <= MAX_BLUR_RATIO * usual_px;
@@ -216,7 +217,7 @@ impl Refiner {
 
     /// Whether the model can be fitted to what is clear around a corner.
     fn has_room(&self, image: ImageView, corner: &GridCorner, room: Room) -> bool {
-        self.window(image, [corner.x, corner.y], room).count() >= MIN_PIXELS
+        self.window(image, corner.position(), room).count() >= MIN_PIXELS
     }
 
     /// All corners of a grid, each by itself.
@@ -229,8 +230,7 @@ impl Refiner {
     ) -> Vec<(Refined, Option<ModelFit>)> {
         each(grid.corners.len(), |fitter, i| {
             let room = self.near(&around[i], blur_px, optics);
-            let GridCorner { x, y, .. } = grid.corners[i];
-            self.refine_within(fitter, image, [x, y], room)
+            self.refine_within(fitter, image, grid.corners[i].position(), room)
         })
     }
 
@@ -241,12 +241,12 @@ impl Refiner {
         let judged = is_judge(refined);
         let place = |(corner, (_, fit)): (&GridCorner, &(_, Option<ModelFit>))| {
             let lost = judged && fit.is_none();
-            let [x, y] = lost.then(|| crossing(grid, corner)).flatten()?;
-            ((x - corner.x).hypot(y - corner.y) > MAX_WAY_PX).then_some([x, y])
+            let place = lost.then(|| crossing(grid, corner)).flatten()?;
+            (place.distance(corner.position()) > MAX_WAY_PX).then_some(place)
         };
         let places: Vec<_> = grid.corners.iter().zip(refined).map(place).collect();
         for (corner, place) in grid.corners.iter_mut().zip(&places) {
-            [corner.x, corner.y] = place.unwrap_or([corner.x, corner.y]);
+            corner.move_to(place.unwrap_or(corner.position()));
         }
         places.iter().map(Option::is_some).collect()
     }
@@ -304,7 +304,7 @@ impl Refiner {
             .collect();
         places.sort_by(|a, b| b.0.total_cmp(&a.0));
         let fits = places.iter().take(BLUR_CORNERS).filter_map(|(clear_px, corner, around)| {
-            let place = Pyramid::from_level_0(level, [corner.x, corner.y]);
+            let place = Pyramid::from_level_0(level, corner.position());
             // What is a wave shows in the middle of the tiles.
             let reach_px = clear_px.max(MIN_MODEL_RADIUS as f64).floor();
             let room = Room { around, blur_px: USUAL_BLUR_PX, reach_px, optics: &self.known };
@@ -329,7 +329,7 @@ impl Refiner {
             sides.take_while(|&side| side / NEXT_WINDOW > least).map(|side| side.max(least));
         let mut fits = sides.filter_map(|side| {
             let room = Room { reach_px: side.floor(), ..room };
-            self.model(fitter, image, [corner.x, corner.y], room, None)
+            self.model(fitter, image, corner.position(), room, None)
         });
         fits.find(|fit| fit.residual <= limit)
     }

@@ -1,5 +1,7 @@
 //! Corners one by one: candidates of all pyramid levels, fitted, read and merged.
 
+use glam::DVec2;
+
 use super::buckets::Buckets;
 use super::polynomial::{FittedCorner, Polynomial};
 use super::ring::{Candidate, candidates, maxima_near};
@@ -40,7 +42,7 @@ const MOST_CANDIDATES: usize = 250_000;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Saddle<const N: usize> {
     /// Position, px.
-    pub position: [f64; 2],
+    pub position: DVec2,
     /// Its edges and brightness.
     pub sectors: Sectors<N>,
     /// The level of the pyramid on which it was read: the finest that shows it sharply.
@@ -91,7 +93,7 @@ impl<const N: usize> SaddleFinder<N> {
                 candidates_above_noise::<N>(level, NOISE_FACTOR * noise)
             };
             for candidate in candidates {
-                let start = [candidate.x as f64, candidate.y as f64];
+                let start = DVec2::new(candidate.x as f64, candidate.y as f64);
                 // What lies on a corner of a finer level is that corner.
                 if n > 0 && saddles.is_known(Pyramid::to_level_0(n, start), n) {
                     continue;
@@ -125,7 +127,7 @@ impl<const N: usize> SaddleFinder<N> {
         }
         let mut all = saddles.all();
         all.sort_by(|a, b| {
-            let key = |s: &Saddle<N>| [s.position[1], s.position[0]];
+            let key = |s: &Saddle<N>| [s.position.y, s.position.x];
             key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
         });
         all
@@ -149,14 +151,14 @@ impl<const N: usize> SaddleFinder<N> {
 
     /// The saddle of a checkerboard that a narrower fit reaches: squares seen at the rim of a
     /// fisheye lens are no wider than the usual window. (Six sectors do not fit into the smaller.)
-    fn narrow(&self, pyramid: &Pyramid, start: [f64; 2]) -> Option<Saddle<N>> {
+    fn narrow(&self, pyramid: &Pyramid, start: DVec2) -> Option<Saddle<N>> {
         match kind::<N>() {
             GridKind::Deltille => None,
             GridKind::Checker => self.at_size(pyramid, start, USUAL - 1),
         }
     }
 
-    fn at_size(&self, pyramid: &Pyramid, start: [f64; 2], size: usize) -> Option<Saddle<N>> {
+    fn at_size(&self, pyramid: &Pyramid, start: DVec2, size: usize) -> Option<Saddle<N>> {
         let corner = self.fits[size].find((&pyramid.levels()[0]).into(), start)?;
         self.describe(&pyramid.levels()[0], 0, &corner, size)
     }
@@ -175,17 +177,17 @@ impl<const N: usize> SaddleFinder<N> {
     }
 
     /// Whether the next wider fit stays in the same place.
-    fn is_stable(&self, image: &Gray<i16>, position: [f64; 2], size: usize) -> bool {
+    fn is_stable(&self, image: &Gray<i16>, position: DVec2, size: usize) -> bool {
         let wider = &self.fits[size + 1];
         let moved = match kind::<N>() {
             // One step tells.
             GridKind::Deltille => wider.step(image.into(), position),
             // That of a quadric overshoots where the squares are as narrow as its window.
-            GridKind::Checker => wider
-                .find(image.into(), position)
-                .map(|corner| [0, 1].map(|i| corner.position[i] - position[i])),
+            GridKind::Checker => {
+                wider.find(image.into(), position).map(|corner| corner.position - position)
+            }
         };
-        moved.is_some_and(|[dx, dy]| dx.hypot(dy) < STABLE_PX)
+        moved.is_some_and(|moved| moved.length() < STABLE_PX)
     }
 
     /// [`Self::near_in`] a level of a pyramid; places and reach in px of level 0.
@@ -193,7 +195,7 @@ impl<const N: usize> SaddleFinder<N> {
         &self,
         pyramid: &Pyramid,
         level: usize,
-        place: [f64; 2],
+        place: DVec2,
         reach_px: f64,
         accept: impl Fn(Saddle<N>) -> Option<S>,
     ) -> Option<S> {
@@ -210,30 +212,29 @@ impl<const N: usize> SaddleFinder<N> {
     pub fn near_in<S>(
         &self,
         image: &Gray<i16>,
-        place: [f64; 2],
+        place: DVec2,
         reach_px: f64,
         accept: impl Fn(Saddle<N>) -> Option<S>,
     ) -> Option<S> {
-        let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         // From the place itself, and from wherever a corner may be seen.
-        let pixel = place.map(|c| c.max(0.0).round() as usize);
+        let pixel = place.to_array().map(|c| c.max(0.0).round() as usize);
         let maxima = maxima_near::<N>(image, pixel, reach_px.ceil() as usize);
         let mut starts =
-            std::iter::once(place).chain(maxima.into_iter().map(|p| p.map(|c| c as f64)));
+            std::iter::once(place).chain(maxima.into_iter().map(|p| p.map(|c| c as f64).into()));
         let sizes: &[usize] = match kind::<N>() {
             GridKind::Deltille => &[USUAL],
             GridKind::Checker => &[USUAL, USUAL - 1],
         };
         // Many starts lead to the same place, which is looked at once with each fit.
-        let mut refused: Vec<([f64; 2], usize)> = Vec::new();
+        let mut refused: Vec<(DVec2, usize)> = Vec::new();
         starts.find_map(|start| {
             sizes.iter().find_map(|&size| {
                 let corner = self.fits[size].find(image.into(), start)?;
                 let position = corner.position;
-                let same = |&(other, with): &([f64; 2], usize)| {
-                    with == size && distance(position, other) < STABLE_PX
+                let same = |&(other, with): &(DVec2, usize)| {
+                    with == size && position.distance(other) < STABLE_PX
                 };
-                if distance(position, place) > reach_px || refused.iter().any(same) {
+                if position.distance(place) > reach_px || refused.iter().any(same) {
                     return None;
                 }
                 let found = self.describe(image, 0, &corner, size).and_then(&accept);
@@ -297,9 +298,10 @@ fn strongest(candidates: &mut Vec<Candidate>, count: usize) {
 /// Whether a level shows a corner blurred; the coarsest never does, and no place at the border. Blur leaves
 /// in the middle the level between dark and bright; a gap between dots, which looks like a corner where
 /// blur closes it, has its own brightness.
-fn is_blurred<const N: usize>(pyramid: &Pyramid, level: usize, position: [f64; 2]) -> bool {
+fn is_blurred<const N: usize>(pyramid: &Pyramid, level: usize, position: DVec2) -> bool {
     let contrast = |n: usize| {
-        contrast_around::<N>(pyramid.levels().get(n)?, Pyramid::from_level_0(n, position))
+        let place = Pyramid::from_level_0(n, position);
+        contrast_around::<N>(pyramid.levels().get(n)?, place)
     };
     contrast(level).zip(contrast(level + 1)).is_some_and(|(fine, coarse)| {
         let further = (level + 2..=level + LEVELS_OF_CONTRAST).map_while(contrast);
@@ -330,22 +332,21 @@ impl<const N: usize> Merged<N> {
     }
 
     /// Saddles within a distance that is the merging distance of a level, px.
-    fn within(&self, position: [f64; 2], level: usize) -> impl Iterator<Item = (usize, Saddle<N>)> {
+    fn within(&self, position: DVec2, level: usize) -> impl Iterator<Item = (usize, Saddle<N>)> {
         let near = self.places.within(position, merge_px(level));
         near.filter_map(|(i, _)| Some((i, self.all[i]?)))
     }
 
     /// Whether a corner that is as good as what `level` shows lies about as near as a candidate to its own.
-    fn is_known(&self, position: [f64; 2], level: usize) -> bool {
+    fn is_known(&self, position: DVec2, level: usize) -> bool {
         self.within(position, level).any(|(i, other)| !(self.blurred[i] && other.level < level))
     }
 
     /// Whether nothing is known to be there that is as good as what `level` shows.
-    fn is_free(&self, position: [f64; 2], level: usize) -> bool {
-        let distance = |[x, y]: [f64; 2]| (x - position[0]).hypot(y - position[1]);
+    fn is_free(&self, position: DVec2, level: usize) -> bool {
         self.within(position, level).all(|(i, other)| {
             self.blurred[i] && other.level < level
-                || distance(other.position) >= merge_px(other.level)
+                || other.position.distance(position) >= merge_px(other.level)
         })
     }
 

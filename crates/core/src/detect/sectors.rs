@@ -20,6 +20,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
+use glam::DVec2;
 use multiversion::multiversion;
 
 use super::polynomial::Form;
@@ -68,7 +69,7 @@ pub struct Sectors<const N: usize> {
 
 impl<const N: usize> Sectors<N> {
     /// Reads the sectors around `position`, from circles or else from the form's roots.
-    pub fn read(image: &Gray<i16>, position: [f64; 2], form: &Form) -> Option<Self> {
+    pub fn read(image: &Gray<i16>, position: DVec2, form: &Form) -> Option<Self> {
         let circles = RADII_PX.iter().filter_map(|&radius| {
             Circle::<N>::sample(image, position, radius).filter(Circle::has_its_mean_in_the_middle)
         });
@@ -86,10 +87,7 @@ impl<const N: usize> Sectors<N> {
 
 /// The level half-way between dark and bright and the mean deviation from it on the smallest circle around
 /// a place; `None` at the border.
-pub fn contrast_around<const N: usize>(
-    image: &Gray<i16>,
-    position: [f64; 2],
-) -> Option<(f64, f64)> {
+pub fn contrast_around<const N: usize>(image: &Gray<i16>, position: DVec2) -> Option<(f64, f64)> {
     let smallest = RADII_PX.into_iter().fold(f64::INFINITY, f64::min);
     let circle = Circle::<N>::sample(image, position, smallest)?;
     Some((circle.level, circle.amplitude()))
@@ -112,7 +110,7 @@ struct Circle<const N: usize> {
 
 impl<const N: usize> Circle<N> {
     /// `None` when the circle leaves the image.
-    fn sample(image: &Gray<i16>, [x, y]: [f64; 2], radius: f64) -> Option<Self> {
+    fn sample(image: &Gray<i16>, DVec2 { x, y }: DVec2, radius: f64) -> Option<Self> {
         let inside = x - radius >= 0.0
             && y - radius >= 0.0
             && x + radius + 1.0 < image.width() as f64
@@ -120,7 +118,7 @@ impl<const N: usize> Circle<N> {
         if !inside {
             return None;
         }
-        let values = on_circle(image, [x, y], radius, &DIRECTIONS);
+        let values = on_circle(image, DVec2::new(x, y), radius, &DIRECTIONS);
         let mean = sum(&values, |value| value) / SAMPLES as f64;
         let level = match kind::<N>() {
             // Opposite sectors have opposite colours, so the mean is the level of the edges.
@@ -231,7 +229,7 @@ struct Directions {
 #[multiversion(targets("x86_64+avx2"))]
 fn on_circle(
     image: &Gray<i16>,
-    [x, y]: [f64; 2],
+    DVec2 { x, y }: DVec2,
     radius: f64,
     directions: &Directions,
 ) -> [f64; SAMPLES] {
@@ -364,7 +362,7 @@ fn above_level(values: &[f64; SAMPLES], level: f64) -> [f64; 2] {
 /// The zeros of the form around the circle; `None` unless all roots are real.
 fn roots<const N: usize>(form: &Form) -> Option<[Crossing; N]> {
     let Directions { cos, sin } = &*DIRECTIONS;
-    let values: [f64; SAMPLES] = std::array::from_fn(|k| form.towards([cos[k], sin[k]]));
+    let values: [f64; SAMPLES] = std::array::from_fn(|k| form.towards(DVec2::new(cos[k], sin[k])));
     if changes(EVERY, bits(&values, |value| value > 0.0)) != N as u32 {
         return None;
     }
@@ -438,7 +436,7 @@ mod tests {
         for k in 0..20 {
             let tilt = 0.3 * f64::from(k);
             let image = corner::<N>(tilt);
-            let sectors = Sectors::<N>::read(&image, [20.0, 20.0], &FLAT).unwrap();
+            let sectors = Sectors::<N>::read(&image, DVec2::splat(20.0), &FLAT).unwrap();
             assert!((sectors.level - 400.0).abs() < 20.0 && sectors.amplitude > 250.0);
             for (i, &ray) in sectors.rays.iter().enumerate() {
                 let next = sectors.rays[(i + 1) % N];
@@ -457,19 +455,19 @@ mod tests {
 
     #[test]
     fn corners_of_the_other_kind_and_flat_images_have_no_rays() {
-        let place = [20.0, 20.0];
+        let place = DVec2::splat(20.0);
         assert!(Sectors::<6>::read(&corner::<4>(0.2), place, &FLAT).is_none());
         assert!(Sectors::<4>::read(&corner::<6>(0.2), place, &FLAT).is_none());
         assert!(Sectors::<6>::read(&Gray::new(41, 41), place, &FLAT).is_none());
         assert!(Sectors::<4>::read(&Gray::new(41, 41), place, &FLAT).is_none());
-        assert!(Sectors::<6>::read(&Gray::new(3, 3), [1.0, 1.0], &FLAT).is_none());
+        assert!(Sectors::<6>::read(&Gray::new(3, 3), DVec2::ONE, &FLAT).is_none());
     }
 
     #[test]
     fn circles_are_sampled_as_single_places_are() {
         let image = Gray::from_fn(33, 29, |x, y| ((x * x * 31 + y * y * 17 + x * y) % 1024) as i16);
         for (centre, radius) in [([9.3, 12.9], 8.0), ([16.0, 14.5], 4.5), ([25.99, 3.5], 3.5)] {
-            let values = on_circle(&image, centre, radius, &DIRECTIONS);
+            let values = on_circle(&image, centre.into(), radius, &DIRECTIONS);
             for (k, value) in values.into_iter().enumerate() {
                 let (sin, cos) = angle_of(k as f64).sin_cos();
                 let [x, y] = [centre[0] + radius * cos, centre[1] + radius * sin];
@@ -498,8 +496,8 @@ mod tests {
                     if (y as f64 - 20.0).abs() < half_width { value } else { 400 }
                 })
             };
-            assert!(Sectors::<4>::read(&bar(100), [20.0, 20.0], &FLAT).is_none());
-            assert!(Sectors::<4>::read(&bar(700), [20.0, 20.0], &FLAT).is_none());
+            assert!(Sectors::<4>::read(&bar(100), DVec2::splat(20.0), &FLAT).is_none());
+            assert!(Sectors::<4>::read(&bar(700), DVec2::splat(20.0), &FLAT).is_none());
         }
     }
 
@@ -508,16 +506,10 @@ mod tests {
         let monkey = Form::Cubic([1.0, 0.0, -3.0, 0.0]);
         let rays: [f64; 6] = ordered_rays(&roots(&monkey).unwrap()).unwrap();
         assert!(turn(rays[0], rays[3] + PI).abs() < 1e-9);
-        assert!(
-            monkey.towards([(rays[0] - 0.3).cos(), (rays[0] - 0.3).sin()]) < 0.0,
-            "dark after an even ray"
-        );
+        assert!(monkey.towards(DVec2::from_angle(rays[0] - 0.3)) < 0.0, "dark after an even ray");
         let saddle = Form::Quadratic([1.0, 0.0, -1.0]);
         let rays: [f64; 4] = ordered_rays(&roots(&saddle).unwrap()).unwrap();
         assert!(turn(rays[0], rays[2] + PI).abs() < 1e-9);
-        assert!(
-            saddle.towards([(rays[0] - 0.3).cos(), (rays[0] - 0.3).sin()]) < 0.0,
-            "dark after an even ray"
-        );
+        assert!(saddle.towards(DVec2::from_angle(rays[0] - 0.3)) < 0.0, "dark after an even ray");
     }
 }

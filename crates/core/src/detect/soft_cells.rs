@@ -19,6 +19,7 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
+use glam::DVec2;
 use nalgebra::{DMatrix, Matrix2};
 
 use super::blurred_corner::erf_sqrt_half;
@@ -64,9 +65,9 @@ pub struct CellModel {
     /// Distance from the tile's edges to the border of the tag.
     margin_bits: f64,
     /// Samples, in tile coordinates.
-    points: Vec<[f64; 2]>,
+    points: Vec<DVec2>,
     /// Parts of the cells: the bit, and their middle in tile coordinates.
-    parts: Vec<(usize, [f64; 2])>,
+    parts: Vec<(usize, DVec2)>,
 }
 
 /// The blur in a tile's coordinates, and the noise.
@@ -118,7 +119,7 @@ impl CellModel {
         let points = (0..bits).flat_map(|bit| {
             let centre = cells.centre(bit, inset_bits);
             let corners = cells.corners(bit, inset_bits);
-            let half_way = move |c: [f64; 2]| [0, 1].map(|i| 0.5 * (c[i] + centre[i]));
+            let half_way = move |corner: DVec2| corner.midpoint(centre);
             std::iter::once(centre).chain(corners.into_iter().map(half_way))
         });
         let parts = (0..bits).flat_map(|bit| {
@@ -136,7 +137,7 @@ impl CellModel {
     }
 
     /// Where a tile is sampled, in its coordinates.
-    pub fn points(&self) -> &[[f64; 2]] {
+    pub fn points(&self) -> &[DVec2] {
         &self.points
     }
 
@@ -182,16 +183,16 @@ impl CellModel {
         let gain = part_area / (std::f64::consts::TAU * determinant.sqrt());
         for (i, point) in self.points.iter().enumerate() {
             for &(bit, part) in &self.parts {
-                let [du, dv] = [0, 1].map(|k| (point[k] - part[k]) * self.width);
+                let DVec2 { x: du, y: dv } = (point - part) * self.width;
                 let distance2 = (vv * du * du - 2.0 * uv * du * dv + uu * dv * dv) / determinant;
                 if distance2 < 16.0 {
                     design[(i, bit)] += 0.5 * gain * (-0.5 * distance2).exp();
                 }
             }
             design[(i, bits)] = LEVEL_ERROR;
-            let [mu, mv] = self.kind.middle();
-            design[(i, bits + 1)] = SLOPE_ERROR * (point[0] - mu);
-            design[(i, bits + 2)] = SLOPE_ERROR * (point[1] - mv);
+            let off_middle = point - self.kind.middle();
+            design[(i, bits + 1)] = SLOPE_ERROR * off_middle.x;
+            design[(i, bits + 2)] = SLOPE_ERROR * off_middle.y;
         }
         let white: Vec<f64> =
             self.points.iter().map(|&p| self.white_beyond(p, [uu, uv, vv])).collect();
@@ -232,11 +233,12 @@ impl CellModel {
     }
 
     /// How much of the white around the border a point sees.
-    fn white_beyond(&self, [u, v]: [f64; 2], [uu, uv, vv]: [f64; 3]) -> f64 {
+    fn white_beyond(&self, point: DVec2, [uu, uv, vv]: [f64; 3]) -> f64 {
         let beyond = |inside_bits: f64, variance: f64| {
             0.5 - 0.5 * f64::from(erf_sqrt_half((inside_bits / variance.sqrt()) as f32))
         };
-        let (u, v, margin, width) = (u * self.width, v * self.width, self.margin_bits, self.width);
+        let (margin, width) = (self.margin_bits, self.width);
+        let DVec2 { x: u, y: v } = point * width;
         let far = match self.kind {
             GridKind::Deltille => beyond(width - u - v - margin, uu + 2.0 * uv + vv),
             GridKind::Checker => beyond(width - u - margin, uu) + beyond(width - v - margin, vv),
@@ -311,29 +313,29 @@ fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
 }
 
 /// Middles of the equal triangles that a cell is divided into.
-fn parts_of(cell: &[[f64; 2]]) -> Vec<[f64; 2]> {
+fn parts_of(cell: &[DVec2]) -> Vec<DVec2> {
     let third = 1.0 / (3.0 * DIVISIONS as f64);
     let rows = (0..DIVISIONS).flat_map(|j| (0..DIVISIONS - j).map(move |i| (i, j)));
-    let parts: Vec<[f64; 2]> = rows
+    let parts: Vec<DVec2> = rows
         .flat_map(|(i, j)| {
             let upright = [3 * i + 1, 3 * j + 1];
             let inverted = (i + j + 1 < DIVISIONS).then_some([3 * i + 2, 3 * j + 2]);
             [Some(upright), inverted].into_iter().flatten()
         })
-        .map(|part| part.map(|thirds| thirds as f64 * third))
+        .map(|part| DVec2::from(part.map(|thirds| thirds as f64)) * third)
         .collect();
     let a = cell[0];
     let triangles = cell[1..].windows(2);
     let middles = triangles.flat_map(|bc| {
-        let [b, c] = [bc[0], bc[1]];
-        parts.iter().map(move |[s, t]| [0, 1].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k])))
+        let (to_b, to_c) = (bc[0] - a, bc[1] - a);
+        parts.iter().map(move |part| a + part.x * to_b + part.y * to_c)
     });
     middles.collect()
 }
 
 /// A covariance in px² as that of a tile's coordinates, whose steps along u and v are these vectors, px.
-pub fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [[f64; 2]; 2]) -> Option<([f64; 3], f64)> {
-    let jacobian = Matrix2::new(a[0], b[0], a[1], b[1]);
+pub fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [DVec2; 2]) -> Option<([f64; 3], f64)> {
+    let jacobian = Matrix2::new(a.x, b.x, a.y, b.y);
     let determinant = jacobian.determinant().abs();
     let inverse = jacobian.try_inverse()?;
     let covariance = Matrix2::new(xx, xy, xy, yy);
@@ -354,16 +356,17 @@ mod tests {
     const INSET_BITS: f64 = 1.5;
 
     /// Whether a polygon of either winding has a point.
-    fn has(polygon: &[[f64; 2]], [u, v]: [f64; 2]) -> bool {
+    fn has(polygon: &[DVec2], point: DVec2) -> bool {
         let side = |i: usize| {
             let (a, b) = (polygon[i], polygon[(i + 1) % polygon.len()]);
-            (b[0] - a[0]) * (v - a[1]) - (b[1] - a[1]) * (u - a[0]) > 0.0
+            (b - a).perp_dot(point - a) > 0.0
         };
         (1..polygon.len()).all(|i| side(i) == side(0))
     }
 
     /// What a tag shows at a place of its tile: 1 for white.
-    fn drawn(cells: &TagCells, word: u64, [u, v]: [f64; 2]) -> f32 {
+    fn drawn(cells: &TagCells, word: u64, point: DVec2) -> f32 {
+        let DVec2 { x: u, y: v } = point;
         let (width, margin) = (cells.width(INSET_BITS), MARGIN_BITS);
         let far = match cells.kind() {
             GridKind::Deltille => width * (1.0 - u - v),
@@ -373,7 +376,7 @@ mod tests {
             return 1.0;
         }
         let bit =
-            (0..cells.dimension().bits()).find(|&bit| has(&cells.corners(bit, INSET_BITS), [u, v]));
+            (0..cells.dimension().bits()).find(|&bit| has(&cells.corners(bit, INSET_BITS), point));
         bit.map_or(0.0, |bit| f32::from(u8::from(word >> bit & 1 == 1)))
     }
 
@@ -386,16 +389,16 @@ mod tests {
         rng: &mut impl Rng,
     ) -> Vec<Sample> {
         let (width, noise) = (cells.width(INSET_BITS), StandardNormal);
-        let share = |&[u, v]: &[f64; 2], rng: &mut _| {
+        let share = |&point: &DVec2, rng: &mut _| {
             let mut sum = 0.0;
             for _ in 0..400 {
                 let [a, b]: [f64; 2] = [0; 2].map(|_| noise.sample(rng));
-                let [du, dv] = match cells.kind() {
+                let off = match cells.kind() {
                     // Steps along u and v lie 60° apart.
-                    GridKind::Deltille => [a - b / 3f64.sqrt(), 2.0 * b / 3f64.sqrt()],
-                    GridKind::Checker => [a, b],
+                    GridKind::Deltille => DVec2::new(a - b / 3f64.sqrt(), 2.0 * b / 3f64.sqrt()),
+                    GridKind::Checker => DVec2::new(a, b),
                 };
-                sum += drawn(cells, word, [u + du * bits / width, v + dv * bits / width]);
+                sum += drawn(cells, word, point + off * bits / width);
             }
             Sample::Share(sum / 400.0)
         };

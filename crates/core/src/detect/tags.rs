@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
+
 use super::grid_light::{ClearDepth, GridLight};
 use super::grow::SaddleGrid;
 use super::soft_cells::{CellModel, Mixings, Sample, TileBlur, in_tile};
@@ -178,9 +180,8 @@ impl TagReader {
             return None;
         }
         let width = self.model.width();
-        let at = |u: f64, v: f64| map.image_from_tile([middle[0] + u, middle[1] + v]);
-        let step = |p: [f64; 2], q: [f64; 2]| [0, 1].map(|i| (p[i] - q[i]) / (0.5 * width));
-        let along = [step(at(0.25, 0.0), at(-0.25, 0.0)), step(at(0.0, 0.25), at(0.0, -0.25))];
+        let at = |by: DVec2| map.image_from_tile(middle + by);
+        let along = [0.25 * DVec2::X, 0.25 * DVec2::Y].map(|by| (at(by) - at(-by)) / (0.5 * width));
         let (covariance, area_px2) = in_tile(light.blur_px2, along)?;
         let noise = light.noise;
         let mixing = self.model.mixing(TileBlur { covariance, area_px2, noise }, mixings)?;
@@ -191,7 +192,7 @@ impl TagReader {
         let brightest = 1.0 + GLARE + GLARE_NOISE * light.noise;
         let mut samples = Vec::with_capacity(self.model.points().len());
         for &point in self.model.points() {
-            let [x, y] = map.image_from_tile(point);
+            let DVec2 { x, y } = map.image_from_tile(point);
             if !(x >= 0.0 && y >= 0.0 && x <= right && y <= lower) {
                 samples.push(Sample::Erased);
                 continue;
@@ -219,7 +220,7 @@ impl TagReader {
             }
         }
         let half_odds = mixing.half_odds(&samples);
-        let length = |[x, y]: [f64; 2]| x.hypot(y);
+        let length = |step: DVec2| step.x.hypot(step.y);
         Some((Reading { tile, half_odds }, length(along[0]).max(length(along[1]))))
     }
 }

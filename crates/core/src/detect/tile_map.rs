@@ -1,3 +1,4 @@
+use glam::DVec2;
 use nalgebra::{RowVector2, SMatrix, SVector};
 
 use super::grow::SaddleGrid;
@@ -31,7 +32,7 @@ impl TileMap {
         for vertex in own.clone() {
             at(&vertex)?;
         }
-        let known: Vec<(Vertex, [f64; 2])> =
+        let known: Vec<(Vertex, DVec2)> =
             around.iter().filter_map(|v| Some((*v, at(v)?))).collect();
         let mut normal = SMatrix::<f64, 6, 6>::zeros();
         let mut right = SMatrix::<f64, 6, 2>::zeros();
@@ -43,7 +44,7 @@ impl TileMap {
             let row = SVector::from(monomials(tile_coordinates(tile.frame(), *vertex)));
             let row = row * weight;
             normal += row * row.transpose();
-            right += row * (RowVector2::from(*position) * weight);
+            right += row * (RowVector2::new(position.x, position.y) * weight);
         }
         let solution = normal.cholesky()?.solve(&right);
         let column = |k: usize| std::array::from_fn(|i| solution[(i, k)]);
@@ -51,21 +52,22 @@ impl TileMap {
     }
 
     /// Image position of the tile point (u, v), px.
-    pub fn image_from_tile(&self, point: [f64; 2]) -> [f64; 2] {
+    pub fn image_from_tile(&self, point: DVec2) -> DVec2 {
         let monomials = monomials(point);
-        self.coefficients.map(|row| row.iter().zip(&monomials).map(|(c, m)| c * m).sum())
+        let value = |row: [f64; 6]| row.iter().zip(&monomials).map(|(c, m)| c * m).sum::<f64>();
+        self.coefficients.map(value).into()
     }
 }
 
-fn monomials([u, v]: [f64; 2]) -> [f64; 6] {
+fn monomials(DVec2 { x: u, y: v }: DVec2) -> [f64; 6] {
     [1.0, u, v, u * u, u * v, v * v]
 }
 
 /// Coordinates of a vertex in the frame of a tile: the two edges from A are steps along
 /// the row and the column.
-fn tile_coordinates([a, b, _]: [Vertex; 3], vertex: Vertex) -> [f64; 2] {
+fn tile_coordinates([a, b, _]: [Vertex; 3], vertex: Vertex) -> DVec2 {
     let offset = vertex - a;
     // Upright: B − A is one column; inverted: B − A is one column backwards, and so is C − A.
     let sign = f64::from((b - a).col);
-    [sign * f64::from(offset.col), sign * f64::from(offset.row)]
+    sign * DVec2::new(offset.col.into(), offset.row.into())
 }

@@ -18,7 +18,7 @@
 
 use std::collections::BTreeSet;
 
-use super::checker_tiles::{CheckerTiles, Point, Square, difference, parity};
+use super::checker_tiles::{CheckerTiles, Point, Square, parity};
 use super::detection::Grid;
 use crate::lattice::{GridKind, Vertex};
 use crate::raster::ImageView;
@@ -143,7 +143,7 @@ fn single(tiles: &CheckerTiles, vertex: Vertex) -> Option<Square> {
     let below = opposite(at(-1, 0), at(2, 1)).or_else(|| opposite(at(-1, 1), at(2, 0)));
     let beside = opposite(at(0, -1), at(1, 2)).or_else(|| opposite(at(1, -1), at(0, 2)));
     let (up, right) = (below?, beside?);
-    let middle = [0, 1].map(|i| (up.0[i] + up.1[i] + right.0[i] + right.1[i]) / 4.0);
-    let edges = [right, up].map(|(from, to)| difference(to, from).map(|c| c / 3.0));
+    let middle = (up.0 + up.1 + right.0 + right.1) / 4.0;
+    let edges = [right, up].map(|(from, to)| (to - from) / 3.0);
     Some(Square { middle, edges })
 }

@@ -1,5 +1,7 @@
 //! What a picture without labels can tell of the reason.
 
+use glam::DVec2;
+
 use super::grow::SaddleGrid;
 use super::label::TagEvidence;
 use super::reason::{Reason, ReasonKind};
@@ -112,7 +114,7 @@ fn ends_at_border(grid: &SaddleGrid, (width, height): (usize, usize)) -> bool {
         return false;
     };
     grid.values().any(|placed| {
-        let [x, y] = placed.position;
+        let DVec2 { x, y } = placed.position;
         x.min(y).min(width as f64 - x).min(height as f64 - y) < edge_px
     })
 }
@@ -120,9 +122,11 @@ fn ends_at_border(grid: &SaddleGrid, (width, height): (usize, usize)) -> bool {
 /// The median distance of corners that follow each other in a row or column, px; `None` where there are none such.
 pub fn edge_px(grid: &SaddleGrid) -> Option<f64> {
     let lengths = grid.iter().flat_map(|(&v, placed)| {
-        let [x, y] = placed.position;
         let beside = GridKind::Checker.neighbours(v).filter_map(|n| grid.get(&n));
-        beside.map(move |other| (other.position[0] - x).hypot(other.position[1] - y))
+        beside.map(move |other| {
+            let edge = other.position - placed.position;
+            edge.x.hypot(edge.y)
+        })
     });
     median(lengths.collect())
 }

@@ -1,5 +1,7 @@
 use std::num::NonZeroU8;
 
+use glam::DVec2;
+
 use super::GridKind;
 
 /// Tag dimension d: a tag has d rows of cells and d² bits. From 3 (9 bits) to 7 (49 bits).
@@ -183,13 +185,13 @@ impl TagCells {
     }
 
     /// Centre of a bit's cell in tile coordinates (u along A→B, v along A→C, both 0..1).
-    pub fn centre(&self, bit: u32, inset: f64) -> [f64; 2] {
+    pub fn centre(&self, bit: u32, inset: f64) -> DVec2 {
         let corners = self.corners(bit, inset);
-        [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / corners.len() as f64)
+        corners.iter().sum::<DVec2>() / corners.len() as f64
     }
 
     /// The corners of a bit's cell in tile coordinates, counter-clockwise on the print.
-    pub fn corners(&self, bit: u32, inset: f64) -> Vec<[f64; 2]> {
+    pub fn corners(&self, bit: u32, inset: f64) -> Vec<DVec2> {
         let width = self.width(inset);
         let Cell { row, col, upright } = self.cells[bit as usize];
         let (u, v) = (inset + f64::from(col), inset + f64::from(row));
@@ -198,7 +200,7 @@ impl TagCells {
             (GridKind::Deltille, true) => &[[u, v], [u + 1.0, v], [u, v + 1.0]],
             (GridKind::Deltille, false) => &[[u + 1.0, v + 1.0], [u, v + 1.0], [u + 1.0, v]],
         };
-        corners.iter().map(|[u, v]| [u / width, v / width]).collect()
+        corners.iter().map(|&corner| DVec2::from(corner) / width).collect()
     }
 }
 
@@ -243,9 +245,9 @@ mod tests {
     fn four_quarter_turns_of_a_square_tag_are_none_and_agree_with_geometry() {
         for tag in squares() {
             for (to, &from) in tag.rotation().iter().enumerate() {
-                let [u, v] = tag.centre(u32::from(from), 1.5);
-                let [x, y] = tag.centre(to as u32, 1.5);
-                assert!((x - (1.0 - v)).abs() < 1e-12 && (y - u).abs() < 1e-12);
+                let DVec2 { x: u, y: v } = tag.centre(u32::from(from), 1.5);
+                let turned = DVec2::new(1.0 - v, u);
+                assert!(tag.centre(to as u32, 1.5).abs_diff_eq(turned, 1e-12));
             }
             let word = 0x1234_5678_9abc_def1 & tag.dimension().mask();
             let turned = (0..4).fold(word, |word, _| tag.rotate(word));
@@ -283,9 +285,9 @@ mod tests {
     fn rotation_agrees_with_geometry() {
         for tag in all() {
             for (to, &from) in tag.rotation().iter().enumerate() {
-                let [u, v] = tag.centre(u32::from(from), 1.5);
-                let [x, y] = tag.centre(to as u32, 1.5);
-                assert!((x - (1.0 - u - v)).abs() < 1e-12 && (y - u).abs() < 1e-12);
+                let DVec2 { x: u, y: v } = tag.centre(u32::from(from), 1.5);
+                let turned = DVec2::new(1.0 - u - v, u);
+                assert!(tag.centre(to as u32, 1.5).abs_diff_eq(turned, 1e-12));
             }
         }
     }
@@ -301,9 +303,9 @@ mod tests {
         let tag = TagCells::new(Dimension::from_bits(25).unwrap());
         for (bit, cell) in tag.cells().iter().enumerate() {
             let third = if cell.upright { 1.0 / 3.0 } else { 2.0 / 3.0 };
-            let [u, v] = tag.centre(bit as u32, 2.0);
-            assert!((u - (2.0 + f64::from(cell.col) + third) / 11.0).abs() < 1e-12);
-            assert!((v - (2.0 + f64::from(cell.row) + third) / 11.0).abs() < 1e-12);
+            let cell = DVec2::new(cell.col.into(), cell.row.into());
+            let formula = (2.0 + cell + third) / 11.0;
+            assert!(tag.centre(bit as u32, 2.0).abs_diff_eq(formula, 1e-12));
         }
     }
 

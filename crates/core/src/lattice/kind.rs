@@ -1,3 +1,4 @@
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{ROW_HEIGHT, Tile, Vertex};
@@ -52,22 +53,22 @@ impl GridKind {
     }
 
     /// The middle of a tile in tile coordinates.
-    pub const fn middle(self) -> [f64; 2] {
-        [1.0 / self.insets(); 2]
+    pub const fn middle(self) -> DVec2 {
+        DVec2::splat(1.0 / self.insets())
     }
 
     /// Position in the plane of a vertex, or of a place between vertices, in edges: x right, y up.
     ///
     /// `x = col + row/2, y = row·√3/2` on a deltille grid, `x = col, y = row` on a checkerboard.
-    pub fn position(self, row: f64, col: f64) -> [f64; 2] {
+    pub fn position(self, row: f64, col: f64) -> DVec2 {
         match self {
-            Self::Deltille => [col + 0.5 * row, row * ROW_HEIGHT],
-            Self::Checker => [col, row],
+            Self::Deltille => DVec2::new(col + 0.5 * row, row * ROW_HEIGHT),
+            Self::Checker => DVec2::new(col, row),
         }
     }
 
     /// The tile at a position in the plane, in edges.
-    pub fn tile_at(self, [x, y]: [f64; 2]) -> Tile {
+    pub fn tile_at(self, DVec2 { x, y }: DVec2) -> Tile {
         let row = if self == Self::Deltille { y / ROW_HEIGHT } else { y };
         let col = if self == Self::Deltille { x - row / 2.0 } else { x };
         let anchor = Vertex::new(row.floor() as i32, col.floor() as i32);
@@ -123,11 +124,9 @@ mod tests {
         fn the_middle_of_a_tile_lies_in_it(row in -9..9, col in -9..9) {
             for kind in KINDS {
                 for tile in kind.tiles_at(Vertex::new(row, col)) {
-                    let sum = tile.vertices().fold([0.0; 2], |[x, y], v| {
-                        let [dx, dy] = kind.position(v.row.into(), v.col.into());
-                        [x + dx, y + dy]
-                    });
-                    prop_assert_eq!(kind.tile_at(sum.map(|s| s / f64::from(kind.turns()))), tile);
+                    let places = tile.vertices().map(|v| kind.position(v.row.into(), v.col.into()));
+                    let middle = places.sum::<DVec2>() / f64::from(kind.turns());
+                    prop_assert_eq!(kind.tile_at(middle), tile);
                 }
             }
         }

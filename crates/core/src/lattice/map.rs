@@ -101,7 +101,7 @@ mod tests {
                 let Vertex { row, col } = m.apply(v);
                 m.kind.position(row.into(), col.into())
             });
-            let cross = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+            let cross = (q - p).perp_dot(r - p);
             let angle = std::f64::consts::TAU / steps.len() as f64;
             prop_assert!((cross - angle.sin()).abs() < 1e-9);
         }

@@ -101,7 +101,7 @@ mod tests {
         let anchor = Vertex::new(2, -3);
         for tile in [Tile::upright(anchor), Tile::inverted(anchor)] {
             let [a, b, c] = tile.frame().map(Vertex::position);
-            let cross = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+            let cross = (b - a).perp_dot(c - a);
             assert!((cross - super::super::ROW_HEIGHT).abs() < 1e-12);
             assert!(tile.vertices().eq(tile.frame()));
         }

@@ -1,3 +1,4 @@
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::ROW_HEIGHT;
@@ -28,9 +29,9 @@ impl Vertex {
     }
 
     /// Position in the plane, in units of the edge length: x right, y up.
-    pub fn position(self) -> [f64; 2] {
+    pub fn position(self) -> DVec2 {
         let (row, col) = (f64::from(self.row), f64::from(self.col));
-        [col + 0.5 * row, row * ROW_HEIGHT]
+        DVec2::new(col + 0.5 * row, row * ROW_HEIGHT)
     }
 
     /// The six neighbours, counter-clockwise, starting along the row.
@@ -62,9 +63,8 @@ mod tests {
     #[test]
     fn the_six_neighbours_are_one_edge_away_and_60_degrees_apart() {
         for (i, step) in Vertex::STEPS.into_iter().enumerate() {
-            let [x, y] = step.position();
             let angle = std::f64::consts::FRAC_PI_3 * i as f64;
-            assert!((x - angle.cos()).abs() < 1e-12 && (y - angle.sin()).abs() < 1e-12);
+            assert!(step.position().abs_diff_eq(DVec2::from_angle(angle), 1e-12));
         }
     }
 }

@@ -1,3 +1,5 @@
+use glam::DVec2;
+
 use super::Gray;
 
 /// Sums polygons into an image by the exact area that each pixel shares with them.
@@ -21,30 +23,30 @@ impl Coverage {
 
     /// Adds `value` times the area of a closed polygon; area counts positive where the outline
     /// runs clockwise on the screen (y down), so holes run the other way.
-    pub fn add(&mut self, polygon: &[[f64; 2]], value: f64) {
+    pub fn add(&mut self, polygon: &[DVec2], value: f64) {
         for (i, &from) in polygon.iter().enumerate() {
             self.add_edge(from, polygon[(i + 1) % polygon.len()], value);
         }
     }
 
     /// Adds the area to the right of an edge.
-    fn add_edge(&mut self, [x0, y0]: [f64; 2], [x1, y1]: [f64; 2], value: f64) {
+    fn add_edge(&mut self, from: DVec2, to: DVec2, value: f64) {
         // From here on pixel (i, j) is the square from (i, j) to (i+1, j+1).
-        let (from, to) = ([x0 + 0.5, y0 + 0.5], [x1 + 0.5, y1 + 0.5]);
+        let (from, to) = (from + 0.5, to + 0.5);
         // Going up the screen with the inside on the right is positive for a clockwise outline.
-        let (sign, upper, lower) = if from[1] > to[1] { (1.0, to, from) } else { (-1.0, from, to) };
-        if upper[1] == lower[1] {
+        let (sign, upper, lower) = if from.y > to.y { (1.0, to, from) } else { (-1.0, from, to) };
+        if upper.y == lower.y {
             return;
         }
-        let slope = (lower[0] - upper[0]) / (lower[1] - upper[1]);
-        let top = upper[1].max(0.0);
-        let bottom = lower[1].min(self.height as f64);
+        let slope = (lower.x - upper.x) / (lower.y - upper.y);
+        let top = upper.y.max(0.0);
+        let bottom = lower.y.min(self.height as f64);
         let mut y = top;
         while y < bottom {
             let row = y as usize;
             let next = ((row + 1) as f64).min(bottom);
-            let x = upper[0] + slope * (y - upper[1]);
-            let x_next = upper[0] + slope * (next - upper[1]);
+            let x = upper.x + slope * (y - upper.y);
+            let x_next = upper.x + slope * (next - upper.y);
             self.add_in_row(row, [x, x_next], sign * value * (next - y));
             y = next;
         }
@@ -111,18 +113,14 @@ mod tests {
 
     use super::*;
 
-    fn area(polygon: &[[f64; 2]]) -> f64 {
+    fn area(polygon: &[DVec2]) -> f64 {
         let n = polygon.len();
-        let cross = |i: usize| {
-            let ([x, y], [u, v]) = (polygon[i], polygon[(i + 1) % n]);
-            x * v - u * y
-        };
-        (0..n).map(cross).sum::<f64>() / 2.0
+        (0..n).map(|i| polygon[i].perp_dot(polygon[(i + 1) % n])).sum::<f64>() / 2.0
     }
 
     prop_compose! {
-        fn point(range: f64)(x in -range..range, y in -range..range) -> [f64; 2] {
-            [x + 8.0, y + 8.0]
+        fn point(range: f64)(x in -range..range, y in -range..range) -> DVec2 {
+            DVec2::new(x, y) + 8.0
         }
     }
 
@@ -141,7 +139,7 @@ mod tests {
             let mut small = Coverage::new(17, 17);
             small.add(&[a, b, c], 1.0);
             let mut large = Coverage::new(81, 81);
-            large.add(&[a, b, c].map(|[x, y]| [x + 32.0, y + 32.0]), 1.0);
+            large.add(&[a, b, c].map(|p| p + 32.0), 1.0);
             let (small, large) = (small.finish(), large.finish());
             for y in 0..17 {
                 for x in 0..17 {
@@ -154,7 +152,8 @@ mod tests {
     #[test]
     fn a_square_covers_its_pixels_by_parts() {
         let mut coverage = Coverage::new(4, 3);
-        coverage.add(&[[0.75, 0.5], [2.5, 0.5], [2.5, 1.5], [0.75, 1.5]], 2.0);
+        let square = [(0.75, 0.5), (2.5, 0.5), (2.5, 1.5), (0.75, 1.5)].map(DVec2::from);
+        coverage.add(&square, 2.0);
         let image = coverage.finish();
         assert_eq!(image.row(0), [0.0; 4]);
         assert_eq!(image.row(1), [0.0, 1.5, 2.0, 0.0]);

@@ -1,3 +1,4 @@
+use glam::DVec2;
 use multiversion::multiversion;
 
 use super::{Gray, ImageView, Intensity, View, fill_bands, of_any};
@@ -35,15 +36,15 @@ impl Pyramid {
     }
 
     /// Position in level 0 of a position in `level`, px.
-    pub fn to_level_0(level: usize, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub fn to_level_0(level: usize, place: DVec2) -> DVec2 {
         let scale = f64::from(1u32 << level);
-        [(x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5]
+        (place + 0.5) * scale - 0.5
     }
 
     /// Position in `level` of a position in level 0, px.
-    pub fn from_level_0(level: usize, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub fn from_level_0(level: usize, place: DVec2) -> DVec2 {
         let scale = f64::from(1u32 << level);
-        [(x + 0.5) / scale - 0.5, (y + 0.5) / scale - 0.5]
+        (place + 0.5) / scale - 0.5
     }
 }
 
@@ -175,8 +176,8 @@ mod tests {
         let ramp = Gray::from_fn(64, 64, |x, _| (4 * x) as u8);
         let pyramid = Pyramid::new(&ramp, 3, 8);
         for (n, level) in pyramid.levels().iter().enumerate() {
-            let [x0, _] = Pyramid::to_level_0(n, [5.0, 5.0]);
-            let expected = 4.0 * x0 / 255.0 * 1023.0;
+            let x = Pyramid::to_level_0(n, DVec2::splat(5.0)).x;
+            let expected = 4.0 * x / 255.0 * 1023.0;
             assert!((f64::from(level.at(5, 5)) - expected).abs() < 1.0);
         }
     }

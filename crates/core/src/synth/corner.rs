@@ -8,13 +8,16 @@
 //!
 //! ```
 //! use deltille_core::synth::SimulatedCorner;
+//! use glam::DVec2;
 //!
-//! let corner = SimulatedCorner::seen_from(3, 0.3, 0.5, [10.2, 9.9], 1.0);
+//! let corner = SimulatedCorner::seen_from(3, 0.3, 0.5, DVec2::new(10.2, 9.9), 1.0);
 //! let image = corner.render(21, 21);
 //! assert!((0.1..0.9).contains(&image.at(10, 10)));
 //! ```
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI, PI};
+
+use glam::DVec2;
 
 use crate::raster::Gray;
 
@@ -36,7 +39,7 @@ const ORTHANT_RULE: usize = 16;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedCorner {
     /// Position, px.
-    pub position: [f64; 2],
+    pub position: DVec2,
     /// Image angles of the lines, rising within a half-turn, radians.
     pub angles: Vec<f64>,
     /// Standard deviation of the optical blur, px; the pixel's square comes on top.
@@ -46,9 +49,9 @@ pub struct SimulatedCorner {
     /// Half-way between dark and bright.
     pub level: f64,
     /// Relative change of illumination per pixel, 0 in `light_centre`.
-    pub slope: [f64; 2],
+    pub slope: DVec2,
     /// Where the illumination is 1, px.
-    pub light_centre: [f64; 2],
+    pub light_centre: DVec2,
 }
 
 impl SimulatedCorner {
@@ -58,7 +61,7 @@ impl SimulatedCorner {
         lines: usize,
         axis_rad: f64,
         tilt_rad: f64,
-        position: [f64; 2],
+        position: DVec2,
         blur_px: f64,
     ) -> Self {
         let mut angles: Vec<f64> = (0..lines)
@@ -74,7 +77,7 @@ impl SimulatedCorner {
             blur_px,
             amplitude: 0.4,
             level: 0.5,
-            slope: [0.0; 2],
+            slope: DVec2::ZERO,
             light_centre: position,
         }
     }
@@ -112,7 +115,8 @@ impl SimulatedCorner {
             }
             _ => Vec::new(),
         };
-        let normals = self.angles.iter().take(MAX_LINES).map(|a| [-a.sin(), a.cos()]).collect();
+        let normals =
+            self.angles.iter().take(MAX_LINES).map(|&a| DVec2::from_angle(a).perp()).collect();
         Rules { normals, pixel: gauss_legendre(nodes), orthant }
     }
 
@@ -121,7 +125,7 @@ impl SimulatedCorner {
         let mut sum = 0.0;
         for &(v, weight_v) in &rules.pixel {
             for &(u, weight_u) in &rules.pixel {
-                let point = self.point(rules, x + 0.5 * u, y + 0.5 * v);
+                let point = self.point(rules, DVec2::new(x + 0.5 * u, y + 0.5 * v));
                 sum += 0.25 * weight_u * weight_v * point;
             }
         }
@@ -130,20 +134,20 @@ impl SimulatedCorner {
 
     /// The blurred image at a point. A linear factor g·p under a Gaussian of s leaves
     /// (g·p)(f∗G) + s² g·∇(f∗G).
-    fn point(&self, rules: &Rules, x: f64, y: f64) -> f64 {
-        let (dx, dy) = (x - self.position[0], y - self.position[1]);
+    fn point(&self, rules: &Rules, p: DVec2) -> f64 {
+        let off = p - self.position;
         let s = self.blur_px;
         let lines = rules.normals.len();
         let mut h = [0.0; MAX_LINES];
         for (h, n) in h.iter_mut().zip(&rules.normals) {
-            *h = (n[0] * dx + n[1] * dy) / s;
+            *h = n.dot(off) / s;
         }
         let bell = |h: f64| (2.0 / PI).sqrt() * (-0.5 * h * h).exp();
         let mut slopes = [0.0; MAX_LINES];
         let mut f = 0.0;
         if lines == 2 {
             let ([h1, h2, _], [n1, n2]) = (h, [rules.normals[0], rules.normals[1]]);
-            let rho = n1[0] * n2[0] + n1[1] * n2[1];
+            let rho = n1.dot(n2);
             let sine = (1.0 - rho * rho).sqrt();
             let (squares, product) = (h1 * h1 + h2 * h2, h1 * h2);
             let exponents = rules
@@ -160,22 +164,17 @@ impl SimulatedCorner {
                 slopes[k] = sign * bell(h[k]);
             }
         }
-        let towards_light: f64 = rules
-            .normals
-            .iter()
-            .zip(slopes)
-            .map(|(n, slope)| slope * (n[0] * self.slope[0] + n[1] * self.slope[1]) / s)
-            .sum();
-        let light = 1.0
-            + self.slope[0] * (x - self.light_centre[0])
-            + self.slope[1] * (y - self.light_centre[1]);
+        let towards_light: f64 =
+            rules.normals.iter().zip(slopes).map(|(n, slope)| slope * n.dot(self.slope) / s).sum();
+        let DVec2 { x: across, y: down } = self.slope * (p - self.light_centre);
+        let light = 1.0 + across + down;
         (self.level + self.amplitude * f) * light + s * s * self.amplitude * towards_light
     }
 }
 
 struct Rules {
     /// Normals of the lines.
-    normals: Vec<[f64; 2]>,
+    normals: Vec<DVec2>,
     /// Nodes and weights on −1 … 1.
     pixel: Vec<(f64, f64)>,
     /// Weight, sin φ and 1/(2 cos² φ) of the orthant integral.
@@ -227,9 +226,9 @@ mod tests {
     fn pixels_are_the_blurred_and_integrated_image() {
         for lines in [2, 3] {
             let corner = SimulatedCorner {
-                slope: [0.004, -0.003],
-                light_centre: [0.0, 0.0],
-                ..SimulatedCorner::seen_from(lines, 0.4, 1.0, [8.3, 7.8], 0.5)
+                slope: DVec2::new(0.004, -0.003),
+                light_centre: DVec2::ZERO,
+                ..SimulatedCorner::seen_from(lines, 0.4, 1.0, DVec2::new(8.3, 7.8), 0.5)
             };
             let image = corner.render(16, 16);
             let (step, reach) = (0.02, 125);
@@ -244,13 +243,10 @@ mod tests {
                 let (mut sum, mut weight) = (0.0, 0.0);
                 for &(dv, wv) in &kernel {
                     for &(du, wu) in &kernel {
-                        let p = [x as f64 + du, y as f64 + dv];
-                        let sign: f64 = corner
-                            .angles
-                            .iter()
-                            .map(|a| (a.cos() * (p[1] - 7.8) - a.sin() * (p[0] - 8.3)).signum())
-                            .product();
-                        let light = 1.0 + 0.004 * p[0] - 0.003 * p[1];
+                        let p = DVec2::new(x as f64 + du, y as f64 + dv);
+                        let side = |&a: &f64| DVec2::from_angle(a).perp_dot(p - corner.position);
+                        let sign: f64 = corner.angles.iter().map(|a| side(a).signum()).product();
+                        let light = 1.0 + corner.slope.dot(p);
                         sum += wu * wv * (0.5 + 0.4 * sign) * light;
                         weight += wu * wv;
                     }

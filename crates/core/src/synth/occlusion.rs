@@ -39,7 +39,7 @@ impl Shadow {
         let outline: Vec<DVec3> = before
             .paper_mm
             .iter()
-            .map(|&[x, y]| before.target_from_surface.apply(DVec3::new(x, y, 0.0)))
+            .map(|p| before.target_from_surface.apply(p.extend(0.0)))
             .map(|p| surface_from_target.apply(p))
             .collect();
         if outline.iter().all(|p| p.z <= ABOVE_MM) {
@@ -57,13 +57,13 @@ impl Shadow {
     }
 
     /// Whether a point of the plane is hidden.
-    pub fn hides(&self, p: [f64; 2]) -> bool {
-        self.halves.iter().all(|half| half.at(DVec2::from(p)) > 0.0)
+    pub fn hides(&self, p: DVec2) -> bool {
+        self.halves.iter().all(|half| half.at(p) > 0.0)
     }
 
     /// The parts of a polygon outside the shadow. An outline and its holes may be cut one by one:
     /// what the cuts add to one they add to the other.
-    pub fn cut(&self, polygon: Vec<[f64; 2]>) -> Vec<Vec<[f64; 2]>> {
+    pub fn cut(&self, polygon: Vec<DVec2>) -> Vec<Vec<DVec2>> {
         let mut visible = Vec::new();
         let mut rest = polygon;
         for half in &self.halves {
@@ -80,16 +80,16 @@ impl Shadow {
 
 /// The part of a polygon on one side of a line (Sutherland and Hodgman 1974). Where the polygon is
 /// not convex, parts stay joined along the line, where they enclose nothing.
-fn clip(polygon: &[[f64; 2]], half: Half) -> Vec<[f64; 2]> {
+fn clip(polygon: &[DVec2], half: Half) -> Vec<DVec2> {
     let mut kept = Vec::with_capacity(polygon.len() + 2);
-    for (i, &from) in polygon.iter().enumerate() {
-        let (p, q) = (DVec2::from(from), DVec2::from(polygon[(i + 1) % polygon.len()]));
+    for (i, &p) in polygon.iter().enumerate() {
+        let q = polygon[(i + 1) % polygon.len()];
         let (at_p, at_q) = (half.at(p), half.at(q));
         if at_p >= 0.0 {
-            kept.push(from);
+            kept.push(p);
         }
         if (at_p > 0.0 && at_q < 0.0) || (at_p < 0.0 && at_q > 0.0) {
-            kept.push((p + (q - p) * (at_p / (at_p - at_q))).to_array());
+            kept.push(p + (q - p) * (at_p / (at_p - at_q)));
         }
     }
     kept

@@ -1,4 +1,4 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -24,7 +24,7 @@ pub struct Light {
     /// Level of what is not the target, of 1.
     pub background: f64,
     /// Relative change of illumination across the width and down the height of the image.
-    pub gradient: [f64; 2],
+    pub gradient: DVec2,
     /// Standard deviation of the Gaussian blur, px.
     pub blur_px: f64,
     /// Standard deviation of the Gaussian noise, of 1.
@@ -40,7 +40,7 @@ impl Default for Light {
             white: 0.9,
             black: 0.1,
             background: 0.5,
-            gradient: [0.0; 2],
+            gradient: DVec2::ZERO,
             blur_px: 0.8,
             noise: 0.01,
             seed: 0,
@@ -56,11 +56,11 @@ pub struct Surface {
     /// target = pose · surface.
     pub target_from_surface: Pose,
     /// Outline of the paper, counter-clockwise.
-    pub paper_mm: Vec<[f64; 2]>,
+    pub paper_mm: Vec<DVec2>,
     /// Black areas by the even-odd rule: each area with its holes; areas do not overlap.
-    pub black_mm: Vec<Vec<Vec<[f64; 2]>>>,
+    pub black_mm: Vec<Vec<Vec<DVec2>>>,
     /// Corners: id, row, column and place.
-    pub corners: Vec<(u32, i32, i32, [f64; 2])>,
+    pub corners: Vec<(u32, i32, i32, DVec2)>,
 }
 
 /// Surfaces of solids, seen from their front sides only. They may hide each other, but not cut
@@ -94,7 +94,7 @@ pub struct TruthCorner {
     /// Position, px.
     pub y: f64,
     /// Position in the target frame, mm.
-    pub target_mm: [f64; 3],
+    pub target_mm: DVec3,
 }
 
 impl Scene {
@@ -105,7 +105,7 @@ impl Scene {
         for (surface, shadows) in self.seen_from(camera_from_target) {
             let view =
                 View { camera, camera_from_surface: surface.camera_from(camera_from_target) };
-            let mut add = |outline: &[[f64; 2]], solid: bool, value: f64| {
+            let mut add = |outline: &[DVec2], solid: bool, value: f64| {
                 for part in lit(outline, &shadows) {
                     let Some(part) = view.outline(&part) else {
                         continue;
@@ -126,11 +126,10 @@ impl Scene {
         let mut image = gaussian(&sharp.map(|v| v + background), light.blur_px);
         let mut rng = ChaCha8Rng::seed_from_u64(light.seed);
         let noise = Normal::new(0.0, light.noise.max(0.0)).ok();
-        let [across, down] = light.gradient;
         for y in 0..height {
-            let row_gain = 1.0 + down * (y as f64 / height as f64 - 0.5);
+            let row_gain = 1.0 + light.gradient.y * (y as f64 / height as f64 - 0.5);
             for (x, pixel) in image.row_mut(y).iter_mut().enumerate() {
-                let gain = row_gain + across * (x as f64 / width as f64 - 0.5);
+                let gain = row_gain + light.gradient.x * (x as f64 / width as f64 - 0.5);
                 let shot = noise.map_or(0.0, |n| n.sample(&mut rng));
                 *pixel = (f64::from(*pixel) * gain + shot).clamp(0.0, 1.0) as f32;
             }
@@ -147,18 +146,18 @@ impl Scene {
             if (View { camera, camera_from_surface }).outline(&surface.paper_mm).is_none() {
                 continue;
             }
-            for &(id, row, col, [x, y]) in &surface.corners {
-                if shadows.iter().any(|shadow| shadow.hides([x, y])) {
+            for &(id, row, col, place) in &surface.corners {
+                if shadows.iter().any(|shadow| shadow.hides(place)) {
                     continue;
                 }
-                let point = DVec3::new(x, y, 0.0);
+                let point = place.extend(0.0);
                 let pixel = camera.project(camera_from_surface.apply(point));
-                let Some([px, py]) = pixel.filter(|&p| camera.sees(p, margin_px)) else {
+                let Some(DVec2 { x, y }) = pixel.filter(|&p| camera.sees(p, margin_px)) else {
                     continue;
                 };
-                let target_mm = surface.target_from_surface.apply(point).to_array();
+                let target_mm = surface.target_from_surface.apply(point);
                 let panel = surface.panel;
-                truth.corners.push(TruthCorner { panel, id, row, col, x: px, y: py, target_mm });
+                truth.corners.push(TruthCorner { panel, id, row, col, x, y, target_mm });
             }
         }
         truth
@@ -168,8 +167,8 @@ impl Scene {
     fn seen_from(&self, camera_from_target: &Pose) -> Vec<(&Surface, Vec<Shadow>)> {
         let eye = camera_from_target.inverse().translation;
         let facing = self.surfaces.iter().filter(|surface| {
-            let [x, y] = surface.paper_mm.first().copied().unwrap_or_default();
-            let on_surface = surface.target_from_surface.apply(DVec3::new(x, y, 0.0));
+            let corner = surface.paper_mm.first().copied().unwrap_or_default();
+            let on_surface = surface.target_from_surface.apply(corner.extend(0.0));
             (surface.target_from_surface.rotation * DVec3::Z).dot(eye - on_surface) > 0.0
         });
         let facing: Vec<&Surface> = facing.collect();
@@ -194,12 +193,12 @@ struct View<'a> {
 }
 
 impl View<'_> {
-    fn project(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-        self.camera.project(self.camera_from_surface.apply(DVec3::new(x, y, 0.0)))
+    fn project(&self, point: DVec2) -> Option<DVec2> {
+        self.camera.project(self.camera_from_surface.apply(point.extend(0.0)))
     }
 
     /// The image of an outline as a fine polygon; `None` when a part of it cannot be projected.
-    fn outline(&self, outline: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+    fn outline(&self, outline: &[DVec2]) -> Option<Vec<DVec2>> {
         let mut image = Vec::with_capacity(4 * outline.len());
         for (i, &from) in outline.iter().enumerate() {
             let to = outline[(i + 1) % outline.len()];
@@ -213,16 +212,16 @@ impl View<'_> {
     /// Pushes the points between the ends of an edge that its curvature asks for.
     fn divide(
         &self,
-        [from, to]: [[f64; 2]; 2],
-        [start, end]: [[f64; 2]; 2],
+        [from, to]: [DVec2; 2],
+        [start, end]: [DVec2; 2],
         divisions: u32,
-        image: &mut Vec<[f64; 2]>,
+        image: &mut Vec<DVec2>,
     ) -> Option<()> {
-        let middle = [(from[0] + to[0]) / 2.0, (from[1] + to[1]) / 2.0];
+        let middle = from.midpoint(to);
         let seen = self.project(middle)?;
-        let (dx, dy) = (end[0] - start[0], end[1] - start[1]);
-        let cross = (seen[0] - start[0]) * dy - (seen[1] - start[1]) * dx;
-        if cross.abs() <= MAX_CHORD_ERROR_PX * dx.hypot(dy) || divisions == 0 {
+        let chord = end - start;
+        let cross = (seen - start).perp_dot(chord);
+        if cross.abs() <= MAX_CHORD_ERROR_PX * chord.length() || divisions == 0 {
             return Some(());
         }
         self.divide([from, middle], [start, seen], divisions - 1, image)?;
@@ -232,14 +231,14 @@ impl View<'_> {
 }
 
 /// The parts of an outline outside all shadows.
-fn lit(outline: &[[f64; 2]], shadows: &[Shadow]) -> Vec<Vec<[f64; 2]>> {
+fn lit(outline: &[DVec2], shadows: &[Shadow]) -> Vec<Vec<DVec2>> {
     shadows.iter().fold(vec![outline.to_vec()], |parts, shadow| {
         parts.into_iter().flat_map(|part| shadow.cut(part)).collect()
     })
 }
 
 /// How many of the other outlines of an area enclose outline `i`.
-fn depth(area: &[Vec<[f64; 2]>], i: usize) -> usize {
+fn depth(area: &[Vec<DVec2>], i: usize) -> usize {
     let Some(&point) = area[i].first() else {
         return 0;
     };
@@ -249,35 +248,27 @@ fn depth(area: &[Vec<[f64; 2]>], i: usize) -> usize {
 }
 
 /// A point inside a polygon, close to the middle of its first edge.
-fn just_inside(polygon: &[[f64; 2]]) -> Option<[f64; 2]> {
+fn just_inside(polygon: &[DVec2]) -> Option<DVec2> {
     let (a, b) = (*polygon.first()?, *polygon.get(1)?);
-    let middle = [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0];
-    let normal = [-(b[1] - a[1]) * 1e-3, (b[0] - a[0]) * 1e-3];
-    [1.0, -1.0]
-        .map(|side| [middle[0] + side * normal[0], middle[1] + side * normal[1]])
-        .into_iter()
-        .find(|&p| encloses(polygon, p))
+    let (middle, normal) = (a.midpoint(b), (b - a).perp() * 1e-3);
+    [middle + normal, middle - normal].into_iter().find(|&p| encloses(polygon, p))
 }
 
 /// Even-odd rule.
-fn encloses(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+fn encloses(polygon: &[DVec2], p: DVec2) -> bool {
     let n = polygon.len();
     (0..n).fold(false, |inside, i| {
-        let ([ax, ay], [bx, by]) = (polygon[i], polygon[(i + 1) % n]);
-        let crosses = (ay > y) != (by > y) && x < (bx - ax) * (y - ay) / (by - ay) + ax;
+        let (a, b) = (polygon[i], polygon[(i + 1) % n]);
+        let crosses =
+            (a.y > p.y) != (b.y > p.y) && p.x < (b.x - a.x) * (p.y - a.y) / (b.y - a.y) + a.x;
         inside != crosses
     })
 }
 
 /// The polygon clockwise on the screen if `solid`, else counter-clockwise.
-fn clockwise(mut polygon: Vec<[f64; 2]>, solid: bool) -> Vec<[f64; 2]> {
+fn clockwise(mut polygon: Vec<DVec2>, solid: bool) -> Vec<DVec2> {
     let n = polygon.len();
-    let doubled: f64 = (0..n)
-        .map(|i| {
-            let ([x, y], [u, v]) = (polygon[i], polygon[(i + 1) % n]);
-            x * v - u * y
-        })
-        .sum();
+    let doubled: f64 = (0..n).map(|i| polygon[i].perp_dot(polygon[(i + 1) % n])).sum();
     if (doubled > 0.0) != solid {
         polygon.reverse();
     }

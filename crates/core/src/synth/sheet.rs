@@ -1,4 +1,4 @@
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2};
 use kurbo::{BezPath, PathEl};
 
 use super::{Scene, Surface};
@@ -35,21 +35,20 @@ pub fn scene_of_sheet(target: &Target, sheet: &Sheet, index: usize) -> Scene {
     Scene { surfaces: surface.into_iter().collect() }
 }
 
-fn rectangle(width: f64, height: f64) -> Vec<[f64; 2]> {
-    vec![[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]
+fn rectangle(width: f64, height: f64) -> Vec<DVec2> {
+    [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)].map(DVec2::from).to_vec()
 }
 
 fn target_from_page(placement: &Placement, panel: &crate::targets::Panel) -> Pose {
-    let [ox, oy] = placement.origin_mm;
     let page_from_panel = Pose {
         rotation: DQuat::from_rotation_z(placement.angle_rad),
-        translation: DVec3::new(ox, oy, 0.0),
+        translation: placement.origin_mm.extend(0.0),
     };
     panel.pose.to_pose().after(&page_from_panel.inverse())
 }
 
 /// The filled ones of some shapes as polygons.
-pub(super) fn black_areas(shapes: &[Shape]) -> Vec<Vec<Vec<[f64; 2]>>> {
+pub(super) fn black_areas(shapes: &[Shape]) -> Vec<Vec<Vec<DVec2>>> {
     shapes
         .iter()
         .filter(|shape| shape.paint == Paint::Fill)
@@ -57,13 +56,13 @@ pub(super) fn black_areas(shapes: &[Shape]) -> Vec<Vec<Vec<[f64; 2]>>> {
         .collect()
 }
 
-fn polygons(path: &BezPath) -> Vec<Vec<[f64; 2]>> {
-    let mut polygons: Vec<Vec<[f64; 2]>> = Vec::new();
+fn polygons(path: &BezPath) -> Vec<Vec<DVec2>> {
+    let mut polygons: Vec<Vec<DVec2>> = Vec::new();
     kurbo::flatten(path, FLATTENING_MM, |element| match element {
-        PathEl::MoveTo(p) => polygons.push(vec![[p.x, p.y]]),
+        PathEl::MoveTo(p) => polygons.push(vec![DVec2::new(p.x, p.y)]),
         PathEl::LineTo(p) => {
             if let Some(polygon) = polygons.last_mut() {
-                polygon.push([p.x, p.y]);
+                polygon.push(DVec2::new(p.x, p.y));
             }
         }
         _ => {}

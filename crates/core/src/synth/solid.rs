@@ -1,3 +1,5 @@
+use glam::DVec2;
+
 use super::sheet::black_areas;
 use super::{Scene, Surface};
 use crate::artwork::{self, ArtworkError};
@@ -21,7 +23,7 @@ pub fn scene_of_target(target: &Target, family: Option<&Family>) -> Result<Scene
             Some(face) => face.outline_mm.to_vec(),
             None => {
                 let [x0, y0, x1, y1] = panel.field_mm();
-                vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+                [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(DVec2::from).to_vec()
             }
         };
         let corners = panel.corners.iter().map(|c| (c.id, c.row, c.col, c.panel_mm));

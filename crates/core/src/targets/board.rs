@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
+
 use super::capacity::{check_family, wider_spacing};
 use super::{
     BoardSpec, Corner, FamilyRef, GridKind, Outline, Panel, PanelPose, TagPlacement, TagSpec,
@@ -46,13 +48,13 @@ fn vertices(spec: &BoardSpec) -> Vec<Vertex> {
 }
 
 /// Width and height of the drawn tiles, mm; what [`Panel::bounds_mm`] finds without a panel at hand.
-pub(super) fn size_mm(spec: &BoardSpec) -> [f64; 2] {
+pub(super) fn size_mm(spec: &BoardSpec) -> DVec2 {
     let (rows, cols) = (f64::from(spec.rows), f64::from(spec.cols));
-    let [width, height] = match spec.grid {
-        GridKind::Deltille => [cols + 1.5, (rows + 1.0) * ROW_HEIGHT],
-        GridKind::Checker => [cols + 1.0, rows + 1.0],
+    let edges = match spec.grid {
+        GridKind::Deltille => DVec2::new(cols + 1.5, (rows + 1.0) * ROW_HEIGHT),
+        GridKind::Checker => DVec2::new(cols + 1.0, rows + 1.0),
     };
-    [width * spec.edge_mm, height * spec.edge_mm]
+    edges * spec.edge_mm
 }
 
 /// The tiles that carry tags, ordered by row, then column.
@@ -79,23 +81,18 @@ pub(super) fn tagged_tiles(
         by_start.entry((tile.row % spacing, tile.col % spacing)).or_default().push(tile);
     }
     let position = |v: Vertex| kind.position(v.row.into(), v.col.into());
+    let mean = |points: &[DVec2]| points.iter().sum::<DVec2>() / points.len() as f64;
     let centre = mean(&corners.iter().map(|&v| position(v)).collect::<Vec<_>>());
     let off_centre = |tiles: &[Vertex]| {
         let vertices = tiles.iter().flat_map(|&v| kind.tag_tile(v).vertices()).map(position);
-        let at = mean(&vertices.collect::<Vec<_>>());
-        let [dx, dy] = [at[0] - centre[0], at[1] - centre[1]];
+        let off = mean(&vertices.collect::<Vec<_>>()) - centre;
         // Rounded, so that noise in the last digit does not decide between equal starts.
-        (dx.hypot(dy) * 1e6).round() as i64
+        (off.length() * 1e6).round() as i64
     };
     by_start
         .into_values()
         .min_by_key(|tiles| (std::cmp::Reverse(tiles.len()), off_centre(tiles)))
         .unwrap_or_default()
-}
-
-fn mean(points: &[[f64; 2]]) -> [f64; 2] {
-    let n = points.len() as f64;
-    [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / n)
 }
 
 /// The panels of a checked spec, and the family of its tags.
@@ -144,9 +141,8 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
             .iter()
             .zip(board * vertices.len() as u32..)
             .map(|(v, id)| {
-                let place = spec.grid.position(v.row.into(), v.col.into());
-                let [x, y] = place.map(|p| p * spec.edge_mm);
-                let (panel_mm, target_mm) = ([x, y], [x, y, 0.0]);
+                let panel_mm = spec.grid.position(v.row.into(), v.col.into()) * spec.edge_mm;
+                let target_mm = panel_mm.extend(0.0);
                 Corner { id, row: v.row, col: v.col, panel_mm, target_mm }
             })
             .collect(),
@@ -214,7 +210,7 @@ mod tests {
             prop_assert!((right - left - 20.0 * (f64::from(cols) + 1.5)).abs() < 1e-9);
             let row_ends = |row: i32| panel.corners.iter().filter(move |c| c.row == row);
             for row in 0..rows as i32 {
-                let x = row_ends(row).map(|c| c.panel_mm[0]).fold(f64::INFINITY, f64::min);
+                let x = row_ends(row).map(|c| c.panel_mm.x).fold(f64::INFINITY, f64::min);
                 let first = if row % 2 == 0 { 20.0 } else { 30.0 };
                 prop_assert!((x - left - first).abs() < 1e-9);
             }

@@ -84,7 +84,7 @@ pub struct ClosedMesh {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Lists {
-    vertices: Vec<[f64; 3]>,
+    vertices: Vec<DVec3>,
     faces: Vec<[usize; 3]>,
 }
 
@@ -92,15 +92,13 @@ impl TryFrom<Lists> for ClosedMesh {
     type Error = ClosedMeshError;
 
     fn try_from(lists: Lists) -> Result<Self, ClosedMeshError> {
-        let vertices: Vec<DVec3> = lists.vertices.into_iter().map(DVec3::from).collect();
-        Ok(Self::new(&vertices, &lists.faces)?.0)
+        Ok(Self::new(&lists.vertices, &lists.faces)?.0)
     }
 }
 
 impl From<ClosedMesh> for Lists {
     fn from(mesh: ClosedMesh) -> Self {
-        let vertices = mesh.vertices.iter().map(DVec3::to_array).collect();
-        Self { vertices, faces: mesh.faces }
+        Self { vertices: mesh.vertices, faces: mesh.faces }
     }
 }
 

@@ -16,6 +16,8 @@
 //! printed, so that a cut which is off by less leaves neither a line nor a letter on the panel, and
 //! a panel cut with its bleed can be trimmed after it was glued.
 
+use glam::DVec2;
+
 use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit};
 use super::length::format_mm;
 use super::net::{Side, Sides};
@@ -92,16 +94,10 @@ pub fn edge_numbers(solid: &Polyhedron, edges: &[[usize; 2]], face: usize) -> [u
 
 /// Bounding box of what is printed of a face, with its marks, in the panel frame, mm.
 fn bounds(face: &Face) -> [f64; 4] {
-    let over = |axis: usize, pick: fn(f64, f64) -> f64, start| {
-        face.outline_mm.iter().map(|p| p[axis]).fold(start, pick)
-    };
+    let [a, b, c] = face.outline_mm;
     let reach = CROSS_MM[0] + CROSS_MM[1];
-    [
-        over(0, f64::min, f64::INFINITY) - reach,
-        over(1, f64::min, f64::INFINITY) - reach,
-        over(0, f64::max, f64::NEG_INFINITY) + reach,
-        over(1, f64::max, f64::NEG_INFINITY) + reach,
-    ]
+    let (least, most) = (a.min(b).min(c) - reach, a.max(b).max(c) + reach);
+    [least.x, least.y, most.x, most.y]
 }
 
 fn arrange(
@@ -145,7 +141,7 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
         let (a, b) = (face.outline_mm[i], face.outline_mm[(i + 1) % 3]);
         for (end, outwards) in [(a, -1.0), (b, 1.0)] {
             let [from_mm, to_mm] =
-                MARK_MM.map(|mm| placement.page_from_panel(along(a, b, end, outwards * mm)));
+                MARK_MM.map(|mm| placement.page_from_panel(end + unit(b - a) * (outwards * mm)));
             let kind = LineKind::Cut;
             sheet.lines.push(SheetLine { kind, from_mm, to_mm, width_mm: MARK_WIDTH_MM });
         }
@@ -153,11 +149,9 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
     }
     for vertex in 0..3 {
         let [a, b, c] = [0, 1, 2].map(|i| face.outline_mm[(vertex + i) % 3]);
-        let (to_b, to_c) = (along(a, b, [0.0; 2], 1.0), along(a, c, [0.0; 2], 1.0));
-        let inwards = [to_b[0] + to_c[0], to_b[1] + to_c[1]];
-        let middle = along([0.0; 2], inwards, a, -CROSS_MM[0]);
-        for [x, y] in [[CROSS_MM[1], 0.0], [0.0, CROSS_MM[1]]] {
-            let ends = [[middle[0] - x, middle[1] - y], [middle[0] + x, middle[1] + y]];
+        let middle = a - CROSS_MM[0] * unit(unit(b - a) + unit(c - a));
+        for arm in [DVec2::X, DVec2::Y].map(|axis| CROSS_MM[1] * axis) {
+            let ends = [middle - arm, middle + arm];
             let [from_mm, to_mm] = ends.map(|end| placement.page_from_panel(end));
             let kind = LineKind::Align;
             sheet.lines.push(SheetLine { kind, from_mm, to_mm, width_mm: MARK_WIDTH_MM });
@@ -166,7 +160,7 @@ fn mark(sheet: &mut SheetLayout, spec: &SolidSpec, face: &Face, index: usize, ed
     let [left, _, _, upper] = bounds(face);
     let max_width_mm = spec.edge_mm / 4.0;
     let mut add = |text: Label, y: f64, cap_height_mm: f64| {
-        let at_mm = placement.page_from_panel([left, y]);
+        let at_mm = placement.page_from_panel(DVec2::new(left, y));
         let angle_rad = placement.angle_rad;
         sheet.texts.push(SheetText { text, at_mm, angle_rad, cap_height_mm, max_width_mm });
     };
@@ -191,17 +185,11 @@ fn inner_number(
         return None;
     }
     let text = upright_number(index);
-    let [[ax, ay], b, c] = face.outline_mm;
-    let unit = |[x, y]: [f64; 2]| {
-        let length = (x - ax).hypot(y - ay);
-        [(x - ax) / length, (y - ay) / length]
-    };
-    let (b, c) = (unit(b), unit(c));
-    let sum = [b[0] + c[0], b[1] + c[1]];
-    let length = sum[0].hypot(sum[1]);
+    let [a, b, c] = face.outline_mm;
+    let inwards = unit(b - a) + unit(c - a);
     let width = text.len() as f64 * ADVANCE_CAPS * cap;
-    let reach = INNER_PLACE * margin_mm / length;
-    let at = [ax + sum[0] * reach - width / 2.0, ay + sum[1] * reach - cap / 2.0];
+    let reach = INNER_PLACE * margin_mm / inwards.x.hypot(inwards.y);
+    let at = a + inwards * reach - DVec2::new(width, cap) / 2.0;
     Some(SheetText {
         text: Label::Words(text),
         at_mm: placement.page_from_panel(at),
@@ -221,28 +209,26 @@ pub fn upright_number(number: usize) -> String {
 /// A text along the middle of an edge, its base line `inwards` from it.
 pub fn edge_text(
     placement: &Placement,
-    [a, b]: [[f64; 2]; 2],
+    [a, b]: [DVec2; 2],
     text: Label,
     inwards: f64,
 ) -> SheetText {
-    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-    let length = dx.hypot(dy);
+    let side = b - a;
+    let (length, along) = (side.x.hypot(side.y), unit(side));
     let width = (text.characters() as f64 * ADVANCE_CAPS * EDGE_CAP_MM).min(length);
-    let middle = along(a, b, a, (length - width) / 2.0);
-    let at = [middle[0] - dy / length * inwards, middle[1] + dx / length * inwards];
+    let at = a + along * ((length - width) / 2.0) + along.perp() * inwards;
     SheetText {
         text,
         at_mm: placement.page_from_panel(at),
-        angle_rad: placement.angle_rad + dy.atan2(dx),
+        angle_rad: placement.angle_rad + side.to_angle(),
         cap_height_mm: EDGE_CAP_MM,
         max_width_mm: length,
     }
 }
 
-/// The point `mm` from `start` in the direction from a to b.
-fn along(a: [f64; 2], b: [f64; 2], start: [f64; 2], mm: f64) -> [f64; 2] {
-    let length = (b[0] - a[0]).hypot(b[1] - a[1]);
-    [0, 1].map(|i| start[i] + (b[i] - a[i]) / length * mm)
+/// The direction of a vector; the written digits of marks depend on how its length is rounded.
+fn unit(v: DVec2) -> DVec2 {
+    v / v.x.hypot(v.y)
 }
 
 /// The label of a face: all that is needed to make it again.

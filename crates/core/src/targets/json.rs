@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -208,7 +209,7 @@ fn check_sheet(sheet: &SheetLayout, field: &str) -> Result<(), Problem> {
         let what = format!("it is more than {LONGEST_SHEET_MM} mm");
         return problem(format!("{field}.{side}"), what);
     }
-    let on_sheet = |[x, y]: [f64; 2]| {
+    let on_sheet = |DVec2 { x, y }: DVec2| {
         (0.0..=sheet.width_mm).contains(&x) && (0.0..=sheet.height_mm).contains(&y)
     };
     match sheet.lines.iter().position(|l| !on_sheet(l.from_mm) || !on_sheet(l.to_mm)) {
@@ -311,12 +312,12 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
             );
             return problem(field("row"), what);
         }
-        if distance(&corner.panel_mm, &panel.lattice_mm(vertex)) > slack {
+        if corner.panel_mm.distance(panel.lattice_mm(vertex)) > slack {
             let what = "it is more than 1 % of an edge away from its place in the lattice";
             return problem(field("panel_mm"), what);
         }
         let expected = panel.pose.target_from_panel(corner.panel_mm);
-        if distance(&corner.target_mm, &expected) > POSE_SLACK_EDGES * panel.edge_mm {
+        if corner.target_mm.distance(expected) > POSE_SLACK_EDGES * panel.edge_mm {
             let what = "it is more than 0.1 % of an edge away from rotation · panel + translation";
             return problem(field("target_mm"), what);
         }
@@ -369,10 +370,6 @@ fn check_covariance(covariance: &[[f64; 6]; 6]) -> Result<(), String> {
         return Err("it is no covariance: some variance in it is negative".to_owned());
     }
     Ok(())
-}
-
-fn distance<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]

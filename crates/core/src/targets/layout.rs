@@ -13,6 +13,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use glam::DVec2;
+
 use super::length::format_mm;
 use super::paper::{Orientation, PaperSize, PaperSpec};
 use super::{
@@ -59,7 +61,7 @@ pub(super) struct Footprint {
 
 impl Footprint {
     fn new(spec: &BoardSpec, margin_mm: f64) -> Self {
-        let [width, height] = board::size_mm(spec);
+        let DVec2 { x: width, y: height } = board::size_mm(spec);
         let quiet = Panel::quiet_zone_at_mm(spec.edge_mm);
         if spec.inverted {
             let (width, height) = (width + 2.0 * quiet, height + 2.0 * quiet);
@@ -72,12 +74,12 @@ impl Footprint {
 /// A sheet before its panel is named: which paper, and where things are.
 #[derive(Clone, Copy)]
 pub(super) struct Arrangement {
-    page: [f64; 2],
+    page: DVec2,
     margin: f64,
     /// Whether the board is turned by 90° counter-clockwise.
     turned: bool,
     /// Lower-left corner of the footprint.
-    board_at: [f64; 2],
+    board_at: DVec2,
     /// What lies along the lower and the right margin.
     marks: [Marks; 2],
 }
@@ -194,12 +196,12 @@ fn on_size(
 /// Fits a board on one page.
 pub(super) fn on_page(
     footprint: &Footprint,
-    page: [f64; 2],
+    page: DVec2,
     margin: f64,
     turned: bool,
 ) -> Option<Arrangement> {
     let Footprint { width, height, edge_blank, mark_blank } = *footprint;
-    let board = if turned { [height, width] } else { [width, height] };
+    let board = if turned { DVec2::new(height, width) } else { DVec2::new(width, height) };
     // The widest gaps that leave room along one axis, with or without the label there.
     let widest = |axis: usize, label: bool| {
         let outside = edge_blank + margin + mark_blank;
@@ -208,10 +210,10 @@ pub(super) fn on_page(
     };
     [true, false].into_iter().find_map(|label_below| {
         let (lower, right) = (widest(1, label_below)?, widest(0, !label_below)?);
-        let middle = [(page[0] - board[0]) / 2.0, (page[1] - board[1]) / 2.0];
-        let right_end = page[0] - margin - right.depth() - mark_blank - board[0];
+        let middle = (page - board) / 2.0;
+        let right_end = page.x - margin - right.depth() - mark_blank - board.x;
         let lower_end = margin + lower.depth() + mark_blank;
-        let board_at = [middle[0].min(right_end), middle[1].max(lower_end)];
+        let board_at = DVec2::new(middle.x.min(right_end), middle.y.max(lower_end));
         Some(Arrangement { page, margin, turned, board_at, marks: [lower, right] })
     })
 }
@@ -219,16 +221,16 @@ pub(super) fn on_page(
 impl Arrangement {
     /// The sheet of one panel, whose `ink` is a rectangle of its frame.
     pub(super) fn sheet(&self, panel: u32, ink: [f64; 4], label: String) -> SheetLayout {
-        let [width_mm, height_mm] = self.page;
+        let DVec2 { x: width_mm, y: height_mm } = self.page;
         let [lower_marks, right_marks] = self.marks;
         let corner = right_marks.depth() + right_marks.gap;
         let lower = Strip {
-            start: [self.margin, self.margin],
+            start: DVec2::splat(self.margin),
             turned: false,
             length: width_mm - 2.0 * self.margin - corner,
         };
         let right = Strip {
-            start: [width_mm - self.margin, self.margin],
+            start: DVec2::new(width_mm - self.margin, self.margin),
             turned: true,
             length: height_mm - 2.0 * self.margin,
         };
@@ -264,47 +266,46 @@ impl Arrangement {
     }
 
     /// Width and height of the page, mm.
-    pub(super) fn page_mm(&self) -> [f64; 2] {
+    pub(super) fn page_mm(&self) -> DVec2 {
         self.page
     }
 
     /// Lower-left corner of the footprint on the page, mm.
-    pub(super) fn footprint_at_mm(&self) -> [f64; 2] {
+    pub(super) fn footprint_at_mm(&self) -> DVec2 {
         self.board_at
     }
 
     /// What the margins and the marks leave free: left, lower, right, upper end, mm.
     pub(super) fn clear_mm(&self) -> [f64; 4] {
         let [lower, right] = self.marks.map(Marks::depth);
-        let [width, height] = self.page;
         let margin = self.margin;
-        [margin, margin + lower, width - margin - right, height - margin]
+        [margin, margin + lower, self.page.x - margin - right, self.page.y - margin]
     }
 
     fn placement(&self, panel: u32, [left, lower, _, upper]: [f64; 4]) -> Placement {
-        let [x, y] = self.board_at;
         if self.turned {
             // (u, v) of the panel goes to (−v, u): its upper end lies left.
-            let origin_mm = [x + upper, y - left];
+            let origin_mm = self.board_at + DVec2::new(upper, -left);
             return Placement { panel, angle_rad: FRAC_PI_2, origin_mm };
         }
-        Placement { panel, angle_rad: 0.0, origin_mm: [x - left, y - lower] }
+        let origin_mm = self.board_at - DVec2::new(left, lower);
+        Placement { panel, angle_rad: 0.0, origin_mm }
     }
 }
 
 /// A strip along the lower or, turned counter-clockwise, the right margin.
 struct Strip {
     /// Its outer corner: lower left, or lower right.
-    start: [f64; 2],
+    start: DVec2,
     turned: bool,
     length: f64,
 }
 
 impl Strip {
     /// The page position `along` the strip and `inwards` from the margin.
-    fn at(&self, along: f64, inwards: f64) -> [f64; 2] {
-        let [x, y] = self.start;
-        if self.turned { [x - inwards, y + along] } else { [x + along, y + inwards] }
+    fn at(&self, along: f64, inwards: f64) -> DVec2 {
+        let way = DVec2::new(along, inwards);
+        self.start + if self.turned { way.perp() } else { way }
     }
 
     /// Length of the bar along it, mm.
@@ -393,13 +394,10 @@ mod tests {
         let (panel, placement) = (&target.panels[0], &target.sheets[0].placements[0]);
         let [left, lower, right, upper] =
             if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
-        let (sin, cos) = placement.angle_rad.sin_cos();
-        let corners = [[left, lower], [right, upper]].map(|[u, v]| {
-            let [x, y] = placement.origin_mm;
-            [x + cos * u - sin * v, y + sin * u + cos * v]
-        });
-        let [[x0, y0], [x1, y1]] = corners;
-        [x0.min(x1), y0.min(y1), x0.max(x1), y0.max(y1)]
+        let corners = [DVec2::new(left, lower), DVec2::new(right, upper)];
+        let [a, b] = corners.map(|corner| placement.page_from_panel(corner));
+        let (least, most) = (a.min(b), a.max(b));
+        [least.x, least.y, most.x, most.y]
     }
 
     #[test]
@@ -473,16 +471,16 @@ mod tests {
             let slack = 1e-9;
             prop_assert!(left >= edge_blank - slack && upper <= sheet.height_mm - edge_blank + slack);
             let [below, beside] = &sheet.check_bars[..] else { panic!("two bars") };
-            prop_assert!(below.from_mm[1] + (CHECK_BAR_STROKE_MM / 2.0) + mark_blank <= lower + slack);
-            prop_assert!(beside.from_mm[0] - (CHECK_BAR_STROKE_MM / 2.0) - mark_blank >= right - slack);
-            prop_assert!(below.to_mm[0] < beside.to_mm[0] - (CHECK_BAR_STROKE_MM / 2.0));
+            prop_assert!(below.from_mm.y + (CHECK_BAR_STROKE_MM / 2.0) + mark_blank <= lower + slack);
+            prop_assert!(beside.from_mm.x - (CHECK_BAR_STROKE_MM / 2.0) - mark_blank >= right - slack);
+            prop_assert!(below.to_mm.x < beside.to_mm.x - (CHECK_BAR_STROKE_MM / 2.0));
             for (bar, axis) in [(below, 0), (beside, 1)] {
                 let size = [sheet.width_mm, sheet.height_mm][axis];
                 prop_assert!(bar.from_mm[axis] >= margin - slack && bar.to_mm[axis] <= size - margin + slack);
                 prop_assert!(bar.length_mm() % BAR_STEP_MM < 1e-9 || bar.length_mm() % BAR_STEP_MM > BAR_STEP_MM - 1e-9);
             }
             for text in &sheet.texts {
-                prop_assert!(text.at_mm.iter().all(|&v| v >= margin));
+                prop_assert!(text.at_mm.min_element() >= margin);
             }
         }
     }

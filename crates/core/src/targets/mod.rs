@@ -27,6 +27,7 @@ mod solid;
 mod spec;
 mod tag_sheet;
 
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use crate::Name;
@@ -154,7 +155,7 @@ pub struct PanelPose {
     pub rotation: [f64; 9],
     /// Translation, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub translation_mm: [f64; 3],
+    pub translation_mm: DVec3,
     /// Covariance of a small turn (rad) and move (mm) along the target's axes, where the pose was
     /// measured.
     #[serde(
@@ -179,10 +180,10 @@ pub struct Corner {
     pub col: i32,
     /// Position in the panel frame, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub panel_mm: [f64; 2],
+    pub panel_mm: DVec2,
     /// Position in the target frame, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub target_mm: [f64; 3],
+    pub target_mm: DVec3,
 }
 
 /// A tag in the upright tile, or the square, whose lower-left vertex is (row, col).
@@ -247,7 +248,7 @@ pub struct SheetPage {
     pub window_mm: [f64; 4],
     /// Position of the sheet's lower-left corner on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub sheet_at_mm: [f64; 2],
+    pub sheet_at_mm: DVec2,
     /// Size of the page, and what is printed around the window.
     pub marks: SheetLayout,
 }
@@ -290,15 +291,14 @@ pub struct Placement {
     pub angle_rad: f64,
     /// Page position of the panel's origin, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub origin_mm: [f64; 2],
+    pub origin_mm: DVec2,
 }
 
 impl Placement {
     /// Page position of a point of the panel, mm.
-    pub fn page_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let (sin, cos) = self.angle_rad.sin_cos();
-        let [ox, oy] = self.origin_mm;
-        [ox + cos * x - sin * y, oy + sin * x + cos * y]
+    pub fn page_from_panel(&self, point: DVec2) -> DVec2 {
+        let right = DVec2::from_angle(self.angle_rad);
+        self.origin_mm + right * point.x + right.perp() * point.y
     }
 }
 
@@ -310,10 +310,10 @@ pub struct SheetLine {
     pub kind: LineKind,
     /// One end on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub from_mm: [f64; 2],
+    pub from_mm: DVec2,
     /// The other end on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub to_mm: [f64; 2],
+    pub to_mm: DVec2,
     /// Its width, mm.
     #[serde(deserialize_with = "quantity::length_mm::de")]
     pub width_mm: f64,
@@ -360,16 +360,17 @@ impl LineKind {
 pub struct CheckBar {
     /// One end on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub from_mm: [f64; 2],
+    pub from_mm: DVec2,
     /// The other end on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub to_mm: [f64; 2],
+    pub to_mm: DVec2,
 }
 
 impl CheckBar {
     /// The length that it states and has, mm.
     pub fn length_mm(&self) -> f64 {
-        (self.to_mm[0] - self.from_mm[0]).hypot(self.to_mm[1] - self.from_mm[1])
+        let way = self.to_mm - self.from_mm;
+        way.x.hypot(way.y)
     }
 }
 
@@ -381,7 +382,7 @@ pub struct SheetText {
     pub text: Label,
     /// Left end of the base line on the page, mm.
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    pub at_mm: [f64; 2],
+    pub at_mm: DVec2,
     /// Counter-clockwise turn of the base line, radians.
     #[serde(deserialize_with = "quantity::angle_rad::de")]
     pub angle_rad: f64,

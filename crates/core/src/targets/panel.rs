@@ -1,6 +1,6 @@
 use std::collections::BTreeSet;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{Corner, Outline, Panel, TagPlacement, TagsIn};
 use crate::lattice::{Tile, Vertex};
@@ -26,7 +26,7 @@ impl Panel {
 
     /// The mean of its corners in the target frame, mm.
     pub fn middle_mm(&self) -> DVec3 {
-        let sum: DVec3 = self.corners.iter().map(|corner| DVec3::from(corner.target_mm)).sum();
+        let sum: DVec3 = self.corners.iter().map(|corner| corner.target_mm).sum();
         sum / self.corners.len() as f64
     }
 
@@ -37,8 +37,8 @@ impl Panel {
     }
 
     /// Where a vertex of the panel's lattice lies in the panel frame, mm.
-    pub fn lattice_mm(&self, vertex: Vertex) -> [f64; 2] {
-        self.kind.position(vertex.row.into(), vertex.col.into()).map(|v| v * self.edge_mm)
+    pub fn lattice_mm(&self, vertex: Vertex) -> DVec2 {
+        self.kind.position(vertex.row.into(), vertex.col.into()) * self.edge_mm
     }
 
     /// The tile of a tag.
@@ -95,16 +95,12 @@ impl Panel {
 
     /// Bounding box of the drawn tiles in the panel frame, mm: left, lower, right and upper end.
     pub fn bounds_mm(&self) -> [f64; 4] {
-        let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
-        for [x, y] in
-            self.dark_tiles().iter().flat_map(|t| t.vertices()).map(|v| self.lattice_mm(v))
-        {
-            bounds[0] = bounds[0].min(x);
-            bounds[1] = bounds[1].min(y);
-            bounds[2] = bounds[2].max(x);
-            bounds[3] = bounds[3].max(y);
+        let (mut least, mut most) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for vertex in self.dark_tiles().iter().flat_map(|tile| tile.vertices()) {
+            let place = self.lattice_mm(vertex);
+            (least, most) = (least.min(place), most.max(place));
         }
-        bounds
+        [least.x, least.y, most.x, most.y]
     }
 
     /// Width of the quiet zone around [`Self::bounds_mm`], mm. Nothing else is printed in it; on

@@ -1,6 +1,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use glam::DVec2;
+
 use super::length::{format_mm, parse_length_mm};
 
 /// Sizes with a name: short and long side, mm (ISO 216; ANSI A and B, US legal).
@@ -126,13 +128,13 @@ impl PaperSize {
     }
 
     /// Width and height of the upright sheet, mm.
-    pub fn portrait_mm(&self) -> [f64; 2] {
-        [self.short_mm, self.long_mm]
+    pub fn portrait_mm(&self) -> DVec2 {
+        DVec2::new(self.short_mm, self.long_mm)
     }
 
     /// Width and height of the lying sheet, mm.
-    pub fn landscape_mm(&self) -> [f64; 2] {
-        [self.long_mm, self.short_mm]
+    pub fn landscape_mm(&self) -> DVec2 {
+        DVec2::new(self.long_mm, self.short_mm)
     }
 }
 
@@ -175,11 +177,10 @@ mod tests {
     #[test]
     fn names_and_sizes() {
         let sides = |text: &str| text.parse::<PaperSize>().unwrap().portrait_mm();
-        assert_eq!(sides("a4"), [210.0, 297.0]);
-        assert_eq!(sides("Letter"), [215.9, 279.4]);
+        assert_eq!(sides("a4"), DVec2::new(210.0, 297.0));
+        assert_eq!(sides("Letter"), DVec2::new(215.9, 279.4));
         for text in ["297x420mm", "420 x 297 mm", "29.7×42cm", "297mmx42cm", "420x297"] {
-            let [short, long] = sides(text);
-            assert!((short - 297.0).abs() < 1e-9 && (long - 420.0).abs() < 1e-9, "{text}");
+            assert!(sides(text).abs_diff_eq(DVec2::new(297.0, 420.0), 1e-9), "{text}");
         }
         let custom: PaperSize = "11x17in".parse().unwrap();
         assert_eq!(custom.name(), "279.4 × 431.8 mm");

@@ -40,7 +40,7 @@ pub struct Polyhedron {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Face {
     /// Outline in the panel frame, mm, counter-clockwise from the left end of the lower edge.
-    pub outline_mm: [[f64; 2]; 3],
+    pub outline_mm: [DVec2; 3],
     /// Pose of the panel frame in the target frame.
     pub pose: PanelPose,
     /// Edge of a tile, mm.
@@ -133,7 +133,7 @@ impl Polyhedron {
         let origin = towards[0] * side / 3f64.sqrt() + DVec2::new(1.5, ROW_HEIGHT) * tile_edge_mm;
         let translation = centre + rotation * origin.extend(0.0);
         Some(Face {
-            outline_mm: outline.map(|p| (p - origin).to_array()),
+            outline_mm: outline.map(|p| p - origin),
             pose: PanelPose::new(rotation, translation),
             tile_edge_mm,
         })
@@ -204,14 +204,13 @@ mod tests {
                 let expected = (150.0 - 2.0 * 3f64.sqrt() * 5.0) / 10.0;
                 assert!((face.tile_edge_mm - expected).abs() < 1e-9);
                 for (flat, vertex) in face.outline_mm.iter().zip(solid.triangle_mm(index)) {
-                    let back = DVec3::from(face.pose.target_from_panel(*flat));
+                    let back = face.pose.target_from_panel(*flat);
                     assert!((back - vertex).length() < 1e-9);
                 }
                 // The lower edge runs along x, and z points outwards.
-                assert!((face.outline_mm[0][1] - face.outline_mm[1][1]).abs() < 1e-9);
-                let r = face.pose.rotation;
-                let outwards = DVec3::new(r[2], r[5], r[8]);
-                assert!(outwards.dot(DVec3::from(face.pose.translation_mm)) > 0.0);
+                assert!((face.outline_mm[0].y - face.outline_mm[1].y).abs() < 1e-9);
+                let outwards = face.pose.matrix().z_axis;
+                assert!(outwards.dot(face.pose.translation_mm) > 0.0);
             }
             assert_eq!(solid.face(0, 10, 50.0), None);
         }

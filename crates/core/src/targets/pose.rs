@@ -1,4 +1,4 @@
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Corner, PanelPose};
@@ -15,14 +15,14 @@ impl PanelPose {
     /// The panel frame is the target frame.
     pub const IDENTITY: PanelPose = PanelPose {
         rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        translation_mm: [0.0; 3],
+        translation_mm: DVec3::ZERO,
         covariance: None,
     };
 
     /// A pose that was not measured.
-    pub fn new(rotation: DMat3, translation: DVec3) -> Self {
+    pub fn new(rotation: DMat3, translation_mm: DVec3) -> Self {
         let rotation = rotation.transpose().to_cols_array();
-        Self { rotation, translation_mm: translation.to_array(), covariance: None }
+        Self { rotation, translation_mm, covariance: None }
     }
 
     /// A pose target_from_panel with its covariance, where it was measured.
@@ -33,7 +33,7 @@ impl PanelPose {
     /// target_from_panel.
     pub fn to_pose(&self) -> Pose {
         let rotation = DQuat::from_mat3(&self.matrix()).normalize();
-        Pose { rotation, translation: self.translation_mm.into() }
+        Pose { rotation, translation: self.translation_mm }
     }
 
     /// The rotation matrix.
@@ -43,14 +43,13 @@ impl PanelPose {
 
     /// The panel position of a point of the target, mm.
     pub fn panel_from_target(&self, point: DVec3) -> DVec3 {
-        self.matrix().transpose() * (point - DVec3::from(self.translation_mm))
+        self.matrix().transpose() * (point - self.translation_mm)
     }
 
     /// The target position of a point of the panel's plane, mm.
-    pub fn target_from_panel(&self, [x, y]: [f64; 2]) -> [f64; 3] {
-        [0, 1, 2].map(|i| {
-            self.rotation[3 * i] * x + self.rotation[3 * i + 1] * y + self.translation_mm[i]
-        })
+    pub fn target_from_panel(&self, point: DVec2) -> DVec3 {
+        let rotation = self.matrix();
+        rotation.x_axis * point.x + rotation.y_axis * point.y + self.translation_mm
     }
 
     /// The pose that takes panel positions to target positions with the least sum of squares;
@@ -59,8 +58,8 @@ impl PanelPose {
     /// With centred p and q, H = Σ q pᵀ = U S Vᵀ and R = U diag(1, 1, det U Vᵀ) Vᵀ (Kabsch 1976).
     pub fn fit(corners: &[Corner]) -> Option<PanelPose> {
         let n = corners.len() as f64;
-        let panel = |c: &Corner| Vector3::new(c.panel_mm[0], c.panel_mm[1], 0.0);
-        let target = |c: &Corner| Vector3::from(c.target_mm);
+        let panel = |c: &Corner| Vector3::new(c.panel_mm.x, c.panel_mm.y, 0.0);
+        let target = |c: &Corner| Vector3::from(c.target_mm.to_array());
         let p0 = corners.iter().map(panel).sum::<Vector3<f64>>() / n;
         let q0 = corners.iter().map(target).sum::<Vector3<f64>>() / n;
         let moved = |c: &Corner| ((target(c) - q0) - (panel(c) - p0)).amax();
@@ -85,13 +84,13 @@ impl PanelPose {
         let t = if flat { t.map(|v| if v.abs() <= FLAT * extent { 0.0 } else { v }) } else { t };
         let mut rotation = [0.0; 9];
         rotation.copy_from_slice(r.transpose().as_slice());
-        Some(PanelPose { rotation, translation_mm: t.into(), covariance: None })
+        Some(PanelPose { rotation, translation_mm: DVec3::new(t.x, t.y, t.z), covariance: None })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Rotation3;
+    use glam::EulerRot;
     use proptest::prelude::*;
 
     use super::*;
@@ -103,21 +102,19 @@ mod tests {
             roll in -3.0f64..3.0, pitch in -1.5f64..1.5, yaw in -3.0f64..3.0,
             t in prop::array::uniform3(-500.0f64..500.0),
         ) {
-            let r = Rotation3::from_euler_angles(roll, pitch, yaw);
+            let r = DQuat::from_euler(EulerRot::ZYX, yaw, pitch, roll);
             let corners: Vec<Corner> = [(0, 0), (0, 3), (2, 1), (4, -2)]
                 .into_iter()
                 .map(|(row, col)| {
-                    let [x, y] = Vertex::new(row, col).position().map(|v| v * 20.0);
-                    let target = r * Vector3::new(x, y, 0.0) + Vector3::from(t);
-                    let (panel_mm, target_mm) = ([x, y], target.into());
+                    let panel_mm = Vertex::new(row, col).position() * 20.0;
+                    let target_mm = r * panel_mm.extend(0.0) + DVec3::from(t);
                     Corner { id: 0, row, col, panel_mm, target_mm }
                 })
                 .collect();
             let pose = PanelPose::fit(&corners).unwrap();
             for c in &corners {
-                let back = pose.target_from_panel(c.panel_mm);
-                let off = (Vector3::from(back) - Vector3::from(c.target_mm)).amax();
-                prop_assert!(off < 1e-9, "{off}");
+                let off = pose.target_from_panel(c.panel_mm) - c.target_mm;
+                prop_assert!(off.abs().max_element() < 1e-9, "{off}");
             }
             prop_assert!(PanelPose::fit(&corners[..2]).is_none());
         }

@@ -57,9 +57,9 @@ impl SolidSpec {
     pub fn panel_faces(&self) -> Result<Vec<Face>, TargetError> {
         let (mut faces, inset_mm) = (self.faces()?, self.panel_inset_mm()?);
         for face in &mut faces {
-            let corners = face.outline_mm.map(|[x, y]| DVec3::new(x, y, 0.0));
+            let corners = face.outline_mm.map(|corner| corner.extend(0.0));
             let inner = Incircle::of(corners).inset(corners, inset_mm, 0.0);
-            face.outline_mm = inner.map(|v| [v.x, v.y]);
+            face.outline_mm = inner.map(DVec3::truncate);
         }
         Ok(faces)
     }
@@ -183,7 +183,7 @@ pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError>
             .iter()
             .zip(index * vertices.len() as u32..)
             .map(|(v, id)| {
-                let panel_mm = v.position().map(|p| p * face.tile_edge_mm);
+                let panel_mm = v.position() * face.tile_edge_mm;
                 let target_mm = face.pose.target_from_panel(panel_mm);
                 Corner { id, row: v.row, col: v.col, panel_mm, target_mm }
             })
@@ -270,12 +270,11 @@ mod tests {
             prop_assert_eq!(ids.len(), target.panels.iter().map(|p| p.tags.len()).sum::<usize>());
             prop_assert_eq!(Target::from_json(&target.to_json()).unwrap(), target.clone());
             for panel in &target.panels {
-                let r = panel.pose.rotation;
-                let height = |p: [f64; 3]| r[2] * p[0] + r[5] * p[1] + r[8] * p[2];
-                let plane = height(panel.pose.translation_mm);
+                let outwards = panel.pose.matrix().z_axis;
+                let plane = outwards.dot(panel.pose.translation_mm);
                 prop_assert!(plane > 0.0);
                 for corner in &panel.corners {
-                    prop_assert!((height(corner.target_mm) - plane).abs() < 1e-9);
+                    prop_assert!((outwards.dot(corner.target_mm) - plane).abs() < 1e-9);
                 }
             }
         }

@@ -7,6 +7,8 @@
 //!     3      4            The rest of the page is that of a board: label and check bars.
 //! ```
 
+use glam::DVec2;
+
 use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, check_margin, on_page};
 use super::length::format_mm;
 use super::paper::{Orientation, PaperSize, PaperSpec};
@@ -46,17 +48,17 @@ impl Blanks {
     }
 
     /// From the base of one tag to that of its neighbour, right and below.
-    fn pitch(&self) -> [f64; 2] {
+    fn pitch(&self) -> DVec2 {
         let below = self.quiet + self.id_cap + BELOW_ID * self.quiet;
-        [self.edge + 2.0 * self.quiet, self.edge * ROW_HEIGHT + below]
+        DVec2::new(self.edge + 2.0 * self.quiet, self.edge * ROW_HEIGHT + below)
     }
 
     /// What a block of tags with their ids takes.
     fn footprint(&self, [columns, rows]: [usize; 2], margin_mm: f64) -> Footprint {
-        let [across, down] = self.pitch();
+        let pitch = self.pitch();
         Footprint {
-            width: across * columns as f64 - 2.0 * self.quiet,
-            height: down * rows as f64 - BELOW_ID * self.quiet,
+            width: pitch.x * columns as f64 - 2.0 * self.quiet,
+            height: pitch.y * rows as f64 - BELOW_ID * self.quiet,
             edge_blank: margin_mm.max(self.quiet),
             mark_blank: self.quiet,
         }
@@ -153,12 +155,12 @@ fn arrange(
         Orientation::Landscape => vec![size.landscape_mm()],
         Orientation::Auto => vec![size.portrait_mm(), size.landscape_mm()],
     };
-    let [across, down] = blanks.pitch();
+    let pitch = blanks.pitch();
     let tags = spec.ids.len();
     let mut best: Option<([usize; 2], Arrangement)> = None;
     for &page in &pages {
-        for columns in 1..=(((page[0] / across) as usize + 1).min(tags)) {
-            for rows in 1..=(((page[1] / down) as usize + 1).min(tags.div_ceil(columns))) {
+        for columns in 1..=(((page.x / pitch.x) as usize + 1).min(tags)) {
+            for rows in 1..=(((page.y / pitch.y) as usize + 1).min(tags.div_ceil(columns))) {
                 let footprint = blanks.footprint([columns, rows], paper.margin_mm);
                 let most = best.as_ref().map_or(0, |([c, r], _)| c * r);
                 // Of two equal blocks the later, wider one.
@@ -196,18 +198,19 @@ fn page(
 ) -> SheetLayout {
     let Footprint { width, height, .. } = blanks.footprint(grid, 0.0);
     let mut sheet = arrangement.sheet(0, [0.0, 0.0, width, height], words);
-    let [left, lower] = sheet.placements[0].origin_mm;
+    let lower_left = sheet.placements[0].origin_mm;
     sheet.placements.clear();
-    let [across, down] = blanks.pitch();
+    let (quiet, id_cap) = (DVec2::Y * blanks.quiet, DVec2::Y * blanks.id_cap);
     for (index, &id) in ids.iter().enumerate() {
-        let x = left + across * (index % columns) as f64;
-        let y = lower + down * (rows - 1 - index / columns) as f64 + blanks.quiet + blanks.id_cap;
-        sheet.placements.push(Placement { panel: id, angle_rad: 0.0, origin_mm: [x, y] });
+        let (column, row) = (index % columns, rows - 1 - index / columns);
+        let place = lower_left + blanks.pitch() * DVec2::new(column as f64, row as f64);
+        let origin_mm = place + quiet + id_cap;
+        sheet.placements.push(Placement { panel: id, angle_rad: 0.0, origin_mm });
         let text = id.to_string();
         let wide = (text.len() as f64 * ADVANCE_CAPS * blanks.id_cap).min(blanks.edge);
         sheet.texts.push(SheetText {
             text: Label::Words(text),
-            at_mm: [x + (blanks.edge - wide) / 2.0, y - blanks.quiet - blanks.id_cap],
+            at_mm: origin_mm + DVec2::X * ((blanks.edge - wide) / 2.0) - quiet - id_cap,
             angle_rad: 0.0,
             cap_height_mm: blanks.id_cap,
             max_width_mm: blanks.edge,
@@ -276,16 +279,17 @@ mod tests {
             let quiet = (0.15 * edge).max(3.0) - 1e-9;
             for sheet in &target.sheets {
                 for (i, a) in sheet.placements.iter().enumerate() {
-                    let [x, y] = a.origin_mm;
+                    let DVec2 { x, y } = a.origin_mm;
                     let upper = y + edge * ROW_HEIGHT;
                     assert!(x >= quiet && x + edge + quiet <= sheet.width_mm);
                     assert!(upper + quiet <= sheet.height_mm);
                     for b in &sheet.placements[..i] {
-                        let [dx, dy] = [0, 1].map(|k| (a.origin_mm[k] - b.origin_mm[k]).abs());
-                        assert!(dx >= edge + 2.0 * quiet || dy >= edge * ROW_HEIGHT + 2.0 * quiet);
+                        let apart = (a.origin_mm - b.origin_mm).abs();
+                        let tag = DVec2::new(edge, edge * ROW_HEIGHT);
+                        assert!(apart.cmpge(tag + 2.0 * quiet).any());
                     }
-                    assert!(sheet.check_bars[0].from_mm[1] + 1.0 + quiet <= y);
-                    assert!(sheet.check_bars[1].from_mm[0] - 1.0 - quiet >= x + edge);
+                    assert!(sheet.check_bars[0].from_mm.y + 1.0 + quiet <= y);
+                    assert!(sheet.check_bars[1].from_mm.x - 1.0 - quiet >= x + edge);
                 }
             }
         }

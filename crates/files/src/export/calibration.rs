@@ -1,6 +1,7 @@
 //! Calibrations as JSON, schema `deltille/calibration/1`: the camera with standard deviations and
 //! correlations, and every view with its pose and residuals.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::estimate::{
@@ -64,7 +65,7 @@ struct SheetOfFile {
 #[derive(Deserialize)]
 pub(super) struct StoredShape {
     #[serde(deserialize_with = "quantity::place_mm::de")]
-    middle_mm: [f64; 3],
+    middle_mm: DVec3,
     #[serde(deserialize_with = "quantity::edge_mm::de")]
     reach_mm: f64,
     #[serde(deserialize_with = "quantity::place_mm::de")]
@@ -74,7 +75,7 @@ pub(super) struct StoredShape {
 impl StoredShape {
     pub(super) fn shape(self) -> Shape {
         let Self { middle_mm, reach_mm, coefficients_mm } = self;
-        Shape { middle_mm: middle_mm.into(), reach_mm, coefficients_mm }
+        Shape { middle_mm, reach_mm, coefficients_mm }
     }
 }
 

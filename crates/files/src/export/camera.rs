@@ -170,8 +170,7 @@ pub fn kalibr(cameras: &[(&Camera, Pose)]) -> Result<String, FormatError> {
 
 fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
-    let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.centre_px);
-    let ends = [fx, fy, cx, cy];
+    let ends = [camera.focal_px, camera.centre_px].map(|v| v.to_array()).concat();
     let plain = |model| (model, [&parameters[..], &ends[..]].concat(), "none", Vec::new());
     let (model, intrinsics, distortion, coefficients) = match &camera.lens {
         Lens::ExtendedUnified(_) => plain("eucm"),
@@ -244,8 +243,8 @@ fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatErro
         Shared::Equidistant(k) => ("OPENCV_FISHEYE", k),
         _ => return refuse(camera, "colmap", "radtan, radtan5, rational, kannala-brandt"),
     };
-    let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.centre_px.map(|c| c + 0.5));
-    Ok((model, [&[fx, fy, cx, cy], coefficients].concat()))
+    let [focal, centre] = [camera.focal_px, camera.centre_px + 0.5].map(|v| v.to_array());
+    Ok((model, [&focal, &centre, coefficients].concat()))
 }
 
 /// nerfstudio's transforms.json: the camera, and for each image its camera_from_target, with lengths
@@ -274,8 +273,8 @@ pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, For
     let mut file = json!({
         "camera_model": model,
         "w": camera.width, "h": camera.height,
-        "fl_x": camera.focal_px[0], "fl_y": camera.focal_px[1],
-        "cx": camera.centre_px[0] + 0.5, "cy": camera.centre_px[1] + 0.5,
+        "fl_x": camera.focal_px.x, "fl_y": camera.focal_px.y,
+        "cx": camera.centre_px.x + 0.5, "cy": camera.centre_px.y + 0.5,
         "frames": frames.collect::<Vec<_>>(),
     });
     for (name, value) in names.iter().zip(coefficients) {
@@ -286,8 +285,8 @@ pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, For
 
 /// Row-major.
 fn matrix(camera: &Camera) -> [f64; 9] {
-    let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.centre_px);
-    [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
+    let (focal, centre) = (camera.focal_px, camera.centre_px);
+    [focal.x, 0.0, centre.x, 0.0, focal.y, centre.y, 0.0, 0.0, 1.0]
 }
 
 /// Numbers as every reader of YAML takes them for floating-point ones: `600.0`, `1e-05`.

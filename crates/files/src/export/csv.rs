@@ -7,6 +7,8 @@
 
 use std::fmt::Write;
 
+use glam::DVec2;
+
 use deltille_core::detect::Detection;
 use deltille_core::lattice::GridKind;
 
@@ -47,14 +49,14 @@ pub fn write(detection: &Detection) -> String {
 ///
 /// # Errors
 /// The line that is no point.
-pub fn read_points(text: &str) -> Result<Vec<[f64; 2]>, String> {
+pub fn read_points(text: &str) -> Result<Vec<DVec2>, String> {
     let mut points = Vec::new();
     for (i, line) in text.lines().enumerate() {
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         let numbers: Option<Vec<f64>> =
             fields.iter().map(|f| f.parse().ok().filter(|n: &f64| n.is_finite())).collect();
         match numbers.as_deref() {
-            Some(&[x, y]) => points.push([x, y]),
+            Some(&[x, y]) => points.push(DVec2::new(x, y)),
             _ if line.trim().is_empty() => {}
             _ if i == 0 && fields == ["x", "y"] => {}
             _ => return Err(format!("line {}: write x,y in px, not {line:?}", i + 1)),

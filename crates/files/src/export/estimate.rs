@@ -1,5 +1,6 @@
 //! What files tell of an estimate, of a single camera and of a rig alike.
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::motion::Motion;
@@ -41,7 +42,7 @@ struct CornerRecord {
 
 #[derive(Serialize)]
 pub(super) struct ShapeRecord {
-    middle_mm: [f64; 3],
+    middle_mm: DVec3,
     reach_mm: f64,
     /// b₁ … b₇, a₁, a₂ of [`deltille_core::calibrate::Shape`].
     coefficients_mm: Vec<f64>,
@@ -99,10 +100,10 @@ pub(super) fn views<'a>(estimate: &Estimate, camera: &'a CameraEstimate) -> Vec<
             panel: corner.panel,
             row: corner.row,
             col: corner.col,
-            x: corner.pixel[0],
-            y: corner.pixel[1],
-            dx: corner.residual[0],
-            dy: corner.residual[1],
+            x: corner.pixel.x,
+            y: corner.pixel.y,
+            dx: corner.residual.x,
+            dy: corner.residual.y,
             outlier: corner.outlier,
         });
         ViewRecord {
@@ -119,7 +120,7 @@ pub(super) fn views<'a>(estimate: &Estimate, camera: &'a CameraEstimate) -> Vec<
 
 pub(super) fn shape(found: BoardShape) -> ShapeRecord {
     ShapeRecord {
-        middle_mm: found.shape.middle_mm.to_array(),
+        middle_mm: found.shape.middle_mm,
         reach_mm: found.shape.reach_mm,
         coefficients_mm: found.shape.coefficients_mm.to_vec(),
         sd_mm: found.sd_mm.to_vec(),

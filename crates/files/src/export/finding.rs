@@ -64,14 +64,12 @@ pub(super) fn records(estimate: &Estimate) -> Vec<FindingRecord> {
                 view: Some(view.clone()),
                 ..counts
             },
-            Shared::Region { camera, from_px: [left, top], to_px: [right, bottom] } => {
-                FindingRecord {
-                    kind: "region",
-                    camera: name(*camera),
-                    region_px: Some([*left, *top, *right, *bottom]),
-                    ..counts
-                }
-            }
+            Shared::Region { camera, from_px, to_px } => FindingRecord {
+                kind: "region",
+                camera: name(*camera),
+                region_px: Some([from_px.x, from_px.y, to_px.x, to_px.y]),
+                ..counts
+            },
             Shared::Camera { camera } => {
                 FindingRecord { kind: "camera", camera: name(*camera), ..counts }
             }

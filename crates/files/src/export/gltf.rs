@@ -42,7 +42,7 @@ pub fn to_bytes(mesh: &TexturedMesh) -> Vec<u8> {
         corners().map(|(face, i)| (face.vertices_mm[i] / 1e3).as_vec3().to_array()).collect();
     let normals: Vec<[f32; 3]> =
         corners().map(|(face, _)| face.normal.as_vec3().normalize().to_array()).collect();
-    let uvs: Vec<[f32; 2]> = corners().map(|(face, i)| face.uv[i].map(|v| v as f32)).collect();
+    let uvs: Vec<[f32; 2]> = corners().map(|(face, i)| face.uv[i].as_vec2().to_array()).collect();
     let count = positions.len();
     let bound = |pick: fn(f32, f32) -> f32| {
         [0, 1, 2].map(|axis| positions.iter().map(|p| p[axis]).reduce(pick).unwrap_or_default())

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{GENERATOR, png};
 use deltille_core::artwork::{ArtworkError, Atlas};
@@ -93,7 +93,7 @@ pub struct MeshFace {
     /// Unit normal, outwards.
     pub normal: DVec3,
     /// Texture coordinates: (0,0) is the upper left corner of the picture, (1,1) the lower right.
-    pub uv: [[f64; 2]; 3],
+    pub uv: [DVec2; 3],
 }
 
 impl TexturedMesh {
@@ -132,14 +132,17 @@ impl TexturedMesh {
             return Err(MeshError::Texture { width, height, instead });
         }
         let solid = spec.polyhedron();
-        let size_mm = [atlas.sheet.width_mm, atlas.sheet.height_mm];
+        let size_mm = DVec2::new(atlas.sheet.width_mm, atlas.sheet.height_mm);
         let mesh_face = |index: usize| {
             let vertices_mm = solid.triangle_mm(index);
             let [a, b, c] = vertices_mm;
             MeshFace {
                 vertices_mm,
                 normal: (b - a).cross(c - a).normalize(),
-                uv: atlas.outlines_mm[index].map(|[x, y]| [x / size_mm[0], 1.0 - y / size_mm[1]]),
+                uv: atlas.outlines_mm[index].map(|corner| {
+                    let part = corner / size_mm;
+                    DVec2::new(part.x, 1.0 - part.y)
+                }),
             }
         };
         Ok(Self {

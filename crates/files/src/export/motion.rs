@@ -1,4 +1,4 @@
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 use serde::Serialize;
 
 use deltille_core::camera::Pose;
@@ -8,7 +8,7 @@ use deltille_core::camera::Pose;
 pub(super) struct Motion {
     /// Row-major.
     rotation: [f64; 9],
-    translation_mm: [f64; 3],
+    translation_mm: DVec3,
     /// Standard deviations of a turn and a move along the axes of the frame that it leads to.
     #[serde(skip_serializing_if = "Option::is_none")]
     rotation_sd_rad: Option<[f64; 3]>,
@@ -20,7 +20,7 @@ impl Motion {
     pub(super) fn new(pose: &Pose, sd: Option<[f64; 6]>) -> Self {
         Self {
             rotation: DMat3::from_quat(pose.rotation).transpose().to_cols_array(),
-            translation_mm: pose.translation.to_array(),
+            translation_mm: pose.translation,
             rotation_sd_rad: sd.map(|[a, b, c, ..]| [a, b, c]),
             translation_sd_mm: sd.map(|[.., a, b, c]| [a, b, c]),
         }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::GENERATOR;
 use super::mesh::TexturedMesh;
@@ -83,7 +83,7 @@ pub fn text(mesh: &TexturedMesh) -> String {
         for v in face.vertices_mm {
             let _ = writeln!(text, "v {:.6} {:.6} {:.6}", v.x, v.y, v.z);
         }
-        for [u, v] in face.uv {
+        for DVec2 { x: u, y: v } in face.uv {
             let _ = writeln!(text, "vt {u:.9} {:.9}", 1.0 - v);
         }
         let n = face.normal;

@@ -5,6 +5,7 @@
 //! Line widths and text follow the size of the tiles, and a small photograph is enlarged, so that
 //! all of it can be read.
 
+use glam::DVec2;
 use tiny_skia::{
     Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, PixmapPaint, Stroke,
     Transform,
@@ -98,10 +99,10 @@ fn steps(kind: GridKind) -> &'static [Vertex] {
 }
 
 /// Image positions of both ends of every edge between two corners, px.
-fn edges(grid: &Grid) -> Vec<[[f64; 2]; 2]> {
-    let at: std::collections::BTreeMap<Vertex, [f64; 2]> =
-        grid.corners.iter().map(|c| (Vertex::new(c.row, c.col), [c.x, c.y])).collect();
-    let joined = |(&from, &p): (&Vertex, &[f64; 2])| {
+fn edges(grid: &Grid) -> Vec<[DVec2; 2]> {
+    let at: std::collections::BTreeMap<Vertex, DVec2> =
+        grid.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.position())).collect();
+    let joined = |(&from, &p): (&Vertex, &DVec2)| {
         let ends = steps(grid.kind).iter().filter_map(|&step| at.get(&(from + step)));
         ends.map(|&q| [p, q]).collect::<Vec<_>>()
     };
@@ -111,40 +112,40 @@ fn edges(grid: &Grid) -> Vec<[[f64; 2]; 2]> {
 fn draw_grid(canvas: &mut Pixmap, grid: &Grid, colour: Color, scale: f64) {
     let Some(edge) = grid.edge_px().map(|px| px * scale) else { return };
     // Pixel centres are at integers here, at halves in tiny-skia.
-    let at = |[x, y]: [f64; 2]| [(x + 0.5) * scale, (y + 0.5) * scale];
+    let at = |p: DVec2| (p + 0.5) * scale;
     let line = (LINE_EDGES * edge).clamp(1.0, 12.0);
     let mut lines = PathBuilder::new();
     for [p, q] in edges(grid).into_iter().map(|ends| ends.map(at)) {
-        lines.move_to(p[0] as f32, p[1] as f32);
-        lines.line_to(q[0] as f32, q[1] as f32);
+        lines.move_to(p.x as f32, p.y as f32);
+        lines.line_to(q.x as f32, q.y as f32);
     }
     let mut rings = PathBuilder::new();
     for corner in &grid.corners {
-        let [x, y] = at([corner.x, corner.y]);
-        rings.push_circle(x as f32, y as f32, (RING_EDGES * edge).max(2.5) as f32);
+        let middle = at(corner.position());
+        rings.push_circle(middle.x as f32, middle.y as f32, (RING_EDGES * edge).max(2.5) as f32);
     }
     let mut faint = colour;
     faint.set_alpha(0.7);
     stroke(canvas, lines.finish(), faint, line);
     stroke(canvas, rings.finish(), colour, line);
 
-    let place: std::collections::BTreeMap<Vertex, [f64; 2]> =
-        grid.corners.iter().map(|c| (Vertex::new(c.row, c.col), at([c.x, c.y]))).collect();
+    let place: std::collections::BTreeMap<Vertex, DVec2> =
+        grid.corners.iter().map(|c| (Vertex::new(c.row, c.col), at(c.position()))).collect();
     for corner in &grid.corners {
-        let [x, y] = at([corner.x, corner.y]);
         let words = match corner.id {
             Some(id) => id.to_string(),
             None => format!("{},{}", corner.row, corner.col),
         };
-        let offset = 1.4 * RING_EDGES * edge;
-        write(canvas, &words, [x + offset, y - offset], TEXT_EDGES * edge, false, Color::WHITE);
+        let offset = DVec2::new(1.0, -1.0) * (1.4 * RING_EDGES * edge);
+        let beside = at(corner.position()) + offset;
+        write(canvas, &words, beside, TEXT_EDGES * edge, false, Color::WHITE);
     }
     for tag in &grid.tags {
         let anchor = Vertex::new(tag.row, tag.col);
         let tile = grid.kind.tag_tile(anchor).vertices();
-        let ends: Option<Vec<[f64; 2]>> = tile.map(|v| place.get(&v).copied()).collect();
+        let ends: Option<Vec<DVec2>> = tile.map(|v| place.get(&v).copied()).collect();
         if let Some(ends) = ends {
-            let centre = [0, 1].map(|i| ends.iter().map(|p| p[i]).sum::<f64>() / ends.len() as f64);
+            let centre = ends.iter().sum::<DVec2>() / ends.len() as f64;
             write(canvas, &tag.id.to_string(), centre, TAG_TEXT_EDGES * edge, true, colour);
         }
     }
@@ -170,11 +171,11 @@ fn stroke(canvas: &mut Pixmap, path: Option<Path>, colour: Color, width: f64) {
 
 /// Writes text with a dark rim, so that it can be read on black, white and grey alike: from the
 /// lower left, or centred.
-fn write(canvas: &mut Pixmap, words: &str, at: [f64; 2], size: f64, centred: bool, colour: Color) {
+fn write(canvas: &mut Pixmap, words: &str, at: DVec2, size: f64, centred: bool, colour: Color) {
     let size = size.clamp(7.0, 160.0);
     // Digits, commas and minus signs, which the font has.
     let Ok((outline, width)) = text::outline(words, size) else { return };
-    let [mut x, mut y] = at;
+    let DVec2 { mut x, mut y } = at;
     if centred {
         x -= width / 2.0;
         y += 0.36 * size;

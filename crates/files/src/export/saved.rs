@@ -4,7 +4,7 @@
 //! words, and where refined panels are, which stands in the refined target. Reasons why views took no
 //! part are the words of the file.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::DMatrix;
 use serde::Deserialize;
 
@@ -173,7 +173,7 @@ struct SavedPose {
     #[serde(deserialize_with = "quantity::cosine::de")]
     rotation: [f64; 9],
     #[serde(deserialize_with = "quantity::figure::de")]
-    translation_mm: [f64; 3],
+    translation_mm: DVec3,
     #[serde(default, deserialize_with = "quantity::deviation::de")]
     rotation_sd_rad: Option<[f64; 3]>,
     #[serde(default, deserialize_with = "quantity::deviation::de")]
@@ -256,7 +256,7 @@ impl Rig {
         estimate.frames = frames.into_iter().map(SavedFrame::read).collect();
         estimate.cameras = cameras;
         let (sum, count) = estimate.corners().fold((0.0, 0), |(sum, count), corner| {
-            (sum + corner.residual.iter().map(|r| r * r).sum::<f64>(), count + 2)
+            (sum + corner.residual.length_squared(), count + 2)
         });
         estimate.rms_px = (sum / f64::from(count.max(1))).sqrt();
         Ok(estimate)
@@ -381,10 +381,7 @@ fn lens_of(names: &[&str]) -> Option<Lens> {
 impl SavedPose {
     fn pose(&self) -> Pose {
         let rotation = DMat3::from_cols_array(&self.rotation).transpose();
-        Pose {
-            rotation: DQuat::from_mat3(&rotation).normalize(),
-            translation: DVec3::from(self.translation_mm),
-        }
+        Pose { rotation: DQuat::from_mat3(&rotation).normalize(), translation: self.translation_mm }
     }
 
     fn sd(&self) -> Option<[f64; 6]> {
@@ -407,7 +404,7 @@ impl SavedFrame {
 impl SavedCorner {
     fn read(&self, panel: PanelRef) -> Corner {
         let Self { row, col, outlier, .. } = *self;
-        let (pixel, residual) = ([self.x, self.y], [self.dx, self.dy]);
+        let (pixel, residual) = (DVec2::new(self.x, self.y), DVec2::new(self.dx, self.dy));
         Corner { panel, row, col, pixel, residual, outlier }
     }
 }

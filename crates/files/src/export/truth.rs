@@ -1,5 +1,6 @@
 //! What a synthetic photograph shows, as JSON, schema `deltille/truth/1`.
 
+use glam::DVec2;
 use serde::Serialize;
 
 use super::motion::Motion;
@@ -17,7 +18,7 @@ struct TruthFile<'a> {
     camera_from_target: Motion,
     blur_px: f64,
     noise: f64,
-    gradient: [f64; 2],
+    gradient: DVec2,
     seed: u64,
     corners: &'a [TruthCorner],
 }

@@ -324,7 +324,7 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
     let camera = &report.estimate.cameras[index];
     let means = survey.means_px.iter().flatten().map(|cell| cell.mean_px);
     let count = means.clone().count().max(1) as f64;
-    let size = (means.map(|[x, y]| (x * x + y * y) / 2.0).sum::<f64>() / count).sqrt();
+    let size = (means.map(|mean| mean.length_squared() / 2.0).sum::<f64>() / count).sqrt();
     match survey.pattern().filter(|_| !report.diagnoses.iter().any(is_cause)) {
         Some(pattern) if pattern > PATTERN && size > PATTERN_PART * camera.rms_px => add(
             Weight::Hint,

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use glam::DVec2;
+
 /// Room around the axes for their numbers and names.
 const LEFT: f64 = 64.0;
 const BELOW: f64 = 40.0;
@@ -23,20 +25,21 @@ const DECADES: i32 = 4;
 pub(super) struct Axes {
     x: [f64; 2],
     y: [f64; 2],
-    size: [f64; 2],
+    size: DVec2,
     body: String,
 }
 
 impl Axes {
     /// Axes over two ranges; `y` grows upwards.
-    pub(super) fn new(size: [f64; 2], x: [f64; 2], y: [f64; 2]) -> Self {
+    pub(super) fn new(size: DVec2, x: [f64; 2], y: [f64; 2]) -> Self {
         Self { x, y, size, body: String::new() }
     }
 
     /// Place of a point.
-    pub(super) fn at(&self, x: f64, y: f64) -> [f64; 2] {
+    pub(super) fn at(&self, DVec2 { x, y }: DVec2) -> DVec2 {
         let part = |v: f64, [low, high]: [f64; 2]| (v - low) / (high - low);
-        [LEFT + part(x, self.x) * self.size[0], ABOVE + (1.0 - part(y, self.y)) * self.size[1]]
+        let parts = DVec2::new(part(x, self.x), 1.0 - part(y, self.y));
+        DVec2::new(LEFT, ABOVE) + parts * self.size
     }
 
     /// Adds an element of SVG.
@@ -45,8 +48,8 @@ impl Axes {
     }
 
     /// A dot of a class.
-    pub(super) fn dot(&mut self, x: f64, y: f64, radius: f64, class: &str) {
-        let [cx, cy] = self.at(x, y);
+    pub(super) fn dot(&mut self, point: DVec2, radius: f64, class: &str) {
+        let DVec2 { x: cx, y: cy } = self.at(point);
         let _ = write!(
             self.body,
             "<circle class=\"{class}\" cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"{radius}\"/>"
@@ -54,9 +57,9 @@ impl Axes {
     }
 
     /// A broken line of a class.
-    pub(super) fn line(&mut self, points: &[[f64; 2]], class: &str) {
-        let places = points.iter().map(|&[x, y]| {
-            let [x, y] = self.at(x, y);
+    pub(super) fn line(&mut self, points: &[DVec2], class: &str) {
+        let places = points.iter().map(|&point| {
+            let DVec2 { x, y } = self.at(point);
             format!("{x:.1},{y:.1}")
         });
         let places: Vec<String> = places.collect();
@@ -64,28 +67,27 @@ impl Axes {
     }
 
     /// A rectangle between two corners, of a class.
-    pub(super) fn bar(&mut self, low: [f64; 2], high: [f64; 2], class: &str, style: &str) {
-        let ([x0, y1], [x1, y0]) = (self.at(low[0], low[1]), self.at(high[0], high[1]));
-        let (x, y) = (x0.min(x1), y0.min(y1));
+    pub(super) fn bar(&mut self, low: DVec2, high: DVec2, class: &str, style: &str) {
+        let (low, high) = (self.at(low), self.at(high));
+        let (DVec2 { x, y }, size) = (low.min(high), (high - low).abs());
         let _ = write!(
             self.body,
             "<rect class=\"{class}\" {style} x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" \
              height=\"{:.1}\"/>",
-            (x1 - x0).abs(),
-            (y1 - y0).abs()
+            size.x, size.y
         );
     }
 
     /// The picture, with the names of its axes, for readers without eyes with what it shows.
     pub(super) fn svg(self, names: [&str; 2], shows: &str) -> String {
-        let [w, h] = self.size;
+        let DVec2 { x: w, y: h } = self.size;
         let (width, height) = (LEFT + w + RIGHT, ABOVE + h + BELOW);
         let mut marks = format!(
             "<rect class=\"frame\" x=\"{LEFT}\" y=\"{ABOVE}\" width=\"{w}\" height=\"{h}\"/>"
         );
         let side_by_side = |text: &str| DIGIT * text.chars().count() as f64 + APART;
         for (value, text) in ticks(self.x, w, side_by_side) {
-            let [x, y] = self.at(value, self.y[0]);
+            let DVec2 { x, y } = self.at(DVec2::new(value, self.y[0]));
             let _ = write!(
                 marks,
                 "<line class=\"tick\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{y:.1}\" y2=\"{:.1}\"/>\
@@ -95,7 +97,7 @@ impl Axes {
             );
         }
         for (value, text) in ticks(self.y, h, |_| LINE) {
-            let [x, y] = self.at(self.x[0], value);
+            let DVec2 { x, y } = self.at(DVec2::new(self.x[0], value));
             let _ = write!(
                 marks,
                 "<line class=\"tick\" x1=\"{:.1}\" x2=\"{x:.1}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>\

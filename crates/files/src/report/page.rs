@@ -306,7 +306,7 @@ fn picture(report: &Report, index: usize, view: &ViewEstimate) -> String {
     let (width, height) = (camera.width, camera.height);
     let dots = view.corners.iter().map(|corner| {
         let class = if corner.outlier { "out" } else { "seen" };
-        let [x, y] = corner.pixel;
+        let (x, y) = corner.pixel.into();
         format!("<circle class=\"{class}\" cx=\"{x:.0}\" cy=\"{y:.0}\" r=\"{}\"/>", width / 160)
     });
     let image = report.thumbnails.get(&(index, view.name.clone())).map_or(String::new(), |png| {

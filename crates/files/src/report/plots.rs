@@ -1,11 +1,13 @@
 //! The plots of a page, each an SVG.
 
+use glam::DVec2;
+
 use super::axes::Axes;
 use super::survey::Survey;
 use deltille_core::calibrate::{CameraEstimate, Corner};
 
 /// Size of the small plots, user units.
-const SMALL: [f64; 2] = [330.0, 250.0];
+const SMALL: DVec2 = DVec2::new(330.0, 250.0);
 
 /// Width of the maps of the image, user units.
 const MAP: f64 = 430.0;
@@ -28,7 +30,7 @@ const ARROW_CELLS: f64 = 1.2;
 /// A range for residuals: four standard deviations, so that the bulk fills the plot.
 fn range_px(camera: &CameraEstimate) -> f64 {
     let inliers = || camera.corners().filter(|corner| !corner.outlier);
-    let sum: f64 = inliers().flat_map(|corner| corner.residual).map(|r| r * r).sum();
+    let sum: f64 = inliers().flat_map(|corner| corner.residual.to_array()).map(|r| r * r).sum();
     let rms = (sum / (2 * inliers().count()).max(1) as f64).sqrt();
     (4.0 * rms).max(1e-6)
 }
@@ -42,22 +44,22 @@ fn thinned(camera: &CameraEstimate) -> impl Iterator<Item = &Corner> {
 /// Residuals as a cloud.
 pub(super) fn scatter(camera: &CameraEstimate) -> String {
     let range = range_px(camera);
-    let side = SMALL[1];
-    let mut axes = Axes::new([side, side], [-range, range], [-range, range]);
-    axes.line(&[[-range, 0.0], [range, 0.0]], "guide");
-    axes.line(&[[0.0, -range], [0.0, range]], "guide");
+    let mut axes = Axes::new(DVec2::splat(SMALL.y), [-range, range], [-range, range]);
+    for axis in [DVec2::X, DVec2::Y] {
+        axes.line(&[-range * axis, range * axis], "guide");
+    }
+    // Residuals run down in the image.
+    let up = |corner: &Corner| corner.residual * DVec2::new(1.0, -1.0);
     for corner in thinned(camera) {
-        let [dx, dy] = corner.residual;
-        if dx.abs() <= range && dy.abs() <= range {
-            axes.dot(dx, -dy, 1.3, if corner.outlier { "dot out" } else { "dot" });
+        if corner.residual.abs().max_element() <= range {
+            axes.dot(up(corner), 1.3, if corner.outlier { "dot out" } else { "dot" });
         }
     }
     for corner in camera.corners() {
         // On the way from the middle, where it leaves the plot.
-        let [dx, dy] = corner.residual;
-        let beyond = dx.abs().max(dy.abs()) / range;
+        let beyond = corner.residual.abs().max_element() / range;
         if beyond > 1.0 {
-            axes.dot(dx / beyond, -dy / beyond, BEYOND, "beyond");
+            axes.dot(up(corner) / beyond, BEYOND, "beyond");
         }
     }
     axes.svg(["right, px", "up, px"], "Residuals of all corners")
@@ -69,7 +71,7 @@ pub(super) fn histogram(camera: &CameraEstimate) -> String {
     let width = range / BINS as f64;
     let mut counts = vec![0usize; 2 * BINS];
     let mut total = 0;
-    for value in camera.corners().flat_map(|corner| corner.residual) {
+    for value in camera.corners().flat_map(|corner| corner.residual.to_array()) {
         total += 1;
         let bin = ((value + range) / width).floor();
         if (0.0..counts.len() as f64).contains(&bin) {
@@ -87,41 +89,46 @@ pub(super) fn histogram(camera: &CameraEstimate) -> String {
     let mut axes = Axes::new(SMALL, [-range, range], [0.0, 1.08 * highest]);
     for (bin, &count) in counts.iter().enumerate() {
         let x = bin as f64 * width - range;
-        axes.bar([x, 0.0], [x + width, part(count)], "bar", "");
+        axes.bar(DVec2::new(x, 0.0), DVec2::new(x + width, part(count)), "bar", "");
     }
-    let curve: Vec<[f64; 2]> =
-        (0..=100).map(|i| f64::from(i) / 50.0 * range - range).map(|x| [x, normal(x)]).collect();
+    let curve = (0..=100).map(|i| f64::from(i) / 50.0 * range - range);
+    let curve: Vec<DVec2> = curve.map(|x| DVec2::new(x, normal(x))).collect();
     axes.line(&curve, "curve");
     axes.svg(["residual of a coordinate, px", "% of coordinates"], "Histogram of residuals")
 }
 
 /// The image from its upper left corner; y runs downwards.
 fn map(survey: &Survey) -> Axes {
-    let [w, h] = survey.size_px;
-    Axes::new([MAP, MAP * h / w], [-0.5, w - 0.5], [h - 0.5, -0.5])
+    let DVec2 { x: w, y: h } = survey.size_px;
+    Axes::new(DVec2::new(MAP, MAP * h / w), [-0.5, w - 0.5], [h - 0.5, -0.5])
+}
+
+/// Columns and rows of the maps.
+fn cells(survey: &Survey) -> DVec2 {
+    survey.cells.map(|count| count as f64).into()
 }
 
 /// Middle of a cell, px.
-fn middle(survey: &Survey, index: usize) -> [f64; 2] {
-    let at = [index % survey.cells[0], index / survey.cells[0]];
-    [0, 1].map(|i| (at[i] as f64 + 0.5) / survey.cells[i] as f64 * survey.size_px[i] - 0.5)
+fn middle(survey: &Survey, index: usize) -> DVec2 {
+    let columns = survey.cells[0];
+    let at = DVec2::new((index % columns) as f64, (index / columns) as f64);
+    (at + 0.5) / cells(survey) * survey.size_px - 0.5
 }
 
 /// As much of an arrow as the image has room for.
-fn within(survey: &Survey, from: [f64; 2], arrow: [f64; 2]) -> [f64; 2] {
+fn within(survey: &Survey, from: DVec2, arrow: DVec2) -> DVec2 {
     let room = |i: usize| match arrow[i] {
         v if v > 0.0 => (survey.size_px[i] - 0.5 - from[i]) / v,
         v if v < 0.0 => (-0.5 - from[i]) / v,
         _ => 1.0,
     };
-    let part = room(0).min(room(1)).min(1.0);
-    arrow.map(|v| part * v)
+    room(0).min(room(1)).min(1.0) * arrow
 }
 
 /// Mean residuals over the image, and by how much the arrows are enlarged.
 pub(super) fn residual_map(survey: &Survey) -> (String, f64) {
-    let cell = survey.size_px[0] / survey.cells[0] as f64;
-    let length = |[x, y]: [f64; 2]| x.hypot(y);
+    let cell = survey.size_px.x / survey.cells[0] as f64;
+    let length = |v: DVec2| v.x.hypot(v.y);
     let means = || survey.means_px.iter().flatten();
     let longest = means().map(|cell| length(cell.mean_px)).fold(0.0, f64::max);
     let scale = if longest > 0.0 { ARROW_CELLS * cell / longest } else { 1.0 };
@@ -131,12 +138,12 @@ pub(super) fn residual_map(survey: &Survey) -> (String, f64) {
     let mut axes = map(survey);
     for (index, mean) in survey.means_px.iter().enumerate() {
         let Some(mean) = mean else { continue };
-        let [x, y] = middle(survey, index);
-        let [dx, dy] = within(survey, [x, y], mean.mean_px.map(|v| v * scale));
+        let foot = middle(survey, index);
+        let arrow = within(survey, foot, mean.mean_px * scale);
         // Means that chance explains are pale.
         let chance = length(mean.mean_px) < 3.0 * mean.sd_px;
-        axes.line(&[[x, y], [x + dx, y + dy]], if chance { "arrow pale" } else { "arrow" });
-        axes.dot(x, y, 1.6, "foot");
+        axes.line(&[foot, foot + arrow], if chance { "arrow pale" } else { "arrow" });
+        axes.dot(foot, 1.6, "foot");
     }
     (axes.svg(["x, px", "y, px"], "Mean residuals over the image"), scale)
 }
@@ -146,14 +153,14 @@ pub(super) fn coverage(survey: &Survey) -> String {
     let most = survey.counts.iter().copied().max().unwrap_or(0).max(1) as f64;
     let mut axes = map(survey);
     for (index, &count) in survey.counts.iter().enumerate() {
-        let [x, y] = middle(survey, index);
-        let half = [0, 1].map(|i| survey.size_px[i] / survey.cells[i] as f64 / 2.0);
-        let (low, high) = ([x - half[0], y + half[1]], [x + half[0], y - half[1]]);
+        let middle = middle(survey, index);
+        let half = survey.size_px / cells(survey) / 2.0;
         let class = if count == 0 { "empty" } else { "cell" };
         let strength = (count as f64 / most).sqrt();
-        axes.bar(low, high, class, &format!("fill-opacity=\"{:.2}\"", 0.1 + 0.9 * strength));
+        let style = format!("fill-opacity=\"{:.2}\"", 0.1 + 0.9 * strength);
+        axes.bar(middle - half, middle + half, class, &style);
         if count > 0 {
-            let [px, py] = axes.at(x, y);
+            let DVec2 { x: px, y: py } = axes.at(middle);
             let text = if strength > 0.55 { "count light" } else { "count" };
             axes.add(&format!(
                 "<text class=\"{text}\" x=\"{px:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{count}\
@@ -167,33 +174,34 @@ pub(super) fn coverage(survey: &Survey) -> String {
 
 /// Error against the distance from the principal point: every corner, and the rms of rings.
 pub(super) fn against_radius(camera: &CameraEstimate) -> String {
-    let [cx, cy] = camera.camera.centre_px;
-    let radius = |corner: &Corner| (corner.pixel[0] - cx).hypot(corner.pixel[1] - cy);
+    let radius = |corner: &Corner| camera.camera.radius_px(corner.pixel);
+    let error = |corner: &Corner| corner.residual.x.hypot(corner.residual.y);
     let farthest = camera.corners().map(radius).fold(1.0, f64::max);
     let top = range_px(camera);
     let mut axes = Axes::new(SMALL, [0.0, farthest], [0.0, top]);
     for corner in thinned(camera) {
-        let error = corner.residual[0].hypot(corner.residual[1]);
-        if error <= top {
-            axes.dot(radius(corner), error, 1.1, if corner.outlier { "dot out" } else { "dot" });
+        let point = DVec2::new(radius(corner), error(corner));
+        if point.y <= top {
+            axes.dot(point, 1.1, if corner.outlier { "dot out" } else { "dot" });
         }
     }
     for corner in camera.corners() {
-        if corner.residual[0].hypot(corner.residual[1]) > top {
-            axes.dot(radius(corner), top, BEYOND, "beyond");
+        if error(corner) > top {
+            axes.dot(DVec2::new(radius(corner), top), BEYOND, "beyond");
         }
     }
     let mut rings = [(0.0, 0usize); RINGS];
     for corner in camera.corners().filter(|corner| !corner.outlier) {
         let ring = (radius(corner) / farthest * RINGS as f64) as usize;
         let (sum, count) = &mut rings[ring.min(RINGS - 1)];
-        *sum += corner.residual.iter().map(|r| r * r).sum::<f64>() / 2.0;
+        *sum += corner.residual.length_squared() / 2.0;
         *count += 1;
     }
     let curve = rings.iter().enumerate().filter(|(_, (_, count))| *count > 3);
-    let curve: Vec<[f64; 2]> = curve
+    let curve: Vec<DVec2> = curve
         .map(|(i, (sum, count))| {
-            [(i as f64 + 0.5) / RINGS as f64 * farthest, (sum / *count as f64).sqrt()]
+            let radius = (i as f64 + 0.5) / RINGS as f64 * farthest;
+            DVec2::new(radius, (sum / *count as f64).sqrt())
         })
         .collect();
     axes.line(&curve, "curve");
@@ -211,7 +219,7 @@ pub(super) fn against_tilt(camera: &CameraEstimate, survey: &Survey) -> Option<S
     let worst = camera.views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
     let mut axes = Axes::new(SMALL, [0.0, 1.05 * steepest], [0.0, 1.1 * worst]);
     for (view, tilt) in camera.views.iter().zip(&tilts) {
-        axes.dot(*tilt, view.rms_px, 3.0, "view");
+        axes.dot(DVec2::new(*tilt, view.rms_px), 3.0, "view");
     }
     Some(axes.svg(["tilt of the board, °", "rms of the view, px"], "Error against tilt"))
 }

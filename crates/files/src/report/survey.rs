@@ -1,4 +1,4 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use deltille_core::calibrate::{CameraEstimate, ImageCircle, ViewEstimate};
 use deltille_core::camera::Camera;
@@ -11,7 +11,7 @@ const CELLS: usize = 16;
 #[non_exhaustive]
 pub struct Survey {
     /// Width and height of the image, px.
-    pub size_px: [f64; 2],
+    pub size_px: DVec2,
     /// Columns and rows of the maps.
     pub cells: [usize; 2],
     /// Corners in each cell, row by row from the top.
@@ -32,7 +32,7 @@ pub struct Survey {
 #[non_exhaustive]
 pub struct CellMean {
     /// Mean, px.
-    pub mean_px: [f64; 2],
+    pub mean_px: DVec2,
     /// Standard deviation of each coordinate of the mean, px.
     pub sd_px: f64,
 }
@@ -54,10 +54,10 @@ const LEAST_IN_CELL: usize = 4;
 impl Survey {
     /// Surveys the views of a camera.
     pub fn new(camera: &CameraEstimate) -> Self {
-        let size_px = [camera.camera.width, camera.camera.height].map(f64::from);
-        let cell = size_px[0].max(size_px[1]) / CELLS as f64;
-        let cells = size_px.map(|side| ((side / cell).round() as usize).max(1));
-        let mut inside: Vec<Vec<[f64; 2]>> = vec![Vec::new(); cells[0] * cells[1]];
+        let size_px = DVec2::new(camera.camera.width.into(), camera.camera.height.into());
+        let cells = (size_px / (size_px.max_element() / CELLS as f64)).round().to_array();
+        let cells = cells.map(|count| (count as usize).max(1));
+        let mut inside: Vec<Vec<DVec2>> = vec![Vec::new(); cells[0] * cells[1]];
         let mut counts = vec![0; inside.len()];
         for corner in camera.corners() {
             let at = |axis: usize| {
@@ -74,7 +74,7 @@ impl Survey {
         let views =
             camera.views.iter().map(|view| surveyed(&camera.camera, view, planar)).collect();
         let means_px = inside.iter().map(|residuals| cell_mean(residuals)).collect();
-        let seen: Vec<[f64; 2]> = camera.corners().map(|corner| corner.pixel).collect();
+        let seen: Vec<DVec2> = camera.corners().map(|corner| corner.pixel).collect();
         let circle = ImageCircle::of(&camera.camera, &seen);
         Self { size_px, cells, counts, means_px, views, planar, circle }
     }
@@ -84,9 +84,9 @@ impl Survey {
         let [columns, rows] = self.cells;
         let is_shown = |index: usize| {
             let [column, row] = [index % columns, index / columns].map(|v| v as f64 + 0.5);
-            let x = column * self.size_px[0] / columns as f64 - 0.5;
-            let y = row * self.size_px[1] / rows as f64 - 0.5;
-            self.circle.is_none_or(|circle| circle.radius_of([x, y]) <= circle.radius_px)
+            let cells = DVec2::new(columns as f64, rows as f64);
+            let place = DVec2::new(column, row) * self.size_px / cells - 0.5;
+            self.circle.is_none_or(|circle| circle.radius_of(place) <= circle.radius_px)
         };
         let shown: Vec<usize> = (0..self.counts.len()).filter(|&index| is_shown(index)).collect();
         let covered = shown.iter().filter(|&&index| self.counts[index] > 0).count();
@@ -96,9 +96,9 @@ impl Survey {
     /// Distance of the outermost corner from the middle of the image, as a part of half its
     /// diagonal; or from the middle of its circle, as a part of its radius.
     pub fn reach(&self, camera: &CameraEstimate) -> f64 {
-        let [w, h] = self.size_px;
+        let size = self.size_px;
         let whole =
-            ImageCircle { centre_px: [w / 2.0 - 0.5, h / 2.0 - 0.5], radius_px: w.hypot(h) / 2.0 };
+            ImageCircle { centre_px: size / 2.0 - 0.5, radius_px: size.x.hypot(size.y) / 2.0 };
         let circle = self.circle.unwrap_or(whole);
         let radii = camera.corners().map(|corner| circle.radius_of(corner.pixel));
         radii.fold(0.0, f64::max) / circle.radius_px
@@ -111,25 +111,21 @@ impl Survey {
             .means_px
             .iter()
             .flatten()
-            .map(|cell| {
-                let [x, y] = cell.mean_px.map(|mean| mean / cell.sd_px);
-                (x * x + y * y) / 2.0
-            })
+            .map(|cell| (cell.mean_px / cell.sd_px).length_squared() / 2.0)
             .collect();
         let mean = seen.iter().sum::<f64>() / seen.len() as f64;
         (!seen.is_empty()).then_some(mean.sqrt())
     }
 }
 
-fn cell_mean(residuals: &[[f64; 2]]) -> Option<CellMean> {
+fn cell_mean(residuals: &[DVec2]) -> Option<CellMean> {
     if residuals.len() < LEAST_IN_CELL {
         return None;
     }
     let n = residuals.len() as f64;
-    let mean_px = [0, 1].map(|axis| residuals.iter().map(|r| r[axis]).sum::<f64>() / n);
-    let off =
-        |r: &[f64; 2]| [0, 1].map(|axis| (r[axis] - mean_px[axis]).powi(2)).iter().sum::<f64>();
-    let variance = residuals.iter().map(off).sum::<f64>() / (2.0 * (n - 1.0));
+    let mean_px = residuals.iter().sum::<DVec2>() / n;
+    let squares = residuals.iter().map(|r| r.distance_squared(mean_px));
+    let variance = squares.sum::<f64>() / (2.0 * (n - 1.0));
     let sd_px = (variance / n).sqrt();
     (sd_px > 0.0).then_some(CellMean { mean_px, sd_px })
 }
@@ -137,7 +133,7 @@ fn cell_mean(residuals: &[[f64; 2]]) -> Option<CellMean> {
 fn surveyed(camera: &Camera, view: &ViewEstimate, planar: bool) -> SurveyedView {
     let normal = view.pose.rotation * DVec3::Z;
     let count = view.corners.len().max(1) as f64;
-    let middle = [0, 1].map(|i| view.corners.iter().map(|c| c.pixel[i]).sum::<f64>() / count);
+    let middle = view.corners.iter().map(|corner| corner.pixel).sum::<DVec2>() / count;
     let sight = camera.unproject(middle).map(|ray| ray.direction).filter(|_| planar);
     SurveyedView {
         tilt_rad: sight.map(|sight| normal.angle_between(-sight)),

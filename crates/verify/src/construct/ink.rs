@@ -3,6 +3,7 @@
 
 use std::collections::HashSet;
 
+use glam::DVec2;
 use kurbo::{BezPath, PathEl, Shape};
 
 /// Length of all contours over the area of the page, 1/mm: tags in all tiles, with cells of
@@ -39,8 +40,8 @@ pub(super) struct Ink {
 
 impl Ink {
     /// An empty page of this width and height, with so many millimetres in a unit.
-    pub fn new([width, height]: [f64; 2], mm: f64) -> Self {
-        Self { page: width * height, mm, length: 0.0, area: 0.0, marks: HashSet::new() }
+    pub fn new(size: DVec2, mm: f64) -> Self {
+        Self { page: size.element_product(), mm, length: 0.0, area: 0.0, marks: HashSet::new() }
     }
 
     /// Adds a filled path, or one that is drawn by a pen of some width, and says why not all viewers draw it alike.
@@ -121,7 +122,7 @@ mod tests {
 
     #[test]
     fn thin_marks_are_told_from_thick_ones() {
-        let ink = Ink::new([100.0, 100.0], 1.0);
+        let ink = Ink::new(DVec2::splat(100.0), 1.0);
         let is_thick = |path: &str| ink.is_thick(&BezPath::from_svg(path).unwrap(), None);
         assert!(is_thick("M0,0 L20,20 L20.1,20 L0.1,0 z"));
         assert!(!is_thick("M0,0 L20,20 L20.01,20 L0.01,0 z"));
@@ -133,7 +134,7 @@ mod tests {
 
     #[test]
     fn a_mark_is_drawn_once() {
-        let mut ink = Ink::new([100.0, 100.0], 1.0);
+        let mut ink = Ink::new(DVec2::splat(100.0), 1.0);
         let mut add = |path: &str, pen| ink.add(&BezPath::from_svg(path).unwrap(), pen);
         assert_eq!(add("M0,0 L20,0 L10,17 z", None), None);
         assert_eq!(add("M20,0 L40,0 L30,17 z", None), None);
@@ -147,12 +148,12 @@ mod tests {
     #[test]
     fn a_page_is_covered_some_times_and_not_often() {
         let page = kurbo::Shape::to_path(&kurbo::Rect::new(0.0, 0.0, 100.0, 100.0), 0.1);
-        let mut ink = Ink::new([100.0, 100.0], 1.0);
+        let mut ink = Ink::new(DVec2::splat(100.0), 1.0);
         (0..10).for_each(|_| _ = ink.add(&page, None));
         assert!(ink.is_drawable());
         (0..40).for_each(|_| _ = ink.add(&page, None));
         assert!(!ink.is_drawable());
-        let mut ink = Ink::new([100.0, 100.0], 1.0);
+        let mut ink = Ink::new(DVec2::splat(100.0), 1.0);
         ink.add(&page, Some(1e9));
         assert!(!ink.is_drawable());
     }

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use glam::DVec2;
 use lopdf::xref::XrefEntry;
 use lopdf::{Dictionary, Document, Object, ObjectId, StringFormat, decode_text_string};
 
@@ -331,7 +332,7 @@ impl<'a> Walk<'a> {
     }
 
     /// All boxes are the page, from its origin; its width and height in points.
-    fn boxes(&mut self, page: &'a Dictionary, place: &str) -> [f64; 2] {
+    fn boxes(&mut self, page: &'a Dictionary, place: &str) -> DVec2 {
         let ends = |key: &str| -> Option<Vec<f32>> {
             let list = self.value(page, key)?.as_array().ok()?;
             list.iter().map(|end| self.resolve(end)?.as_float().ok()).collect()
@@ -342,8 +343,8 @@ impl<'a> Walk<'a> {
         self.found.unless(crop == media, place, "a CropBox other than the page");
         self.found.unless(trim == media, place, "a TrimBox other than the page");
         match media.as_deref() {
-            Some(&[_, _, width, height]) => [width, height].map(f64::from),
-            _ => [0.0; 2],
+            Some(&[_, _, width, height]) => DVec2::new(width.into(), height.into()),
+            _ => DVec2::ZERO,
         }
     }
 
@@ -359,12 +360,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn content(
-        &mut self,
-        page: &'a Dictionary,
-        size_pt: [f64; 2],
-        place: &str,
-    ) -> Result<(), String> {
+    fn content(&mut self, page: &'a Dictionary, size_pt: DVec2, place: &str) -> Result<(), String> {
         let stream = self.value(page, "Contents").and_then(|object| object.as_stream().ok());
         let Some(stream) = stream else {
             self.found.add(place, "content other than one stream");

@@ -1,6 +1,7 @@
 //! The operators of a PDF page that every viewer draws alike: black paths, filled by the even-odd
 //! rule or stroked.
 
+use glam::DVec2;
 use kurbo::BezPath;
 
 use super::ink::Ink;
@@ -51,7 +52,7 @@ const EDGE_SLACK_PT: f64 = 0.01;
 /// nothing else. What is painted is on the page, and with what is said before.
 pub(super) fn check(
     content: &[u8],
-    size_pt: [f64; 2],
+    size_pt: DVec2,
     page: &str,
     limits: &Limits,
     found: &mut Findings,
@@ -97,7 +98,7 @@ pub(super) fn check(
 
 /// What was said so far on a page.
 struct Painter {
-    size_pt: [f64; 2],
+    size_pt: DVec2,
     /// Operators that tell what paths are painted with.
     said: Vec<&'static str>,
     /// Width of lines.
@@ -169,7 +170,7 @@ impl Painter {
             return Err(problem.to_owned());
         }
         let [left, lower, right, upper] = path.unwrap_or_default();
-        let [width, height] = self.size_pt;
+        let DVec2 { x: width, y: height } = self.size_pt;
         let half = pen.unwrap_or_default() / 2.0;
         Ok(left - half > -EDGE_SLACK_PT
             && lower - half > -EDGE_SLACK_PT

@@ -1,5 +1,6 @@
 //! The SVG elements, attributes and values that every viewer draws alike.
 
+use glam::DVec2;
 use kurbo::BezPath;
 use resvg::usvg::roxmltree::{Document, Error, Node, NodeType, ParsingOptions};
 
@@ -156,9 +157,9 @@ impl View {
     }
 
     /// Width and height.
-    fn size(&self) -> [f64; 2] {
+    fn size(&self) -> DVec2 {
         let [x0, y0, x1, y1] = self.ends;
-        [x1 - x0, y1 - y0]
+        DVec2::new(x1 - x0, y1 - y0)
     }
 
     /// Whether marks with these ends are on the page.

@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use glam::DVec2;
+
 use super::reader::{self, Artifact, Reader};
 use deltille_core::raster::Gray;
 use deltille_files::limits::{Guard, Limits, ReadError};
@@ -182,7 +184,7 @@ impl Document {
     }
 
     /// Width and height of a page (counted from 0) as the file states them, mm.
-    pub fn size_mm(&self, page: usize) -> [f64; 2] {
+    pub fn size_mm(&self, page: usize) -> DVec2 {
         match &*self.content {
             Content::Pdf(pdf) => pdf.size_mm(page),
             Content::Svg(svg) => svg.size_mm(),
@@ -191,11 +193,10 @@ impl Document {
     }
 
     /// What is said of a page that is far larger than it should be.
-    pub(super) fn too_large(&self, found_mm: [f64; 2], stated_mm: [f64; 2]) -> DocumentError {
-        let [[width, height], [stated_width, stated_height]] = [found_mm, stated_mm];
+    pub(super) fn too_large(&self, found_mm: DVec2, stated_mm: DVec2) -> DocumentError {
         let problem = format!(
-            "a page of {width} x {height} mm instead of {stated_width} x {stated_height} mm is not \
-             looked at"
+            "a page of {} x {} mm instead of {} x {} mm is not looked at",
+            found_mm.x, found_mm.y, stated_mm.x, stated_mm.y
         );
         DocumentError::unreadable(&self.path, problem)
     }
@@ -216,7 +217,7 @@ impl Document {
     /// # Errors
     /// Where the page cannot be drawn, or passes a limit.
     pub fn render(&self, page: usize, px_per_mm: f64) -> Result<Page, DocumentError> {
-        let [width_mm, height_mm] = self.size_mm(page);
+        let DVec2 { x: width_mm, y: height_mm } = self.size_mm(page);
         let most = (MAX_PIXELS / (width_mm * height_mm)).sqrt();
         let px_per_mm = match &*self.content {
             Content::Png(png) => png.image_px_per_mm(),
@@ -246,13 +247,14 @@ impl Document {
 
 impl Page {
     /// Pixel position of a point of the page frame (mm, y up).
-    pub fn px_from_page(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [x * self.px_per_mm - 0.5, (self.height_mm - y) * self.px_per_mm - 0.5]
+    pub fn px_from_page(&self, place: DVec2) -> DVec2 {
+        DVec2::new(place.x, self.height_mm - place.y) * self.px_per_mm - 0.5
     }
 
     /// Point of the page frame (mm, y up) of a pixel position.
-    pub fn page_from_px(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [(x + 0.5) / self.px_per_mm, self.height_mm - (y + 0.5) / self.px_per_mm]
+    pub fn page_from_px(&self, pixel: DVec2) -> DVec2 {
+        let from_top = (pixel + 0.5) / self.px_per_mm;
+        DVec2::new(from_top.x, self.height_mm - from_top.y)
     }
 
     /// The page as a lens shows it: each pixel with its neighbours, weighted 1 2 1 along both axes,
@@ -285,7 +287,7 @@ impl Page {
     }
 
     /// Ink at a pixel, 0 on paper to 1 in solid black; paper beyond the page.
-    pub fn ink(&self, [x, y]: [f64; 2]) -> f64 {
+    pub fn ink(&self, DVec2 { x, y }: DVec2) -> f64 {
         let inside = x > -0.5
             && y > -0.5
             && x < self.image.width() as f64 - 0.5

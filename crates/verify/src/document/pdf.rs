@@ -1,6 +1,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use glam::{DVec2, Vec2Swizzles as _};
 use hayro::hayro_interpret::InterpreterSettings;
 use hayro::hayro_syntax::page::Page;
 use hayro::kurbo::Affine;
@@ -31,19 +32,19 @@ impl Pdf {
     }
 
     /// The visible part of the page.
-    pub fn size_mm(&self, index: usize) -> [f64; 2] {
+    pub fn size_mm(&self, index: usize) -> DVec2 {
         let page = &self.0.pages()[index];
         let visible = page.intersected_crop_box();
         let unit: f64 = page.raw().get::<f64>("UserUnit").unwrap_or(1.0) * MM_PER_PT;
-        let [width, height] = [visible.width() * unit, visible.height() * unit];
+        let size = DVec2::new(visible.width(), visible.height()) * unit;
         // Turned by 90° or 270° when the render size says so.
         let (upright, shown) = (page.base_dimensions(), page.render_dimensions());
-        if upright == shown { [width, height] } else { [height, width] }
+        if upright == shown { size } else { size.yx() }
     }
 
     pub fn render(&self, index: usize, px_per_mm: f64, end: Option<Instant>) -> Gray<u8> {
         let page = &self.0.pages()[index];
-        let [width_mm, height_mm] = self.size_mm(index);
+        let DVec2 { x: width_mm, y: height_mm } = self.size_mm(index);
         let (width, height) = (pixels(width_mm, px_per_mm), pixels(height_mm, px_per_mm));
         let scale = width_mm * px_per_mm / f64::from(page.render_dimensions().0);
         let cache = RenderCache::new();

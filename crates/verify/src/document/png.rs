@@ -1,5 +1,6 @@
 use std::io::Cursor;
 
+use glam::DVec2;
 use image::ImageReader;
 
 use super::MAX_PIXELS;
@@ -51,8 +52,8 @@ impl Png {
         Ok(Self { image, reduced, size_px: [width, height], px_per_mm })
     }
 
-    pub fn size_mm(&self) -> [f64; 2] {
-        self.size_px.map(|px| px as f64 / self.px_per_mm)
+    pub fn size_mm(&self) -> DVec2 {
+        DVec2::from(self.size_px.map(|px| px as f64)) / self.px_per_mm
     }
 
     /// The resolution of the file.

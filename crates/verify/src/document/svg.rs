@@ -1,6 +1,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use glam::DVec2;
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{self, roxmltree};
 
@@ -12,7 +13,7 @@ use deltille_files::limits::{self, Broken};
 /// An SVG, drawn by resvg.
 pub(super) struct Svg {
     tree: usvg::Tree,
-    size_mm: [f64; 2],
+    size_mm: DVec2,
 }
 
 impl Svg {
@@ -26,19 +27,19 @@ impl Svg {
                 format!("its {name} {value:?} is not a length in mm, cm, in, pt, pc or px")
             })
         };
-        let size_mm = [length("width")?, length("height")?];
+        let size_mm = DVec2::new(length("width")?, length("height")?);
         let tree = usvg::Tree::from_xmltree(&xml, &usvg::Options::default())
             .map_err(|error| format!("not a readable SVG ({error})"))?;
         Ok(Self { tree, size_mm })
     }
 
-    pub fn size_mm(&self) -> [f64; 2] {
+    pub fn size_mm(&self) -> DVec2 {
         self.size_mm
     }
 
     pub fn render(&self, px_per_mm: f64, end: Option<Instant>) -> Result<Gray<u8>, String> {
-        let [width, height] = self.size_mm.map(|mm| pixels(mm, px_per_mm));
-        let scale = px_per_mm * self.size_mm[0] / f64::from(self.tree.size().width());
+        let [width, height] = self.size_mm.to_array().map(|mm| pixels(mm, px_per_mm));
+        let scale = px_per_mm * self.size_mm.x / f64::from(self.tree.size().width());
         let mut grey = Vec::with_capacity(width * height);
         // Blocks are drawn on threads that are not this one.
         let is_broken = AtomicBool::new(false);

@@ -1,7 +1,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DMat4, DVec2, DVec3, Vec2, Vec3};
 use image::ImageDecoder as _;
 
 use super::{Model, Triangle};
@@ -68,7 +68,7 @@ fn visit<'a>(
         let normals: Vec<DVec3> =
             reader.read_normals().ok_or("it has no normals")?.map(turn).collect();
         let uvs = reader.read_tex_coords(0).ok_or("it has no texture coordinates")?;
-        let uvs: Vec<[f64; 2]> = uvs.into_f32().map(|uv| uv.map(f64::from)).collect();
+        let uvs: Vec<DVec2> = uvs.into_f32().map(|uv| Vec2::from(uv).as_dvec2()).collect();
         let indices: Vec<u32> = match reader.read_indices() {
             Some(indices) => indices.into_u32().collect(),
             None => (0..positions.len() as u32).collect(),
@@ -100,7 +100,7 @@ fn obj(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, Strin
         };
         // OBJ counts v upwards from the lower edge of the texture.
         let uvs = mesh.texcoords.as_chunks::<2>().0.iter();
-        let uvs: Vec<[f64; 2]> = uvs.map(|&[u, v]| [u, 1.0 - v]).collect();
+        let uvs: Vec<DVec2> = uvs.map(|&[u, v]| DVec2::new(u, 1.0 - v)).collect();
         add(
             &mut triangles,
             &mesh.indices,
@@ -121,7 +121,7 @@ fn add(
     indices: &[u32],
     positions: &[DVec3],
     normals: (&[u32], &[DVec3]),
-    uvs: (&[u32], &[[f64; 2]]),
+    uvs: (&[u32], &[DVec2]),
 ) -> Result<(), String> {
     fn pick<T: Copy>(list: &[T], at: Option<&u32>) -> Result<T, String> {
         let found = at.and_then(|&at| list.get(at as usize)).copied();
@@ -132,7 +132,7 @@ fn add(
         let mut triangle = Triangle {
             vertices_mm: [DVec3::ZERO; 3],
             normals: [DVec3::ZERO; 3],
-            uv: [[0.0; 2]; 3],
+            uv: [DVec2::ZERO; 3],
         };
         for (i, at) in three.into_iter().enumerate() {
             triangle.vertices_mm[i] = pick(positions, indices.get(at))?;

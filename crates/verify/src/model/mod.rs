@@ -4,7 +4,7 @@ mod load;
 mod stl;
 mod view;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use deltille_core::raster::Gray;
 
@@ -24,7 +24,7 @@ pub(super) struct Triangle {
     pub vertices_mm: [DVec3; 3],
     pub normals: [DVec3; 3],
     /// (0,0) is the upper left corner of the texture.
-    pub uv: [[f64; 2]; 3],
+    pub uv: [DVec2; 3],
 }
 
 impl Triangle {

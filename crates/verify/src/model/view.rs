@@ -24,10 +24,9 @@ impl View {
         let mut nearest = vec![0.0f32; width * height];
         let mut shades = vec![BACKGROUND; width * height];
         let scale = SAMPLES as f64;
-        let sample =
-            |[x, y]: [f64; 2]| DVec2::new((x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5);
+        let sample = |pixel: DVec2| (pixel + 0.5) * scale - 0.5;
         let texture = &model.texture;
-        let size = [texture.width() as f64, texture.height() as f64];
+        let size = DVec2::new(texture.width() as f64, texture.height() as f64);
         for triangle in &model.triangles {
             let seen = triangle.vertices_mm.map(|v| self.camera_from_target.apply(v));
             let normal = (seen[1] - seen[0]).cross(seen[2] - seen[0]);
@@ -61,11 +60,9 @@ impl View {
                         continue;
                     }
                     nearest[at] = inverse_z as f32;
-                    let uv = [0, 1].map(|axis| {
-                        let sum: f64 = (0..3).map(|i| per_z[i] * triangle.uv[i][axis]).sum();
-                        sum / inverse_z * size[axis] - 0.5
-                    });
-                    shades[at] = texture.bilinear(uv[0], uv[1]).round() as u8;
+                    let sum: DVec2 = (0..3).map(|i| per_z[i] * triangle.uv[i]).sum();
+                    let texel = sum / inverse_z * size - 0.5;
+                    shades[at] = texture.bilinear(texel.x, texel.y).round() as u8;
                 }
             }
         }
@@ -78,12 +75,11 @@ impl View {
     }
 
     /// Where the ray of a pixel meets the mesh first, in the target frame, mm.
-    pub fn meet(&self, model: &Model, [x, y]: [f64; 2]) -> Option<DVec3> {
-        let [fx, fy] = self.camera.focal_px;
-        let [cx, cy] = self.camera.centre_px;
+    pub fn meet(&self, model: &Model, pixel: DVec2) -> Option<DVec3> {
         let target_from_camera = self.camera_from_target.inverse();
         let eye = target_from_camera.translation;
-        let ray = target_from_camera.rotation * DVec3::new((x - cx) / fx, (y - cy) / fy, 1.0);
+        let ahead = (pixel - self.camera.centre_px) / self.camera.focal_px;
+        let ray = target_from_camera.rotation * ahead.extend(1.0);
         let meets = model.triangles.iter().filter_map(|triangle| {
             let normal = triangle.winding();
             let towards = normal.dot(ray);

@@ -62,8 +62,8 @@ pub fn level([across, down]: [f64; 2], side: u32, level: u8) -> Damage {
 fn on_bar(from_mm: f64, length_mm: f64, height_mm: f64, level: u8) -> Damage {
     const PX_PER_MM: f64 = 300.0 / 25.4;
     let sheet = &BOARD.target.sheets[0];
-    let [x, y] = sheet.check_bars[0].from_mm;
-    let along_x = (sheet.check_bars[0].to_mm[1] - y).abs() < 1e-9;
+    let (x, y) = sheet.check_bars[0].from_mm.into();
+    let along_x: bool = (sheet.check_bars[0].to_mm.y - y).abs() < 1e-9;
     let ends = |along: f64, across: f64| {
         if along_x { [x + along, y + across] } else { [x + across, y + along] }
     };

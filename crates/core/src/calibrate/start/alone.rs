@@ -75,7 +75,7 @@ impl<'a> Search<'a> {
         let poses: Vec<Option<Pose>> =
             agreeing.iter().map(|view| estimate_pose(&ideal, panels, &view.sightings)).collect();
         let from = |(lens, scale): (Lens, f64)| {
-            let camera = Camera::centred(width, height, scale * ideal.focal_px[0], lens);
+            let camera = Camera::centred(width, height, scale * ideal.focal_px.x, lens);
             let (views, poses) = (agreeing.clone(), poses.clone());
             let mut search = Search { views, panels, camera, poses };
             search.adjust(model.coarse())?;

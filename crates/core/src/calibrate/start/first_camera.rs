@@ -57,8 +57,8 @@ fn error_px(camera: &Camera, view: &[Observation]) -> f64 {
 }
 
 fn squared_px(camera: &Camera, pose: &Pose, seen: &Observation) -> f64 {
-    let Some([x, y]) = camera.project(pose.apply(seen.panel_mm)) else { return f64::INFINITY };
-    (seen.pixel[0] - x).powi(2) + (seen.pixel[1] - y).powi(2)
+    let at = camera.project(pose.apply(seen.panel_mm));
+    at.map_or(f64::INFINITY, |at| seen.pixel.distance_squared(at))
 }
 
 fn largest_panel(view: &View) -> Option<Vec<Observation>> {

@@ -92,7 +92,7 @@ pub fn sheets(
             let Some(piece) = lay(piece, tabs, paper)? else { break };
             laid.push(piece);
         }
-        let area: f64 = laid.iter().map(|l| l.arrangement.page_mm().iter().product::<f64>()).sum();
+        let area: f64 = laid.iter().map(|l| l.arrangement.page_mm().element_product()).sum();
         if laid.len() == count && best.as_ref().is_none_or(|(least, _)| area < *least) {
             let sheets = laid.iter().enumerate();
             let sheets = sheets.map(|(index, laid)| drawing.sheet(laid, [index, count]));
@@ -106,7 +106,7 @@ pub fn sheets(
         let problem = "the faces leave no room for glue tabs: take `SolidSheets::PerFace`";
         return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
     };
-    let tiles: Vec<(u32, [[f64; 2]; 3])> =
+    let tiles: Vec<(u32, [DVec2; 3])> =
         panels.iter().map(|panel| (panel.id, tiles_outline(panel))).collect();
     let count = net.pieces.len();
     let pieces = net.pieces.iter().zip(&net.tabs).enumerate();
@@ -124,7 +124,7 @@ pub fn sheets(
 
 /// The unfoldings that have room for tabs, best liked first.
 fn nets(solid: &Polyhedron, spec: &SolidSpec, faces: &[Face], sides: &Sides) -> Vec<Net> {
-    let flat: Vec<[DVec2; 3]> = faces.iter().map(|face| face.outline_mm.map(DVec2::from)).collect();
+    let flat: Vec<[DVec2; 3]> = faces.iter().map(|face| face.outline_mm).collect();
     let with_tabs = |pieces: Vec<Piece>| {
         let tabs = tabs::place(&pieces, sides)?;
         Some(Net { pieces, tabs })
@@ -144,7 +144,7 @@ fn nets(solid: &Polyhedron, spec: &SolidSpec, faces: &[Face], sides: &Sides) -> 
 }
 
 /// The triangle that the tiles of a face fill, in the panel frame, mm.
-fn tiles_outline(panel: &Panel) -> [[f64; 2]; 3] {
+fn tiles_outline(panel: &Panel) -> [DVec2; 3] {
     let top = panel.corners.iter().map(|corner| corner.row).max().unwrap_or_default();
     let ends = [(-1, -1), (-1, top + 2), (top + 2, -1)];
     ends.map(|(row, col)| panel.lattice_mm(Vertex::new(row, col)))
@@ -187,7 +187,7 @@ fn lay<'a>(
                 mark_blank: BLANK_MM,
             };
             if let Some(arrangement) = fit_upright(&footprint, &paper)? {
-                let [x, y] = arrangement.footprint_at_mm();
+                let DVec2 { x, y } = arrangement.footprint_at_mm();
                 let shift = DVec2::new(x - left, y + WORDS_MM - lower);
                 let page_from_net = Motion { shift, ..turn };
                 return Ok(Some(Laid { piece, tabs, arrangement, page_from_net }));
@@ -241,7 +241,7 @@ impl<'a> Drawing<'a> {
         sheet.placements.clear();
         self.draw(&mut sheet, laid.piece, laid.tabs, &laid.page_from_net);
         let [left, lower, right, _] = laid.arrangement.clear_mm();
-        let at = [left, lower + BLANK_MM];
+        let at = DVec2::new(left, lower + BLANK_MM);
         let words = instructions(&sheet.lines, at, right - left - BLANK_MM);
         sheet.texts.extend(words);
         sheet
@@ -253,12 +253,12 @@ impl<'a> Drawing<'a> {
         for flat in piece {
             let (face, index) = (&self.faces[flat.face], flat.face);
             let corners = flat.corners.map(|corner| sheet_from_net.apply(corner));
-            let [a, b, _] = face.outline_mm.map(DVec2::from);
+            let [a, b, _] = face.outline_mm;
             let motion = Motion::carrying([a, b], [corners[0], corners[1]]);
             let placement = Placement {
                 panel: self.panels[index].id,
                 angle_rad: motion.turn.to_angle(),
-                origin_mm: motion.shift.to_array(),
+                origin_mm: motion.shift,
             };
             sheet.placements.push(placement);
             let mut named = false;
@@ -358,7 +358,7 @@ impl<'a> Drawing<'a> {
 
 /// How to make the solid from a print of these lines, two lines of text; the lower one stands at
 /// `at`.
-pub(super) fn instructions(lines: &[SheetLine], at: [f64; 2], room: f64) -> [SheetText; 2] {
+pub(super) fn instructions(lines: &[SheetLine], at: DVec2, room: f64) -> [SheetText; 2] {
     let has = |kind| lines.iter().any(|line| line.kind == kind);
     let mut folds = if has(LineKind::Valley) {
         "Cut along solid lines. Score and fold dashed lines away from the print, dash-dotted ones \
@@ -373,12 +373,12 @@ pub(super) fn instructions(lines: &[SheetLine], at: [f64; 2], room: f64) -> [She
     let glue = "Glue each tab under the face that it names, where the face has the same number: \
                 edge 1 to edge 1, and so on."
         .to_owned();
-    let mut y = at[1] + 2.0 * WORDS_STEP_MM;
+    let mut y = at.y + 2.0 * WORDS_STEP_MM;
     [folds, glue].map(|text| {
         y -= WORDS_STEP_MM;
         SheetText {
             text: Label::Words(text),
-            at_mm: [at[0], y],
+            at_mm: DVec2::new(at.x, y),
             angle_rad: 0.0,
             cap_height_mm: WORDS_CAP_MM,
             max_width_mm: room,
@@ -386,8 +386,7 @@ pub(super) fn instructions(lines: &[SheetLine], at: [f64; 2], room: f64) -> [She
     })
 }
 
-fn line(kind: LineKind, [from, to]: [DVec2; 2]) -> SheetLine {
-    let (from_mm, to_mm) = (from.to_array(), to.to_array());
+fn line(kind: LineKind, [from_mm, to_mm]: [DVec2; 2]) -> SheetLine {
     SheetLine { kind, from_mm, to_mm, width_mm: LINE_WIDTH_MM }
 }
 
@@ -410,7 +409,7 @@ fn words(
     let start = from + (to - from) * part - along * width(&text, cap) / 2.0;
     SheetText {
         text,
-        at_mm: (start + along.perp() * inwards).to_array(),
+        at_mm: start + along.perp() * inwards,
         angle_rad: along.to_angle(),
         cap_height_mm: cap,
         max_width_mm: room,
@@ -429,7 +428,7 @@ mod tests {
     /// The rectangle that a text takes, by estimate.
     fn text_box(text: &SheetText) -> [DVec2; 4] {
         let width = width(&text.text, text.cap_height_mm).min(text.max_width_mm);
-        let (at, along) = (DVec2::from(text.at_mm), DVec2::from_angle(text.angle_rad));
+        let (at, along) = (text.at_mm, DVec2::from_angle(text.angle_rad));
         let up = along.perp() * text.cap_height_mm;
         [at, at + along * width, at + along * width + up, at + up]
     }
@@ -439,7 +438,7 @@ mod tests {
         let TargetSpec::Solid(spec) = &target.spec else { panic!("a solid") };
         let index = target.panels.iter().position(|panel| panel.id == placement.panel).unwrap();
         let outline = spec.faces().unwrap()[index].outline_mm;
-        outline.map(|p| DVec2::from(placement.page_from_panel(p)))
+        outline.map(|p| placement.page_from_panel(p))
     }
 
     proptest! {
@@ -477,10 +476,9 @@ mod tests {
             }
             let tiles = sheet.placements.iter().map(|placement| {
                 let panel = target.panels.iter().find(|p| p.id == placement.panel).unwrap();
-                tiles_outline(panel).map(|p| DVec2::from(placement.page_from_panel(p))).to_vec()
+                tiles_outline(panel).map(|p| placement.page_from_panel(p)).to_vec()
             });
-            let lines =
-                sheet.lines.iter().map(|l| [l.from_mm, l.to_mm].map(DVec2::from).to_vec());
+            let lines = sheet.lines.iter().map(|l| vec![l.from_mm, l.to_mm]);
             let marks: Vec<Vec<DVec2>> = tiles.chain(lines).collect();
             let boxes: Vec<_> = sheet.texts.iter().map(text_box).collect();
             for (n, text) in boxes.iter().enumerate() {
@@ -489,10 +487,10 @@ mod tests {
                 prop_assert!(boxes[n + 1..].iter().all(|other| gap_mm(text, other) > 0.2), "{}", words);
             }
             for line in sheet.lines.iter().filter(|_| !sheet.pages.is_empty()) {
-                let shown = |at: [f64; 2]| {
+                let shown = |at: DVec2| {
                     let on = |page: &&crate::targets::SheetPage| {
                         let [left, lower, right, upper] = page.window_mm;
-                        let [x, y] = [0, 1].map(|i| at[i] + page.sheet_at_mm[i]);
+                        let DVec2 { x, y } = at + page.sheet_at_mm;
                         left <= x && x <= right && lower <= y && y <= upper
                     };
                     sheet.pages.iter().filter(on).count()
@@ -500,7 +498,7 @@ mod tests {
                 let least = if line.kind == LineKind::Align { 2 } else { 1 };
                 for part in 0..=10 {
                     let part = f64::from(part) / 10.0;
-                    let at = [0, 1].map(|i| line.from_mm[i] * (1.0 - part) + line.to_mm[i] * part);
+                    let at = line.from_mm.lerp(line.to_mm, part);
                     prop_assert!(shown(at) >= least, "{:?}", line);
                 }
             }

@@ -106,25 +106,24 @@ impl Tiling {
     fn on(page: &Arrangement, turn: Motion, points: &[DVec2]) -> Self {
         let [left, lower, right, upper] = page.clear_mm();
         let window_mm = [left, lower + BLANK_MM + WORDS_MM, right - BLANK_MM, upper];
-        let [width, height] = [window_mm[2] - window_mm[0], window_mm[3] - window_mm[1]];
+        let window = DVec2::new(window_mm[2] - window_mm[0], window_mm[3] - window_mm[1]);
         let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
         let [x0, y0, x1, y1] = bounds(&turned);
         let count = |size: f64, window: f64| {
             let beyond = (size + 2.0 * BORDER_MM - OVERLAP_MM) / (window - OVERLAP_MM);
             beyond.ceil().max(1.0) as usize
         };
-        let counts = [count(x1 - x0, width), count(y1 - y0, height)];
+        let counts = [count(x1 - x0, window.x), count(y1 - y0, window.y)];
         let mut tiling = Self { page: *page, window_mm, counts, sheet_from_net: turn };
         // The net lies in the middle of the sheet.
-        let [sheet_width, sheet_height] = tiling.size_mm();
         let middle = DVec2::new(x0 + x1, y0 + y1) / 2.0;
-        tiling.sheet_from_net.shift = DVec2::new(sheet_width, sheet_height) / 2.0 - middle;
+        tiling.sheet_from_net.shift = tiling.size_mm() / 2.0 - middle;
         tiling
     }
 
     fn check(&self, spec: &SolidSpec, size: &PaperSize) -> Result<(), TargetError> {
         let pages = self.counts[0] * self.counts[1];
-        let area: f64 = self.size_mm().iter().product();
+        let area = self.size_mm().element_product();
         let too_large = (area / MOST_AREA_MM2).max(pages as f64 / MOST_PAGES as f64);
         if too_large <= 1.0 {
             return Ok(());
@@ -147,7 +146,7 @@ impl Tiling {
 
     /// The sheet, still empty.
     pub fn sheet(&self) -> SheetLayout {
-        let [width_mm, height_mm] = self.size_mm();
+        let DVec2 { x: width_mm, y: height_mm } = self.size_mm();
         SheetLayout {
             width_mm,
             height_mm,
@@ -159,28 +158,28 @@ impl Tiling {
         }
     }
 
-    fn window_size(&self) -> [f64; 2] {
-        [0, 1].map(|i| self.window_mm[i + 2] - self.window_mm[i])
+    fn window_size(&self) -> DVec2 {
+        let [left, lower, right, upper] = self.window_mm;
+        DVec2::new(right - left, upper - lower)
     }
 
     /// Width and height of the sheet, mm.
-    fn size_mm(&self) -> [f64; 2] {
-        let window = self.window_size();
-        [0, 1].map(|i| (window[i] - OVERLAP_MM) * self.counts[i] as f64 + OVERLAP_MM)
+    fn size_mm(&self) -> DVec2 {
+        let [columns, rows] = self.counts.map(|count| count as f64);
+        (self.window_size() - OVERLAP_MM) * DVec2::new(columns, rows) + OVERLAP_MM
     }
 
     /// The window in a column and a row (from the top) on the sheet: left, lower, right, upper.
     fn window_on_sheet(&self, column: usize, row: usize) -> [f64; 4] {
-        let [width, height] = self.window_size();
-        let [_, sheet_height] = self.size_mm();
-        let left = (width - OVERLAP_MM) * column as f64;
-        let upper = sheet_height - (height - OVERLAP_MM) * row as f64;
-        [left, upper - height, left + width, upper]
+        let window = self.window_size();
+        let left = (window.x - OVERLAP_MM) * column as f64;
+        let upper = self.size_mm().y - (window.y - OVERLAP_MM) * row as f64;
+        [left, upper - window.y, left + window.x, upper]
     }
 
     /// Adds crosses to a sheet that holds the net, and its pages. `faces` holds the outline of the
     /// tiles of each panel, by its id.
-    pub fn add_pages(&self, sheet: &mut SheetLayout, faces: &[(u32, [[f64; 2]; 3])], label: &str) {
+    pub fn add_pages(&self, sheet: &mut SheetLayout, faces: &[(u32, [DVec2; 3])], label: &str) {
         let obstacles = obstacles(sheet, faces);
         let [columns, rows] = self.counts;
         let shown: Vec<(usize, usize)> = (0..rows)
@@ -213,7 +212,7 @@ impl Tiling {
             SheetPage {
                 label: name((column, row)),
                 window_mm: self.window_mm,
-                sheet_at_mm: [left - window[0], lower - window[1]],
+                sheet_at_mm: DVec2::new(left - window[0], lower - window[1]),
                 marks,
             }
         });
@@ -221,42 +220,41 @@ impl Tiling {
     }
 
     /// Size of the overview, mm, and its scale.
-    fn overview(&self) -> ([f64; 2], f64) {
-        let [width, height] = self.size_mm();
+    fn overview(&self) -> (DVec2, f64) {
+        let size = self.size_mm();
         let high = WORDS_MM - 2.0 * BLANK_MM;
-        let [across, _] = self.window_size();
-        let scale = (high / height).min(0.25 * across / width);
-        ([width * scale, height * scale], scale)
+        let scale = (high / size.y).min(0.25 * self.window_size().x / size.x);
+        (size * scale, scale)
     }
 
     /// The name of the page, and what to do with it.
     fn explain(&self, marks: &mut SheetLayout, name: String, lines: &[SheetLine]) {
         let [left, lower, right, _] = self.page.clear_mm();
         let at = lower + BLANK_MM;
-        let ([overview, _], _) = self.overview();
+        let (overview, _) = self.overview();
         let width = name.chars().count() as f64 * ADVANCE_CAPS * NAME_CAP_MM;
         let start = left + width + 3.0;
-        let room = right - overview - 3.0 * BLANK_MM - start;
-        let text = |text: String, at_mm, cap_height_mm, max_width_mm| SheetText {
+        let room = right - overview.x - 3.0 * BLANK_MM - start;
+        let text = |text: String, at: (f64, f64), cap_height_mm, max_width_mm| SheetText {
             text: Label::Words(text),
-            at_mm,
+            at_mm: at.into(),
             angle_rad: 0.0,
             cap_height_mm,
             max_width_mm,
         };
         let middle = at + (WORDS_MM - 2.0 * BLANK_MM - NAME_CAP_MM) / 2.0;
-        marks.texts.push(text(name, [left, middle], NAME_CAP_MM, width));
-        marks.texts.extend(instructions(lines, [start, at], room));
+        marks.texts.push(text(name, (left, middle), NAME_CAP_MM, width));
+        marks.texts.extend(instructions(lines, DVec2::new(start, at), room));
         let join = "Join the pages first: what overlaps is the same on both; lay cross on cross.";
-        marks.texts.push(text(join.to_owned(), [start, at + 7.2], 2.2, room));
+        marks.texts.push(text(join.to_owned(), (start, at + 7.2), 2.2, room));
     }
 
     /// A small picture of the sheet with the window of the page framed.
     fn draw_overview(&self, marks: &mut SheetLayout, lines: &[SheetLine], window: [f64; 4]) {
         let [_, lower, right, _] = self.page.clear_mm();
-        let ([width, _], scale) = self.overview();
-        let origin = DVec2::new(right - BLANK_MM - width, lower + BLANK_MM);
-        let place = |p: [f64; 2]| (origin + DVec2::from(p) * scale).to_array();
+        let (size, scale) = self.overview();
+        let origin = DVec2::new(right - BLANK_MM - size.x, lower + BLANK_MM);
+        let place = |p: DVec2| origin + p * scale;
         let small = |line: &SheetLine| SheetLine {
             kind: LineKind::Align,
             from_mm: place(line.from_mm),
@@ -264,7 +262,7 @@ impl Tiling {
             width_mm: LINE_MM,
         };
         marks.lines.extend(lines.iter().map(small));
-        let frame = rectangle(window).map(|p| p.to_array());
+        let frame = rectangle(window);
         marks.lines.extend((0..4).map(|i| SheetLine {
             width_mm: FRAME_MM,
             ..small(&SheetLine {
@@ -295,17 +293,17 @@ fn rectangle([left, lower, right, upper]: [f64; 4]) -> [DVec2; 4] {
 }
 
 /// Everything printed on a sheet, as convex polygons.
-fn obstacles(sheet: &SheetLayout, faces: &[(u32, [[f64; 2]; 3])]) -> Vec<Vec<DVec2>> {
+fn obstacles(sheet: &SheetLayout, faces: &[(u32, [DVec2; 3])]) -> Vec<Vec<DVec2>> {
     let tiles = sheet.placements.iter().filter_map(|placement| {
         let (_, face) = faces.iter().find(|(panel, _)| *panel == placement.panel)?;
-        Some(face.map(|p| DVec2::from(placement.page_from_panel(p))).to_vec())
+        Some(face.map(|p| placement.page_from_panel(p)).to_vec())
     });
-    let lines = sheet.lines.iter().map(|l| vec![DVec2::from(l.from_mm), DVec2::from(l.to_mm)]);
+    let lines = sheet.lines.iter().map(|l| vec![l.from_mm, l.to_mm]);
     let texts = sheet.texts.iter().map(|text| {
         let width = text.text.characters() as f64 * ADVANCE_CAPS * text.cap_height_mm;
         let width = width.min(text.max_width_mm);
         let along = DVec2::from_angle(text.angle_rad);
-        let (at, up) = (DVec2::from(text.at_mm), along.perp() * text.cap_height_mm);
+        let (at, up) = (text.at_mm, along.perp() * text.cap_height_mm);
         let below = at - up * 0.33;
         vec![below, below + along * width, at + up + along * width, at + up]
     });
@@ -341,10 +339,10 @@ fn crosses(shared: [f64; 4], obstacles: &[Vec<DVec2>]) -> Vec<SheetLine> {
     };
     let mut found: Vec<DVec2> = [1.0, -1.0].into_iter().filter_map(from_one_end).collect();
     found.dedup_by(|a, b| a.distance(*b) < 4.0 * arm);
-    let stroke = |from: DVec2, to: DVec2| SheetLine {
+    let stroke = |from_mm: DVec2, to_mm: DVec2| SheetLine {
         kind: LineKind::Align,
-        from_mm: from.to_array(),
-        to_mm: to.to_array(),
+        from_mm,
+        to_mm,
         width_mm: LINE_MM,
     };
     let arms = [DVec2::X * arm, DVec2::Y * arm];

@@ -274,20 +274,20 @@ mod tests {
     use crate::targets::net::tabs;
 
     /// A named solid with its vertices moved; a face keeps its lengths, not its angles.
-    fn dented(shape: &SolidShape, moves: &[[f64; 3]]) -> Polyhedron {
+    fn dented(shape: &SolidShape, moves: &[DVec3]) -> Polyhedron {
         let mut solid = match shape {
             SolidShape::Tetrahedron => Polyhedron::tetrahedron(100.0),
             SolidShape::Octahedron => Polyhedron::octahedron(100.0),
             _ => Polyhedron::icosahedron(100.0),
         };
         for (vertex, by) in solid.vertices_mm.iter_mut().zip(moves) {
-            *vertex += DVec3::from(*by);
+            *vertex += *by;
         }
         solid
     }
 
     fn outlines(solid: &Polyhedron) -> Vec<[DVec2; 3]> {
-        let outline = |face| solid.face(face, 6, 1.0).unwrap().outline_mm.map(DVec2::from);
+        let outline = |face| solid.face(face, 6, 1.0).unwrap().outline_mm;
         (0..solid.faces.len()).map(outline).collect()
     }
 
@@ -341,6 +341,7 @@ mod tests {
         ) {
             use SolidShape::{Icosahedron, Octahedron, Tetrahedron};
             let shape = [Tetrahedron, Octahedron, Icosahedron][shape].clone();
+            let moves: Vec<DVec3> = moves.into_iter().map(DVec3::from).collect();
             let solid = dented(&shape, &moves);
             let flat = outlines(&solid);
             for net in usual(&solid, &shape, &flat).iter().chain(&grown(&solid, &flat)[..2]) {

@@ -1,5 +1,7 @@
 use std::collections::BTreeMap;
 
+use glam::DVec3;
+
 use super::{Dialect, DscError, FAMILIES};
 use deltille_core::family::Family;
 use deltille_core::lattice::{GridKind, Vertex};
@@ -148,7 +150,7 @@ struct ListedCorner<'a> {
     line: Line<'a>,
     vertex: Vertex,
     tag: Option<u32>,
-    position: [f64; 3],
+    position: DVec3,
 }
 
 impl<'a> Block<'a> {
@@ -224,8 +226,8 @@ impl<'a> Block<'a> {
             tags: Vec::new(),
         };
         for (&vertex, listed) in &by_vertex {
-            let target_mm = listed.position.map(|v| v * unit_mm);
-            for place in target_mm {
+            let target_mm = listed.position * unit_mm;
+            for place in target_mm.to_array() {
                 place_mm::RANGE.check(place).map_err(|what| listed.line.fault(what.to_string()))?;
             }
             panel.corners.push(Corner {
@@ -258,8 +260,7 @@ impl<'a> Block<'a> {
             .iter()
             .filter_map(|(&vertex, from)| {
                 let to = corners.get(&(vertex + Vertex::new(0, 1)))?;
-                let squares = from.position.iter().zip(&to.position).map(|(a, b)| (a - b).powi(2));
-                Some(squares.sum::<f64>().sqrt())
+                Some(from.position.distance(to.position))
             })
             .collect();
         let Some(step) = median(steps) else {
@@ -295,7 +296,7 @@ impl<'a> ListedCorner<'a> {
         };
         let position = [("x", x), ("y", y), ("z", z)];
         let [x, y, z] = position.map(|(what, field)| line.within(field, what, place_mm::RANGE));
-        let position = [x?, y?, z?];
+        let position = DVec3::new(x?, y?, z?);
         Ok(Self { line, vertex: Vertex::new(row as i32, col as i32), tag, position })
     }
 }

@@ -1,5 +1,7 @@
 use std::fmt::Write;
 
+use glam::DVec3;
+
 use super::{Dialect, DscError, FAMILIES};
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::targets::{Panel, TagsIn, Target};
@@ -49,7 +51,7 @@ pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
         for corner in &panel.corners {
             let tag = panel.tags.iter().find(|tag| (tag.row, tag.col) == (corner.row, corner.col));
             let tag = tag.map_or(-1, |tag| i64::from(tag.id));
-            let [x, y, z] = corner.target_mm;
+            let DVec3 { x, y, z } = corner.target_mm;
             let _ = writeln!(text, "{tag},{},{},{x},{y},{z}", corner.col, corner.row);
         }
     }

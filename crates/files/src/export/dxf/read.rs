@@ -1,3 +1,5 @@
+use glam::DVec2;
+
 use super::LAYERS;
 use deltille_core::artwork::{CutDrawing, CutLayer, CutPath};
 
@@ -126,8 +128,8 @@ impl Record<'_> {
         &self,
         before: usize,
         codes: [u32; N],
-    ) -> Result<[[f64; 2]; N], DxfError> {
-        let mut points = [[0.0; 2]; N];
+    ) -> Result<[DVec2; N], DxfError> {
+        let mut points = [DVec2::ZERO; N];
         for (i, (point, code)) in points.iter_mut().zip(codes).enumerate() {
             let mut values = [0.0; 3];
             for (axis, value) in values.iter_mut().enumerate() {
@@ -146,7 +148,7 @@ impl Record<'_> {
             if values[2] != 0.0 {
                 return Err(self.fault(format!("{} out of the plane", self.name)));
             }
-            *point = [values[0], values[1]];
+            *point = DVec2::new(values[0], values[1]);
         }
         Ok(points)
     }
@@ -196,7 +198,7 @@ impl<'a, 't> Reader<'a, 't> {
         let begin =
             Record { line: head.line, name: "HEADER", fields: head.fields[..known].to_vec() };
         begin.check(&HEAD)?;
-        let mut ends = [[0.0; 2]; 2];
+        let mut ends = [DVec2::ZERO; 2];
         for (i, (end, name)) in ends.iter_mut().zip(["$EXTMIN", "$EXTMAX"]).enumerate() {
             let at = HEAD.len() + 4 * i;
             if head.fields.get(at) != Some(&(9, name)) {
@@ -208,8 +210,8 @@ impl<'a, 't> Reader<'a, 't> {
             return Err(head.fault(format!("variable {name} of HEADER")));
         }
         self.expect("ENDSEC", &[])?;
-        let [[left, lower], [right, upper]] = ends;
-        Ok([left, lower, right, upper])
+        let [least, most] = ends;
+        Ok([least.x, least.y, most.x, most.y])
     }
 
     fn tables(&mut self) -> Result<(), DxfError> {
@@ -249,7 +251,7 @@ impl<'a, 't> Reader<'a, 't> {
         if flags != [Some((66, "1")), Some((70, "1"))] {
             return Err(head.fault("POLYLINE that is not closed"));
         }
-        if head.points(2, [10])? != [[0.0; 2]] {
+        if head.points(2, [10])? != [DVec2::ZERO] {
             return Err(head.fault("POLYLINE that is raised"));
         }
         head.count(6)?;
@@ -284,12 +286,9 @@ mod tests {
     use crate::export::dxf::text;
 
     fn drawing() -> CutDrawing {
-        let path = |layer, closed, points: &[[f64; 2]]| CutPath {
-            layer,
-            closed,
-            points_mm: points.to_vec(),
-        };
-        let triangle = [[0.0, 0.0], [10.5, 0.0], [5.0, 8.25]];
+        let path =
+            |layer, closed, points: &[DVec2]| CutPath { layer, closed, points_mm: points.to_vec() };
+        let triangle = [(0.0, 0.0), (10.5, 0.0), (5.0, 8.25)].map(DVec2::from);
         CutDrawing {
             paths: vec![
                 path(CutLayer::Cut, true, &triangle),

@@ -1,5 +1,7 @@
 use std::fmt::Write;
 
+use glam::DVec2;
+
 use super::{LAYERS, layer_name};
 use crate::export::GENERATOR;
 use deltille_core::artwork::{CutDrawing, CutPath};
@@ -13,8 +15,8 @@ pub fn text(drawing: &CutDrawing) -> String {
         file.tag(9, "$ACADVER").tag(1, "AC1009");
         // Millimetres, for readers that know the variable of later releases.
         file.tag(9, "$INSUNITS").tag(70, "4");
-        file.tag(9, "$EXTMIN").point(10, [left, lower]);
-        file.tag(9, "$EXTMAX").point(10, [right, upper]);
+        file.tag(9, "$EXTMIN").point(10, DVec2::new(left, lower));
+        file.tag(9, "$EXTMAX").point(10, DVec2::new(right, upper));
     });
     file.section("TABLES", |file| {
         file.tag(0, "TABLE").tag(2, "LTYPE").tag(70, "1");
@@ -50,7 +52,7 @@ impl File {
     }
 
     /// A point at z = 0; its coordinates have codes ten apart.
-    fn point(&mut self, code: u32, [x, y]: [f64; 2]) -> &mut Self {
+    fn point(&mut self, code: u32, DVec2 { x, y }: DVec2) -> &mut Self {
         for (code, mm) in [(code, x), (code + 10, y), (code + 20, 0.0)] {
             self.tag(code, &format!("{:.6}", mm + 0.0));
         }
@@ -71,7 +73,7 @@ impl File {
             }
             return;
         }
-        self.tag(0, "POLYLINE").tag(8, layer).tag(66, "1").point(10, [0.0; 2]).tag(70, "1");
+        self.tag(0, "POLYLINE").tag(8, layer).tag(66, "1").point(10, DVec2::ZERO).tag(70, "1");
         for &point in &path.points_mm {
             self.tag(0, "VERTEX").tag(8, layer).point(10, point);
         }
