@@ -37,6 +37,9 @@ pub struct SolveArgs {
     /// than chance
     #[arg(long, conflicts_with = "shape")]
     board_shape: bool,
+    /// Find the place of every corner of the target, too, and write it as a measured target
+    #[arg(long, conflicts_with_all = ["shape", "board_shape"])]
+    measure_target: bool,
     /// Write a page that shows what the calibration is worth, and what would make it better
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -85,6 +88,7 @@ impl SolveArgs {
             .loss(loss)
             .weights(weights)
             .board_shape(self.board_shape)
+            .measure_target(self.measure_target)
             .hold_out(self.holdout.map(|every| every as usize));
         let estimate = calibration.solve().map_err(|error| {
             let option = match error {

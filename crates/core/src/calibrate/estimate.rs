@@ -1,6 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3};
 
 use super::calibration::{CameraViews, PanelPlace};
 use super::error::CalibrationError;
@@ -12,9 +12,11 @@ use super::minimise::Minimum;
 use super::model::Model;
 use super::normal::Covariances;
 use super::panel::PanelRef;
+use super::problem::Problem;
 use super::reweighting::{Settled, variance};
 use super::shape::{BoardShape, Shape};
 use super::start::Frame;
+use super::target_map::{CornerOffset, TargetMap};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 use crate::targets::{Name, PanelPose, Target};
 
@@ -32,6 +34,8 @@ pub struct Estimate {
     pub panels: Vec<PanelPlace>,
     /// The shape of the board's sheet, where it was to be found.
     pub shape: Option<BoardShape>,
+    /// Where the corners of the target are, where that was to be found.
+    pub map: Option<TargetMap>,
     /// Root mean square error of a coordinate over all corners, px: √(Σ(dx² + dy²)/2N).
     pub rms_px: f64,
     /// The deviation that was added to every corner's covariance, px; `None` where corners were
@@ -261,7 +265,7 @@ impl Estimate {
         let Settled { minimum, whitening, .. } = settled;
         let Minimum { problem, normal, layout, steps } = minimum;
         let open = |parameters: String| CalibrationError::Undetermined { parameters };
-        let found = normal.covariances().ok_or_else(|| open("the poses".to_owned()))?;
+        let found = normal.covariances(layout).ok_or_else(|| open("the poses".to_owned()))?;
         let is_open = |first: Option<usize>| {
             first.is_some_and(|first| (first..first + 6).any(|i| found.loose.contains(&i)))
         };
@@ -303,6 +307,7 @@ impl Estimate {
             frames: of_frames.collect(),
             panels: panels.collect(),
             shape: board_shape(minimum, &covariance, f_ratio),
+            map: target_map(problem, &found.corners, variance),
             rms_px: rms_px(cameras.iter().flat_map(CameraEstimate::corners)),
             common_px: whitening.common_px,
             sigma: variance.sqrt(),
@@ -380,6 +385,28 @@ fn camera_estimate(
         rms_px: rms_px(views.iter().flat_map(|view| &view.corners)),
         views,
     }
+}
+
+fn target_map(
+    problem: &Problem,
+    covariances: &[Matrix3<f64>],
+    variance: f64,
+) -> Option<TargetMap> {
+    let map = problem.map.as_ref()?;
+    let mut covariances: Vec<_> = covariances.iter().map(|c| c * variance).collect();
+    map.without_gauge(&mut covariances, problem);
+    let corners = map.corners.iter().zip(&map.offsets_mm).zip(covariances);
+    let corners = corners.map(|((corner, &offset_mm), covariance)| CornerOffset {
+        panel: corner.panel,
+        row: corner.row,
+        col: corner.col,
+        panel_mm: corner.panel_mm,
+        offset_mm,
+        covariance_mm2: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+        views: corner.views,
+    });
+    let expected_mm = [map.prior_mm.x, map.prior_mm.z];
+    Some(TargetMap { corners: corners.collect(), expected_mm })
 }
 
 fn board_shape(minimum: &Minimum, covariance: &DMatrix<f64>, f_ratio: f64) -> Option<BoardShape> {

@@ -9,6 +9,7 @@ use super::grid::UntaggedGrid;
 use super::panel::PanelRef;
 use super::problem::Observation;
 use super::shape::Shape;
+use super::target_map::TargetMap;
 use crate::camera::Pose;
 use crate::detect::{Detection, Grid};
 use crate::targets::{Panel, Target, TargetSpec};
@@ -89,6 +90,13 @@ impl Sighting {
     pub fn bend(&mut self, shape: &Shape) {
         for seen in &mut self.observations {
             seen.panel_mm += shape.offset(seen.panel_mm);
+        }
+    }
+
+    /// Moves the corners to where a map has them; those that it does not have stay.
+    pub fn correct(&mut self, map: &TargetMap) {
+        for seen in &mut self.observations {
+            seen.panel_mm += map.offset_mm(self.panel, seen.row, seen.col);
         }
     }
 

@@ -1,0 +1,80 @@
+use glam::DVec3;
+
+use super::panel::PanelRef;
+
+/// Where the corners of a target are, as the views have it.
+///
+/// Offsets are relative to a plan that lies as well as it can: poses of the views take up any move and turn
+/// of all corners, and distances a common scale, so that these are not in them. Where the poses of panels
+/// are found too, moves and turns of each panel are not in them either.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct TargetMap {
+    /// Every corner that was seen, by panel, row and column.
+    pub corners: Vec<CornerOffset>,
+    /// The deviation of the offsets that was found, in the plane of the panels and out of it, mm: corners that
+    /// few views show are drawn to zero accordingly.
+    pub expected_mm: [f64; 2],
+}
+
+/// A corner that is not quite where its plan has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CornerOffset {
+    /// The panel.
+    pub panel: PanelRef,
+    /// Lattice row.
+    pub row: i32,
+    /// Lattice column.
+    pub col: i32,
+    /// Its place in the plan, in the panel frame, mm.
+    pub panel_mm: DVec3,
+    /// How far it is from there, in the panel frame, mm.
+    pub offset_mm: DVec3,
+    /// Covariance of that, mm².
+    pub covariance_mm2: [[f64; 3]; 3],
+    /// How many views show it.
+    pub views: usize,
+}
+
+/// Of a perfect target one in a hundred has a corner that is said to be off.
+const FALSE_ALARM: f64 = 0.01;
+
+impl TargetMap {
+    /// Root mean square of the offsets in the plane of the panels, a coordinate, and out of it, mm.
+    pub fn rms_mm(&self) -> [f64; 2] {
+        let count = self.corners.len().max(1) as f64;
+        let sum = |square: fn(DVec3) -> f64| {
+            self.corners.iter().map(|corner| square(corner.offset_mm)).sum::<f64>()
+        };
+        let plane = sum(|offset| offset.truncate().length_squared()) / 2.0;
+        [plane, sum(|offset| offset.z * offset.z)].map(|sum| (sum / count).sqrt())
+    }
+
+    /// How far a corner is from its place in the plan, mm; zero of one that was not seen.
+    pub fn offset_mm(&self, panel: PanelRef, row: i32, col: i32) -> DVec3 {
+        let label = |corner: &CornerOffset| (corner.panel, corner.row, corner.col);
+        let found = self.corners.binary_search_by_key(&(panel, row, col), label);
+        found.map_or(DVec3::ZERO, |index| self.corners[index].offset_mm)
+    }
+
+    /// The corners that are off by more than chance makes of any corner of a perfect target.
+    pub fn significant(&self) -> impl Iterator<Item = &CornerOffset> {
+        let of_each = FALSE_ALARM / self.corners.len().max(1) as f64;
+        self.corners.iter().filter(move |corner| corner.chance() < of_each)
+    }
+}
+
+impl CornerOffset {
+    /// How often chance makes as large an offset of a corner that is in its place.
+    pub fn chance(&self) -> f64 {
+        let covariance = nalgebra::Matrix3::from_fn(|i, j| self.covariance_mm2[i][j]);
+        let offset = nalgebra::Vector3::from(self.offset_mm.to_array());
+        let Some(inverse) = covariance.try_inverse() else { return 1.0 };
+        let square = offset.dot(&(inverse * offset)).max(0.0);
+        // Of χ² with three degrees of freedom.
+        let root = square.sqrt();
+        let density = (2.0 / std::f64::consts::PI).sqrt() * root * (-square / 2.0).exp();
+        libm::erfc(root / std::f64::consts::SQRT_2) + density
+    }
+}
