@@ -77,7 +77,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // What no format can carry is told before the work.
     let camera = sample(&intrinsics);
     args.format.iter().try_for_each(|format| format.check(&camera)).context("--format")?;
-    let Sightings { views, panels, empty, left_out, print } = args.sightings.read()?;
+    let measure = args.solve.measures_target();
+    let Sightings { views, panels, target, empty, left_out, print } =
+        args.sightings.read(measure)?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     for picture in &empty {
         tell!("{}: no board, left out", picture.display());
@@ -103,7 +105,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let texts = args.format.iter().map(|&format| format.texts(&stem, &solved));
     let texts = texts.collect::<anyhow::Result<Vec<_>>>().context("--format")?;
     let files = texts.into_iter().flatten().map(|(name, text)| text_file(name, text));
-    let files: Vec<File> = files.collect();
+    let measured = solved.measured(&stem, target.as_ref());
+    let files: Vec<File> = files.chain(measured).collect();
     let mut written = write_all(output::folder_of(&path), &files, args.overwrite)?;
     if let Some(page) = page {
         solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
+use super::files::{File, text_file};
 use crate::calibrate::{
-    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, Loss, View,
-    Weights, Words,
+    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, Loss, TargetMap,
+    View, Weights, Words,
 };
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
@@ -18,6 +19,7 @@ use crate::name::is_within;
 use crate::photograph;
 use crate::raster::AnyGray;
 use crate::report::{Report, thumbnail};
+use crate::targets::Target;
 use crate::words::counted;
 
 /// How a calibration is solved, and the page about it.
@@ -73,6 +75,11 @@ pub struct Calibrated {
 }
 
 impl SolveArgs {
+    /// Whether the places of the target's corners are to be found.
+    pub fn measures_target(&self) -> bool {
+        self.measure_target
+    }
+
     /// Solves, and says what is to be said about it.
     pub fn solve(&self, calibration: Calibration, print: Print) -> anyhow::Result<Calibrated> {
         let loss = match self.robust {
@@ -133,12 +140,21 @@ impl Calibrated {
         Ok(())
     }
 
+    /// The measured target and its picture, `<stem>-measured.json` and `.svg`; none where it was not measured.
+    pub fn measured(&self, stem: &str, target: Option<&Target>) -> Vec<File> {
+        let Some((_, target)) = self.estimate.map.as_ref().zip(target) else { return Vec::new() };
+        let file = |end: &str, text: String| text_file(format!("{stem}-measured.{end}"), text);
+        let target = self.estimate.refined(target);
+        vec![file("json", target.to_json())]
+    }
+
     /// What is known of the print and the sheet, a line each.
     pub fn lines(&self) -> Vec<String> {
         let shape = self.estimate.shape.as_ref().map(told);
         let ink = self.print.ink.filter(|ink| ink.used);
         let ink = ink.map(|ink| format!("ink: {ink}, which the corners allow for"));
-        shape.into_iter().chain(ink).collect()
+        let map = self.estimate.map.as_ref().map(mapped);
+        shape.into_iter().chain(map).chain(ink).collect()
     }
 
     /// Writes the page; `folders` are those of each camera's photographs.
@@ -227,6 +243,17 @@ pub fn check_images(folder: &Path, views: &[View]) -> anyhow::Result<()> {
         );
     }
     Ok(())
+}
+
+/// The places of the corners, and whether they are more than chance.
+fn mapped(map: &TargetMap) -> String {
+    let [plane, out] = map.rms_mm();
+    format!(
+        "target: corners are {plane:.3} mm beside their places and {out:.3} mm above or below (rms a \
+         coordinate), {} of {} by more than chance makes",
+        map.significant().count(),
+        map.corners.len()
+    )
 }
 
 /// The shape of a sheet, and whether it is to be believed.

@@ -113,6 +113,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             read.with_context(|| format!("--camera {name}"))?;
         check_own(name, &detections, &seen)?;
         seen.push((name, detections));
+        if args.solve.measures_target() {
+            let unsure = sightings::take_sure(&mut views, &reference);
+            left_out.extend(
+                unsure.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }),
+            );
+        }
         sightings::put_on(&sheet, Some(&target), &mut views)?;
         left_out.extend(out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }));
         ink.extend(of_camera);
@@ -143,7 +149,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for format in &args.format {
         files.extend(format.files(estimate).context("--format")?);
     }
-    if args.refine_target {
+    if args.refine_target || args.solve.measures_target() {
         let refined = estimate.refined(&target);
         let place = args.output.join(format!("{}.json", refined.name));
         if same_file(&place, &args.target) {

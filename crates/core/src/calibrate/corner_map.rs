@@ -112,11 +112,7 @@ impl CornerMap {
     ///
     /// A move and a turn of everything are such; of each panel by itself, where panels are found; and a
     /// common scale, where nothing else tells lengths.
-    pub fn without_gauge(
-        &self,
-        covariances: &mut [Matrix3<f64>],
-        problem: &Problem,
-    ) {
+    pub fn without_gauge(&self, covariances: &mut [Matrix3<f64>], problem: &Problem) {
         let groups = self.rigid_groups(problem);
         let mut modes: Vec<Vec<DVec3>> = Vec::new();
         for group in 0..=groups.iter().copied().max().unwrap_or_default() {

@@ -175,8 +175,17 @@ impl Estimate {
         self.panels.iter().any(|panel| panel.covariance.is_some())
     }
 
-    /// The target with its panels where they were found, named `<target>-refined`.
+    /// The target as it was found: with its panels where they are, named `<target>-refined`, and its
+    /// corners where they are, named `<target>-measured`.
     pub fn refined(&self, target: &Target) -> Target {
+        let target = match self.has_refined_panels() {
+            true => self.with_panels(target),
+            false => target.clone(),
+        };
+        self.map.as_ref().map_or(target.clone(), |map| map.on(&target))
+    }
+
+    fn with_panels(&self, target: &Target) -> Target {
         let poses = self.panels.iter();
         let poses =
             poses.map(|panel| PanelPose::from_pose(&panel.target_from_panel, panel.covariance));
@@ -387,11 +396,7 @@ fn camera_estimate(
     }
 }
 
-fn target_map(
-    problem: &Problem,
-    covariances: &[Matrix3<f64>],
-    variance: f64,
-) -> Option<TargetMap> {
+fn target_map(problem: &Problem, covariances: &[Matrix3<f64>], variance: f64) -> Option<TargetMap> {
     let map = problem.map.as_ref()?;
     let mut covariances: Vec<_> = covariances.iter().map(|c| c * variance).collect();
     map.without_gauge(&mut covariances, problem);

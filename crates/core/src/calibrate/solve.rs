@@ -1,11 +1,11 @@
 //! From a calibration to its estimate: start, gross errors, bundle adjustment.
 
 use super::calibration::{Calibration, CameraViews, Intrinsics};
+use super::corner_map::CornerMap;
 use super::error::CalibrationError;
 use super::estimate::{CameraEstimate, Estimate};
 use super::excluded::{Excluded, Reason};
 use super::gross_errors::{Gross, Kept, WrongFrame, within_pictures};
-use super::corner_map::CornerMap;
 use super::minimise::{Minimum, Until, minimise};
 use super::panels;
 use super::reweighting::{Settled, settle, variance};
@@ -198,7 +198,6 @@ impl Calibration {
             let Some(map) = &problem.map else { break };
             let found = normal.covariances(layout).ok_or(CalibrationError::NoStart)?;
             let prior_mm = map.fitted_prior(&found.corners);
-            eprintln!("prior {:?} -> {:?}  rms {:?} sigma {} common {:?}", map.prior_mm, prior_mm, variance(&settled.minimum).sqrt(), settled.whitening.sigma, settled.whitening.common_px);
             let change = (prior_mm - map.prior_mm).abs() / map.prior_mm;
             if change.max_element() < SAME_PRIOR {
                 break;

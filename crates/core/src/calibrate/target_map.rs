@@ -1,6 +1,7 @@
 use glam::DVec3;
 
 use super::panel::PanelRef;
+use crate::targets::{MeasuredPlace, Name, Target};
 
 /// Where the corners of a target are, as the views have it.
 ///
@@ -41,6 +42,37 @@ pub struct CornerOffset {
 const FALSE_ALARM: f64 = 0.01;
 
 impl TargetMap {
+    /// A target with its corners where the map has them, named `<target>-measured`.
+    ///
+    /// Offsets are from the plan to where the views have a corner: what had moved the corners before, an
+    /// earlier measurement or a print scale, is in them.
+    pub fn on(&self, target: &Target) -> Target {
+        let mut measured = target.clone();
+        measured.name =
+            Name::like(&format!("{}-measured", target.name.trim_end_matches("-measured")));
+        for (index, panel) in measured.panels.iter_mut().enumerate() {
+            let of_panel = PanelRef::new(index, panel.id);
+            let plan = panel.pose.to_pose().inverse();
+            for corner in &mut panel.corners {
+                let label = (of_panel, corner.row, corner.col);
+                let Some(found) = self.corner(label) else { continue };
+                let place = found.panel_mm + found.offset_mm;
+                let c = found.covariance_mm2;
+                corner.measured = Some(MeasuredPlace {
+                    offset_mm: (place - plan.apply(corner.target_mm.into())).to_array(),
+                    covariance_mm2: [c[0][0], c[0][1], c[0][2], c[1][1], c[1][2], c[2][2]],
+                });
+            }
+        }
+        measured
+    }
+
+    /// The corner with a label.
+    fn corner(&self, label: (PanelRef, i32, i32)) -> Option<&CornerOffset> {
+        let of = |corner: &CornerOffset| (corner.panel, corner.row, corner.col);
+        self.corners.binary_search_by_key(&label, of).ok().map(|index| &self.corners[index])
+    }
+
     /// Root mean square of the offsets in the plane of the panels, a coordinate, and out of it, mm.
     pub fn rms_mm(&self) -> [f64; 2] {
         let count = self.corners.len().max(1) as f64;
@@ -53,9 +85,7 @@ impl TargetMap {
 
     /// How far a corner is from its place in the plan, mm; zero of one that was not seen.
     pub fn offset_mm(&self, panel: PanelRef, row: i32, col: i32) -> DVec3 {
-        let label = |corner: &CornerOffset| (corner.panel, corner.row, corner.col);
-        let found = self.corners.binary_search_by_key(&(panel, row, col), label);
-        found.map_or(DVec3::ZERO, |index| self.corners[index].offset_mm)
+        self.corner((panel, row, col)).map_or(DVec3::ZERO, |corner| corner.offset_mm)
     }
 
     /// The corners that are off by more than chance makes of any corner of a perfect target.

@@ -131,6 +131,20 @@ impl Reference<'_> {
         }
     }
 
+    /// Whether the labels of a view are those of the target: tags tell them, or that the board is seen
+    /// whole.
+    pub fn is_sure_of(&self, view: &View) -> bool {
+        let whole = match self {
+            Self::Grid(grid) => grid.size.map(|[rows, cols]| rows as usize * cols as usize),
+            Self::Target(target) => {
+                let tagged = target.panels.iter().all(|panel| !panel.tags.is_empty());
+                let count = target.panels.iter().map(|panel| panel.corners.len()).sum();
+                Some(if tagged { 0 } else { count })
+            }
+        };
+        whole.is_some_and(|count| view.corner_count() >= count)
+    }
+
     /// Whether its panels are boards that lie about, each for itself.
     fn is_loose(&self) -> bool {
         match self {
@@ -301,7 +315,10 @@ fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
     let places: BTreeMap<(i32, i32), DVec3> = panel
         .corners
         .iter()
-        .map(|corner| ((corner.row, corner.col), from_target.apply(corner.target_mm.into())))
+        .map(|corner| {
+            let place = from_target.apply(corner.target_mm.into()) + corner.offset_mm();
+            ((corner.row, corner.col), place)
+        })
         .collect();
     let mut found = Vec::new();
     for corner in &grid.corners {

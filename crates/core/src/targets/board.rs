@@ -147,7 +147,7 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
                 let place = spec.grid.position(v.row.into(), v.col.into());
                 let [x, y] = place.map(|p| p * spec.edge_mm);
                 let (panel_mm, target_mm) = ([x, y], [x, y, 0.0]);
-                Corner { id, row: v.row, col: v.col, panel_mm, target_mm }
+                Corner { id, row: v.row, col: v.col, panel_mm, target_mm, measured: None }
             })
             .collect(),
         tags: tiles

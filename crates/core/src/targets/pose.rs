@@ -110,7 +110,7 @@ mod tests {
                     let [x, y] = Vertex::new(row, col).position().map(|v| v * 20.0);
                     let target = r * Vector3::new(x, y, 0.0) + Vector3::from(t);
                     let (panel_mm, target_mm) = ([x, y], target.into());
-                    Corner { id: 0, row, col, panel_mm, target_mm }
+                    Corner { id: 0, row, col, panel_mm, target_mm, measured: None }
                 })
                 .collect();
             let pose = PanelPose::fit(&corners).unwrap();
