@@ -18,7 +18,7 @@ use crate::export::kind::Kind;
 use crate::name::is_within;
 use crate::photograph;
 use crate::raster::AnyGray;
-use crate::report::{Report, thumbnail};
+use crate::report::{Report, target_map_svg, thumbnail};
 use crate::targets::Target;
 use crate::words::counted;
 
@@ -142,10 +142,10 @@ impl Calibrated {
 
     /// The measured target and its picture, `<stem>-measured.json` and `.svg`; none where it was not measured.
     pub fn measured(&self, stem: &str, target: Option<&Target>) -> Vec<File> {
-        let Some((_, target)) = self.estimate.map.as_ref().zip(target) else { return Vec::new() };
+        let Some((map, target)) = self.estimate.map.as_ref().zip(target) else { return Vec::new() };
         let file = |end: &str, text: String| text_file(format!("{stem}-measured.{end}"), text);
         let target = self.estimate.refined(target);
-        vec![file("json", target.to_json())]
+        vec![file("json", target.to_json()), file("svg", target_map_svg(map))]
     }
 
     /// What is known of the print and the sheet, a line each.
@@ -252,7 +252,7 @@ fn mapped(map: &TargetMap) -> String {
         "target: corners are {plane:.3} mm beside their places and {out:.3} mm above or below (rms a \
          coordinate), {} of {} by more than chance makes",
         map.significant().count(),
-        map.corners.len()
+        map.corners().len()
     )
 }
 

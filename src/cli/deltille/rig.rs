@@ -21,6 +21,7 @@ use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::Print;
 use crate::export::camera::{FormatError, colmap, colmap_rig, kalibr};
 use crate::export::rig;
+use crate::report::target_map_svg;
 use crate::targets::Name;
 use crate::words::{counted, shown};
 
@@ -159,6 +160,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             );
         }
         files.push(text_file(format!("{}.json", refined.name), refined.to_json()));
+        let drawn = estimate.map.as_ref().map(target_map_svg);
+        files.extend(drawn.map(|svg| text_file(format!("{}.svg", refined.name), svg)));
     }
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {

@@ -411,7 +411,7 @@ fn target_map(problem: &Problem, covariances: &[Matrix3<f64>], variance: f64) ->
         views: corner.views,
     });
     let expected_mm = [map.prior_mm.x, map.prior_mm.z];
-    Some(TargetMap { corners: corners.collect(), expected_mm })
+    Some(TargetMap::new(corners.collect(), expected_mm))
 }
 
 fn board_shape(minimum: &Minimum, covariance: &DMatrix<f64>, f_ratio: f64) -> Option<BoardShape> {

@@ -669,11 +669,18 @@ mod tests {
     use crate::calibrate::{PanelRef, Shape};
     use crate::camera::{Camera, Pose};
 
+    #[derive(Clone, Copy, PartialEq)]
+    enum Kind {
+        Rig,
+        Bent,
+        Map { frames: usize },
+    }
+
     /// Two cameras and two panels in three frames, every link open that may be, seen with noise; or one camera and a
-    /// panel that is bent.
-    fn problem(is_bent: bool) -> Problem {
+    /// panel that is bent, or whose corners are anywhere.
+    fn problem(kind: Kind) -> Problem {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let count = if is_bent { 1 } else { 2 };
+        let count = if kind == Kind::Rig { 2 } else { 1 };
         let beside = |x: f64| Pose { translation: DVec3::new(x, 3.0, -2.0), ..Pose::IDENTITY };
         let cameras = (0..count).map(|i| {
             let camera = Camera::pinhole(640 + 80 * i, 480, 1.0);
@@ -690,23 +697,29 @@ mod tests {
             let prior = prior.filter(|_| i > 0);
             PanelUnknowns { target_from_panel, pose_free: i > 0, prior }
         });
-        let frames = [[30.0, 40.0], [-50.0, 20.0], [10.0, -60.0]].map(|[x, y]| {
-            Pose::looking_at(DVec3::new(x, y, 300.0), DVec3::new(30.0, 20.0, 0.0), DVec3::Y)
+        let moments = match kind {
+            Kind::Map { frames } => frames,
+            Kind::Rig | Kind::Bent => 3,
+        };
+        let frames = (0..moments).map(|i| {
+            let (sin, cos) = (2.4 * i as f64).sin_cos();
+            let eye = DVec3::new(50.0 * cos, 50.0 * sin, 300.0);
+            Pose::looking_at(eye, DVec3::new(30.0, 20.0, 0.0), DVec3::Y)
         });
-        let shape = is_bent.then(|| Shape {
+        let shape = (kind == Kind::Bent).then(|| Shape {
             middle_mm: DVec3::new(30.0, 20.0, 0.0),
             reach_mm: 40.0,
             coefficients_mm: std::array::from_fn(|i| 0.1 * i as f64),
         });
         let mut problem = Problem {
             cameras: cameras.collect(),
-            frames: frames.to_vec(),
+            frames: frames.collect(),
             panels: panels.collect(),
             blocks: Vec::new(),
             shape,
             map: None,
         };
-        for frame in 0..3 {
+        for frame in 0..moments {
             for (camera, panel) in (0..count).flat_map(|c| (0..count).map(move |p| (c, p))) {
                 let seen = (0..20).map(|k| Observation {
                     row: k / 5,
@@ -726,6 +739,13 @@ mod tests {
                 }
                 problem.blocks.push(block);
             }
+        }
+        if let Kind::Map { .. } = kind {
+            let mut map = CornerMap::flat(&problem);
+            for offset in &mut map.offsets_mm {
+                *offset = DVec3::from([0; 3].map(|_| rng.random_range(-0.1..0.1)));
+            }
+            problem.map = Some(map);
         }
         problem
     }
@@ -752,30 +772,43 @@ mod tests {
                 all.extend((half.transpose() * -off).iter());
             }
         }
+        if let Some(map) = &problem.map {
+            let offsets = map.offsets_mm.iter();
+            all.extend(offsets.flat_map(|&mm| (mm / map.prior_mm * whitening.sigma).to_array()));
+        }
         DVector::from_vec(all)
     }
 
-    fn step(layout: &Layout, values: &DVector<f64>) -> Step {
-        let (shared, frames) = values.as_slice().split_at(layout.count);
+    fn step(layout: &Layout, frames: usize, values: &DVector<f64>) -> Step {
+        let (shared, others) = values.as_slice().split_at(layout.shared);
+        let (frames, corners) = others.split_at(6 * frames);
         let frames = frames.chunks_exact(6).map(Vector6::from_column_slice).collect();
-        Step { shared: DVector::from_column_slice(shared), frames, corners: Vec::new() }
+        let corners = corners.chunks_exact(3).map(Vector3::from_column_slice).collect();
+        Step { shared: DVector::from_column_slice(shared), frames, corners }
     }
 
-    /// Eliminating the frames changes nothing, and every derivative is that of the residuals: cost, step and
+    /// Eliminating frames or corners changes nothing, and every derivative is that of the residuals: cost, step and
     /// covariances are those of the whole equations, made from differences.
     #[test]
     fn equations_are_those_of_the_residuals_differences() {
-        for is_bent in [false, true] {
-            let problem = problem(is_bent);
+        // Of few frames corners are eliminated, of many frames.
+        let maps = [5, 12].map(|frames| Kind::Map { frames });
+        for kind in [Kind::Rig, Kind::Bent].into_iter().chain(maps) {
+            let problem = problem(kind);
             let (layout, whitening) = (Layout::of(&problem), whitening(&problem));
             let normal = Normal::of(&problem, &layout, &whitening, Loss::Squared).unwrap();
             let here = residuals(&problem, &whitening);
-            let count = layout.count + 6 * problem.frames.len();
+            let of_corners = problem.map.as_ref().map_or(0, |map| 3 * map.len());
+            let frames = problem.frames.len();
+            let count = layout.shared + 6 * frames + of_corners;
             let column = |i: usize| {
                 // A ten-millionth of a pixel, about, whatever the unit.
                 let unit = DVector::from_fn(count, |j, _| f64::from(u8::from(i == j)));
                 let at = |by: f64| {
-                    residuals(&problem.after(&layout, &step(&layout, &(&unit * by))), &whitening)
+                    residuals(
+                        &problem.after(&layout, &step(&layout, frames, &(&unit * by))),
+                        &whitening,
+                    )
                 };
                 let size = 1e-4 / (at(1e-6) - &here).norm().max(1e-9) * 1e-6;
                 (at(size) - at(-size)) / (2.0 * size)
@@ -791,8 +824,10 @@ mod tests {
 
             assert!((normal.cost - here.norm_squared()).abs() < 1e-9 * normal.cost);
             let found = normal.step(&layout, 0.0).unwrap();
-            let frames = found.frames.iter().flat_map(|frame| frame.iter().copied());
-            let found = DVector::from_iterator(count, found.shared.iter().copied().chain(frames));
+            let frames = found.frames.iter().flat_map(|frame| frame.iter());
+            let corners = found.corners.iter().flat_map(|corner| corner.iter());
+            let found = found.shared.iter().chain(frames).chain(corners).copied();
+            let found = DVector::from_iterator(count, found);
             for i in 0..count {
                 let deviation = inverse[(i, i)].sqrt() / scale[i];
                 let off = (found[i] - expected[i]).abs();
@@ -801,10 +836,11 @@ mod tests {
             let covariances = normal.covariances(&layout).unwrap();
             assert!(covariances.loose.is_empty());
             for i in 0..count {
-                let found = match i.checked_sub(layout.count) {
-                    None => covariances.shared[(i, i)],
-                    Some(k) => covariances.frames[k / 6][(k % 6, k % 6)],
-                };
+                let shared = covariances.shared.diagonal();
+                let frames = covariances.frames.iter().flat_map(|c| c.diagonal().data.0[0]);
+                let corners = covariances.corners.iter().flat_map(|c| c.diagonal().data.0[0]);
+                let all = shared.iter().copied().chain(frames).chain(corners);
+                let found = all.collect::<Vec<f64>>()[i];
                 let ratio = found / inverse[(i, i)] * scale[i] * scale[i];
                 assert!((ratio - 1.0).abs() < 1e-3, "variance of unknown {i}: {ratio}");
             }

@@ -9,10 +9,9 @@ use crate::targets::{MeasuredPlace, Name, Target};
 /// of all corners, and distances a common scale, so that these are not in them. Where the poses of panels
 /// are found too, moves and turns of each panel are not in them either.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub struct TargetMap {
-    /// Every corner that was seen, by panel, row and column.
-    pub corners: Vec<CornerOffset>,
+    /// By panel, row and column.
+    corners: Vec<CornerOffset>,
     /// The deviation of the offsets that was found, in the plane of the panels and out of it, mm: corners that
     /// few views show are drawn to zero accordingly.
     pub expected_mm: [f64; 2],
@@ -20,7 +19,6 @@ pub struct TargetMap {
 
 /// A corner that is not quite where its plan has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub struct CornerOffset {
     /// The panel.
     pub panel: PanelRef,
@@ -42,6 +40,17 @@ pub struct CornerOffset {
 const FALSE_ALARM: f64 = 0.01;
 
 impl TargetMap {
+    /// A map of these corners; `expected_mm` as in [`Self::expected_mm`].
+    pub fn new(mut corners: Vec<CornerOffset>, expected_mm: [f64; 2]) -> Self {
+        corners.sort_by_key(CornerOffset::label);
+        Self { corners, expected_mm }
+    }
+
+    /// Every corner that was seen, by panel, row and column.
+    pub fn corners(&self) -> &[CornerOffset] {
+        &self.corners
+    }
+
     /// A target with its corners where the map has them, named `<target>-measured`.
     ///
     /// Offsets are from the plan to where the views have a corner: what had moved the corners before, an
@@ -69,8 +78,8 @@ impl TargetMap {
 
     /// The corner with a label.
     fn corner(&self, label: (PanelRef, i32, i32)) -> Option<&CornerOffset> {
-        let of = |corner: &CornerOffset| (corner.panel, corner.row, corner.col);
-        self.corners.binary_search_by_key(&label, of).ok().map(|index| &self.corners[index])
+        let found = self.corners.binary_search_by_key(&label, CornerOffset::label);
+        found.ok().map(|index| &self.corners[index])
     }
 
     /// Root mean square of the offsets in the plane of the panels, a coordinate, and out of it, mm.
@@ -90,12 +99,20 @@ impl TargetMap {
 
     /// The corners that are off by more than chance makes of any corner of a perfect target.
     pub fn significant(&self) -> impl Iterator<Item = &CornerOffset> {
-        let of_each = FALSE_ALARM / self.corners.len().max(1) as f64;
-        self.corners.iter().filter(move |corner| corner.chance() < of_each)
+        self.corners.iter().filter(|corner| self.is_significant(corner))
+    }
+
+    /// Whether a corner is one of these.
+    pub fn is_significant(&self, corner: &CornerOffset) -> bool {
+        corner.chance() < FALSE_ALARM / self.corners.len().max(1) as f64
     }
 }
 
 impl CornerOffset {
+    fn label(&self) -> (PanelRef, i32, i32) {
+        (self.panel, self.row, self.col)
+    }
+
     /// How often chance makes as large an offset of a corner that is in its place.
     pub fn chance(&self) -> f64 {
         let covariance = nalgebra::Matrix3::from_fn(|i, j| self.covariance_mm2[i][j]);

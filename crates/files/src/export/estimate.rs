@@ -151,7 +151,7 @@ struct OffsetRecord<'a> {
 }
 
 pub(super) fn map(found: &TargetMap) -> MapRecord<'_> {
-    let corners = found.corners.iter().map(|corner| OffsetRecord {
+    let corners = found.corners().iter().map(|corner| OffsetRecord {
         panel: corner.panel,
         row: corner.row,
         col: corner.col,

@@ -11,8 +11,8 @@ use serde::Deserialize;
 use super::calibration::{self, StoredShape};
 use super::rig;
 use deltille_core::calibrate::{
-    BoardShape, CameraEstimate, Corner, Estimate, Excluded, FrameEstimate, Model, PanelRef,
-    Parameter, Reason, Reference, SHAPE_COEFFICIENTS as COUNT, ViewEstimate,
+    BoardShape, CameraEstimate, Corner, CornerOffset, Estimate, Excluded, FrameEstimate, Model,
+    PanelRef, Parameter, Reason, Reference, SHAPE_COEFFICIENTS as COUNT, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::json::{self, ReadError};
@@ -104,6 +104,7 @@ struct Fit {
     #[serde(deserialize_with = "quantity::deviation::de")]
     common_px: Option<f64>,
     board_shape: Option<SavedShape>,
+    target_map: Option<SavedMap>,
     excluded: Vec<SavedExcluded>,
 }
 
@@ -195,6 +196,29 @@ struct SavedShape {
 }
 
 #[derive(Deserialize)]
+struct SavedMap {
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    expected_mm: [f64; 2],
+    corners: Vec<SavedOffset>,
+}
+
+#[derive(Deserialize)]
+struct SavedOffset {
+    panel: u32,
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    row: i32,
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    col: i32,
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    panel_mm: [f64; 3],
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    offset_mm: [f64; 3],
+    #[serde(deserialize_with = "quantity::figure::de")]
+    covariance_mm2: [[f64; 3]; 3],
+    views: usize,
+}
+
+#[derive(Deserialize)]
 struct SavedExcluded {
     camera: Option<String>,
     view: String,
@@ -218,7 +242,7 @@ impl Single {
             Ok(Estimate { cameras: vec![known], frames, rms_px, excluded, ..Estimate::default() })
         });
         let held_out = held_out.transpose()?.map(Box::new);
-        Ok(Estimate { cameras: vec![found], frames, rms_px, held_out, ..fit.estimate() })
+        Ok(Estimate { cameras: vec![found], frames, rms_px, held_out, ..fit.estimate(reference)? })
     }
 }
 
@@ -244,7 +268,7 @@ impl Rig {
         });
         let held_out = held_out.transpose()?.map(Box::new);
         let frames = frames.into_iter().map(SavedFrame::read).collect();
-        let estimate = Estimate { cameras, frames, held_out, ..fit.estimate() };
+        let estimate = Estimate { cameras, frames, held_out, ..fit.estimate(reference)? };
         let (sum, count) = estimate.corners().fold((0.0, 0), |(sum, count), corner| {
             (sum + corner.residual.iter().map(|r| r * r).sum::<f64>(), count + 2)
         });
@@ -253,14 +277,16 @@ impl Rig {
 }
 
 impl Fit {
-    fn estimate(self) -> Estimate {
-        Estimate {
+    fn estimate(self, reference: &Reference) -> Result<Estimate, SavedError> {
+        let map = self.target_map.map(|map| map.read(reference)).transpose()?;
+        Ok(Estimate {
+            map,
             sigma: self.sigma,
             common_px: self.common_px,
             shape: self.board_shape.map(SavedShape::read),
             excluded: self.excluded.into_iter().map(SavedExcluded::read).collect(),
             ..Estimate::default()
-        }
+        })
     }
 }
 
@@ -414,6 +440,19 @@ impl SavedShape {
     fn read(self) -> BoardShape {
         let Self { shape, sd_mm, f_ratio, bent_mm, stretched_mm } = self;
         BoardShape { shape: shape.shape(), sd_mm, f_ratio, bent_mm, stretched_mm }
+    }
+}
+
+impl SavedMap {
+    fn read(self, reference: &Reference) -> Result<TargetMap, SavedError> {
+        let corners = self.corners.into_iter().map(|corner| {
+            let panel = reference.panel(corner.panel).ok_or(SavedError::Panel(corner.panel))?;
+            let SavedOffset { row, col, covariance_mm2, views, .. } = corner;
+            let [panel_mm, offset_mm] = [corner.panel_mm, corner.offset_mm].map(DVec3::from);
+            Ok(CornerOffset { panel, row, col, panel_mm, offset_mm, covariance_mm2, views })
+        });
+        let corners = corners.collect::<Result<Vec<_>, _>>()?;
+        Ok(TargetMap::new(corners, self.expected_mm))
     }
 }
 

@@ -14,6 +14,7 @@ mod axes;
 mod page;
 mod plots;
 mod survey;
+mod target_map;
 mod thumbnail;
 
 use std::collections::BTreeMap;
@@ -23,6 +24,7 @@ use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Words};
 
 pub use advice::{Advice, Weight, advice};
 pub use survey::{Survey, SurveyedView};
+pub use target_map::target_map_svg;
 pub use thumbnail::thumbnail;
 
 /// What a page tells.
