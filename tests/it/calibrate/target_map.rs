@@ -218,7 +218,10 @@ fn a_measured_target_serves_other_views() {
 
     let board = BOARD.target("board").unwrap().unwrap();
     let measured = map.on(&board);
-    assert_eq!((measured.name.as_str(), measured.is_measured()), ("board-measured", true));
+    assert_eq!(
+        (measured.name.to_string(), measured.is_measured()),
+        ("board-measured".to_owned(), true)
+    );
     let measured = Target::from_json(&measured.to_json()).unwrap();
     let of_target = |map: &CornerOffset| {
         let corners = &measured.panels[0].corners;

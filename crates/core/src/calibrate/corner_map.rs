@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use nalgebra::{DMatrix, Matrix3};
 
 use super::panel::PanelRef;
@@ -91,14 +91,14 @@ impl CornerMap {
         index.map_or(DVec3::ZERO, |&index| self.offsets_mm[index])
     }
 
-    /// The expectation that fits the offsets, whose covariances are those of the posterior.
-    pub fn fitted_prior(&self, covariances: &[Matrix3<f64>]) -> DVec3 {
+    /// The expectation that fits the offsets; `covariances` and `sigma` are as in [`Self::without_gauge`].
+    pub fn fitted_prior(&self, covariances: &[Matrix3<f64>], sigma: f64) -> DVec3 {
         let of_axes = |axes: &[usize]| {
             let (mut squares, mut determined) = (0.0, 0.0);
             for (offset, covariance) in self.offsets_mm.iter().zip(covariances) {
                 for &k in axes {
                     squares += offset[k] * offset[k];
-                    determined += 1.0 - covariance[(k, k)] / self.prior_mm[k].powi(2);
+                    determined += 1.0 - covariance[(k, k)] * (sigma / self.prior_mm[k]).powi(2);
                 }
             }
             (squares / determined.max(1.0)).sqrt().max(LEAST_PRIOR_MM)
@@ -107,19 +107,25 @@ impl CornerMap {
         DVec3::new(plane, plane, out)
     }
 
-    /// Takes out of the covariances what poses and distances take up: the expectation is then all that is
-    /// known of these directions, and holds them at zero.
+    /// The covariances, as the equations have them, without what poses and distances take up: the expectation
+    /// is all that is known of these directions, and holds them at zero. `sigma` is the deviation of a
+    /// whitened coordinate, the unit in which costs are counted.
     ///
     /// A move and a turn of everything are such; of each panel by itself, where panels are found; and a
     /// common scale, where nothing else tells lengths.
-    pub fn without_gauge(&self, covariances: &mut [Matrix3<f64>], problem: &Problem) {
+    pub fn without_gauge(
+        &self,
+        covariances: &[Matrix3<f64>],
+        sigma: f64,
+        problem: &Problem,
+    ) -> Vec<Matrix3<f64>> {
         let groups = self.rigid_groups(problem);
         let mut modes: Vec<Vec<DVec3>> = Vec::new();
         for group in 0..=groups.iter().copied().max().unwrap_or_default() {
             let of_group = |field: &dyn Fn(DVec3) -> DVec3| {
                 let corners = self.corners.iter().zip(&groups);
-                let of_corner = corners.map(|(corner, &of)| match of == group {
-                    true => self.on_panel(problem, corner, field),
+                let of_corner = corners.enumerate().map(|(index, (_, &of))| match of == group {
+                    true => self.on_panel(problem, index, field),
                     false => DVec3::ZERO,
                 });
                 of_corner.collect::<Vec<_>>()
@@ -130,30 +136,27 @@ impl CornerMap {
             }
         }
         if has_free_scale(problem) {
-            let corners = self.corners.iter();
-            modes.push(corners.map(|corner| self.on_panel(problem, corner, &|at| at)).collect());
+            let corners = 0..self.len();
+            modes.push(corners.map(|index| self.on_panel(problem, index, &|at| at)).collect());
         }
         let scaled = DMatrix::from_fn(3 * self.len(), modes.len(), |i, mode| {
             modes[mode][i / 3][i % 3] / self.prior_mm[i % 3]
         });
         let basis = scaled.qr().q();
-        for (index, covariance) in covariances.iter_mut().enumerate() {
+        let prior = self.prior_mm / sigma;
+        let of_corner = |(index, covariance): (usize, &Matrix3<f64>)| {
             let of_corner = basis.fixed_rows::<3>(3 * index);
             let held = of_corner * of_corner.transpose();
-            *covariance -=
-                Matrix3::from_fn(|i, j| held[(i, j)] * self.prior_mm[i] * self.prior_mm[j]);
-        }
+            covariance - Matrix3::from_fn(|i, j| held[(i, j)] * prior[i] * prior[j])
+        };
+        covariances.iter().enumerate().map(of_corner).collect()
     }
 
-    /// A field in the target's frame as it moves a corner in that of its panel.
-    fn on_panel(
-        &self,
-        problem: &Problem,
-        corner: &MappedCorner,
-        field: &dyn Fn(DVec3) -> DVec3,
-    ) -> DVec3 {
-        let pose = problem.panels[corner.panel.index()].target_from_panel;
-        DMat3::from_quat(pose.rotation).transpose() * field(pose.apply(corner.panel_mm))
+    /// A field in the target's frame as it moves a corner, from where it is, in the frame of its panel.
+    fn on_panel(&self, problem: &Problem, index: usize, field: &dyn Fn(DVec3) -> DVec3) -> DVec3 {
+        let MappedCorner { panel, panel_mm, .. } = self.corners[index];
+        let pose = problem.panels[panel.index()].target_from_panel;
+        pose.rotation.conjugate() * field(pose.apply(panel_mm + self.offsets_mm[index]))
     }
 
     /// For each corner the group of panels that move as one.

@@ -316,7 +316,7 @@ impl Estimate {
             frames: of_frames.collect(),
             panels: panels.collect(),
             shape: board_shape(minimum, &covariance, f_ratio),
-            map: target_map(problem, &found.corners, variance),
+            map: target_map(problem, &found.corners, variance, whitening.sigma),
             rms_px: rms_px(cameras.iter().flat_map(CameraEstimate::corners)),
             common_px: whitening.common_px,
             sigma: variance.sqrt(),
@@ -396,11 +396,16 @@ fn camera_estimate(
     }
 }
 
-fn target_map(problem: &Problem, covariances: &[Matrix3<f64>], variance: f64) -> Option<TargetMap> {
+fn target_map(
+    problem: &Problem,
+    covariances: &[Matrix3<f64>],
+    variance: f64,
+    sigma: f64,
+) -> Option<TargetMap> {
     let map = problem.map.as_ref()?;
-    let mut covariances: Vec<_> = covariances.iter().map(|c| c * variance).collect();
-    map.without_gauge(&mut covariances, problem);
-    let corners = map.corners.iter().zip(&map.offsets_mm).zip(covariances);
+    let covariances = map.without_gauge(covariances, sigma, problem);
+    let corners = map.corners.iter().zip(&map.offsets_mm);
+    let corners = corners.zip(covariances.into_iter().map(|covariance| covariance * variance));
     let corners = corners.map(|((corner, &offset_mm), covariance)| CornerOffset {
         panel: corner.panel,
         row: corner.row,

@@ -197,7 +197,7 @@ impl Calibration {
             let Minimum { problem, normal, layout, .. } = &settled.minimum;
             let Some(map) = &problem.map else { break };
             let found = normal.covariances(layout).ok_or(CalibrationError::NoStart)?;
-            let prior_mm = map.fitted_prior(&found.corners);
+            let prior_mm = map.fitted_prior(&found.corners, settled.whitening.sigma);
             let change = (prior_mm - map.prior_mm).abs() / map.prior_mm;
             if change.max_element() < SAME_PRIOR {
                 break;
