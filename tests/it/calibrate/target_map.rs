@@ -159,7 +159,8 @@ fn offsets_are_within_their_deviations() {
         counts = [0, 1].map(|i| counts[i] + of_board[i]);
         let truth = camera().parameters().into_iter().chain([0.0; 4]);
         for (parameter, truth) in found.cameras[0].parameters.iter().zip(truth) {
-            let (name, value, sd) = (&parameter.name, parameter.value, parameter.sd.unwrap());
+            let (name, value) = (&parameter.name, parameter.value);
+            let Some(sd) = parameter.sd else { continue };
             assert!((value - truth).abs() < 4.0 * sd, "{name} {value} ± {sd}, not {truth}");
         }
     }
