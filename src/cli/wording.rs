@@ -26,6 +26,7 @@ const NAMED: &[Named] = &[
     named("BoardSpec::rows", "deltille board", "--rows"),
     named("BoardSpec::tags", "deltille board", "--untagged"),
     named("Calibration::board_shape", "deltille calibrate", "--board-shape"),
+    named("Calibration::measure_target", "deltille calibrate", "--measure-target"),
     named("Calibration::refine_panels", "deltille rig", "--refine-target"),
     named("Dialect::Fork", "deltille board", "--dsc-dialect fork"),
     named("Family::to_json", "deltag gen-family", ""),

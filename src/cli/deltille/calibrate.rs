@@ -78,9 +78,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let intrinsics = args.intrinsics()?;
     let folder = output::folder_of(&path);
     let planned = args.files(&stem, &sample(&intrinsics), &[], &sample_of(calibration::SCHEMA))?;
+    let planned: Vec<File> = planned.into_iter().chain(args.solve.planned(&stem)).collect();
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
-    let Sightings { views, panels, empty, left_out, print } = args.sightings.read()?;
+    let measure = args.solve.measures_target();
+    let Sightings { views, panels, target, empty, left_out, print } =
+        args.sightings.read(measure)?;
     ensure!(!views.is_empty(), "no board of this kind in {}", counted(empty.len(), "picture"));
     for picture in &empty {
         tell!("{}: no board, left out", picture.display());
@@ -109,6 +112,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         files =
             args.files(&stem, &camera.camera, &views.collect::<Vec<_>>(), &in_options(&json))?;
     }
+    files.extend(solved.measured(&stem, target.as_ref()));
     let mut written = write_all(folder, &files, args.overwrite)?;
     if let Some(page) = page {
         solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
+use super::files::{File, sample_of, text_file};
 use crate::calibrate::{
-    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, Loss, PanelPlace,
-    View, Weights, Words,
+    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, LEAST_TO_MEASURE,
+    Loss, PanelPlace, TargetMap, View, Weights, Words,
 };
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
@@ -18,7 +19,8 @@ use crate::export::kind::Kind;
 use crate::name::is_within;
 use crate::photograph;
 use crate::raster::AnyGray;
-use crate::report::{Report, thumbnail};
+use crate::report::{Report, target_map_svg, thumbnail};
+use crate::targets::{self, Target};
 use crate::words::counted;
 
 /// How a calibration is solved, and the page about it.
@@ -38,6 +40,9 @@ pub struct SolveArgs {
     /// than chance
     #[arg(long, conflicts_with = "shape")]
     board_shape: bool,
+    /// Find the place of every corner of the target, too, and write it as a measured target
+    #[arg(long, conflicts_with_all = ["shape", "board_shape"])]
+    measure_target: bool,
     /// Write a page that shows what the calibration is worth, and what would make it better
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -73,6 +78,21 @@ pub struct Calibrated {
 }
 
 impl SolveArgs {
+    /// Samples of what [`Calibrated::measured`] will be.
+    pub fn planned(&self, stem: &str) -> Vec<File> {
+        let file = |end: &str, text: String| text_file(format!("{stem}-measured.{end}"), text);
+        let empty = || target_map_svg(&TargetMap::new(Vec::new(), [0.0; 2]));
+        match self.measure_target {
+            true => vec![file("json", sample_of(targets::SCHEMA)), file("svg", empty())],
+            false => Vec::new(),
+        }
+    }
+
+    /// Whether the places of the target's corners are to be found.
+    pub fn measures_target(&self) -> bool {
+        self.measure_target
+    }
+
     /// Solves, and says what is to be said about it.
     pub fn solve(&self, calibration: Calibration, print: Print) -> anyhow::Result<Calibrated> {
         let loss = match self.robust {
@@ -88,6 +108,7 @@ impl SolveArgs {
             .loss(loss)
             .weights(weights)
             .board_shape(self.board_shape)
+            .measure_target(self.measure_target)
             .hold_out(self.holdout.map(|every| every as usize));
         let estimate = calibration.solve().map_err(|error| {
             let option = match error {
@@ -133,12 +154,22 @@ impl Calibrated {
         Ok(())
     }
 
+    /// The measured target and its picture, `<stem>-measured.json` and `.svg`; none where it was not measured.
+    pub fn measured(&self, stem: &str, target: Option<&Target>) -> Vec<File> {
+        let Some((map, target)) = self.estimate.map.as_ref().zip(target) else { return Vec::new() };
+        let file = |end: &str, text: String| text_file(format!("{stem}-measured.{end}"), text);
+        let target = map.on(target);
+        vec![file("json", target.to_json()), file("svg", target_map_svg(map))]
+    }
+
     /// What is known of the print and the sheet, a line each.
     pub fn lines(&self) -> Vec<String> {
         let shape = self.estimate.shape.as_ref().map(told);
         let ink = self.print.ink.filter(|ink| ink.used);
         let ink = ink.map(|ink| format!("ink: {ink}, which the corners allow for"));
-        shape.into_iter().chain(ink).collect()
+        let views = self.estimate.views_of_a_corner();
+        let map = self.estimate.map.as_ref().map(|map| mapped(map, views));
+        shape.into_iter().chain(map).chain(ink).collect()
     }
 
     /// Writes the page; `folders` are those of each camera's photographs.
@@ -229,6 +260,21 @@ pub fn check_images(folder: &Path, views: &[View]) -> anyhow::Result<()> {
         );
     }
     Ok(())
+}
+
+/// The places of the corners, and whether they are more than chance.
+fn mapped(map: &TargetMap, views: usize) -> String {
+    let [plane, out] = map.rms_mm();
+    let few = match views >= LEAST_TO_MEASURE {
+        true => String::new(),
+        false => format!("; {views} views of a corner are few, take {LEAST_TO_MEASURE} or more"),
+    };
+    format!(
+        "target: corners are {plane:.3} mm beside their places and {out:.3} mm above or below (rms a \
+         coordinate), {} of {} by more than chance makes{few}",
+        map.significant().count(),
+        map.corners().len()
+    )
 }
 
 /// The shape of a sheet, and whether it is to be believed.

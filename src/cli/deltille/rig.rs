@@ -12,7 +12,7 @@ use super::limits::FileLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
-    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference,
+    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference, TargetMap,
 };
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
@@ -22,6 +22,7 @@ use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::Print;
 use crate::export::camera::{FormatError, colmap, colmap_rig, kalibr};
 use crate::export::rig;
+use crate::report::target_map_svg;
 use crate::targets::{Name, Target};
 use crate::words::counted;
 
@@ -110,6 +111,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             read.with_context(|| format!("--camera {name}"))?;
         check_own(name, &detections, &seen)?;
         seen.push((name, detections));
+        if args.solve.measures_target() {
+            let unsure = sightings::take_sure(&mut views, &reference);
+            left_out.extend(
+                unsure.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }),
+            );
+        }
         sightings::put_on(&sheet, Some(&target), &mut views)?;
         left_out.extend(out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }));
         ink.extend(of_camera);
@@ -134,8 +141,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let json = rig::write(estimate, diagnoses, &args.model.to_string(), *print);
     let cameras = estimate.cameras.iter();
     let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
-    let refined = args.refine_target.then(|| estimate.refined(&target));
-    let files = args.files(&cameras.collect::<Vec<_>>(), &in_options(&json), refined)?;
+    let cameras = cameras.collect::<Vec<_>>();
+    let files = args.files(&cameras, &in_options(&json), estimate, &target)?;
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
         let folder = |(name, _): &(String, PathBuf)| of_name(&args.images, name);
@@ -165,8 +172,10 @@ impl Args {
         let samples: Vec<Camera> = cameras.iter().map(sample).collect();
         let cameras = self.camera.iter().zip(&samples);
         let cameras = cameras.map(|((name, _), camera)| (name.as_str(), camera, Pose::IDENTITY));
-        let refined = self.refine_target.then(|| Estimate::default().refined(target));
-        let files = self.files(&cameras.collect::<Vec<_>>(), &sample_of(rig::SCHEMA), refined)?;
+        let mut found = Estimate::default();
+        found.map = self.solve.measures_target().then(|| TargetMap::new(Vec::new(), [0.0; 2]));
+        let json = sample_of(rig::SCHEMA);
+        let files = self.files(&cameras.collect::<Vec<_>>(), &json, &found, target)?;
         check_places(&self.output, &files, self.overwrite)
     }
 
@@ -175,7 +184,8 @@ impl Args {
         &self,
         cameras: &[(&str, &Camera, Pose)],
         json: &str,
-        refined: Option<Target>,
+        found: &Estimate,
+        target: &Target,
     ) -> anyhow::Result<Vec<File>> {
         let mut files = vec![text_file("rig.json".to_owned(), json.to_owned())];
         for (name, camera, _) in cameras {
@@ -184,15 +194,19 @@ impl Args {
         for format in &self.format {
             files.extend(format.files(cameras).context("--format")?);
         }
-        if let Some(refined) = refined {
-            let name = format!("{}.json", refined.name);
+        let refined = self.refine_target.then(|| found.refined(target));
+        let measured = found.map.as_ref().map(|map| map.on(refined.as_ref().unwrap_or(target)));
+        if let Some(target) = measured.or(refined) {
+            let name = format!("{}.json", target.name);
             let place = self.output.join(&name);
             ensure!(
                 !same_file(&place, &self.target),
                 "-o: {} would overwrite the target that was given: choose another folder",
                 place.display()
             );
-            files.push(text_file(name, refined.to_json()));
+            files.push(text_file(name, target.to_json()));
+            let drawn = found.map.as_ref().map(target_map_svg);
+            files.extend(drawn.map(|svg| text_file(format!("{}.svg", target.name), svg)));
         }
         Ok(files)
     }

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 
 use super::limits::FileLimits;
 use super::target_file;
-use crate::calibrate::{Excluded, PanelPlace, Reference, Shown, UntaggedGrid, View, views};
+use crate::calibrate::{Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views};
 use crate::cli::output::tell;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::{self, Print, Sheet};
@@ -85,6 +85,8 @@ pub struct Sightings {
     pub views: Vec<View>,
     /// Where each panel is on the target.
     pub panels: Vec<PanelPlace>,
+    /// What was photographed, with its corners where the plan has them.
+    pub target: Option<Target>,
     /// Files of the detections in which no view was found.
     pub empty: Vec<PathBuf>,
     /// What does not belong to the target.
@@ -100,8 +102,8 @@ impl SightingsArgs {
         Ok(Some(edge_mm::RANGE.check(mm).context("--edge")?))
     }
 
-    /// Reads everything.
-    pub fn read(&self) -> anyhow::Result<Sightings> {
+    /// Reads everything. Where the target is to be measured, it takes views whose labels are sure.
+    pub fn read(&self, measure_target: bool) -> anyhow::Result<Sightings> {
         let limits = self.limits.limits();
         let target = self.target.as_deref().map(|path| target_file::read(path, &limits));
         let target: Option<Target> = target.transpose().context("--target")?;
@@ -119,13 +121,26 @@ impl SightingsArgs {
                 "give --target FILE, or --grid deltille or checker with --edge for untagged boards"
             ),
         };
-        let Read { mut views, empty, left_out, ink, .. } =
+        let Read { mut views, empty, mut left_out, ink, .. } =
             read(&self.detections, &reference, &limits)?;
+        let board = match reference {
+            Reference::Grid(grid) if measure_target => {
+                let made = grid.target("board").context(
+                    "--measure-target: give --rows and --cols, so that it is known which corner is which",
+                )?;
+                Some(made.context("--measure-target")?)
+            }
+            _ => None,
+        };
+        if measure_target {
+            left_out.extend(take_sure(&mut views, &reference));
+        }
         let sheet = self.sheet.read(&limits)?;
         put_on(&sheet, target.as_ref(), &mut views)?;
         let panels = panels(&reference, &sheet)?;
         let print = Print { scale: sheet.print_scale, ink };
-        Ok(Sightings { panels, views, empty, left_out, print })
+        let target = target.or(board);
+        Ok(Sightings { panels, target, views, empty, left_out, print })
     }
 }
 
@@ -140,6 +155,27 @@ impl SheetArgs {
         calibration::read_sheet(&text).with_context(show)
     }
 }
+
+/// Takes out the views of which it is not known which corner is which, and tells them.
+pub fn take_sure(views: &mut Vec<View>, reference: &Reference) -> Vec<Excluded> {
+    let unsure = views.extract_if(.., |view| !reference.is_sure_of(view));
+    let unsure = unsure.map(|view| {
+        tell!("left out: {}: {NOT_WHOLE}", view.name);
+        Excluded {
+            camera: None,
+            corners: view.corner_count(),
+            view: view.name,
+            image: view.image,
+            panel: None,
+            reason: Reason::Foreign(NOT_WHOLE.to_owned()),
+        }
+    });
+    unsure.collect()
+}
+
+/// Why a view cannot measure an untagged board.
+const NOT_WHOLE: &str =
+    "a board without tags is measured where it is seen whole: its corners have no ids";
 
 /// Where the panels of what was photographed are, on a solid as large as its net was printed.
 pub fn panels(reference: &Reference, sheet: &Sheet) -> anyhow::Result<Vec<PanelPlace>> {
@@ -187,6 +223,13 @@ fn is_solid(target: &Target) -> bool {
 pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> anyhow::Result<()> {
     if let Some(target) = target {
         solid_scale(sheet, target)?;
+        let given = sheet.print_scale.map(|_| "--print-scale").or(sheet.shape.map(|_| "--shape"));
+        if let Some(option) = given.filter(|_| target.is_measured()) {
+            bail!(
+                "{option}: {} says where its corners were measured, as they were printed",
+                target.name
+            );
+        }
     }
     if sheet.shape.is_some() && target.is_some_and(|target| target.panels.len() > 1) {
         bail!("--shape: it is that of one board, and the target has several panels");

@@ -4,3 +4,4 @@ mod commands;
 mod gross_errors;
 mod models;
 mod rig;
+mod target_map;

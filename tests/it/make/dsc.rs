@@ -39,7 +39,7 @@ fn face(side: i32, pose: PanelPose) -> Target {
             .map(|(id, (row, col))| {
                 let panel_mm = Vertex::new(row, col).position() * 10.0;
                 let target_mm = pose.target_from_panel(panel_mm);
-                Corner { id: id as u32, row, col, panel_mm, target_mm }
+                Corner { id: id as u32, row, col, panel_mm, target_mm, measured: None }
             })
             .collect(),
         tags: vec![TagPlacement { id: 7, row: 0, col: 1 }],

@@ -6,7 +6,6 @@ use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::loss::Loss;
 use super::model::Model;
-use super::shape::BoardShape;
 use super::view::View;
 use super::weights::Weights;
 use crate::camera::{Camera, Pose};
@@ -36,6 +35,7 @@ pub struct Calibration {
     pub(super) weights: Weights,
     pub(super) refine_panels: bool,
     pub(super) board_shape: bool,
+    pub(super) measure_target: bool,
     pub(super) hold_out: Option<usize>,
 }
 
@@ -141,6 +141,7 @@ impl Calibration {
             weights: Weights::default(),
             refine_panels: false,
             board_shape: false,
+            measure_target: false,
             hold_out: None,
         }
     }
@@ -182,6 +183,12 @@ impl Calibration {
     #[must_use]
     pub fn board_shape(self, board_shape: bool) -> Self {
         Self { board_shape, ..self }
+    }
+
+    /// Whether the place of every corner of the target is found, too, see [`Estimate::map`].
+    #[must_use]
+    pub fn measure_target(self, measure_target: bool) -> Self {
+        Self { measure_target, ..self }
     }
 
     /// Keeps every n-th frame (the n-th, the 2n-th, …) out of the calibration; only the poses in these are
@@ -261,9 +268,9 @@ impl Calibration {
     pub(super) fn given(&self, estimate: &Estimate) -> Self {
         let cameras = self.cameras.iter().zip(&estimate.cameras).map(|(camera, found)| {
             let mut views = camera.views.clone();
-            if let Some(BoardShape { shape, .. }) = &estimate.shape {
-                let sightings = views.iter_mut().flat_map(|view| &mut view.sightings);
-                sightings.for_each(|sighting| sighting.bend(shape));
+            for sighting in views.iter_mut().flat_map(|view| &mut view.sightings) {
+                estimate.shape.iter().for_each(|found| sighting.bend(&found.shape));
+                estimate.map.iter().for_each(|map| sighting.correct(map));
             }
             CameraViews {
                 name: camera.name.clone(),
@@ -279,6 +286,7 @@ impl Calibration {
             cameras: cameras.collect(),
             refine_panels: false,
             board_shape: false,
+            measure_target: false,
             ..*self
         }
     }

@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3};
 
 use super::calibration::{CameraViews, PanelPlace};
 use super::error::CalibrationError;
@@ -13,10 +13,13 @@ use super::minimise::Minimum;
 use super::model::Model;
 use super::normal::Covariances;
 use super::panel::PanelRef;
+use super::problem::Problem;
 use super::reweighting::{Settled, variance};
 use super::shape::{BoardShape, Shape};
 use super::start::Frame;
+use super::target_map::{CornerOffset, TargetMap};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
+use crate::statistics::median;
 use crate::targets::{Name, PanelPose, Target};
 
 /// Cameras, and where they and the target were, as the views have it, with what that is worth.
@@ -34,6 +37,8 @@ pub struct Estimate {
     pub panels: Vec<PanelPlace>,
     /// The shape of the board's sheet, where it was to be found.
     pub shape: Option<BoardShape>,
+    /// Where the corners of the target are, where that was to be found.
+    pub map: Option<TargetMap>,
     /// Root mean square error of a coordinate over all corners, px: √(Σ(dx² + dy²)/2N).
     pub rms_px: f64,
     /// The deviation that was added to every corner's covariance, px; `None` where corners were
@@ -158,6 +163,16 @@ impl Estimate {
         self.corners().filter(|corner| corner.outlier).count()
     }
 
+    /// In how many views a corner of the target was seen, the median of all.
+    pub fn views_of_a_corner(&self) -> usize {
+        let mut counts: BTreeMap<_, usize> = BTreeMap::new();
+        for corner in self.corners() {
+            *counts.entry((corner.panel, corner.row, corner.col)).or_default() += 1;
+        }
+        let counts = counts.into_values().map(|count| count as f64).collect();
+        median(counts).unwrap_or(0.0) as usize
+    }
+
     /// [`Self::rms_px`] of the corners that are no outliers.
     pub fn inlier_rms_px(&self) -> f64 {
         rms_px(self.corners().filter(|corner| !corner.outlier))
@@ -174,7 +189,8 @@ impl Estimate {
         self.panels.iter().any(|panel| panel.covariance.is_some())
     }
 
-    /// The target with its panels where they were found, named `<target>-refined`.
+    /// The target with its panels where they were found, named `<target>-refined`. [`TargetMap::on`] does the
+    /// same for its corners.
     pub fn refined(&self, target: &Target) -> Target {
         let poses = self.panels.iter();
         let poses =
@@ -282,7 +298,7 @@ impl Estimate {
         let Settled { minimum, whitening, .. } = settled;
         let Minimum { problem, normal, layout, steps } = minimum;
         let open = |parameters: String| CalibrationError::Undetermined { parameters };
-        let found = normal.covariances().ok_or_else(|| open("the poses".to_owned()))?;
+        let found = normal.covariances(layout).ok_or_else(|| open("the poses".to_owned()))?;
         let is_open = |first: Option<usize>| {
             first.is_some_and(|first| (first..first + 6).any(|i| found.loose.contains(&i)))
         };
@@ -324,6 +340,7 @@ impl Estimate {
             frames: of_frames.collect(),
             panels: panels.collect(),
             shape: board_shape(minimum, &covariance, f_ratio),
+            map: target_map(problem, &found.corners, variance, whitening.sigma),
             rms_px: rms_px(cameras.iter().flat_map(CameraEstimate::corners)),
             common_px: whitening.common_px,
             sigma: variance.sqrt(),
@@ -401,6 +418,29 @@ fn camera_estimate(
         rms_px: rms_px(views.iter().flat_map(|view| &view.corners)),
         views,
     }
+}
+
+fn target_map(
+    problem: &Problem,
+    covariances: &[Matrix3<f64>],
+    variance: f64,
+    sigma: f64,
+) -> Option<TargetMap> {
+    let map = problem.map.as_ref()?;
+    let covariances = map.without_gauge(covariances, sigma, problem);
+    let corners = map.corners.iter().zip(&map.offsets_mm);
+    let corners = corners.zip(covariances.into_iter().map(|covariance| covariance * variance));
+    let corners = corners.map(|((corner, &offset_mm), covariance)| CornerOffset {
+        panel: corner.panel,
+        row: corner.row,
+        col: corner.col,
+        panel_mm: corner.panel_mm,
+        offset_mm,
+        covariance_mm2: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+        views: corner.views,
+    });
+    let expected_mm = [map.prior_mm.x, map.prior_mm.z];
+    Some(TargetMap::new(corners.collect(), expected_mm))
 }
 
 fn board_shape(minimum: &Minimum, covariance: &DMatrix<f64>, f_ratio: f64) -> Option<BoardShape> {

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::detect::Grid;
 use crate::lattice::GridKind;
-use crate::targets::zigzag_vertices;
+use crate::targets::{BoardSpec, Target, TargetError, TargetSpec, zigzag_vertices};
 
 /// An untagged board that no file describes. Its labels may differ between views by a motion of the
 /// lattice, which the pose of the view takes up.
@@ -19,6 +19,17 @@ pub struct UntaggedGrid {
 }
 
 impl UntaggedGrid {
+    /// The board as a target; `None` where its size is not known.
+    ///
+    /// # Errors
+    /// Where no board is so small, or so large.
+    pub fn target(&self, name: &str) -> Option<Result<Target, TargetError>> {
+        let [rows, cols] = self.size?;
+        let plain = BoardSpec::new(self.kind, rows, cols, self.edge_mm);
+        let spec = BoardSpec { tags: None, ..plain };
+        Some(Target::build(name, &TargetSpec::Board(spec), None, None))
+    }
+
     /// Where a corner is, mm.
     pub(super) fn place(&self, row: i32, col: i32) -> DVec3 {
         self.edge_mm * self.kind.position(row.into(), col.into()).extend(0.0)

@@ -57,12 +57,12 @@ pub(super) fn minimise(
     let mut damping = DAMPING;
     let coordinates = 2.0 * best.problem.count() as f64;
     while best.steps < MOST_STEPS && damping < MOST_DAMPING {
-        let Some(step) = best.normal.step(damping) else {
+        let Some(step) = best.normal.step(&best.layout, damping) else {
             damping *= STIFFEN;
             continue;
         };
         let variance = best.normal.cost / coordinates;
-        if best.normal.predicted(&step) <= until.deviations().powi(2) * variance {
+        if best.normal.predicted(&best.layout, &step) <= until.deviations().powi(2) * variance {
             break;
         }
         let problem = best.problem.after(&best.layout, &step);

@@ -22,6 +22,7 @@
 
 mod calibration;
 mod consensus;
+mod corner_map;
 mod diagnosis;
 mod error;
 mod estimate;
@@ -45,6 +46,7 @@ mod reweighting;
 mod shape;
 mod solve;
 mod start;
+mod target_map;
 mod view;
 mod view_consistency;
 mod weights;
@@ -66,6 +68,7 @@ pub use model_selection::{Instead, Remedy};
 pub use panel::PanelRef;
 pub use problem::Observation;
 pub use shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
+pub use target_map::{CornerOffset, LEAST_TO_MEASURE, TargetMap};
 pub use view::{Reference, Shown, Sighting, View, views};
 pub use weights::Weights;
 pub use words::Words;

@@ -1,25 +1,30 @@
 //! Normal equations of a problem, with the poses of the frames eliminated.
 //!
 //! ```text
-//!     ⎡ A   B ⎤ ⎡ shared ⎤   ⎡ a ⎤      A: cameras and panels, dense
-//!     ⎣ Bᵀ  C ⎦ ⎣ frames ⎦ = ⎣ c ⎦      C: a 6 × 6 block for each frame
+//!     ⎡ A   B ⎤ ⎡ kept  ⎤   ⎡ a ⎤      A: cameras and panels, dense
+//!     ⎣ Bᵀ  C ⎦ ⎣ parts ⎦ = ⎣ c ⎦      C: a 6 × 6 block for each frame
 //!
-//!     (A − Σ B C⁻¹ Bᵀ) shared = a − Σ B C⁻¹ c,     frame = C⁻¹ (c − Bᵀ shared)
+//!     (A − Σ B C⁻¹ Bᵀ) kept = a − Σ B C⁻¹ c,     part = C⁻¹ (c − Bᵀ kept)
 //! ```
+//!
+//! Where corners of the target are unknown too, no frame has an unknown in common with another frame but
+//! through them, nor a corner with another corner but through frames: of the two the one that has more
+//! unknowns is eliminated, and the other is kept.
 
 use std::collections::BTreeSet;
 
 use glam::{DMat3, DVec2, DVec3};
-use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 
+use super::corner_map::CornerMap;
 use super::loss::Loss;
 use super::problem::{Block, Problem, moved};
 use super::shape;
 use super::weights::Whitening;
 use crate::camera::MAX_PARAMETERS;
 
-/// Which column of the shared unknowns belongs to what.
+/// Which column of the unknowns that are kept belongs to what.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layout {
     /// For each camera the parameters that are unknown, and their columns.
@@ -30,6 +35,12 @@ pub(super) struct Layout {
     pub panels: Vec<Option<usize>>,
     /// First of the columns of the sheet's shape.
     pub shape: Option<usize>,
+    /// Number of columns of what all frames share: all of the above.
+    pub shared: usize,
+    /// First of the columns of the frames' poses; `None` where they are eliminated.
+    pub frames: Option<usize>,
+    /// First of the columns of the corners' offsets; `None` where they are eliminated, or known.
+    pub corners: Option<usize>,
     /// Number of columns.
     pub count: usize,
 }
@@ -50,38 +61,51 @@ impl Layout {
         }
         let panels = problem.panels.iter().map(|p| p.pose_free.then(|| take(6))).collect();
         let shape = problem.shape.map(|_| take(shape::COUNT));
-        Self { parameters, cameras, panels, shape, count }
+        let shared = take(0);
+        let of_frames = 6 * problem.frames.len();
+        let of_corners = problem.map.as_ref().map(|map| 3 * map.len());
+        let (frames, corners) = match of_corners {
+            None => (None, None),
+            Some(of_corners) if of_corners <= of_frames => (None, Some(take(of_corners))),
+            Some(_) => (Some(take(of_frames)), None),
+        };
+        Self { parameters, cameras, panels, shape, shared, frames, corners, count }
     }
 }
 
-/// The part of the equations that belongs to a frame.
+/// The equations of unknowns that are eliminated: a frame, or a corner.
 #[derive(Clone, Debug)]
-struct Frame {
+struct Part {
     b: DMatrix<f64>,
-    c: Matrix6<f64>,
-    right: Vector6<f64>,
+    c: DMatrix<f64>,
+    right: DVector<f64>,
 }
 
 /// The normal equations at a point, and what the residuals cost there.
 #[derive(Clone, Debug)]
 pub(super) struct Normal {
     pub cost: f64,
+    /// Columns of what all frames share, the first.
+    shared: usize,
     a: DMatrix<f64>,
     right: DVector<f64>,
-    frames: Vec<Frame>,
+    /// Frames, or corners.
+    parts: Vec<Part>,
 }
 
 /// A step of all unknowns.
 pub(super) struct Step {
     shared: DVector<f64>,
     frames: Vec<Vector6<f64>>,
+    corners: Vec<Vector3<f64>>,
 }
 
-/// The covariance of all unknowns for residuals of variance 1: of the shared ones, and of each
-/// frame's pose.
+/// The covariance of all unknowns for residuals of variance 1: of the shared ones, of each frame's pose, and
+/// of each corner's offset.
 pub(super) struct Covariances {
     pub shared: DMatrix<f64>,
     pub frames: Vec<Matrix6<f64>>,
+    pub corners: Vec<Matrix3<f64>>,
     /// The columns that nothing tells apart beyond what rounding leaves; their variances are the
     /// least that they can be.
     pub loose: Vec<usize>,
@@ -98,12 +122,20 @@ impl Normal {
         loss: Loss,
     ) -> Option<Self> {
         let n = layout.count;
-        let frame = Frame { b: DMatrix::zeros(n, 6), c: Matrix6::zeros(), right: Vector6::zeros() };
+        let part = |size: usize| Part {
+            b: DMatrix::zeros(n, size),
+            c: DMatrix::zeros(size, size),
+            right: DVector::zeros(size),
+        };
         let mut normal = Self {
             cost: 0.0,
+            shared: layout.shared,
             a: DMatrix::zeros(n, n),
             right: DVector::zeros(n),
-            frames: vec![frame; problem.frames.len()],
+            parts: match (layout.frames, &problem.map) {
+                (Some(_), Some(map)) => vec![part(3); map.len()],
+                _ => vec![part(6); problem.frames.len()],
+            },
         };
         let blocks: Vec<_> = problem.blocks.iter().zip(&whitening.blocks).collect();
         for some in blocks.chunks(BLOCKS_AT_A_TIME) {
@@ -113,8 +145,11 @@ impl Normal {
             // Summed in the order of the blocks, however many threads there are.
             let locals = locals.collect::<Vec<Option<Local>>>();
             for ((block, _), local) in some.iter().zip(locals) {
-                normal.add(&local?, block.frame);
+                normal.add(layout, &local?, block.frame);
             }
+        }
+        if let Some(map) = &problem.map {
+            normal.add_map(map, layout, whitening.sigma);
         }
         normal.a.fill_upper_triangle_with_lower_triangle();
         for (panel, first) in problem.panels.iter().zip(&layout.panels) {
@@ -144,11 +179,32 @@ impl Normal {
         }
     }
 
-    /// Adds a block, to the lower triangle only: its columns ascend, and its last six are those of
-    /// the frame's pose.
-    fn add(&mut self, local: &Local, frame: usize) {
+    /// Adds what is expected of the corners' offsets.
+    fn add_map(&mut self, map: &CornerMap, layout: &Layout, sigma: f64) {
+        let weights = map.prior_mm.map(|sd| (sigma / sd).powi(2));
+        for (index, offset) in map.offsets_mm.iter().enumerate() {
+            for k in 0..3 {
+                let pull = weights[k] * offset[k];
+                self.cost += offset[k] * pull;
+                match layout.corners {
+                    Some(first) => {
+                        let column = first + 3 * index + k;
+                        self.a[(column, column)] += weights[k];
+                        self.right[column] -= pull;
+                    }
+                    None => {
+                        self.parts[index].c[(k, k)] += weights[k];
+                        self.parts[index].right[k] -= pull;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds a block, to the lower triangle of what is kept only: its columns ascend, and its last six are
+    /// those of the frame's pose.
+    fn add(&mut self, layout: &Layout, local: &Local, frame: usize) {
         self.cost += local.cost;
-        let frame = &mut self.frames[frame];
         let shared = local.columns.len();
         for (i, &row) in local.columns.iter().enumerate() {
             for (&column, value) in local.columns.iter().zip(local.row(i)) {
@@ -158,85 +214,160 @@ impl Normal {
         }
         for i in 0..6 {
             let (of_shared, of_frame) = local.row(shared + i).split_at(shared);
+            let right = local.right[shared + i];
+            if let Some(first) = layout.frames {
+                let first = first + 6 * frame;
+                for (&column, value) in local.columns.iter().zip(of_shared) {
+                    self.a[(first + i, column)] += value;
+                }
+                for (j, value) in of_frame.iter().enumerate() {
+                    self.a[(first + i, first + j)] += value;
+                }
+                self.right[first + i] += right;
+                continue;
+            }
+            let part = &mut self.parts[frame];
             for (&row, value) in local.columns.iter().zip(of_shared) {
-                frame.b[(row, i)] += value;
+                part.b[(row, i)] += value;
             }
             for (j, value) in of_frame.iter().enumerate() {
-                frame.c[(i, j)] += value;
+                part.c[(i, j)] += value;
                 if j < i {
-                    frame.c[(j, i)] += value;
+                    part.c[(j, i)] += value;
                 }
             }
-            frame.right[i] += local.right[shared + i];
+            part.right[i] += right;
+        }
+        local.corners.iter().for_each(|corner| self.add_corner(layout, local, corner, frame));
+    }
+
+    /// Adds what a block says of a corner's offset.
+    fn add_corner(&mut self, layout: &Layout, local: &Local, corner: &OfCorner, frame: usize) {
+        let (of_shared, of_frame) = corner.cross.split_at(local.columns.len());
+        for k in 0..3 {
+            if let Some(first) = layout.corners {
+                let row = first + 3 * corner.index + k;
+                for (&column, values) in local.columns.iter().zip(of_shared) {
+                    self.a[(row, column)] += values[k];
+                }
+                for (i, values) in of_frame.iter().enumerate() {
+                    self.parts[frame].b[(row, i)] += values[k];
+                }
+                for l in 0..=k {
+                    self.a[(row, first + 3 * corner.index + l)] += corner.own[(k, l)];
+                }
+                self.right[row] += corner.right[k];
+            } else if let Some(first) = layout.frames {
+                let part = &mut self.parts[corner.index];
+                let of_frame =
+                    of_frame.iter().enumerate().map(|(i, of)| (first + 6 * frame + i, of));
+                let of_shared = local.columns.iter().copied().zip(of_shared);
+                for (row, values) in of_shared.chain(of_frame) {
+                    part.b[(row, k)] += values[k];
+                }
+                for l in 0..3 {
+                    part.c[(k, l)] += corner.own[(k, l)];
+                }
+                part.right[k] += corner.right[k];
+            }
         }
     }
 
     /// The step of Levenberg and Marquardt: diagonals grow by the factor 1 + `damping`. `None`
     /// where the equations have no unique solution.
-    pub(super) fn step(&self, damping: f64) -> Option<Step> {
-        let grown = |diagonal: f64| diagonal * (1.0 + damping);
-        let mut reduced = self.a.clone();
-        for i in 0..reduced.nrows() {
-            reduced[(i, i)] = grown(reduced[(i, i)]);
-        }
-        let mut right = self.right.clone();
-        let mut solved = Vec::with_capacity(self.frames.len());
-        for Frame { b, c, right: of_frame } in &self.frames {
-            let mut c = *c;
-            for i in 0..6 {
-                c[(i, i)] = grown(c[(i, i)]);
-            }
-            let inverse = c.cholesky()?.inverse();
-            let through = b * inverse;
-            reduced -= &through * b.transpose();
-            right -= &through * of_frame;
-            solved.push(inverse);
-        }
-        let shared = solve_scaled(reduced, right)?;
-        let frames = self.frames.iter().zip(solved);
-        let frames = frames.map(|(f, inverse)| inverse * (f.right - f.b.tr_mul(&shared)));
-        let step = Step { frames: frames.collect(), shared };
-        step.shared.iter().all(|v| v.is_finite()).then_some(step)
+    pub(super) fn step(&self, layout: &Layout, damping: f64) -> Option<Step> {
+        let Reduced { matrix, right, inverses } = self.reduced(damping)?;
+        let kept = solve_scaled(matrix, right)?;
+        let parts = self.parts.iter().zip(inverses);
+        let parts = parts.map(|(part, inverse)| inverse * (&part.right - part.b.tr_mul(&kept)));
+        let (frames, corners) = layout.split(&kept, &parts.collect::<Vec<_>>());
+        let shared = kept.rows(0, self.shared).into_owned();
+        let step = Step { shared, frames, corners };
+        kept.iter().all(|v| v.is_finite()).then_some(step)
     }
 
     /// By how much the cost falls along a step if the equations hold.
-    pub(super) fn predicted(&self, step: &Step) -> f64 {
-        let frames = self.frames.iter().zip(&step.frames);
-        self.right.dot(&step.shared) + frames.map(|(f, step)| f.right.dot(step)).sum::<f64>()
+    pub(super) fn predicted(&self, layout: &Layout, step: &Step) -> f64 {
+        let parts = self.parts.iter().map(|part| &part.right).collect::<Vec<_>>();
+        let (frames, corners) = layout.split(&self.right, &parts);
+        let of_frames = frames.iter().zip(&step.frames).map(|(right, step)| right.dot(step));
+        let of_corners = corners.iter().zip(&step.corners).map(|(right, step)| right.dot(step));
+        let shared = self.right.rows(0, self.shared).dot(&step.shared);
+        shared + of_frames.chain(of_corners).sum::<f64>()
     }
 
-    /// What is left of the equations when poses are eliminated: S and s of S shared = s. `None` where a frame's
-    /// pose is open by itself.
-    pub(super) fn reduced(&self) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    /// What is left of the equations when parts are eliminated. `None` where a frame's pose is open by itself.
+    pub(super) fn reduced(&self, damping: f64) -> Option<Reduced> {
+        let grown = |diagonal: f64| diagonal * (1.0 + damping);
         let (mut matrix, mut right) = (self.a.clone(), self.right.clone());
-        for Frame { b, c, right: of_frame } in &self.frames {
-            let through = b * c.cholesky()?.inverse();
-            matrix -= &through * b.transpose();
-            right -= &through * of_frame;
+        (0..matrix.nrows()).for_each(|i| matrix[(i, i)] = grown(matrix[(i, i)]));
+        let mut inverses = Vec::with_capacity(self.parts.len());
+        for parts in self.parts.chunks(PARTS_AT_A_TIME) {
+            let columns = parts.iter().map(|part| part.c.nrows()).sum();
+            let mut through = DMatrix::zeros(matrix.nrows(), columns);
+            let mut across = DMatrix::zeros(columns, matrix.nrows());
+            let mut first = 0;
+            for Part { b, c, right: of_part } in parts {
+                let mut c = c.clone();
+                (0..c.nrows()).for_each(|i| c[(i, i)] = grown(c[(i, i)]));
+                let inverse = c.cholesky()?.inverse();
+                let through_part = b * &inverse;
+                right -= &through_part * of_part;
+                through.columns_mut(first, b.ncols()).copy_from(&through_part);
+                across.rows_mut(first, b.ncols()).tr_copy_from(b);
+                first += b.ncols();
+                inverses.push(inverse);
+            }
+            matrix.gemm(-1.0, &through, &across, 1.0);
         }
-        Some((matrix, right))
+        Some(Reduced { matrix, right, inverses })
     }
 
     /// The inverse of the equations; `None` where a frame's pose is open by itself.
-    pub(super) fn covariances(&self) -> Option<Covariances> {
-        let mut reduced = self.a.clone();
-        let mut inverses = Vec::with_capacity(self.frames.len());
-        for Frame { b, c, .. } in &self.frames {
-            let inverse = c.cholesky()?.inverse();
-            reduced -= b * inverse * b.transpose();
-            inverses.push(inverse);
-        }
-        let (shared, loose, tied) = self.invert_reduced(reduced);
-        let frames = self.frames.iter().zip(inverses).map(|(frame, inverse)| {
-            let through = &frame.b * inverse;
-            let carried = through.tr_mul(&shared) * &through;
-            inverse + Matrix6::from_fn(|i, j| carried[(i, j)])
-        });
-        Some(Covariances { frames: frames.collect(), shared, loose, tied })
+    pub(super) fn covariances(&self, layout: &Layout) -> Option<Covariances> {
+        let Reduced { matrix, inverses, .. } = self.reduced(0.0)?;
+        let (kept, loose, tied) = self.invert(matrix)?;
+        let of_part = |(part, inverse): (&Part, DMatrix<f64>)| {
+            let through = &part.b * &inverse;
+            inverse + through.tr_mul(&(&kept * &through))
+        };
+        let parts: Vec<_> = self.parts.iter().zip(inverses).map(of_part).collect();
+        let (frames, corners) = match (layout.frames, layout.corners) {
+            (Some(first), _) => (blocks(&kept, first), parts.iter().map(fixed).collect()),
+            (None, Some(first)) => (parts.iter().map(fixed).collect(), blocks(&kept, first)),
+            (None, None) => (parts.iter().map(fixed).collect(), Vec::new()),
+        };
+        let shared = kept.view((0, 0), (self.shared, self.shared)).into_owned();
+        Some(Covariances { shared, frames, corners, loose, tied })
     }
 
-    /// The inverse of the reduced equations, and the columns that they leave open, and tie to others.
-    fn invert_reduced(&self, reduced: DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>, Vec<usize>) {
+    /// The inverse of the reduced equations, and the columns that they leave open, and tie to others. Only
+    /// what all frames share may be open.
+    fn invert(&self, reduced: DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<usize>, Vec<usize>)> {
+        let (n, shared) = (reduced.nrows(), self.shared);
+        let others = n - shared;
+        if others == 0 {
+            return Some(self.invert_shared(reduced));
+        }
+        let own = reduced.view((shared, shared), (others, others)).into_owned();
+        let own = own.cholesky()?.inverse();
+        let across = reduced.view((shared, 0), (others, shared));
+        let through = &own * across;
+        let of_shared = reduced.view((0, 0), (shared, shared)) - across.tr_mul(&through);
+        let (of_shared, loose, tied) = self.invert_shared(of_shared);
+        let carried = &through * &of_shared;
+        let mut inverse = DMatrix::zeros(n, n);
+        inverse.view_mut((0, 0), (shared, shared)).copy_from(&of_shared);
+        inverse.view_mut((shared, 0), (others, shared)).copy_from(&-&carried);
+        inverse.view_mut((0, shared), (shared, others)).copy_from(&-carried.transpose());
+        let own = own + carried * through.transpose();
+        inverse.view_mut((shared, shared), (others, others)).copy_from(&own);
+        Some((inverse, loose, tied))
+    }
+
+    /// The inverse of the equations of what all frames share, and the columns that they leave open, and tie to
+    /// others.
+    fn invert_shared(&self, reduced: DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>, Vec<usize>) {
         let n = reduced.nrows();
         if n == 0 {
             return (reduced, Vec::new(), Vec::new());
@@ -259,6 +390,49 @@ impl Normal {
         (inverse, loose.into_iter().collect(), tied)
     }
 }
+
+/// What is left of equations, S and s of S kept = s, and the inverses by which parts were eliminated.
+pub(super) struct Reduced {
+    pub matrix: DMatrix<f64>,
+    pub right: DVector<f64>,
+    inverses: Vec<DMatrix<f64>>,
+}
+
+impl Layout {
+    /// What belongs to frames and to corners of a vector over what is kept, and of those over parts.
+    fn split(
+        &self,
+        kept: &DVector<f64>,
+        parts: &[impl std::borrow::Borrow<DVector<f64>>],
+    ) -> (Vec<Vector6<f64>>, Vec<Vector3<f64>>) {
+        fn rows<const K: usize>(kept: &DVector<f64>, first: usize) -> Vec<SMatrix<f64, K, 1>> {
+            kept.as_slice()[first..].chunks_exact(K).map(SMatrix::from_column_slice).collect()
+        }
+        fn each<const K: usize>(
+            parts: &[impl std::borrow::Borrow<DVector<f64>>],
+        ) -> Vec<SMatrix<f64, K, 1>> {
+            parts.iter().map(|part| SMatrix::from_column_slice(part.borrow().as_slice())).collect()
+        }
+        match (self.frames, self.corners) {
+            (Some(first), _) => (rows(kept, first), each(parts)),
+            (None, Some(first)) => (each(parts), rows(kept, first)),
+            (None, None) => (each(parts), Vec::new()),
+        }
+    }
+}
+
+/// The blocks on the diagonal from a row on.
+fn blocks<const K: usize>(matrix: &DMatrix<f64>, first: usize) -> Vec<SMatrix<f64, K, K>> {
+    let block = |i: usize| matrix.fixed_view::<K, K>(i, i).into_owned();
+    (first..matrix.nrows()).step_by(K).map(block).collect()
+}
+
+fn fixed<const K: usize>(matrix: &DMatrix<f64>) -> SMatrix<f64, K, K> {
+    matrix.fixed_view::<K, K>(0, 0).into_owned()
+}
+
+/// Parts whose share of the reduced equations is taken away at a time: as one product of matrices.
+const PARTS_AT_A_TIME: usize = 64;
 
 /// Eigenvalues of the reduced equations, scaled by the diagonal that they would have if poses were
 /// known, mean nothing below this: elimination leaves a few dozen times the precision of numbers.
@@ -299,6 +473,18 @@ struct Local {
     /// Rows of the lower triangle, one after the other.
     matrix: Vec<f64>,
     right: Vec<f64>,
+    /// The corners, where they are unknown.
+    corners: Vec<OfCorner>,
+}
+
+/// What a corner in a block says of its own offset.
+struct OfCorner {
+    /// Its place in the map.
+    index: usize,
+    /// For each column of the block.
+    cross: Vec<[f64; 3]>,
+    own: Matrix3<f64>,
+    right: Vector3<f64>,
 }
 
 impl Local {
@@ -323,18 +509,20 @@ impl Local {
         let columns: Vec<usize> = free.iter().map(|&(_, column)| column).chain(poses).collect();
         let n = columns.len() + 6;
         let matrix = vec![0.0; n * (n + 1) / 2];
-        let mut local = Self { cost: 0.0, columns, matrix, right: vec![0.0; n] };
+        let mut local =
+            Self { cost: 0.0, columns, matrix, right: vec![0.0; n], corners: Vec::new() };
         let mut rows = [[0.0; MOST_COLUMNS]; 2];
         for (seen, &w) in block.observations.iter().zip(whitening) {
             let bends = problem.shape.map(|shape| shape.directions(seen.panel_mm));
-            let offset = problem.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
-            let turned_panel = target.target_from_panel.rotation * (seen.panel_mm + offset);
+            let mapped = problem.map.as_ref().map(|map| map.index(block.panel, seen));
+            let turned_panel = target.target_from_panel.rotation * problem.panel_point(block, seen);
             let in_target = turned_panel + target.target_from_panel.translation;
             let turned_target = rig.rotation * in_target;
             let in_rig = turned_target + rig.translation;
             let turned_rig = camera.camera_from_rig.rotation * in_rig;
             let in_camera = turned_rig + camera.camera_from_rig.translation;
             let at = camera.camera.project_with_derivatives(in_camera)?;
+            let mut by_place = [DVec3::ZERO; 2];
             for (i, row) in rows.iter_mut().enumerate() {
                 let mut next = 0;
                 let mut push = |value: f64| {
@@ -356,17 +544,22 @@ impl Local {
                 if of_panel.is_some() {
                     pose(turned_panel, target_from_rig * by_rig);
                 }
+                let panel_from_target = target.target_from_panel.rotation.conjugate();
+                by_place[i] = panel_from_target * (target_from_rig * by_rig);
                 if let Some(bends) = bends {
-                    let panel_from_target = target.target_from_panel.rotation.conjugate();
-                    let by_panel = panel_from_target * (target_from_rig * by_rig);
-                    bends.iter().for_each(|&bend| push(by_panel.dot(bend)));
+                    bends.iter().for_each(|&bend| push(by_place[i].dot(bend)));
                 }
                 let mut pose = |arm: DVec3, by: DVec3| {
                     arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(&mut push);
                 };
                 pose(turned_target, by_rig);
             }
-            local.add([&rows[0][..n], &rows[1][..n]], seen.pixel - at.pixel, w, loss, sigma);
+            let residual = seen.pixel - at.pixel;
+            let rows = [&rows[0][..n], &rows[1][..n]];
+            let weight = local.add(rows, residual, w, loss, sigma);
+            if let Some(index) = mapped {
+                local.corners.push(OfCorner::new(index, rows, by_place, residual, w, weight));
+            }
         }
         Some(local)
     }
@@ -376,7 +569,7 @@ impl Local {
         &self.matrix[i * (i + 1) / 2..][..=i]
     }
 
-    /// Adds a corner's two rows.
+    /// Adds a corner's two rows; returns the weight that the loss gives it.
     fn add(
         &mut self,
         [along_x, along_y]: [&[f64]; 2],
@@ -384,7 +577,7 @@ impl Local {
         w: [f64; 3],
         loss: Loss,
         sigma: f64,
-    ) {
+    ) -> f64 {
         let r = Whitening::apply(w, residual);
         let (cost, weight) = loss.of(r.length_squared(), sigma);
         self.cost += cost;
@@ -400,6 +593,29 @@ impl Local {
             }
             rest = below;
         }
+        weight
+    }
+}
+
+impl OfCorner {
+    fn new(
+        index: usize,
+        [along_x, along_y]: [&[f64]; 2],
+        by_place: [DVec3; 2],
+        residual: DVec2,
+        w: [f64; 3],
+        weight: f64,
+    ) -> Self {
+        let r = Whitening::apply(w, residual);
+        let [a, b, c] = w;
+        let (x, y) = (a * by_place[0], b * by_place[0] + c * by_place[1]);
+        // By the residual before it was whitened.
+        let (by_x, by_y) = (weight * (a * x + b * y), weight * (c * y));
+        let cross = along_x.iter().zip(along_y);
+        let cross = cross.map(|(&of_x, &of_y)| (by_x * of_x + by_y * of_y).to_array());
+        let own = Matrix3::from_fn(|k, l| by_x[k] * by_place[0][l] + by_y[k] * by_place[1][l]);
+        let right = weight * (x * r.x + y * r.y);
+        Self { index, cross: cross.collect(), own, right: right.to_array().into() }
     }
 }
 
@@ -434,6 +650,11 @@ impl Problem {
         for (frame, step) in problem.frames.iter_mut().zip(&step.frames) {
             *frame = moved(frame, step.as_slice());
         }
+        if let Some(map) = &mut problem.map {
+            for (offset, step) in map.offsets_mm.iter_mut().zip(&step.corners) {
+                *offset += DVec3::from_slice(step.as_slice());
+            }
+        }
         problem
     }
 }
@@ -448,11 +669,18 @@ mod tests {
     use crate::calibrate::{PanelRef, Shape};
     use crate::camera::{Camera, Pose};
 
+    #[derive(Clone, Copy, PartialEq)]
+    enum Kind {
+        Rig,
+        Bent,
+        Map { frames: usize },
+    }
+
     /// Two cameras and two panels in three frames, every link open that may be, seen with noise; or one camera and a
-    /// panel that is bent.
-    fn problem(is_bent: bool) -> Problem {
+    /// panel that is bent, or whose corners are anywhere.
+    fn problem(kind: Kind) -> Problem {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let count = if is_bent { 1 } else { 2 };
+        let count = if kind == Kind::Rig { 2 } else { 1 };
         let beside = |x: f64| Pose { translation: DVec3::new(x, 3.0, -2.0), ..Pose::IDENTITY };
         let cameras = (0..count).map(|i| {
             let camera = Camera::pinhole(640 + 80 * i, 480, 1.0);
@@ -469,22 +697,29 @@ mod tests {
             let prior = prior.filter(|_| i > 0);
             PanelUnknowns { target_from_panel, pose_free: i > 0, prior }
         });
-        let frames = [[30.0, 40.0], [-50.0, 20.0], [10.0, -60.0]].map(|[x, y]| {
-            Pose::looking_at(DVec3::new(x, y, 300.0), DVec3::new(30.0, 20.0, 0.0), DVec3::Y)
+        let moments = match kind {
+            Kind::Map { frames } => frames,
+            Kind::Rig | Kind::Bent => 3,
+        };
+        let frames = (0..moments).map(|i| {
+            let (sin, cos) = (2.4 * i as f64).sin_cos();
+            let eye = DVec3::new(50.0 * cos, 50.0 * sin, 300.0);
+            Pose::looking_at(eye, DVec3::new(30.0, 20.0, 0.0), DVec3::Y)
         });
-        let shape = is_bent.then(|| Shape {
+        let shape = (kind == Kind::Bent).then(|| Shape {
             middle_mm: DVec3::new(30.0, 20.0, 0.0),
             reach_mm: 40.0,
             coefficients_mm: std::array::from_fn(|i| 0.1 * i as f64),
         });
         let mut problem = Problem {
             cameras: cameras.collect(),
-            frames: frames.to_vec(),
+            frames: frames.collect(),
             panels: panels.collect(),
             blocks: Vec::new(),
             shape,
+            map: None,
         };
-        for frame in 0..3 {
+        for frame in 0..moments {
             for (camera, panel) in (0..count).flat_map(|c| (0..count).map(move |p| (c, p))) {
                 let seen = (0..20).map(|k| Observation {
                     row: k / 5,
@@ -504,6 +739,13 @@ mod tests {
                 }
                 problem.blocks.push(block);
             }
+        }
+        if let Kind::Map { .. } = kind {
+            let mut map = CornerMap::flat(&problem);
+            for offset in &mut map.offsets_mm {
+                *offset = DVec3::from([0; 3].map(|_| rng.random_range(-0.1..0.1)));
+            }
+            problem.map = Some(map);
         }
         problem
     }
@@ -530,30 +772,43 @@ mod tests {
                 all.extend((half.transpose() * -off).iter());
             }
         }
+        if let Some(map) = &problem.map {
+            let offsets = map.offsets_mm.iter();
+            all.extend(offsets.flat_map(|&mm| (mm / map.prior_mm * whitening.sigma).to_array()));
+        }
         DVector::from_vec(all)
     }
 
-    fn step(layout: &Layout, values: &DVector<f64>) -> Step {
-        let (shared, frames) = values.as_slice().split_at(layout.count);
+    fn step(layout: &Layout, frames: usize, values: &DVector<f64>) -> Step {
+        let (shared, others) = values.as_slice().split_at(layout.shared);
+        let (frames, corners) = others.split_at(6 * frames);
         let frames = frames.chunks_exact(6).map(Vector6::from_column_slice).collect();
-        Step { shared: DVector::from_column_slice(shared), frames }
+        let corners = corners.chunks_exact(3).map(Vector3::from_column_slice).collect();
+        Step { shared: DVector::from_column_slice(shared), frames, corners }
     }
 
-    /// Eliminating the frames changes nothing, and every derivative is that of the residuals: cost, step and
+    /// Eliminating frames or corners changes nothing, and every derivative is that of the residuals: cost, step and
     /// covariances are those of the whole equations, made from differences.
     #[test]
     fn equations_are_those_of_the_residuals_differences() {
-        for is_bent in [false, true] {
-            let problem = problem(is_bent);
+        // Of few frames corners are eliminated, of many frames.
+        let maps = [5, 12].map(|frames| Kind::Map { frames });
+        for kind in [Kind::Rig, Kind::Bent].into_iter().chain(maps) {
+            let problem = problem(kind);
             let (layout, whitening) = (Layout::of(&problem), whitening(&problem));
             let normal = Normal::of(&problem, &layout, &whitening, Loss::Squared).unwrap();
             let here = residuals(&problem, &whitening);
-            let count = layout.count + 6 * problem.frames.len();
+            let of_corners = problem.map.as_ref().map_or(0, |map| 3 * map.len());
+            let frames = problem.frames.len();
+            let count = layout.shared + 6 * frames + of_corners;
             let column = |i: usize| {
                 // A ten-millionth of a pixel, about, whatever the unit.
                 let unit = DVector::from_fn(count, |j, _| f64::from(u8::from(i == j)));
                 let at = |by: f64| {
-                    residuals(&problem.after(&layout, &step(&layout, &(&unit * by))), &whitening)
+                    residuals(
+                        &problem.after(&layout, &step(&layout, frames, &(&unit * by))),
+                        &whitening,
+                    )
                 };
                 let size = 1e-4 / (at(1e-6) - &here).norm().max(1e-9) * 1e-6;
                 (at(size) - at(-size)) / (2.0 * size)
@@ -568,21 +823,24 @@ mod tests {
             let expected = (&inverse * right).component_div(&scale);
 
             assert!((normal.cost - here.norm_squared()).abs() < 1e-9 * normal.cost);
-            let found = normal.step(0.0).unwrap();
-            let frames = found.frames.iter().flat_map(|frame| frame.iter().copied());
-            let found = DVector::from_iterator(count, found.shared.iter().copied().chain(frames));
+            let found = normal.step(&layout, 0.0).unwrap();
+            let frames = found.frames.iter().flat_map(|frame| frame.iter());
+            let corners = found.corners.iter().flat_map(|corner| corner.iter());
+            let found = found.shared.iter().chain(frames).chain(corners).copied();
+            let found = DVector::from_iterator(count, found);
             for i in 0..count {
                 let deviation = inverse[(i, i)].sqrt() / scale[i];
                 let off = (found[i] - expected[i]).abs();
                 assert!(off < 1e-4 * deviation, "unknown {i}: {off} of {deviation}");
             }
-            let covariances = normal.covariances().unwrap();
+            let covariances = normal.covariances(&layout).unwrap();
             assert!(covariances.loose.is_empty());
             for i in 0..count {
-                let found = match i.checked_sub(layout.count) {
-                    None => covariances.shared[(i, i)],
-                    Some(k) => covariances.frames[k / 6][(k % 6, k % 6)],
-                };
+                let shared = covariances.shared.diagonal();
+                let frames = covariances.frames.iter().flat_map(|c| c.diagonal().data.0[0]);
+                let corners = covariances.corners.iter().flat_map(|c| c.diagonal().data.0[0]);
+                let all = shared.iter().copied().chain(frames).chain(corners);
+                let found = all.collect::<Vec<f64>>()[i];
                 let ratio = found / inverse[(i, i)] * scale[i] * scale[i];
                 assert!((ratio - 1.0).abs() < 1e-3, "variance of unknown {i}: {ratio}");
             }

@@ -165,6 +165,7 @@ fn refine(
         panels: fixed(panels),
         blocks: blocks(sightings, 0).collect(),
         shape: None,
+        map: None,
     };
     let first: Option<Vec<_>> =
         problem.blocks.iter().map(|block| problem.residuals(block)).collect();

@@ -1,6 +1,7 @@
 use glam::{DVec2, DVec3};
 use nalgebra::{Matrix6, Vector6};
 
+use super::corner_map::CornerMap;
 use super::panel::PanelRef;
 use super::shape::Shape;
 use super::view::LEAST_CORNERS;
@@ -99,6 +100,8 @@ pub(super) struct Problem {
     pub blocks: Vec<Block>,
     /// How the panels' sheets differ from their plan, where that is unknown too; of one panel.
     pub shape: Option<Shape>,
+    /// How the corners differ from their plan, each by itself, where that is unknown.
+    pub map: Option<CornerMap>,
 }
 
 impl CameraUnknowns {
@@ -109,10 +112,16 @@ impl CameraUnknowns {
 }
 
 impl Problem {
+    /// Where a corner is in the frame of its panel, mm.
+    pub fn panel_point(&self, block: &Block, seen: &Observation) -> DVec3 {
+        let bent = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
+        let moved = self.map.as_ref().map_or(DVec3::ZERO, |map| map.offset(block.panel, seen));
+        seen.panel_mm + bent + moved
+    }
+
     /// Where a corner is in the frame of the camera that saw it, mm.
     pub fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
-        let shape = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(observation.panel_mm));
-        let at = observation.panel_mm + shape;
+        let at = self.panel_point(block, observation);
         let target = self.panels[block.panel.index()].target_from_panel.apply(at);
         let rig = self.frames[block.frame].apply(target);
         self.cameras[block.camera].camera_from_rig.apply(rig)
@@ -150,7 +159,7 @@ impl Problem {
             .filter_map(|block| Some(Block { frame: places[block.frame]?, ..block.clone() }));
         let blocks = blocks.collect();
         let (cameras, panels) = (self.cameras.clone(), self.panels.clone());
-        Problem { cameras, frames, panels, blocks, shape: self.shape }
+        Problem { cameras, frames, panels, blocks, shape: self.shape, map: self.map.clone() }
     }
 }
 
@@ -169,9 +178,7 @@ impl Problem {
             Block { observations: kept.map(|(seen, _)| *seen).collect(), ..*block }
         };
         let blocks = self.blocks.iter().zip(kept).map(of_block).collect();
-        let Problem { cameras, frames, panels, shape, .. } = self;
-        let (cameras, frames, panels) = (cameras.clone(), frames.clone(), panels.clone());
-        Problem { cameras, frames, panels, blocks, shape: *shape }
+        Problem { blocks, ..self.unknowns() }
     }
 
     /// The blocks for which `kept` holds, and the frames that still have as many corners as a panel needs.
@@ -197,12 +204,20 @@ impl Problem {
         for (frame, pose) in frames.into_iter().zip(problem.frames) {
             self.frames[frame] = pose;
         }
-        (self.cameras, self.panels, self.shape) = (problem.cameras, problem.panels, problem.shape);
+        (self.cameras, self.panels) = (problem.cameras, problem.panels);
+        (self.shape, self.map) = (problem.shape, problem.map);
     }
 
     /// Its observations with what was found in a problem of the same unknowns.
     pub(super) fn at(&self, found: &Problem) -> Problem {
-        Problem { blocks: self.blocks.clone(), ..found.clone() }
+        Problem { blocks: self.blocks.clone(), ..found.unknowns() }
+    }
+
+    /// The same without observations.
+    fn unknowns(&self) -> Problem {
+        let Problem { cameras, frames, panels, shape, map, .. } = self;
+        let (cameras, frames, panels) = (cameras.clone(), frames.clone(), panels.clone());
+        Problem { cameras, frames, panels, blocks: Vec::new(), shape: *shape, map: map.clone() }
     }
 }
 

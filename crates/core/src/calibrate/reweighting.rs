@@ -212,7 +212,8 @@ pub(super) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f6
 
 /// The a-posteriori variance: what the residuals cost for each of their degrees of freedom.
 pub(super) fn variance(minimum: &Minimum) -> f64 {
-    let unknowns = minimum.layout.count + 6 * minimum.problem.frames.len();
+    // Offsets of corners are as many unknowns as expectations of them.
+    let unknowns = minimum.layout.shared + 6 * minimum.problem.frames.len();
     let freedom = (2 * minimum.problem.count()).saturating_sub(unknowns).max(1);
     minimum.normal.cost / freedom as f64
 }

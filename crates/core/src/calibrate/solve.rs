@@ -1,11 +1,12 @@
 //! From a calibration to its estimate: start, gross errors, bundle adjustment.
 
 use super::calibration::{Calibration, CameraViews, Intrinsics};
+use super::corner_map::CornerMap;
 use super::error::CalibrationError;
 use super::estimate::{CameraEstimate, Estimate};
 use super::excluded::{Excluded, Reason};
 use super::gross_errors::{Gross, Kept, WrongFrame, within_pictures};
-use super::minimise::{Until, minimise};
+use super::minimise::{Minimum, Until, minimise};
 use super::panels;
 use super::reweighting::{Settled, settle, variance};
 use super::shape::{self, Shape};
@@ -90,6 +91,10 @@ impl Calibration {
             true => own.bent(&gross, settled)?,
             false => (settled, 0.0),
         };
+        let settled = match own.measure_target {
+            true => own.measured(&gross, settled)?,
+            false => settled,
+        };
         findings.extend(gross.findings(&settled, |frame| frames[frame].name.clone()));
         let kept: Vec<&Frame> = gross.belonging().map(|frame| &frames[frame]).collect();
         let estimate = Estimate::new(&own.cameras, &kept, &settled, f_ratio)?;
@@ -172,6 +177,36 @@ impl Calibration {
         let problem = settled.problem.at(&bent.problem);
         let settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
         Ok((settled, f_ratio))
+    }
+}
+
+/// An expectation is found when it changes by less than this part.
+const SAME_PRIOR: f64 = 0.05;
+
+/// Rounds in which offsets and what is expected of them are fitted to one another.
+const PRIOR_ROUNDS: usize = 10;
+
+impl Calibration {
+    /// Finds the place of every corner of the target too.
+    fn measured(&self, gross: &Gross, settled: Settled) -> Result<Settled, CalibrationError> {
+        let mut problem = settled.problem.clone();
+        let map = CornerMap::flat(&settled.minimum.problem);
+        problem.map = Some(map);
+        let mut settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
+        for _ in 0..PRIOR_ROUNDS {
+            let Minimum { problem, normal, layout, .. } = &settled.minimum;
+            let Some(map) = &problem.map else { break };
+            let found = normal.covariances(layout).ok_or(CalibrationError::NoStart)?;
+            let prior_mm = map.fitted_prior(&found.corners, settled.whitening.sigma);
+            let change = (prior_mm - map.prior_mm).abs() / map.prior_mm;
+            if change.max_element() < SAME_PRIOR {
+                break;
+            }
+            let mut problem = settled.problem.clone();
+            problem.map = Some(map.clone().expecting(prior_mm));
+            settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
+        }
+        Ok(settled)
     }
 }
 

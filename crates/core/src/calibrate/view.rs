@@ -9,6 +9,7 @@ use super::grid::UntaggedGrid;
 use super::panel::PanelRef;
 use super::problem::Observation;
 use super::shape::Shape;
+use super::target_map::TargetMap;
 use crate::camera::Pose;
 use crate::detect::{Detection, Grid};
 use crate::targets::{Panel, Target, TargetSpec};
@@ -93,6 +94,13 @@ impl Sighting {
         }
     }
 
+    /// Moves the corners to where a map has them; those that it does not have stay.
+    pub fn correct(&mut self, map: &TargetMap) {
+        for seen in &mut self.observations {
+            seen.panel_mm += map.offset_mm(self.panel, seen.row, seen.col);
+        }
+    }
+
     /// Moves the corners to where a print has them that is stretched across and up its sheet;
     /// the panel is turned by `angle_rad` on it.
     pub fn stretch(&mut self, [across, up]: [f64; 2], angle_rad: f64) {
@@ -122,6 +130,20 @@ impl Reference<'_> {
                 Some(PanelRef::new(index, id))
             }
         }
+    }
+
+    /// Whether the labels of a view are those of the target: tags tell them, or that the board is seen
+    /// whole.
+    pub fn is_sure_of(&self, view: &View) -> bool {
+        let whole = match self {
+            Self::Grid(grid) => grid.size.map(|[rows, cols]| rows as usize * cols as usize),
+            Self::Target(target) => {
+                let tagged = target.panels.iter().all(|panel| !panel.tags.is_empty());
+                let count = target.panels.iter().map(|panel| panel.corners.len()).sum();
+                Some(if tagged { 0 } else { count })
+            }
+        };
+        whole.is_some_and(|count| view.corner_count() >= count)
     }
 
     /// Whether its panels are boards that lie about, each for itself.
@@ -295,7 +317,10 @@ fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
     let places: BTreeMap<(i32, i32), DVec3> = panel
         .corners
         .iter()
-        .map(|corner| ((corner.row, corner.col), from_target.apply(corner.target_mm)))
+        .map(|corner| {
+            let place = from_target.apply(corner.target_mm) + corner.offset_mm();
+            ((corner.row, corner.col), place)
+        })
         .collect();
     let mut found = Vec::new();
     for corner in &grid.corners {

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::lack_of_fit::deviate_of_f;
 use super::loss::Loss;
-use super::normal::{Layout, Normal};
+use super::normal::{Layout, Normal, Reduced};
 use super::problem::Problem;
 use super::reweighting::Settled;
 use crate::statistics::median;
@@ -88,7 +88,7 @@ impl Opinions {
 /// What each frame says; `None` where one says nothing by itself.
 fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     let problem = &settled.minimum.problem;
-    let (all, _) = settled.minimum.normal.reduced()?;
+    let all = settled.minimum.normal.reduced(0.0)?.matrix;
     let whiten = whitener(&all)?;
     let variance = settled.whitening.sigma.powi(2);
     let of_frame = |frame: usize| {
@@ -121,7 +121,8 @@ fn reduced_of(
 ) -> Option<(DMatrix<f64>, DVector<f64>)> {
     let part = problem.with_frames(|other| other == frame);
     let whitening = settled.whitening.of(&part);
-    let found = Normal::of(&part, &Layout::of(&part), &whitening, loss)?.reduced();
+    let found = Normal::of(&part, &Layout::of(&part), &whitening, loss)?.reduced(0.0);
+    let found = found.map(|Reduced { matrix, right, .. }| (matrix, right));
     found.filter(|(matrix, right)| matrix.iter().chain(right).all(|v| v.is_finite()))
 }
 

@@ -7,6 +7,7 @@ use super::lack_of_fit::LackOfFit;
 use super::model::Model;
 use super::model_selection::{Instead, Remedy};
 use super::panel::PanelRef;
+use super::target_map::LEAST_TO_MEASURE;
 use crate::words::counted;
 
 /// A panel that is turned by less looks only moved.
@@ -190,19 +191,36 @@ impl<'a> Words<'a> {
             Some(_) => "measure its check bars again",
             None => "measure its check bars for `Sighting::stretch`",
         };
+        let measuring = self.measuring();
         match (self.estimate.shape, model) {
+            _ if self.estimate.map.is_some() => format!(
+                "{scale}the board is not the same in all views: glue it on something flat, {bars}"
+            ),
             (Some(_), _) => format!(
                 "{scale}the board is bent in more ways than `Calibration::board_shape` describes, or not \
-                 the same in all views: glue it on something flat, {bars}"
+                 the same in all views: {measuring}, glue it on something flat, {bars}"
             ),
             (None, Some(_)) => format!(
                 "{scale}the board is not flat or not printed as stated: try \
-                 `Calibration::board_shape`, {bars}"
+                 `Calibration::board_shape`, {measuring}, {bars}"
             ),
             (None, None) => format!(
                 "{scale}the board is not flat or not printed as stated, or the camera that was given is \
                  another one: find its shape by a calibration with `Calibration::board_shape`, \
                  and give it by `Sighting::bend`, {bars}"
+            ),
+        }
+    }
+
+    /// Whether there are views enough to find the place of every corner.
+    fn measuring(&self) -> String {
+        match self.estimate.views_of_a_corner() {
+            views if views >= LEAST_TO_MEASURE => {
+                "find the place of every corner by `Calibration::measure_target`".to_owned()
+            }
+            views => format!(
+                "take at least {LEAST_TO_MEASURE} views of every corner, not {views}, to find their places by \
+                 `Calibration::measure_target`"
             ),
         }
     }

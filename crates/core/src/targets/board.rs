@@ -143,7 +143,7 @@ pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
             .map(|(v, id)| {
                 let panel_mm = spec.grid.position(v.row.into(), v.col.into()) * spec.edge_mm;
                 let target_mm = panel_mm.extend(0.0);
-                Corner { id, row: v.row, col: v.col, panel_mm, target_mm }
+                Corner { id, row: v.row, col: v.col, panel_mm, target_mm, measured: None }
             })
             .collect(),
         tags: tiles

@@ -20,6 +20,10 @@ pub const SCHEMA: &str = "deltille/target/1";
 /// less; another unit or another corner's position differs by more.
 const SLACK_EDGES: f64 = 0.01;
 
+/// How far the corner of a target that was made may lie from its place in the plan, in edges: farther off it
+/// would be nearer to another one.
+const MEASURED_SLACK_EDGES: f64 = 0.5;
+
 /// How far its target position may be from that by its panel's pose, in edges: what six written digits of a
 /// rotation leave on a panel of a thousand edges.
 const POSE_SLACK_EDGES: f64 = 0.001;
@@ -316,6 +320,16 @@ fn check_panel(panel: &Panel, field: &str) -> Result<(), Problem> {
             let what = "it is more than 1 % of an edge away from its place in the lattice";
             return problem(field("panel_mm"), what);
         }
+        if let Some(place) = &corner.measured {
+            if corner.offset_mm().length() > MEASURED_SLACK_EDGES * panel.edge_mm {
+                let what = "it is more than half an edge, so that another corner were nearer";
+                return problem(field("measured.offset_mm"), what);
+            }
+            if !is_covariance(&place.covariance_mm2) {
+                let what = "it is no covariance: some variance in it is negative";
+                return problem(field("measured.covariance_mm2"), what);
+            }
+        }
         let expected = panel.pose.target_from_panel(corner.panel_mm);
         if corner.target_mm.distance(expected) > POSE_SLACK_EDGES * panel.edge_mm {
             let what = "it is more than 0.1 % of an edge away from rotation · panel + translation";
@@ -370,6 +384,12 @@ fn check_covariance(covariance: &[[f64; 6]; 6]) -> Result<(), String> {
         return Err("it is no covariance: some variance in it is negative".to_owned());
     }
     Ok(())
+}
+
+/// Whether the upper triangle xx, xy, xz, yy, yz, zz is that of a covariance.
+fn is_covariance(&[xx, xy, xz, yy, yz, zz]: &[f64; 6]) -> bool {
+    let matrix = nalgebra::Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    matrix.symmetric_eigenvalues().min() >= -COVARIANCE_SLACK * matrix.amax()
 }
 
 #[cfg(test)]

@@ -108,7 +108,7 @@ mod tests {
                 .map(|(row, col)| {
                     let panel_mm = Vertex::new(row, col).position() * 20.0;
                     let target_mm = r * panel_mm.extend(0.0) + DVec3::from(t);
-                    Corner { id: 0, row, col, panel_mm, target_mm }
+                    Corner { id: 0, row, col, panel_mm, target_mm, measured: None }
                 })
                 .collect();
             let pose = PanelPose::fit(&corners).unwrap();

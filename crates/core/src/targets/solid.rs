@@ -185,7 +185,7 @@ pub(super) fn untied_panels(spec: &SolidSpec) -> Result<Vec<Panel>, TargetError>
             .map(|(v, id)| {
                 let panel_mm = v.position() * face.tile_edge_mm;
                 let target_mm = face.pose.target_from_panel(panel_mm);
-                Corner { id, row: v.row, col: v.col, panel_mm, target_mm }
+                Corner { id, row: v.row, col: v.col, panel_mm, target_mm, measured: None }
             })
             .collect(),
         tags: tiles

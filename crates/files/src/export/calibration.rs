@@ -5,8 +5,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::estimate::{
-    DiagnosisRecord, ParameterRecord, ShapeRecord, ViewRecord, correlations, diagnoses, parameters,
-    shape, views,
+    DiagnosisRecord, MapRecord, ParameterRecord, ShapeRecord, ViewRecord, correlations, diagnoses,
+    map, parameters, shape, views,
 };
 use super::finding::{FindingRecord, records};
 use deltille_core::calibrate::{Diagnosis, Estimate, Excluded, SHAPE_COEFFICIENTS as COUNT, Shape};
@@ -119,6 +119,8 @@ struct CalibrationFile<'a> {
     ink: Option<InkEstimate>,
     #[serde(skip_serializing_if = "Option::is_none")]
     board_shape: Option<ShapeRecord>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target_map: Option<MapRecord<'a>>,
     views: Vec<ViewRecord<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     held_out: Option<HeldOut<'a>>,
@@ -157,6 +159,7 @@ pub fn write(found: &Estimate, said: &[Diagnosis], print: Print) -> Option<Strin
         print_scale: print.scale,
         ink: print.ink,
         board_shape: found.shape.map(shape),
+        target_map: found.map.as_ref().map(map),
         views: views(found, camera),
         held_out: held_out.map(|(test, camera)| HeldOut {
             rms_px: test.rms_px,

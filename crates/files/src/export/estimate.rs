@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::motion::Motion;
 use deltille_core::calibrate::{
     BoardShape, CameraEstimate, Diagnosis, Estimate, Instead, LackOfFit, LensEnd, PanelRef,
-    ViewEstimate, Words,
+    TargetMap, ViewEstimate, Words,
 };
 
 #[derive(Serialize)]
@@ -128,6 +128,44 @@ pub(super) fn shape(found: BoardShape) -> ShapeRecord {
         stretched_mm: found.stretched_mm,
         f_ratio: found.f_ratio,
         significant: found.is_significant(),
+    }
+}
+
+/// The map of a target's corners.
+#[derive(Serialize)]
+pub(super) struct MapRecord<'a> {
+    expected_mm: [f64; 2],
+    rms_mm: [f64; 2],
+    significant: usize,
+    corners: Vec<OffsetRecord<'a>>,
+}
+
+#[derive(Serialize)]
+struct OffsetRecord<'a> {
+    panel: PanelRef,
+    row: i32,
+    col: i32,
+    panel_mm: [f64; 3],
+    offset_mm: [f64; 3],
+    covariance_mm2: &'a [[f64; 3]; 3],
+    views: usize,
+}
+
+pub(super) fn map(found: &TargetMap) -> MapRecord<'_> {
+    let corners = found.corners().iter().map(|corner| OffsetRecord {
+        panel: corner.panel,
+        row: corner.row,
+        col: corner.col,
+        panel_mm: corner.panel_mm.to_array(),
+        offset_mm: corner.offset_mm.to_array(),
+        covariance_mm2: &corner.covariance_mm2,
+        views: corner.views,
+    });
+    MapRecord {
+        expected_mm: found.expected_mm,
+        rms_mm: found.rms_mm(),
+        significant: found.significant().count(),
+        corners: corners.collect(),
     }
 }
 

@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use super::calibration::Print;
 use super::estimate::{
-    DiagnosisRecord, ParameterRecord, ShapeRecord, ViewRecord, correlations, diagnoses, parameters,
-    shape, views,
+    DiagnosisRecord, MapRecord, ParameterRecord, ShapeRecord, ViewRecord, correlations, diagnoses,
+    map, parameters, shape, views,
 };
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;
@@ -29,6 +29,8 @@ struct RigFile<'a> {
     print_scale: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     board_shape: Option<ShapeRecord>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target_map: Option<MapRecord<'a>>,
     cameras: Vec<Camera<'a>>,
     frames: Vec<Frame<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -98,6 +100,7 @@ pub fn write(found: &Estimate, said: &[Diagnosis], model: &str, print: Print) ->
         common_px: found.common_px,
         print_scale: print.scale,
         board_shape: found.shape.map(shape),
+        target_map: found.map.as_ref().map(map),
         cameras: found.cameras.iter().map(|camera| of_camera(found, camera)).collect(),
         frames: frames(found),
         held_out,

@@ -11,8 +11,8 @@ use serde::Deserialize;
 use super::calibration::{self, StoredShape};
 use super::rig;
 use deltille_core::calibrate::{
-    BoardShape, CameraEstimate, Corner, Estimate, Excluded, FrameEstimate, Model, PanelRef,
-    Parameter, Reason, Reference, SHAPE_COEFFICIENTS as COUNT, ViewEstimate,
+    BoardShape, CameraEstimate, Corner, CornerOffset, Estimate, Excluded, FrameEstimate, Model,
+    PanelRef, Parameter, Reason, Reference, SHAPE_COEFFICIENTS as COUNT, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::json::{self, ReadError};
@@ -104,6 +104,7 @@ struct Fit {
     #[serde(deserialize_with = "quantity::deviation::de")]
     common_px: Option<f64>,
     board_shape: Option<SavedShape>,
+    target_map: Option<SavedMap>,
     excluded: Vec<SavedExcluded>,
 }
 
@@ -195,6 +196,29 @@ struct SavedShape {
 }
 
 #[derive(Deserialize)]
+struct SavedMap {
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    expected_mm: [f64; 2],
+    corners: Vec<SavedOffset>,
+}
+
+#[derive(Deserialize)]
+struct SavedOffset {
+    panel: u32,
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    row: i32,
+    #[serde(deserialize_with = "quantity::place_in_lattice::de")]
+    col: i32,
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    panel_mm: [f64; 3],
+    #[serde(deserialize_with = "quantity::place_mm::de")]
+    offset_mm: [f64; 3],
+    #[serde(deserialize_with = "quantity::figure::de")]
+    covariance_mm2: [[f64; 3]; 3],
+    views: usize,
+}
+
+#[derive(Deserialize)]
 struct SavedExcluded {
     camera: Option<String>,
     view: String,
@@ -220,7 +244,7 @@ impl Single {
             (estimate.frames, estimate.rms_px, estimate.excluded) = (frames, rms_px, excluded);
             Ok(estimate)
         });
-        let mut estimate = fit.estimate();
+        let mut estimate = fit.estimate(reference)?;
         estimate.held_out = held_out.transpose()?.map(Box::new);
         estimate.cameras = vec![found];
         (estimate.frames, estimate.rms_px) = (frames, rms_px);
@@ -251,7 +275,7 @@ impl Rig {
             (estimate.rms_px, estimate.excluded) = (rms_px, excluded);
             Ok(estimate)
         });
-        let mut estimate = fit.estimate();
+        let mut estimate = fit.estimate(reference)?;
         estimate.held_out = held_out.transpose()?.map(Box::new);
         estimate.frames = frames.into_iter().map(SavedFrame::read).collect();
         estimate.cameras = cameras;
@@ -264,12 +288,13 @@ impl Rig {
 }
 
 impl Fit {
-    fn estimate(self) -> Estimate {
+    fn estimate(self, reference: &Reference) -> Result<Estimate, SavedError> {
         let mut estimate = Estimate::default();
         (estimate.sigma, estimate.common_px) = (self.sigma, self.common_px);
         estimate.shape = self.board_shape.map(SavedShape::read);
+        estimate.map = self.target_map.map(|map| map.read(reference)).transpose()?;
         estimate.excluded = self.excluded.into_iter().map(SavedExcluded::read).collect();
-        estimate
+        Ok(estimate)
     }
 }
 
@@ -413,6 +438,19 @@ impl SavedShape {
     fn read(self) -> BoardShape {
         let Self { shape, sd_mm, f_ratio, bent_mm, stretched_mm } = self;
         BoardShape { shape: shape.shape(), sd_mm, f_ratio, bent_mm, stretched_mm }
+    }
+}
+
+impl SavedMap {
+    fn read(self, reference: &Reference) -> Result<TargetMap, SavedError> {
+        let corners = self.corners.into_iter().map(|corner| {
+            let panel = reference.panel(corner.panel).ok_or(SavedError::Panel(corner.panel))?;
+            let SavedOffset { row, col, covariance_mm2, views, .. } = corner;
+            let [panel_mm, offset_mm] = [corner.panel_mm, corner.offset_mm].map(DVec3::from);
+            Ok(CornerOffset { panel, row, col, panel_mm, offset_mm, covariance_mm2, views })
+        });
+        let corners = corners.collect::<Result<Vec<_>, _>>()?;
+        Ok(TargetMap::new(corners, self.expected_mm))
     }
 }
 

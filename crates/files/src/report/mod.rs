@@ -15,6 +15,7 @@ mod page;
 mod plots;
 mod rig;
 mod survey;
+mod target_map;
 mod thumbnail;
 
 use std::collections::BTreeMap;
@@ -24,6 +25,7 @@ use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, PanelPlace, 
 
 pub use advice::{Advice, Weight, advice};
 pub use survey::{Survey, SurveyedView};
+pub use target_map::target_map_svg;
 pub use thumbnail::thumbnail;
 
 /// What a page tells.

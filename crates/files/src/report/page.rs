@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 
-use super::{Report, Survey, SurveyedView, Weight, advice, plots, rig};
-use deltille_core::calibrate::{CameraEstimate, Excluded, Parameter, ViewEstimate};
+use super::{Report, Survey, SurveyedView, Weight, advice, plots, rig, target_map};
+use deltille_core::calibrate::{CameraEstimate, Excluded, Parameter, TargetMap, ViewEstimate};
 use deltille_core::words::places;
 
 /// Views in the table: all, or where there are more the worst ones.
@@ -49,6 +49,7 @@ pub(super) fn html(report: &Report) -> String {
         page += &rig::places(report);
     }
     page += &rig::panels(report);
+    page += &report.estimate.map.as_ref().map_or(String::new(), target);
     for (index, (camera, survey)) in cameras.iter().zip(&surveys).enumerate() {
         if report.is_rig() {
             let figures = figures(&of_camera(report, index, camera));
@@ -230,6 +231,22 @@ fn drawings(camera: &CameraEstimate, survey: &Survey) -> String {
     format!(
         "<section><h2>Residuals and coverage</h2><div class=\"row\">{}</div></section>\n",
         figures.collect::<String>()
+    )
+}
+
+/// The corners of the target that was measured.
+fn target(map: &TargetMap) -> String {
+    let [plane, out] = map.rms_mm();
+    let figures = figures(&[
+        (format!("{plane:.3} mm"), "in the plane, rms of a coordinate"),
+        (format!("{out:.3} mm"), "out of the plane, rms"),
+        (format!("{} of {}", map.significant().count(), map.corners().len()), "more than chance"),
+    ]);
+    let svg = target_map::drawing(map, "");
+    format!(
+        "<section><h2>The target, measured</h2>{figures}<figure>{svg}<figcaption>Where the corners are, \
+         against the plan. Moves and turns of the target and its scale are not in it: poses and distances take \
+         them up.</figcaption></figure></section>\n"
     )
 }
 

@@ -236,6 +236,7 @@ impl<'a> Block<'a> {
                 col: vertex.col,
                 panel_mm: panel.lattice_mm(vertex),
                 target_mm,
+                measured: None,
             });
             *next_id += 1;
             if let Some(id) = listed.tag {

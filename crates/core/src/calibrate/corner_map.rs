@@ -1,0 +1,191 @@
+//! Corners that are not where the target's plan has them, each by itself.
+//!
+//! What is expected beforehand of an offset is normal, with one deviation in the plane of the panels and one
+//! out of it. Both are found from the data (empirical Bayes, MacKay 1992): with γ the number of offsets
+//! that the views determine better than the expectation, σ² = Σ offset² / γ.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use nalgebra::{DMatrix, Matrix3};
+
+use super::panel::PanelRef;
+use super::problem::{Observation, Problem};
+use crate::statistics::median;
+
+/// What is expected first, in edges: more than any print is off.
+const FIRST_PRIOR: f64 = 0.01;
+
+/// The least that corners are expected to be off, mm: a hundredth of what the best print resolves.
+const LEAST_PRIOR_MM: f64 = 1e-4;
+
+/// A corner of a panel: index of the panel, row, column.
+type Label = (usize, i32, i32);
+
+/// Offsets of corners on their panels.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct CornerMap {
+    index: BTreeMap<Label, usize>,
+    /// Which corners.
+    pub corners: Vec<MappedCorner>,
+    /// How far each is from its place in the plan, in its panel's frame, mm.
+    pub offsets_mm: Vec<DVec3>,
+    /// The deviation that is expected of that, along x, y and z.
+    pub prior_mm: DVec3,
+}
+
+/// A corner whose place is unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MappedCorner {
+    pub panel: PanelRef,
+    pub row: i32,
+    pub col: i32,
+    /// Its place in the plan, mm.
+    pub panel_mm: DVec3,
+    /// How many observations it has.
+    pub views: usize,
+}
+
+impl CornerMap {
+    /// All corners that a problem has observations of, at their places.
+    pub fn flat(problem: &Problem) -> Self {
+        let mut index = BTreeMap::new();
+        let mut corners: Vec<MappedCorner> = Vec::new();
+        for block in &problem.blocks {
+            for &Observation { row, col, panel_mm, .. } in &block.observations {
+                let at = *index.entry((block.panel.index(), row, col)).or_insert(corners.len());
+                if at == corners.len() {
+                    let panel = block.panel;
+                    corners.push(MappedCorner { panel, row, col, panel_mm, views: 0 });
+                }
+                corners[at].views += 1;
+            }
+        }
+        // By label.
+        corners.sort_by_key(|corner| (corner.panel, corner.row, corner.col));
+        let labels = corners.iter().map(|corner| (corner.panel.index(), corner.row, corner.col));
+        let index = labels.enumerate().map(|(at, label)| (label, at)).collect();
+        let offsets_mm = vec![DVec3::ZERO; corners.len()];
+        let prior_mm = DVec3::splat(FIRST_PRIOR * nearest_mm(&corners));
+        Self { index, corners, offsets_mm, prior_mm }
+    }
+
+    /// The same with another expectation.
+    pub fn expecting(self, prior_mm: DVec3) -> Self {
+        Self { prior_mm, ..self }
+    }
+
+    /// How many corners it has.
+    pub fn len(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// The place of a corner in it.
+    pub fn index(&self, panel: PanelRef, seen: &Observation) -> usize {
+        self.index[&(panel.index(), seen.row, seen.col)]
+    }
+
+    /// The offset of a corner; zero of one that it does not have.
+    pub fn offset(&self, panel: PanelRef, seen: &Observation) -> DVec3 {
+        let index = self.index.get(&(panel.index(), seen.row, seen.col));
+        index.map_or(DVec3::ZERO, |&index| self.offsets_mm[index])
+    }
+
+    /// The expectation that fits the offsets; `covariances` and `sigma` are as in [`Self::without_gauge`].
+    pub fn fitted_prior(&self, covariances: &[Matrix3<f64>], sigma: f64) -> DVec3 {
+        let of_axes = |axes: &[usize]| {
+            let (mut squares, mut determined) = (0.0, 0.0);
+            for (offset, covariance) in self.offsets_mm.iter().zip(covariances) {
+                for &k in axes {
+                    squares += offset[k] * offset[k];
+                    determined += 1.0 - covariance[(k, k)] * (sigma / self.prior_mm[k]).powi(2);
+                }
+            }
+            (squares / determined.max(1.0)).sqrt().max(LEAST_PRIOR_MM)
+        };
+        let [plane, out] = [of_axes(&[0, 1]), of_axes(&[2])];
+        DVec3::new(plane, plane, out)
+    }
+
+    /// The covariances, as the equations have them, without what poses and distances take up: the expectation
+    /// is all that is known of these directions, and holds them at zero. `sigma` is the deviation of a
+    /// whitened coordinate, the unit in which costs are counted.
+    ///
+    /// A move and a turn of everything are such; of each panel by itself, where panels are found; and a
+    /// common scale, where nothing else tells lengths.
+    pub fn without_gauge(
+        &self,
+        covariances: &[Matrix3<f64>],
+        sigma: f64,
+        problem: &Problem,
+    ) -> Vec<Matrix3<f64>> {
+        let groups = self.rigid_groups(problem);
+        let mut modes: Vec<Vec<DVec3>> = Vec::new();
+        for group in 0..=groups.iter().copied().max().unwrap_or_default() {
+            let of_group = |field: &dyn Fn(DVec3) -> DVec3| {
+                let corners = self.corners.iter().zip(&groups);
+                let of_corner = corners.enumerate().map(|(index, (_, &of))| match of == group {
+                    true => self.on_panel(problem, index, field),
+                    false => DVec3::ZERO,
+                });
+                of_corner.collect::<Vec<_>>()
+            };
+            for axis in DVec3::AXES {
+                modes.push(of_group(&|_| axis));
+                modes.push(of_group(&|at| axis.cross(at)));
+            }
+        }
+        if has_free_scale(problem) {
+            let corners = 0..self.len();
+            modes.push(corners.map(|index| self.on_panel(problem, index, &|at| at)).collect());
+        }
+        let scaled = DMatrix::from_fn(3 * self.len(), modes.len(), |i, mode| {
+            modes[mode][i / 3][i % 3] / self.prior_mm[i % 3]
+        });
+        let basis = scaled.qr().q();
+        let prior = self.prior_mm / sigma;
+        let of_corner = |(index, covariance): (usize, &Matrix3<f64>)| {
+            let of_corner = basis.fixed_rows::<3>(3 * index);
+            let held = of_corner * of_corner.transpose();
+            covariance - Matrix3::from_fn(|i, j| held[(i, j)] * prior[i] * prior[j])
+        };
+        covariances.iter().enumerate().map(of_corner).collect()
+    }
+
+    /// A field in the target's frame as it moves a corner, from where it is, in the frame of its panel.
+    fn on_panel(&self, problem: &Problem, index: usize, field: &dyn Fn(DVec3) -> DVec3) -> DVec3 {
+        let MappedCorner { panel, panel_mm, .. } = self.corners[index];
+        let pose = problem.panels[panel.index()].target_from_panel;
+        pose.rotation.conjugate() * field(pose.apply(panel_mm + self.offsets_mm[index]))
+    }
+
+    /// For each corner the group of panels that move as one.
+    fn rigid_groups(&self, problem: &Problem) -> Vec<usize> {
+        let mut groups: Vec<PanelRef> = Vec::new();
+        let is_free = |panel: PanelRef| problem.panels[panel.index()].pose_free;
+        let any_is_free = self.corners.iter().any(|corner| is_free(corner.panel));
+        let of_corner = |corner: &MappedCorner| {
+            if !any_is_free {
+                return 0;
+            }
+            groups.iter().position(|&panel| panel == corner.panel).unwrap_or_else(|| {
+                groups.push(corner.panel);
+                groups.len() - 1
+            })
+        };
+        self.corners.iter().map(of_corner).collect()
+    }
+}
+
+/// The usual distance of a corner to the next in its row, mm; of corners without, 1.
+fn nearest_mm(corners: &[MappedCorner]) -> f64 {
+    let pairs = corners.iter().zip(corners.iter().skip(1));
+    let in_a_row = pairs.filter(|(a, b)| (a.panel, a.row, a.col + 1) == (b.panel, b.row, b.col));
+    let distances = in_a_row.map(|(a, b)| a.panel_mm.distance(b.panel_mm)).collect();
+    median(distances).unwrap_or(1.0)
+}
+
+/// Whether nothing but the target's plan tells lengths: no distance between cameras is known.
+fn has_free_scale(problem: &Problem) -> bool {
+    problem.cameras.iter().filter(|camera| !camera.pose_free).count() <= 1
+}

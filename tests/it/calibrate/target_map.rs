@@ -1,0 +1,242 @@
+//! Targets that measure themselves: offsets of corners are found within their deviations, none where there is
+//! none, and a measured target serves other calibrations.
+
+use deltille::calibrate::{
+    Calibration, CornerOffset, Estimate, Model, Observation, PanelPlace, PanelRef, Reference,
+    Sighting, TargetMap, UntaggedGrid, View,
+};
+use deltille::camera::{Camera, Pose};
+use deltille::export::calibration::{self, Print};
+use deltille::export::saved;
+use deltille::lattice::GridKind;
+use deltille::targets::Target;
+use glam::{DQuat, DVec2, DVec3};
+use nalgebra::{DMatrix, DVector};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+
+const NOISE_PX: f64 = 0.02;
+const SIDE: i32 = 9;
+const BOARD: UntaggedGrid =
+    UntaggedGrid { kind: GridKind::Checker, edge_mm: 20.0, size: Some([SIDE as u32, SIDE as u32]) };
+
+/// A print and a mount of their own: corners off at random, and a sheet that is bent.
+struct Sheet {
+    random_mm: f64,
+    bent_mm: f64,
+}
+
+impl Sheet {
+    /// Offsets of the corners of panel after panel.
+    fn offsets(&self, panels: usize, seed: u64) -> Vec<Vec<DVec3>> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let normal = Normal::new(0.0, self.random_mm).unwrap();
+        let corner = |i: i32, random: &mut ChaCha8Rng| {
+            let [u, v] = [i % SIDE, i / SIDE].map(|k| f64::from(2 * k) / f64::from(SIDE - 1) - 1.0);
+            let [x, y, z] = [0; 3].map(|_| normal.sample(random));
+            DVec3::new(x, y, 0.3 * z + self.bent_mm * (u * u - 0.5 * v + 0.3 * u * v * v))
+        };
+        let panel = |_| (0..SIDE * SIDE).map(|i| corner(i, &mut random)).collect();
+        (0..panels).map(panel).collect()
+    }
+}
+
+fn plan(i: i32) -> DVec3 {
+    DVec3::new(20.0 * f64::from(i % SIDE), 20.0 * f64::from(i / SIDE), 0.0)
+}
+
+fn camera() -> Camera {
+    Camera::pinhole(1600, 1200, 1.0)
+}
+
+/// Views of panels whose corners are off.
+fn views(
+    panels: &[Pose],
+    offsets: &[Vec<DVec3>],
+    camera_from_rig: &Pose,
+    count: usize,
+    seed: u64,
+) -> Vec<View> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut noisy = ChaCha8Rng::seed_from_u64(seed ^ camera_from_rig.translation.x.to_bits() ^ 99);
+    let noise = Normal::new(0.0, NOISE_PX).unwrap();
+    let camera = camera();
+    let view = |index: usize| {
+        let tilt = DVec3::from([0; 3].map(|_| random.random_range(-0.7..0.7)));
+        let rotation = DQuat::from_scaled_axis(tilt) * DQuat::from_rotation_x(std::f64::consts::PI);
+        let at = DVec3::new(
+            random.random_range(-70.0..70.0),
+            random.random_range(-50.0..50.0),
+            random.random_range(300.0..420.0),
+        );
+        let pose = Pose { rotation, translation: at - rotation * DVec3::new(80.0, 80.0, 0.0) };
+        let pose = camera_from_rig.after(&pose);
+        let sightings = panels.iter().zip(offsets).enumerate().map(|(p, (panel, offsets))| {
+            let camera_from_panel = pose.after(panel);
+            let seen = offsets.iter().zip(0..).filter_map(|(offset, i)| {
+                let seen = camera.project(camera_from_panel.apply(plan(i) + *offset))?;
+                let off = DVec2::from([0; 2].map(|_| noise.sample(&mut noisy)));
+                let pixel = seen + off;
+                let cov = Some([NOISE_PX * NOISE_PX, 0.0, NOISE_PX * NOISE_PX]);
+                Some(Observation { row: i / SIDE, col: i % SIDE, panel_mm: plan(i), pixel, cov })
+            });
+            Sighting { panel: PanelRef::new(p, p as u32), observations: seen.collect() }
+        });
+        let name = index.to_string();
+        View { image: name.clone(), name, size_px: [1600, 1200], sightings: sightings.collect() }
+    };
+    (0..count).map(view).collect()
+}
+
+fn of(views: Vec<View>) -> Calibration {
+    Calibration::new([Pose::IDENTITY]).camera("", views, Model::Radtan)
+}
+
+/// The truth less what poses and distances take up, of each panel by itself or of all together.
+fn without_gauge(truth: &[DVec3], map: &TargetMap, panels: &[Pose], by_panel: bool) -> Vec<DVec3> {
+    let corners = map.corners();
+    let [plane, out] = map.expected_mm;
+    let prior = [plane, plane, out];
+    let groups = if by_panel { panels.len() } else { 1 };
+    let mut modes: Vec<Vec<f64>> = Vec::new();
+    let mut add = |field: &dyn Fn(usize, DVec3) -> DVec3| {
+        let mode = corners.iter().flat_map(|corner| {
+            let panel = panels[corner.panel.index()];
+            let moved = field(corner.panel.index(), panel.apply(corner.panel_mm));
+            (panel.rotation.conjugate() * moved).to_array()
+        });
+        modes.push(mode.enumerate().map(|(i, v)| v / prior[i % 3]).collect());
+    };
+    for group in 0..groups {
+        for axis in DVec3::AXES {
+            let of = |panel: usize| if !by_panel || panel == group { axis } else { DVec3::ZERO };
+            add(&|panel, _| of(panel));
+            add(&|panel, at| of(panel).cross(at));
+        }
+    }
+    add(&|_, at| at);
+    let modes = DMatrix::from_fn(3 * corners.len(), modes.len(), |i, j| modes[j][i]);
+    let truth = DVector::from_iterator(
+        3 * truth.len(),
+        truth.iter().flat_map(|mm| mm.to_array()).enumerate().map(|(i, mm)| mm / prior[i % 3]),
+    );
+    let along = (modes.tr_mul(&modes)).cholesky().unwrap().solve(&modes.tr_mul(&truth));
+    let left = truth - modes * along;
+    left.as_slice().chunks(3).map(|v| DVec3::new(v[0], v[1], v[2]) * DVec3::from(prior)).collect()
+}
+
+/// How many corners of a map lie within 3σ of the truth, a coordinate, and the mean squared deviation.
+fn compared(map: &TargetMap, truth: &[DVec3]) -> (usize, f64) {
+    let (mut within, mut squares) = (0, 0.0);
+    for (corner, truth) in map.corners().iter().zip(truth) {
+        let off = corner.offset_mm - *truth;
+        let sd: [f64; 3] = std::array::from_fn(|k| corner.covariance_mm2[k][k].sqrt());
+        let off: [f64; 3] = std::array::from_fn(|k| off[k] / sd[k]);
+        within += usize::from(off.iter().all(|off| off.abs() < 3.0));
+        squares += off.iter().map(|off| off * off).sum::<f64>() / 3.0;
+    }
+    (within, squares / map.corners().len() as f64)
+}
+
+fn check(found: &Estimate, truth: &[Vec<DVec3>], panels: &[Pose], by_panel: bool) -> [usize; 2] {
+    let map = found.map.as_ref().unwrap();
+    let truth = without_gauge(&truth.concat(), map, panels, by_panel);
+    let (within, chi2) = compared(map, &truth);
+    assert!((0.8..1.25).contains(&chi2), "e² {chi2}");
+    [within, map.corners().len()]
+}
+
+/// Of all corners of ten boards 99 in a hundred are within 3σ in all three coordinates, as they should be.
+#[test]
+fn offsets_are_within_their_deviations() {
+    let mut counts = [0; 2];
+    for seed in 0..10 {
+        let offsets = Sheet { random_mm: 0.08, bent_mm: 0.1 }.offsets(1, seed);
+        let views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 20, 1000 + seed);
+        let found = of(views).measure_target(true).solve().unwrap();
+        assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.1, "rms {} px", found.rms_px);
+        let of_board = check(&found, &offsets, &[Pose::IDENTITY], false);
+        counts = [0, 1].map(|i| counts[i] + of_board[i]);
+        let truth = camera().parameters().into_iter().chain([0.0; 4]);
+        for (parameter, truth) in found.cameras[0].parameters.iter().zip(truth) {
+            let (name, value) = (&parameter.name, parameter.value);
+            let Some(sd) = parameter.sd else { continue };
+            assert!((value - truth).abs() < 4.0 * sd, "{name} {value} ± {sd}, not {truth}");
+        }
+    }
+    assert!(counts[0] as f64 >= 0.985 * counts[1] as f64, "{counts:?}");
+}
+
+/// A board as planned shows no offset.
+#[test]
+fn a_perfect_board_has_no_offsets() {
+    let perfect = |seed: u64| {
+        let offsets = Sheet { random_mm: 0.0, bent_mm: 0.0 }.offsets(1, seed);
+        let views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 12, 2000 + seed);
+        let found = of(views).measure_target(true).solve().unwrap();
+        found.map.unwrap().significant().count()
+    };
+    let alarms: Vec<usize> = (0..12).map(perfect).collect();
+    assert_eq!(alarms, [0; 12]);
+}
+
+/// Two panels of a target whose places are found too, seen by two cameras.
+#[test]
+fn a_rig_measures_several_panels() {
+    let up = |x: f64, angle: f64| Pose {
+        rotation: DQuat::from_rotation_y(angle),
+        translation: DVec3::new(x, 0.0, 0.0),
+    };
+    let planned = [up(-90.0, 0.2), up(90.0, -0.2)];
+    let made = [planned[0], Pose { translation: DVec3::new(90.4, 0.3, -0.2), ..planned[1] }];
+    let offsets = Sheet { random_mm: 0.08, bent_mm: 0.1 }.offsets(2, 5);
+    let right =
+        Pose::looking_at(DVec3::new(60.0, 0.0, 0.0), DVec3::new(0.0, 0.0, 350.0), DVec3::NEG_Y);
+    let of_camera = |pose: &Pose| views(&made, &offsets, pose, 30, 3000);
+    let rig = Calibration::new(planned.map(PanelPlace::from))
+        .camera("left", of_camera(&Pose::IDENTITY), Model::Radtan)
+        .camera("right", of_camera(&right), Model::Radtan)
+        .refine_panels(true)
+        .measure_target(true);
+    let found = rig.solve().unwrap();
+    assert!((found.rms_px / NOISE_PX - 1.0).abs() < 0.1, "rms {} px", found.rms_px);
+    let [within, all] = check(&found, &offsets, &made, true);
+    assert!(within as f64 >= 0.97 * all as f64, "{within} of {all}");
+}
+
+/// What was measured with some views makes the residuals of others noise, and is read back from both files.
+#[test]
+fn a_measured_target_serves_other_views() {
+    let offsets = Sheet { random_mm: 0.08, bent_mm: 0.1 }.offsets(1, 7);
+    let some = |seed: u64| views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 20, seed);
+    let found = of(some(1)).measure_target(true).hold_out(Some(4)).solve().unwrap();
+    let map = found.map.as_ref().unwrap();
+    let held_out = found.held_out.as_ref().unwrap();
+    assert!((held_out.rms_px / NOISE_PX - 1.0).abs() < 0.15, "{}", held_out.rms_px);
+    let text = calibration::write(&found, &[], Print::default()).unwrap();
+    let read = saved::read(&text, &Reference::Grid(BOARD)).unwrap();
+    assert_eq!(read.map.as_ref(), Some(map));
+
+    let board = BOARD.target("board").unwrap().unwrap();
+    let measured = map.on(&board);
+    assert_eq!(
+        (measured.name.to_string(), measured.is_measured()),
+        ("board-measured".to_owned(), true)
+    );
+    let measured = Target::from_json(&measured.to_json()).unwrap();
+    let of_target = |map: &CornerOffset| {
+        let corners = &measured.panels[0].corners;
+        let corner = corners.iter().find(|c| (c.row, c.col) == (map.row, map.col)).unwrap();
+        corner.offset_mm()
+    };
+    let same = map.corners().iter().all(|c| (of_target(c) - c.offset_mm).length() < 1e-9);
+    assert!(same);
+    let mut others = some(2);
+    for sighting in others.iter_mut().flat_map(|view| &mut view.sightings) {
+        sighting.correct(map);
+    }
+    let with_map = of(others).solve().unwrap();
+    assert!((with_map.rms_px / NOISE_PX - 1.0).abs() < 0.15, "{}", with_map.rms_px);
+    assert!(of(some(2)).solve().unwrap().rms_px > 3.0 * NOISE_PX);
+}
