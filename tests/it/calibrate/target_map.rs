@@ -168,17 +168,26 @@ fn offsets_are_within_their_deviations() {
     assert!(counts[0] as f64 >= 0.985 * counts[1] as f64, "{counts:?}");
 }
 
-/// A board as planned shows no offset.
+/// How many of so many boards as planned show an offset.
+fn alarms(boards: u64) -> usize {
+    let is_alarm = |seed: &u64| {
+        let offsets = Sheet { random_mm: 0.0, bent_mm: 0.0 }.offsets(1, *seed);
+        let views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 12, 2000 + *seed);
+        let found = of(views).measure_target(true).solve().unwrap();
+        found.map.unwrap().significant().count() > 0
+    };
+    (0..boards).filter(is_alarm).count()
+}
+
 #[test]
 fn a_perfect_board_has_no_offsets() {
-    let perfect = |seed: u64| {
-        let offsets = Sheet { random_mm: 0.0, bent_mm: 0.0 }.offsets(1, seed);
-        let views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 12, 2000 + seed);
-        let found = of(views).measure_target(true).solve().unwrap();
-        found.map.unwrap().significant().count()
-    };
-    let alarms: Vec<usize> = (0..12).map(perfect).collect();
-    assert_eq!(alarms, [0; 12]);
+    assert_eq!(alarms(12), 0);
+}
+
+#[test]
+#[ignore = "200 boards"]
+fn one_of_a_hundred_perfect_boards_has_offsets() {
+    assert!(alarms(200) <= 2);
 }
 
 /// Two panels of a target whose places are found too, seen by two cameras.
