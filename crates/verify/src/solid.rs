@@ -165,8 +165,8 @@ fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
     let centre = panel.middle_mm();
     let corners = || panel.corners.iter().map(|c| c.target_mm);
     let radius = corners().map(|c| c.distance(centre)).fold(0.0, f64::max) + 2.0 * panel.edge_mm;
-    let rows = verifier.family.map_or(0, |family| family.dimension().rows());
-    let cell_mm = panel.edge_mm / (f64::from(rows) + 3.0 * panel.border_bits.unwrap_or_default());
+    let cells = verifier.family.map(|family| family.cells().width(panel.tag_inset_bits()));
+    let cell_mm = panel.edge_mm / cells.unwrap_or(1.0);
     let px_per_mm = (CELL_PX / cell_mm).min(MAX_SIDE_PX / (2.0 * radius));
     let [x, y, z] = [0, 1, 2].map(|axis| panel.pose.matrix().col(axis));
     let side = (2.0 * radius * px_per_mm).ceil().max(64.0) as u32;

@@ -112,7 +112,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         check_own(name, &detections, &seen)?;
         seen.push((name, detections));
         if args.solve.measures_target() {
-            let unsure = sightings::take_sure(&mut views, &reference);
+            let unsure = sightings::take_sure(&mut views, &reference)?;
             left_out.extend(
                 unsure.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }),
             );
@@ -196,17 +196,18 @@ impl Args {
         }
         let refined = self.refine_target.then(|| found.refined(target));
         let measured = found.map.as_ref().map(|map| map.on(refined.as_ref().unwrap_or(target)));
+        let end = if measured.is_some() { "-measured" } else { "" };
         if let Some(target) = measured.or(refined) {
-            let name = format!("{}.json", target.name);
-            let place = self.output.join(&name);
+            let name = format!("{}{end}", target.name);
+            let place = self.output.join(format!("{name}.json"));
             ensure!(
                 !same_file(&place, &self.target),
                 "-o: {} would overwrite the target that was given: choose another folder",
                 place.display()
             );
-            files.push(text_file(name, target.to_json()));
+            files.push(text_file(format!("{name}.json"), target.to_json()));
             let drawn = found.map.as_ref().map(target_map_svg);
-            files.extend(drawn.map(|svg| text_file(format!("{}.svg", target.name), svg)));
+            files.extend(drawn.map(|svg| text_file(format!("{name}.svg"), svg)));
         }
         Ok(files)
     }

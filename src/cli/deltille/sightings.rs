@@ -133,7 +133,7 @@ impl SightingsArgs {
             _ => None,
         };
         if measure_target {
-            left_out.extend(take_sure(&mut views, &reference));
+            left_out.extend(take_sure(&mut views, &reference)?);
         }
         let sheet = self.sheet.read(&limits)?;
         put_on(&sheet, target.as_ref(), &mut views)?;
@@ -157,7 +157,14 @@ impl SheetArgs {
 }
 
 /// Takes out the views of which it is not known which corner is which, and tells them.
-pub fn take_sure(views: &mut Vec<View>, reference: &Reference) -> Vec<Excluded> {
+pub fn take_sure(views: &mut Vec<View>, reference: &Reference) -> anyhow::Result<Vec<Excluded>> {
+    let is_any_sure = views.iter().any(|view| reference.is_sure_of(view));
+    ensure!(
+        is_any_sure || views.is_empty(),
+        "--measure-target: none of {} shows all corners of the board, without tags it is measured where it is seen \
+         whole",
+        counted(views.len(), "picture")
+    );
     let unsure = views.extract_if(.., |view| !reference.is_sure_of(view));
     let unsure = unsure.map(|view| {
         tell!("left out: {}: {NOT_WHOLE}", view.name);
@@ -170,7 +177,7 @@ pub fn take_sure(views: &mut Vec<View>, reference: &Reference) -> Vec<Excluded> 
             reason: Reason::Foreign(NOT_WHOLE.to_owned()),
         }
     });
-    unsure.collect()
+    Ok(unsure.collect())
 }
 
 /// Why a view cannot measure an untagged board.

@@ -168,17 +168,26 @@ fn offsets_are_within_their_deviations() {
     assert!(counts[0] as f64 >= 0.985 * counts[1] as f64, "{counts:?}");
 }
 
-/// A board as planned shows no offset.
+/// How many of so many boards as planned show an offset.
+fn alarms(boards: u64) -> usize {
+    let is_alarm = |seed: &u64| {
+        let offsets = Sheet { random_mm: 0.0, bent_mm: 0.0 }.offsets(1, *seed);
+        let views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 12, 2000 + *seed);
+        let found = of(views).measure_target(true).solve().unwrap();
+        found.map.unwrap().significant().count() > 0
+    };
+    (0..boards).filter(is_alarm).count()
+}
+
 #[test]
 fn a_perfect_board_has_no_offsets() {
-    let perfect = |seed: u64| {
-        let offsets = Sheet { random_mm: 0.0, bent_mm: 0.0 }.offsets(1, seed);
-        let views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 12, 2000 + seed);
-        let found = of(views).measure_target(true).solve().unwrap();
-        found.map.unwrap().significant().count()
-    };
-    let alarms: Vec<usize> = (0..12).map(perfect).collect();
-    assert_eq!(alarms, [0; 12]);
+    assert_eq!(alarms(12), 0);
+}
+
+#[test]
+#[ignore = "200 boards"]
+fn one_of_a_hundred_perfect_boards_has_offsets() {
+    assert!(alarms(200) <= 2);
 }
 
 /// Two panels of a target whose places are found too, seen by two cameras.
@@ -220,10 +229,7 @@ fn a_measured_target_serves_other_views() {
 
     let board = BOARD.target("board").unwrap().unwrap();
     let measured = map.on(&board);
-    assert_eq!(
-        (measured.name.to_string(), measured.is_measured()),
-        ("board-measured".to_owned(), true)
-    );
+    assert_eq!((measured.name.to_string(), measured.is_measured()), ("board".to_owned(), true));
     let measured = Target::from_json(&measured.to_json()).unwrap();
     let of_target = |map: &CornerOffset| {
         let corners = &measured.panels[0].corners;
@@ -239,4 +245,21 @@ fn a_measured_target_serves_other_views() {
     let with_map = of(others).solve().unwrap();
     assert!((with_map.rms_px / NOISE_PX - 1.0).abs() < 0.15, "{}", with_map.rms_px);
     assert!(of(some(2)).solve().unwrap().rms_px > 3.0 * NOISE_PX);
+}
+
+/// A corner that is somewhere else in every view has no place; all others do.
+#[test]
+fn a_corner_that_is_wrong_everywhere_is_not_measured() {
+    let offsets = Sheet { random_mm: 0.08, bent_mm: 0.1 }.offsets(1, 8);
+    let mut views = views(&[Pose::IDENTITY], &offsets, &Pose::IDENTITY, 15, 8);
+    let mut random = ChaCha8Rng::seed_from_u64(8);
+    for view in &mut views {
+        let wrong = &mut view.sightings[0].observations[40];
+        wrong.pixel +=
+            DVec2::new(random.random_range(20.0..60.0), random.random_range(-60.0..60.0));
+    }
+    let found = of(views).measure_target(true).solve().unwrap();
+    let map = found.map.as_ref().unwrap();
+    assert_eq!((map.corners().len(), found.outlier_count()), (80, 15));
+    assert!((found.inlier_rms_px() / NOISE_PX - 1.0).abs() < 0.1, "{}", found.inlier_rms_px());
 }

@@ -103,6 +103,11 @@ fn same_everywhere(line: &str) -> String {
         let first = parts.next().unwrap().to_owned();
         return parts.fold(first, |all, part| all + " within …" + part.trim_start_matches(digits));
     }
+    if let Some((before, after)) = line.split_once("the lens is good up to ") {
+        // Where hardly determined numbers have a pole.
+        let after = after.trim_start_matches(|c: char| c.is_ascii_digit());
+        return format!("{before}the lens is good up to …{after}");
+    }
     let Some(end) = line.find(" (os error ") else { return line };
     let begin = line[..end].rfind(": ").map_or(0, |colon| colon + 2);
     line[..begin].to_owned() + "[what the system says]"

@@ -42,8 +42,6 @@ pub(super) struct MappedCorner {
     pub col: i32,
     /// Its place in the plan, mm.
     pub panel_mm: DVec3,
-    /// How many observations it has.
-    pub views: usize,
 }
 
 impl CornerMap {
@@ -56,9 +54,8 @@ impl CornerMap {
                 let at = *index.entry((block.panel.index(), row, col)).or_insert(corners.len());
                 if at == corners.len() {
                     let panel = block.panel;
-                    corners.push(MappedCorner { panel, row, col, panel_mm, views: 0 });
+                    corners.push(MappedCorner { panel, row, col, panel_mm });
                 }
-                corners[at].views += 1;
             }
         }
         // By label.
@@ -78,6 +75,15 @@ impl CornerMap {
     /// How many corners it has.
     pub fn len(&self) -> usize {
         self.corners.len()
+    }
+
+    /// In how many blocks each of its corners is.
+    pub fn views(&self, problem: &Problem) -> Vec<usize> {
+        let mut views = vec![0; self.len()];
+        for block in &problem.blocks {
+            block.observations.iter().for_each(|seen| views[self.index(block.panel, seen)] += 1);
+        }
+        views
     }
 
     /// The place of a corner in it.

@@ -428,16 +428,19 @@ fn target_map(
 ) -> Option<TargetMap> {
     let map = problem.map.as_ref()?;
     let covariances = map.without_gauge(covariances, sigma, problem);
-    let corners = map.corners.iter().zip(&map.offsets_mm);
-    let corners = corners.zip(covariances.into_iter().map(|covariance| covariance * variance));
-    let corners = corners.map(|((corner, &offset_mm), covariance)| CornerOffset {
+    let corners = map.corners.iter().zip(&map.offsets_mm).zip(covariances).zip(map.views(problem));
+    // Of a corner whose observations are all wrong nothing was found.
+    let seen = corners.filter(|(_, views)| *views > 0);
+    let corners = seen.map(|(((corner, &offset_mm), covariance), views)| CornerOffset {
         panel: corner.panel,
         row: corner.row,
         col: corner.col,
         panel_mm: corner.panel_mm,
         offset_mm,
-        covariance_mm2: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
-        views: corner.views,
+        covariance_mm2: std::array::from_fn(|i| {
+            std::array::from_fn(|j| variance * covariance[(i, j)])
+        }),
+        views,
     });
     let expected_mm = [map.prior_mm.x, map.prior_mm.z];
     Some(TargetMap::new(corners.collect(), expected_mm))

@@ -190,7 +190,7 @@ impl Calibration {
     /// Finds the place of every corner of the target too.
     fn measured(&self, gross: &Gross, settled: Settled) -> Result<Settled, CalibrationError> {
         let mut problem = settled.problem.clone();
-        let map = CornerMap::flat(&settled.minimum.problem);
+        let map = CornerMap::flat(&problem);
         problem.map = Some(map);
         let mut settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
         for _ in 0..PRIOR_ROUNDS {

@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 use super::panel::PanelRef;
-use crate::targets::{MeasuredPlace, Name, Target};
+use crate::targets::{MeasuredPlace, Target};
 
 /// Where the corners of a target are, as the views have it.
 ///
@@ -55,14 +55,12 @@ impl TargetMap {
         &self.corners
     }
 
-    /// A target with its corners where the map has them, named `<target>-measured`.
+    /// A target with its corners where the map has them. It keeps its name, by which its prints are known.
     ///
     /// Offsets are from the plan to where the views have a corner: what had moved the corners before, an
     /// earlier measurement or a print scale, is in them.
     pub fn on(&self, target: &Target) -> Target {
         let mut measured = target.clone();
-        measured.name =
-            Name::like(&format!("{}-measured", target.name.trim_end_matches("-measured")));
         for (index, panel) in measured.panels.iter_mut().enumerate() {
             let of_panel = PanelRef::new(index, panel.id);
             let plan = panel.pose.to_pose().inverse();

@@ -925,7 +925,7 @@ mod tests {
         let scene = crate::synth::scene_of_sheet(&target, sheet, 0);
         let panel = &target.panels[0];
         let camera = crate::camera::Camera::pinhole(160, 160, 0.3);
-        let bits_across = 6.0 + 3.0 * panel.border_bits.unwrap();
+        let bits_across = family.cells().width(panel.tag_inset_bits());
         let distance_mm = camera.focal_px.x * panel.edge_mm / bits_across / 4.0;
         let mut seen = NoisyTags::default();
         for seed in 0..views {
