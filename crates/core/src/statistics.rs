@@ -1,4 +1,4 @@
-//! Medians and quantiles.
+//! Medians, quantiles, and how often chance makes a sum of squares.
 
 /// The middle value, of an even number the upper of two; `None` of none. What is no number counts as large.
 ///
@@ -15,6 +15,34 @@ pub fn quantile(values: &mut [f64], part: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
     Some(values[((part * values.len() as f64) as usize).min(last)])
+}
+
+/// How often the sum of so many squared normal numbers of variance 1 is larger than this.
+///
+/// ```
+/// let chance = deltille_core::statistics::chi_squared_chance(11.07, 5);
+/// assert!((chance - 0.05).abs() < 1e-4);
+/// ```
+pub fn chi_squared_chance(sum: f64, freedom: usize) -> f64 {
+    let half = sum.max(0.0) / 2.0;
+    if !half.is_finite() {
+        return 0.0;
+    }
+    // Q(a + 1, h) = Q(a, h) + hᵃ e⁻ʰ / Γ(a + 1), from Q(1, h) = e⁻ʰ or Q(1/2, h) = erfc √h.
+    let (mut chance, mut term, mut a) = match freedom % 2 {
+        0 => (0.0, (-half).exp(), 0.0),
+        _ => (
+            libm::erfc(half.sqrt()),
+            (-half).exp() * (half / std::f64::consts::PI).sqrt() * 2.0,
+            0.5,
+        ),
+    };
+    while 2.0 * a + 0.5 < freedom as f64 {
+        chance += term;
+        a += 1.0;
+        term *= half / a;
+    }
+    chance.min(1.0)
 }
 
 #[cfg(test)]

@@ -104,6 +104,8 @@ pub(super) struct Step {
 /// of each corner's offset.
 pub(super) struct Covariances {
     pub shared: DMatrix<f64>,
+    /// Of the shared unknowns with all that are kept.
+    pub across: DMatrix<f64>,
     pub frames: Vec<Matrix6<f64>>,
     pub corners: Vec<Matrix3<f64>>,
     /// The columns that nothing tells apart beyond what rounding leaves; their variances are the
@@ -337,8 +339,25 @@ impl Normal {
             (None, Some(first)) => (parts.iter().map(fixed).collect(), blocks(&kept, first)),
             (None, None) => (parts.iter().map(fixed).collect(), Vec::new()),
         };
-        let shared = kept.view((0, 0), (self.shared, self.shared)).into_owned();
-        Some(Covariances { shared, frames, corners, loose, tied })
+        let across = kept.rows(0, self.shared).into_owned();
+        let shared = across.columns(0, self.shared).into_owned();
+        Some(Covariances { shared, across, frames, corners, loose, tied })
+    }
+
+    /// Adds the pull of a corner in one block to that of all that are kept.
+    pub(super) fn pull_of_corner(
+        &self,
+        layout: &Layout,
+        corner: &OfCorner,
+        pull: &mut DVector<f64>,
+    ) {
+        if let Some(first) = layout.corners {
+            let mut own = pull.fixed_rows_mut::<3>(first + 3 * corner.index);
+            own += corner.right;
+        } else if let Some(part) = self.parts.get(corner.index) {
+            let Some(whole) = part.c.clone().cholesky() else { return };
+            *pull -= &part.b * whole.solve(&corner.right);
+        }
     }
 
     /// The inverse of the reduced equations, and the columns that they leave open, and tie to others. Only
@@ -466,19 +485,19 @@ const BLOCKS_AT_A_TIME: usize = 256;
 const MOST_COLUMNS: usize = MAX_PARAMETERS + 18 + shape::COUNT;
 
 /// The normal equations of one block, with only the columns that it has.
-struct Local {
+pub(super) struct Local {
     cost: f64,
     /// Shared columns; those of the frame's pose follow.
-    columns: Vec<usize>,
+    pub columns: Vec<usize>,
     /// Rows of the lower triangle, one after the other.
     matrix: Vec<f64>,
-    right: Vec<f64>,
+    pub right: Vec<f64>,
     /// The corners, where they are unknown.
-    corners: Vec<OfCorner>,
+    pub corners: Vec<OfCorner>,
 }
 
 /// What a corner in a block says of its own offset.
-struct OfCorner {
+pub(super) struct OfCorner {
     /// Its place in the map.
     index: usize,
     /// For each column of the block.
@@ -488,7 +507,7 @@ struct OfCorner {
 }
 
 impl Local {
-    fn of(
+    pub(super) fn of(
         problem: &Problem,
         layout: &Layout,
         block: &Block,
@@ -565,7 +584,7 @@ impl Local {
     }
 
     /// A row of the lower triangle, up to the diagonal.
-    fn row(&self, i: usize) -> &[f64] {
+    pub(super) fn row(&self, i: usize) -> &[f64] {
         &self.matrix[i * (i + 1) / 2..][..=i]
     }
 

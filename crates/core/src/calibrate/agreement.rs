@@ -1,0 +1,152 @@
+//! How far the frames of a calibration agree with each other.
+//!
+//! Deviations that follow from the noise of corners take the model of cameras and target for true. What is
+//! not, such as a board that is not quite flat, pulls at the estimate in every frame another way. So the pull of
+//! each frame is taken for one draw of what pulls, and the scatter of all for the covariance that is observed:
+//! the cluster-robust covariance with the correction CR2, which is that of the noise where noise is all there is
+//! (Bell & McCaffrey 2002).
+//!
+//! ```text
+//!     yᵥ = (I − LᵀHᵥL)^−½ Lᵀ gᵥ,    Σ = LLᵀ       Hᵥ, gᵥ: what frame v adds to the normal equations and their right side
+//!     S = L (Σᵥ yᵥ yᵥᵀ) Lᵀ
+//! ```
+//!
+//! F frames tell at most F − 1 directions, and each roughly; so S is drawn towards a multiple of the covariance
+//! that follows from noise, as far as its own scatter calls for (Ledoit & Wolf 2004).
+
+use nalgebra::{DMatrix, DVector, Matrix6};
+use rayon::prelude::*;
+
+use super::loss::Loss;
+use super::minimise::Minimum;
+use super::normal::{Covariances, Local};
+use super::weights::Whitening;
+
+/// With fewer frames nothing is observed.
+const LEAST_FRAMES: usize = 5;
+
+/// The most of what is known of a direction that one frame may tell: beyond, nothing holds it to account.
+const MOST_OF_ONE: f64 = 0.9;
+
+/// By how much each frame moves what all frames share, a column each; `None` where there are too few frames.
+pub(super) fn moved_by_each(
+    minimum: &Minimum,
+    whitening: &Whitening,
+    loss: Loss,
+    found: &Covariances,
+) -> Option<DMatrix<f64>> {
+    let frames = minimum.problem.frames.len();
+    if frames < LEAST_FRAMES {
+        return None;
+    }
+    let root = root(&found.shared);
+    let moved = |frame: usize| moved_by(minimum, whitening, loss, found, &root, frame);
+    let columns = (0..frames).into_par_iter().map(moved).collect::<Option<Vec<_>>>()?;
+    Some(DMatrix::from_columns(&columns))
+}
+
+/// A square root of a covariance of unknowns that have different units, and its inverse.
+struct Root {
+    half: DMatrix<f64>,
+    inverse: DMatrix<f64>,
+}
+
+/// What nothing determines has no part in it.
+fn root(covariance: &DMatrix<f64>) -> Root {
+    let n = covariance.nrows();
+    let sd = DVector::from_fn(n, |i, _| covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt());
+    let scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / sd[i] / sd[j]);
+    let eigen = scaled.symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|value| value.max(SINGULAR).sqrt());
+    let half = DMatrix::from_fn(n, n, |i, j| sd[i] * eigen.eigenvectors[(i, j)] * roots[j]);
+    let inverse = DMatrix::from_fn(n, n, |i, j| eigen.eigenvectors[(j, i)] / roots[i] / sd[j]);
+    Root { half, inverse }
+}
+
+/// Of matrices with a unit diagonal what is below this is rounding.
+const SINGULAR: f64 = 1e-14;
+
+fn moved_by(
+    minimum: &Minimum,
+    whitening: &Whitening,
+    loss: Loss,
+    found: &Covariances,
+    root: &Root,
+    frame: usize,
+) -> Option<DVector<f64>> {
+    let Minimum { problem, normal, layout, .. } = minimum;
+    let n = layout.shared;
+    let (mut own, mut across, mut pose) =
+        (DMatrix::<f64>::zeros(n, n), DMatrix::<f64>::zeros(n, 6), Matrix6::<f64>::zeros());
+    let mut pull = DVector::<f64>::zeros(layout.count);
+    for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
+        if block.frame != frame {
+            continue;
+        }
+        let local = Local::of(problem, layout, block, weights, loss, whitening.sigma)?;
+        let shared = local.columns.len();
+        for (i, &row) in local.columns.iter().enumerate() {
+            pull[row] += local.right[i];
+            for (&column, value) in local.columns.iter().zip(local.row(i)) {
+                own[(row, column)] += value;
+            }
+        }
+        for i in 0..6 {
+            let (of_shared, of_pose) = local.row(shared + i).split_at(shared);
+            local.columns.iter().zip(of_shared).for_each(|(&row, v)| across[(row, i)] += v);
+            of_pose.iter().enumerate().for_each(|(j, value)| pose[(i, j)] += value);
+        }
+        // The pose of the frame is where its own pull is zero.
+        for corner in &local.corners {
+            normal.pull_of_corner(layout, corner, &mut pull);
+        }
+    }
+    let moved = &root.inverse * (&found.across * pull);
+    let moved = if problem.map.is_some() {
+        // Corners take up most of what a frame tells of itself, and each frame tells of all of them alike.
+        let frames = problem.frames.len() as f64;
+        moved * (frames / (frames - 1.0)).sqrt()
+    } else {
+        own.fill_upper_triangle_with_lower_triangle();
+        pose.fill_upper_triangle_with_lower_triangle();
+        let through = pose.cholesky()?.solve(&across.transpose());
+        let own: DMatrix<f64> = own - &across * through;
+        let share = (root.half.tr_mul(&own) * &root.half).symmetric_eigen();
+        let grown =
+            share.eigenvalues.map(|part| (1.0 - part.clamp(0.0, MOST_OF_ONE)).sqrt().recip());
+        let turned = share.eigenvectors.tr_mul(&moved).component_mul(&grown);
+        &share.eigenvectors * turned
+    };
+    let moved = &root.half * moved;
+    moved.iter().all(|v| v.is_finite()).then_some(moved)
+}
+
+/// The covariance of unknowns that the frames show, where `noise` is the one that follows from noise, and
+/// `moved` by how much each frame moves them. `None` where some of them cannot be told apart.
+pub(super) fn observed(noise: &DMatrix<f64>, moved: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let (n, frames) = (noise.nrows(), moved.ncols() as f64);
+    if n == 0 {
+        return None;
+    }
+    // Units apart, so that the matrix is well conditioned.
+    let sd = DVector::from_fn(n, |i, _| noise[(i, i)].sqrt());
+    let scaled = DMatrix::from_fn(n, n, |i, j| noise[(i, j)] / sd[i] / sd[j]);
+    let half = scaled.cholesky()?.l();
+    let moved = DMatrix::from_fn(n, moved.ncols(), |i, v| moved[(i, v)] / sd[i]);
+    let white = half.solve_lower_triangular(&moved)? * frames.sqrt();
+    let scatter = shrunk(&white);
+    let back = DMatrix::from_diagonal(&sd) * half;
+    Some(&back * scatter * back.transpose())
+}
+
+/// The mean of x xᵀ over columns, drawn towards a multiple of the identity (Ledoit & Wolf 2004).
+fn shrunk(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, count) = (columns.nrows() as f64, columns.ncols() as f64);
+    let mean = columns * columns.transpose() / count;
+    let level = DMatrix::identity(columns.nrows(), columns.nrows()) * (mean.trace() / n);
+    let spread = (&mean - &level).norm_squared();
+    let scatter = columns.column_iter().map(|x| (x * x.transpose() - &mean).norm_squared());
+    let uncertain = (scatter.sum::<f64>() / (count * count)).min(spread);
+    let share = if spread > 0.0 { uncertain / spread } else { 1.0 };
+    level * share + mean * (1.0 - share)
+}
