@@ -12,7 +12,7 @@ use super::foreshortened::foreshortened_grids;
 use super::grow::{SaddleGrid, grids};
 use super::ink::{Ink, InkEstimate};
 use super::label::Budget;
-use super::labels::{Labels, MOST_CORNERS, report_once};
+use super::labels::{FoundGrid, Labels, MOST_CORNERS, report_once};
 use super::optics::Optics;
 use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
@@ -317,9 +317,9 @@ impl Detector {
         left_out: &mut Vec<Reason>,
     ) -> Vec<(Grid, Option<Reason>)> {
         let mut budget = Budget::default();
+        let found = found.iter().map(|corners| FoundGrid { kind: kind::<N>(), corners });
         let mut grids: Vec<(Grid, Option<Reason>)> =
-            found.iter().flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
-        grids.iter_mut().for_each(|(grid, _)| grid.kind = kind::<N>());
+            found.flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
         let least = least_untagged_corners(kind::<N>()) as usize;
         let most = self.labels.most_corners();
         let mut refused = None;
