@@ -5,6 +5,8 @@ use std::io;
 use serde::{Deserialize, Serialize};
 use serde_json::ser::{CompactFormatter, Formatter, PrettyFormatter};
 
+use crate::reading::in_words;
+
 /// Serialises plain data, indented down to `depth` levels; what lies deeper stays on one line.
 pub fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
     let mut text = Vec::new();
@@ -39,7 +41,7 @@ pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> 
         let field = error.path().to_string();
         let inner = error.into_inner();
         if inner.is_data() && field != "." {
-            ReadError::Field { field, problem: inner.to_string() }
+            ReadError::Field { field, problem: in_words(&inner) }
         } else {
             ReadError::Json(inner)
         }

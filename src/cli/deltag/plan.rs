@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
-use super::values::whole;
 use crate::cli::output::say;
+use crate::cli::values::whole;
 use crate::family::{Family, shipped_names, smallest_shipped};
 use crate::lattice::GridKind;
 

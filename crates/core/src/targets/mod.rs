@@ -48,7 +48,7 @@ pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec
 pub use polyhedron::{Face, Polyhedron};
 pub use skeleton::Incircle;
 pub use skeleton::{Skeleton, SkeletonSpec};
-pub use spec::{BORDER_BITS, MOST_ROWS, SIDES, least_untagged_corners};
+pub use spec::{BORDER_BITS, FACE_TILES, MOST_ROWS, SIDES, least_untagged_corners};
 pub use spec::{
     BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSheetSpec, TagSpec, TargetSpec,
 };

@@ -35,7 +35,7 @@ const SOLID_EDGE_MM: std::ops::RangeInclusive<f64> = 10.0..=5000.0;
 
 /// Range of tiles along a side of a face: with fewer than six a face has at most six corners,
 /// and the detector takes so few for no grid.
-const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
+pub const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
 
 /// Farthest a mesh may lie from its origin, mm: meshes and bodies are written in single precision,
 /// which at 100 m leaves 0.01 mm.
