@@ -13,6 +13,7 @@ use crate::statistics::median;
 
 /// What was found in one image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Detection {
     /// File name of the image, or a name given by the caller.
     pub image: String,
@@ -35,6 +36,13 @@ pub struct Detection {
     /// Milliseconds per stage; written only where it is asked for, as no two runs take the same.
     #[serde(default)]
     pub timing_ms: BTreeMap<String, f64>,
+}
+
+impl Detection {
+    /// What was found in an image of a width and height, px, by whatever found it.
+    pub fn new(image: impl Into<String>, [width, height]: [u32; 2], grids: Vec<Grid>) -> Self {
+        Self { image: image.into(), width, height, grids, ..Self::default() }
+    }
 }
 
 /// A connected piece of a tiling.

@@ -15,7 +15,15 @@ const MAX_CHORD_ERROR_PX: f64 = 1e-4;
 const MAX_DIVISIONS: u32 = 10;
 
 /// Brightness and imperfections of a photograph.
+///
+/// ```
+/// use deltille_core::synth::Light;
+///
+/// let dim = Light::default().white(0.3).noise(0.02).seed(7);
+/// assert_eq!([dim.white, dim.blur_px], [0.3, 0.8]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Light {
     /// Level of white paper, of 1.
     pub white: f64,
@@ -48,6 +56,50 @@ impl Default for Light {
     }
 }
 
+impl Light {
+    /// With white paper of this level, of full scale 1.
+    #[must_use]
+    pub fn white(self, white: f64) -> Self {
+        Self { white, ..self }
+    }
+
+    /// With black print of this level, of full scale 1.
+    #[must_use]
+    pub fn black(self, black: f64) -> Self {
+        Self { black, ..self }
+    }
+
+    /// With this level around the target, of full scale 1.
+    #[must_use]
+    pub fn background(self, background: f64) -> Self {
+        Self { background, ..self }
+    }
+
+    /// With an illumination that changes by these parts of itself across the width and down the height.
+    #[must_use]
+    pub fn gradient(self, gradient: DVec2) -> Self {
+        Self { gradient, ..self }
+    }
+
+    /// With a Gaussian blur of this standard deviation, px.
+    #[must_use]
+    pub fn blur_px(self, blur_px: f64) -> Self {
+        Self { blur_px, ..self }
+    }
+
+    /// With Gaussian noise of this standard deviation, of full scale 1.
+    #[must_use]
+    pub fn noise(self, noise: f64) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// With other noise of the same strength.
+    #[must_use]
+    pub fn seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+}
+
 /// A plane piece of the world: white paper with black outlines, in its own frame (mm, y up).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
@@ -73,6 +125,7 @@ pub struct Scene {
 
 /// Where the corners of a synthetic image are.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Truth {
     /// All corners in the image.
     pub corners: Vec<TruthCorner>,
@@ -80,6 +133,7 @@ pub struct Truth {
 
 /// A visible corner.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TruthCorner {
     /// Panel id.
     pub panel: u32,
