@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 use crate::quantity;
 use crate::words::counted;
 
-/// Why something has no labels.
+/// Why a picture, or a grid in it, has no labels. It is displayed as a sentence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Reason {
-    /// What is the matter.
+    /// The kind of reason.
     pub kind: ReasonKind,
     /// Index of the grid that it is about; `None` for the whole picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -27,7 +27,7 @@ pub struct Reason {
     pub figures: BTreeMap<String, f64>,
 }
 
-/// What may be the matter.
+/// The kinds of reasons, each with the names of its [`figures`](Reason::figures).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

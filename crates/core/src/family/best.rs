@@ -45,11 +45,11 @@ use crate::lattice::Dimension;
 pub struct Best {
     /// Dimension of the tags.
     pub dimension: Dimension,
-    /// Distance h.
+    /// Least distance h between any two codes in any turn.
     pub distance: u32,
     /// Rules for single codes.
     pub rules: Rules,
-    /// How much of it.
+    /// How long to search.
     pub budget: Budget,
     /// Seed of all random choices.
     pub seed: u64,
@@ -108,7 +108,7 @@ pub const DRAWS: u64 = 4;
 /// What a search starts from.
 #[derive(Clone, Debug)]
 pub struct Start {
-    /// The family on record.
+    /// Name of the family on record.
     pub family: String,
     /// Its codes, as far as they satisfy the rules.
     pub codes: Vec<u64>,

@@ -25,17 +25,17 @@ const MAX_DIVISIONS: u32 = 10;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Light {
-    /// Level of white paper, of 1.
+    /// Grey value of white paper; full scale is 1.
     pub white: f64,
-    /// Level of black print, of 1.
+    /// Grey value of black print; full scale is 1.
     pub black: f64,
-    /// Level of what is not the target, of 1.
+    /// Grey value of what is not the target; full scale is 1.
     pub background: f64,
     /// Relative change of illumination across the width and down the height of the image.
     pub gradient: DVec2,
     /// Standard deviation of the Gaussian blur, px.
     pub blur_px: f64,
-    /// Standard deviation of the Gaussian noise, of 1.
+    /// Standard deviation of the Gaussian noise; full scale is 1.
     pub noise: f64,
     /// Seed of the noise.
     pub seed: u64,
@@ -105,13 +105,14 @@ impl Light {
 pub struct Surface {
     /// Panel id.
     pub panel: u32,
-    /// target = pose · surface.
+    /// Pose of the surface: from its own frame to the target frame, mm.
     pub target_from_surface: Pose,
-    /// Outline of the paper, counter-clockwise.
+    /// Outline of the paper in the surface's frame, counter-clockwise, mm.
     pub paper_mm: Vec<DVec2>,
-    /// Black areas by the even-odd rule: each area with its holes; areas do not overlap.
+    /// Black areas in the surface's frame, mm: each a list of outlines, filled by the even-odd rule; areas do not
+    /// overlap.
     pub black_mm: Vec<Vec<Vec<DVec2>>>,
-    /// Corners: id, row, column and place.
+    /// Corners: id, lattice row, lattice column, and position in the surface's frame, mm.
     pub corners: Vec<(u32, i32, i32, DVec2)>,
 }
 
@@ -143,9 +144,9 @@ pub struct TruthCorner {
     pub row: i32,
     /// Lattice column.
     pub col: i32,
-    /// Position, px.
+    /// True horizontal position, px, to the right; pixel centres at integers.
     pub x: f64,
-    /// Position, px.
+    /// True vertical position, px, downwards.
     pub y: f64,
     /// Position in the target frame, mm.
     pub target_mm: DVec3,

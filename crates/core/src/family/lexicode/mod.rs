@@ -35,7 +35,7 @@ const LARGEST_CHUNK: u64 = 1 << 21;
 pub struct Lexicode {
     /// Dimension of the tags.
     pub dimension: Dimension,
-    /// Distance h.
+    /// Least distance h between any two codes in any turn.
     pub distance: u32,
     /// Rules for single codes.
     pub rules: Rules,
