@@ -14,7 +14,7 @@ pub enum FamilyError {
         name: String,
     },
     /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
-    #[error("not a family file ({}); generate it anew with `Family::to_json`", in_words(.0))]
+    #[error("not a family file: {}; generate it anew with `Family::to_json`", in_words(.0))]
     Json(#[from] serde_json::Error),
     /// Another schema, or another version of it.
     #[error(
