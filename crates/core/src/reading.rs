@@ -14,14 +14,15 @@ use std::fmt::Display;
 /// ```
 pub fn in_words(message: impl Display) -> String {
     let message = message.to_string();
+    if message.ends_with(" at line 1 column 0") {
+        return "the text is empty".to_owned();
+    }
     let (message, line) = without_place(&message);
     let at = KNOWN.iter().filter_map(|(start, _)| starts_at(message, start)).min().unwrap_or(0);
     let (before, said) = message.split_at(at);
     let known = KNOWN.iter().find_map(|(start, told)| told(said.strip_prefix(start)?));
     let said = known.unwrap_or_else(|| said.to_owned());
     match line {
-        // Of a text without anything.
-        Some("0") => "the text is empty".to_owned(),
         Some(line) => format!("{before}{said} (line {line})"),
         None => format!("{before}{said}"),
     }
@@ -53,8 +54,7 @@ fn without_place(message: &str) -> (&str, Option<&str>) {
     let parts = message.rsplit_once(" at line ").and_then(|(before, place)| {
         let (line, column) = place.split_once(" column ")?;
         let are_numbers = [line, column].iter().all(|n| n.bytes().all(|b| b.is_ascii_digit()));
-        let is_empty = line == "1" && column == "0";
-        are_numbers.then_some((before, Some(if is_empty { "0" } else { line })))
+        are_numbers.then_some((before, Some(line)))
     });
     parts.unwrap_or((message, None))
 }
