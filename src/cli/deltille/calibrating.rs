@@ -268,7 +268,9 @@ fn mapped(map: &TargetMap, views: usize) -> String {
     let [plane, out] = map.rms_mm();
     let few = match views >= LEAST_TO_MEASURE {
         true => String::new(),
-        false => format!("; {views} views of a corner are few, take {LEAST_TO_MEASURE} or more"),
+        false => {
+            format!("; a corner is in {}, take {LEAST_TO_MEASURE} or more", counted(views, "view"))
+        }
     };
     format!(
         "target: corners are {plane:.3} mm beside their places and {out:.3} mm above or below (rms a \
