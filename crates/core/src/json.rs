@@ -30,7 +30,7 @@ pub enum ReadError {
     },
 }
 
-/// Parses JSON; an error that is not one of JSON's grammar names the field.
+/// Parses JSON. An error names the field where the text is JSON at all.
 ///
 /// # Errors
 /// Where it is no JSON, or a field is missing, unknown, or holds what it must not.
@@ -72,7 +72,7 @@ fn check_object(text: &[u8]) -> serde_json::Result<()> {
     }
 }
 
-/// What a schema describes: all but its version.
+/// The kind of a schema, such as `deltille/target` of `deltille/target/1`.
 pub fn kind(schema: &str) -> &str {
     schema.rsplit_once('/').map_or(schema, |(kind, _)| kind)
 }

@@ -153,7 +153,7 @@ mod tests {
             ("", "the text is empty"),
             ("{\"count\": 1", "the text ends within an object, as if it was cut off (line 1)"),
             ("\n[", "the text ends within a list, as if it was cut off (line 2)"),
-            ("{\"count\": -1}", "-1 stands where a whole number, 0 or more, belongs (line 1)"),
+            ("{\"count\": -1}", "`-1` stands where a whole number, 0 or more, belongs (line 1)"),
             (
                 "{\"count\": \"a, b\"}",
                 "the text \"a, b\" stands where a whole number, 0 or more, belongs (line 1)",

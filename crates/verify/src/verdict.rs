@@ -22,19 +22,19 @@ pub struct Verdict {
     pub passed: bool,
     /// What is wrong with the file as a whole.
     pub findings: Vec<Finding>,
-    /// Its pages.
+    /// The pages of a document, in order; empty for other files.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sheets: Vec<SheetVerdict>,
-    /// The faces of a mesh.
+    /// The faces of a mesh, in order; empty for other files.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faces: Vec<FaceVerdict>,
-    /// A body to print.
+    /// What was found of a body to print; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body: Option<BodyVerdict>,
-    /// A list for other detectors.
+    /// What was found of a list for other detectors; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub list: Option<ListVerdict>,
-    /// A drawing for a cutter.
+    /// What was found of a drawing for a cutter; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cut: Option<CutVerdict>,
 }
@@ -45,9 +45,9 @@ pub struct Verdict {
 pub struct ListVerdict {
     /// Boards of the target that are listed.
     pub boards: usize,
-    /// Their corners that are.
+    /// Corners of these boards that are listed.
     pub corners: usize,
-    /// Their tags that are listed in their places.
+    /// Tags of these boards that are listed in their places.
     pub tags: usize,
     /// Largest distance of a listed corner from its stated position, mm.
     pub max_deviation_mm: f64,
@@ -59,9 +59,9 @@ pub struct ListVerdict {
 pub struct CutVerdict {
     /// Outlines that were found in their places.
     pub outlines: usize,
-    /// Lines to fold that were.
+    /// Lines to fold that were found in their places.
     pub folds: usize,
-    /// Engraved outlines that were.
+    /// Engraved outlines that were found in their places.
     pub engraved: usize,
     /// Largest distance of a point of these from its stated position, mm.
     pub max_deviation_mm: f64,
@@ -73,7 +73,7 @@ pub struct CutVerdict {
 pub struct BodyVerdict {
     /// Triangles of its surface.
     pub triangles: usize,
-    /// Volume, mm³.
+    /// Volume of the body, mm³.
     pub volume_mm3: f64,
     /// Seats of a skeleton that have their depth and outline.
     pub seats: usize,

@@ -14,7 +14,7 @@ mod stl;
 mod svg;
 
 use std::fs;
-use std::path::Path;
+use std::path::{MAIN_SEPARATOR, Path};
 use std::sync::LazyLock;
 
 use deltille::artwork;
@@ -140,7 +140,10 @@ impl Artifacts {
         match self.verify(&folder.path().join(verified)) {
             Ok(verdict) if verdict.passed => None,
             Ok(verdict) => Some(found(&verdict)),
-            Err(error) => Some(format!("not read: {error}")),
+            Err(error) => {
+                let place = format!("{}{MAIN_SEPARATOR}", folder.path().display());
+                Some(format!("not read: {}", error.replace(&place, "")))
+            }
         }
     }
 
