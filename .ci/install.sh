@@ -9,7 +9,7 @@ set -eu
 
 from=${1:?give the address or the folder where the archives lie}
 version=${2:-0.1.0}
-bin=${DELTILLE_BIN:-$HOME/.local/bin}
+bin=${DELTILLE_BIN:-${HOME:?is not set: name a folder in DELTILLE_BIN}/.local/bin}
 
 fail() {
   echo "error: $*" >&2
@@ -44,9 +44,9 @@ done
 
 cd "$work"
 if command -v sha256sum >/dev/null; then
-  sha256sum -c "$name.tar.gz.sha256" >/dev/null || fail "$name.tar.gz is damaged: its checksum is another"
+  sha256sum -c "$name.tar.gz.sha256" >/dev/null 2>&1 || fail "$name.tar.gz is damaged: its checksum is another"
 else
-  shasum -a 256 -c "$name.tar.gz.sha256" >/dev/null || fail "$name.tar.gz is damaged: its checksum is another"
+  shasum -a 256 -c "$name.tar.gz.sha256" >/dev/null 2>&1 || fail "$name.tar.gz is damaged: its checksum is another"
 fi
 tar -xzf "$name.tar.gz"
 mkdir -p "$bin"

@@ -28,7 +28,7 @@ fn photograph() -> (Target, Family, Gray<u8>) {
     let centre = target.panels[0].middle_mm();
     let eye = centre + 420.0 * DVec3::new(0.4, -0.41, 0.82);
     let pose = Pose::looking_at(eye, centre, DVec3::Y);
-    let light = Light { blur_px: 0.8, noise: 0.01, seed: 1, ..Light::default() };
+    let light = Light::default().blur_px(0.8).noise(0.01).seed(1);
     let image = scene.render(&Camera::pinhole(1600, 1200, 75f64.to_radians()), &pose, &light);
     (target, family, image.map(|v| (v * 255.0 + 0.5) as u8))
 }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use deltille::artwork;
 use deltille::export::svg;
 use deltille::family::best::{Best, Budget};
-use deltille::family::{Control, Rules, certify};
+use deltille::family::{Control, certify};
 use deltille::lattice::Dimension;
 use deltille::targets::{BoardSpec, PaperSpec, TagSpec, Target, TargetSpec};
 
@@ -19,16 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&folder)?;
     // 16 bits, any two codes in any turn at least 7 cells apart: three misread cells are mended.
     let (dimension, distance) = (Dimension::from_bits(16)?, 7);
-    let search = Best {
-        dimension,
-        distance,
-        rules: Rules::published(distance),
-        // So many steps give the same codes on every machine.
-        budget: Budget::Work(1),
-        seed: 7,
-        limit: None,
-        exchange: true,
-    };
+    // So many steps give the same codes on every machine.
+    let search = Best::new(dimension, distance, Budget::Work(1)).seed(7);
     let family = search.family("own16h7", None, Control::default())?;
     let certificate = certify(&family);
     println!("{}: {} codes, proved: {}", family.name(), family.codes().len(), certificate.holds());

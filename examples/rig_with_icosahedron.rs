@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let turn = DVec3::new((0.7 * i).sin(), (1.1 * i).cos(), (0.3 * i).sin()) * 3.0;
             let translation = DVec3::new(30.0 * i.sin(), 30.0 * i.cos(), 680.0 + 20.0 * i.sin());
             let world_from_target = Pose { rotation: DQuat::from_scaled_axis(turn), translation };
-            let light = Light { seed: frame.into(), ..Light::default() };
+            let light = Light::default().seed(frame.into());
             let image = scene.render(&camera, &camera_from_world.after(&world_from_target), &light);
             let image = image.map(|grey| (255.0 * grey + 0.5) as u8);
             // Pictures of one moment have the same name.

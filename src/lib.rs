@@ -31,7 +31,7 @@
 
 pub use deltille_core::{
     Clock, Name, artwork, calibrate, camera, detect, glam, json, lattice, nalgebra, name, quantity,
-    raster, statistics, synth, targets, words,
+    raster, reading, statistics, synth, targets, words,
 };
 #[cfg(feature = "photographs")]
 pub use deltille_files::photograph;

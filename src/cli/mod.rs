@@ -6,4 +6,5 @@ pub mod interrupt;
 pub mod output;
 pub mod progress;
 pub mod run;
+mod values;
 pub mod wording;

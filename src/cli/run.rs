@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::Parser;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::cli::output::tell;
 use crate::cli::{interrupt, wording};
@@ -86,7 +87,7 @@ fn shortened(line: &str) -> String {
 
 /// The first paragraph of a message of clap, and its tip, on one line.
 fn one_line(error: &clap::Error) -> String {
-    if error.kind() == clap::error::ErrorKind::InvalidUtf8 {
+    if error.kind() == ErrorKind::InvalidUtf8 {
         let arguments = (1..).zip(std::env::args_os().skip(1));
         let wrong: Vec<String> = arguments
             .filter(|(_, argument)| argument.to_str().is_none())
@@ -94,15 +95,18 @@ fn one_line(error: &clap::Error) -> String {
             .collect();
         return format!("argument {} is not UTF-8 text", wrong.join(" or "));
     }
+    if let (ErrorKind::MissingSubcommand, Some(ContextValue::Strings(commands))) =
+        (error.kind(), error.get(ContextKind::ValidSubcommand))
+    {
+        let commands = commands.join(", ");
+        return format!("a command is missing, one of {commands} (--help tells what they do)");
+    }
     let text = error.to_string();
     let mut paragraphs = text
         .split("\n\n")
         .map(|paragraph| paragraph.split_whitespace().collect::<Vec<_>>().join(" "));
     let first = paragraphs.next().unwrap_or_default();
     let first = first.trim_start_matches("error: ").to_owned();
-    if first.starts_with("Usage") || !text.starts_with("error") {
-        return "a command is missing; --help lists them".to_owned();
-    }
     match paragraphs.find(|paragraph| paragraph.starts_with("tip: ")) {
         Some(tip) => format!("{first} ({})", tip.trim_start_matches("tip: ")),
         None => format!("{first} (--help tells more)"),

@@ -230,7 +230,7 @@ fn picture(
 ) -> Detection {
     let pose = world.camera_from_world[camera].after(&world.world_from_target[frame]);
     let number = (camera * world.world_from_target.len() + frame) as u64;
-    let light = Light { seed: seed.wrapping_add(number), ..Light::default() };
+    let light = Light::default().seed(seed.wrapping_add(number));
     let image = scene.render(&world.camera, &pose, &light);
     detector.detect(&image.map(|v| (v * 255.0 + 0.5) as u8), "")
 }

@@ -2,5 +2,5 @@
 
 use std::time::Duration;
 
-/// The time since any moment that stays the same.
+/// A monotonic clock: the time since a moment that stays the same, whichever it is.
 pub type Clock = fn() -> Duration;

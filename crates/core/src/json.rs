@@ -5,6 +5,8 @@ use std::io;
 use serde::{Deserialize, Serialize};
 use serde_json::ser::{CompactFormatter, Formatter, PrettyFormatter};
 
+use crate::reading::in_words;
+
 /// Serialises plain data, indented down to `depth` levels; what lies deeper stays on one line.
 pub fn to_text<T: Serialize>(value: &T, depth: usize) -> String {
     let mut text = Vec::new();
@@ -28,7 +30,7 @@ pub enum ReadError {
     },
 }
 
-/// Parses JSON; an error that is not one of JSON's grammar names the field.
+/// Parses JSON. An error names the field where the text is JSON at all.
 ///
 /// # Errors
 /// Where it is no JSON, or a field is missing, unknown, or holds what it must not.
@@ -39,7 +41,7 @@ pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, ReadError> 
         let field = error.path().to_string();
         let inner = error.into_inner();
         if inner.is_data() && field != "." {
-            ReadError::Field { field, problem: inner.to_string() }
+            ReadError::Field { field, problem: in_words(&inner) }
         } else {
             ReadError::Json(inner)
         }
@@ -70,7 +72,7 @@ fn check_object(text: &[u8]) -> serde_json::Result<()> {
     }
 }
 
-/// What a schema describes: all but its version.
+/// The kind of a schema, such as `deltille/target` of `deltille/target/1`.
 pub fn kind(schema: &str) -> &str {
     schema.rsplit_once('/').map_or(schema, |(kind, _)| kind)
 }

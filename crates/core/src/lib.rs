@@ -31,6 +31,7 @@ pub mod lattice;
 pub mod name;
 pub mod quantity;
 pub mod raster;
+pub mod reading;
 pub mod statistics;
 pub mod synth;
 pub mod targets;

@@ -16,7 +16,7 @@ const LONGEST: usize = 64;
 pub struct Name(String);
 
 impl Name {
-    /// This name; what is wrong with it where it is none.
+    /// A name of this text, if it is one.
     ///
     /// # Errors
     /// What is wrong with it.

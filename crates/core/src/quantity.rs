@@ -22,7 +22,7 @@ use serde::{Deserialize, Deserializer, de::Error};
 pub struct Range {
     /// The smallest number it may be.
     pub least: f64,
-    /// The largest.
+    /// The largest number it may be.
     pub most: f64,
     /// Its unit; empty where it has none.
     pub unit: &'static str,
@@ -94,7 +94,7 @@ impl Range {
     }
 }
 
-/// What is made of numbers.
+/// A value that is made of numbers, such as a list or a vector.
 pub trait Numbers {
     /// Goes through them until one does not pass.
     ///

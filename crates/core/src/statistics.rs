@@ -10,7 +10,8 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// The least value that no less than a part of the others, from 0 to 1, lies below; `None` of none. Sorts the values.
+/// The quantile of some values at `part`, from 0 to 1: the least value below which at least that part of them lies, or the
+/// greatest of all; `None` of no values. The values are sorted by it.
 pub fn quantile(values: &mut [f64], part: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;

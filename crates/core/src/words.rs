@@ -13,6 +13,22 @@ pub fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
+/// What is quoted of a text: all of it, or the beginning of one that may be a whole file.
+///
+/// ```
+/// use deltille_core::words::quoted;
+///
+/// assert_eq!(quoted("id,A,B"), "`id,A,B`");
+/// assert!(quoted(&"x".repeat(5000)).len() < 80);
+/// ```
+pub fn quoted(text: &str) -> String {
+    const MOST_CHARACTERS: usize = 60;
+    match text.char_indices().nth(MOST_CHARACTERS) {
+        Some((end, _)) => format!("`{} …`", &text[..end]),
+        None => format!("`{text}`"),
+    }
+}
+
 /// How many places two digits of a standard deviation need, and so the value that it belongs to.
 ///
 /// ```

@@ -13,6 +13,7 @@ use super::tiles::PlacedPanel;
 use super::{Finding, SheetVerdict, TOLERANCE_MM, Verifier};
 use deltille_core::detect::{Detection, Detector, DetectorConfig, GridCorner, Ink, Tone};
 use deltille_core::targets::{Corner, Panel, SheetLayout};
+use deltille_core::words::counted;
 
 /// An unlabelled corner is taken for a stated one within this many edges of it: less than half the
 /// way to the next.
@@ -43,7 +44,7 @@ pub enum BoardFinding {
         panel: u32,
     },
     /// The picture shows another board: its corners are not those of the target.
-    #[error("shows another board: {found} corners instead of {stated}")]
+    #[error("shows another board: {} instead of {stated}", counted(*found, "corner"))]
     AnotherBoard {
         /// Corners that were found.
         found: usize,

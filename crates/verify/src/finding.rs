@@ -4,6 +4,8 @@
 use glam::DVec2;
 use serde::Serialize;
 
+use deltille_core::words::counted;
+
 pub use super::board::BoardFinding;
 pub use super::construct::ConstructFinding;
 pub use super::cutting::CutFinding;
@@ -54,7 +56,7 @@ pub enum Finding {
 #[non_exhaustive]
 pub enum PageFinding {
     /// The file has too many or too few pages.
-    #[error("{found} pages instead of {stated}")]
+    #[error("{} instead of {stated}", counted(*found, "page"))]
     Pages {
         /// Pages of the file.
         found: usize,

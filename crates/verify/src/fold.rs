@@ -22,6 +22,7 @@ use serde::Serialize;
 use super::{Finding, FoldVerdict, SheetVerdict};
 use deltille_core::artwork;
 use deltille_core::targets::{Label, SheetLayout, Target, TargetSpec};
+use deltille_core::words::counted;
 
 /// Largest distance of a folded corner, or of an end of an edge, from where it belongs, mm: that
 /// of meshes, see [`MESH_TOLERANCE_MM`](super::MESH_TOLERANCE_MM).
@@ -123,7 +124,7 @@ pub enum FoldFinding {
         tabs: usize,
     },
     /// More than two sides carry a number.
-    #[error("edge number {number} is on {sides} sides")]
+    #[error("edge number {number} is on {}", counted(*sides, "side"))]
     EdgeNumberAgain {
         /// The number.
         number: usize,

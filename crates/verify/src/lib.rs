@@ -274,7 +274,7 @@ impl<'a> Verifier<'a> {
         })
     }
 
-    /// The same, and reading artifacts within other limits than the default.
+    /// The same verifier with other limits for reading artifacts than the default.
     pub fn within(self, limits: Limits) -> Self {
         Self { limits, ..self }
     }

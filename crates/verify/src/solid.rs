@@ -20,6 +20,7 @@ use deltille_core::detect::Detection;
 use deltille_core::lattice::Vertex;
 use deltille_core::raster::Gray;
 use deltille_core::targets::{Corner, Panel, TargetSpec};
+use deltille_core::words::counted;
 
 /// Largest deviation of a corner of a mesh, mm: a tenth of what a well glued panel is off.
 pub const MESH_TOLERANCE_MM: f64 = 0.05;
@@ -75,7 +76,7 @@ pub enum MeshFinding {
         problem: String,
     },
     /// Triangles of a mesh whose normals are not theirs.
-    #[error("{triangles} triangles with wrong normals")]
+    #[error("{} with wrong normals", counted(*triangles, "triangle"))]
     Normals {
         /// How many.
         triangles: usize,
@@ -97,14 +98,14 @@ pub enum MeshFinding {
 /// How a tag was read.
 fn how_read(errors: Option<u32>) -> String {
     match errors {
-        Some(errors) => format!("read with {errors} wrong bits"),
+        Some(errors) => format!("read with {}", counted(errors as usize, "wrong bit")),
         None => "not read".to_owned(),
     }
 }
 
 /// What there is to say of a mesh that has not the stated number of triangles.
 pub(super) fn other_count(found: usize, stated: usize) -> Option<Finding> {
-    let problem = || format!("{found} triangles instead of {stated}");
+    let problem = || format!("{} instead of {stated}", counted(found, "triangle"));
     (found != stated).then(|| MeshFinding::Body { problem: problem() }.into())
 }
 

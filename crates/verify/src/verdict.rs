@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::document::Format;
 use super::finding::Finding;
+use deltille_core::words::counted;
 
 /// What was found in one artifact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -21,19 +22,19 @@ pub struct Verdict {
     pub passed: bool,
     /// What is wrong with the file as a whole.
     pub findings: Vec<Finding>,
-    /// Its pages.
+    /// The pages of a document, in order; empty for other files.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sheets: Vec<SheetVerdict>,
-    /// The faces of a mesh.
+    /// The faces of a mesh, in order; empty for other files.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faces: Vec<FaceVerdict>,
-    /// A body to print.
+    /// What was found of a body to print; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body: Option<BodyVerdict>,
-    /// A list for other detectors.
+    /// What was found of a list for other detectors; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub list: Option<ListVerdict>,
-    /// A drawing for a cutter.
+    /// What was found of a drawing for a cutter; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cut: Option<CutVerdict>,
 }
@@ -44,9 +45,9 @@ pub struct Verdict {
 pub struct ListVerdict {
     /// Boards of the target that are listed.
     pub boards: usize,
-    /// Their corners that are.
+    /// Corners of these boards that are listed.
     pub corners: usize,
-    /// Their tags that are listed in their places.
+    /// Tags of these boards that are listed in their places.
     pub tags: usize,
     /// Largest distance of a listed corner from its stated position, mm.
     pub max_deviation_mm: f64,
@@ -58,9 +59,9 @@ pub struct ListVerdict {
 pub struct CutVerdict {
     /// Outlines that were found in their places.
     pub outlines: usize,
-    /// Lines to fold that were.
+    /// Lines to fold that were found in their places.
     pub folds: usize,
-    /// Engraved outlines that were.
+    /// Engraved outlines that were found in their places.
     pub engraved: usize,
     /// Largest distance of a point of these from its stated position, mm.
     pub max_deviation_mm: f64,
@@ -72,7 +73,7 @@ pub struct CutVerdict {
 pub struct BodyVerdict {
     /// Triangles of its surface.
     pub triangles: usize,
-    /// Volume, mm³.
+    /// Volume of the body, mm³.
     pub volume_mm3: f64,
     /// Seats of a skeleton that have their depth and outline.
     pub seats: usize,
@@ -167,17 +168,18 @@ impl Verdict {
 impl fmt::Display for ListVerdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { boards, corners, tags, max_deviation_mm } = self;
-        let s = |n: &usize| if *n == 1 { "" } else { "s" };
-        write!(f, "verified, {boards} board{}, {corners} corners listed within ", s(boards))?;
-        write!(f, "{max_deviation_mm:.4} mm, {tags} tag{}", s(tags))
+        let (boards, corners) = (counted(*boards, "board"), counted(*corners, "corner"));
+        write!(f, "verified, {boards}, {corners} listed within {max_deviation_mm:.4} mm, ")?;
+        write!(f, "{}", counted(*tags, "tag"))
     }
 }
 
 impl fmt::Display for CutVerdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { outlines, folds, engraved, max_deviation_mm } = self;
-        write!(f, "verified, {outlines} outlines to cut, {folds} lines to fold, {engraved} ")?;
-        write!(f, "engraved, within {max_deviation_mm:.4} mm")
+        let (outlines, folds) = (counted(*outlines, "outline"), counted(*folds, "line"));
+        write!(f, "verified, {outlines} to cut, {folds} to fold, {engraved} engraved, ")?;
+        write!(f, "within {max_deviation_mm:.4} mm")
     }
 }
 
@@ -193,23 +195,23 @@ impl fmt::Display for Verdict {
         }
         if let Some(body) = self.body.as_ref().filter(|_| self.passed) {
             let BodyVerdict { triangles, volume_mm3, seats, max_deviation_mm } = body;
-            write!(f, "verified, closed body of {triangles} triangles, ")?;
+            write!(f, "verified, closed body of {}, ", counted(*triangles, "triangle"))?;
             write!(f, "{:.1} cm³, ", volume_mm3 / 1e3)?;
             return match seats {
                 0 => write!(f, "vertices within {max_deviation_mm:.4} mm"),
-                _ => write!(f, "{seats} seats within {max_deviation_mm:.4} mm"),
+                _ => write!(f, "{} within {max_deviation_mm:.4} mm", counted(*seats, "seat")),
             };
         }
         if self.passed && !self.faces.is_empty() {
             let sum =
                 |count: fn(&FaceVerdict) -> usize| self.faces.iter().map(count).sum::<usize>();
             let deviation = self.faces.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
-            let (corners, tags) = (sum(|s| s.corners_found), sum(|s| s.tags_exact));
-            let faces = self.faces.len();
+            let corners = counted(sum(|s| s.corners_found), "corner");
+            let tags = counted(sum(|s| s.tags_exact), "tag");
+            let faces = counted(self.faces.len(), "face");
             return write!(
                 f,
-                "verified, {faces} faces, {corners} corners in space within {deviation:.4} mm, \
-                 {tags} tags exact"
+                "verified, {faces}, {corners} in space within {deviation:.4} mm, {tags} exact"
             );
         }
         if self.passed {
@@ -224,17 +226,18 @@ impl fmt::Display for Verdict {
             let corners = sum(|s| s.corners_found);
             // A sheet of single tags has none.
             if corners > 0 {
-                write!(f, "{corners} corners within {deviation:.4} mm, ")?;
+                write!(f, "{} within {deviation:.4} mm, ", counted(corners, "corner"))?;
             }
             let folds: Vec<&FoldVerdict> =
                 self.sheets.iter().filter_map(|s| s.fold.as_ref()).collect();
             if !folds.is_empty() {
                 let off = folds.iter().map(|fold| fold.max_deviation_mm).fold(0.0, f64::max);
                 let edges: usize = folds.iter().map(|fold| fold.edges).sum();
-                write!(f, "folds into the solid within {off:.4} mm, {edges} edges matched, ")?;
+                write!(f, "folds into the solid within {off:.4} mm, ")?;
+                write!(f, "{} matched, ", counted(edges, "edge"))?;
             }
             let tags = sum(|s| s.tags_exact);
-            write!(f, "{tags} {} exact, ", if tags == 1 { "tag" } else { "tags" })?;
+            write!(f, "{} exact, ", counted(tags, "tag"))?;
             let bars = self.sheets.iter().flat_map(|s| &s.check_bars_mm);
             let bars: Vec<String> =
                 bars.filter_map(|(_, found)| Some(format!("{:.2}", (*found)?))).collect();

@@ -3,8 +3,8 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use super::values::whole;
 use crate::cli::output;
+use crate::cli::values::whole;
 use crate::family::{self, Construction, Screen, TagWords};
 
 #[derive(clap::Args)]

@@ -4,8 +4,8 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::ValueEnum;
 
-use super::values::name;
 use crate::cli::output::{self, Overwrite, say};
+use crate::cli::values::name;
 use crate::family::{ExportFormat, export};
 
 #[derive(clap::Args)]

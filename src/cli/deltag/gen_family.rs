@@ -11,12 +11,12 @@ use clap::ValueEnum;
 use super::checkpoint::CheckpointFile;
 use super::parameters::Parameters;
 use super::rules::RuleArgs;
-use super::values::{name, number, whole};
 use super::verify_family::proof_of;
 use crate::cli::interrupt;
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::progress::SearchProgress;
 use crate::cli::run::FAILED;
+use crate::cli::values::{name, number, whole};
 use crate::clock;
 use crate::export::kind::Kind;
 use crate::family::best::{Best, Budget};
@@ -163,7 +163,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let shown = SearchProgress::new(total, unit);
     let report = |progress: Progress| shown.show(progress);
-    let control = Control { cancel: Some(interrupt::flag()), report: Some(&report) };
+    let control = Control::default().cancel(interrupt::flag()).report(&report);
     let file = CheckpointFile::new(args.resume.as_deref(), args.identity(&rules));
     let outcome = match args.method {
         Method::Lexicode => args.lexicode(&name, rules, &file, control),
@@ -343,7 +343,7 @@ impl Args {
         control: Control,
     ) -> anyhow::Result<Outcome> {
         let Parameters { dimension, distance } = self.family;
-        let lexicode = Lexicode { rules, ..Lexicode::published(dimension, distance) };
+        let lexicode = Lexicode::published(dimension, distance).rules(rules);
         let mut checkpoint: lexicode::Checkpoint = file.load()?;
         interrupt::keeps_results();
         match lexicode.resume(&mut checkpoint, &|c| file.save(c), control) {
@@ -363,7 +363,7 @@ impl Args {
         control: Control,
     ) -> anyhow::Result<Outcome> {
         let Parameters { dimension, distance } = self.family;
-        let search = Search { seed: self.seed(), rounds: self.rounds(), steps: Search::STEPS };
+        let search = Search::new(self.seed(), self.rounds());
         let screen = Screen::new(TagWords::new(dimension), distance, &rules);
         let mut checkpoint: search::Checkpoint = file.load()?;
         ensure!(
@@ -404,20 +404,12 @@ impl Args {
         let Parameters { dimension, distance } = self.family;
         let limit =
             self.limit.or((dimension.bits() > 36).then(|| FILE_LIMIT / bytes_per_code(dimension)));
-        let best = Best {
-            dimension,
-            distance,
-            rules,
-            budget: match self.work {
-                Some(steps) => Budget::Work(steps),
-                None => {
-                    Budget::Time(Duration::from_secs_f64(self.time.unwrap_or(60.0)), clock::now)
-                }
-            },
-            seed: self.seed(),
-            limit,
-            exchange: self.method == Method::Best,
+        let budget = match self.work {
+            Some(steps) => Budget::Work(steps),
+            None => Budget::Time(Duration::from_secs_f64(self.time.unwrap_or(60.0)), clock::now),
         };
+        let best = Best::new(dimension, distance, budget).rules(rules).seed(self.seed());
+        let best = best.limit(limit).exchange(self.method == Method::Best);
         let stopped = || interrupt::flag().load(Ordering::Relaxed);
         let start = if self.from_nothing { None } else { best.start() };
         if let Some(start) = &start {

@@ -4,6 +4,7 @@ use crate::cli::output::say;
 use crate::family::{Family, TagWords, bounds::bounds};
 use crate::lattice::GridKind;
 use crate::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use crate::words::counted;
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -53,11 +54,13 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let [rows, cols] = BOARD;
     let board = tags_of(&TargetSpec::Board(BoardSpec::new(GridKind::Deltille, rows, cols, 20.0)))?;
     let solid = tags_of(&TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron)))?;
+    let solids = match family.len() / solid {
+        1 => "1 icosahedron".to_owned(),
+        n => format!("{n} icosahedra"),
+    };
     say!(
-        "  enough for      {} boards of {rows} x {cols} corners ({board} tags each) or {} icosahedra \
-         ({solid} tags each)",
-        family.len() / board,
-        family.len() / solid
+        "  enough for      {} of {rows} x {cols} corners ({board} tags each) or {solids} ({solid} tags each)",
+        counted(family.len() / board, "board")
     );
     say!("  a random pattern is taken for a tag with probability");
     for (corrected, rate) in family.false_positive_rates().iter().enumerate() {

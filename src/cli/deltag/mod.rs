@@ -12,7 +12,6 @@ mod plan;
 mod rules;
 mod sheet;
 mod show;
-mod values;
 mod verify_family;
 
 use std::path::Path;

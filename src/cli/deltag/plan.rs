@@ -3,10 +3,11 @@
 use std::process::ExitCode;
 
 use super::gen_family::{FILE_LIMIT, bytes_per_code};
-use super::values::whole;
 use crate::cli::output::say;
+use crate::cli::values::whole;
 use crate::family::{Family, shipped_names, smallest_shipped};
 use crate::lattice::GridKind;
+use crate::words::counted;
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -43,14 +44,15 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         };
         let (kind, corrects) = match args.corrects {
             0 => (String::new(), ""),
-            n => (format!(" that correct {n} cells"), " or --corrects"),
+            n => (format!(" that correct {}", counted(n as usize, "cell")), " or --corrects"),
         };
         anyhow::bail!(
             "{needed} tags{kind}: the largest shipped family, {name}, lists {len}; {instead} \
              --faces or --tags-per-face{corrects}"
         );
     };
-    say!("{} x {} = {needed} tags: {}", args.faces, args.tags_per_face, about(&best));
+    let tags = counted(needed as usize, "tag");
+    say!("{} x {} = {tags}: {}", args.faces, args.tags_per_face, about(&best));
     // What more bits would buy.
     if let Some(more) = smallest_shipped(GridKind::Deltille, needed, best.correctable() + 1) {
         say!("to correct more, with smaller cells: {}", about(&more));

@@ -3,9 +3,9 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use super::values::{Ids, name, whole};
 use crate::artwork::{Artwork, GalleryTile, tag_gallery};
 use crate::cli::output::{self, Overwrite, say};
+use crate::cli::values::{Ids, name, whole};
 use crate::export::kind::Kind;
 use crate::export::{png, svg};
 

@@ -11,6 +11,7 @@ use super::images::Images;
 use crate::cli::interrupt;
 use crate::cli::output::say;
 use crate::cli::run::Interrupted;
+use crate::cli::values::whole;
 use crate::clock;
 use crate::photograph;
 use crate::statistics::quantile;
@@ -37,7 +38,7 @@ struct DetectArgs {
     finder: FinderArgs,
     /// Detections in each image; the fastest counts, as others were held up by something else
     #[arg(long, value_name = "N", default_value_t = 5,
-          value_parser = clap::value_parser!(u32).range(1..=1000))]
+          value_parser = whole(1..=1000u32))]
     repeat: u32,
 }
 

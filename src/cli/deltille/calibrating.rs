@@ -13,6 +13,7 @@ use crate::calibrate::{
 };
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
+use crate::cli::values::whole;
 use crate::cli::wording::in_options;
 use crate::export::calibration::Print;
 use crate::export::kind::Kind;
@@ -28,7 +29,7 @@ use crate::words::counted;
 pub struct SolveArgs {
     /// Keep every N-th view (the N-th, 2N-th, …), of a rig every N-th frame, out of the calibration and tell
     /// the error there, where only poses are found
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    #[arg(long, value_name = "N", value_parser = whole(2..=u32::MAX))]
     holdout: Option<u32>,
     /// How corners far off their prediction count
     #[arg(long, value_name = "LOSS", default_value = "huber")]
@@ -294,7 +295,9 @@ fn mapped(map: &TargetMap, views: usize) -> String {
     let [plane, out] = map.rms_mm();
     let few = match views >= LEAST_TO_MEASURE {
         true => String::new(),
-        false => format!("; {views} views of a corner are few, take {LEAST_TO_MEASURE} or more"),
+        false => {
+            format!("; a corner is in {}, take {LEAST_TO_MEASURE} or more", counted(views, "view"))
+        }
     };
     format!(
         "target: corners are {plane:.3} mm beside their places and {out:.3} mm above or below (rms a \

@@ -14,6 +14,7 @@ use super::images::{self, Images, Stems};
 use super::in_flight;
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{self, BAD_INPUT, FAILED, Interrupted};
+use crate::cli::values::whole;
 use crate::cli::{interrupt, progress};
 use crate::clock;
 use crate::detect::{Detection, Detector, InkEstimate};
@@ -57,7 +58,7 @@ pub struct Args {
     #[command(flatten)]
     overwrite: Overwrite,
     /// Images at a time [default: one per processor]
-    #[arg(short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(short, value_name = "N", value_parser = whole(1..=1024u16))]
     jobs: Option<u16>,
 }
 
@@ -340,7 +341,8 @@ fn one_image(
     let Photograph { image, notes } =
         photograph::read_with_notes(path, &limits, args.accept_damaged)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let found = Detection { file: notes, ..detector.detect(&image, &name) };
+    let mut found = detector.detect(&image, &name);
+    found.file = notes;
     if let Some(folder) = args.folder() {
         let save = |extension: &str, content: &[u8]| {
             let path = folder.join(format!("{stem}.{extension}"));

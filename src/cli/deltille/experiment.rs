@@ -12,6 +12,7 @@ use super::images::Images;
 use super::target_file;
 use crate::cli::output::{Overwrite, say};
 use crate::cli::run::Interrupted;
+use crate::cli::values::whole;
 use crate::cli::{interrupt, output, progress};
 use crate::detect::Tone;
 use crate::experiment::photographs::axes::Axis;
@@ -53,11 +54,11 @@ struct Table2Args {
 struct RigArgs {
     /// Width of the pictures, px; 4000 is the paper's
     #[arg(long, value_name = "PX", default_value_t = 1600,
-          value_parser = clap::value_parser!(u32).range(800..=8000))]
+          value_parser = whole(800..=8000u32))]
     width: u32,
     /// Moments at which pictures are taken; 150 is the paper's
     #[arg(long, value_name = "N", default_value_t = 30,
-          value_parser = clap::value_parser!(u32).range(5..=1000))]
+          value_parser = whole(5..=1000u32))]
     frames: u32,
     #[command(flatten)]
     simulation: SimulationArgs,
@@ -67,7 +68,7 @@ struct RigArgs {
 struct CornersArgs {
     /// Simulated images at every point; each is refined from four starts
     #[arg(long, value_name = "N", default_value_t = 1000,
-          value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+          value_parser = whole(1..=1_000_000u32))]
     images: u32,
     /// Tone curve of the simulated camera where it is not varied: linear, srgb, or a gamma such as 2.2
     #[arg(long, value_name = "CURVE", default_value = "linear")]
@@ -94,7 +95,7 @@ struct PhotographsArgs {
     family: Option<String>,
     /// Photographs at each level
     #[arg(long, value_name = "N", default_value_t = 6,
-          value_parser = clap::value_parser!(u32).range(1..=10_000))]
+          value_parser = whole(1..=10_000u32))]
     views: u32,
     /// Write all pictures with their truth to this folder
     #[arg(long, value_name = "FOLDER")]
@@ -110,7 +111,7 @@ struct SimulationArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads [default: one per processor]
-    #[arg(short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(short, value_name = "N", value_parser = whole(1..=1024u16))]
     jobs: Option<u16>,
     /// Folder for the results
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]

@@ -12,7 +12,7 @@ use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{Interrupted, message};
 use crate::export::kind::Kind;
 use crate::export::staging::{Staging, same_content};
-use crate::export::{atomic, pdf, png, sheet_file_name, svg};
+use crate::export::{ExportError, atomic, pdf, png, sheet_file_name, svg};
 use crate::targets;
 
 /// Writes one file to a path.
@@ -75,7 +75,11 @@ pub fn drawn(name: &str, artwork: Artwork, formats: Formats, dpi: u32) -> Vec<Fi
         if formats.png {
             let (artwork, dpi) = (artwork.clone(), f64::from(dpi));
             let write = move |path: &Path| {
-                Ok(png::write(&artwork.sheets[index], &artwork.title, path, dpi)?)
+                let written = png::write(&artwork.sheets[index], &artwork.title, path, dpi);
+                written.map_err(|error| match error {
+                    ExportError::TooLarge { .. } => anyhow!(error).context("--dpi"),
+                    _ => anyhow!(error),
+                })
             };
             let name = sheet_file_name(name, index, count, "png");
             files.push(File::new(name, Kind::own_printed_png(), write));

@@ -8,10 +8,11 @@ use clap::ValueEnum;
 use super::limits::ImageLimits;
 use super::refine::Method;
 use super::target_file;
+use crate::cli::values::whole;
 use crate::detect::{Detector, DetectorConfig, Ink, Tone};
 use crate::lattice::GridKind;
 use crate::limits::Limits;
-use crate::targets::Target;
+use crate::targets::{SIDES, Target};
 
 /// Options that say what to look for.
 #[derive(clap::Args)]
@@ -24,16 +25,16 @@ pub struct FinderArgs {
     grid: Option<Kind>,
     /// Rows of corners of the untagged board: labels boards seen whole from their lower left, on a
     /// checkerboard the corner whose square is dark
-    #[arg(long, conflicts_with = "target", requires = "cols", value_parser = side())]
+    #[arg(long, conflicts_with = "target", requires = "cols", value_parser = whole(SIDES))]
     rows: Option<u32>,
     /// Corners in each row of the untagged board
-    #[arg(long, conflicts_with = "target", requires = "rows", value_parser = side())]
+    #[arg(long, conflicts_with = "target", requires = "rows", value_parser = whole(SIDES))]
     cols: Option<u32>,
     /// Family file, where the target names a family that is not shipped
     #[arg(long, conflicts_with = "grid")]
     family: Option<String>,
     /// Most bits of a tag that may be corrected [default: ⌊(h−1)/2⌋ of its family]
-    #[arg(long, value_name = "BITS", conflicts_with = "grid")]
+    #[arg(long, value_name = "BITS", conflicts_with = "grid", value_parser = whole(0..=u32::MAX))]
     max_errors: Option<u32>,
     /// Label boards that are seen as in a mirror too
     #[arg(long)]
@@ -59,11 +60,6 @@ enum Kind {
     Deltille,
     /// Squares
     Checker,
-}
-
-/// A range that boards have.
-fn side() -> clap::builder::RangedI64ValueParser<u32> {
-    clap::value_parser!(u32).range(2..=500)
 }
 
 impl FinderArgs {

@@ -1,5 +1,6 @@
 //! The options that say how much of a file is read.
 
+use crate::cli::values::whole;
 use crate::limits::Limits;
 
 /// Heading of these options in the help.
@@ -36,10 +37,10 @@ pub struct AllLimits {
     #[arg(long, help_heading = HEADING, value_name = "PARTS", value_parser = count)]
     max_nodes: Option<u64>,
     /// How deep parts may lie within each other [default: 64]
-    #[arg(long, help_heading = HEADING, value_name = "LEVELS", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, help_heading = HEADING, value_name = "LEVELS", value_parser = whole(1..=u16::MAX))]
     max_depth: Option<u16>,
     /// Most seconds for reading a file, and for drawing a page [default: 60]
-    #[arg(long, help_heading = HEADING, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, help_heading = HEADING, value_name = "SECONDS", value_parser = whole(1..=u32::MAX))]
     max_seconds: Option<u32>,
 }
 

@@ -89,13 +89,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         true => Ok(value),
         false => bail!("{option}: {value} is not between 0 and {most}"),
     };
-    let light = Light {
-        blur_px: in_range("--blur", args.blur, 100.0)?,
-        noise: in_range("--noise", args.noise, 100.0)? / 100.0,
-        gradient: args.gradient.into(),
-        seed: args.seed,
-        ..Light::default()
-    };
+    let light = Light::default()
+        .blur_px(in_range("--blur", args.blur, 100.0)?)
+        .noise(in_range("--noise", args.noise, 100.0)? / 100.0)
+        .gradient(args.gradient.into())
+        .seed(args.seed);
     if args.gradient.iter().any(|g| !(-2.0..=2.0).contains(g)) {
         bail!("--gradient: it must be between -2 and 2");
     }

@@ -9,10 +9,12 @@ use std::path::Path;
 use anyhow::{Context, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
+use crate::cli::values::{number, whole};
 use crate::export::GENERATOR;
 use crate::export::dsc::Dialect;
 use crate::lattice::GridKind;
 use crate::limits;
+use crate::reading::in_words;
 use crate::targets::{
     BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, MOST_ROWS, PaperSpec, SIDES, TagSpec, TagsIn,
     largest_edge_mm, parse_length_mm,
@@ -66,7 +68,7 @@ pub struct Settings {
     tag_spacing: Option<u32>,
     /// Black border of a tag, in widths of a bit, 0.6 to 10, on a checkerboard at least 1
     /// [default: 1.5, in black squares 2, in white ones 1]
-    #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = border)]
+    #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     tag_border: Option<f64>,
     /// Id of the first tag; the others follow [default: 0]
     #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
@@ -118,28 +120,12 @@ pub struct Settings {
     name: Option<String>,
 }
 
-/// Reads a whole number of a range.
-fn whole(range: RangeInclusive<u32>) -> impl Fn(&str) -> Result<u32, String> + Clone {
-    move |text| {
-        let number = text.trim().parse().ok().filter(|number| range.contains(number));
-        let (least, most) = (range.start(), range.end());
-        number.ok_or_else(|| format!("not a whole number from {least} to {most}"))
-    }
-}
-
-/// Reads the width of a tag's border.
-fn border(text: &str) -> Result<f64, String> {
-    let number = text.trim().parse().ok().filter(|number| BORDER_BITS.contains(number));
-    let (least, most) = (BORDER_BITS.start(), BORDER_BITS.end());
-    number.ok_or_else(|| format!("not a number from {least} to {most}"))
-}
-
 /// Reads the colour of the squares that carry tags.
 fn colour(text: &str) -> Result<TagsIn, String> {
     match text {
         "black" => Ok(TagsIn::Black),
         "white" => Ok(TagsIn::White),
-        _ => Err("neither black nor white".to_owned()),
+        _ => Err("write black or white".to_owned()),
     }
 }
 
@@ -174,9 +160,11 @@ impl Settings {
             limits::read_short_text(path, limits::MAX_SETTINGS_BYTES).context("--template")?;
         let settings: Self = toml::from_str(&text).map_err(|error| {
             let before = error.span().map_or("", |span| &text[..span.start]);
-            let line = before.matches('\n').count() + 1;
-            let message = error.message().replace('\n', " ");
-            anyhow!("--template: {} line {line}: {message}", path.display())
+            let line = before.matches('\n').count();
+            let field = text.lines().nth(line).and_then(|line| line.split_once('='));
+            let field = field.map_or("", |(field, _)| field.trim());
+            let message = in_words(error.message().replace('\n', " "));
+            anyhow!("--template: {} line {}, `{field}`: {message}", path.display(), line + 1)
         })?;
         match settings.command.as_deref().filter(|made_for| *made_for != command(grid)) {
             Some(made_for) => bail!(

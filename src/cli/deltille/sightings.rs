@@ -9,13 +9,14 @@ use super::limits::FileLimits;
 use super::target_file;
 use crate::calibrate::{Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views};
 use crate::cli::output::tell;
+use crate::cli::values::whole;
 use crate::detect::{Detection, InkEstimate};
 use crate::export::calibration::{self, Print, Sheet};
 use crate::export::detection;
 use crate::lattice::GridKind;
 use crate::limits::{Limits, ReadError};
 use crate::quantity::{edge_mm, print_scale};
-use crate::targets::{Target, TargetSpec, parse_length_mm};
+use crate::targets::{SIDES, Target, TargetSpec, parse_length_mm};
 use crate::words::counted;
 
 /// Detections and what they show.
@@ -31,10 +32,10 @@ pub struct SightingsArgs {
     #[arg(long, value_name = "KIND", requires = "edge")]
     grid: Option<Kind>,
     /// Rows of corners of the untagged board
-    #[arg(long, requires_all = ["grid", "cols"], value_parser = clap::value_parser!(u32).range(2..=500))]
+    #[arg(long, requires_all = ["grid", "cols"], value_parser = whole(SIDES))]
     rows: Option<u32>,
     /// Corners in each row of the untagged board
-    #[arg(long, requires_all = ["grid", "rows"], value_parser = clap::value_parser!(u32).range(2..=500))]
+    #[arg(long, requires_all = ["grid", "rows"], value_parser = whole(SIDES))]
     cols: Option<u32>,
     /// Length of a tile's edge of the untagged board, such as 20mm
     #[arg(long, requires = "grid", value_name = "LENGTH", allow_hyphen_values = true)]

@@ -10,14 +10,16 @@ use super::files::{self, File, bytes_file, text_file};
 use super::settings::DEFAULT_DPI;
 use crate::artwork;
 use crate::cli::output::say;
+use crate::cli::values::{number, whole};
 use crate::export::dsc::{self, Dialect};
 use crate::export::mesh::TexturedMesh;
 use crate::export::{dxf, gltf, obj, stl};
 use crate::family::{self, Family};
-use crate::quantity::{dots_per_inch, unit_mm};
+use crate::quantity::unit_mm;
 use crate::targets::{
-    ClosedMesh, DEFAULT_MARGIN_MM, NEAR_EQUILATERAL, PaperSpec, Skeleton, SkeletonSpec, SolidShape,
-    SolidSheets, SolidSpec, TagSpec, TagsIn, Target, TargetSpec, parse_length_mm,
+    BORDER_BITS, ClosedMesh, DEFAULT_MARGIN_MM, FACE_TILES, MOST_ROWS, NEAR_EQUILATERAL, PaperSpec,
+    Skeleton, SkeletonSpec, SolidShape, SolidSheets, SolidSpec, TagSpec, TagsIn, Target,
+    TargetSpec, parse_length_mm,
 };
 
 /// Arguments of the commands that make solids.
@@ -28,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     edge: Option<String>,
     /// Black tiles along each side of a face [default: 10]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(FACE_TILES))]
     tiles: Option<u32>,
     /// Blank between a face's edges and its tiles [default: 5mm, with a skeleton at least 3 mm on
     /// its panels]
@@ -38,16 +40,16 @@ pub struct Args {
     #[arg(long)]
     family: Option<String>,
     /// A tag in every n-th row and column of a face [default: 3]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
     /// Black border of a tag, in widths of a bit [default: 1.5]
-    #[arg(long, value_name = "BITS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     tag_border: Option<f64>,
     /// Id of the first tag; the others follow, face by face [default: 0]
-    #[arg(long, value_name = "ID", allow_negative_numbers = true)]
+    #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
     /// Id of the first face's board; the others follow [default: 0]
-    #[arg(long, value_name = "ID", allow_negative_numbers = true)]
+    #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     board_id: Option<u32>,
     /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); so it is where no other of gltf,
     /// obj, stl, skeleton, dxf, pdf, svg, png is asked for
@@ -78,7 +80,7 @@ pub struct Args {
     dxf: bool,
     /// Resolution of the texture, dots per inch [default: 20 texels per tag bit]
     #[arg(long, value_name = "DPI", allow_negative_numbers = true,
-          value_parser = |text: &str| dots_per_inch::RANGE.parse(text))]
+          value_parser = number(1.0..=1e5))]
     texture_dpi: Option<f64>,
     /// Write <name>.pdf: the net to cut out, fold and glue, or with --per-face a page per face
     #[arg(long)]
@@ -99,7 +101,7 @@ pub struct Args {
     #[arg(long, value_name = "DIALECT")]
     dsc_dialect: Option<String>,
     /// Resolution of the PNG pages, dots per inch [default: 300]
-    #[arg(long, value_parser = clap::value_parser!(u32).range(200..=2400))]
+    #[arg(long, value_parser = whole(200..=2400u32))]
     dpi: Option<u32>,
     /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm; a net that is larger is
     /// printed on several pages [default: the smallest of A4 to A0 that takes it, else A0]
@@ -126,7 +128,7 @@ pub struct MeshArgs {
     mesh: PathBuf,
     /// Millimetres per unit of the mesh, such as 1000 for metres, 25.4 for inches [default: 1]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, conflicts_with = "edge",
-          value_parser = |text: &str| unit_mm::RANGE.parse(text))]
+          value_parser = number(unit_mm::RANGE.least..=unit_mm::RANGE.most))]
     scale: Option<f64>,
     /// Take faces that are far from equilateral, as long as a board fits
     #[arg(long)]
@@ -287,9 +289,6 @@ impl Args {
             files.push(text_file(format!("{name}.dsc"), text));
         }
         let (printed, with_gltf) = (self.printed(), self.with_gltf());
-        if self.texture_dpi.is_some_and(|dpi| !(1.0..=1e5).contains(&dpi)) {
-            bail!("--texture-dpi: it must be between 1 and 100000");
-        }
         if self.stl {
             let bytes = stl::to_bytes(name, &spec.polyhedron().triangles_mm());
             files.push(bytes_file(format!("{name}.stl"), bytes));

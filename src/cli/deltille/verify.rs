@@ -65,6 +65,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if let Some(path) = &args.report {
         args.overwrite.check(path, &Kind::of_schema(SCHEMA)).context("--report")?;
+        output::check_writable("--report", path)?;
     }
     interrupt::stands("not all was compared");
     let report = args.report.as_deref().map(|path| (path, args.overwrite));
@@ -116,16 +117,16 @@ pub fn verify(
         output::write(path, json.as_bytes(), overwrite).context("--report")?;
     }
     let count = verdicts.len();
-    let files = if count == 1 { "file" } else { "files" };
     if !errors.is_empty() {
         return Ok(ExitCode::from(run::BAD_INPUT));
     }
     if failed > 0 {
         let differ = if failed == 1 { "differs" } else { "differ" };
-        say!("FAILED: {failed} of {count} {files} {differ} from target {}", target.name);
+        let files = counted(count, "file");
+        say!("FAILED: {failed} of {files} {differ} from target {}", target.name);
         return Ok(ExitCode::from(FAILED));
     }
-    say!("verified: {count} {files} of target {}", target.name);
+    say!("verified: {} of target {}", counted(count, "file"), target.name);
     Ok(ExitCode::SUCCESS)
 }
 

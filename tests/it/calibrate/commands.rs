@@ -59,12 +59,7 @@ fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8
         corners,
         tags: Vec::new(),
     };
-    Detection {
-        width: camera.width,
-        height: camera.height,
-        grids: vec![grid],
-        ..Detection::default()
-    }
+    Detection::new("", [camera.width, camera.height], vec![grid])
 }
 
 /// Detections of a board in so many pictures, tilted by up to 0.7 rad.
@@ -90,7 +85,8 @@ fn folder(target: &Target, detections: &[Detection]) -> tempfile::TempDir {
     std::fs::write(folder.path().join("board.json"), target.to_json()).unwrap();
     std::fs::create_dir(folder.path().join("corners")).unwrap();
     for (i, detection) in detections.iter().enumerate() {
-        let detection = Detection { image: format!("{i:02}.png"), ..detection.clone() };
+        let mut detection = detection.clone();
+        detection.image = format!("{i:02}.png");
         let path = folder.path().join(format!("corners/{i:02}.json"));
         std::fs::write(path, detection::write(&detection)).unwrap();
     }
@@ -346,7 +342,8 @@ fn what_calibrate_refuses() {
     }
 
     page.title("Nothing counts twice");
-    let renamed = Detection { image: "copy.png".to_owned(), ..good[0].clone() };
+    let mut renamed = good[0].clone();
+    renamed.image = "copy.png".to_owned();
     std::fs::write(at.join("copy.json"), detection::write(&renamed)).unwrap();
     let twice = CALIBRATE.replace("corners", "corners copy.json corners/01.json");
     page.warned(at, &format!("deltille {twice}"));
@@ -532,7 +529,8 @@ fn names_in_files_lead_nowhere() {
     let folder = folder(&target, &found);
     let path = |name: &str| folder.path().join(name);
     for (i, image) in ["../secret.png", "a\u{1b}[31m.png"].into_iter().enumerate() {
-        let detection = Detection { image: image.to_owned(), ..found[i].clone() };
+        let mut detection = found[i].clone();
+        detection.image = image.to_owned();
         std::fs::write(path(&format!("corners/{i:02}.json")), detection::write(&detection))
             .unwrap();
     }
@@ -592,7 +590,7 @@ fn of_displaced_panel(target: &Target, count: usize, by_mm: DVec3) -> Vec<Detect
             let (kind, panel) = (panel.kind, Some(panel.id));
             faces.then(|| Grid { kind, panel, mirrored: false, corners, tags: Vec::new() })
         });
-        Detection { width: 1600, height: 1200, grids: grids.collect(), ..Detection::default() }
+        Detection::new("", [1600, 1200], grids.collect())
     });
     pictures.collect()
 }

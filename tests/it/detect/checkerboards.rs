@@ -121,8 +121,7 @@ fn whole_boards_are_labelled_from_their_dark_corner_up_to_60_degrees() {
         for view in 0..12u32 {
             let tilt = f64::from(view) / 12.0 * 60f64.to_radians();
             let pose = seen_from(&mut rng, 330.0, tilt);
-            let light =
-                Light { seed: view.into(), gradient: DVec2::new(0.5, -0.3), ..Light::default() };
+            let light = Light::default().seed(view.into()).gradient(DVec2::new(0.5, -0.3));
             let image = scene.render(&camera, &pose, &light);
             let detection = detect(&image, GridKind::Checker, SIZE);
             assert_eq!(detection.grids.len(), 1, "view {view}");
@@ -146,7 +145,7 @@ fn a_fisheye_lens_bends_the_rows_but_not_the_labels() {
     let mut all = Vec::new();
     for view in 0..8u32 {
         let pose = seen_from(&mut rng, 120.0, 0.1 * f64::from(view));
-        let light = Light { seed: view.into(), ..Light::default() };
+        let light = Light::default().seed(view.into());
         let image = scene.render(&camera, &pose, &light);
         let truth = scene.truth(&camera, &pose, 14.0);
         let detection = detect(&image, GridKind::Checker, SIZE);
@@ -169,7 +168,7 @@ fn all_that_is_seen_of_a_covered_board_is_found_where_it_is() {
         let right_mm = (0.1 + 0.025 * f64::from(view)) * f64::from(COLS) * EDGE_MM;
         let scene = covered(right_mm);
         let pose = seen_from(&mut rng, 330.0, 0.5);
-        let light = Light { seed: view.into(), ..Light::default() };
+        let light = Light::default().seed(view.into());
         let truth = scene.truth(&camera, &pose, 0.0);
         let detection = detect(&scene.render(&camera, &pose, &light), GridKind::Checker, SIZE);
         assert_eq!(detection.grids.len(), 1, "view {view}");

@@ -92,7 +92,7 @@ fn labelled(boards: u64) -> Vec<String> {
         let distance_mm = camera.focal_px.x * shown.bit_mm / bit_px;
         let tilt = rng.random_range(0.0..1.0);
         let pose = tilted(&mut rng, shown.centre_mm, distance_mm, tilt);
-        let light = Light { noise: rng.random_range(0.002..0.03), seed, ..Light::default() };
+        let light = Light::default().noise(rng.random_range(0.002..0.03)).seed(seed);
         let mut image = shown.scene.render(&camera, &pose, &light);
         if control == "mirrored" {
             image = flopped(&image);

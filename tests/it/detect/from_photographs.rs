@@ -36,7 +36,7 @@ fn lenses_that_bend_edges_are_found_within_their_deviations() {
             let distance_mm = 0.3 * camera.focal_px.x + 8.0 * f64::from(view);
             let centre_mm = target.panels[0].middle_mm();
             let pose = tilted(&mut rng, centre_mm, distance_mm, 0.05 * f64::from(view));
-            let light = Light { seed: view.into(), ..Light::default() };
+            let light = Light::default().seed(view.into());
             let image = scene.render(&camera, &pose, &light).map(|v| (v * 255.0 + 0.5) as u8);
             (format!("{view:02}"), detector.detect(&image, "view.png"))
         });

@@ -115,7 +115,7 @@ fn small_tags(views: u64, bit_px: f64) -> (u64, f64) {
     let (mut whole, mut tags) = (0, 0);
     for seed in 0..views {
         let view = board.view(&mut rng, bit_px, 45f64.to_radians());
-        let light = Light { blur_px: 0.7, noise: 0.02, seed, ..Light::default() };
+        let light = Light::default().blur_px(0.7).noise(0.02).seed(seed);
         let seen = board.seen(view, &light, eight_bits);
         assert_eq!(seen.wrong, 0, "view {seed}: {seen:?}");
         whole += u64::from(seen.whole());
@@ -169,7 +169,7 @@ fn covered_boards_keep_absolute_labels() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     for seed in 0..8 {
         let view = board.view(&mut rng, 5.0, 0.5);
-        let seen = board.seen(view, &Light { seed, ..Light::default() }, eight_bits);
+        let seen = board.seen(view, &Light::default().seed(seed), eight_bits);
         // The sheet's own edge may spoil the corners beside it.
         assert!(seen.wrong == 0 && seen.tags >= 1, "view {seed}: {seen:?}");
         assert!(seen.corners[0] * 10 >= seen.corners[1] * 7, "view {seed}: {seen:?}");
@@ -182,7 +182,7 @@ fn whole_through(inverted: bool, light: &Light, spoil: impl Fn(Gray<f32>) -> Gra
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     for seed in 0..8 {
         let view = board.view(&mut rng, 4.0, 0.6);
-        let seen = board.seen(view, &Light { seed, ..*light }, &spoil);
+        let seen = board.seen(view, &light.seed(seed), &spoil);
         assert!(seen.whole() && seen.tags >= 1, "view {seed}: {seen:?}");
     }
 }
@@ -190,11 +190,7 @@ fn whole_through(inverted: bool, light: &Light, spoil: impl Fn(Gray<f32>) -> Gra
 #[test]
 fn light_of_ten_to_one_across_the_image() {
     // 1 ± 0.82 of the mean: 10 : 1.
-    whole_through(
-        false,
-        &Light { gradient: DVec2::X * 1.636, white: 0.5, ..Light::default() },
-        eight_bits,
-    );
+    whole_through(false, &Light::default().gradient(DVec2::X * 1.636).white(0.5), eight_bits);
 }
 
 #[test]

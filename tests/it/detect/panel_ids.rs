@@ -55,13 +55,8 @@ fn seen(target: &Target, camera: &Camera, camera_from_target: &Pose, view: u32) 
             tags: Vec::new(),
         })
     };
-    Detection {
-        image: format!("{view:02}.png"),
-        width: camera.width,
-        height: camera.height,
-        grids: target.panels.iter().filter_map(grid).collect(),
-        ..Detection::default()
-    }
+    let grids = target.panels.iter().filter_map(grid).collect();
+    Detection::new(format!("{view:02}.png"), [camera.width, camera.height], grids)
 }
 
 /// Every panel that a JSON file names.

@@ -47,7 +47,7 @@ impl Board {
 }
 
 fn light() -> Light {
-    Light { blur_px: 0.7, noise: 0.01, seed: 5, ..Light::default() }
+    Light::default().blur_px(0.7).noise(0.01).seed(5)
 }
 
 fn tags(change: impl Fn(&mut TagSpec)) -> Option<TagSpec> {
@@ -61,11 +61,11 @@ fn nothing_is_seen_in_bad_light_and_focus_and_from_too_far() {
     for kind in [GridKind::Deltille, GridKind::Checker] {
         let board = board(kind, |_| {});
         let why = |mm: f64, light: Light| board.not_seen_in(&board.photograph(mm, &light));
-        let dark = Light { white: 0.008, black: 0.002, background: 0.004, ..light() };
+        let dark = light().white(0.008).black(0.002).background(0.004);
         assert_eq!(why(300.0, dark), [ReasonKind::TooDark], "{kind:?}");
-        let bright = Light { white: 9.0, black: 2.0, background: 3.0, ..light() };
+        let bright = light().white(9.0).black(2.0).background(3.0);
         assert_eq!(why(300.0, bright), [ReasonKind::Overexposed], "{kind:?}");
-        let blurred = Light { blur_px: 25.0, ..light() };
+        let blurred = light().blur_px(25.0);
         assert_eq!(why(300.0, blurred), [ReasonKind::TooBlurred], "{kind:?}");
         // Tiles of 5.5 px; those of 6 px are read on some checkerboards.
         assert_eq!(why(3000.0, light()), [ReasonKind::TooSmall], "{kind:?}");
@@ -96,7 +96,7 @@ fn tags_that_cannot_be_read_are_no_missing_tags() {
     let mut unread = 0;
     for mm in [400.0, 600.0, 900.0] {
         for blur_px in [2.0, 3.0, 4.0, 5.0, 6.0] {
-            let image = board.photograph(mm, &Light { blur_px, ..light() });
+            let image = board.photograph(mm, &light().blur_px(blur_px));
             let Detection { grids, reasons, .. } = board.detector.detect(&image, "view");
             if grids.is_empty() || grids.iter().any(|grid| grid.panel.is_some()) {
                 continue;

@@ -58,7 +58,7 @@ fn area_in_pixel(triangle: [DVec2; 3], x: f64, y: f64) -> f64 {
 fn corners_are_where_the_truth_says_to_a_five_hundredth_of_a_pixel() {
     let (target, _, scene) = solid(SolidShape::Octahedron, 0, 0);
     let camera = Camera::pinhole(1200, 1000, 0.6);
-    let light = Light { blur_px: 0.0, noise: 0.0, ..Light::default() };
+    let light = Light::default().blur_px(0.0).noise(0.0);
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut checked = 0;
     for _ in 0..4 {
@@ -155,7 +155,7 @@ fn hidden_parts_of_a_concave_solid_are_hidden() {
     let (target, _, scene) = solid(shape.clone(), 0, 0);
     let outline = SolidSpec::new(shape).polyhedron().triangles_mm();
     let camera = Camera::pinhole(900, 900, 0.5);
-    let light = Light { blur_px: 0.0, noise: 0.0, ..Light::default() };
+    let light = Light::default().blur_px(0.0).noise(0.0);
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let (mut hidden, mut compared) = (0, 0);
     for _ in 0..4 {
@@ -234,7 +234,7 @@ fn every_corner_has_an_honest_covariance() {
                 DVec3::from_array([0; 3].map(|_| rng.random_range(-1.0..1.0))).normalize()
             });
             let pose = Pose::looking_at(direction * distance_mm, aside * 100.0, aside);
-            let light = Light { seed: view, ..Light::default() };
+            let light = Light::default().seed(view);
             let image = eight_bits(&scene.render(&camera, &pose, &light));
             let truth: BTreeMap<u32, _> =
                 scene.truth(&camera, &pose, 0.0).corners.into_iter().map(|c| (c.id, c)).collect();
@@ -307,7 +307,7 @@ fn three_hundred_views_of_an_icosahedron() {
         };
         let (direction, up) = (random(&mut rng), random(&mut rng));
         let pose = Pose::looking_at(direction * distance, DVec3::ZERO, up);
-        let light = Light { seed: view, ..Light::default() };
+        let light = Light::default().seed(view);
         let image = eight_bits(&scene.render(&camera, &pose, &light));
         let truth: BTreeMap<u32, _> =
             scene.truth(&camera, &pose, 0.0).corners.into_iter().map(|c| (c.id, c)).collect();

@@ -126,15 +126,9 @@ fn best_families_hold_whatever_the_rules() {
         (16, 6, Rules { min_complexity: 0.6, black_distance: 6, white_distance: 6 }),
         (36, 13, Rules::published(13)),
     ] {
-        let search = best::Best {
-            dimension: Dimension::from_bits(bits).unwrap(),
-            distance,
-            rules,
-            budget: best::Budget::Time(std::time::Duration::from_millis(500), clock::now),
-            seed: 3,
-            limit: None,
-            exchange: true,
-        };
+        let dimension = Dimension::from_bits(bits).unwrap();
+        let budget = best::Budget::Time(std::time::Duration::from_millis(500), clock::now);
+        let search = best::Best::new(dimension, distance, budget).rules(rules).seed(3);
         let family = search.family("test", search.start(), Control::default()).unwrap();
         assert_eq!(certify(&family).failures, [""; 0]);
         assert_eq!(Family::from_json(&family.to_json()).unwrap(), family);

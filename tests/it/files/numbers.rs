@@ -163,13 +163,8 @@ fn pictures(target: &Target) -> Vec<(String, Detection)> {
                 corners: panel.corners.iter().map(corner).collect(),
                 tags: Vec::new(),
             };
-            let detection = Detection {
-                image: format!("{index}.png"),
-                width: camera.width,
-                height: camera.height,
-                grids: vec![grid],
-                ..Detection::default()
-            };
+            let size = [camera.width, camera.height];
+            let detection = Detection::new(format!("{index}.png"), size, vec![grid]);
             (index.to_string(), detection)
         })
         .collect()

@@ -91,8 +91,7 @@ impl Board {
         tilt: f64,
     ) -> (Detection, Truth) {
         let pose = tilted(rng, self.centre_mm, mm, tilt);
-        let light =
-            Light { seed: rng.random(), gradient: DVec2::new(0.5, -0.3), ..Light::default() };
+        let light = Light::default().seed(rng.random()).gradient(DVec2::new(0.5, -0.3));
         let image: Gray<u8> =
             self.scene.render(camera, &pose, &light).map(|v| (v * 255.0 + 0.5) as u8);
         (self.detector.detect(&image, "view"), self.scene.truth(camera, &pose, 0.0))

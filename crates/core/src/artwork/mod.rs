@@ -27,6 +27,7 @@ use kurbo::BezPath;
 use crate::family::Family;
 use crate::lattice::GridKind;
 use crate::targets::{LineKind, Panel, Placement, SheetText, Target};
+use crate::words::counted;
 
 pub use atlas::Atlas;
 pub use board::drawn_lines;
@@ -220,7 +221,6 @@ pub fn text_outline(text: &SheetText) -> Result<BezPath, text::MissingGlyph> {
 pub fn subject(target: &Target) -> String {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();
-    let plural = if tags == 1 { "" } else { "s" };
     let what = match corners {
         0 => "single DelTags".to_owned(),
         _ => {
@@ -231,7 +231,7 @@ pub fn subject(target: &Target) -> String {
             format!("{kind} calibration target, {corners} corners")
         }
     };
-    let mut subject = format!("{what}, {tags} tag{plural}");
+    let mut subject = format!("{what}, {}", counted(tags, "tag"));
     if let Some(family) = &target.family {
         subject += &format!(", family {}, fingerprint {}", family.name, family.fingerprint);
     }

@@ -43,25 +43,25 @@ pub struct Calibration {
 /// What one camera saw, and what is known of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraViews {
-    /// Name of the camera.
+    /// Name of the camera, by which results and messages call it.
     pub name: String,
     /// Its views; those of the same name in different cameras were taken at the same moment.
     pub views: Vec<View>,
-    /// What is known of its lens.
+    /// What is known of its intrinsics.
     pub intrinsics: Intrinsics,
-    /// Its place on the rig, where that is known. The first camera is the rig, and lies at its origin
-    /// unless said otherwise.
+    /// Its pose on the rig, where that is known. The frame of the first camera is the rig frame unless said
+    /// otherwise.
     pub camera_from_rig: Option<Pose>,
 }
 
-/// What is known of a camera by itself.
+/// What is known of the intrinsics of a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Intrinsics {
-    /// Nothing but the model.
+    /// Nothing but the model, whose parameters are estimated.
     Unknown(Model),
-    /// All of it; it is kept.
+    /// All parameters, which are kept.
     Known(Camera),
-    /// Nearly all: some of its parameters are found, from the values that they have.
+    /// All parameters approximately: some are estimated, starting from the values that they have.
     Near {
         /// The camera.
         camera: Camera,
@@ -70,10 +70,10 @@ pub enum Intrinsics {
     },
 }
 
-/// Where a panel is on its target.
+/// The pose of a panel on its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PanelPlace {
-    /// target_from_panel.
+    /// The pose, from the panel frame to the target frame, mm.
     pub target_from_panel: Pose,
     /// Covariance of a turn (rad) and a move (mm) along the target's axes, where it was measured;
     /// `None` where it is as stated.
@@ -124,7 +124,7 @@ impl Intrinsics {
 }
 
 impl CameraViews {
-    /// A camera whose place on the rig is to be found.
+    /// A camera whose pose on the rig is to be estimated.
     pub fn new(name: &str, views: Vec<View>, intrinsics: impl Into<Intrinsics>) -> Self {
         let (name, intrinsics) = (name.to_owned(), intrinsics.into());
         Self { name, views, intrinsics, camera_from_rig: None }
@@ -161,13 +161,13 @@ impl Calibration {
         self
     }
 
-    /// How corners far off count; by [`Loss::Huber`] unless said otherwise.
+    /// With a loss, by which corners with large residuals count less; it is [`Loss::Huber`] unless said otherwise.
     #[must_use]
     pub fn loss(self, loss: Loss) -> Self {
         Self { loss, ..self }
     }
 
-    /// How corners are weighted; by [`Weights::Covariance`] unless said otherwise.
+    /// With weights of the corners; they are [`Weights::Covariance`] unless said otherwise.
     #[must_use]
     pub fn weights(self, weights: Weights) -> Self {
         Self { weights, ..self }

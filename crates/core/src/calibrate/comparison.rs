@@ -6,10 +6,10 @@
 //!
 //! ```text
 //!     d = (I − P) (J_B δθ_B − J_A δθ_A)        P: what the motion explains
-//!     χ² = Σᵢ (eᵢ · d)² / λᵢ                   λᵢ, eᵢ: variances and directions of d
+//!     Σᵢ (eᵢ · d)² / (λᵢ + ε²)                  λᵢ, eᵢ: variances and directions of d
 //! ```
 //!
-//! d over all places of the region.
+//! d over all places of the region, and ε what no calibration is better known than.
 
 use std::collections::BTreeMap;
 
@@ -426,10 +426,11 @@ impl Known {
         let largest = eigen.eigenvalues.max();
         let modes = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
         let modes = modes.filter(|(variance, _)| **variance > SINGULAR * largest);
-        let squares =
-            modes.map(|(&variance, mode)| mode.dot(&along).powi(2) / variance / (variance + floor));
-        let squares: Vec<f64> = squares.collect();
-        known.chance = chi_squared_chance(squares.iter().sum(), squares.len());
+        let modes = modes.map(|(&variance, mode)| {
+            let share = variance / (variance + floor);
+            (mode.dot(&along).powi(2) / variance / (variance + floor), share)
+        });
+        known.chance = chance_of(&modes.collect::<Vec<_>>());
         Some(known)
     }
 
@@ -474,6 +475,18 @@ impl Known {
             + self.by_motion(second, motion, point)? * &self.motions;
         Some((changes.norm_squared() / 2.0).sqrt())
     }
+}
+
+/// How often chance makes a sum as large, of squares that are expected to be as large as given: by the χ² of the same
+/// mean and variance (Satterthwaite 1946).
+fn chance_of(squares: &[(f64, f64)]) -> f64 {
+    let sum = |of: fn(&(f64, f64)) -> f64| squares.iter().map(of).sum::<f64>();
+    let (found, mean, spread) = (sum(|of| of.0), sum(|of| of.1), sum(|of| of.1 * of.1));
+    if squares.is_empty() || spread == 0.0 {
+        return 1.0;
+    }
+    let freedom = (mean * mean / spread).round().max(1.0);
+    chi_squared_chance(found * freedom / mean, freedom as usize)
 }
 
 /// A square root of the covariance of a camera's parameters: that which is observed, else that from noise.

@@ -25,7 +25,7 @@ use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 use crate::statistics::median;
 use crate::targets::{Name, PanelPose, Target};
 
-/// Cameras, and where they and the target were, as the views have it, with what that is worth.
+/// The result of a calibration: cameras, their poses and those of the target, with uncertainties.
 ///
 /// One camera is a rig of one: the rig frame is that of the camera, and a frame a view.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,23 +59,23 @@ pub struct Estimate {
     /// The same cameras in frames that took no part, where some were held out; only the poses of the
     /// target were found there.
     pub held_out: Option<Box<Estimate>>,
-    /// Steps of the last bundle adjustment.
+    /// Number of iterations of the last bundle adjustment.
     pub steps: usize,
 }
 
-/// A camera as its views have it.
+/// The estimate of one camera.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CameraEstimate {
-    /// Its name.
+    /// Name of the camera, as it was given.
     pub name: String,
-    /// The camera.
+    /// The camera with its estimated parameters.
     pub camera: Camera,
-    /// The model that was found; `None` where the camera was given.
+    /// The model that was estimated; `None` where the camera was given.
     pub model: Option<Model>,
-    /// Its parameters, those that were found and those that were kept.
+    /// All its parameters, estimated and kept ones.
     pub parameters: Vec<Parameter>,
-    /// Covariance of the parameters that were found, in their order.
+    /// Covariance of the estimated parameters, in their order; each entry in the product of their units.
     pub covariance: DMatrix<f64>,
     /// How sure it is of where it projects a point; `None` where it was given, or where its motion is open.
     pub projection: Option<ProjectionUncertainty>,
@@ -83,28 +83,28 @@ pub struct CameraEstimate {
     /// corner, and their deviations are the least that they can be; or hardly any, so that neither the
     /// value nor the deviation of one alone means anything.
     pub ill_conditioned: Vec<String>,
-    /// Where it is on the rig.
+    /// Pose on the rig: from the rig frame to the camera frame, mm.
     pub camera_from_rig: Pose,
-    /// Standard deviations of that: of a turn (rad) and a move (mm) along the camera's axes; `None`
+    /// Standard deviations of that pose: of a rotation (rad) and a translation (mm) about the camera's axes; `None`
     /// where it was not to be found, as of the first camera, which is the rig.
     pub pose_sd: Option<[f64; 6]>,
-    /// The same as the frames agree with each other; `None` where it was not to be found, or of too
-    /// few frames.
+    /// The same as the frames agree with each other; `None` where it was not to be found, or of too few frames.
     pub observed_pose_sd: Option<[f64; 6]>,
-    /// Its views that took part, in the order of the frames.
+    /// The views that took part, in the order of the frames.
     pub views: Vec<ViewEstimate>,
     /// Root mean square error of a coordinate over all its views, px.
     pub rms_px: f64,
 }
 
-/// A moment at which pictures were taken.
+/// A moment at which the cameras took pictures, and the pose of the target in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameEstimate {
-    /// Its name.
+    /// Name of the frame: that of its views.
     pub name: String,
-    /// Where the target was.
+    /// Pose of the target: from the target frame to the rig frame, mm. Of a single camera the rig frame is the camera
+    /// frame.
     pub rig_from_target: Pose,
-    /// Standard deviations of that: of a turn (rad) and a move (mm) along the rig's axes.
+    /// Standard deviations of that pose: of a rotation (rad) and a translation (mm) about the rig's axes.
     pub pose_sd: [f64; 6],
     /// Root mean square error of a coordinate over all cameras, px.
     pub rms_px: f64,
@@ -113,15 +113,15 @@ pub struct FrameEstimate {
 /// A parameter of a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// Its name, such as `k1`.
+    /// Name, such as `k1`.
     pub name: String,
-    /// Its value; lengths in px or mm.
+    /// Value: px for focal lengths and the principal point, mm for shifts of the pupil, else without unit.
     pub value: f64,
-    /// Its standard deviation; `None` where it was not to be found.
+    /// Standard deviation, in the unit of the value; `None` where the parameter was given.
     pub sd: Option<f64>,
 }
 
-/// A view as its camera explains it.
+/// A view with its residuals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewEstimate {
     /// Name of the view.
@@ -130,7 +130,7 @@ pub struct ViewEstimate {
     pub image: String,
     /// Index of the frame in which it was taken.
     pub frame: usize,
-    /// camera_from_target.
+    /// Pose of the target: from the target frame to the camera frame, mm.
     pub pose: Pose,
     /// Root mean square error of a coordinate, px.
     pub rms_px: f64,
@@ -138,20 +138,20 @@ pub struct ViewEstimate {
     pub corners: Vec<Corner>,
 }
 
-/// A corner as its camera explains it.
+/// A corner with its residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner {
-    /// The panel.
+    /// The panel that it lies on.
     pub panel: PanelRef,
     /// Lattice row.
     pub row: i32,
     /// Lattice column.
     pub col: i32,
-    /// Where it was seen, px.
+    /// Detected position, px.
     pub pixel: DVec2,
-    /// Seen less predicted position, px.
+    /// Residual: detected less predicted position, px.
     pub residual: DVec2,
-    /// Whether it is farther off than corners are by chance.
+    /// Whether the residual is larger than chance explains, see [`Loss`](super::Loss).
     pub outlier: bool,
 }
 

@@ -2,7 +2,7 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-/// Something seen that took no part, and why.
+/// A view, a frame or a panel in a view that took no part in a calibration, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Excluded {
     /// Name of the camera, in a rig; `None` where all its cameras are meant.
@@ -14,9 +14,9 @@ pub struct Excluded {
     pub image: String,
     /// Id of the panel that is wrong in itself; `None` where the view does not fit as a whole.
     pub panel: Option<u32>,
-    /// How many corners went.
+    /// How many corners were left out by it.
     pub corners: usize,
-    /// Why.
+    /// Why it was left out.
     pub reason: Reason,
 }
 

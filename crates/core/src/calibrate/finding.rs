@@ -5,17 +5,17 @@ use glam::DVec2;
 use super::panel::PanelRef;
 use super::problem::Problem;
 
-/// Corners that are wrong together, and what they share.
+/// Gross errors of corners that have something in common.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Finding {
-    /// What they share.
+    /// What they have in common.
     pub shared: Shared,
-    /// How many corners that have it are outliers.
+    /// How many of these corners are outliers.
     pub outliers: usize,
-    /// How many corners have it.
+    /// How many corners have it in common.
     pub corners: usize,
-    /// Whether all of them took no part.
+    /// Whether all of them were left out of the calibration.
     pub left_out: bool,
 }
 
@@ -71,13 +71,13 @@ pub enum Shared {
     },
 }
 
-/// How far a panel is from its place.
+/// How far a panel is from its stated pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Moved {
-    /// How far its middle is, mm.
+    /// Distance of its middle from the stated position, mm.
     pub by_mm: f64,
-    /// By how much it is turned, rad.
+    /// Angle between its orientation and the stated one, rad.
     pub turned_rad: f64,
 }
 

@@ -16,23 +16,23 @@ const MORE_TERMS: usize = 6;
 /// ξ in the two valleys of double sphere.
 const VALLEYS: [f64; 2] = [-0.3, 0.3];
 
-/// What is to be found of a camera, beside fx, fy, cx and cy.
+/// A camera model: which parameters are estimated beside fx, fy, cx and cy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Model {
     /// Perspective with k1, k2, p1, p2.
     Radtan,
-    /// The same and k3.
+    /// As [`Self::Radtan`], and k3.
     Radtan5,
-    /// The same and k4, k5, k6.
+    /// As [`Self::Radtan5`], and k4, k5, k6.
     Rational,
-    /// The same and s1, s2, s3, s4.
+    /// As [`Self::Rational`], and s1, s2, s3, s4.
     ThinPrism,
-    /// Equidistant polynomial of so many terms.
+    /// Equidistant fisheye polynomial with so many coefficients k1, k2, ….
     KannalaBrandt(usize),
-    /// Extended unified model.
+    /// Extended unified camera model with α and β.
     Eucm,
-    /// Double sphere.
+    /// Double sphere model with ξ and α.
     DoubleSphere,
     /// Equidistant polynomial with a moving entrance pupil.
     Pupil,

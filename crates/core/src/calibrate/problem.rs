@@ -7,18 +7,18 @@ use super::shape::Shape;
 use super::view::LEAST_CORNERS;
 use crate::camera::{Camera, Pose};
 
-/// A corner that a camera saw.
+/// A corner of a panel that a camera detected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
     /// Lattice row on its panel.
     pub row: i32,
     /// Lattice column on its panel.
     pub col: i32,
-    /// Its place in the panel frame, mm.
+    /// Position in the panel frame, mm.
     pub panel_mm: DVec3,
-    /// Where it was seen, px.
+    /// Detected position, px.
     pub pixel: DVec2,
-    /// Covariance xx, xy, yy of that, px²; `None` where it is not known.
+    /// Covariance xx, xy, yy of the detected position, px²; `None` where it is not known.
     pub cov: Option<[f64; 3]>,
 }
 

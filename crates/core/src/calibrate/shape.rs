@@ -20,16 +20,16 @@ pub struct Shape {
     pub middle_mm: DVec3,
     /// Distance of its farthest corner from there, more than zero.
     pub reach_mm: f64,
-    /// b₁ … b₇, a₁, a₂, mm.
+    /// The coefficients b₁ … b₇ and a₁, a₂ of the formula, mm.
     pub coefficients_mm: [f64; COUNT],
 }
 
-/// The shape of a board as the views have it.
+/// The estimated shape of a board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoardShape {
     /// The shape.
     pub shape: Shape,
-    /// Standard deviations of its coefficients, mm.
+    /// Standard deviations of the coefficients of the shape, mm.
     pub sd_mm: [f64; COUNT],
     /// By how much the residuals fall for each coefficient, in a-posteriori variances: about 1 where
     /// the sheet is as planned.

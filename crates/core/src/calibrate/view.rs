@@ -48,7 +48,8 @@ pub enum Reference<'a> {
 /// What one picture shows of one rigid target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// Name, such as that of the detection's file.
+    /// Name of the view, such as that of the detection's file; views of several cameras with the same name belong to
+    /// one frame.
     pub name: String,
     /// File name of the picture.
     pub image: String,
@@ -61,9 +62,9 @@ pub struct View {
 /// A panel in a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sighting {
-    /// Which panel.
+    /// The panel.
     pub panel: PanelRef,
-    /// Its corners.
+    /// Its detected corners.
     pub observations: Vec<Observation>,
 }
 

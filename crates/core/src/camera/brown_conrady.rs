@@ -36,13 +36,13 @@ const ITERATIONS: usize = 20;
 /// narrower than a pixel. Only the ring is not valid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BrownConrady {
-    /// k1, k2, k3.
+    /// Radial coefficients k1, k2, k3 of the numerator.
     pub radial: [f64; 3],
-    /// p1, p2.
+    /// Tangential coefficients p1, p2.
     pub tangential: [f64; 2],
-    /// k4, k5, k6.
+    /// Radial coefficients k4, k5, k6 of the denominator.
     pub denominator: [f64; 3],
-    /// s1, s2, s3, s4.
+    /// Thin-prism coefficients s1, s2, s3, s4.
     pub prism: [f64; 4],
 }
 

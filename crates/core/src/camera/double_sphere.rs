@@ -15,9 +15,9 @@ use super::lens::{Imaged, LensLaw, Ray};
 /// w = α/(1 − α) up to α = ½, (1 − α)/α above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubleSphere {
-    /// ξ.
+    /// Distance ξ of the centres of the two spheres, in radii.
     pub xi: f64,
-    /// α.
+    /// Weight α of the second projection, 0 to 1.
     pub alpha: f64,
 }
 

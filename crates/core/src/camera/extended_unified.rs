@@ -12,9 +12,9 @@ use super::lens::{Imaged, LensLaw, Ray};
 /// Valid for 0 ≤ α ≤ 1 and β > 0, where Z > −w d with w = α/(1 − α) up to α = ½, (1 − α)/α above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExtendedUnified {
-    /// α.
+    /// Weight α of the distance from the centre, 0 to 1; 0 is a pinhole camera.
     pub alpha: f64,
-    /// β.
+    /// Form β of the surface that points are projected to; 1 is a sphere.
     pub beta: f64,
 }
 

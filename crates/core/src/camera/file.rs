@@ -34,6 +34,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::quantity;
+use crate::reading::in_words;
 
 use super::{
     BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
@@ -241,7 +242,7 @@ fn check_size(text: &str) -> Result<(), String> {
 }
 
 fn parse<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, CameraFileError> {
-    serde_yaml_ng::from_str(text).map_err(|error| CameraFileError::Yaml(error.to_string()))
+    serde_yaml_ng::from_str(text).map_err(|error| CameraFileError::Yaml(in_words(error)))
 }
 
 fn from_foreign(text: &str) -> Result<Own, CameraFileError> {

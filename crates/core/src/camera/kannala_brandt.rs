@@ -14,7 +14,7 @@ use super::lens::{Imaged, LensLaw, Ray};
 /// Valid up to θ = π, where r still grows with θ.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct KannalaBrandt {
-    /// k1, k2, …, at most [`MAX_LENS_PARAMETERS`](super::MAX_LENS_PARAMETERS).
+    /// Coefficients k1, k2, … of θ³, θ⁵, …, at most [`MAX_LENS_PARAMETERS`](super::MAX_LENS_PARAMETERS).
     pub k: Vec<f64>,
 }
 

@@ -25,7 +25,7 @@ pub enum Lens {
 pub struct Ray {
     /// Where it starts, mm: zero unless the lens is not central.
     pub origin: DVec3,
-    /// Its direction, of length 1.
+    /// Its direction, a unit vector of the camera frame.
     pub direction: DVec3,
 }
 
@@ -40,9 +40,9 @@ impl Ray {
 /// rows x', y'; columns X, Y, Z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imaged {
-    /// x', y'.
+    /// The point (x', y'), without unit.
     pub at: DVec2,
-    /// ∂(x', y')/∂(X, Y, Z).
+    /// ∂(x', y')/∂(X, Y, Z), 1/mm; a row for each of x', y'.
     pub by_point: [[f64; 3]; 2],
 }
 
@@ -97,12 +97,12 @@ impl Lens {
         }
     }
 
-    /// Its parameters' names, in the order of [`Self::parameters`].
+    /// The names of its parameters, such as `k1`, in the order of [`Self::parameters`].
     pub fn names(&self) -> Vec<String> {
         self.law().names()
     }
 
-    /// Its parameters.
+    /// The values of its parameters, in the order of [`Self::names`].
     pub fn parameters(&self) -> Vec<f64> {
         self.law().parameters()
     }

@@ -42,22 +42,23 @@ pub struct Camera {
     pub width: u32,
     /// Image height, px.
     pub height: u32,
-    /// Focal lengths fx, fy, px.
+    /// Focal lengths fx and fy: pixels per unit of the normalised image plane.
     pub focal_px: DVec2,
-    /// Principal point cx, cy, px.
+    /// Principal point cx, cy, px; the centre of the upper left pixel is (0, 0).
     pub centre_px: DVec2,
-    /// The lens.
+    /// Distortion: how directions become points of the normalised image plane.
     pub lens: Lens,
 }
 
 /// A pixel position with all its derivatives: rows are the pixel's x, y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
-    /// Position, px.
+    /// Position in the image, px.
     pub pixel: DVec2,
-    /// By the point of the camera frame, px/mm.
+    /// Derivatives by the coordinates X, Y, Z of the point in the camera frame, px/mm.
     pub by_point: [[f64; 3]; 2],
-    /// By each parameter of the camera, a pair each; only as many as it has are filled.
+    /// Derivatives of x and y by each parameter, in the order of [`Camera::parameter_names`]; entries beyond the
+    /// parameters that the camera has are not filled.
     pub by_parameters: [[f64; 2]; MAX_PARAMETERS],
 }
 

@@ -4,9 +4,9 @@ use glam::{DMat3, DQuat, DVec3};
 /// `camera_from_target`. Translations in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// R, a unit quaternion.
+    /// The rotation R, a unit quaternion.
     pub rotation: DQuat,
-    /// t, mm.
+    /// The translation t, mm.
     pub translation: DVec3,
 }
 
@@ -14,18 +14,18 @@ impl Pose {
     /// The motion that leaves every point where it is.
     pub const IDENTITY: Pose = Pose { rotation: DQuat::IDENTITY, translation: DVec3::ZERO };
 
-    /// Where `point` goes.
+    /// The point R·x + t of the second frame, mm, for a point x of the first.
     pub fn apply(&self, point: DVec3) -> DVec3 {
         self.rotation * point + self.translation
     }
 
-    /// The motion back.
+    /// The inverse motion: `target_from_camera` of `camera_from_target`.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.conjugate();
         Self { rotation, translation: -(rotation * self.translation) }
     }
 
-    /// This motion after `first`.
+    /// The composition of this motion after `first`: `a_from_c` of `a_from_b` and `b_from_c`.
     ///
     /// ```
     /// use deltille_core::camera::Pose;

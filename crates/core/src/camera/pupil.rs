@@ -28,11 +28,11 @@ const CONVERGED_RAD: f64 = 1e-14;
 /// Parameters in the order k1 … k5, p1, p2, e1, e2, e3.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pupil {
-    /// k1 … k5.
+    /// Coefficients k1 … k5 of the polynomial in θ.
     pub k: [f64; 5],
-    /// p1, p2.
+    /// Tangential coefficients p1, p2.
     pub tangential: [f64; 2],
-    /// e1, e2, e3, mm.
+    /// Coefficients e1, e2, e3 of the shift of the entrance pupil along the axis, mm.
     pub shift_mm: [f64; 3],
 }
 

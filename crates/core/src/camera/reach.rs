@@ -36,7 +36,7 @@ impl Camera {
         self.corners_px().map(|corner| self.radius_px(corner)).into_iter().fold(0.0, f64::max)
     }
 
-    /// The corners of the image.
+    /// The centres of the four corner pixels of the image, px.
     pub fn corners_px(&self) -> [DVec2; 4] {
         let [right, low] = [self.width, self.height].map(|side| f64::from(side) - 0.5);
         [[-0.5, -0.5], [right, -0.5], [-0.5, low], [right, low]].map(DVec2::from)

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::quantity;
 
-/// The tone curve of a camera, as the user tells it.
+/// The tone curve of a camera, as far as it is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Tone {
@@ -78,20 +78,20 @@ pub struct ToneEstimate {
     /// Median black of the corners, of full scale.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub black: f64,
-    /// Median white.
+    /// Median white of the corners, of full scale.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub white: f64,
     /// Curvature κ₀ between them: grey = middle + half·(S + (1 − S²)(κ₀ + κ₁ S + …)); 0 is linear,
     /// positive brightens.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub kappa: f64,
-    /// Its standard deviation.
+    /// Standard deviation of κ₀.
     #[serde(deserialize_with = "quantity::deviation::de")]
     pub kappa_deviation: f64,
-    /// The next term, κ₁.
+    /// The next coefficient of the curve, κ₁.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub kappa_odd: f64,
-    /// Whether it differs from a line by more than its deviation explains, and was used.
+    /// Whether the curve differs significantly from a line; only then corners were located with it.
     pub used: bool,
 }
 

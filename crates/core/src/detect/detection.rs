@@ -13,17 +13,18 @@ use crate::statistics::median;
 
 /// What was found in one image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Detection {
-    /// File name of the image, or a name given by the caller.
+    /// File name of the image, or any name that the caller gave to it.
     pub image: String,
-    /// Width, px.
+    /// Width of the image, px.
     pub width: u32,
-    /// Height, px.
+    /// Height of the image, px.
     pub height: u32,
     /// What the image's file says beside its pixels.
     #[serde(default, skip_serializing_if = "FileNotes::is_empty")]
     pub file: FileNotes,
-    /// Grids: labelled ones by panel id, then the others, largest first.
+    /// The grids that were found: labelled ones by the id of their panel, then the others, largest first.
     pub grids: Vec<Grid>,
     /// What was found of the camera's tone curve, where it was looked for.
     pub tone: Option<ToneEstimate>,
@@ -32,9 +33,16 @@ pub struct Detection {
     /// Why there are no labels, where labels were looked for and no grid has any; and why there are no grids.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<Reason>,
-    /// Milliseconds per stage; written only where it is asked for, as no two runs take the same.
+    /// Duration of each stage by its name, ms, where the detector has a clock; written only where it is asked for, as no two runs take the same.
     #[serde(default)]
     pub timing_ms: BTreeMap<String, f64>,
+}
+
+impl Detection {
+    /// What was found in an image of a width and height, px, by whatever found it.
+    pub fn new(image: impl Into<String>, [width, height]: [u32; 2], grids: Vec<Grid>) -> Self {
+        Self { image: image.into(), width, height, grids, ..Self::default() }
+    }
 }
 
 /// A connected piece of a tiling.
@@ -43,16 +51,16 @@ pub struct Detection {
 /// own origin, correct up to a motion of the lattice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
-    /// The tiling.
+    /// The tiling: triangles or squares.
     pub kind: GridKind,
-    /// Panel of the target, once known.
+    /// Id of the panel of the target; `None` where the grid has no labels.
     pub panel: Option<u32>,
     /// Whether it is seen as in a mirror. Its labels, if any, are those of the print.
     #[serde(default, skip_serializing_if = "is_false")]
     pub mirrored: bool,
-    /// Corners, ordered by row, then column.
+    /// The corners, ordered by row, then column.
     pub corners: Vec<GridCorner>,
-    /// Tags that were decoded and agree with the labelling.
+    /// The tags that were decoded and agree with the labels.
     pub tags: Vec<DecodedTag>,
 }
 
@@ -94,21 +102,21 @@ fn is_false(value: &bool) -> bool {
 /// A corner in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridCorner {
-    /// Lattice row.
+    /// Lattice row: on the panel, or relative where the grid has no labels.
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub row: i32,
-    /// Lattice column.
+    /// Lattice column, alike.
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub col: i32,
-    /// Corner id in the target, once known.
+    /// Id of the corner in the target; `None` where the grid has no labels.
     pub id: Option<u32>,
-    /// Position, px; pixel centres at integers.
+    /// Horizontal position, px, to the right; pixel centres at integers.
     #[serde(deserialize_with = "quantity::place_px::de")]
     pub x: f64,
-    /// Position, px, downwards.
+    /// Vertical position, px, downwards; pixel centres at integers.
     #[serde(deserialize_with = "quantity::place_px::de")]
     pub y: f64,
-    /// Covariance xx, xy, yy, px²; `None` where the method gives none.
+    /// Covariance xx, xy, yy of the position, px²; `None` where the method gives none.
     pub cov: Option<[f64; 3]>,
 }
 
@@ -127,9 +135,9 @@ impl GridCorner {
 /// A tag read in the image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DecodedTag {
-    /// Index of the code in its family.
+    /// Id of the tag: the index of its code in the family.
     pub id: u32,
-    /// Name of the family.
+    /// Name of the family, such as `delTag25h7`.
     pub family: String,
     /// Row of the tile's lower-left vertex, in the grid's rows.
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
@@ -137,6 +145,6 @@ pub struct DecodedTag {
     /// Column of the tile's lower-left vertex.
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     pub col: i32,
-    /// Corrected bits.
+    /// Number of bits that were misread and corrected.
     pub errors: u32,
 }

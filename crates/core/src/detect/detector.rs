@@ -12,7 +12,7 @@ use super::foreshortened::foreshortened_grids;
 use super::grow::{SaddleGrid, grids};
 use super::ink::{Ink, InkEstimate};
 use super::label::Budget;
-use super::labels::{Labels, MOST_CORNERS, report_once};
+use super::labels::{FoundGrid, Labels, MOST_CORNERS, report_once};
 use super::optics::Optics;
 use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
@@ -56,11 +56,17 @@ const MOST_REASONS: usize = 3;
 /// A grid of the other tiling with fewer corners is no reason to ask whether that was meant.
 const LEAST_OTHER_CORNERS: usize = 20;
 
-/// Options of a detector.
+/// Settings of a detector.
+///
+/// ```
+/// use deltille_core::detect::{DetectorConfig, Tone};
+///
+/// let config = DetectorConfig::default().tone(Tone::Linear).max_bit_errors(Some(1));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct DetectorConfig {
-    /// Most bits of a tag that may be corrected; `None` for ⌊(h − 1)/2⌋ of its family.
+    /// Most bits of a tag that may be corrected; `None` for ⌊(h − 1)/2⌋, where h is the distance of its family.
     pub max_bit_errors: Option<u32>,
     /// Whether grids seen as in a mirror get labels too. They are those of the print, and belong to no
     /// camera that looks at it: use them only to find out what was mirrored.
@@ -69,7 +75,7 @@ pub struct DetectorConfig {
     pub refinement: Refinement,
     /// The camera's tone curve.
     pub tone: Tone,
-    /// Growth of what is dark on the print.
+    /// How far ink has spread on the print.
     pub ink: Ink,
 }
 
@@ -98,7 +104,7 @@ impl DetectorConfig {
         Self { tone, ..self }
     }
 
-    /// With the growth of what is dark on the print.
+    /// With the spread of ink on the print.
     #[must_use]
     pub fn ink(self, ink: Ink) -> Self {
         Self { ink, ..self }
@@ -205,17 +211,19 @@ impl Detector {
         Self { finder, refiner, tag_areas, labels, edge_mm, ink: None, clock: None }
     }
 
-    /// The same detector, which tells how long its stages took by a clock.
+    /// The same detector with a clock, by which it notes how long each stage took, see [`Detection::timing_ms`].
     pub fn with_clock(self, clock: Clock) -> Self {
         Self { clock: Some(clock), ..self }
     }
 
-    /// The same detector of a print of which this is known.
+    /// The same detector for a print whose spread of ink was estimated before.
     pub fn with_ink(self, ink: InkEstimate) -> Self {
         Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), ..self }
     }
 
-    /// Finds grids in one image; `name` is only noted in the result.
+    /// Finds the grids in one image and labels their corners; `name` is only noted in the result.
+    ///
+    /// An image without a grid is no error: [`Detection::reasons`] says why there is none.
     pub fn detect<'a>(&self, image: impl Into<ImageView<'a>>, name: &str) -> Detection {
         self.detect_view(image.into(), name)
     }
@@ -317,9 +325,9 @@ impl Detector {
         left_out: &mut Vec<Reason>,
     ) -> Vec<(Grid, Option<Reason>)> {
         let mut budget = Budget::default();
+        let found = found.iter().map(|corners| FoundGrid { kind: kind::<N>(), corners });
         let mut grids: Vec<(Grid, Option<Reason>)> =
-            found.iter().flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
-        grids.iter_mut().for_each(|(grid, _)| grid.kind = kind::<N>());
+            found.flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
         let least = least_untagged_corners(kind::<N>()) as usize;
         let most = self.labels.most_corners();
         let mut refused = None;

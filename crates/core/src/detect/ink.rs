@@ -9,13 +9,13 @@ use crate::quantity;
 use crate::statistics::median;
 use crate::words::places;
 
-/// How far what is dark has grown, as the user tells it.
+/// How far ink has spread on the print, as far as it is known: dark areas have grown by it on every side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Ink {
     /// Estimated from the corners of each picture.
     #[default]
     Auto,
-    /// So much on every side, µm; less than 0 where it has shrunk.
+    /// Known: by so much on every side, µm; less than 0 where dark areas have shrunk.
     Um(f64),
 }
 
@@ -35,15 +35,15 @@ impl std::str::FromStr for Ink {
     }
 }
 
-/// The growth of what is dark that was found in a picture, on every side.
+/// The spread of ink that was found in a picture: how far dark areas have grown on every side.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct InkEstimate {
-    /// In edges of a tile; less than 0 where it has shrunk.
+    /// The spread, in edge lengths of a tile; less than 0 where dark areas have shrunk.
     #[serde(deserialize_with = "quantity::figure::de")]
     pub edges: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the spread, in edge lengths of a tile.
     #[serde(deserialize_with = "quantity::deviation::de")]
     pub edges_deviation: f64,
     /// In µm of the print, where the target is known.
@@ -60,9 +60,9 @@ pub struct InkEstimate {
         deserialize_with = "quantity::deviation::de"
     )]
     pub um_deviation: Option<f64>,
-    /// Whether it differs from nothing by more than its deviation explains, and was used.
+    /// Whether the spread differs significantly from zero; only then corners were located with it.
     pub used: bool,
-    /// How many pictures say so.
+    /// From how many pictures it was estimated.
     pub pictures: u32,
 }
 
@@ -112,7 +112,7 @@ impl InkEstimate {
         })
     }
 
-    /// With µm of a print whose tiles have this edge.
+    /// The same with the spread in µm, of a print whose tiles have edges of `edge_mm`.
     pub fn on_print(self, edge_mm: f64) -> Self {
         let um = |edges: f64| Some(1e3 * edge_mm * edges);
         Self { um: um(self.edges), um_deviation: um(self.edges_deviation), ..self }

@@ -19,6 +19,13 @@ use crate::lattice::{GridKind, LatticeMap, Vertex};
 use crate::raster::ImageView;
 use crate::targets::{Target, zigzag_vertices};
 
+/// A grid of corners without labels, and its tiling.
+#[derive(Clone, Copy, Debug)]
+pub struct FoundGrid<'a> {
+    pub kind: GridKind,
+    pub corners: &'a SaddleGrid,
+}
+
 /// How corners get absolute labels.
 #[derive(Clone, Debug)]
 pub struct Labels {
@@ -88,43 +95,44 @@ impl Labels {
     pub fn label(
         &self,
         image: ImageView,
-        grid: &SaddleGrid,
+        found: FoundGrid,
         budget: &mut Budget,
     ) -> Vec<(Grid, Option<Reason>)> {
+        let grid = found.corners;
         let size = (image.width(), image.height());
         match &self.source {
-            Source::None => vec![(unlabelled(grid), None)],
+            Source::None => vec![(unlabelled(found), None)],
             Source::Outline(outline) => {
                 let fit = |grid: &SaddleGrid| fit_outline(grid, outline, false);
-                vec![self.on_outline(grid, outline.len(), size, fit)]
+                vec![self.on_outline(found, outline.len(), size, fit)]
             }
             Source::Rectangle(rectangle) => {
                 let fit = |grid: &SaddleGrid| fit_rectangle(grid, *rectangle, false);
                 let expected = rectangle.0 as usize * rectangle.1 as usize;
-                vec![self.on_outline(grid, expected, size, fit)]
+                vec![self.on_outline(found, expected, size, fit)]
             }
             Source::Target { tags, panels } => {
                 let evidence = tags.as_ref().map(|tags| tags.label(image, grid, budget));
-                let found = evidence.as_ref().map_or(&[][..], |evidence| &evidence.found);
-                if found.is_empty() {
-                    if let Some(by_outline) = on_untagged_panel(grid, panels, false) {
+                let labelled = evidence.as_ref().map_or(&[][..], |evidence| &evidence.found);
+                if labelled.is_empty() {
+                    if let Some(by_outline) = on_untagged_panel(found, panels, false) {
                         return vec![(by_outline, None)];
                     }
-                    if let Some(in_a_mirror) = on_untagged_panel(grid, panels, true) {
+                    if let Some(in_a_mirror) = on_untagged_panel(found, panels, true) {
                         let allowed = self.allow_mirrored;
-                        return vec![if allowed { (in_a_mirror, None) } else { in_mirror(grid) }];
+                        return vec![if allowed { (in_a_mirror, None) } else { in_mirror(found) }];
                     }
                     let why = match &evidence {
                         Some(evidence) => why::no_labels(evidence, grid, size),
                         None => why::no_outline(grid, self.most_corners(), size),
                     };
-                    return vec![(unlabelled(grid), Some(why))];
+                    return vec![(unlabelled(found), Some(why))];
                 }
-                if !self.allow_mirrored && found.iter().any(|labelled| labelled.mirrored) {
-                    return vec![in_mirror(grid)];
+                if !self.allow_mirrored && labelled.iter().any(|labelled| labelled.mirrored) {
+                    return vec![in_mirror(found)];
                 }
                 // What hangs on to labelled panels without being part of one is not reported.
-                found.iter().map(|l| (on_panel(grid, &panels[l.panel], l), None)).collect()
+                labelled.iter().map(|l| (on_panel(found, &panels[l.panel], l), None)).collect()
             }
         }
     }
@@ -150,30 +158,30 @@ impl Labels {
     /// A grid on the outline of an untagged board, which a mirror image may fit as well.
     fn on_outline(
         &self,
-        grid: &SaddleGrid,
+        found: FoundGrid,
         expected: usize,
         size: (usize, usize),
         fit: impl Fn(&SaddleGrid) -> Option<LatticeMap>,
     ) -> (Grid, Option<Reason>) {
-        if let Some(map) = fit(grid) {
+        if let Some(map) = fit(found.corners) {
             let label = |v| Some((map.apply(v), None));
-            return (relabelled(grid, label, None, Vec::new()), None);
+            return (relabelled(found, label, None, Vec::new()), None);
         }
-        let Some(map) = fit(&mirror_image(grid)) else {
-            return (unlabelled(grid), Some(why::no_outline(grid, expected, size)));
+        let Some(map) = fit(&mirror_image(found.corners)) else {
+            return (unlabelled(found), Some(why::no_outline(found.corners, expected, size)));
         };
         if !self.allow_mirrored {
-            return in_mirror(grid);
+            return in_mirror(found);
         }
         let label = |v| Some((map.apply(mirrored(v)), None));
-        (Grid { mirrored: true, ..relabelled(grid, label, None, Vec::new()) }, None)
+        (Grid { mirrored: true, ..relabelled(found, label, None, Vec::new()) }, None)
     }
 }
 
 /// A grid seen as in a mirror, which gets no labels.
-fn in_mirror(grid: &SaddleGrid) -> (Grid, Option<Reason>) {
-    let why = Reason::new(ReasonKind::Mirrored, [("corners", grid.len() as f64)]);
-    (Grid { mirrored: true, ..unlabelled(grid) }, Some(why))
+fn in_mirror(found: FoundGrid) -> (Grid, Option<Reason>) {
+    let why = Reason::new(ReasonKind::Mirrored, [("corners", found.corners.len() as f64)]);
+    (Grid { mirrored: true, ..unlabelled(found) }, Some(why))
 }
 
 /// Where a vertex lies in the mirror: rows and columns are exchanged, which leaves upright tiles upright and
@@ -213,22 +221,22 @@ pub(super) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) -> Option<Rea
     (elsewhere > 0).then(|| Reason::new(ReasonKind::SeenTwice, [("corners", elsewhere as f64)]))
 }
 
-fn unlabelled(grid: &SaddleGrid) -> Grid {
-    relabelled(grid, |v| Some((v, None)), None, Vec::new())
+fn unlabelled(found: FoundGrid) -> Grid {
+    relabelled(found, |v| Some((v, None)), None, Vec::new())
 }
 
-fn on_panel(grid: &SaddleGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid {
+fn on_panel(found: FoundGrid, panel: &TargetPanel, labelled: &Labelled) -> Grid {
     let label = |v: Vertex| {
         let vertex = *labelled.vertices.get(&v)?;
         Some((vertex, panel.corner_ids.get(&vertex).copied()))
     };
-    let labels = relabelled(grid, label, Some(panel.id), labelled.tags.clone());
+    let labels = relabelled(found, label, Some(panel.id), labelled.tags.clone());
     Grid { mirrored: labelled.mirrored, ..labels }
 }
 
 /// The grid, as it is seen or in a mirror, on the one untagged panel whose outline it fills.
-fn on_untagged_panel(grid: &SaddleGrid, panels: &[TargetPanel], is_mirrored: bool) -> Option<Grid> {
-    let turned = if is_mirrored { mirror_image(grid) } else { grid.clone() };
+fn on_untagged_panel(found: FoundGrid, panels: &[TargetPanel], is_mirrored: bool) -> Option<Grid> {
+    let turned = if is_mirrored { mirror_image(found.corners) } else { found.corners.clone() };
     let mut fitting = panels.iter().filter(|panel| !panel.tagged).filter_map(|panel| {
         let map = match panel.kind {
             GridKind::Deltille => {
@@ -247,18 +255,19 @@ fn on_untagged_panel(grid: &SaddleGrid, panels: &[TargetPanel], is_mirrored: boo
         let vertex = map.apply(if is_mirrored { mirrored(v) } else { v });
         Some((vertex, panel.corner_ids.get(&vertex).copied()))
     };
-    let labels = relabelled(grid, label, Some(panel.id), Vec::new());
+    let labels = relabelled(found, label, Some(panel.id), Vec::new());
     Some(Grid { mirrored: is_mirrored, ..labels })
 }
 
 /// A grid with new labels, ordered by them; corners without a label are left out.
 fn relabelled(
-    grid: &SaddleGrid,
+    found: FoundGrid,
     label: impl Fn(Vertex) -> Option<(Vertex, Option<u32>)>,
     panel: Option<u32>,
     tags: Vec<DecodedTag>,
 ) -> Grid {
-    let mut corners: Vec<GridCorner> = grid
+    let mut corners: Vec<GridCorner> = found
+        .corners
         .iter()
         .filter_map(|(&vertex, placed)| {
             let (Vertex { row, col }, id) = label(vertex)?;
@@ -267,5 +276,5 @@ fn relabelled(
         })
         .collect();
     corners.sort_by_key(|corner| (corner.row, corner.col));
-    Grid { kind: GridKind::Deltille, panel, mirrored: false, corners, tags }
+    Grid { kind: found.kind, panel, mirrored: false, corners, tags }
 }

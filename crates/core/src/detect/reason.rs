@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 use crate::quantity;
 use crate::words::counted;
 
-/// Why something has no labels.
+/// Why a picture, or a grid in it, has no labels. It is displayed as a sentence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Reason {
-    /// What is the matter.
+    /// The kind of reason.
     pub kind: ReasonKind,
     /// Index of the grid that it is about; `None` for the whole picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -27,7 +27,7 @@ pub struct Reason {
     pub figures: BTreeMap<String, f64>,
 }
 
-/// What may be the matter.
+/// The kinds of reasons, each with the names of its [`figures`](Reason::figures).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -107,6 +107,7 @@ impl fmt::Display for Reason {
     /// A sentence without its full stop.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let figure = |name| self.figure(name);
+        let count = |name, thing| counted(figure(name) as usize, thing);
         match self.kind {
             ReasonKind::NoCorners => write!(f, "nothing in the picture looks like a corner"),
             ReasonKind::TooDark => write!(
@@ -125,7 +126,7 @@ impl fmt::Display for Reason {
                 figure("blur_px")
             ),
             ReasonKind::NoGrid => {
-                write!(f, "{}, but no grid of them", counted(figure("corners") as usize, "corner"))
+                write!(f, "{}, but no grid of them", count("corners", "corner"))
             }
             ReasonKind::TooSmall => write!(
                 f,
@@ -134,7 +135,7 @@ impl fmt::Display for Reason {
                 figure("needed_edge_px")
             ),
             ReasonKind::OtherTiling => {
-                write!(f, "the {} corners are those of the other tiling", figure("corners"))
+                write!(f, "{} of the other tiling", count("corners", "corner"))
             }
             ReasonKind::UnreadableTags if !self.figures.contains_key("needed_bit_px") => write!(
                 f,
@@ -154,60 +155,59 @@ impl fmt::Display for Reason {
             ReasonKind::NoTiles => {
                 write!(
                     f,
-                    "among {} corners no tile that could carry a tag is whole",
-                    figure("corners")
+                    "among {} no tile that could carry a tag is whole",
+                    count("corners", "corner")
                 )
             }
             ReasonKind::NoTags => {
-                write!(f, "no tag is seen in {} tiles that could carry one", figure("tiles"))
+                write!(f, "no tag is seen in {} that could carry one", count("tiles", "tile"))
             }
             ReasonKind::OtherIds => write!(
                 f,
-                "{} tags have ids that the target does not have, {} for one: is it another target?",
-                figure("tags"),
+                "{} whose id the target does not have, such as {}: is it another target?",
+                count("tags", "tag"),
                 figure("id")
             ),
             ReasonKind::OtherLayout => write!(
                 f,
-                "tags of the target, but {} of {} tiles are not as they are around them on the target: is it another \
-                 target?",
+                "tags of the target, but tiles around them are not those of the target, {} of {}: is it another target?",
                 figure("disagreeing"),
                 figure("agreeing") + figure("disagreeing")
             ),
             ReasonKind::OtherFamily => write!(
                 f,
-                "{} tiles are read without doubt and are no tags of the target's family",
-                figure("tiles")
+                "in {} read without doubt there is no tag of the target's family",
+                count("tiles", "tile")
             ),
             ReasonKind::Mirrored => write!(
                 f,
-                "a grid of {} corners is seen as in a mirror; flip the picture, or allow mirrored labels",
-                figure("corners")
+                "a grid of {} is seen as in a mirror; flip the picture, or allow mirrored labels",
+                count("corners", "corner")
             ),
             ReasonKind::Ambiguous => {
-                write!(f, "a grid of {} corners could lie in more than one way", figure("corners"))
+                write!(f, "a grid of {} could lie in more than one way", count("corners", "corner"))
             }
             ReasonKind::NotWhole => write!(
                 f,
-                "a grid of {} corners is not the whole board of {}",
-                figure("corners"),
+                "a grid of {} is not the whole board of {}",
+                count("corners", "corner"),
                 figure("expected")
             ),
             ReasonKind::TooManyCorners => write!(
                 f,
-                "a grid of {} corners is larger than any board, which has at most {}",
-                figure("corners"),
+                "a grid of {} is larger than any board, which has at most {}",
+                count("corners", "corner"),
                 figure("expected")
             ),
             ReasonKind::CutByBorder => write!(
                 f,
-                "a grid of {} corners is cut by the border of the picture",
-                figure("corners")
+                "a grid of {} is cut by the border of the picture",
+                count("corners", "corner")
             ),
             ReasonKind::SeenTwice => write!(
                 f,
                 "{} left out: they show what is seen elsewhere in the picture too; is there a second copy of the target?",
-                counted(figure("corners") as usize, "corner")
+                count("corners", "corner")
             ),
             ReasonKind::TooManyGrids => {
                 write!(f, "the picture holds more grids, or corners, than are worth the time")

@@ -45,21 +45,21 @@ pub const MAX_WINDOW_PX: usize = 2 * MAX_RADIUS + 1;
 /// How positions are refined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Refinement {
-    /// The paper's: the umbilic point of a cubic, or the saddle of a quadric.
+    /// The umbilic point of a fitted cubic surface, as in the paper, or the saddle of a quadric.
     Polynomial,
     /// A blurred corner fitted to the pixels, from the polynomial's result.
     #[default]
     Model,
 }
 
-/// What came of a refinement.
+/// Which method gave a refined position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RefineStatus {
-    /// The method asked for has found the corner.
+    /// The method that was asked for.
     Ok,
     /// The model does not hold here; the position is the polynomial's.
     Polynomial,
-    /// No corner; the position is the start.
+    /// None, as there is no corner: the position is the start.
     Failed,
 }
 
@@ -67,9 +67,9 @@ pub enum RefineStatus {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Refined {
-    /// Position, px.
+    /// Position, px; pixel centres at integers.
     pub position: DVec2,
-    /// Covariance xx, xy, yy, px², where the method gives one.
+    /// Covariance xx, xy, yy of the position, px²; `None` where the method gives none.
     pub cov: Option<[f64; 3]>,
     /// Which method found it.
     pub status: RefineStatus,

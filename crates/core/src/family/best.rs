@@ -29,15 +29,27 @@ use crate::Clock;
 use crate::lattice::Dimension;
 
 /// What to search and for how long.
+///
+/// ```
+/// use deltille_core::family::best::{Best, Budget};
+/// use deltille_core::family::Control;
+/// use deltille_core::lattice::Dimension;
+///
+/// let search = Best::new(Dimension::from_bits(9)?, 5, Budget::Work(1)).seed(7);
+/// let family = search.family("own9h5", None, Control::default())?;
+/// assert!(!family.is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Best {
     /// Dimension of the tags.
     pub dimension: Dimension,
-    /// Distance h.
+    /// Least distance h between any two codes in any turn.
     pub distance: u32,
     /// Rules for single codes.
     pub rules: Rules,
-    /// How much of it.
+    /// How long to search.
     pub budget: Budget,
     /// Seed of all random choices.
     pub seed: u64,
@@ -45,6 +57,38 @@ pub struct Best {
     pub limit: Option<u64>,
     /// Whether local search may exchange codes at the end; without it the family is algebraic.
     pub exchange: bool,
+}
+
+impl Best {
+    /// A search for all codes that satisfy the published rules of their distance, local search included.
+    pub fn new(dimension: Dimension, distance: u32, budget: Budget) -> Self {
+        let rules = Rules::published(distance);
+        Self { dimension, distance, rules, budget, seed: 0, limit: None, exchange: true }
+    }
+
+    /// With other rules for single codes.
+    #[must_use]
+    pub fn rules(self, rules: Rules) -> Self {
+        Self { rules, ..self }
+    }
+
+    /// With other random choices.
+    #[must_use]
+    pub fn seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// With so many codes at most.
+    #[must_use]
+    pub fn limit(self, limit: Option<u64>) -> Self {
+        Self { limit, ..self }
+    }
+
+    /// With local search at the end, or without; see [`Self::exchange`].
+    #[must_use]
+    pub fn exchange(self, exchange: bool) -> Self {
+        Self { exchange, ..self }
+    }
 }
 
 /// How long a search goes on.
@@ -64,7 +108,7 @@ pub const DRAWS: u64 = 4;
 /// What a search starts from.
 #[derive(Clone, Debug)]
 pub struct Start {
-    /// The family on record.
+    /// Name of the family on record.
     pub family: String,
     /// Its codes, as far as they satisfy the rules.
     pub codes: Vec<u64>,
@@ -243,7 +287,7 @@ impl Best {
         let most = self.most();
         let mut best: Option<(Vec<u64>, Construction)> = None;
         if let Some(Start { codes, construction, .. }) = start {
-            control.report(0, 1000, codes.len());
+            control.tell(0, 1000, codes.len());
             let found =
                 self.exchanged(&screen, construction, codes, spent.until(0.0), &spent, control)?;
             best = Some(found);
@@ -274,7 +318,7 @@ impl Best {
             if best.as_ref().is_none_or(|(codes, _)| found.0.len() > codes.len()) {
                 best = Some(found);
             }
-            control.report(spent.thousandths(), 1000, best.as_ref().map_or(0, |b| b.0.len()));
+            control.tell(spent.thousandths(), 1000, best.as_ref().map_or(0, |b| b.0.len()));
         }
         let (codes, construction) = match best {
             Some(found) if !found.0.is_empty() => found,
@@ -351,7 +395,7 @@ impl Best {
                 spent.step();
             }
             let best = kept.first().map_or(0, |c| c.worth as usize);
-            control.report(spent.thousandths(), 1000, best.max(known));
+            control.tell(spent.thousandths(), 1000, best.max(known));
             if halt() || best >= enough || draw >= steps * BATCH * DRAWS {
                 return kept;
             }
@@ -524,7 +568,7 @@ impl Best {
             });
             let best = candidates.iter().map(|c| c.worth as usize).max().unwrap_or(0);
             spent.step();
-            control.report(spent.thousandths(), 1000, best.max(known));
+            control.tell(spent.thousandths(), 1000, best.max(known));
             if over() || candidates.is_empty() || best >= enough {
                 break;
             }
@@ -566,9 +610,9 @@ impl Best {
         let known = codes.len();
         let report = |progress: Progress| {
             spent.step();
-            control.report(spent.thousandths(), 1000, progress.codes.max(known));
+            control.tell(spent.thousandths(), 1000, progress.codes.max(known));
         };
-        let within = Control { report: Some(&report), ..control };
+        let within = control.report(&report);
         let polished = polish(screen, codes.clone(), effort, within, || is_past(end));
         if polished.len() <= codes.len() {
             return Ok((codes, Construction::Algebraic(construction)));
@@ -591,7 +635,7 @@ impl Best {
             control.check()?;
             return Err(FamilyError::field("codes", "none was found"));
         }
-        let search = Search { seed: self.seed, rounds: 3, steps: Search::STEPS };
+        let search = Search::new(self.seed, 3);
         let codes = search.codes(screen, control)?;
         Ok((codes, search.construction(search.rounds)))
     }

@@ -19,9 +19,9 @@ use crate::lattice::Dimension;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Bounds {
-    /// Delsarte's bound, a third of it.
+    /// A third of Delsarte's linear programming bound, as every tag takes three words.
     pub linear_programming: u64,
-    /// The sphere-packing bound, a third of it.
+    /// A third of the sphere-packing bound.
     pub sphere_packing: u64,
 }
 

@@ -16,6 +16,7 @@ pub struct Progress {
 
 /// What lets a long search be watched and stopped; the library itself prints nothing.
 #[derive(Clone, Copy, Default)]
+#[non_exhaustive]
 pub struct Control<'a> {
     /// Stops the search soon after it becomes true.
     pub cancel: Option<&'a AtomicBool>,
@@ -23,7 +24,19 @@ pub struct Control<'a> {
     pub report: Option<&'a (dyn Fn(Progress) + Sync)>,
 }
 
-impl Control<'_> {
+impl<'a> Control<'a> {
+    /// With a flag that stops the search soon after it becomes true.
+    #[must_use]
+    pub fn cancel(self, cancel: &'a AtomicBool) -> Self {
+        Self { cancel: Some(cancel), ..self }
+    }
+
+    /// With a function that is called now and then, from one thread at a time.
+    #[must_use]
+    pub fn report(self, report: &'a (dyn Fn(Progress) + Sync)) -> Self {
+        Self { report: Some(report), ..self }
+    }
+
     pub(super) fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
@@ -32,7 +45,7 @@ impl Control<'_> {
         if self.is_cancelled() { Err(FamilyError::Cancelled) } else { Ok(()) }
     }
 
-    pub(super) fn report(&self, done: u64, total: u64, codes: usize) {
+    pub(super) fn tell(&self, done: u64, total: u64, codes: usize) {
         if let Some(report) = self.report {
             report(Progress { done, total, codes });
         }

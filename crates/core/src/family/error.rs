@@ -1,3 +1,5 @@
+use crate::reading::in_words;
+
 /// What is wrong with a family, its text or its name.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -12,7 +14,7 @@ pub enum FamilyError {
         name: String,
     },
     /// Not JSON, cut off, or with a field missing, unknown or of the wrong type.
-    #[error("not a family file ({}); generate it anew with `Family::to_json`", plain(.0))]
+    #[error("not a family file: {}; generate it anew with `Family::to_json`", in_words(.0))]
     Json(#[from] serde_json::Error),
     /// Another schema, or another version of it.
     #[error(
@@ -54,20 +56,4 @@ impl FamilyError {
     pub fn is_broken_claim(&self) -> bool {
         matches!(self, Self::Claim { .. })
     }
-}
-
-/// Where a text is no family file, and why, in words that are not Rust's.
-fn plain(error: &serde_json::Error) -> String {
-    use serde_json::error::Category;
-    let text = error.to_string();
-    let named = ["unknown field", "missing field", "duplicate field"];
-    let problem = match error.classify() {
-        Category::Data if named.iter().any(|start| text.starts_with(start)) => {
-            text.split([',', ' ']).take(3).collect::<Vec<_>>().join(" ")
-        }
-        Category::Data => "there is a value of the wrong kind".to_owned(),
-        Category::Eof => "the text ends too early".to_owned(),
-        Category::Syntax | Category::Io => "the text is not JSON".to_owned(),
-    };
-    format!("line {}, column {}: {problem}", error.line(), error.column())
 }

@@ -48,7 +48,7 @@ pub(super) fn polish(
             break;
         }
         best = round(screen, &best, effort, number, halt);
-        control.report(u64::from(number) + 1, u64::from(effort.rounds), best.len());
+        control.tell(u64::from(number) + 1, u64::from(effort.rounds), best.len());
     }
     best
 }

@@ -10,6 +10,7 @@ use super::{Construction, Control, FamilyError, Screen};
 
 /// Parameters of a local search.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Search {
     /// Seed of the random choices.
     pub seed: u64,
@@ -22,6 +23,7 @@ pub struct Search {
 /// What whole rounds have found, to go on from there.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Checkpoint {
     /// Rounds that are done.
     pub rounds_done: u32,
@@ -32,6 +34,11 @@ pub struct Checkpoint {
 impl Search {
     /// Moves in a round of the shipped program.
     pub const STEPS: u64 = 200_000;
+
+    /// A search of so many rounds of [`Self::STEPS`] moves.
+    pub fn new(seed: u64, rounds: u32) -> Self {
+        Self { seed, rounds, steps: Self::STEPS }
+    }
 
     /// The codes found, in the order of a family.
     ///
@@ -72,7 +79,7 @@ impl Search {
             checkpoint.rounds_done += 1;
             let go_on = save(checkpoint);
             let (done, found) = (checkpoint.rounds_done, checkpoint.codes.len());
-            control.report(done.into(), self.rounds.into(), found);
+            control.tell(done.into(), self.rounds.into(), found);
             if !go_on {
                 break;
             }

@@ -40,7 +40,7 @@ impl TagWords {
         Self { kind, dimension, turned, neighbours, pairs: cells.neighbours().len() as u32 }
     }
 
-    /// The dimension.
+    /// The dimension of the tags.
     pub fn dimension(&self) -> Dimension {
         self.dimension
     }

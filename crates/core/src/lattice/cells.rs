@@ -149,7 +149,7 @@ impl TagCells {
         self.kind
     }
 
-    /// The dimension.
+    /// The dimension d of the tag.
     pub fn dimension(&self) -> Dimension {
         self.dimension
     }

@@ -46,11 +46,11 @@ pub struct SimulatedCorner {
     pub blur_px: f64,
     /// Half the contrast, of full scale.
     pub amplitude: f64,
-    /// Half-way between dark and bright.
+    /// Grey value half-way between dark and bright, of full scale.
     pub level: f64,
     /// Relative change of illumination per pixel, 0 in `light_centre`.
     pub slope: DVec2,
-    /// Where the illumination is 1, px.
+    /// Position at which the relative illumination is 1, px.
     pub light_centre: DVec2,
 }
 

@@ -15,19 +15,27 @@ const MAX_CHORD_ERROR_PX: f64 = 1e-4;
 const MAX_DIVISIONS: u32 = 10;
 
 /// Brightness and imperfections of a photograph.
+///
+/// ```
+/// use deltille_core::synth::Light;
+///
+/// let dim = Light::default().white(0.3).noise(0.02).seed(7);
+/// assert_eq!([dim.white, dim.blur_px], [0.3, 0.8]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Light {
-    /// Level of white paper, of 1.
+    /// Grey value of white paper; full scale is 1.
     pub white: f64,
-    /// Level of black print, of 1.
+    /// Grey value of black print; full scale is 1.
     pub black: f64,
-    /// Level of what is not the target, of 1.
+    /// Grey value of what is not the target; full scale is 1.
     pub background: f64,
     /// Relative change of illumination across the width and down the height of the image.
     pub gradient: DVec2,
     /// Standard deviation of the Gaussian blur, px.
     pub blur_px: f64,
-    /// Standard deviation of the Gaussian noise, of 1.
+    /// Standard deviation of the Gaussian noise; full scale is 1.
     pub noise: f64,
     /// Seed of the noise.
     pub seed: u64,
@@ -48,18 +56,63 @@ impl Default for Light {
     }
 }
 
+impl Light {
+    /// With white paper of this level, of full scale 1.
+    #[must_use]
+    pub fn white(self, white: f64) -> Self {
+        Self { white, ..self }
+    }
+
+    /// With black print of this level, of full scale 1.
+    #[must_use]
+    pub fn black(self, black: f64) -> Self {
+        Self { black, ..self }
+    }
+
+    /// With this level around the target, of full scale 1.
+    #[must_use]
+    pub fn background(self, background: f64) -> Self {
+        Self { background, ..self }
+    }
+
+    /// With an illumination that changes by these parts of itself across the width and down the height.
+    #[must_use]
+    pub fn gradient(self, gradient: DVec2) -> Self {
+        Self { gradient, ..self }
+    }
+
+    /// With a Gaussian blur of this standard deviation, px.
+    #[must_use]
+    pub fn blur_px(self, blur_px: f64) -> Self {
+        Self { blur_px, ..self }
+    }
+
+    /// With Gaussian noise of this standard deviation, of full scale 1.
+    #[must_use]
+    pub fn noise(self, noise: f64) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// With other noise of the same strength.
+    #[must_use]
+    pub fn seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+}
+
 /// A plane piece of the world: white paper with black outlines, in its own frame (mm, y up).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     /// Panel id.
     pub panel: u32,
-    /// target = pose · surface.
+    /// Pose of the surface: from its own frame to the target frame, mm.
     pub target_from_surface: Pose,
-    /// Outline of the paper, counter-clockwise.
+    /// Outline of the paper in the surface's frame, counter-clockwise, mm.
     pub paper_mm: Vec<DVec2>,
-    /// Black areas by the even-odd rule: each area with its holes; areas do not overlap.
+    /// Black areas in the surface's frame, mm: each a list of outlines, filled by the even-odd rule; areas do not
+    /// overlap.
     pub black_mm: Vec<Vec<Vec<DVec2>>>,
-    /// Corners: id, row, column and place.
+    /// Corners: id, lattice row, lattice column, and position in the surface's frame, mm.
     pub corners: Vec<(u32, i32, i32, DVec2)>,
 }
 
@@ -73,6 +126,7 @@ pub struct Scene {
 
 /// Where the corners of a synthetic image are.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Truth {
     /// All corners in the image.
     pub corners: Vec<TruthCorner>,
@@ -80,6 +134,7 @@ pub struct Truth {
 
 /// A visible corner.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TruthCorner {
     /// Panel id.
     pub panel: u32,
@@ -89,9 +144,9 @@ pub struct TruthCorner {
     pub row: i32,
     /// Lattice column.
     pub col: i32,
-    /// Position, px.
+    /// True horizontal position, px, to the right; pixel centres at integers.
     pub x: f64,
-    /// Position, px.
+    /// True vertical position, px, downwards.
     pub y: f64,
     /// Position in the target frame, mm.
     pub target_mm: DVec3,

@@ -12,6 +12,7 @@ use super::{
 use crate::json::{self, ReadError};
 use crate::lattice::Vertex;
 use crate::quantity;
+use crate::reading::in_words;
 
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/target/1";
@@ -46,7 +47,7 @@ const COVARIANCE_SLACK: f64 = 1e-6;
 #[non_exhaustive]
 pub enum TargetFileError {
     /// Not JSON, or cut off.
-    #[error("not a target file: {0}; make it anew with `Target::to_json`")]
+    #[error("not a target file: {}; make it anew with `Target::to_json`", in_words(.0))]
     Json(serde_json::Error),
     /// A file of something else.
     #[error(

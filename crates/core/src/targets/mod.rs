@@ -48,7 +48,7 @@ pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec
 pub use polyhedron::{Face, Polyhedron};
 pub use skeleton::Incircle;
 pub use skeleton::{Skeleton, SkeletonSpec};
-pub use spec::{BORDER_BITS, MOST_ROWS, SIDES, least_untagged_corners};
+pub use spec::{BORDER_BITS, FACE_TILES, MOST_ROWS, SIDES, least_untagged_corners};
 pub use spec::{
     BoardSpec, ListFormat, ListedSpec, SolidShape, SolidSpec, TagSheetSpec, TagSpec, TargetSpec,
 };
@@ -56,9 +56,9 @@ pub use spec::{
 /// A target: its panels, and the sheets they are printed on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
-    /// Name; the stem of the files made from it.
+    /// Name of the target, which is the stem of the names of its files.
     pub name: Name,
-    /// What was asked for.
+    /// The specification that the target was made from.
     pub spec: TargetSpec,
     /// The family of its tags; `None` on an untagged target.
     pub family: Option<FamilyRef>,
@@ -112,7 +112,7 @@ impl TagsIn {
     }
 }
 
-/// A planar piece of a target.
+/// A planar piece of a target: a board, or a face of a solid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
@@ -138,7 +138,7 @@ pub struct Panel {
     /// (`docs/formats.md`, “.dsc target descriptions”); it holds every corner.
     #[serde(deserialize_with = "quantity::side_of_matrix::de")]
     pub matrix: [u32; 2],
-    /// Pose of the panel frame in the target frame.
+    /// Pose of the panel: from the panel frame to the target frame.
     pub pose: PanelPose,
     /// Saddle points, ordered by row, then column.
     pub corners: Vec<Corner>,
@@ -170,7 +170,7 @@ pub struct PanelPose {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Corner {
-    /// Unique within the target.
+    /// Id of the corner, unique within the target.
     pub id: u32,
     /// Lattice row.
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
@@ -314,7 +314,7 @@ impl Target {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Placement {
-    /// Which panel.
+    /// Id of the panel.
     pub panel: u32,
     /// Counter-clockwise turn of the panel on the page, radians.
     #[serde(deserialize_with = "quantity::angle_rad::de")]

@@ -27,12 +27,12 @@ const SHORTEST_MM: f64 = 50.0;
 /// Margin unless another is asked for, mm. Office printers leave 3 to 5 mm blank.
 pub const DEFAULT_MARGIN_MM: f64 = 5.0;
 
-/// What to print on.
+/// The paper that a target is laid out on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperSpec {
     /// The paper; `None` for the smallest of A4, A3, A2, A1 and A0 that takes the board.
     pub size: Option<PaperSize>,
-    /// Which way it lies.
+    /// Whether the sheet stands upright or lies.
     pub orientation: Orientation,
     /// Width of the strip along the paper's edges that stays blank, mm.
     pub margin_mm: f64,
@@ -62,15 +62,15 @@ impl Default for PaperSpec {
     }
 }
 
-/// Which way a sheet lies.
+/// Whether a sheet stands upright or lies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Orientation {
     /// The one that takes the board.
     #[default]
     Auto,
-    /// Upright.
+    /// Upright: higher than wide.
     Portrait,
-    /// Lying.
+    /// Lying: wider than high.
     Landscape,
 }
 
@@ -107,7 +107,7 @@ pub enum PaperError {
     /// A side that is too short or too long.
     #[error("`{0}` is no paper: its sides must be {SHORTEST_MM} to {LONGEST_MM} mm long")]
     Side(String),
-    /// None of the three.
+    /// None of auto, portrait and landscape.
     #[error("`{0}` is none of auto, portrait, landscape")]
     Orientation(String),
 }

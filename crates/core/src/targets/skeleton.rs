@@ -55,11 +55,11 @@ impl Default for SkeletonSpec {
     }
 }
 
-/// The frame of a solid.
+/// The frame of a solid, to be printed in three dimensions.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Skeleton {
-    /// Its surface, mm.
+    /// Triangles of its surface in the target frame, counter-clockwise from outside, mm.
     pub triangles_mm: Vec<[DVec3; 3]>,
     /// Distance of the panels from the edges of their faces, mm.
     pub panel_inset_mm: f64,
@@ -148,11 +148,11 @@ impl Skeleton {
 
 /// The circle that touches the sides of a triangle in space.
 pub struct Incircle {
-    /// Its middle.
+    /// Centre of the circle.
     pub centre: DVec3,
-    /// Its radius, in the unit of the corners.
+    /// Radius of the circle, in the unit of the corners.
     pub radius: f64,
-    /// What stands upright on the triangle, of length 1.
+    /// Unit normal of the triangle.
     pub normal: DVec3,
 }
 

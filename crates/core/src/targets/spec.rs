@@ -35,7 +35,7 @@ const SOLID_EDGE_MM: std::ops::RangeInclusive<f64> = 10.0..=5000.0;
 
 /// Range of tiles along a side of a face: with fewer than six a face has at most six corners,
 /// and the detector takes so few for no grid.
-const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
+pub const FACE_TILES: std::ops::RangeInclusive<u32> = 6..=200;
 
 /// Farthest a mesh may lie from its origin, mm: meshes and bodies are written in single precision,
 /// which at 100 m leaves 0.01 mm.
@@ -49,7 +49,7 @@ const MOST_FACES: u32 = 10_000;
 /// on it does.
 pub const BORDER_BITS: std::ops::RangeInclusive<f64> = 0.6..=10.0;
 
-/// What was asked for: enough to make the target again.
+/// The specification of a target: enough to make it again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum TargetSpec {
@@ -70,9 +70,9 @@ pub struct BoardSpec {
     /// The tiling.
     #[serde(default, skip_serializing_if = "is_deltille")]
     pub grid: GridKind,
-    /// Rows of corners.
+    /// Number of rows of corners, 2 to 500.
     pub rows: u32,
-    /// Corners in each row.
+    /// Number of corners in each row, 2 to 500.
     pub cols: u32,
     /// Length of a tile's edge, mm.
     pub edge_mm: f64,
@@ -84,7 +84,7 @@ pub struct BoardSpec {
     pub board_id: u32,
     /// Tags; `None` for an untagged board.
     pub tags: Option<TagSpec>,
-    /// Exchange black and white.
+    /// Whether black and white are exchanged: white tiles on a black field.
     pub inverted: bool,
 }
 
@@ -104,11 +104,11 @@ pub struct TagSpec {
     pub family: String,
     /// Id of the first tag; the others follow, by row, then column, board after board.
     pub first_id: u32,
-    /// A tag in every n-th row and column.
+    /// Every how many rows and columns there is a tag.
     pub spacing: u32,
-    /// Border in bit-widths along the edge.
+    /// Width of the border, in widths of a bit, 0.6 to 10.
     pub border_bits: f64,
-    /// Which squares of a checkerboard carry them.
+    /// Which squares of a checkerboard carry the tags.
     #[serde(default, skip_serializing_if = "TagsIn::is_black")]
     pub tags_in: TagsIn,
 }
@@ -123,7 +123,7 @@ pub struct TagSheetSpec {
     pub ids: Vec<u32>,
     /// Length of a tag's edge, mm.
     pub edge_mm: f64,
-    /// Border in bit-widths along the edge.
+    /// Width of the border, in widths of a bit, 0.6 to 10.
     pub border_bits: f64,
 }
 
@@ -131,17 +131,17 @@ pub struct TagSheetSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidSpec {
-    /// Which solid.
+    /// The shape of the solid.
     pub shape: SolidShape,
     /// Length of the solid's edges, mm; on a mesh their mean, to which it is scaled.
     pub edge_mm: f64,
-    /// Black tiles along each side of a face.
+    /// Number of black tiles along each side of a face, 6 to 200.
     pub tiles: u32,
     /// Blank between a face's edges and its tiles, mm.
     pub margin_mm: f64,
     /// Id of the first face's board; the others follow in the order of the faces.
     pub board_id: u32,
-    /// Tags: faces could not be told apart without.
+    /// The tags, without which faces could not be told apart.
     pub tags: TagSpec,
     /// A frame that holds the faces as panels, if one is to be printed.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -25,7 +25,7 @@ static MOVING: Mutex<()> = Mutex::new(());
 pub struct WriteError {
     /// The file asked for.
     pub path: PathBuf,
-    /// Why.
+    /// What the system says.
     pub source: io::Error,
 }
 

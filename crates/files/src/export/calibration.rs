@@ -14,21 +14,21 @@ use deltille_core::detect::InkEstimate;
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
 
-/// What a calibration tells of the sheet that was photographed.
+/// What a calibration found out about the printed sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sheet {
-    /// How the print came out across and up the sheet.
+    /// Print scale, measured over stated length, across and up the sheet; `None` where it was not measured.
     pub print_scale: Option<[f64; 2]>,
-    /// How the sheet differs from its plan then.
+    /// How the sheet differs from its plan after that scale; `None` where no shape was estimated.
     pub shape: Option<Shape>,
 }
 
 /// What is known of the print that was photographed, beside its plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Print {
-    /// How it came out across and up its sheet, where that was measured.
+    /// Print scale, measured over stated length, across and up the sheet; `None` where it was not measured.
     pub scale: Option<[f64; 2]>,
-    /// How far ink has spread, as the detections tell.
+    /// The spread of ink, from the detections; `None` where it was not estimated.
     pub ink: Option<InkEstimate>,
 }
 

@@ -8,6 +8,7 @@ use deltille_core::detect::{Detection, Grid, InkEstimate, Reason, ToneEstimate};
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
 use deltille_core::raster::FileNotes;
+use deltille_core::reading::in_words;
 
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/detection/1";
@@ -17,7 +18,7 @@ pub const SCHEMA: &str = "deltille/detection/1";
 #[non_exhaustive]
 pub enum DetectionFileError {
     /// Not JSON, or cut off.
-    #[error("not a detection file: {0}; make it anew with `detection::write`")]
+    #[error("not a detection file: {}; make it anew with `detection::write`", in_words(.0))]
     Json(serde_json::Error),
     /// Another schema, or another version of it.
     #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
@@ -100,7 +101,7 @@ struct DetectionFile {
 /// use deltille_core::detect::Detection;
 /// use deltille_files::export::detection;
 ///
-/// let found = Detection { image: "desk.png".to_owned(), width: 640, height: 480, ..Detection::default() };
+/// let found = Detection::new("desk.png", [640, 480], Vec::new());
 /// assert_eq!(detection::read(&detection::write(&found))?, found);
 /// # Ok::<(), detection::DetectionFileError>(())
 /// ```
@@ -115,7 +116,7 @@ pub fn write_line(detection: &Detection) -> String {
 
 impl DetectionFile {
     fn of(detection: &Detection) -> Self {
-        let Detection { image, width, height, file, grids, tone, ink, reasons, timing_ms } =
+        let Detection { image, width, height, file, grids, tone, ink, reasons, timing_ms, .. } =
             detection.clone();
         Self {
             schema: SCHEMA.to_owned(),
@@ -176,7 +177,11 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
             }
         }
     }
-    Ok(Detection { image, width, height, file, grids, tone, ink, reasons, timing_ms })
+    let mut detection = Detection::new(image, [width, height], grids);
+    detection.file = file;
+    (detection.tone, detection.ink) = (tone, ink);
+    (detection.reasons, detection.timing_ms) = (reasons, timing_ms);
+    Ok(detection)
 }
 
 /// Checks the covariance of a corner.

@@ -94,9 +94,9 @@ pub enum Kind {
 /// A limit that a file passes.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub struct Exceeded {
-    /// Which one.
+    /// Which limit.
     pub kind: Kind,
-    /// Its value.
+    /// The value of the limit, in its unit: bytes, pixels, parts, levels or seconds.
     pub limit: f64,
 }
 

@@ -30,7 +30,7 @@ pub use survey::{Survey, SurveyedView};
 pub use target_map::target_map_svg;
 pub use thumbnail::thumbnail;
 
-/// What a page tells.
+/// What the page about a calibration shows.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Report<'a> {
@@ -55,7 +55,7 @@ impl<'a> Report<'a> {
         Self { title, estimate, diagnoses, stated, print, thumbnails: BTreeMap::new() }
     }
 
-    /// The page.
+    /// The page as HTML in one file, with its pictures within.
     pub fn html(&self) -> String {
         page::html(self)
     }

@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use super::glb_json::{Accessor, Material, Node, Primitive, Root, Sampler, Surface};
 use super::{Findings, Words, is_creator, png};
+use deltille_core::reading::in_words;
 use deltille_files::export::gltf::{
     ARRAY_BUFFER, CLAMP_TO_EDGE, ELEMENT_ARRAY_BUFFER, FLOAT, LINEAR, LINEAR_MIPMAP_LINEAR,
     MATERIAL, UNSIGNED_SHORT,
@@ -32,7 +33,7 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
             let place = error.path().to_string();
             let inner = error.into_inner();
             if !inner.is_data() {
-                return Err(format!("not glTF: {inner}"));
+                return Err(format!("not glTF: {}", in_words(inner)));
             }
             let text = inner.to_string();
             let what = text.split(", expected").next().unwrap_or_default();
@@ -41,7 +42,7 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
         }
     };
     let value: Value =
-        serde_json::from_slice(json).map_err(|error| format!("not glTF: {error}"))?;
+        serde_json::from_slice(json).map_err(|error| format!("not glTF: {}", in_words(error)))?;
     if value.is_array() || !has_objects(&value) {
         found.add("the JSON", "a list for an object or within a list");
         return Ok(found);

@@ -12,158 +12,77 @@ pub fn board() -> Vec<Case> {
     cases(
         "b.svg",
         vec![
-            (
-                "a web page over the board",
-                "element <foreignObject>",
-                over("<foreignObject width=\"297\" height=\"210\"/>"),
-            ),
-            (
-                "hidden in print",
-                "element <style>",
-                over("<style>@media print { * { display: none } }</style>"),
-            ),
+            ("a web page over the board", over("<foreignObject width=\"297\" height=\"210\"/>")),
+            ("hidden in print", over("<style>@media print { * { display: none } }</style>")),
             (
                 "hidden on dark screens",
-                "element <style>",
                 over("<style>@media (prefers-color-scheme: dark) { path { fill: #fff } }</style>"),
             ),
-            (
-                "a script",
-                "element <script>",
-                over("<script>document.rootElement.remove()</script>"),
-            ),
+            ("a script", over("<script>document.rootElement.remove()</script>")),
             (
                 "an animation",
-                "element <animate>",
                 before("</g>", "<animate attributeName=\"fill\" to=\"#fff\" dur=\"1s\"/>"),
             ),
             (
                 "an animated value",
-                "element <set>",
                 before("</g>", "<set attributeName=\"fill\" to=\"#fff\" begin=\"1s\"/>"),
             ),
-            (
-                "a moving board",
-                "element <animateTransform>",
-                before("</g>", "<animateTransform attributeName=\"transform\"/>"),
-            ),
+            ("a moving board", before("</g>", "<animateTransform attributeName=\"transform\"/>")),
             (
                 "an external picture",
-                "element <image>",
                 over("<image href=\"http://example.org/a.png\" width=\"9\" height=\"9\"/>"),
             ),
-            ("an external part", "element <use>", over("<use href=\"other.svg#a\"/>")),
-            ("text in a font", "element <text>", over("<text x=\"9\" y=\"9\">5</text>")),
-            ("a choice by language", "element <switch>", over("<switch/>")),
-            ("a link", "element <a>", over("<a href=\"http://example.org\"/>")),
-            ("a filter", "element <filter>", over("<filter id=\"f\"/>")),
+            ("an external part", over("<use href=\"other.svg#a\"/>")),
+            ("text in a font", over("<text x=\"9\" y=\"9\">5</text>")),
+            ("a choice by language", over("<switch/>")),
+            ("a link", over("<a href=\"http://example.org\"/>")),
+            ("a filter", over("<filter id=\"f\"/>")),
             (
                 "a tile twice",
-                "a mark that is drawn twice",
                 line("<path", |path| format!("{path}\n{}", path.replace("id=\"", "id=\"x"))),
             ),
-            (
-                "a hairline",
-                "a mark so thin",
-                swap("<path ", "<path d=\"M9 9L20 9Z\" id=\"x\"/><path "),
-            ),
+            ("a hairline", swap("<path ", "<path d=\"M9 9L20 9Z\" id=\"x\"/><path ")),
             (
                 "a dot of dust",
-                "spot of",
                 swap("<path ", "<path d=\"M3 3L3.03 3L3.03 3.03L3 3.03Z\" id=\"x\"/><path "),
             ),
-            ("a mask", "element <mask>", over("<mask id=\"m\"/>")),
-            ("a pattern", "element <pattern>", over("<pattern id=\"p\"/>")),
-            ("a view of a part", "element <view>", over("<view id=\"v\" viewBox=\"0 0 9 9\"/>")),
-            ("a drawing within", "element <svg> within <svg>", over("<svg/>")),
+            ("a mask", over("<mask id=\"m\"/>")),
+            ("a pattern", over("<pattern id=\"p\"/>")),
+            ("a view of a part", over("<view id=\"v\" viewBox=\"0 0 9 9\"/>")),
+            ("a drawing within", over("<svg/>")),
             (
                 "a path of another language",
-                "element <path>",
                 over("<path xmlns=\"http://example.org\" d=\"M0 0Z\"/>"),
             ),
-            (
-                "no paper",
-                "no paper below the marks",
-                swap("<rect fill=\"#fff\" height=\"100%\" width=\"100%\"/>", ""),
-            ),
-            (
-                "a white page over all",
-                "paper above the marks",
-                over("<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>"),
-            ),
-            ("style of the marks", "attribute style of <g>", on("g", "style=\"display: none\"")),
-            ("a class", "attribute class of <g>", on("g", "class=\"a\"")),
-            ("opacity of the marks", "attribute opacity of <g>", on("g", "opacity=\"0\"")),
-            ("a transform", "attribute transform of <g>", on("g", "transform=\"rotate(1)\"")),
-            (
-                "a blend mode",
-                "attribute mix-blend-mode of <g>",
-                on("g", "mix-blend-mode=\"screen\""),
-            ),
-            ("a hidden tile", "attribute display of <path>", on("path", "display=\"none\"")),
-            (
-                "an invisible tile",
-                "attribute visibility of <path>",
-                on("path", "visibility=\"hidden\""),
-            ),
-            (
-                "a clipped tile",
-                "attribute clip-path of <path>",
-                on("path", "clip-path=\"url(#c)\""),
-            ),
-            (
-                "a dashed tile",
-                "attribute stroke-dasharray of <path>",
-                on("path", "stroke-dasharray=\"1 1\""),
-            ),
-            (
-                "code that is run when shown",
-                "attribute onload of <svg>",
-                on("svg", "onload=\"alert()\""),
-            ),
-            (
-                "another aspect",
-                "attribute preserveAspectRatio of <svg>",
-                on("svg", "preserveAspectRatio=\"none\""),
-            ),
-            ("white marks", "fill=\"#fff\" of <g>", swap("fill=\"#000\"", "fill=\"#fff\"")),
-            (
-                "marks of the reader's colour",
-                "fill=\"currentColor\" of <g>",
-                swap("fill=\"#000\"", "fill=\"currentColor\""),
-            ),
-            (
-                "marks of a pattern",
-                "fill=\"url(#p)\" of <g>",
-                swap("fill=\"#000\"", "fill=\"url(#p)\""),
-            ),
-            ("another rule of filling", "fill-rule=\"nonzero\" of <g>", swap("evenodd", "nonzero")),
-            ("black paper", "fill=\"#000\" of <rect>", swap("fill=\"#fff\"", "fill=\"#000\"")),
-            (
-                "a tile that ends early",
-                "d=\"M",
-                line("<path", |line| line.replacen("Z\"", "L1\"", 1)),
-            ),
+            ("no paper", swap("<rect fill=\"#fff\" height=\"100%\" width=\"100%\"/>", "")),
+            ("a white page over all", over("<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>")),
+            ("style of the marks", on("g", "style=\"display: none\"")),
+            ("a class", on("g", "class=\"a\"")),
+            ("opacity of the marks", on("g", "opacity=\"0\"")),
+            ("a transform", on("g", "transform=\"rotate(1)\"")),
+            ("a blend mode", on("g", "mix-blend-mode=\"screen\"")),
+            ("a hidden tile", on("path", "display=\"none\"")),
+            ("an invisible tile", on("path", "visibility=\"hidden\"")),
+            ("a clipped tile", on("path", "clip-path=\"url(#c)\"")),
+            ("a dashed tile", on("path", "stroke-dasharray=\"1 1\"")),
+            ("code that is run when shown", on("svg", "onload=\"alert()\"")),
+            ("another aspect", on("svg", "preserveAspectRatio=\"none\"")),
+            ("white marks", swap("fill=\"#000\"", "fill=\"#fff\"")),
+            ("marks of the reader's colour", swap("fill=\"#000\"", "fill=\"currentColor\"")),
+            ("marks of a pattern", swap("fill=\"#000\"", "fill=\"url(#p)\"")),
+            ("another rule of filling", swap("evenodd", "nonzero")),
+            ("black paper", swap("fill=\"#fff\"", "fill=\"#000\"")),
+            ("a tile that ends early", line("<path", |line| line.replacen("Z\"", "L1\"", 1))),
             (
                 "a tile with an arc",
-                "d=\"M",
                 line("<path", |line| line.replacen("Z\"", "A1 1 0 0 0 2 2Z\"", 1)),
             ),
-            (
-                "a style sheet",
-                "processing instruction <?xml-stylesheet?>",
-                before("<svg", "<?xml-stylesheet href=\"a.css\"?>"),
-            ),
-            (
-                "entities",
-                "a document type declaration",
-                before("<svg", "<!DOCTYPE svg [<!ENTITY a \"b\">]>"),
-            ),
-            ("another encoding", "instead of <?xml", swap("UTF-8", "UTF-16")),
-            ("words on the page", "text between elements", over("words")),
+            ("a style sheet", before("<svg", "<?xml-stylesheet href=\"a.css\"?>")),
+            ("entities", before("<svg", "<!DOCTYPE svg [<!ENTITY a \"b\">]>")),
+            ("another encoding", swap("UTF-8", "UTF-16")),
+            ("words on the page", over("words")),
             (
                 "an edge that bulges by 0.1 mm",
-                "beside its place, towards white",
                 on_tile(|d| {
                     let [[ax, ay], [bx, by], [cx, cy]] = vertices(d);
                     let bulge = [(ax + bx) / 2.0, (ay + by) / 2.0 + 0.1];
@@ -172,7 +91,6 @@ pub fn board() -> Vec<Case> {
             ),
             (
                 "a tile grown by 0.06 mm on one side",
-                "beside its place, towards white",
                 on_tile(|d| {
                     let [[ax, ay], [bx, by], [cx, cy]] = vertices(d);
                     let (start, end) = (0.1 * (bx - ax), 0.9 * (bx - ax));
@@ -189,65 +107,40 @@ pub fn board() -> Vec<Case> {
             ),
             (
                 "a tile that is missing",
-                "tile missing at row 1 col 1",
                 text(|text| {
                     let tile = text.lines().find(|line| line.contains("tile-0-r1-c1\"")).unwrap();
                     text.replacen(tile, "", 1)
                 }),
             ),
-            ("another page", "page of 298.000", {
+            ("another page", {
                 text(|text| text.replacen("297mm", "298mm", 1).replacen("0 0 297", "0 0 298", 1))
             }),
-            ("a drawing of another shape", "no page in mm", swap("297mm", "298mm")),
-            ("a page of another unit", "no page in mm", swap("297mm", "29.7cm")),
-            ("a unit in capitals", "no page in mm", swap("297mm", "297MM")),
-            ("no width", "no width of <svg>", swap(" width=\"297mm\"", "")),
-            ("no part of the drawing", "no viewBox of <svg>", swap(" viewBox=\"0 0 297 210\"", "")),
-            ("a byte order mark", "a byte order mark", before("<?xml", "\u{feff}")),
-            ("another version of XML", "instead of <?xml version=\"1.0\"", swap("1.0", "1.1")),
-            (
-                "no declaration",
-                "instead of <?xml",
-                swap("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", ""),
-            ),
-            ("another alphabet", "instead of <?xml", {
+            ("a drawing of another shape", swap("297mm", "298mm")),
+            ("a page of another unit", swap("297mm", "29.7cm")),
+            ("a unit in capitals", swap("297mm", "297MM")),
+            ("no width", swap(" width=\"297mm\"", "")),
+            ("no part of the drawing", swap(" viewBox=\"0 0 297 210\"", "")),
+            ("a byte order mark", before("<?xml", "\u{feff}")),
+            ("another version of XML", swap("1.0", "1.1")),
+            ("no declaration", swap("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", "")),
+            ("another alphabet", {
                 Box::new(|bytes| bytes.iter().flat_map(|&byte| [byte, 0]).collect())
             }),
-            ("a comment", "a comment", over("<!-- desk -->")),
-            (
-                "a section of characters",
-                "a CDATA section",
-                swap("<title>b<", "<title><![CDATA[b]]><"),
-            ),
-            ("another title", "a title other", swap("<title>b<", "<title>c<")),
-            ("no title", "a title other", swap("<title>b</title>", "")),
-            ("two titles", "a title other", before("<title>", "<title>b</title>")),
-            ("another description", "a desc that", swap("20 corners", "21 corners")),
-            (
-                "a value with references",
-                "that is spelled otherwise",
-                swap("\"#000\"", "\"&#35;000\""),
-            ),
-            ("kept blanks", "attribute space of", on("svg", "xml:space=\"preserve\"")),
-            (
-                "marks without a rule of filling",
-                "no fill-rule of <g>",
-                swap(" fill-rule=\"evenodd\"", ""),
-            ),
-            ("marks without a colour", "no fill of <g>", swap("<g fill=\"#000\"", "<g")),
-            ("a mark of no paint", "not painted", swap("<path ", "<path fill=\"none\" ")),
-            (
-                "marks off the page",
-                "over the edge of the page",
-                before("</g>", "<path d=\"M300 9L310 9L310 19Z\" id=\"a\"/>"),
-            ),
-            ("numbers without blanks", "d=\"M", line("<path", |line| line.replacen("L", " L", 1))),
-            (
-                "another scale",
-                "scale 0.99",
-                swap("viewBox=\"0 0 297 210\"", "viewBox=\"0 0 300 212.1212\""),
-            ),
-            ("a second document", "not a readable SVG", append("<svg/>")),
+            ("a comment", over("<!-- desk -->")),
+            ("a section of characters", swap("<title>b<", "<title><![CDATA[b]]><")),
+            ("another title", swap("<title>b<", "<title>c<")),
+            ("no title", swap("<title>b</title>", "")),
+            ("two titles", before("<title>", "<title>b</title>")),
+            ("another description", swap("20 corners", "21 corners")),
+            ("a value with references", swap("\"#000\"", "\"&#35;000\"")),
+            ("kept blanks", on("svg", "xml:space=\"preserve\"")),
+            ("marks without a rule of filling", swap(" fill-rule=\"evenodd\"", "")),
+            ("marks without a colour", swap("<g fill=\"#000\"", "<g")),
+            ("a mark of no paint", swap("<path ", "<path fill=\"none\" ")),
+            ("marks off the page", before("</g>", "<path d=\"M300 9L310 9L310 19Z\" id=\"a\"/>")),
+            ("numbers without blanks", line("<path", |line| line.replacen("L", " L", 1))),
+            ("another scale", swap("viewBox=\"0 0 297 210\"", "viewBox=\"0 0 300 212.1212\"")),
+            ("a second document", append("<svg/>")),
         ],
     )
 }
@@ -285,28 +178,15 @@ pub fn net() -> Vec<Case> {
     cases(
         "t.svg",
         vec![
-            (
-                "lines of no width",
-                "stroke-width=\"0\" of <path>",
-                swap("stroke-width=\"0.15\"", "stroke-width=\"0\""),
-            ),
-            (
-                "white lines",
-                "stroke=\"#fff\" of <path>",
-                swap("stroke=\"#000\"", "stroke=\"#fff\""),
-            ),
+            ("lines of no width", swap("stroke-width=\"0.15\"", "stroke-width=\"0\"")),
+            ("white lines", swap("stroke=\"#000\"", "stroke=\"#fff\"")),
             (
                 "lines as wide as the screen says",
-                "attribute vector-effect",
                 swap("stroke=\"#000\"", "vector-effect=\"non-scaling-stroke\" stroke=\"#000\""),
             ),
-            ("wide lines", "to cut, differs", swap("stroke-width=\"0.15\"", "stroke-width=\"1\"")),
-            (
-                "narrow lines",
-                "to cut, differs",
-                swap("stroke-width=\"0.15\"", "stroke-width=\"0.04\""),
-            ),
-            ("a line beside its place", "to cut, differs", {
+            ("wide lines", swap("stroke-width=\"0.15\"", "stroke-width=\"1\"")),
+            ("narrow lines", swap("stroke-width=\"0.15\"", "stroke-width=\"0.04\"")),
+            ("a line beside its place", {
                 text(|text| {
                     let cut = text.lines().find(|line| line.contains("id=\"cut-")).unwrap();
                     text.replacen(cut, &beside(cut), 1)
@@ -314,7 +194,6 @@ pub fn net() -> Vec<Case> {
             }),
             (
                 "a line that is missing",
-                "line ",
                 text(|text| {
                     let cut = text.lines().find(|line| line.contains("id=\"cut-")).unwrap();
                     text.replacen(cut, "", 1)

@@ -18,7 +18,7 @@ pub struct Decoded {
     /// Number of counter-clockwise turns of the tag that give the word read: by 120°, 0 to 2, or of
     /// a square tag by 90°, 0 to 3.
     pub turns: u8,
-    /// Cells that differ.
+    /// Number of cells in which the word differs from the code.
     pub errors: u32,
     /// Errors of the next best reading (another tag, or another turn), if that lies within the
     /// errors allowed too. Never so while these are at most ⌊(h−1)/2⌋; then any other reading has

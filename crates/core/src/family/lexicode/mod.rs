@@ -31,10 +31,11 @@ const LARGEST_CHUNK: u64 = 1 << 21;
 
 /// Parameters of a lexicode.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Lexicode {
     /// Dimension of the tags.
     pub dimension: Dimension,
-    /// Distance h.
+    /// Least distance h between any two codes in any turn.
     pub distance: u32,
     /// Rules for single codes.
     pub rules: Rules,
@@ -66,6 +67,12 @@ impl Lexicode {
             step: STEP,
             candidates: dimension.mask() + 1,
         }
+    }
+
+    /// With other rules for single codes.
+    #[must_use]
+    pub fn rules(self, rules: Rules) -> Self {
+        Self { rules, ..self }
     }
 
     /// Runs the search. Does not depend on the number of threads.
@@ -138,7 +145,7 @@ impl Lexicode {
                     kept.push(v, screen);
                 }
             }
-            control.report(to, self.candidates, kept.codes.len());
+            control.tell(to, self.candidates, kept.codes.len());
             (from, chunk) = (to, (2 * chunk).min(LARGEST_CHUNK));
         }
         if saved < count {
@@ -170,7 +177,7 @@ impl Lexicode {
             let share = to as f64 / sweep.parts() as f64;
             let done =
                 FIRST_CANDIDATES as f64 + share * (self.candidates - FIRST_CANDIDATES) as f64;
-            control.report(done as u64, self.candidates, kept.codes.len());
+            control.tell(done as u64, self.candidates, kept.codes.len());
         }
         Ok(())
     }
@@ -208,7 +215,7 @@ impl Lexicode {
                     kept.push(v, screen);
                 }
             }
-            control.report(self.candidates, self.candidates, kept.codes.len());
+            control.tell(self.candidates, self.candidates, kept.codes.len());
         }
         Ok(kept.codes)
     }

@@ -11,6 +11,7 @@ use deltille_core::targets::{
     Corner, FamilyRef, ListFormat, ListedSpec, Name, Outline, Panel, PanelPose, TagPlacement,
     TagsIn, Target, TargetSpec,
 };
+use deltille_core::words::{counted, quoted};
 
 /// Most boards in a file, and most columns or rows of one: beyond this a number is a typing error.
 const MOST: u32 = 10_000;
@@ -96,7 +97,7 @@ fn family_ref(name: &str, blocks: &[Block]) -> Result<FamilyRef, DscError> {
     for block in blocks {
         for corner in &block.corners {
             if corner.tag.is_some_and(|tag| tag as usize >= family.len()) {
-                let problem = format!("{name} has {} codes only", family.len());
+                let problem = format!("{name} has no more than {}", counted(family.len(), "code"));
                 return Err(corner.line.fault(problem));
             }
         }
@@ -119,11 +120,13 @@ impl<'a> Line<'a> {
     /// The comma-separated fields, of which there must be `N`.
     fn fields<const N: usize>(self, form: &str) -> Result<[&'a str; N], DscError> {
         let fields: Vec<&str> = self.text.split(',').map(str::trim).collect();
-        fields.try_into().map_err(|_| self.fault(format!("`{}` is not `{form}`", self.text)))
+        fields.try_into().map_err(|_| self.fault(format!("{} is not `{form}`", quoted(self.text))))
     }
 
     fn number<T: std::str::FromStr>(self, field: &str, what: &str) -> Result<T, DscError> {
-        field.parse().map_err(|_| self.fault(format!("{what} `{field}` is not such a number")))
+        field
+            .parse()
+            .map_err(|_| self.fault(format!("{what} {} is not such a number", quoted(field))))
     }
 
     fn within(self, field: &str, what: &str, range: Range) -> Result<f64, DscError> {
@@ -170,7 +173,7 @@ impl<'a> Block<'a> {
         let border = second.within(border, "border", border_bits::RANGE)?;
         let (family, dialect, kind) = family_of(family, b).ok_or_else(|| {
             let names = FAMILIES.map(|f| format!("delTag{f}, aprilTag{f}, t{f}")).join(", ");
-            second.fault(format!("family `{family}` is none of {names}"))
+            second.fault(format!("family {} is none of {names}", quoted(family)))
         })?;
         let matrix = match (dialect, kind) {
             (Dialect::Fork, _) => [a, b],
@@ -189,8 +192,9 @@ impl<'a> Block<'a> {
         };
         if let Some(expected) = expected.filter(|&n| n as usize != corners.len()) {
             let problem = format!(
-                "board {id} must list {expected} corners, and {} follow it: the file is cut off, \
-                 or A and B are not those of the original dialect",
+                "board {id} must list {}, not {}: the file is cut off, or A and B are not those of \
+                 the original dialect",
+                counted(expected as usize, "corner"),
                 corners.len()
             );
             return Err(head.fault(problem));
@@ -288,7 +292,7 @@ impl<'a> ListedCorner<'a> {
         let tag: i64 = line.number(tag, "tag")?;
         let (col, row): (u32, u32) = (line.number(col, "column")?, line.number(row, "row")?);
         if col >= cols || row >= rows {
-            let problem = format!("{col},{row} is outside the board's {cols} columns, {rows} rows");
+            let problem = format!("{col},{row} is outside the board's {cols} × {rows} corners");
             return Err(line.fault(problem));
         }
         let tag = match tag {

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use crate::Name;
 
 /// A whole number of a range. The ends of the number's own type go unsaid.
-pub(super) fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone
+pub fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone
 where
     T: FromStr + PartialOrd + Display + Copy + Bounded + Send + Sync + 'static,
 {
@@ -28,7 +28,7 @@ where
 }
 
 /// A type of whole numbers with its greatest.
-pub(super) trait Bounded {
+pub trait Bounded {
     const MOST: Self;
 }
 
@@ -45,7 +45,7 @@ impl Bounded for u64 {
 }
 
 /// A decimal number of a range.
-pub(super) fn number(
+pub fn number(
     range: RangeInclusive<f64>,
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
     let wanted = format!("write a number from {} to {}", range.start(), range.end());
@@ -53,20 +53,20 @@ pub(super) fn number(
 }
 
 /// A name that can be the stem of a file and the name of a family.
-pub(super) fn name(text: &str) -> Result<String, String> {
+pub fn name(text: &str) -> Result<String, String> {
     Name::without_dots(text).map(Into::into)
 }
 
 /// Ids of tags, in the order given.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Ids(pub(super) Vec<u32>);
+pub struct Ids(pub Vec<u32>);
 
 impl Ids {
     /// More are nobody's wish: all tags of the largest family that fits a file.
     const MOST: usize = 10_000_000;
 
     /// Refuses ids that a family does not have.
-    pub(super) fn check(&self, family: &crate::family::Family) -> anyhow::Result<()> {
+    pub fn check(&self, family: &crate::family::Family) -> anyhow::Result<()> {
         match self.0.iter().find(|&&id| family.code(id).is_none()) {
             None => Ok(()),
             Some(id) => anyhow::bail!(
