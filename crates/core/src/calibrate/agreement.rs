@@ -28,50 +28,34 @@ const LEAST_FRAMES: usize = 5;
 /// The most of what is known of a direction that one frame may tell: beyond, nothing holds it to account.
 const MOST_OF_ONE: f64 = 0.9;
 
-/// By how much each frame moves what all frames share, a column each; `None` where there are too few frames.
-pub(super) fn moved_by_each(
+/// The covariance of what all frames share as the frames show it; `None` of too few frames, or where nothing is shared.
+pub(super) fn observed(
     minimum: &Minimum,
     whitening: &Whitening,
     loss: Loss,
     found: &Covariances,
 ) -> Option<DMatrix<f64>> {
     let frames = minimum.problem.frames.len();
-    if frames < LEAST_FRAMES {
+    if frames < LEAST_FRAMES || minimum.layout.shared == 0 {
         return None;
     }
-    let root = root(&found.shared);
-    let moved = |frame: usize| moved_by(minimum, whitening, loss, found, &root, frame);
-    let columns = (0..frames).into_par_iter().map(moved).collect::<Option<Vec<_>>>()?;
-    Some(DMatrix::from_columns(&columns))
+    let pull = |frame: usize| pull_of(minimum, whitening, loss, found, frame);
+    let columns = (0..frames).into_par_iter().map(pull).collect::<Option<Vec<_>>>()?;
+    let mut pulls = DMatrix::from_columns(&columns);
+    // At the minimum they cancel; what the search left is no scatter.
+    let mean = pulls.column_mean();
+    pulls.column_iter_mut().for_each(|mut pull| pull -= &mean);
+    let count = frames as f64;
+    let scatter = shrunk(&pulls) * (count / (count - 1.0));
+    Some(&found.root.half * scatter * found.root.half.transpose())
 }
 
-/// A square root of a covariance of unknowns that have different units, and its inverse.
-struct Root {
-    half: DMatrix<f64>,
-    inverse: DMatrix<f64>,
-}
-
-/// What nothing determines has no part in it.
-fn root(covariance: &DMatrix<f64>) -> Root {
-    let n = covariance.nrows();
-    let sd = DVector::from_fn(n, |i, _| covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt());
-    let scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / sd[i] / sd[j]);
-    let eigen = scaled.symmetric_eigen();
-    let roots = eigen.eigenvalues.map(|value| value.max(SINGULAR).sqrt());
-    let half = DMatrix::from_fn(n, n, |i, j| sd[i] * eigen.eigenvectors[(i, j)] * roots[j]);
-    let inverse = DMatrix::from_fn(n, n, |i, j| eigen.eigenvectors[(j, i)] / roots[i] / sd[j]);
-    Root { half, inverse }
-}
-
-/// Of matrices with a unit diagonal what is below this is rounding.
-const SINGULAR: f64 = 1e-14;
-
-fn moved_by(
+/// By how much a frame moves what all frames share, in units of what noise does.
+fn pull_of(
     minimum: &Minimum,
     whitening: &Whitening,
     loss: Loss,
     found: &Covariances,
-    root: &Root,
     frame: usize,
 ) -> Option<DVector<f64>> {
     let Minimum { problem, normal, layout, .. } = minimum;
@@ -101,11 +85,11 @@ fn moved_by(
             normal.pull_of_corner(layout, corner, &mut pull);
         }
     }
-    let moved = &root.inverse * (&found.across * pull);
-    let moved = if problem.map.is_some() {
+    let root = &found.root;
+    let pull = if problem.map.is_some() {
         // Corners take up most of what a frame tells of itself, and each frame tells of all of them alike.
         let frames = problem.frames.len() as f64;
-        moved * (frames / (frames - 1.0)).sqrt()
+        &root.inverse * (&found.across * pull) * (frames / (frames - 1.0)).sqrt()
     } else {
         own.fill_upper_triangle_with_lower_triangle();
         pose.fill_upper_triangle_with_lower_triangle();
@@ -114,35 +98,17 @@ fn moved_by(
         let share = (root.half.tr_mul(&own) * &root.half).symmetric_eigen();
         let grown =
             share.eigenvalues.map(|part| (1.0 - part.clamp(0.0, MOST_OF_ONE)).sqrt().recip());
-        let turned = share.eigenvectors.tr_mul(&moved).component_mul(&grown);
+        let turned = share.eigenvectors.tr_mul(&root.half.tr_mul(&pull)).component_mul(&grown);
         &share.eigenvectors * turned
     };
-    let moved = &root.half * moved;
-    moved.iter().all(|v| v.is_finite()).then_some(moved)
+    pull.iter().all(|v| v.is_finite()).then_some(pull)
 }
 
-/// The covariance of unknowns that the frames show, where `noise` is the one that follows from noise, and
-/// `moved` by how much each frame moves them. `None` where some of them cannot be told apart.
-pub(super) fn observed(noise: &DMatrix<f64>, moved: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let (n, frames) = (noise.nrows(), moved.ncols() as f64);
-    if n == 0 {
-        return None;
-    }
-    // Units apart, so that the matrix is well conditioned.
-    let sd = DVector::from_fn(n, |i, _| noise[(i, i)].sqrt());
-    let scaled = DMatrix::from_fn(n, n, |i, j| noise[(i, j)] / sd[i] / sd[j]);
-    let half = scaled.cholesky()?.l();
-    let moved = DMatrix::from_fn(n, moved.ncols(), |i, v| moved[(i, v)] / sd[i]);
-    let white = half.solve_lower_triangular(&moved)? * frames.sqrt();
-    let scatter = shrunk(&white);
-    let back = DMatrix::from_diagonal(&sd) * half;
-    Some(&back * scatter * back.transpose())
-}
-
-/// The mean of x xᵀ over columns, drawn towards a multiple of the identity (Ledoit & Wolf 2004).
+/// The sum of x xᵀ over columns, drawn towards a multiple of the identity (Ledoit & Wolf 2004).
 fn shrunk(columns: &DMatrix<f64>) -> DMatrix<f64> {
     let (n, count) = (columns.nrows() as f64, columns.ncols() as f64);
-    let mean = columns * columns.transpose() / count;
+    let columns = columns * count.sqrt();
+    let mean = &columns * columns.transpose() / count;
     let level = DMatrix::identity(columns.nrows(), columns.nrows()) * (mean.trace() / n);
     let spread = (&mean - &level).norm_squared();
     let scatter = columns.column_iter().map(|x| (x * x.transpose() - &mean).norm_squared());

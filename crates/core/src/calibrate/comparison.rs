@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 use super::estimate::CameraEstimate;
 use super::uncertainty::{INFINITY_MM, Source, by_motion, by_parameters, seen_at};
 use crate::camera::Pose;
-use crate::statistics::chi_squared_chance;
+use crate::statistics::{chi_squared_chance, f_chance};
 
 /// Places along the longer side of the image.
 const PLACES: usize = 40;
@@ -430,7 +430,8 @@ impl Known {
             let share = variance / (variance + floor);
             (mode.dot(&along).powi(2) / variance / (variance + floor), share)
         });
-        known.chance = chance_of(&modes.collect::<Vec<_>>());
+        let frames = [first, second].map(CameraEstimate::frames_observed);
+        known.chance = chance_of(&modes.collect::<Vec<_>>(), frames);
         Some(known)
     }
 
@@ -478,15 +479,25 @@ impl Known {
 }
 
 /// How often chance makes a sum as large, of squares that are expected to be as large as given: by the χ² of the same
-/// mean and variance (Satterthwaite 1946).
-fn chance_of(squares: &[(f64, f64)]) -> f64 {
+/// mean and variance (Satterthwaite 1946); where that is known from so many frames only, by the F distribution.
+fn chance_of(squares: &[(f64, f64)], frames: [Option<usize>; 2]) -> f64 {
     let sum = |of: fn(&(f64, f64)) -> f64| squares.iter().map(of).sum::<f64>();
     let (found, mean, spread) = (sum(|of| of.0), sum(|of| of.1), sum(|of| of.1 * of.1));
     if squares.is_empty() || spread == 0.0 {
         return 1.0;
     }
     let freedom = (mean * mean / spread).round().max(1.0);
-    chi_squared_chance(found * freedom / mean, freedom as usize)
+    match frames.into_iter().flatten().min() {
+        Some(frames) => f_chance(found / mean, freedom, frames as f64 - 1.0),
+        None => chi_squared_chance(found * freedom / mean, freedom as usize),
+    }
+}
+
+impl CameraEstimate {
+    /// How many frames its covariance is known from that is observed.
+    fn frames_observed(&self) -> Option<usize> {
+        self.covariance_from(Source::Observed).map(|_| self.views.len().max(2))
+    }
 }
 
 /// A square root of the covariance of a camera's parameters: that which is observed, else that from noise.

@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 use nalgebra::{DMatrix, Matrix3};
 
-use super::agreement::{moved_by_each, observed};
+use super::agreement::observed;
 use super::calibration::{CameraViews, PanelPlace};
 use super::error::CalibrationError;
 use super::excluded::Excluded;
@@ -324,18 +324,17 @@ impl Estimate {
         }
         let variance = variance(minimum, whitening, loss);
         let covariance = &found.shared * variance;
-        let moved = moved_by_each(minimum, whitening, loss, &found);
+        let observed = observed(minimum, whitening, loss, &found);
         let mut views = views(cameras, frames, settled);
         let cameras = cameras.iter().enumerate().map(|(index, camera)| {
             let views = std::mem::take(&mut views[index]);
             let mut camera = camera_estimate(index, camera, views, settled, &found, &covariance);
-            camera.projection = projection(index, &camera, settled, distances_mm, moved.as_ref());
-            camera.observed_pose_sd =
-                layout.cameras[index].zip(moved.as_ref()).and_then(|(first, moved)| {
-                    let noise = covariance.view((first, first), (6, 6)).into_owned();
-                    let found = observed(&noise, &moved.rows(first, 6).into_owned())?;
-                    Some(std::array::from_fn(|i| found[(i, i)].sqrt()))
-                });
+            camera.projection =
+                projection(index, &camera, settled, distances_mm, observed.as_ref());
+            let of_pose = layout.cameras[index].zip(observed.as_ref());
+            camera.observed_pose_sd = of_pose.map(|(first, observed)| {
+                std::array::from_fn(|i| observed[(first + i, first + i)].sqrt())
+            });
             camera
         });
         let cameras: Vec<CameraEstimate> = cameras.collect();
@@ -442,23 +441,23 @@ fn camera_estimate(
     }
 }
 
-/// How a camera's projections are known, where each frame moves what all share as given.
+/// How a camera's projections are known, with the covariance of what all frames share as these show it.
 fn projection(
     index: usize,
     camera: &CameraEstimate,
     settled: &Settled,
     distances_mm: &[f64],
-    moved: Option<&DMatrix<f64>>,
+    observed: Option<&DMatrix<f64>>,
 ) -> Option<ProjectionUncertainty> {
     let Minimum { problem, layout, .. } = &settled.minimum;
     let columns = &layout.parameters[index];
     if columns.is_empty() {
         return None;
     }
-    let of_camera = |moved: &DMatrix<f64>| {
-        DMatrix::from_fn(columns.len(), moved.ncols(), |i, v| moved[(columns[i].1, v)])
-    };
-    let observed = moved.and_then(|moved| observed(&camera.covariance, &of_camera(moved)));
+    let observed = observed.map(|observed| {
+        let n = columns.len();
+        DMatrix::from_fn(n, n, |i, j| observed[(columns[i].1, columns[j].1)])
+    });
     let (whitening, free) = (&settled.whitening, camera.free());
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)
 }
