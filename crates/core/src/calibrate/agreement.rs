@@ -28,13 +28,20 @@ const LEAST_FRAMES: usize = 5;
 /// The most of what is known of a direction that one frame may tell: beyond, nothing holds it to account.
 const MOST_OF_ONE: f64 = 0.9;
 
+/// A covariance as frames show it.
+pub(super) struct Observed {
+    pub covariance: DMatrix<f64>,
+    /// From so many squares a variance of it is known.
+    pub freedom: f64,
+}
+
 /// The covariance of what all frames share as the frames show it; `None` of too few frames, or where nothing is shared.
 pub(super) fn observed(
     minimum: &Minimum,
     whitening: &Whitening,
     loss: Loss,
     found: &Covariances,
-) -> Option<DMatrix<f64>> {
+) -> Option<Observed> {
     let frames = minimum.problem.frames.len();
     if frames < LEAST_FRAMES || minimum.layout.shared == 0 {
         return None;
@@ -46,8 +53,14 @@ pub(super) fn observed(
     let mean = pulls.column_mean();
     pulls.column_iter_mut().for_each(|mut pull| pull -= &mean);
     let count = frames as f64;
-    let scatter = shrunk(&pulls) * (count / (count - 1.0));
-    Some(&found.root.half * scatter * found.root.half.transpose())
+    let (scatter, share) = shrunk(&pulls);
+    let scatter = scatter * (count / (count - 1.0));
+    // The level that is common to all directions is known from all of them.
+    let directions = minimum.layout.shared as f64;
+    Some(Observed {
+        covariance: &found.root.half * scatter * found.root.half.transpose(),
+        freedom: (count - 1.0) * (1.0 + share * (directions - 1.0)),
+    })
 }
 
 /// By how much a frame moves what all frames share, in units of what noise does.
@@ -104,8 +117,8 @@ fn pull_of(
     pull.iter().all(|v| v.is_finite()).then_some(pull)
 }
 
-/// The sum of x xᵀ over columns, drawn towards a multiple of the identity (Ledoit & Wolf 2004).
-fn shrunk(columns: &DMatrix<f64>) -> DMatrix<f64> {
+/// The sum of x xᵀ over columns, drawn towards a multiple of the identity (Ledoit & Wolf 2004), and how far, from 0 to 1.
+fn shrunk(columns: &DMatrix<f64>) -> (DMatrix<f64>, f64) {
     let (n, count) = (columns.nrows() as f64, columns.ncols() as f64);
     let columns = columns * count.sqrt();
     let mean = &columns * columns.transpose() / count;
@@ -114,5 +127,5 @@ fn shrunk(columns: &DMatrix<f64>) -> DMatrix<f64> {
     let scatter = columns.column_iter().map(|x| (x * x.transpose() - &mean).norm_squared());
     let uncertain = (scatter.sum::<f64>() / (count * count)).min(spread);
     let share = if spread > 0.0 { uncertain / spread } else { 1.0 };
-    level * share + mean * (1.0 - share)
+    (level * share + mean * (1.0 - share), share)
 }

@@ -430,8 +430,8 @@ impl Known {
             let share = variance / (variance + floor);
             (mode.dot(&along).powi(2) / variance / (variance + floor), share)
         });
-        let frames = [first, second].map(CameraEstimate::frames_observed);
-        known.chance = chance_of(&modes.collect::<Vec<_>>(), frames);
+        let freedom = [first, second].map(CameraEstimate::observed_freedom);
+        known.chance = chance_of(&modes.collect::<Vec<_>>(), freedom);
         Some(known)
     }
 
@@ -479,24 +479,23 @@ impl Known {
 }
 
 /// How often chance makes a sum as large, of squares that are expected to be as large as given: by the χ² of the same
-/// mean and variance (Satterthwaite 1946); where that is known from so many frames only, by the F distribution.
-fn chance_of(squares: &[(f64, f64)], frames: [Option<usize>; 2]) -> f64 {
+/// mean and variance (Satterthwaite 1946); where covariances are known as from so many squares only, by the F distribution.
+fn chance_of(squares: &[(f64, f64)], known: [Option<f64>; 2]) -> f64 {
     let sum = |of: fn(&(f64, f64)) -> f64| squares.iter().map(of).sum::<f64>();
     let (found, mean, spread) = (sum(|of| of.0), sum(|of| of.1), sum(|of| of.1 * of.1));
     if squares.is_empty() || spread == 0.0 {
         return 1.0;
     }
     let freedom = (mean * mean / spread).round().max(1.0);
-    match frames.into_iter().flatten().min() {
-        Some(frames) => f_chance(found / mean, freedom, frames as f64 - 1.0),
+    match known.into_iter().flatten().reduce(f64::min) {
+        Some(known) => f_chance(found / mean, freedom, known),
         None => chi_squared_chance(found * freedom / mean, freedom as usize),
     }
 }
 
 impl CameraEstimate {
-    /// How many frames its covariance is known from that is observed.
-    fn frames_observed(&self) -> Option<usize> {
-        self.covariance_from(Source::Observed).map(|_| self.views.len().max(2))
+    fn observed_freedom(&self) -> Option<f64> {
+        Some(self.projection.as_ref()?.observed.as_ref()?.freedom)
     }
 }
 

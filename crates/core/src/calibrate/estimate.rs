@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 use nalgebra::{DMatrix, Matrix3};
 
-use super::agreement::observed;
+use super::agreement::{Observed, observed};
 use super::calibration::{CameraViews, PanelPlace};
 use super::error::CalibrationError;
 use super::excluded::Excluded;
@@ -20,7 +20,7 @@ use super::reweighting::{Settled, variance};
 use super::shape::{BoardShape, Shape};
 use super::start::Frame;
 use super::target_map::{CornerOffset, TargetMap};
-use super::uncertainty::ProjectionUncertainty;
+use super::uncertainty::{ObservedCovariance, ProjectionUncertainty};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 use crate::statistics::median;
 use crate::targets::{Name, PanelPose, Target};
@@ -333,7 +333,7 @@ impl Estimate {
                 projection(index, &camera, settled, distances_mm, observed.as_ref());
             let of_pose = layout.cameras[index].zip(observed.as_ref());
             camera.observed_pose_sd = of_pose.map(|(first, observed)| {
-                std::array::from_fn(|i| observed[(first + i, first + i)].sqrt())
+                std::array::from_fn(|i| observed.covariance[(first + i, first + i)].sqrt())
             });
             camera
         });
@@ -447,16 +447,17 @@ fn projection(
     camera: &CameraEstimate,
     settled: &Settled,
     distances_mm: &[f64],
-    observed: Option<&DMatrix<f64>>,
+    observed: Option<&Observed>,
 ) -> Option<ProjectionUncertainty> {
     let Minimum { problem, layout, .. } = &settled.minimum;
     let columns = &layout.parameters[index];
     if columns.is_empty() {
         return None;
     }
-    let observed = observed.map(|observed| {
+    let observed = observed.map(|Observed { covariance, freedom }| {
         let n = columns.len();
-        DMatrix::from_fn(n, n, |i, j| observed[(columns[i].1, columns[j].1)])
+        let own = DMatrix::from_fn(n, n, |i, j| covariance[(columns[i].1, columns[j].1)]);
+        ObservedCovariance { covariance: own, freedom: *freedom }
     });
     let (whitening, free) = (&settled.whitening, camera.free());
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)

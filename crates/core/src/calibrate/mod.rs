@@ -73,7 +73,7 @@ pub use panel::PanelRef;
 pub use problem::Observation;
 pub use shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
 pub use target_map::{CornerOffset, LEAST_TO_MEASURE, TargetMap};
-pub use uncertainty::{ProjectionUncertainty, Source, UncertaintyMap};
+pub use uncertainty::{ObservedCovariance, ProjectionUncertainty, Source, UncertaintyMap};
 pub use view::{Reference, Shown, Sighting, View, views};
 pub use weights::Weights;
 pub use words::Words;

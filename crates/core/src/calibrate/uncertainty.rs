@@ -32,7 +32,16 @@ pub struct ProjectionUncertainty {
     pub distances_mm: Vec<f64>,
     /// Covariance of the parameters that were found as the frames agree with each other; `None` of too few
     /// frames.
-    pub observed: Option<DMatrix<f64>>,
+    pub observed: Option<ObservedCovariance>,
+}
+
+/// A covariance of parameters as frames show it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObservedCovariance {
+    /// The covariance, in the order of the parameters that were found.
+    pub covariance: DMatrix<f64>,
+    /// How well it is known: a variance of it as from so many independent squares.
+    pub freedom: f64,
 }
 
 /// Where a deviation comes from.
@@ -71,7 +80,7 @@ impl ProjectionUncertainty {
     pub fn new(
         alignment: DMatrix<f64>,
         distances_mm: Vec<f64>,
-        observed: Option<DMatrix<f64>>,
+        observed: Option<ObservedCovariance>,
     ) -> Self {
         Self { alignment, distances_mm, observed }
     }
@@ -83,7 +92,7 @@ impl ProjectionUncertainty {
         camera: usize,
         free: &[usize],
         distances_mm: &[f64],
-        observed: Option<DMatrix<f64>>,
+        observed: Option<ObservedCovariance>,
     ) -> Option<Self> {
         let lens = &problem.cameras[camera].camera;
         let mut motion = Matrix6::zeros();
@@ -139,7 +148,7 @@ impl CameraEstimate {
     pub fn covariance_from(&self, source: Source) -> Option<&DMatrix<f64>> {
         match source {
             Source::Noise => (self.covariance.nrows() > 0).then_some(&self.covariance),
-            Source::Observed => self.projection.as_ref()?.observed.as_ref(),
+            Source::Observed => Some(&self.projection.as_ref()?.observed.as_ref()?.covariance),
         }
     }
 

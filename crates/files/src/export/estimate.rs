@@ -26,6 +26,9 @@ pub(super) struct ProjectionRecord {
     alignment: Vec<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_correlations: Option<Vec<Vec<f64>>>,
+    /// From so many squares a variance of that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    observed_freedom: Option<f64>,
     distances_mm: Vec<f64>,
     maps: Vec<UncertaintyRecord>,
 }
@@ -134,7 +137,8 @@ pub(super) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
     });
     Some(ProjectionRecord {
         alignment: (0..rows).map(row).collect(),
-        observed_correlations: known.observed.as_ref().map(correlations_of),
+        observed_correlations: known.observed.as_ref().map(|of| correlations_of(&of.covariance)),
+        observed_freedom: known.observed.as_ref().map(|of| of.freedom),
         distances_mm: known.distances_mm.clone(),
         maps: maps.collect(),
     })

@@ -12,8 +12,8 @@ use super::calibration::{self, StoredShape};
 use super::rig;
 use deltille_core::calibrate::{
     BoardShape, CameraEstimate, Corner, CornerOffset, Estimate, Excluded, FrameEstimate, Model,
-    PanelRef, Parameter, ProjectionUncertainty, Reason, Reference, SHAPE_COEFFICIENTS as COUNT,
-    TargetMap, ViewEstimate,
+    ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
+    SHAPE_COEFFICIENTS as COUNT, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::json::{self, ReadError};
@@ -158,6 +158,8 @@ struct SavedProjection {
     alignment: Vec<Vec<f64>>,
     #[serde(default, deserialize_with = "quantity::figure::de")]
     observed_correlations: Option<Vec<Vec<f64>>>,
+    #[serde(default, deserialize_with = "quantity::deviation::de")]
+    observed_freedom: Option<f64>,
     #[serde(deserialize_with = "quantity::length_mm::de")]
     distances_mm: Vec<f64>,
 }
@@ -440,15 +442,16 @@ fn covariance(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
 impl SavedProjection {
     /// Of so many parameters that were found, with the deviations that were observed.
     fn read(self, found: usize, sds: &[f64]) -> Result<ProjectionUncertainty, &'static str> {
-        let Self { alignment, observed_correlations, distances_mm } = self;
+        let Self { alignment, observed_correlations, observed_freedom, distances_mm } = self;
         if alignment.len() != 6 || alignment.iter().any(|row| row.len() != found) {
             return Err("`alignment` has not six rows with a number for each parameter");
         }
         let alignment = DMatrix::from_fn(6, found, |i, j| alignment[i][j]);
-        let observed = observed_correlations.map(|rows| {
-            covariance(&rows, sds)
-                .filter(|_| sds.len() == found)
-                .ok_or("`observed_correlations` are not one for each pair of parameters")
+        let observed = observed_correlations.zip(observed_freedom).map(|(rows, freedom)| {
+            let covariance = covariance(&rows, sds).filter(|_| sds.len() == found);
+            let covariance = covariance
+                .ok_or("`observed_correlations` are not one for each pair of parameters")?;
+            Ok(ObservedCovariance { covariance, freedom })
         });
         Ok(ProjectionUncertainty::new(alignment, distances_mm, observed.transpose()?))
     }
