@@ -1,4 +1,4 @@
-//! Medians and quantiles.
+//! Medians, quantiles, and how often chance makes a sum of squares.
 
 /// The middle value, of an even number the upper of two; `None` of none. What is no number counts as large.
 ///
@@ -18,11 +18,102 @@ pub fn quantile(values: &mut [f64], part: f64) -> Option<f64> {
     Some(values[((part * values.len() as f64) as usize).min(last)])
 }
 
+/// How often the sum of so many squared normal numbers of variance 1 is larger than this.
+///
+/// ```
+/// let chance = deltille_core::statistics::chi_squared_chance(11.07, 5);
+/// assert!((chance - 0.05).abs() < 1e-4);
+/// ```
+pub fn chi_squared_chance(sum: f64, freedom: usize) -> f64 {
+    let half = sum.max(0.0) / 2.0;
+    if !half.is_finite() {
+        return 0.0;
+    }
+    // Q(a + 1, h) = Q(a, h) + hᵃ e⁻ʰ / Γ(a + 1), from Q(1, h) = e⁻ʰ or Q(1/2, h) = erfc √h.
+    let (mut chance, mut term, mut a) = match freedom % 2 {
+        0 => (0.0, (-half).exp(), 0.0),
+        _ => (
+            libm::erfc(half.sqrt()),
+            (-half).exp() * (half / std::f64::consts::PI).sqrt() * 2.0,
+            0.5,
+        ),
+    };
+    while 2.0 * a + 0.5 < freedom as f64 {
+        chance += term;
+        a += 1.0;
+        term *= half / a;
+    }
+    chance.min(1.0)
+}
+
+/// How often the ratio of two mean squares of normal numbers of one variance, of so many above and of so many below, is
+/// larger than this.
+///
+/// ```
+/// let chance = deltille_core::statistics::f_chance(3.326, 5.0, 10.0);
+/// assert!((chance - 0.05).abs() < 1e-4);
+/// ```
+pub fn f_chance(ratio: f64, above: f64, below: f64) -> f64 {
+    let (a, b) = (below / 2.0, above / 2.0);
+    let x = below / (below + above * ratio.max(0.0));
+    // The continued fraction converges fast on one side of the mean.
+    if x < (a + 1.0) / (a + b + 2.0) { beta_part(x, a, b) } else { 1.0 - beta_part(1.0 - x, b, a) }
+}
+
+/// The regularised incomplete beta function I_x(a, b) by its continued fraction (DLMF 8.17.22).
+fn beta_part(x: f64, a: f64, b: f64) -> f64 {
+    if x <= 0.0 {
+        return 0.0;
+    }
+    let front = libm::lgamma(a + b) - libm::lgamma(a) - libm::lgamma(b);
+    let front = (front + a * x.ln() + b * (-x).ln_1p()).exp() / a;
+    let term = |m: u32| {
+        let (half, m) = (f64::from(m / 2), f64::from(m));
+        match m as u32 % 2 {
+            0 => half * (b - half) * x / ((a + m - 1.0) * (a + m)),
+            _ => -(a + half) * (a + b + half) * x / ((a + m - 1.0) * (a + m)),
+        }
+    };
+    // From behind.
+    let fraction = (1..=FRACTIONS).rev().fold(1.0, |rest, m| 1.0 + term(m) / rest);
+    (front / fraction).clamp(0.0, 1.0)
+}
+
+/// Terms of a continued fraction; thousands of degrees of freedom take fewer.
+const FRACTIONS: u32 = 400;
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    /// Values of SciPy 1.17.1, `scipy.stats.f.sf` and `chi2.sf`.
+    #[test]
+    fn chances_are_those_of_tables() {
+        let of_ratios = [
+            (1.0, 9.0, 19.0, 4.725595768e-01),
+            (6.0, 9.0, 19.0, 5.181127378e-04),
+            (2.0, 3.0, 400.0, 1.134306057e-01),
+            (20.0, 12.0, 9.0, 5.040182827e-05),
+            (0.2, 7.0, 30.0, 9.830186062e-01),
+            (50.0, 2.0, 5.0, 4.948251479e-04),
+        ];
+        for (ratio, above, below, chance) in of_ratios {
+            let found = f_chance(ratio, above, below);
+            assert!((found / chance - 1.0_f64).abs() < 1e-7, "{ratio} {above} {below}: {found}");
+        }
+        let of_sums = [
+            (0.5, 1, 4.795001222e-01),
+            (3.0, 2, 2.231301601e-01),
+            (40.0, 12, 7.190884053e-05),
+            (100.0, 31, 3.464370245e-09),
+        ];
+        for (sum, freedom, chance) in of_sums {
+            let found = chi_squared_chance(sum, freedom);
+            assert!((found / chance - 1.0_f64).abs() < 1e-7, "{sum} {freedom}: {found}");
+        }
+    }
 
     proptest! {
         #[test]

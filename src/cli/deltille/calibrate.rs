@@ -7,11 +7,11 @@ use std::process::ExitCode;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
-use super::calibrating::{Calibrated, SolveArgs, check_images, sample, without_outliers};
+use super::calibrating::{Calibrated, SolveArgs, check_images, sample, sureness, without_outliers};
 use super::camera_file;
 use super::files::{File, check_places, sample_of, text_file, write_all};
 use super::sightings::{Sightings, SightingsArgs};
-use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Model};
+use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Model, Source};
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
@@ -188,11 +188,25 @@ fn table(estimate: &Estimate) -> String {
 
 fn of_camera(camera: &CameraEstimate) -> String {
     let mut text = String::new();
-    for parameter in camera.parameters.iter() {
+    let is_observed = camera.covariance_from(Source::Observed).is_some();
+    if camera.covariance_from(Source::Noise).is_some() {
+        let observed = if is_observed { "    observed" } else { "" };
+        let _ = writeln!(text, "                        ± from noise{observed}");
+    }
+    for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()) {
         let Some(sd) = parameter.sd else { continue };
-        let places = places(sd).max(1);
-        let _ =
-            writeln!(text, "{:5} {:>14.places$} ± {sd:.places$}", parameter.name, parameter.value);
+        let digits = places(sd).max(1);
+        let observed = observed.map_or(String::new(), |sd| {
+            format!("{sd:>12.digits$}", digits = places(sd).max(1).min(digits))
+        });
+        let _ = writeln!(
+            text,
+            "{:5} {:>16.digits$} ± {sd:>11.digits$}{observed}",
+            parameter.name, parameter.value
+        );
+    }
+    if let Some(line) = sureness(camera) {
+        let _ = writeln!(text, "{line}");
     }
     let found: Vec<&str> = camera.found().collect();
     for i in 0..found.len() {

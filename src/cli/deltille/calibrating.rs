@@ -8,8 +8,8 @@ use clap::ValueEnum;
 
 use super::files::{File, sample_of, text_file};
 use crate::calibrate::{
-    BoardShape, Calibration, CalibrationError, Diagnosis, Estimate, Intrinsics, LEAST_TO_MEASURE,
-    Loss, PanelPlace, TargetMap, View, Weights, Words,
+    BoardShape, Calibration, CalibrationError, CameraEstimate, Diagnosis, Estimate, Intrinsics,
+    LEAST_TO_MEASURE, Loss, PanelPlace, Source, TargetMap, View, Weights, Words,
 };
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
@@ -21,7 +21,7 @@ use crate::name::is_within;
 use crate::photograph;
 use crate::raster::AnyGray;
 use crate::report::{Report, target_map_svg, thumbnail};
-use crate::targets::{self, Target};
+use crate::targets::{self, Target, parse_length_mm};
 use crate::words::counted;
 
 /// How a calibration is solved, and the page about it.
@@ -44,6 +44,10 @@ pub struct SolveArgs {
     /// Find the place of every corner of the target, too, and write it as a measured target
     #[arg(long, conflicts_with_all = ["shape", "board_shape"])]
     measure_target: bool,
+    /// Distance of points for which the uncertainty of projections is told beside that at infinity, such as 2m;
+    /// several may be given, separated by commas [default: the median distance of the corners]
+    #[arg(long, value_name = "LENGTH", value_delimiter = ',', value_parser = distance)]
+    uncertainty_at: Vec<f64>,
     /// Write a page that shows what the calibration is worth, and what would make it better
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -110,6 +114,7 @@ impl SolveArgs {
             .weights(weights)
             .board_shape(self.board_shape)
             .measure_target(self.measure_target)
+            .distances_mm(self.uncertainty_at.clone())
             .hold_out(self.holdout.map(|every| every as usize));
         let estimate = calibration.solve().map_err(|error| {
             let option = match error {
@@ -198,6 +203,28 @@ impl Calibrated {
         (report.print, report.thumbnails) = (*print, thumbnails);
         output::write(page, in_options(&report.html()).as_bytes(), overwrite).context("--report")
     }
+}
+
+/// How far a point is, mm.
+pub fn distance(text: &str) -> Result<f64, String> {
+    let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
+    let range = 1.0..=1e6;
+    range.contains(&mm).then_some(mm).ok_or_else(|| format!("{text}: not between 1 mm and 1000 m"))
+}
+
+/// How sure projections are where corners were, a line for each camera of which it is known.
+pub fn sureness(camera: &CameraEstimate) -> Option<String> {
+    let far = |mm: Option<f64>| mm.map_or("infinity".to_owned(), |mm| format!("{mm:.0} mm"));
+    let distances = camera.projection.iter().flat_map(|known| &known.distances_mm);
+    let distances = distances.map(|&mm| Some(mm)).chain([None]);
+    let told = distances.filter_map(|mm| {
+        let noise = camera.projection_sd_px(mm, Source::Noise)?;
+        let observed = camera.projection_sd_px(mm, Source::Observed);
+        let observed = observed.map_or(String::new(), |sd| format!(", {sd:.4} px observed"));
+        Some(format!("at {} {noise:.4} px from noise{observed}", far(mm)))
+    });
+    let told: Vec<String> = told.collect();
+    (!told.is_empty()).then(|| format!("projections are known to: {}", told.join("; ")))
 }
 
 /// A camera that has all parameters that are found, and none of them zero: what a format cannot carry of it is

@@ -5,6 +5,7 @@ mod board;
 mod calibrate;
 mod calibrating;
 mod camera_file;
+mod compare;
 mod delivery;
 mod detect;
 mod experiment;
@@ -58,6 +59,8 @@ enum Command {
     Detect(detect::Args),
     /// Find a camera from detections
     Calibrate(calibrate::Args),
+    /// Say whether two calibrations of a camera or rig differ by more than chance
+    Compare(compare::Args),
     /// Time the stages of detection on this machine
     Bench(bench::Args),
     /// Measure the library on simulated images
@@ -79,6 +82,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
     match deltille.command {
         Command::Bench(args) => bench::run(args),
         Command::Calibrate(args) => calibrate::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Board(args) => board::run(GridKind::Deltille, *args),
         Command::Checkerboard(args) => board::run(GridKind::Checker, *args),
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),

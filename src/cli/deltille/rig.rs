@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
-use super::calibrating::{Calibrated, SolveArgs, check_images, sample, without_outliers};
+use super::calibrating::{Calibrated, SolveArgs, check_images, sample, sureness, without_outliers};
 use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::limits::FileLimits;
 use super::sightings::SheetArgs;
@@ -323,6 +323,7 @@ fn summary(solved: &Calibrated) -> String {
             without_outliers(camera.outlier_count(), camera.inlier_rms_px()),
             at.to_array().map(|mm| fixed(mm, 2)).join(", ")
         ));
+        lines.extend(sureness(camera).map(|line| format!("{}: {line}", camera.name)));
     }
     lines.extend(solved.lines());
     lines.extend(estimate.held_out.iter().map(|test| format!("held out: {}", headline(test))));

@@ -5,3 +5,4 @@ mod gross_errors;
 mod models;
 mod rig;
 mod target_map;
+mod uncertainty;

@@ -14,7 +14,7 @@ use rand_distr::{Distribution, Normal};
 const NOISE_PX: f64 = 0.05;
 
 /// A camera of a model with coefficients as lenses have them.
-fn camera(model: Model) -> Camera {
+pub(super) fn camera(model: Model) -> Camera {
     let values: &[f64] = match model {
         Model::Radtan => &[-0.17, 0.02, 5e-4, 2e-4],
         Model::Radtan5 => &[-0.17, 0.02, 5e-4, 2e-4, 0.002],
@@ -73,7 +73,12 @@ fn any_pose(rng: &mut ChaCha8Rng, reach_rad: f64, tilt_rad: f64, distance: f64) 
 }
 
 /// So many views of a camera with noise.
-fn simulated(camera: &Camera, count: usize, tilt_rad: f64, seed: u64) -> (Vec<View>, Vec<Pose>) {
+pub(super) fn simulated(
+    camera: &Camera,
+    count: usize,
+    tilt_rad: f64,
+    seed: u64,
+) -> (Vec<View>, Vec<Pose>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(0.0, NOISE_PX).unwrap();
     let mut noise_rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED);
@@ -102,11 +107,11 @@ const MODELS: [Model; 8] = [
     Model::Pupil,
 ];
 
-fn of(views: &[View], intrinsics: impl Into<Intrinsics>) -> Calibration {
+pub(super) fn of(views: &[View], intrinsics: impl Into<Intrinsics>) -> Calibration {
     Calibration::new([Pose::IDENTITY]).camera("", views.to_vec(), intrinsics)
 }
 
-fn solved(views: &[View], model: Model) -> Estimate {
+pub(super) fn solved(views: &[View], model: Model) -> Estimate {
     of(views, model).solve().unwrap()
 }
 

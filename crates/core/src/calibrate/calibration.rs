@@ -37,6 +37,7 @@ pub struct Calibration {
     pub(super) board_shape: bool,
     pub(super) measure_target: bool,
     pub(super) hold_out: Option<usize>,
+    pub(super) distances_mm: Vec<f64>,
 }
 
 /// What one camera saw, and what is known of it.
@@ -143,6 +144,7 @@ impl Calibration {
             board_shape: false,
             measure_target: false,
             hold_out: None,
+            distances_mm: Vec::new(),
         }
     }
 
@@ -198,6 +200,13 @@ impl Calibration {
         Self { hold_out, ..self }
     }
 
+    /// How far points are, mm, for which the uncertainty of projections is told beside that at infinity; unless
+    /// said otherwise as far as the corners were.
+    #[must_use]
+    pub fn distances_mm(self, distances_mm: Vec<f64>) -> Self {
+        Self { distances_mm, ..self }
+    }
+
     /// The cameras and their views.
     pub fn cameras(&self) -> &[CameraViews] {
         &self.cameras
@@ -220,13 +229,25 @@ impl Calibration {
 
     /// The same with other cameras.
     pub(super) fn of_cameras(&self, cameras: Vec<CameraViews>) -> Self {
-        Self { panels: self.panels.clone(), cameras, ..*self }
+        Self {
+            panels: self.panels.clone(),
+            cameras,
+            distances_mm: self.distances_mm.clone(),
+            ..*self
+        }
     }
 
     /// One of its cameras by itself, with panels at these places.
     pub(super) fn alone(&self, camera: usize, panels: &[PanelPlace]) -> Self {
         let cameras = vec![self.cameras[camera].clone()];
-        Self { panels: panels.to_vec(), cameras, refine_panels: false, hold_out: None, ..*self }
+        Self {
+            panels: panels.to_vec(),
+            cameras,
+            refine_panels: false,
+            hold_out: None,
+            distances_mm: Vec::new(),
+            ..*self
+        }
     }
 
     /// The frames that take part, and those that are held out.
@@ -287,6 +308,7 @@ impl Calibration {
             refine_panels: false,
             board_shape: false,
             measure_target: false,
+            distances_mm: Vec::new(),
             ..*self
         }
     }

@@ -3,12 +3,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 use nalgebra::{DMatrix, Matrix3};
 
+use super::agreement::{Observed, observed};
 use super::calibration::{CameraViews, PanelPlace};
 use super::error::CalibrationError;
 use super::excluded::Excluded;
 use super::finding::Finding;
 use super::lack_of_fit::{LackOfFit, lack_of_fit};
 use super::lens_end::LensEnd;
+use super::loss::Loss;
 use super::minimise::Minimum;
 use super::model::Model;
 use super::normal::Covariances;
@@ -18,6 +20,7 @@ use super::reweighting::{Settled, variance};
 use super::shape::{BoardShape, Shape};
 use super::start::Frame;
 use super::target_map::{CornerOffset, TargetMap};
+use super::uncertainty::{ObservedCovariance, ProjectionUncertainty};
 use crate::camera::{Camera, PROJECTION_PARAMETERS, Pose};
 use crate::statistics::median;
 use crate::targets::{Name, PanelPose, Target};
@@ -74,6 +77,8 @@ pub struct CameraEstimate {
     pub parameters: Vec<Parameter>,
     /// Covariance of the estimated parameters, in their order; each entry in the product of their units.
     pub covariance: DMatrix<f64>,
+    /// How sure it is of where it projects a point; `None` where it was given, or where its motion is open.
+    pub projection: Option<ProjectionUncertainty>,
     /// Names of parameters that the views cannot tell apart: some change of them together moves no
     /// corner, and their deviations are the least that they can be; or hardly any, so that neither the
     /// value nor the deviation of one alone means anything.
@@ -83,6 +88,8 @@ pub struct CameraEstimate {
     /// Standard deviations of that pose: of a rotation (rad) and a translation (mm) about the camera's axes; `None`
     /// where it was not to be found, as of the first camera, which is the rig.
     pub pose_sd: Option<[f64; 6]>,
+    /// The same as the frames agree with each other; `None` where it was not to be found, or of too few frames.
+    pub observed_pose_sd: Option<[f64; 6]>,
     /// The views that took part, in the order of the frames.
     pub views: Vec<ViewEstimate>,
     /// Root mean square error of a coordinate over all its views, px.
@@ -223,9 +230,11 @@ impl CameraEstimate {
             camera,
             model: None,
             covariance: DMatrix::zeros(0, 0),
+            projection: None,
             ill_conditioned: Vec::new(),
             camera_from_rig: Pose::IDENTITY,
             pose_sd: None,
+            observed_pose_sd: None,
             views: Vec::new(),
             rms_px: 0.0,
         }
@@ -294,6 +303,7 @@ impl Estimate {
         cameras: &[CameraViews],
         frames: &[&Frame],
         settled: &Settled,
+        (loss, distances_mm): (Loss, &[f64]),
         f_ratio: f64,
     ) -> Result<Self, CalibrationError> {
         let Settled { minimum, whitening, .. } = settled;
@@ -312,12 +322,20 @@ impl Estimate {
         if !poses.is_empty() {
             return Err(open(poses.join(", ")));
         }
-        let variance = variance(minimum);
+        let variance = variance(minimum, whitening, loss);
         let covariance = &found.shared * variance;
+        let observed = observed(minimum, whitening, loss, &found);
         let mut views = views(cameras, frames, settled);
         let cameras = cameras.iter().enumerate().map(|(index, camera)| {
             let views = std::mem::take(&mut views[index]);
-            camera_estimate(index, camera, views, settled, &found, &covariance)
+            let mut camera = camera_estimate(index, camera, views, settled, &found, &covariance);
+            camera.projection =
+                projection(index, &camera, settled, distances_mm, observed.as_ref());
+            let of_pose = layout.cameras[index].zip(observed.as_ref());
+            camera.observed_pose_sd = of_pose.map(|(first, observed)| {
+                std::array::from_fn(|i| observed.covariance[(first + i, first + i)].sqrt())
+            });
+            camera
         });
         let cameras: Vec<CameraEstimate> = cameras.collect();
         let of_frames = problem.frames.iter().zip(&found.frames).zip(frames).enumerate();
@@ -413,12 +431,36 @@ fn camera_estimate(
         covariance: DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
             covariance[(columns[i].1, columns[j].1)]
         }),
+        projection: None,
         ill_conditioned: loose.collect(),
         camera_from_rig: unknowns.camera_from_rig,
         pose_sd: layout.cameras[index].map(|first| std::array::from_fn(|i| sd(first + i))),
+        observed_pose_sd: None,
         rms_px: rms_px(views.iter().flat_map(|view| &view.corners)),
         views,
     }
+}
+
+/// How a camera's projections are known, with the covariance of what all frames share as these show it.
+fn projection(
+    index: usize,
+    camera: &CameraEstimate,
+    settled: &Settled,
+    distances_mm: &[f64],
+    observed: Option<&Observed>,
+) -> Option<ProjectionUncertainty> {
+    let Minimum { problem, layout, .. } = &settled.minimum;
+    let columns = &layout.parameters[index];
+    if columns.is_empty() {
+        return None;
+    }
+    let observed = observed.map(|Observed { covariance, freedom }| {
+        let n = columns.len();
+        let own = DMatrix::from_fn(n, n, |i, j| covariance[(columns[i].1, columns[j].1)]);
+        ObservedCovariance { covariance: own, freedom: *freedom }
+    });
+    let (whitening, free) = (&settled.whitening, camera.free());
+    ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)
 }
 
 fn target_map(

@@ -19,6 +19,16 @@ pub enum Loss {
     Cauchy,
 }
 
+/// How a corner pulls at what explains it, for an estimate's covariance.
+pub(super) struct Influence {
+    /// Its weight in the normal equations.
+    pub weight: f64,
+    /// The square of its pull.
+    pub squared: f64,
+    /// By how much the pull grows with a coordinate, the mean of both.
+    pub slope: f64,
+}
+
 impl Loss {
     /// What a squared distance costs, and the weight of its normal equations, where a standard
     /// deviation is `sigma`.
@@ -35,5 +45,17 @@ impl Loss {
                 (c * c * relative.ln_1p(), 1.0 / (1.0 + relative))
             }
         }
+    }
+    /// The pull w e of a corner at a squared distance.
+    pub(super) fn influence(self, squared: f64, sigma: f64) -> Influence {
+        let (_, weight) = self.of(squared, sigma);
+        let relative = squared / (SCALE_SIGMA * sigma).powi(2);
+        // Half the divergence of the pull: w + e w′ / 2.
+        let slope = match self {
+            Self::Huber if relative > 1.0 => weight / 2.0,
+            Self::Squared | Self::Huber => 1.0,
+            Self::Cauchy => weight * weight,
+        };
+        Influence { weight, squared: weight * weight * squared, slope }
     }
 }

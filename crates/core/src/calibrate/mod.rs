@@ -20,7 +20,9 @@
 //! pose leads to, and the translation grows by τ. Standard deviations of poses are those of ω (rad)
 //! and τ (mm).
 
+mod agreement;
 mod calibration;
+mod comparison;
 mod consensus;
 mod corner_map;
 mod diagnosis;
@@ -47,12 +49,14 @@ mod shape;
 mod solve;
 mod start;
 mod target_map;
+mod uncertainty;
 mod view;
 mod view_consistency;
 mod weights;
 mod words;
 
 pub use calibration::{Calibration, CameraViews, Intrinsics, PanelPlace};
+pub use comparison::{CameraMotion, Comparison, ComparisonError, Difference, Region};
 pub use diagnosis::Diagnosis;
 pub use error::CalibrationError;
 pub use estimate::{CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, ViewEstimate};
@@ -69,6 +73,7 @@ pub use panel::PanelRef;
 pub use problem::Observation;
 pub use shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
 pub use target_map::{CornerOffset, LEAST_TO_MEASURE, TargetMap};
+pub use uncertainty::{ObservedCovariance, ProjectionUncertainty, Source, UncertaintyMap};
 pub use view::{Reference, Shown, Sighting, View, views};
 pub use weights::Weights;
 pub use words::Words;

@@ -104,6 +104,10 @@ pub(super) struct Step {
 /// of each corner's offset.
 pub(super) struct Covariances {
     pub shared: DMatrix<f64>,
+    /// Of the shared unknowns with all that are kept.
+    pub across: DMatrix<f64>,
+    /// A square root of that of the shared unknowns.
+    pub root: Root,
     pub frames: Vec<Matrix6<f64>>,
     pub corners: Vec<Matrix3<f64>>,
     /// The columns that nothing tells apart beyond what rounding leaves; their variances are the
@@ -111,6 +115,21 @@ pub(super) struct Covariances {
     pub loose: Vec<usize>,
     /// The columns whose deviation is [`TIED`] times what it were if all other shared ones were known.
     pub tied: Vec<usize>,
+}
+
+/// A square root L of a covariance, LLᵀ, and its inverse, both from the equations, so that what is well determined is
+/// exact beside what is not.
+pub(super) struct Root {
+    pub half: DMatrix<f64>,
+    pub inverse: DMatrix<f64>,
+}
+
+/// The inverse of equations, and the columns that they leave open, and tie to others.
+struct Inverse {
+    matrix: DMatrix<f64>,
+    root: Root,
+    loose: Vec<usize>,
+    tied: Vec<usize>,
 }
 
 impl Normal {
@@ -326,7 +345,7 @@ impl Normal {
     /// The inverse of the equations; `None` where a frame's pose is open by itself.
     pub(super) fn covariances(&self, layout: &Layout) -> Option<Covariances> {
         let Reduced { matrix, inverses, .. } = self.reduced(0.0)?;
-        let (kept, loose, tied) = self.invert(matrix)?;
+        let Inverse { matrix: kept, root, loose, tied } = self.invert(matrix)?;
         let of_part = |(part, inverse): (&Part, DMatrix<f64>)| {
             let through = &part.b * &inverse;
             inverse + through.tr_mul(&(&kept * &through))
@@ -337,13 +356,29 @@ impl Normal {
             (None, Some(first)) => (parts.iter().map(fixed).collect(), blocks(&kept, first)),
             (None, None) => (parts.iter().map(fixed).collect(), Vec::new()),
         };
-        let shared = kept.view((0, 0), (self.shared, self.shared)).into_owned();
-        Some(Covariances { shared, frames, corners, loose, tied })
+        let across = kept.rows(0, self.shared).into_owned();
+        let shared = across.columns(0, self.shared).into_owned();
+        Some(Covariances { shared, across, root, frames, corners, loose, tied })
     }
 
-    /// The inverse of the reduced equations, and the columns that they leave open, and tie to others. Only
-    /// what all frames share may be open.
-    fn invert(&self, reduced: DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<usize>, Vec<usize>)> {
+    /// Adds the pull of a corner in one block to that of all that are kept.
+    pub(super) fn pull_of_corner(
+        &self,
+        layout: &Layout,
+        corner: &OfCorner,
+        pull: &mut DVector<f64>,
+    ) {
+        if let Some(first) = layout.corners {
+            let mut own = pull.fixed_rows_mut::<3>(first + 3 * corner.index);
+            own += corner.right;
+        } else if let Some(part) = self.parts.get(corner.index) {
+            let Some(whole) = part.c.clone().cholesky() else { return };
+            *pull -= &part.b * whole.solve(&corner.right);
+        }
+    }
+
+    /// The inverse of the reduced equations; the root is that of what all frames share, which alone may be open.
+    fn invert(&self, reduced: DMatrix<f64>) -> Option<Inverse> {
         let (n, shared) = (reduced.nrows(), self.shared);
         let others = n - shared;
         if others == 0 {
@@ -354,23 +389,24 @@ impl Normal {
         let across = reduced.view((shared, 0), (others, shared));
         let through = &own * across;
         let of_shared = reduced.view((0, 0), (shared, shared)) - across.tr_mul(&through);
-        let (of_shared, loose, tied) = self.invert_shared(of_shared);
-        let carried = &through * &of_shared;
+        let found = self.invert_shared(of_shared);
+        let of_shared = &found.matrix;
+        let carried = &through * of_shared;
         let mut inverse = DMatrix::zeros(n, n);
-        inverse.view_mut((0, 0), (shared, shared)).copy_from(&of_shared);
+        inverse.view_mut((0, 0), (shared, shared)).copy_from(of_shared);
         inverse.view_mut((shared, 0), (others, shared)).copy_from(&-&carried);
         inverse.view_mut((0, shared), (shared, others)).copy_from(&-carried.transpose());
         let own = own + carried * through.transpose();
         inverse.view_mut((shared, shared), (others, others)).copy_from(&own);
-        Some((inverse, loose, tied))
+        Some(Inverse { matrix: inverse, ..found })
     }
 
-    /// The inverse of the equations of what all frames share, and the columns that they leave open, and tie to
-    /// others.
-    fn invert_shared(&self, reduced: DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>, Vec<usize>) {
+    /// The inverse of the equations of what all frames share.
+    fn invert_shared(&self, reduced: DMatrix<f64>) -> Inverse {
         let n = reduced.nrows();
         if n == 0 {
-            return (reduced, Vec::new(), Vec::new());
+            let root = Root { half: reduced.clone(), inverse: reduced.clone() };
+            return Inverse { matrix: reduced, root, loose: Vec::new(), tied: Vec::new() };
         }
         let scale = DVector::from_fn(n, |i, _| 1.0 / self.a[(i, i)].max(f64::MIN_POSITIVE).sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| reduced[(i, j)] * scale[i] * scale[j]);
@@ -387,7 +423,13 @@ impl Normal {
         let is_tied = |&i: &usize| inverse[(i, i)] * scaled[(i, i)] > TIED * TIED;
         let tied = (0..n).filter(is_tied).collect();
         let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-        (inverse, loose.into_iter().collect(), tied)
+        let roots = eigen.eigenvalues.map(|value| value.max(SINGULAR).sqrt());
+        let turn = &eigen.eigenvectors;
+        let root = Root {
+            half: DMatrix::from_fn(n, n, |i, j| scale[i] * turn[(i, j)] / roots[j]),
+            inverse: DMatrix::from_fn(n, n, |i, j| roots[i] * turn[(j, i)] / scale[j]),
+        };
+        Inverse { matrix: inverse, root, loose: loose.into_iter().collect(), tied }
     }
 }
 
@@ -466,19 +508,19 @@ const BLOCKS_AT_A_TIME: usize = 256;
 const MOST_COLUMNS: usize = MAX_PARAMETERS + 18 + shape::COUNT;
 
 /// The normal equations of one block, with only the columns that it has.
-struct Local {
+pub(super) struct Local {
     cost: f64,
     /// Shared columns; those of the frame's pose follow.
-    columns: Vec<usize>,
+    pub columns: Vec<usize>,
     /// Rows of the lower triangle, one after the other.
     matrix: Vec<f64>,
-    right: Vec<f64>,
+    pub right: Vec<f64>,
     /// The corners, where they are unknown.
-    corners: Vec<OfCorner>,
+    pub corners: Vec<OfCorner>,
 }
 
 /// What a corner in a block says of its own offset.
-struct OfCorner {
+pub(super) struct OfCorner {
     /// Its place in the map.
     index: usize,
     /// For each column of the block.
@@ -488,7 +530,7 @@ struct OfCorner {
 }
 
 impl Local {
-    fn of(
+    pub(super) fn of(
         problem: &Problem,
         layout: &Layout,
         block: &Block,
@@ -565,7 +607,7 @@ impl Local {
     }
 
     /// A row of the lower triangle, up to the diagonal.
-    fn row(&self, i: usize) -> &[f64] {
+    pub(super) fn row(&self, i: usize) -> &[f64] {
         &self.matrix[i * (i + 1) / 2..][..=i]
     }
 

@@ -210,10 +210,37 @@ pub(super) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f6
     problem.blocks.iter().zip(&weights).map(of_block).collect()
 }
 
-/// The a-posteriori variance: what the residuals cost for each of their degrees of freedom.
-pub(super) fn variance(minimum: &Minimum) -> f64 {
+/// The variance by which the inverse of the normal equations is to be multiplied, for a robust loss by the
+/// asymptotic formula of an M-estimate (Huber & Ronchetti 2009, 7.6),
+///
+/// ```text
+///     σ² = Σψ² / (2N − p) · mean w / (mean ψ′)²
+/// ```
+///
+/// with the pull ψ = w e of each coordinate. Where every corner counts in full that is what the residuals cost
+/// for each of their degrees of freedom.
+pub(super) fn variance(minimum: &Minimum, whitening: &Whitening, loss: Loss) -> f64 {
+    let Minimum { problem, normal, layout, .. } = minimum;
     // Offsets of corners are as many unknowns as expectations of them.
-    let unknowns = minimum.layout.shared + 6 * minimum.problem.frames.len();
-    let freedom = (2 * minimum.problem.count()).saturating_sub(unknowns).max(1);
-    minimum.normal.cost / freedom as f64
+    let unknowns = layout.shared + 6 * problem.frames.len();
+    let freedom = (2 * problem.count()).saturating_sub(unknowns).max(1) as f64;
+    if loss == Loss::Squared {
+        return normal.cost / freedom;
+    }
+    // Expectations of poses and offsets cost, too.
+    let (mut cost, mut pull, mut weight, mut slope) = (0.0, 0.0, 0.0, 0.0);
+    for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
+        for (seen, &w) in block.observations.iter().zip(weights) {
+            let Some(off) = problem.residual(block, seen) else { continue };
+            let squared = Whitening::apply(w, off).length_squared();
+            let influence = loss.influence(squared, whitening.sigma);
+            cost += loss.of(squared, whitening.sigma).0;
+            pull += influence.squared;
+            weight += influence.weight;
+            slope += influence.slope;
+        }
+    }
+    let count = problem.count().max(1) as f64;
+    let beside = normal.cost - cost;
+    (pull + beside) / freedom * (weight / count) / (slope / count).powi(2)
 }

@@ -97,7 +97,8 @@ impl Calibration {
         };
         findings.extend(gross.findings(&settled, |frame| frames[frame].name.clone()));
         let kept: Vec<&Frame> = gross.belonging().map(|frame| &frames[frame]).collect();
-        let estimate = Estimate::new(&own.cameras, &kept, &settled, f_ratio)?;
+        let estimate =
+            Estimate::new(&own.cameras, &kept, &settled, (own.loss, &own.distances_mm), f_ratio)?;
         if let ([camera], [CameraViews { intrinsics: Intrinsics::Unknown(_), .. }]) =
             (estimate.cameras.as_slice(), own.cameras.as_slice())
         {
@@ -173,7 +174,8 @@ impl Calibration {
         // Compared under the same weights.
         let bent = minimise(problem, &settled.whitening, self.loss, Until::Fine)
             .ok_or(CalibrationError::NoStart)?;
-        let f_ratio = (flat - bent.normal.cost) / shape::COUNT as f64 / variance(&bent);
+        let variance = variance(&bent, &settled.whitening, self.loss);
+        let f_ratio = (flat - bent.normal.cost) / shape::COUNT as f64 / variance;
         let problem = settled.problem.at(&bent.problem);
         let settled = settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)?;
         Ok((settled, f_ratio))

@@ -1,6 +1,7 @@
 use glam::DVec3;
 
 use super::panel::PanelRef;
+use crate::statistics::chi_squared_chance;
 use crate::targets::{MeasuredPlace, Target};
 
 /// Where the corners of a target are, as the views have it.
@@ -120,10 +121,6 @@ impl CornerOffset {
         let covariance = nalgebra::Matrix3::from_fn(|i, j| self.covariance_mm2[i][j]);
         let offset = nalgebra::Vector3::from(self.offset_mm.to_array());
         let Some(inverse) = covariance.try_inverse() else { return 1.0 };
-        let square = offset.dot(&(inverse * offset)).max(0.0);
-        // Of χ² with three degrees of freedom.
-        let root = square.sqrt();
-        let density = (2.0 / std::f64::consts::PI).sqrt() * root * (-square / 2.0).exp();
-        libm::erfc(root / std::f64::consts::SQRT_2) + density
+        chi_squared_chance(offset.dot(&(inverse * offset)), 3)
     }
 }

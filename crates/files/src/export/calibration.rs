@@ -5,8 +5,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::estimate::{
-    DiagnosisRecord, MapRecord, ParameterRecord, ShapeRecord, ViewRecord, correlations, diagnoses,
-    map, parameters, shape, views,
+    DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord, ViewRecord,
+    correlations, diagnoses, map, parameters, projection, shape, views,
 };
 use super::finding::{FindingRecord, records};
 use deltille_core::calibrate::{Diagnosis, Estimate, Excluded, SHAPE_COEFFICIENTS as COUNT, Shape};
@@ -108,6 +108,8 @@ struct CalibrationFile<'a> {
     parameters: Vec<ParameterRecord<'a>>,
     correlations: Vec<Vec<f64>>,
     loose: &'a [String],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    projection: Option<ProjectionRecord>,
     rms_px: f64,
     inlier_rms_px: f64,
     outliers: usize,
@@ -151,6 +153,7 @@ pub fn write(found: &Estimate, said: &[Diagnosis], print: Print) -> Option<Strin
         parameters: parameters(camera),
         correlations: correlations(camera),
         loose: &camera.ill_conditioned,
+        projection: projection(camera),
         rms_px: found.rms_px,
         inlier_rms_px: found.inlier_rms_px(),
         outliers: found.outlier_count(),

@@ -1,11 +1,12 @@
 //! What files tell of an estimate, of a single camera and of a rig alike.
 
 use glam::DVec3;
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::motion::Motion;
 use deltille_core::calibrate::{
-    BoardShape, CameraEstimate, Diagnosis, Estimate, Instead, LackOfFit, LensEnd, PanelRef,
+    BoardShape, CameraEstimate, Diagnosis, Estimate, Instead, LackOfFit, LensEnd, PanelRef, Source,
     TargetMap, ViewEstimate, Words,
 };
 
@@ -14,6 +15,32 @@ pub(super) struct ParameterRecord<'a> {
     name: &'a str,
     value: f64,
     sd: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    observed_sd: Option<f64>,
+}
+
+/// How the projections of a camera are known.
+#[derive(Serialize)]
+pub(super) struct ProjectionRecord {
+    /// For a turn (rad) and a move (mm) along each axis its change by each parameter that was found.
+    alignment: Vec<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    observed_correlations: Option<Vec<Vec<f64>>>,
+    /// From so many squares a variance of that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    observed_freedom: Option<f64>,
+    distances_mm: Vec<f64>,
+    maps: Vec<UncertaintyRecord>,
+}
+
+/// How sure a camera is over its image, row by row.
+#[derive(Serialize)]
+struct UncertaintyRecord {
+    distance_mm: Option<f64>,
+    from: &'static str,
+    columns: usize,
+    rows: usize,
+    sd_px: Vec<Option<f64>>,
 }
 
 #[derive(Serialize)]
@@ -82,13 +109,49 @@ pub(super) struct DiagnosisRecord<'a> {
 }
 
 pub(super) fn parameters(camera: &CameraEstimate) -> Vec<ParameterRecord<'_>> {
-    let parameters = camera.parameters.iter();
-    parameters.map(|p| ParameterRecord { name: &p.name, value: p.value, sd: p.sd }).collect()
+    let parameters = camera.parameters.iter().zip(camera.observed_sd());
+    parameters
+        .map(|(p, observed_sd)| ParameterRecord {
+            name: &p.name,
+            value: p.value,
+            sd: p.sd,
+            observed_sd,
+        })
+        .collect()
+}
+
+pub(super) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
+    let known = camera.projection.as_ref()?;
+    let (rows, columns) = known.alignment.shape();
+    let row = |i: usize| (0..columns).map(|j| known.alignment[(i, j)]).collect();
+    let maps = camera.uncertainty_maps().into_iter().map(|map| UncertaintyRecord {
+        distance_mm: map.distance_mm,
+        from: match map.source {
+            Source::Noise => "noise",
+            Source::Observed => "observed",
+        },
+        columns: map.columns,
+        rows: map.rows,
+        // Nobody needs more digits of a deviation.
+        sd_px: map.sd_px.iter().map(|sd| sd.map(|sd| (sd * 1e5).round() / 1e5)).collect(),
+    });
+    Some(ProjectionRecord {
+        alignment: (0..rows).map(row).collect(),
+        observed_correlations: known.observed.as_ref().map(|of| correlations_of(&of.covariance)),
+        observed_freedom: known.observed.as_ref().map(|of| of.freedom),
+        distances_mm: known.distances_mm.clone(),
+        maps: maps.collect(),
+    })
+}
+
+fn correlations_of(covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    let c = covariance;
+    let of = |i: usize, j: usize| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
+    (0..c.nrows()).map(|i| (0..c.nrows()).map(|j| of(i, j)).collect()).collect()
 }
 
 pub(super) fn correlations(camera: &CameraEstimate) -> Vec<Vec<f64>> {
-    let found = camera.found().count();
-    (0..found).map(|i| (0..found).map(|j| camera.correlation(i, j)).collect()).collect()
+    correlations_of(&camera.covariance)
 }
 
 /// The views of a camera; poses have deviations where the camera is the rig.

@@ -7,6 +7,7 @@
 pub mod atomic;
 pub mod calibration;
 pub mod camera;
+pub mod comparison;
 pub mod csv;
 pub mod detection;
 pub mod dsc;

@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use super::calibration::Print;
 use super::estimate::{
-    DiagnosisRecord, MapRecord, ParameterRecord, ShapeRecord, ViewRecord, correlations, diagnoses,
-    map, parameters, shape, views,
+    DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord, ViewRecord,
+    correlations, diagnoses, map, parameters, projection, shape, views,
 };
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;
@@ -55,7 +55,12 @@ struct Camera<'a> {
     parameters: Vec<ParameterRecord<'a>>,
     correlations: Vec<Vec<f64>>,
     loose: &'a [String],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    projection: Option<ProjectionRecord>,
     camera_from_rig: Motion,
+    /// As the frames agree with each other: of a turn (rad) and a move (mm).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    observed_pose_sd: Option<[f64; 6]>,
     views: Vec<ViewRecord<'a>>,
 }
 
@@ -124,7 +129,9 @@ fn of_camera<'a>(estimate: &Estimate, found: &'a CameraEstimate) -> Camera<'a> {
         parameters: parameters(found),
         correlations: correlations(found),
         loose: &found.ill_conditioned,
+        projection: projection(found),
         camera_from_rig: Motion::new(&found.camera_from_rig, found.pose_sd),
+        observed_pose_sd: found.observed_pose_sd,
         views: views(estimate, found),
     }
 }

@@ -12,7 +12,8 @@ use super::calibration::{self, StoredShape};
 use super::rig;
 use deltille_core::calibrate::{
     BoardShape, CameraEstimate, Corner, CornerOffset, Estimate, Excluded, FrameEstimate, Model,
-    PanelRef, Parameter, Reason, Reference, SHAPE_COEFFICIENTS as COUNT, TargetMap, ViewEstimate,
+    ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
+    SHAPE_COEFFICIENTS as COUNT, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::json::{self, ReadError};
@@ -43,6 +44,10 @@ pub enum SavedError {
 /// # Errors
 /// Where it is no such file, a field is wrong, or the target has other panels.
 pub fn read(text: &str, reference: &Reference) -> Result<Estimate, SavedError> {
+    estimate(text, Some(reference))
+}
+
+fn estimate(text: &str, reference: Panels) -> Result<Estimate, SavedError> {
     let wrong = |error| match error {
         ReadError::Json(_) => SavedError::Foreign,
         ReadError::Field { field, problem } => SavedError::Field { field, problem },
@@ -51,6 +56,25 @@ pub fn read(text: &str, reference: &Reference) -> Result<Estimate, SavedError> {
         Some(calibration::SCHEMA) => json::read::<Single>(text).map_err(wrong)?.estimate(reference),
         Some(rig::SCHEMA) => json::read::<Rig>(text).map_err(wrong)?.estimate(reference),
         _ => Err(SavedError::Foreign),
+    }
+}
+
+/// Reads the cameras of a calibration or a rig by themselves, whatever was photographed; panels of corners are
+/// only told apart.
+///
+/// # Errors
+/// Where it is no such file, or a field is wrong.
+pub fn read_cameras(text: &str) -> Result<Vec<CameraEstimate>, SavedError> {
+    Ok(estimate(text, None)?.cameras)
+}
+
+/// What was photographed, if that is known.
+type Panels<'a> = Option<&'a Reference<'a>>;
+
+fn panel(panels: Panels, id: u32) -> Result<PanelRef, SavedError> {
+    match panels {
+        Some(reference) => reference.panel(id).ok_or(SavedError::Panel(id)),
+        None => Ok(PanelRef::new(id as usize, id)),
     }
 }
 
@@ -121,8 +145,23 @@ struct SavedCamera {
     #[serde(deserialize_with = "quantity::figure::de")]
     correlations: Vec<Vec<f64>>,
     loose: Vec<String>,
+    projection: Option<SavedProjection>,
     camera_from_rig: Option<SavedPose>,
+    #[serde(default, deserialize_with = "quantity::deviation::de")]
+    observed_pose_sd: Option<[f64; 6]>,
     views: Vec<SavedView>,
+}
+
+#[derive(Deserialize)]
+struct SavedProjection {
+    #[serde(deserialize_with = "quantity::figure::de")]
+    alignment: Vec<Vec<f64>>,
+    #[serde(default, deserialize_with = "quantity::figure::de")]
+    observed_correlations: Option<Vec<Vec<f64>>>,
+    #[serde(default, deserialize_with = "quantity::deviation::de")]
+    observed_freedom: Option<f64>,
+    #[serde(deserialize_with = "quantity::length_mm::de")]
+    distances_mm: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -132,6 +171,8 @@ struct SavedParameter {
     value: f64,
     #[serde(deserialize_with = "quantity::deviation::de")]
     sd: Option<f64>,
+    #[serde(default, deserialize_with = "quantity::deviation::de")]
+    observed_sd: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -229,7 +270,7 @@ struct SavedExcluded {
 }
 
 impl Single {
-    fn estimate(self, reference: &Reference) -> Result<Estimate, SavedError> {
+    fn estimate(self, reference: Panels) -> Result<Estimate, SavedError> {
         let Self { camera, fit, held_out } = self;
         let (rms_px, views) = (camera.rms_px, &camera.views);
         let frames = frames_of(views);
@@ -253,7 +294,7 @@ impl Single {
 }
 
 impl Rig {
-    fn estimate(self, reference: &Reference) -> Result<Estimate, SavedError> {
+    fn estimate(self, reference: Panels) -> Result<Estimate, SavedError> {
         let Self { cameras, frames, fit, held_out } = self;
         let place =
             |frames: &[SavedFrame], name: &str| frames.iter().position(|frame| frame.name == name);
@@ -288,7 +329,7 @@ impl Rig {
 }
 
 impl Fit {
-    fn estimate(self, reference: &Reference) -> Result<Estimate, SavedError> {
+    fn estimate(self, reference: Panels) -> Result<Estimate, SavedError> {
         let mut estimate = Estimate::default();
         (estimate.sigma, estimate.common_px) = (self.sigma, self.common_px);
         estimate.shape = self.board_shape.map(SavedShape::read);
@@ -315,7 +356,7 @@ fn known(
     rms_px: f64,
     views: Vec<SavedView>,
     frame: impl Fn(usize, &str) -> Option<usize>,
-    reference: &Reference,
+    reference: Panels,
 ) -> Result<CameraEstimate, SavedError> {
     let mut camera = CameraEstimate::given(&found.name, found.camera.clone());
     camera.camera_from_rig = found.camera_from_rig;
@@ -327,7 +368,7 @@ fn known(
 fn estimates(
     views: Vec<SavedView>,
     frame: impl Fn(usize, &str) -> Option<usize>,
-    reference: &Reference,
+    reference: Panels,
 ) -> Result<Vec<ViewEstimate>, SavedError> {
     let read = |(index, view): (usize, SavedView)| {
         let frame = frame(index, &view.name).ok_or_else(|| SavedError::Field {
@@ -335,7 +376,7 @@ fn estimates(
             problem: format!("{} is no frame", view.name),
         })?;
         let corners = view.corners.iter().map(|corner| {
-            let panel = reference.panel(corner.panel).ok_or(SavedError::Panel(corner.panel))?;
+            let panel = panel(reference, corner.panel)?;
             Ok(corner.read(panel))
         });
         Ok(ViewEstimate {
@@ -355,7 +396,7 @@ impl SavedCamera {
         self,
         name: &str,
         frame: impl Fn(usize, &str) -> Option<usize>,
-        reference: &Reference,
+        reference: Panels,
     ) -> Result<CameraEstimate, SavedError> {
         let field = |field: &str, problem: &str| SavedError::Field {
             field: field.to_owned(),
@@ -367,10 +408,11 @@ impl SavedCamera {
             .ok_or_else(|| field("parameters", "they are those of no lens here"))?;
         let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
         let sds: Vec<f64> = self.parameters.iter().filter_map(|p| p.sd).collect();
-        let rows = &self.correlations;
-        if rows.len() != sds.len() || rows.iter().any(|row| row.len() != sds.len()) {
-            return Err(field("correlations", "there is not one for each pair of parameters"));
-        }
+        let covariance = covariance(&self.correlations, &sds)
+            .ok_or_else(|| field("correlations", "there is not one for each pair of parameters"))?;
+        let observed: Vec<f64> = self.parameters.iter().filter_map(|p| p.observed_sd).collect();
+        let projection = self.projection.map(|known| known.read(sds.len(), &observed));
+        let projection = projection.transpose().map_err(|wrong| field("projection", wrong))?;
         let parameters = self.parameters.iter();
         let parameters =
             parameters.map(|p| Parameter { name: p.name.clone(), value: p.value, sd: p.sd });
@@ -378,14 +420,40 @@ impl SavedCamera {
         let mut camera = CameraEstimate::given(name, blank.with_parameters(&values));
         camera.model = self.model.parse().ok();
         camera.parameters = parameters.collect();
-        camera.covariance =
-            DMatrix::from_fn(sds.len(), sds.len(), |i, j| rows[i][j] * sds[i] * sds[j]);
+        camera.covariance = covariance;
+        camera.projection = projection;
         camera.ill_conditioned = self.loose;
         camera.camera_from_rig = place.map_or(Pose::IDENTITY, SavedPose::pose);
         camera.pose_sd = place.and_then(SavedPose::sd);
+        camera.observed_pose_sd = self.observed_pose_sd;
         camera.views = estimates(self.views, frame, reference)?;
         camera.rms_px = self.rms_px;
         Ok(camera)
+    }
+}
+
+/// What correlations and deviations make; `None` where there is not a correlation for each pair.
+fn covariance(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
+    let n = sds.len();
+    let is_square = rows.len() == n && rows.iter().all(|row| row.len() == n);
+    is_square.then(|| DMatrix::from_fn(n, n, |i, j| rows[i][j] * sds[i] * sds[j]))
+}
+
+impl SavedProjection {
+    /// Of so many parameters that were found, with the deviations that were observed.
+    fn read(self, found: usize, sds: &[f64]) -> Result<ProjectionUncertainty, &'static str> {
+        let Self { alignment, observed_correlations, observed_freedom, distances_mm } = self;
+        if alignment.len() != 6 || alignment.iter().any(|row| row.len() != found) {
+            return Err("`alignment` has not six rows with a number for each parameter");
+        }
+        let alignment = DMatrix::from_fn(6, found, |i, j| alignment[i][j]);
+        let observed = observed_correlations.zip(observed_freedom).map(|(rows, freedom)| {
+            let covariance = covariance(&rows, sds).filter(|_| sds.len() == found);
+            let covariance = covariance
+                .ok_or("`observed_correlations` are not one for each pair of parameters")?;
+            Ok(ObservedCovariance { covariance, freedom })
+        });
+        Ok(ProjectionUncertainty::new(alignment, distances_mm, observed.transpose()?))
     }
 }
 
@@ -442,9 +510,9 @@ impl SavedShape {
 }
 
 impl SavedMap {
-    fn read(self, reference: &Reference) -> Result<TargetMap, SavedError> {
+    fn read(self, reference: Panels) -> Result<TargetMap, SavedError> {
         let corners = self.corners.into_iter().map(|corner| {
-            let panel = reference.panel(corner.panel).ok_or(SavedError::Panel(corner.panel))?;
+            let panel = panel(reference, corner.panel)?;
             let SavedOffset { row, col, covariance_mm2, views, .. } = corner;
             let [panel_mm, offset_mm] = [corner.panel_mm, corner.offset_mm].map(DVec3::from);
             Ok(CornerOffset { panel, row, col, panel_mm, offset_mm, covariance_mm2, views })

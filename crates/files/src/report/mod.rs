@@ -11,6 +11,7 @@
 
 mod advice;
 mod axes;
+mod field;
 mod page;
 mod plots;
 mod rig;
@@ -24,6 +25,7 @@ use crate::export::calibration::Print;
 use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, PanelPlace, Words};
 
 pub use advice::{Advice, Weight, advice};
+pub use field::{comparison_svg, uncertainty_svg};
 pub use survey::{Survey, SurveyedView};
 pub use target_map::target_map_svg;
 pub use thumbnail::thumbnail;

@@ -4,8 +4,10 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 
-use super::{Report, Survey, SurveyedView, Weight, advice, plots, rig, target_map};
-use deltille_core::calibrate::{CameraEstimate, Excluded, Parameter, TargetMap, ViewEstimate};
+use super::{Report, Survey, SurveyedView, Weight, advice, field, plots, rig, target_map};
+use deltille_core::calibrate::{
+    CameraEstimate, Excluded, Parameter, Source, TargetMap, ViewEstimate,
+};
 use deltille_core::words::places;
 
 /// Views in the table: all, or where there are more the worst ones.
@@ -56,6 +58,7 @@ pub(super) fn html(report: &Report) -> String {
             let _ = write!(page, "<h2 class=\"camera\">{}</h2>{figures}", escaped(&camera.name));
         }
         page += &parameters(camera);
+        page += &uncertainty(camera);
         page += &drawings(camera, survey);
         page += &views(report, index, survey);
     }
@@ -138,15 +141,27 @@ pub(super) fn out_row(out: &Excluded, columns: usize) -> String {
 
 fn parameters(camera: &CameraEstimate) -> String {
     let mut rows = String::new();
-    let told = |p: &&Parameter| p.sd.is_some() || p.value != 0.0;
-    for parameter in camera.parameters.iter().filter(told) {
+    let told = |(p, _): &(&Parameter, Option<f64>)| p.sd.is_some() || p.value != 0.0;
+    let is_observed = camera.covariance_from(Source::Observed).is_some();
+    for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()).filter(told) {
         let (value, sd) = rounded(parameter.value, parameter.sd);
+        let observed = match (is_observed, observed) {
+            (false, _) => String::new(),
+            (true, None) => "<td></td>".to_owned(),
+            (true, Some(_)) => {
+                format!("<td class=\"number\">{}</td>", rounded(parameter.value, observed).1)
+            }
+        };
         let _ = write!(
             rows,
-            "<tr><td>{}</td><td class=\"number\">{value}</td><td class=\"number\">{sd}</td></tr>",
+            "<tr><td>{}</td><td class=\"number\">{value}</td><td class=\"number\">{sd}</td>{observed}</tr>",
             escaped(&parameter.name)
         );
     }
+    let heads = match is_observed {
+        true => "<th>± from noise</th><th>± observed</th>",
+        false => "<th>± from noise</th>",
+    };
     let names: Vec<&str> = camera.found().collect();
     let mut matrix = String::new();
     if !names.is_empty() {
@@ -174,7 +189,7 @@ fn parameters(camera: &CameraEstimate) -> String {
     }
     format!(
         "<section><h2>Parameters</h2><div class=\"row\"><table class=\"plain\"><tr><th>name</th>\
-         <th>value</th><th>± standard deviation</th></tr>{rows}</table>{matrix}</div></section>\n"
+         <th>value</th>{heads}</tr>{rows}</table>{matrix}</div></section>\n"
     )
 }
 
@@ -231,6 +246,36 @@ fn drawings(camera: &CameraEstimate, survey: &Survey) -> String {
     format!(
         "<section><h2>Residuals and coverage</h2><div class=\"row\">{}</div></section>\n",
         figures.collect::<String>()
+    )
+}
+
+/// How sure the camera is over its image.
+fn uncertainty(camera: &CameraEstimate) -> String {
+    let maps = camera.uncertainty_maps();
+    if maps.is_empty() {
+        return String::new();
+    }
+    let drawn = maps.iter().map(|map| {
+        let (svg, caption) = (field::uncertainty(camera, map, ""), field::caption(map));
+        format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>")
+    });
+    let told = maps.iter().filter_map(|map| {
+        let sd = camera.projection_sd_px(map.distance_mm, map.source)?;
+        let source = match map.source {
+            Source::Noise => "from noise",
+            Source::Observed => "observed",
+        };
+        let distance = map.distance_mm.map_or("infinity".to_owned(), |mm| format!("{mm:.0} mm"));
+        Some(format!(
+            "<tr><td>{distance}</td><td>{source}</td><td class=\"number\">{sd:.4}</td></tr>"
+        ))
+    });
+    format!(
+        "<section><h2>How sure projections are</h2><p>Standard deviation of a coordinate where corners were, \
+         after the motion of the camera that explains the corners best.</p><table class=\"plain\"><tr>\
+         <th>distance</th><th>deviation</th><th>px</th></tr>{}</table><div class=\"row\">{}</div></section>\n",
+        told.collect::<String>(),
+        drawn.collect::<String>()
     )
 }
 

@@ -188,7 +188,7 @@ fn spacing_mm(map: &TargetMap) -> f64 {
 }
 
 /// The largest of 1, 2 and 5 times a power of ten that is no more.
-fn round_down(value: f64) -> f64 {
+pub(super) fn round_down(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     let digit = [5.0, 2.0].into_iter().find(|digit| digit * decade <= value * (1.0 + 1e-9));
     let rounded = digit.unwrap_or(1.0) * decade;

@@ -1,0 +1,131 @@
+//! How far the frames of a calibration agree with each other.
+//!
+//! Deviations that follow from the noise of corners take the model of cameras and target for true. What is
+//! not, such as a board that is not quite flat, pulls at the estimate in every frame another way. So the pull of
+//! each frame is taken for one draw of what pulls, and the scatter of all for the covariance that is observed:
+//! the cluster-robust covariance with the correction CR2, which is that of the noise where noise is all there is
+//! (Bell & McCaffrey 2002).
+//!
+//! ```text
+//!     yᵥ = (I − LᵀHᵥL)^−½ Lᵀ gᵥ,    Σ = LLᵀ       Hᵥ, gᵥ: what frame v adds to the normal equations and their right side
+//!     S = L (Σᵥ yᵥ yᵥᵀ) Lᵀ
+//! ```
+//!
+//! F frames tell at most F − 1 directions, and each roughly; so S is drawn towards a multiple of the covariance
+//! that follows from noise, as far as its own scatter calls for (Ledoit & Wolf 2004).
+
+use nalgebra::{DMatrix, DVector, Matrix6};
+use rayon::prelude::*;
+
+use super::loss::Loss;
+use super::minimise::Minimum;
+use super::normal::{Covariances, Local};
+use super::weights::Whitening;
+
+/// With fewer frames nothing is observed.
+const LEAST_FRAMES: usize = 5;
+
+/// The most of what is known of a direction that one frame may tell: beyond, nothing holds it to account.
+const MOST_OF_ONE: f64 = 0.9;
+
+/// A covariance as frames show it.
+pub(super) struct Observed {
+    pub covariance: DMatrix<f64>,
+    /// From so many squares a variance of it is known.
+    pub freedom: f64,
+}
+
+/// The covariance of what all frames share as the frames show it; `None` of too few frames, or where nothing is shared.
+pub(super) fn observed(
+    minimum: &Minimum,
+    whitening: &Whitening,
+    loss: Loss,
+    found: &Covariances,
+) -> Option<Observed> {
+    let frames = minimum.problem.frames.len();
+    if frames < LEAST_FRAMES || minimum.layout.shared == 0 {
+        return None;
+    }
+    let pull = |frame: usize| pull_of(minimum, whitening, loss, found, frame);
+    let columns = (0..frames).into_par_iter().map(pull).collect::<Option<Vec<_>>>()?;
+    let mut pulls = DMatrix::from_columns(&columns);
+    // At the minimum they cancel; what the search left is no scatter.
+    let mean = pulls.column_mean();
+    pulls.column_iter_mut().for_each(|mut pull| pull -= &mean);
+    let count = frames as f64;
+    let (scatter, share) = shrunk(&pulls);
+    let scatter = scatter * (count / (count - 1.0));
+    // The level that is common to all directions is known from all of them.
+    let directions = minimum.layout.shared as f64;
+    Some(Observed {
+        covariance: &found.root.half * scatter * found.root.half.transpose(),
+        freedom: (count - 1.0) * (1.0 + share * (directions - 1.0)),
+    })
+}
+
+/// By how much a frame moves what all frames share, in units of what noise does.
+fn pull_of(
+    minimum: &Minimum,
+    whitening: &Whitening,
+    loss: Loss,
+    found: &Covariances,
+    frame: usize,
+) -> Option<DVector<f64>> {
+    let Minimum { problem, normal, layout, .. } = minimum;
+    let n = layout.shared;
+    let (mut own, mut across, mut pose) =
+        (DMatrix::<f64>::zeros(n, n), DMatrix::<f64>::zeros(n, 6), Matrix6::<f64>::zeros());
+    let mut pull = DVector::<f64>::zeros(layout.count);
+    for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
+        if block.frame != frame {
+            continue;
+        }
+        let local = Local::of(problem, layout, block, weights, loss, whitening.sigma)?;
+        let shared = local.columns.len();
+        for (i, &row) in local.columns.iter().enumerate() {
+            pull[row] += local.right[i];
+            for (&column, value) in local.columns.iter().zip(local.row(i)) {
+                own[(row, column)] += value;
+            }
+        }
+        for i in 0..6 {
+            let (of_shared, of_pose) = local.row(shared + i).split_at(shared);
+            local.columns.iter().zip(of_shared).for_each(|(&row, v)| across[(row, i)] += v);
+            of_pose.iter().enumerate().for_each(|(j, value)| pose[(i, j)] += value);
+        }
+        // The pose of the frame is where its own pull is zero.
+        for corner in &local.corners {
+            normal.pull_of_corner(layout, corner, &mut pull);
+        }
+    }
+    let root = &found.root;
+    let pull = if problem.map.is_some() {
+        // Corners take up most of what a frame tells of itself, and each frame tells of all of them alike.
+        let frames = problem.frames.len() as f64;
+        &root.inverse * (&found.across * pull) * (frames / (frames - 1.0)).sqrt()
+    } else {
+        own.fill_upper_triangle_with_lower_triangle();
+        pose.fill_upper_triangle_with_lower_triangle();
+        let through = pose.cholesky()?.solve(&across.transpose());
+        let own: DMatrix<f64> = own - &across * through;
+        let share = (root.half.tr_mul(&own) * &root.half).symmetric_eigen();
+        let grown =
+            share.eigenvalues.map(|part| (1.0 - part.clamp(0.0, MOST_OF_ONE)).sqrt().recip());
+        let turned = share.eigenvectors.tr_mul(&root.half.tr_mul(&pull)).component_mul(&grown);
+        &share.eigenvectors * turned
+    };
+    pull.iter().all(|v| v.is_finite()).then_some(pull)
+}
+
+/// The sum of x xᵀ over columns, drawn towards a multiple of the identity (Ledoit & Wolf 2004), and how far, from 0 to 1.
+fn shrunk(columns: &DMatrix<f64>) -> (DMatrix<f64>, f64) {
+    let (n, count) = (columns.nrows() as f64, columns.ncols() as f64);
+    let columns = columns * count.sqrt();
+    let mean = &columns * columns.transpose() / count;
+    let level = DMatrix::identity(columns.nrows(), columns.nrows()) * (mean.trace() / n);
+    let spread = (&mean - &level).norm_squared();
+    let scatter = columns.column_iter().map(|x| (x * x.transpose() - &mean).norm_squared());
+    let uncertain = (scatter.sum::<f64>() / (count * count)).min(spread);
+    let share = if spread > 0.0 { uncertain / spread } else { 1.0 };
+    (level * share + mean * (1.0 - share), share)
+}

@@ -1,0 +1,96 @@
+//! Comparisons of two calibrations as JSON, schema `deltille/comparison/1`.
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::motion::Motion;
+use deltille_core::calibrate::{CameraMotion, Comparison};
+use deltille_core::json;
+
+/// Schema and version that this crate writes.
+pub const SCHEMA: &str = "deltille/comparison/1";
+
+#[derive(Serialize)]
+struct ComparisonFile<'a> {
+    schema: &'static str,
+    cameras: Vec<CameraRecord<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    motions: Vec<MotionRecord<'a>>,
+}
+
+#[derive(Serialize)]
+struct CameraRecord<'a> {
+    #[serde(skip_serializing_if = "str::is_empty")]
+    name: &'a str,
+    /// `null` at infinity.
+    distance_mm: Option<f64>,
+    compared: usize,
+    rms_px: f64,
+    largest_px: f64,
+    expected_px: Option<f64>,
+    chance: Option<f64>,
+    significant: Option<bool>,
+    second_from_first: Motion,
+    /// x, y of a pixel of the first camera, dx, dy of the second there, and the deviation of a coordinate.
+    places: Vec<PlaceRecord>,
+}
+
+#[derive(Serialize)]
+struct PlaceRecord {
+    x: f64,
+    y: f64,
+    dx: f64,
+    dy: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sd: Option<f64>,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    compared: bool,
+}
+
+#[derive(Serialize)]
+struct MotionRecord<'a> {
+    from: &'a str,
+    to: &'a str,
+    turn_rad: DVec3,
+    moved_mm: DVec3,
+    chance: Option<f64>,
+    significant: Option<bool>,
+}
+
+/// The text of the file; `names` are those of the cameras, empty of one that has none.
+pub fn write(names: &[&str], found: &[Comparison], motions: &[CameraMotion]) -> String {
+    let cameras = names.iter().zip(found).map(|(name, found)| CameraRecord {
+        name,
+        distance_mm: found.distance_mm,
+        compared: found.compared().count(),
+        rms_px: found.rms_px,
+        largest_px: found.largest_px(),
+        expected_px: found.expected_px,
+        chance: found.chance,
+        significant: found.is_significant(),
+        second_from_first: Motion::new(&found.second_from_first, None),
+        places: found.places.iter().flatten().map(place).collect(),
+    });
+    let motions = motions.iter().map(|motion| MotionRecord {
+        from: &motion.from,
+        to: &motion.to,
+        turn_rad: motion.turn_rad,
+        moved_mm: motion.moved_mm,
+        chance: motion.chance,
+        significant: motion.is_significant(),
+    });
+    let file =
+        ComparisonFile { schema: SCHEMA, cameras: cameras.collect(), motions: motions.collect() };
+    json::to_text(&file, 4)
+}
+
+fn place(found: &deltille_core::calibrate::Difference) -> PlaceRecord {
+    PlaceRecord {
+        x: found.pixel.x,
+        y: found.pixel.y,
+        dx: found.by.x,
+        dy: found.by.y,
+        sd: found.sd_px,
+        compared: found.is_compared,
+    }
+}

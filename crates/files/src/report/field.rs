@@ -1,0 +1,253 @@
+//! Values over an image as a picture: colours for how large they are, an outline around where corners were, and
+//! arrows.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use glam::DVec2;
+
+use super::target_map::round_down;
+use deltille_core::calibrate::{CameraEstimate, Comparison, Source, UncertaintyMap};
+use deltille_core::statistics::quantile;
+
+/// Width of the picture, user units, and room for the scales below it.
+const WIDTH: f64 = 480.0;
+const SCALES: f64 = 58.0;
+
+/// Where colours change, px, from the finest on.
+const LEVELS: [f64; 10] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
+
+/// The colours between them, light where little is: told apart by those who see no red or no green.
+const COLOURS: [&str; 11] = [
+    "#ffffe5", "#f0f9c8", "#d5eeb3", "#a9ddb7", "#73c9bd", "#45b4c2", "#2897bf", "#2073b2",
+    "#234da0", "#1e2f88", "#081d58",
+];
+
+/// Nearly all arrows are at most as long as this part of the distance between them.
+const ARROW_PART: f64 = 0.9;
+const NEARLY_ALL: f64 = 0.95;
+
+/// Arrows along a row at most.
+const ARROWS: usize = 20;
+
+/// Colours for viewers in the light and in the dark.
+const STYLE: &str = "\
+.field text{font:11px system-ui,sans-serif;fill:#556}\
+.field .outline{stroke:#c21f2b;stroke-width:1.5;fill:none}\
+.field .by{stroke:#c21f2b;stroke-width:1.4;fill:none;stroke-linecap:round}\
+.field .none{fill:#888;fill-opacity:.25}\
+@media(prefers-color-scheme:dark){.field text{fill:#a9b2bd}}";
+
+/// Values over an image, row by row.
+struct Field {
+    size: DVec2,
+    columns: usize,
+    values: Vec<Option<f64>>,
+    /// Places to be outlined.
+    outlined: Vec<bool>,
+    /// What the outline means.
+    outline: &'static str,
+    arrows: Vec<(DVec2, DVec2)>,
+}
+
+/// How sure a camera is over its image, as a file of its own.
+pub fn uncertainty_svg(camera: &CameraEstimate, map: &UncertaintyMap) -> String {
+    uncertainty(camera, map, SPACE)
+}
+
+/// How two cameras differ over their image, as a file of its own.
+pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
+    let places = found.places.iter();
+    let values = places.map(|place| Some(place.as_ref()?.by.length()));
+    let outlined = found.places.iter().map(|place| place.is_some_and(|place| place.is_compared));
+    let every = (found.columns / ARROWS).max(1);
+    let is_drawn = |index: usize| {
+        let (row, column) = (index / found.columns, index % found.columns);
+        row % every == every / 2 && column % every == every / 2
+    };
+    let arrows = found.places.iter().enumerate().filter(|(index, _)| is_drawn(*index));
+    let field = Field {
+        size: DVec2::from(size_px.map(f64::from)),
+        columns: found.columns,
+        values: values.collect(),
+        outlined: outlined.collect(),
+        outline: "outlined: what was compared",
+        arrows: arrows
+            .filter_map(|(_, place)| place.map(|place| (place.pixel, place.by)))
+            .collect(),
+    };
+    field.drawing("Differences of two cameras over the image", SPACE)
+}
+
+/// What files of their own need.
+const SPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
+
+/// How sure a camera is over its image; `space` is an attribute that files of their own need.
+pub(super) fn uncertainty(camera: &CameraEstimate, map: &UncertaintyMap, space: &str) -> String {
+    let size = DVec2::new(f64::from(camera.camera.width), f64::from(camera.camera.height));
+    let parts = DVec2::new(map.columns as f64, map.rows as f64);
+    let seen: BTreeSet<[i64; 2]> = camera
+        .corners()
+        .map(|corner| {
+            let at = ((corner.pixel + 0.5) / size * parts).floor();
+            [at.x as i64, at.y as i64]
+        })
+        .collect();
+    let places = 0..map.columns * map.rows;
+    let is_seen =
+        |place: usize| seen.contains(&[(place % map.columns) as i64, (place / map.columns) as i64]);
+    let field = Field {
+        size,
+        columns: map.columns,
+        values: map.sd_px.clone(),
+        outlined: places.map(is_seen).collect(),
+        outline: "outlined: where corners were",
+        arrows: Vec::new(),
+    };
+    field.drawing("How sure the camera is over its image", space)
+}
+
+/// What a map of uncertainty shows, in words.
+pub(super) fn caption(map: &UncertaintyMap) -> String {
+    let source = match map.source {
+        Source::Noise => "from the noise of corners alone",
+        Source::Observed => "observed: as the views agree with each other",
+    };
+    let distance = match map.distance_mm {
+        Some(mm) => format!("of points {mm:.0} mm away"),
+        None => "of points at infinity".to_owned(),
+    };
+    format!("Standard deviation of projections {distance}, along the worst direction, {source}.")
+}
+
+impl Field {
+    fn drawing(&self, shows: &str, space: &str) -> String {
+        let scale = WIDTH / self.size.x;
+        let height = self.size.y * scale;
+        let mut body =
+            self.cells(scale) + &self.outline_lines(scale) + &levels(&self.values, height);
+        let enlarged = self.enlarged();
+        for &(pixel, by) in &self.arrows {
+            let from = (pixel + 0.5) * scale;
+            let to = from + by * enlarged * scale;
+            let _ = write!(
+                body,
+                "<line class=\"by\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>\
+                 <circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"1.2\" fill=\"#c21f2b\"/>",
+                from.x, from.y, to.x, to.y, from.x, from.y
+            );
+        }
+        let said = match self.arrows.is_empty() {
+            true => self.outline.to_owned(),
+            false => format!("arrows: {enlarged} times enlarged; {}", self.outline),
+        };
+        let total = height + SCALES;
+        format!(
+            "<svg{space} class=\"field\" viewBox=\"0 0 {WIDTH} {total:.1}\" width=\"{WIDTH}\" role=\"img\" \
+             aria-label=\"{shows}\"><style>{STYLE}</style>{body}\
+             <text x=\"0\" y=\"{:.1}\">{said}</text></svg>",
+            height + 50.0
+        )
+    }
+
+    /// The size of a place in the picture.
+    fn place(&self, scale: f64) -> DVec2 {
+        let rows = self.values.len().div_ceil(self.columns.max(1));
+        self.size * scale / DVec2::new(self.columns as f64, rows as f64)
+    }
+
+    fn at(&self, index: usize, scale: f64) -> DVec2 {
+        let place = DVec2::new((index % self.columns) as f64, (index / self.columns) as f64);
+        place * self.place(scale)
+    }
+
+    fn cells(&self, scale: f64) -> String {
+        let side = self.place(scale);
+        let mut drawn = String::new();
+        for (index, value) in self.values.iter().enumerate() {
+            let DVec2 { x, y } = self.at(index, scale);
+            let fill = match value {
+                Some(value) => format!("fill=\"{}\"", COLOURS[level(*value)]),
+                None => "class=\"none\"".to_owned(),
+            };
+            // A little larger, so that no lines show between them.
+            let _ = write!(
+                drawn,
+                "<rect {fill} x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>",
+                side.x + 0.3,
+                side.y + 0.3
+            );
+        }
+        drawn
+    }
+
+    /// Lines between places that are outlined and others.
+    fn outline_lines(&self, scale: f64) -> String {
+        let side = self.place(scale);
+        let rows = self.values.len() / self.columns.max(1);
+        let is_in = |row: i64, column: i64| {
+            let is_there =
+                (0..rows as i64).contains(&row) && (0..self.columns as i64).contains(&column);
+            is_there && self.outlined[row as usize * self.columns + column as usize]
+        };
+        let mut path = String::new();
+        for index in (0..self.outlined.len()).filter(|&index| self.outlined[index]) {
+            let (row, column) = ((index / self.columns) as i64, (index % self.columns) as i64);
+            let low = self.at(index, scale);
+            let high = low + side;
+            let sides = [
+                (is_in(row - 1, column), low, DVec2::new(high.x, low.y)),
+                (is_in(row + 1, column), DVec2::new(low.x, high.y), high),
+                (is_in(row, column - 1), low, DVec2::new(low.x, high.y)),
+                (is_in(row, column + 1), DVec2::new(high.x, low.y), high),
+            ];
+            for (_, from, to) in sides.iter().filter(|(is_in, _, _)| !is_in) {
+                let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1}", from.x, from.y, to.x, to.y);
+            }
+        }
+        format!("<path class=\"outline\" d=\"{path}\"/>")
+    }
+
+    /// By how much arrows are enlarged.
+    fn enlarged(&self) -> f64 {
+        let mut lengths: Vec<f64> = self.arrows.iter().map(|(_, by)| by.length()).collect();
+        let longest = quantile(&mut lengths, NEARLY_ALL).unwrap_or(0.0).max(1e-6);
+        let apart = self.size.max_element() / ARROWS as f64;
+        round_down(ARROW_PART * apart / longest)
+    }
+}
+
+/// The colour of a value, by its place in [`COLOURS`].
+fn level(value: f64) -> usize {
+    LEVELS.iter().filter(|&&level| value >= level).count()
+}
+
+/// The colours that occur and what they mean, below a picture.
+fn levels(values: &[Option<f64>], top: f64) -> String {
+    let found = values.iter().flatten().map(|&value| level(value));
+    let (first, last) = found.fold((usize::MAX, 0), |(low, high), at| (low.min(at), high.max(at)));
+    let mut drawn = String::new();
+    let shown: Vec<usize> = (first.min(last)..=last).collect();
+    let width = ((WIDTH - 30.0) / shown.len() as f64).min(46.0);
+    for (place, &at) in shown.iter().enumerate() {
+        let x = place as f64 * width;
+        let _ = write!(
+            drawn,
+            "<rect x=\"{x:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"10\" fill=\"{}\" \
+             stroke=\"#888\" stroke-width=\".4\"/>",
+            top + 8.0,
+            COLOURS[at]
+        );
+        if let Some(limit) = LEVELS.get(at).filter(|_| place + 1 < shown.len()) {
+            let _ = write!(
+                drawn,
+                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{limit}</text>",
+                x + width,
+                top + 31.0
+            );
+        }
+    }
+    let end = shown.len() as f64 * width + 8.0;
+    let _ = write!(drawn, "<text x=\"{end:.1}\" y=\"{:.1}\">px</text>", top + 17.0);
+    drawn
+}

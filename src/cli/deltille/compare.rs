@@ -1,0 +1,202 @@
+//! `deltille compare`.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, ensure};
+use glam::DVec2;
+
+use super::calibrating::distance;
+use super::camera_file;
+use super::files::{File, check_places, sample_of, text_file, write_all};
+use crate::calibrate::{CameraEstimate, CameraMotion, Comparison, Region};
+use crate::camera::Pose;
+use crate::cli::output::{self, Overwrite};
+use crate::cli::run::FAILED;
+use crate::export::{comparison, saved};
+use crate::limits::Limits;
+use crate::report::comparison_svg;
+use crate::words::{counted, shown};
+
+/// Arguments of `deltille compare`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A calibration: the .json of `deltille calibrate` or `rig`; or a camera file, of which no uncertainty is known
+    #[arg(value_name = "FIRST")]
+    first: PathBuf,
+    /// Another one of the same camera or rig
+    #[arg(value_name = "SECOND")]
+    second: PathBuf,
+    /// Distance of the points by which cameras are compared, such as 2m [default: infinity]
+    #[arg(long, value_name = "LENGTH", value_parser = distance)]
+    distance: Option<f64>,
+    /// Part of the image that is compared: seen, where both saw corners; image, all of it; or the pixels
+    /// LEFT,TOP,RIGHT,BOTTOM
+    #[arg(long, value_name = "PART", default_value = "seen", value_parser = region)]
+    region: Region,
+    /// Write the comparison, and a picture of the same name of each camera
+    #[arg(short, long, value_name = "FILE.json")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+fn region(text: &str) -> Result<Region, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match (text, numbers.as_deref()) {
+        ("seen", _) => Ok(Region::Seen),
+        ("image", _) => Ok(Region::Image),
+        (_, Some(&[left, top, right, bottom])) if left < right && top < bottom => {
+            Ok(Region::Within(DVec2::new(left, top), DVec2::new(right, bottom)))
+        }
+        _ => Err("give seen, image, or four pixels LEFT,TOP,RIGHT,BOTTOM".to_owned()),
+    }
+}
+
+/// Compares two calibrations; exit code 1 where they differ by more than their uncertainties explain.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let path = args.output.as_deref().map(|path| output::file(path, "comparison", "json"));
+    let path = path.transpose()?;
+    let (first, second) = (read("FIRST", &args.first)?, read("SECOND", &args.second)?);
+    let pairs = pairs(&first, &second)?;
+    if let Some(path) = &path {
+        let json = sample_of(comparison::SCHEMA);
+        check_places(output::folder_of(path), &files(path, &pairs, &[], &json), args.overwrite)?;
+    }
+    let mut found = Vec::new();
+    for (one, other) in &pairs {
+        let compared = Comparison::of(one, other, args.distance, args.region);
+        found.push(match one.name.as_str() {
+            "" => compared?,
+            name => compared.with_context(|| name.to_owned())?,
+        });
+    }
+    let motions = CameraMotion::of_rig(&pairs);
+    let mut text = String::new();
+    for ((one, _), found) in pairs.iter().zip(&found) {
+        text += &told(one, found);
+    }
+    for motion in &motions {
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{} seen from {}: turned by {:.4}° and moved by {:.3} mm: {}",
+            shown(&motion.to),
+            shown(&motion.from),
+            motion.turn_rad.length().to_degrees(),
+            motion.moved_mm.length(),
+            verdict(motion.chance, motion.is_significant(), "it has moved")
+        );
+    }
+    if let Some(path) = &path {
+        let names: Vec<&str> = pairs.iter().map(|(one, _)| one.name.as_str()).collect();
+        let json = comparison::write(&names, &found, &motions);
+        let files = files(path, &pairs, &found, &json);
+        for path in write_all(output::folder_of(path), &files, args.overwrite)? {
+            let _ = writeln!(text, "wrote {}", shown(&path.display().to_string()));
+        }
+    }
+    output::print(&text)?;
+    let has_changed = found.iter().any(|found| found.is_significant() == Some(true))
+        || motions.iter().any(|motion| motion.is_significant() == Some(true));
+    Ok(if has_changed { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
+}
+
+/// The cameras of a calibration or rig, or the one of a camera file.
+fn read(option: &'static str, path: &Path) -> anyhow::Result<Vec<CameraEstimate>> {
+    let is_json = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json"));
+    if !is_json {
+        let camera = camera_file::read(option, path)?;
+        return Ok(vec![CameraEstimate::given("", camera)]);
+    }
+    let text = Limits::default().read_text(path).context(option)?;
+    let cameras = saved::read_cameras(&text);
+    cameras.with_context(|| format!("{option}: {}", path.display()))
+}
+
+/// The same cameras of both.
+fn pairs<'a>(
+    first: &'a [CameraEstimate],
+    second: &'a [CameraEstimate],
+) -> anyhow::Result<Vec<(&'a CameraEstimate, &'a CameraEstimate)>> {
+    if let ([one], [other]) = (first, second) {
+        return Ok(vec![(one, other)]);
+    }
+    let same = |one: &'a CameraEstimate| {
+        second.iter().find(|other| other.name == one.name).map(|other| (one, other))
+    };
+    let pairs: Vec<_> = first.iter().filter_map(same).collect();
+    let names = |of: &[CameraEstimate]| {
+        of.iter().map(|camera| shown(&camera.name)).collect::<Vec<_>>().join(", ")
+    };
+    ensure!(
+        !pairs.is_empty(),
+        "no camera is in both: FIRST has {}, SECOND {}: give two calibrations of the same rig",
+        names(first),
+        names(second)
+    );
+    Ok(pairs)
+}
+
+/// The comparison, and a picture of each camera that was compared.
+fn files(
+    path: &Path,
+    pairs: &[(&CameraEstimate, &CameraEstimate)],
+    found: &[Comparison],
+    json: &str,
+) -> Vec<File> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let mut files = vec![text_file(format!("{stem}.json"), json.to_owned())];
+    for (index, (camera, _)) in pairs.iter().enumerate() {
+        let name = match camera.name.as_str() {
+            "" => format!("{stem}.svg"),
+            name => format!("{stem}-{name}.svg"),
+        };
+        let size_px = [camera.camera.width, camera.camera.height];
+        // Before the work, a picture of nothing.
+        let nothing = Comparison::default();
+        let found = found.get(index).unwrap_or(&nothing);
+        files.push(text_file(name, comparison_svg(size_px, found)));
+    }
+    files
+}
+
+/// How two cameras differ, in words.
+fn told(camera: &CameraEstimate, found: &Comparison) -> String {
+    let name = match camera.name.as_str() {
+        "" => String::new(),
+        name => format!("{}: ", shown(name)),
+    };
+    let far = found.distance_mm.map_or("infinity".to_owned(), |mm| format!("{mm:.0} mm"));
+    let [turn, moved] = found.second_from_first.off(&Pose::IDENTITY);
+    let moved = match found.distance_mm {
+        Some(_) => format!(" and moved by {:.3} mm", moved.length()),
+        None => String::new(),
+    };
+    let expected = found.expected_px.map_or(String::new(), |px| {
+        format!(
+            "{name}from the uncertainties of both {px:.4} px are expected: {}\n",
+            verdict(found.chance, found.is_significant(), "the camera has changed")
+        )
+    });
+    format!(
+        "{name}differs by {:.4} px (rms a coordinate), at most {:.4} px, over {} at {far}, after it is turned by \
+         {:.4}°{moved}\n{expected}",
+        found.rms_px,
+        found.largest_px(),
+        counted(found.compared().count(), "place"),
+        turn.length().to_degrees()
+    )
+}
+
+/// Whether chance makes as much.
+fn verdict(chance: Option<f64>, is_significant: Option<bool>, changed: &str) -> String {
+    match (chance, is_significant) {
+        (Some(chance), Some(true)) => {
+            format!("more than chance makes (p = {chance:.1e}): {changed}")
+        }
+        (Some(chance), _) => format!("no more than chance makes (p = {chance:.2})"),
+        (None, _) => "how sure that is, is not known".to_owned(),
+    }
+}
