@@ -1,0 +1,156 @@
+//! The model of a lens, chosen by views that took no part in finding it.
+//!
+//! Each model is found from two thirds of the views and held against the others, where poses alone are found. Of
+//! those that hold the views as well as the best one does, the one with the fewest parameters is taken: an error
+//! that is larger than the best one's by no more than chance makes, or by less than matters.
+
+use std::collections::BTreeMap;
+
+use super::calibration::{Calibration, CameraViews};
+use super::error::CalibrationError;
+use super::estimate::Estimate;
+use super::model::Model;
+use super::start::evenly;
+use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
+use crate::statistics::median;
+
+/// Models that are tried, those with fewer parameters first.
+const TRIED: [Model; 9] = [
+    Model::Radtan,
+    Model::Eucm,
+    Model::DoubleSphere,
+    Model::Radtan5,
+    Model::KannalaBrandt(4),
+    Model::KannalaBrandt(6),
+    Model::Rational,
+    Model::Pupil,
+    Model::ThinPrism,
+];
+
+/// Views that take part in the choice, evenly over the sequence.
+const MOST_VIEWS: usize = 60;
+
+/// Every so many views are held out.
+const HELD_OUT: usize = 3;
+
+/// A model holds a lens if its mean square is at most by this part larger than the best one's, or by no more than so
+/// many of its deviations.
+const SAME: f64 = 0.02;
+const SAME_SIGMA: f64 = 2.0;
+
+/// A model that was tried.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Candidate {
+    /// The model.
+    pub model: Model,
+    /// How many parameters it has.
+    pub parameters: usize,
+    /// Root mean square error of a coordinate on views that took no part, px, in which corners that are off by more than
+    /// five deviations of the best model count as just five; `None` where no camera of the model was found.
+    pub held_out_px: Option<f64>,
+    /// Whether it holds the lens as well as the best one.
+    pub holds: bool,
+    /// Whether it was chosen.
+    pub chosen: bool,
+}
+
+/// The errors of a model on views that took no part, by view, px².
+type Squares = BTreeMap<String, Vec<f64>>;
+
+impl Calibration {
+    /// The model to be found of a camera, and what speaks for it. Where its model is given already, it counts for
+    /// nothing here.
+    ///
+    /// # Errors
+    /// Where there are too few views to hold some out, or no model explains them.
+    pub fn choose_model(&self, camera: usize) -> Result<(Model, Vec<Candidate>), CalibrationError> {
+        let views = evenly(&self.cameras[camera].views, MOST_VIEWS).cloned().collect();
+        let alone = self.alone(camera, &self.panels);
+        let of_model = |model: Model| {
+            let only = CameraViews::new("", Vec::clone(&views), model);
+            let calibration = alone.of_cameras(vec![only]).hold_out(Some(HELD_OUT));
+            calibration.board_shape(false).measure_target(false).solve()
+        };
+        let tried = TRIED.map(|model| (model, of_model(model)));
+        let mut error = CalibrationError::NoStart;
+        let mut squares: Vec<(Model, Option<Squares>)> = Vec::new();
+        for (model, found) in tried {
+            let held_out = match &found {
+                Ok(found) => found.held_out.as_deref().map(squares_of),
+                Err(why) => {
+                    error = why.clone();
+                    None
+                }
+            };
+            squares.push((model, held_out));
+        }
+        let candidates = judged(&squares);
+        match candidates.iter().find(|candidate| candidate.chosen) {
+            Some(chosen) => Ok((chosen.model, candidates)),
+            None => Err(error),
+        }
+    }
+}
+
+fn squares_of(test: &Estimate) -> Squares {
+    let views = test.cameras.iter().flat_map(|camera| &camera.views);
+    let of_view = |view: &super::ViewEstimate| {
+        view.corners.iter().map(|corner| corner.residual.length_squared()).collect()
+    };
+    views.map(|view| (view.name.clone(), of_view(view))).collect()
+}
+
+/// Compares models by the same corners: those of all views that any model explains.
+fn judged(tried: &[(Model, Option<Squares>)]) -> Vec<Candidate> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for (name, of_view) in tried.iter().filter_map(|(_, found)| found.as_ref()).flatten() {
+        let count = counts.entry(name).or_default();
+        *count = (*count).max(of_view.len());
+    }
+    let medians = tried.iter().filter_map(|(_, found)| {
+        let found = found.as_ref().filter(|found| 2 * found.len() > counts.len())?;
+        median(found.values().flatten().copied().collect())
+    });
+    let Some(least) = medians.min_by(f64::total_cmp) else {
+        return tried.iter().map(|(model, _)| candidate(*model, None)).collect();
+    };
+    let most = OUTLIER_SIGMA * OUTLIER_SIGMA * least / MEDIAN_OF_CHI_SQUARED_2;
+    // Means by view; a corner or a view that a model does not reach counts as an outlier.
+    let means = |found: &Squares| -> Vec<f64> {
+        let of_view = |(name, &count): (&&str, &usize)| {
+            let squares = found.get(*name).map_or(&[][..], Vec::as_slice);
+            let sum = squares.iter().map(|square| square.min(most)).sum::<f64>();
+            (sum + (count - squares.len()) as f64 * most) / count.max(1) as f64
+        };
+        counts.iter().map(of_view).collect()
+    };
+    let means: Vec<Option<Vec<f64>>> =
+        tried.iter().map(|(_, found)| found.as_ref().map(means)).collect();
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    let best = means.iter().flatten().min_by(|a, b| mean(a).total_cmp(&mean(b)));
+    let holds = |own: &[f64]| {
+        let Some(best) = best else { return false };
+        let more: Vec<f64> = own.iter().zip(best).map(|(own, best)| own - best).collect();
+        let by = mean(&more);
+        let squares = more.iter().map(|more| (more - by).powi(2)).sum::<f64>();
+        let sd = (squares / more.len() as f64 / (more.len() as f64 - 1.0).max(1.0)).sqrt();
+        by <= (SAME * mean(best)).max(SAME_SIGMA * sd)
+    };
+    let mut candidates: Vec<Candidate> = tried
+        .iter()
+        .zip(&means)
+        .map(|((model, _), own)| Candidate {
+            holds: own.as_deref().is_some_and(holds),
+            ..candidate(*model, own.as_deref().map(|own| (mean(own) / 2.0).sqrt()))
+        })
+        .collect();
+    let chosen = candidates.iter_mut().filter(|candidate| candidate.holds);
+    chosen.min_by_key(|candidate| candidate.parameters).into_iter().for_each(|c| c.chosen = true);
+    candidates
+}
+
+fn candidate(model: Model, held_out_px: Option<f64>) -> Candidate {
+    let parameters = model.free().into_iter().filter(|free| *free).count();
+    Candidate { model, parameters, held_out_px, holds: false, chosen: false }
+}
