@@ -196,9 +196,8 @@ fn of_camera(camera: &CameraEstimate) -> String {
     for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()) {
         let Some(sd) = parameter.sd else { continue };
         let digits = places(sd).max(1);
-        let observed = observed.map_or(String::new(), |sd| {
-            format!("{sd:>12.digits$}", digits = places(sd).max(1).min(digits))
-        });
+        let observed = observed
+            .map_or(String::new(), |sd| format!("{sd:>12.digits$}", digits = places(sd).max(1)));
         let _ = writeln!(
             text,
             "{:5} {:>16.digits$} ± {sd:>11.digits$}{observed}",
