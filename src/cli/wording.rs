@@ -39,7 +39,7 @@ const NAMED: &[Named] = &[
     named("PaperSpec::margin_mm", "deltille board", "--margin"),
     named("PaperSpec::size", "deltille board", "--paper"),
     named("Print::scale", "deltille calibrate", "--print-scale"),
-    named("Region", "deltille compare", "--region"),
+    named("Region::Image", "deltille compare", "--region image"),
     named("Sighting::bend", "deltille calibrate", "--shape"),
     named("Sighting::stretch", "deltille calibrate", "--print-scale"),
     named("SkeletonSpec::panel_thickness_mm", "deltille icosahedron", "--panel-thickness"),

@@ -103,7 +103,9 @@ pub enum ComparisonError {
         second: [u32; 2],
     },
     /// No part of the image that both cover.
-    #[error("no part of the image is compared: both see nothing of it: give another `Region`")]
+    #[error(
+        "too little of the image was seen by both, or lies in the region: take `Region::Image`, or a larger part"
+    )]
     Nothing,
 }
 
