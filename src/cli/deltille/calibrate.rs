@@ -205,7 +205,7 @@ fn of_camera(camera: &CameraEstimate) -> String {
         let Some(sd) = parameter.sd else { continue };
         let digits = places(sd).max(1);
         let observed = observed
-            .map_or(String::new(), |sd| format!("{sd:>12.digits$}", digits = places(sd).max(1)));
+            .map_or(String::new(), |sd| format!(" {sd:>11.digits$}", digits = places(sd).max(1)));
         let _ = writeln!(
             text,
             "{:5} {:>16.digits$} ± {sd:>11.digits$}{observed}",

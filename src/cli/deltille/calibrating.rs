@@ -137,6 +137,7 @@ fn chosen(tried: &[Candidate]) -> String {
         let note = match (candidate.chosen, candidate.holds) {
             (true, _) => "  taken",
             (_, true) => "  as good",
+            _ if candidate.held_out_px.is_some() && !candidate.is_stable => "  not told apart",
             _ => "",
         };
         // Writing to a String cannot fail.

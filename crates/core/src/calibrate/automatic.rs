@@ -2,13 +2,14 @@
 //!
 //! Each model is found from two thirds of the views and held against the others, where poses alone are found. Of
 //! those that hold the views as well as the best one does, the one with the fewest parameters is taken: an error
-//! that is larger than the best one's by no more than chance makes, or by less than matters.
+//! that is larger than the best one's by no more than chance makes, or by less than matters. Models whose parameters
+//! the views do not tell apart are taken only where there is no other.
 
 use std::collections::BTreeMap;
 
 use super::calibration::{Calibration, CameraViews};
 use super::error::CalibrationError;
-use super::estimate::Estimate;
+use super::estimate::{Estimate, ViewEstimate};
 use super::model::Model;
 use super::start::evenly;
 use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
@@ -33,9 +34,9 @@ const MOST_VIEWS: usize = 60;
 /// Every so many views are held out.
 const HELD_OUT: usize = 3;
 
-/// A model holds a lens if its mean square is at most by this part larger than the best one's, or by no more than so
-/// many of its deviations.
-const SAME: f64 = 0.02;
+/// A model holds a lens if its mean square is at most by this part larger than the best one's, 5 % in the error, or by no
+/// more than so many of its deviations.
+const SAME: f64 = 0.1;
 const SAME_SIGMA: f64 = 2.0;
 
 /// A model that was tried.
@@ -49,14 +50,20 @@ pub struct Candidate {
     /// Root mean square error of a coordinate on views that took no part, px, in which corners that are off by more than
     /// five deviations of the best model count as just five; `None` where no camera of the model was found.
     pub held_out_px: Option<f64>,
+    /// Whether the views tell all its parameters apart.
+    pub is_stable: bool,
     /// Whether it holds the lens as well as the best one.
     pub holds: bool,
     /// Whether it was chosen.
     pub chosen: bool,
 }
 
-/// The errors of a model on views that took no part, by view, px².
-type Squares = BTreeMap<String, Vec<f64>>;
+/// The errors of a model on views that took no part.
+struct Tried {
+    /// By view, px².
+    squares: BTreeMap<String, Vec<f64>>,
+    is_stable: bool,
+}
 
 impl Calibration {
     /// The model to be found of a camera, and what speaks for it. Where its model is given already, it counts for
@@ -74,18 +81,18 @@ impl Calibration {
         };
         let tried = TRIED.map(|model| (model, of_model(model)));
         let mut error = CalibrationError::NoStart;
-        let mut squares: Vec<(Model, Option<Squares>)> = Vec::new();
-        for (model, found) in tried {
-            let held_out = match &found {
-                Ok(found) => found.held_out.as_deref().map(squares_of),
+        let mut found = Vec::new();
+        for (model, estimate) in tried {
+            let of_model = match &estimate {
+                Ok(estimate) => Tried::of(estimate),
                 Err(why) => {
                     error = why.clone();
                     None
                 }
             };
-            squares.push((model, held_out));
+            found.push((model, of_model));
         }
-        let candidates = judged(&squares);
+        let candidates = judged(&found);
         match candidates.iter().find(|candidate| candidate.chosen) {
             Some(chosen) => Ok((chosen.model, candidates)),
             None => Err(error),
@@ -93,33 +100,39 @@ impl Calibration {
     }
 }
 
-fn squares_of(test: &Estimate) -> Squares {
-    let views = test.cameras.iter().flat_map(|camera| &camera.views);
-    let of_view = |view: &super::ViewEstimate| {
-        view.corners.iter().map(|corner| corner.residual.length_squared()).collect()
-    };
-    views.map(|view| (view.name.clone(), of_view(view))).collect()
+impl Tried {
+    /// `None` where no views were held out.
+    fn of(found: &Estimate) -> Option<Self> {
+        let views = found.held_out.as_deref()?.cameras.iter().flat_map(|camera| &camera.views);
+        let of_view = |view: &ViewEstimate| {
+            view.corners.iter().map(|corner| corner.residual.length_squared()).collect()
+        };
+        Some(Self {
+            squares: views.map(|view| (view.name.clone(), of_view(view))).collect(),
+            is_stable: found.cameras.iter().all(|camera| camera.ill_conditioned.is_empty()),
+        })
+    }
 }
 
 /// Compares models by the same corners: those of all views that any model explains.
-fn judged(tried: &[(Model, Option<Squares>)]) -> Vec<Candidate> {
+fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    for (name, of_view) in tried.iter().filter_map(|(_, found)| found.as_ref()).flatten() {
+    let found = || tried.iter().filter_map(|(_, found)| found.as_ref());
+    for (name, of_view) in found().flat_map(|found| &found.squares) {
         let count = counts.entry(name).or_default();
         *count = (*count).max(of_view.len());
     }
-    let medians = tried.iter().filter_map(|(_, found)| {
-        let found = found.as_ref().filter(|found| 2 * found.len() > counts.len())?;
-        median(found.values().flatten().copied().collect())
-    });
+    let whole = found().filter(|found| 2 * found.squares.len() > counts.len());
+    let medians =
+        whole.filter_map(|found| median(found.squares.values().flatten().copied().collect()));
     let Some(least) = medians.min_by(f64::total_cmp) else {
-        return tried.iter().map(|(model, _)| candidate(*model, None)).collect();
+        return tried.iter().map(|(model, _)| candidate(*model, None, false)).collect();
     };
     let most = OUTLIER_SIGMA * OUTLIER_SIGMA * least / MEDIAN_OF_CHI_SQUARED_2;
     // Means by view; a corner or a view that a model does not reach counts as an outlier.
-    let means = |found: &Squares| -> Vec<f64> {
+    let means = |found: &Tried| -> Vec<f64> {
         let of_view = |(name, &count): (&&str, &usize)| {
-            let squares = found.get(*name).map_or(&[][..], Vec::as_slice);
+            let squares = found.squares.get(*name).map_or(&[][..], Vec::as_slice);
             let sum = squares.iter().map(|square| square.min(most)).sum::<f64>();
             (sum + (count - squares.len()) as f64 * most) / count.max(1) as f64
         };
@@ -128,7 +141,12 @@ fn judged(tried: &[(Model, Option<Squares>)]) -> Vec<Candidate> {
     let means: Vec<Option<Vec<f64>>> =
         tried.iter().map(|(_, found)| found.as_ref().map(means)).collect();
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    let best = means.iter().flatten().min_by(|a, b| mean(a).total_cmp(&mean(b)));
+    let is_stable = |found: &Option<Tried>| found.as_ref().is_some_and(|found| found.is_stable);
+    let any_is_stable = tried.iter().any(|(_, found)| is_stable(found));
+    let may_be_taken = |found: &Option<Tried>| is_stable(found) || !any_is_stable;
+    let best = tried.iter().zip(&means).filter(|((_, found), _)| may_be_taken(found));
+    let best = best.filter_map(|(_, own)| own.as_ref());
+    let best = best.min_by(|a, b| mean(a).total_cmp(&mean(b)));
     let holds = |own: &[f64]| {
         let Some(best) = best else { return false };
         let more: Vec<f64> = own.iter().zip(best).map(|(own, best)| own - best).collect();
@@ -140,9 +158,13 @@ fn judged(tried: &[(Model, Option<Squares>)]) -> Vec<Candidate> {
     let mut candidates: Vec<Candidate> = tried
         .iter()
         .zip(&means)
-        .map(|((model, _), own)| Candidate {
-            holds: own.as_deref().is_some_and(holds),
-            ..candidate(*model, own.as_deref().map(|own| (mean(own) / 2.0).sqrt()))
+        .map(|((model, found), own)| Candidate {
+            holds: may_be_taken(found) && own.as_deref().is_some_and(holds),
+            ..candidate(
+                *model,
+                own.as_deref().map(|own| (mean(own) / 2.0).sqrt()),
+                is_stable(found),
+            )
         })
         .collect();
     let chosen = candidates.iter_mut().filter(|candidate| candidate.holds);
@@ -150,7 +172,7 @@ fn judged(tried: &[(Model, Option<Squares>)]) -> Vec<Candidate> {
     candidates
 }
 
-fn candidate(model: Model, held_out_px: Option<f64>) -> Candidate {
+fn candidate(model: Model, held_out_px: Option<f64>, is_stable: bool) -> Candidate {
     let parameters = model.free().into_iter().filter(|free| *free).count();
-    Candidate { model, parameters, held_out_px, holds: false, chosen: false }
+    Candidate { model, parameters, held_out_px, is_stable, holds: false, chosen: false }
 }
