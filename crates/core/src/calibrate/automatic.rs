@@ -1,9 +1,8 @@
 //! The model of a lens, chosen by views that took no part in finding it.
 //!
 //! Each model is found from two thirds of the views and held against the others, where poses alone are found. Of
-//! those that hold the views as well as the best one does, the one with the fewest parameters is taken: an error
-//! that is larger than the best one's by no more than chance makes, or by less than matters. Models whose parameters
-//! the views do not tell apart are taken only where there is no other.
+//! those that hold the views as well as the best one does, to 5 % in the error, the one with the fewest parameters is
+//! taken; one whose parameters the views do not tell apart only where there is no other.
 
 use std::collections::BTreeMap;
 
@@ -34,10 +33,8 @@ const MOST_VIEWS: usize = 60;
 /// Every so many views are held out.
 const HELD_OUT: usize = 3;
 
-/// A model holds a lens if its mean square is at most by this part larger than the best one's, 5 % in the error, or by no
-/// more than so many of its deviations.
+/// A model holds a lens if its mean square is at most by this part larger than the best one's, 5 % in the error.
 const SAME: f64 = 0.1;
-const SAME_SIGMA: f64 = 2.0;
 
 /// A model that was tried.
 #[derive(Clone, Debug, PartialEq)]
@@ -141,34 +138,19 @@ fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
     let means: Vec<Option<Vec<f64>>> =
         tried.iter().map(|(_, found)| found.as_ref().map(means)).collect();
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    let is_stable = |found: &Option<Tried>| found.as_ref().is_some_and(|found| found.is_stable);
-    let any_is_stable = tried.iter().any(|(_, found)| is_stable(found));
-    let may_be_taken = |found: &Option<Tried>| is_stable(found) || !any_is_stable;
-    let best = tried.iter().zip(&means).filter(|((_, found), _)| may_be_taken(found));
-    let best = best.filter_map(|(_, own)| own.as_ref());
-    let best = best.min_by(|a, b| mean(a).total_cmp(&mean(b)));
-    let holds = |own: &[f64]| {
-        let Some(best) = best else { return false };
-        let more: Vec<f64> = own.iter().zip(best).map(|(own, best)| own - best).collect();
-        let by = mean(&more);
-        let squares = more.iter().map(|more| (more - by).powi(2)).sum::<f64>();
-        let sd = (squares / more.len() as f64 / (more.len() as f64 - 1.0).max(1.0)).sqrt();
-        by <= (SAME * mean(best)).max(SAME_SIGMA * sd)
-    };
-    let mut candidates: Vec<Candidate> = tried
-        .iter()
-        .zip(&means)
-        .map(|((model, found), own)| Candidate {
-            holds: may_be_taken(found) && own.as_deref().is_some_and(holds),
-            ..candidate(
-                *model,
-                own.as_deref().map(|own| (mean(own) / 2.0).sqrt()),
-                is_stable(found),
-            )
-        })
-        .collect();
-    let chosen = candidates.iter_mut().filter(|candidate| candidate.holds);
-    chosen.min_by_key(|candidate| candidate.parameters).into_iter().for_each(|c| c.chosen = true);
+    let best = means.iter().flatten().map(|own| mean(own)).min_by(f64::total_cmp);
+    let candidates = tried.iter().zip(&means).map(|((model, found), own)| {
+        let own = own.as_deref().map(mean);
+        let is_stable = found.as_ref().is_some_and(|found| found.is_stable);
+        Candidate {
+            holds: own.zip(best).is_some_and(|(own, best)| own <= (1.0 + SAME) * best),
+            ..candidate(*model, own.map(|own| (own / 2.0).sqrt()), is_stable)
+        }
+    });
+    let mut candidates: Vec<Candidate> = candidates.collect();
+    let holding = candidates.iter_mut().filter(|candidate| candidate.holds);
+    let chosen = holding.min_by_key(|candidate| (!candidate.is_stable, candidate.parameters));
+    chosen.into_iter().for_each(|chosen| chosen.chosen = true);
     candidates
 }
 
