@@ -7,11 +7,13 @@ use std::process::ExitCode;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
-use super::calibrating::{Calibrated, SolveArgs, check_images, sample, sureness, without_outliers};
+use super::calibrating::{
+    Calibrated, ModelChoice, SolveArgs, check_images, sample, sureness, without_outliers,
+};
 use super::camera_file;
 use super::files::{File, check_places, sample_of, text_file, write_all};
 use super::sightings::{Sightings, SightingsArgs};
-use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Model, Source};
+use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Source};
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
@@ -30,9 +32,10 @@ pub struct Args {
     sightings: SightingsArgs,
     /// What is to be found beside fx, fy, cx, cy: radtan (k1 k2 p1 p2), radtan5 (and k3), rational
     /// (and k4 k5 k6), thin-prism (and s1 … s4), kannala-brandt (4 terms; kannala-brandt-5 …),
-    /// eucm, double-sphere, or pupil (fisheye with a moving entrance pupil)
+    /// eucm, double-sphere, or pupil (fisheye with a moving entrance pupil); auto takes the one that
+    /// holds views best that took no part in finding it
     #[arg(long, required_unless_present = "fixed_intrinsics")]
-    model: Option<Model>,
+    model: Option<ModelChoice>,
     /// Find only the poses of this camera: its file, as written by this command, ROS or OpenCV
     #[arg(long, value_name = "CAMERA", conflicts_with_all = ["model", "holdout", "board_shape"])]
     fixed_intrinsics: Option<PathBuf>,
@@ -91,7 +94,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(folder) = &args.images {
         check_images(folder, &views)?;
     }
-    let calibration = Calibration::new(panels).camera(&stem, views, intrinsics);
+    let mut calibration = Calibration::new(panels).camera(&stem, views, intrinsics);
+    let tried = match args.model {
+        Some(model) => model.choose(&mut calibration, 0)?,
+        None => String::new(),
+    };
     let mut solved = args.solve.solve(calibration, print)?;
     ensure!(!solved.estimate.frames.is_empty(), "no view shows the target as this camera sees it");
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
@@ -118,7 +125,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;
         written.push(page);
     }
-    let mut text = table(&solved.estimate);
+    let mut text = tried + &table(&solved.estimate);
     for line in solved.lines() {
         text += &(line + "\n");
     }
@@ -130,7 +137,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let _ = writeln!(text, "wrote {}", shown(&path.display().to_string()));
     }
     output::print(&text)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(solved.exit_code())
 }
 
 impl Args {
@@ -138,7 +145,8 @@ impl Args {
     fn intrinsics(&self) -> anyhow::Result<Intrinsics> {
         let known = self.fixed_intrinsics.as_deref();
         let known = known.map(|path| camera_file::read("--fixed-intrinsics", path)).transpose()?;
-        let known = known.map(Intrinsics::Known).or(self.model.map(Intrinsics::Unknown));
+        let sought = self.model.map(|model| Intrinsics::Unknown(model.richest()));
+        let known = known.map(Intrinsics::Known).or(sought);
         known.context("give --model, or --fixed-intrinsics")
     }
 
@@ -197,7 +205,7 @@ fn of_camera(camera: &CameraEstimate) -> String {
         let Some(sd) = parameter.sd else { continue };
         let digits = places(sd).max(1);
         let observed = observed
-            .map_or(String::new(), |sd| format!("{sd:>12.digits$}", digits = places(sd).max(1)));
+            .map_or(String::new(), |sd| format!(" {sd:>11.digits$}", digits = places(sd).max(1)));
         let _ = writeln!(
             text,
             "{:5} {:>16.digits$} ± {sd:>11.digits$}{observed}",

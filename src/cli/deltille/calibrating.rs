@@ -1,18 +1,23 @@
 //! What commands that calibrate have in common: how they solve, what they tell, and the page.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::str::FromStr;
 
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use super::files::{File, sample_of, text_file};
 use crate::calibrate::{
-    BoardShape, Calibration, CalibrationError, CameraEstimate, Diagnosis, Estimate, Intrinsics,
-    LEAST_TO_MEASURE, Loss, PanelPlace, Source, TargetMap, View, Weights, Words,
+    BoardShape, Calibration, CalibrationError, CameraEstimate, Candidate, Diagnosis, Estimate,
+    Intrinsics, LEAST_TO_MEASURE, Loss, Model, ModelError, PanelPlace, Source, TargetMap, View,
+    Weights, Words,
 };
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
+use crate::cli::run::FAILED;
 use crate::cli::values::whole;
 use crate::cli::wording::in_options;
 use crate::export::calibration::Print;
@@ -71,6 +76,79 @@ enum Weighting {
     Equal,
     /// By the detections' covariances, with a common deviation found beside them
     Covariance,
+}
+
+/// A model, or the choice of one.
+#[derive(Clone, Copy, PartialEq)]
+pub enum ModelChoice {
+    Auto,
+    Model(Model),
+}
+
+impl FromStr for ModelChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => text.parse().map(Self::Model).map_err(|error: ModelError| {
+                format!(
+                    "{error}, or auto, which takes the one that holds views best that took no part"
+                )
+            }),
+        }
+    }
+}
+
+impl ModelChoice {
+    /// The model with the most parameters that may be chosen.
+    pub fn richest(self) -> Model {
+        match self {
+            Self::Auto => Model::ThinPrism,
+            Self::Model(model) => model,
+        }
+    }
+
+    /// As it was given.
+    pub fn name(self) -> String {
+        match self {
+            Self::Auto => "auto".to_owned(),
+            Self::Model(model) => model.to_string(),
+        }
+    }
+
+    /// Sets the model of a camera that is not known; returns in lines what was tried where it was to be chosen.
+    pub fn choose(self, calibration: &mut Calibration, camera: usize) -> anyhow::Result<String> {
+        let (Self::Auto, Some(_)) = (self, calibration.cameras()[camera].intrinsics.model()) else {
+            return Ok(String::new());
+        };
+        let (model, tried) = calibration.choose_model(camera).context("--model auto")?;
+        calibration.set_intrinsics(camera, model);
+        Ok(chosen(&tried))
+    }
+}
+
+/// What models that were tried leave on views that took no part.
+fn chosen(tried: &[Candidate]) -> String {
+    let mut text = "model            parameters  held out px\n".to_owned();
+    for candidate in tried {
+        let held_out =
+            candidate.held_out_px.map_or("no camera".to_owned(), |px| format!("{px:.4}"));
+        let note = match (candidate.chosen, candidate.holds) {
+            (true, _) => "  taken",
+            (_, true) => "  as good",
+            _ if candidate.held_out_px.is_some() && !candidate.is_stable => "  not told apart",
+            _ => "",
+        };
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{:16} {:10}  {held_out:>11}{note}",
+            candidate.model.to_string(),
+            candidate.parameters
+        );
+    }
+    text
 }
 
 /// What came of a calibration.
@@ -155,9 +233,18 @@ impl Calibrated {
             if matches!(diagnosis, Diagnosis::ForeignCamera { .. }) {
                 bail!("{text}; nothing was written");
             }
-            tell!("warning: {text}");
+            let kind = if diagnosis.is_failure() { "error" } else { "warning" };
+            tell!("{kind}: {text}");
         }
         Ok(())
+    }
+
+    /// Exit code 1 where what was found is not to be used as it is.
+    pub fn exit_code(&self) -> ExitCode {
+        match self.diagnoses.iter().any(Diagnosis::is_failure) {
+            true => ExitCode::from(FAILED),
+            false => ExitCode::SUCCESS,
+        }
     }
 
     /// The measured target and its picture, `<stem>-measured.json` and `.svg`; none where it was not measured.

@@ -6,13 +6,15 @@ use std::process::ExitCode;
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
-use super::calibrating::{Calibrated, SolveArgs, check_images, sample, sureness, without_outliers};
+use super::calibrating::{
+    Calibrated, ModelChoice, SolveArgs, check_images, sample, sureness, without_outliers,
+};
 use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::limits::FileLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
-    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Model, Reference, TargetMap,
+    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
 };
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
@@ -38,7 +40,7 @@ pub struct Args {
     target: PathBuf,
     /// What is to be found of each camera, see `deltille calibrate`
     #[arg(long, default_value = "radtan")]
-    model: Model,
+    model: ModelChoice,
     /// A camera that is known already and kept, with its file
     #[arg(long, value_name = "NAME=FILE", value_parser = named)]
     known: Vec<(String, PathBuf)>,
@@ -125,6 +127,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         calibration = calibration.with(CameraViews::new(name, views, intrinsics));
     }
+    let mut tried = String::new();
+    for (index, (name, _)) in args.camera.iter().enumerate() {
+        let of_camera = args.model.choose(&mut calibration, index);
+        let of_camera = of_camera.with_context(|| format!("--camera {name}"))?;
+        if !of_camera.is_empty() {
+            tried += &format!("{name}:\n{of_camera}");
+        }
+    }
     let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
     let mut solved = args.solve.solve(calibration, print)?;
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
@@ -135,10 +145,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         report(&foreign.context("--known"));
         return Ok(ExitCode::from(FAILED));
     }
-    let text = summary(&solved);
+    let text = tried + &summary(&solved);
     solved.estimate.excluded.splice(0..0, left_out);
     let Calibrated { estimate, diagnoses, print, .. } = &solved;
-    let json = rig::write(estimate, diagnoses, &args.model.to_string(), *print);
+    let json = rig::write(estimate, diagnoses, &args.model.name(), *print);
     let cameras = estimate.cameras.iter();
     let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
     let cameras = cameras.collect::<Vec<_>>();
@@ -156,7 +166,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for path in written {
         say!("wrote {}", path.display());
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(solved.exit_code())
 }
 
 impl Args {
@@ -164,7 +174,7 @@ impl Args {
     fn intrinsics(&self, name: &str) -> anyhow::Result<Intrinsics> {
         let known = of_name(&self.known, name).map(|path| camera_file::read("--known", path));
         let known = known.transpose()?.map(Intrinsics::Known);
-        Ok(known.unwrap_or(Intrinsics::Unknown(self.model)))
+        Ok(known.unwrap_or(Intrinsics::Unknown(self.model.richest())))
     }
 
     /// Refuses before the work what could not be written after it.

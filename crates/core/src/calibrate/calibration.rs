@@ -38,6 +38,8 @@ pub struct Calibration {
     pub(super) measure_target: bool,
     pub(super) hold_out: Option<usize>,
     pub(super) distances_mm: Vec<f64>,
+    /// Which of the model's starts is taken; the best where none is said.
+    pub(super) start: Option<usize>,
 }
 
 /// What one camera saw, and what is known of it.
@@ -145,6 +147,7 @@ impl Calibration {
             measure_target: false,
             hold_out: None,
             distances_mm: Vec::new(),
+            start: None,
         }
     }
 
@@ -159,6 +162,11 @@ impl Calibration {
     pub fn with(mut self, camera: CameraViews) -> Self {
         self.cameras.push(camera);
         self
+    }
+
+    /// Says something else of one of its cameras, by its index.
+    pub fn set_intrinsics(&mut self, camera: usize, intrinsics: impl Into<Intrinsics>) {
+        self.cameras[camera].intrinsics = intrinsics.into();
     }
 
     /// With a loss, by which corners with large residuals count less; it is [`Loss::Huber`] unless said otherwise.

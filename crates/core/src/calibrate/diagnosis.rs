@@ -1,5 +1,7 @@
 //! What is to be said about an estimate: what is wrong with it, what that comes from, and what helps.
 
+use std::collections::BTreeSet;
+
 use super::calibration::Calibration;
 use super::estimate::{CameraEstimate, Estimate};
 use super::finding::Finding;
@@ -7,6 +9,7 @@ use super::lack_of_fit::LackOfFit;
 use super::lens_end::LensEnd;
 use super::model::Model;
 use super::model_selection::{Instead, Remedy, is_explained};
+use crate::camera::Camera;
 
 /// Corners are found to a few hundredths of a pixel; a camera that leaves more than this does not
 /// have the lens of the model.
@@ -17,6 +20,14 @@ const POOR_RMS_PX: f64 = 1.0;
 /// lens, zoom or crop only.
 pub(super) const FOREIGN_PART: f64 = 0.005;
 
+/// The part of its views that a calibration may leave out.
+const MOST_LEFT_OUT: f64 = 0.2;
+
+/// Focal lengths that differ by so many deviations are those of two minima; one that leaves so many times as much as
+/// the best is none to be taken for it.
+const APART_SIGMA: f64 = 10.0;
+const NEARLY: f64 = 1.5;
+
 /// What is to be said about an estimate. Cameras are indices.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -26,6 +37,29 @@ pub enum Diagnosis {
         /// The camera.
         camera: usize,
         /// What it leaves, outliers left out, px.
+        rms_px: f64,
+    },
+    /// A camera that was found leaves so much that nothing of the estimate is of use.
+    AbsurdFit {
+        /// The camera.
+        camera: usize,
+        /// What it leaves, outliers left out, px.
+        rms_px: f64,
+    },
+    /// More than a fifth of the views, of a rig of the frames, took no part: what was found is that of the others only.
+    ManyLeftOut {
+        /// How many took no part.
+        left_out: usize,
+        /// Of how many.
+        all: usize,
+    },
+    /// Another camera of the same model explains the views as well, or nearly.
+    OtherMinimum {
+        /// The camera.
+        camera: usize,
+        /// The other one.
+        other: Camera,
+        /// What that leaves, outliers left out, px.
         rms_px: f64,
     },
     /// The lens turns back or runs away within the image.
@@ -64,6 +98,16 @@ pub enum Diagnosis {
     },
 }
 
+impl Diagnosis {
+    /// Whether what was found is not to be used as it is.
+    pub fn is_failure(&self) -> bool {
+        matches!(
+            self,
+            Self::ForeignCamera { .. } | Self::AbsurdFit { .. } | Self::ManyLeftOut { .. }
+        )
+    }
+}
+
 impl Calibration {
     /// What is to be said about what [`solve`](Self::solve) found, what matters most first. Where residuals
     /// are not noise, other models, the shape of the board, and the places of panels are tried, on a part of
@@ -72,7 +116,28 @@ impl Calibration {
         // What was solved was split before.
         let own = self.split().map_or_else(|_| self.clone(), |(own, _)| own);
         let alone = own.each_alone(found);
-        said(found, &alone)
+        let mut said = said(found, &alone);
+        if let (true, Some((other, rms_px))) = (own.is_single(), own.other_minimum(found)) {
+            said.push(Diagnosis::OtherMinimum { camera: 0, other, rms_px });
+        }
+        said
+    }
+
+    /// A camera of another valley that leaves not much more, where a model has several.
+    fn other_minimum(&self, found: &Estimate) -> Option<(Camera, f64)> {
+        let model = self.cameras[0].intrinsics.model()?;
+        let own = found.cameras.first()?;
+        let starts = 0..model.starts().len();
+        let others = starts.filter(|_| model.starts().len() > 1).filter_map(|start| {
+            let other = Self { start: Some(start), ..self.clone() }.adjusted().ok()?;
+            let is_whole = other.frames.len() == found.frames.len();
+            let sd = own.parameters.first()?.sd?.max(other.cameras[0].parameters.first()?.sd?);
+            let off = other.cameras[0].camera.focal_px.x - own.camera.focal_px.x;
+            let rms_px = other.inlier_rms_px();
+            let is_other = off.abs() > APART_SIGMA * sd && rms_px < NEARLY * found.inlier_rms_px();
+            (is_whole && is_other).then(|| (other.cameras[0].camera.clone(), rms_px))
+        });
+        others.min_by(|(_, one), (_, other)| one.total_cmp(other))
     }
 
     /// Every camera by itself, and what its views say; `None` where they say nothing, or where there is nothing
@@ -117,6 +182,9 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     });
     let foreign =
         foreign.map(|(camera, of)| Diagnosis::ForeignCamera { camera, rms_px: of.inlier_rms_px() });
+    let absurd = cameras().filter(|(_, camera)| camera.model.is_some() && is_absurd(camera));
+    let absurd =
+        absurd.map(|(camera, of)| Diagnosis::AbsurdFit { camera, rms_px: of.inlier_rms_px() });
     let ends = cameras()
         .filter_map(|(camera, of)| Some(Diagnosis::LensEnds { camera, end: of.lens_end()? }));
     let gross = found.findings.iter().cloned().map(Diagnosis::GrossErrors);
@@ -127,7 +195,31 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
         sufficient: alone.as_ref().and_then(|(alone, found)| alone.sufficient(found)),
     });
     let causes = causes(found, alone);
-    foreign.chain(ends).chain(gross).chain(causes).chain(open).collect()
+    let failures = foreign.chain(absurd).chain(many_left_out(found));
+    failures.chain(ends).chain(gross).chain(causes).chain(open).collect()
+}
+
+/// Whether a camera leaves so much that it cannot be that of the pictures.
+pub(super) fn is_absurd(camera: &CameraEstimate) -> bool {
+    camera.inlier_rms_px() > FOREIGN_PART * f64::from(camera.camera.width)
+}
+
+/// Whether too many views of cameras that were to be found took no part.
+fn many_left_out(found: &Estimate) -> Option<Diagnosis> {
+    let frames: BTreeSet<&str> = found.frames.iter().map(|frame| frame.name.as_str()).collect();
+    let whole = found.excluded.iter().filter(|out| out.panel.is_none());
+    let is_rig = found.cameras.len() > 1;
+    let left_out = match is_rig {
+        true => {
+            let names: BTreeSet<&str> = whole.map(|out| out.view.as_str()).collect();
+            names.difference(&frames).count()
+        }
+        false => whole.count(),
+    };
+    let all = found.frames.len() + left_out;
+    let is_sought = found.cameras.iter().any(|camera| camera.model.is_some());
+    let is_many = left_out as f64 > MOST_LEFT_OUT * all as f64;
+    (is_sought && is_many).then_some(Diagnosis::ManyLeftOut { left_out, all })
 }
 
 /// Why residuals are not noise.
@@ -170,7 +262,7 @@ fn causes(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
         is_single || remedies.iter().any(|(of, _)| *of == camera) || told.iter().any(is_lens)
     };
     let is_poor = |(index, camera): &(usize, &CameraEstimate)| {
-        camera.inlier_rms_px() > POOR_RMS_PX && !is_named(*index)
+        camera.inlier_rms_px() > POOR_RMS_PX && !is_absurd(camera) && !is_named(*index)
     };
     let poor = found.cameras.iter().enumerate().filter(is_poor);
     let poor: Vec<Diagnosis> = poor

@@ -21,6 +21,7 @@
 //! and τ (mm).
 
 mod agreement;
+mod automatic;
 mod calibration;
 mod comparison;
 mod consensus;
@@ -55,6 +56,7 @@ mod view_consistency;
 mod weights;
 mod words;
 
+pub use automatic::Candidate;
 pub use calibration::{Calibration, CameraViews, Intrinsics, PanelPlace};
 pub use comparison::{CameraMotion, Comparison, ComparisonError, Difference, Region};
 pub use diagnosis::Diagnosis;

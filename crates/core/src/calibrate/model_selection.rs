@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::calibration::{Calibration, CameraViews, Intrinsics};
+use super::diagnosis::is_absurd;
 use super::estimate::Estimate;
 use super::lack_of_fit::{MATTERS, SIGNIFICANT, deviate_of_f};
 use super::model::Model;
@@ -93,7 +94,8 @@ impl Calibration {
             .richer()
             .iter()
             .map(|&model| (Instead::Model(model), trial.of_intrinsics(model).adjusted().ok()));
-        let bends = self.panels.len() == 1 && !self.board_shape;
+        // No sheet is bent so far that nothing fits.
+        let bends = self.panels.len() == 1 && !self.board_shape && !is_absurd(&found.cameras[0]);
         let shape =
             bends.then(|| (Instead::Shape, trial.clone().board_shape(true).adjusted().ok()));
         let shows_several = trial.cameras[0].views.iter().any(|view| view.sightings.len() > 1);

@@ -8,6 +8,7 @@ use super::model::Model;
 use super::model_selection::{Instead, Remedy};
 use super::panel::PanelRef;
 use super::target_map::LEAST_TO_MEASURE;
+use crate::camera::Camera;
 use crate::words::counted;
 
 /// A panel that is turned by less looks only moved.
@@ -43,6 +44,17 @@ impl<'a> Words<'a> {
                     100.0 * FOREIGN_PART
                 ),
             ),
+            Diagnosis::AbsurdFit { camera, rms_px } => self.of_camera(
+                *camera,
+                format!(
+                    "corners are off by {rms_px:.1} px, more than {} % of the image's width: this is no \
+                     calibration; {}, or labels are wrong",
+                    100.0 * FOREIGN_PART,
+                    other_lens(self.model(*camera))
+                ),
+            ),
+            Diagnosis::ManyLeftOut { left_out, all } => self.many_left_out(*left_out, *all),
+            Diagnosis::OtherMinimum { camera, other, rms_px } => self.other_minimum(*camera, other, *rms_px),
             Diagnosis::LensEnds { camera, end } => self.of_camera(*camera, end.to_string()),
             Diagnosis::GrossErrors(finding) => self.finding(finding),
             Diagnosis::Remedied { camera, remedy } => self.remedied(*camera, remedy),
@@ -58,6 +70,31 @@ impl<'a> Words<'a> {
                 self.of_camera(*camera, cannot_tell_apart(parameters, *sufficient))
             }
         }
+    }
+
+    fn many_left_out(&self, left_out: usize, all: usize) -> String {
+        let (what, lens) = match self.estimate.cameras.as_slice() {
+            [only] => ("views", other_lens(only.model)),
+            _ => ("frames", "a camera was moved, or pictures are not of one moment".to_owned()),
+        };
+        format!(
+            "{left_out} of {all} {what} were left out, more than a fifth: what was found is that of the \
+             others only; {lens}, or labels are wrong in so many"
+        )
+    }
+
+    fn other_minimum(&self, camera: usize, other: &Camera, rms_px: f64) -> String {
+        let found = &self.estimate.cameras[camera];
+        let focal = |of: &Camera| of.focal_px.x;
+        let text = format!(
+            "another camera of the model explains the views nearly as well: fx {:.1} px leaves {rms_px:.4} px, fx \
+             {:.1} px {:.4} px: a deviation is that around one of the two; parameters of the lens mean nothing by \
+             themselves, take a model without a second minimum",
+            focal(other),
+            focal(&found.camera),
+            found.inlier_rms_px()
+        );
+        self.of_camera(camera, text)
     }
 
     /// What outliers share.

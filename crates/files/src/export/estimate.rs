@@ -1,5 +1,7 @@
 //! What files tell of an estimate, of a single camera and of a rig alike.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -92,6 +94,13 @@ pub(super) struct DiagnosisRecord<'a> {
     rms_px: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    left_out: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    all: Option<usize>,
+    /// Parameters of another camera that explains the views.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    other: BTreeMap<String, f64>,
     /// Radius up to which a lens is good.
     #[serde(skip_serializing_if = "Option::is_none")]
     steady_px: Option<f64>,
@@ -248,6 +257,25 @@ pub(super) fn diagnoses<'a>(
                 kind: "foreign_camera",
                 camera: name(*camera),
                 rms_px: Some(*rms_px),
+                ..text
+            },
+            Diagnosis::AbsurdFit { camera, rms_px } => DiagnosisRecord {
+                kind: "absurd_fit",
+                camera: name(*camera),
+                rms_px: Some(*rms_px),
+                ..text
+            },
+            Diagnosis::ManyLeftOut { left_out, all } => DiagnosisRecord {
+                kind: "many_left_out",
+                left_out: Some(*left_out),
+                all: Some(*all),
+                ..text
+            },
+            Diagnosis::OtherMinimum { camera, other, rms_px } => DiagnosisRecord {
+                kind: "other_minimum",
+                camera: name(*camera),
+                rms_px_then: Some(*rms_px),
+                other: other.parameter_names().into_iter().zip(other.parameters()).collect(),
                 ..text
             },
             Diagnosis::LensEnds { camera, end: LensEnd { steady_px, .. } } => DiagnosisRecord {

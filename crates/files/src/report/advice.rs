@@ -85,7 +85,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let mut add = |weight, text: String| found.push(Advice { weight, text });
     left_out(report, &mut add, |out| report.is_rig() && out.camera.is_none());
     told(report, &mut add, |diagnosis| {
-        matches!(diagnosis, Diagnosis::ForeignCamera { .. } | Diagnosis::GrossErrors(_))
+        diagnosis.is_failure() || matches!(diagnosis, Diagnosis::GrossErrors(_))
     });
     told(report, &mut add, is_cause);
     for (index, (camera, survey)) in cameras() {
@@ -162,7 +162,10 @@ fn told(
 fn is_cause(diagnosis: &Diagnosis) -> bool {
     matches!(
         diagnosis,
-        Diagnosis::Remedied { .. } | Diagnosis::LackOfFit(_) | Diagnosis::PoorFit { .. }
+        Diagnosis::Remedied { .. }
+            | Diagnosis::LackOfFit(_)
+            | Diagnosis::PoorFit { .. }
+            | Diagnosis::OtherMinimum { .. }
     )
 }
 

@@ -30,7 +30,9 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
     let CameraViews { views, intrinsics, .. } = &calibration.cameras[0];
     let panels = calibration.panel_poses();
     let search = match intrinsics {
-        Intrinsics::Unknown(model) => Search::without_guess(views, &panels, *model)?,
+        Intrinsics::Unknown(model) => {
+            Search::without_guess(views, &panels, *model, calibration.start)?
+        }
         Intrinsics::Known(camera) | Intrinsics::Near { camera, .. } => {
             Search::with_camera(views, &panels, camera)?
         }
@@ -67,6 +69,7 @@ impl<'a> Search<'a> {
         views: &[View],
         panels: &'a [Pose],
         model: Model,
+        start: Option<usize>,
     ) -> Result<Self, CalibrationError> {
         enough(views.len(), views.len())?;
         let agreeing: Vec<View> = views.iter().map(agreeing).collect();
@@ -85,7 +88,9 @@ impl<'a> Search<'a> {
             Ok((search.error_px(), search))
         };
         // The best of all starts; an error where none leads anywhere.
-        let found = model.starts().into_iter().map(from);
+        let starts = model.starts().into_iter().enumerate();
+        let starts = starts.filter(|(index, _)| start.is_none_or(|start| start == *index));
+        let found = starts.map(|(_, start)| from(start));
         let error =
             |found: &Result<(f64, Search), _>| found.as_ref().map_or(f64::INFINITY, |f| f.0);
         let best = found.min_by(|a, b| error(a).total_cmp(&error(b)));

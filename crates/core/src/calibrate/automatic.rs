@@ -1,0 +1,160 @@
+//! The model of a lens, chosen by views that took no part in finding it.
+//!
+//! Each model is found from two thirds of the views and held against the others, where poses alone are found. Of
+//! those that hold the views as well as the best one does, to 5 % in the error, the one with the fewest parameters is
+//! taken; one whose parameters the views do not tell apart only where there is no other.
+
+use std::collections::BTreeMap;
+
+use super::calibration::{Calibration, CameraViews};
+use super::error::CalibrationError;
+use super::estimate::{Estimate, ViewEstimate};
+use super::model::Model;
+use super::start::evenly;
+use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
+use crate::statistics::median;
+
+/// Models that are tried, those with fewer parameters first.
+const TRIED: [Model; 9] = [
+    Model::Radtan,
+    Model::Eucm,
+    Model::DoubleSphere,
+    Model::Radtan5,
+    Model::KannalaBrandt(4),
+    Model::KannalaBrandt(6),
+    Model::Rational,
+    Model::Pupil,
+    Model::ThinPrism,
+];
+
+/// Views that take part in the choice, evenly over the sequence.
+const MOST_VIEWS: usize = 60;
+
+/// Every so many views are held out.
+const HELD_OUT: usize = 3;
+
+/// A model holds a lens if its mean square is at most by this part larger than the best one's, 5 % in the error.
+const SAME: f64 = 0.1;
+
+/// A model that was tried.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Candidate {
+    /// The model.
+    pub model: Model,
+    /// How many parameters it has.
+    pub parameters: usize,
+    /// Root mean square error of a coordinate on views that took no part, px, in which corners that are off by more than
+    /// five deviations of the best model count as just five; `None` where no camera of the model was found.
+    pub held_out_px: Option<f64>,
+    /// Whether the views tell all its parameters apart.
+    pub is_stable: bool,
+    /// Whether it holds the lens as well as the best one.
+    pub holds: bool,
+    /// Whether it was chosen.
+    pub chosen: bool,
+}
+
+/// The errors of a model on views that took no part.
+struct Tried {
+    /// By view, px².
+    squares: BTreeMap<String, Vec<f64>>,
+    is_stable: bool,
+}
+
+impl Calibration {
+    /// The model to be found of a camera, and what speaks for it. Where its model is given already, it counts for
+    /// nothing here.
+    ///
+    /// # Errors
+    /// Where there are too few views to hold some out, or no model explains them.
+    pub fn choose_model(&self, camera: usize) -> Result<(Model, Vec<Candidate>), CalibrationError> {
+        let views = evenly(&self.cameras[camera].views, MOST_VIEWS).cloned().collect();
+        let alone = self.alone(camera, &self.panels);
+        let of_model = |model: Model| {
+            let only = CameraViews::new("", Vec::clone(&views), model);
+            let calibration = alone.of_cameras(vec![only]).hold_out(Some(HELD_OUT));
+            calibration.board_shape(false).measure_target(false).solve()
+        };
+        let tried = TRIED.map(|model| (model, of_model(model)));
+        let mut error = CalibrationError::NoStart;
+        let mut found = Vec::new();
+        for (model, estimate) in tried {
+            let of_model = match &estimate {
+                Ok(estimate) => Tried::of(estimate),
+                Err(why) => {
+                    error = why.clone();
+                    None
+                }
+            };
+            found.push((model, of_model));
+        }
+        let candidates = judged(&found);
+        match candidates.iter().find(|candidate| candidate.chosen) {
+            Some(chosen) => Ok((chosen.model, candidates)),
+            None => Err(error),
+        }
+    }
+}
+
+impl Tried {
+    /// `None` where no views were held out.
+    fn of(found: &Estimate) -> Option<Self> {
+        let views = found.held_out.as_deref()?.cameras.iter().flat_map(|camera| &camera.views);
+        let of_view = |view: &ViewEstimate| {
+            view.corners.iter().map(|corner| corner.residual.length_squared()).collect()
+        };
+        Some(Self {
+            squares: views.map(|view| (view.name.clone(), of_view(view))).collect(),
+            is_stable: found.cameras.iter().all(|camera| camera.ill_conditioned.is_empty()),
+        })
+    }
+}
+
+/// Compares models by the same corners: those of all views that any model explains.
+fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    let found = || tried.iter().filter_map(|(_, found)| found.as_ref());
+    for (name, of_view) in found().flat_map(|found| &found.squares) {
+        let count = counts.entry(name).or_default();
+        *count = (*count).max(of_view.len());
+    }
+    let whole = found().filter(|found| 2 * found.squares.len() > counts.len());
+    let medians =
+        whole.filter_map(|found| median(found.squares.values().flatten().copied().collect()));
+    let Some(least) = medians.min_by(f64::total_cmp) else {
+        return tried.iter().map(|(model, _)| candidate(*model, None, false)).collect();
+    };
+    let most = OUTLIER_SIGMA * OUTLIER_SIGMA * least / MEDIAN_OF_CHI_SQUARED_2;
+    // Means by view; a corner or a view that a model does not reach counts as an outlier.
+    let means = |found: &Tried| -> Vec<f64> {
+        let of_view = |(name, &count): (&&str, &usize)| {
+            let squares = found.squares.get(*name).map_or(&[][..], Vec::as_slice);
+            let sum = squares.iter().map(|square| square.min(most)).sum::<f64>();
+            (sum + (count - squares.len()) as f64 * most) / count.max(1) as f64
+        };
+        counts.iter().map(of_view).collect()
+    };
+    let means: Vec<Option<Vec<f64>>> =
+        tried.iter().map(|(_, found)| found.as_ref().map(means)).collect();
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    let best = means.iter().flatten().map(|own| mean(own)).min_by(f64::total_cmp);
+    let candidates = tried.iter().zip(&means).map(|((model, found), own)| {
+        let own = own.as_deref().map(mean);
+        let is_stable = found.as_ref().is_some_and(|found| found.is_stable);
+        Candidate {
+            holds: own.zip(best).is_some_and(|(own, best)| own <= (1.0 + SAME) * best),
+            ..candidate(*model, own.map(|own| (own / 2.0).sqrt()), is_stable)
+        }
+    });
+    let mut candidates: Vec<Candidate> = candidates.collect();
+    let holding = candidates.iter_mut().filter(|candidate| candidate.holds);
+    let chosen = holding.min_by_key(|candidate| (!candidate.is_stable, candidate.parameters));
+    chosen.into_iter().for_each(|chosen| chosen.chosen = true);
+    candidates
+}
+
+fn candidate(model: Model, held_out_px: Option<f64>, is_stable: bool) -> Candidate {
+    let parameters = model.free().into_iter().filter(|free| *free).count();
+    Candidate { model, parameters, held_out_px, is_stable, holds: false, chosen: false }
+}
