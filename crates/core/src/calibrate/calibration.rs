@@ -158,8 +158,8 @@ impl Calibration {
     }
 
     /// A calibration with several targets, of these names and panels, that are fixed to each other, nobody knows
-    /// how. [`PanelRef::index`] counts the panels of all targets, one target after the other, as
-    /// [`Reference::Targets`](super::Reference::Targets) does. The scene's frame is that of the first target.
+    /// how. [`PanelRef::index`](super::PanelRef::index) counts the panels of all targets, one target after the
+    /// other. The scene's frame is that of the first target.
     ///
     /// Two cameras need not see the same target: where each sees one of its own, the cameras and the targets are
     /// found from how the rig moves, which must turn about two axes.
