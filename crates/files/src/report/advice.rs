@@ -62,6 +62,8 @@ const HOLDOUT: f64 = 1.25;
 /// What would make a calibration better, what matters most first; `surveys` are those of its cameras.
 pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let mut found = Vec::new();
+    let mut add = |weight, text: String| found.push(Advice { weight, text });
+    told(report, &mut add, Diagnosis::is_failure);
     let cameras = || report.estimate.cameras.iter().zip(surveys).enumerate();
     for (index, (camera, survey)) in cameras() {
         let mut add = |weight, text: String| {
@@ -84,9 +86,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     }
     let mut add = |weight, text: String| found.push(Advice { weight, text });
     left_out(report, &mut add, |out| report.is_rig() && out.camera.is_none());
-    told(report, &mut add, |diagnosis| {
-        diagnosis.is_failure() || matches!(diagnosis, Diagnosis::GrossErrors(_))
-    });
+    told(report, &mut add, |diagnosis| matches!(diagnosis, Diagnosis::GrossErrors(_)));
     told(report, &mut add, is_cause);
     for (index, (camera, survey)) in cameras() {
         let mut add = |weight, text: String| {

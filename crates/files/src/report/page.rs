@@ -4,14 +4,17 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 
-use super::{Report, Survey, SurveyedView, Weight, advice, field, plots, rig, target_map};
+use super::{Advice, Report, Survey, SurveyedView, Weight, advice, field, plots, rig, target_map};
 use deltille_core::calibrate::{
-    CameraEstimate, Excluded, Parameter, Source, TargetMap, ViewEstimate,
+    CameraEstimate, Diagnosis, Excluded, Parameter, Source, TargetMap, ViewEstimate,
 };
-use deltille_core::words::places;
+use deltille_core::words::{counted, places};
 
 /// Views in the table: all, or where there are more the worst ones.
 pub(super) const MOST_VIEWS: usize = 300;
+
+/// Views that are shown at once, the others unfold.
+const UNFOLDED: usize = 12;
 
 /// Correlations from here on are drawn in a blue on which white is read better than ink.
 const STRONG: f64 = 0.85;
@@ -33,8 +36,10 @@ pub(super) fn html(report: &Report) -> String {
             _ => figures(&of_rig(report)),
         }
     );
+    let advice = advice(report, &surveys);
+    page += &verdict(report, &advice);
     page += "<section><h2>What to make of it</h2><ul class=\"advice\">";
-    for piece in advice(report, &surveys) {
+    for piece in advice {
         let (class, sign) = match piece.weight {
             Weight::Good => ("good", "✓"),
             Weight::Hint => ("hint", "→"),
@@ -73,6 +78,34 @@ pub(super) fn html(report: &Report) -> String {
         env!("CARGO_PKG_VERSION")
     );
     page
+}
+
+/// Good or bad, at a glance.
+fn verdict(report: &Report, advice: &[Advice]) -> String {
+    let warnings = advice.iter().filter(|piece| piece.weight == Weight::Warning).count();
+    if report.diagnoses.iter().any(Diagnosis::is_failure) {
+        return "<p class=\"verdict warning\">Not to be used: see why below.</p>\n".to_owned();
+    }
+    let (class, text) = if warnings > 0 {
+        let text = format!("To be used with care: {} below.", counted(warnings, "warning"));
+        ("hint", text)
+    } else {
+        ("good", "Good: nothing speaks against it.".to_owned())
+    };
+    format!("<p class=\"verdict {class}\">{text}{}</p>\n", sureness(report))
+}
+
+/// How sure the projections of a single camera are.
+fn sureness(report: &Report) -> String {
+    let [camera] = report.estimate.cameras.as_slice() else { return String::new() };
+    let distance = camera.projection.as_ref().and_then(|known| known.distances_mm.first().copied());
+    let known = distance.and_then(|mm| {
+        let sd = |source| camera.projection_sd_px(Some(mm), source);
+        Some((mm, sd(Source::Observed).or_else(|| sd(Source::Noise))?))
+    });
+    known.map_or(String::new(), |(mm, sd)| {
+        format!(" Where corners were, points {mm:.0} mm away are projected to ± {sd:.3} px.")
+    })
 }
 
 /// A figure and what it is.
@@ -299,24 +332,21 @@ fn views(report: &Report, index: usize, survey: &Survey) -> String {
     let camera = &report.estimate.cameras[index];
     let mut order: Vec<usize> = (0..camera.views.len()).collect();
     let all = order.len();
-    if all > MOST_VIEWS {
-        let rms = |index: usize| camera.views[index].rms_px;
-        order.sort_by(|&a, &b| rms(b).total_cmp(&rms(a)));
-        order.truncate(MOST_VIEWS);
-        order.sort_unstable();
-    }
+    let rms = |index: usize| camera.views[index].rms_px;
+    order.sort_by(|&a, &b| rms(b).total_cmp(&rms(a)));
+    order.truncate(MOST_VIEWS);
     let held_out = report.held_out(index).map(|held_out| (held_out, Survey::new(held_out)));
     let of_test =
         held_out.iter().flat_map(|(held_out, survey)| held_out.views.iter().zip(&survey.views));
     let of_test: Vec<(&ViewEstimate, &SurveyedView)> = of_test.collect();
     let every = camera.views.iter().chain(of_test.iter().map(|(view, _)| *view));
     let worst = every.map(|view| view.rms_px).fold(f64::MIN_POSITIVE, f64::max);
-    let mut rows = String::new();
-    for of_view in order {
-        rows += &row(report, index, &camera.views[of_view], &survey.views[of_view], worst, "");
-    }
+    let rows = order.into_iter().map(|of_view| {
+        row(report, index, &camera.views[of_view], &survey.views[of_view], worst, "")
+    });
+    let mut rows: Vec<String> = rows.collect();
     for (view, stands) in of_test {
-        rows += &row(report, index, view, stands, worst, " (held out)");
+        rows.push(row(report, index, view, stands, worst, " (held out)"));
     }
     let is_here = |out: &&Excluded| match &out.camera {
         Some(name) => *name == camera.name,
@@ -329,10 +359,23 @@ fn views(report: &Report, index: usize, survey: &Survey) -> String {
         true => format!("<p>The worst {MOST_VIEWS} of {all} views.</p>"),
         false => String::new(),
     };
+    let folded = rows.split_off(rows.len().min(UNFOLDED));
+    let folded = match folded.len() {
+        0 => String::new(),
+        n => format!(
+            "<details><summary>{} that fit better</summary>{}</details>",
+            counted(n, "view"),
+            table_of_views(&folded.concat())
+        ),
+    };
+    let table = table_of_views(&(excluded + &rows.concat()));
+    format!("<section><h2>Views, the worst first</h2>{note}{table}{folded}</section>\n")
+}
+
+fn table_of_views(rows: &str) -> String {
     format!(
-        "<section><h2>Views</h2>{note}<table class=\"plain views\"><tr><th></th><th>view</th>\
-         <th>corners</th><th>rms, px</th><th>outliers</th><th>tilt</th><th>distance, mm</th></tr>\
-         {rows}{excluded}</table></section>\n"
+        "<table class=\"plain views\"><tr><th></th><th>view</th><th>corners</th><th>rms, px</th>\
+         <th>outliers</th><th>tilt</th><th>distance, mm</th></tr>{rows}</table>"
     )
 }
 
