@@ -8,7 +8,7 @@ use deltille::calibrate::{
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
-use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
 use glam::{DQuat, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -28,12 +28,6 @@ struct Scene {
     camera_from_rig: Vec<Pose>,
     /// By camera.
     views: Vec<Vec<View>>,
-}
-
-fn icosahedron() -> Target {
-    let family = Family::shipped("delTag25h7").unwrap();
-    let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
-    Target::build("ico", &spec, Some(&family), None).unwrap()
 }
 
 fn board(name: &str, first_id: u32) -> Target {
@@ -61,13 +55,18 @@ fn middle(target: &Target) -> DVec3 {
 }
 
 /// What a camera sees of the targets of a scene.
-fn seen(scene: &Scene, camera: usize, rig_from_scene: &Pose, name: &str, random: &mut ChaCha8Rng) -> View {
+fn seen(
+    scene: &Scene,
+    camera: usize,
+    rig_from_scene: &Pose,
+    name: &str,
+    random: &mut ChaCha8Rng,
+) -> View {
     let noise = Normal::new(0.0, NOISE_PX).unwrap();
     let (mut sightings, mut first) = (Vec::new(), 0);
     let lens = &scene.cameras[camera];
     for (target, place) in scene.targets.iter().zip(&scene.scene_from_target) {
-        let camera_from_target =
-            scene.camera_from_rig[camera].after(rig_from_scene).after(place);
+        let camera_from_target = scene.camera_from_rig[camera].after(rig_from_scene).after(place);
         for (index, panel) in target.panels.iter().enumerate() {
             let pose = camera_from_target.after(&panel.pose.to_pose());
             let away = pose.apply(panel.corners[0].panel_mm.extend(0.0));
@@ -97,9 +96,8 @@ impl Scene {
     fn photographed(mut self, places: &[Pose], random: &mut ChaCha8Rng) -> Self {
         let views = (0..self.cameras.len()).map(|camera| {
             let views = places.iter().enumerate();
-            let views = views.map(|(frame, place)| {
-                seen(&self, camera, place, &format!("{frame:03}"), random)
-            });
+            let views = views
+                .map(|(frame, place)| seen(&self, camera, place, &format!("{frame:03}"), random));
             views.filter(|view| !view.sightings.is_empty()).collect()
         });
         self.views = views.collect();
@@ -159,30 +157,6 @@ fn is_within(errors: &[f64]) -> bool {
     beyond as f64 <= 0.02 * errors.len() as f64 && worst < 4.5
 }
 
-/// Cameras around an icosahedron that is turned anyhow before them.
-fn around(cameras: usize, frames: usize, seed: u64) -> Scene {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let world_from_rig = |index: usize| {
-        let angle = 0.35 * index as f64;
-        let eye = DVec3::new(700.0 * angle.sin(), 40.0 * index as f64, 700.0 - 700.0 * angle.cos());
-        Pose::looking_at(eye, DVec3::new(0.0, 0.0, 700.0), DVec3::NEG_Y)
-    };
-    let first = world_from_rig(0).inverse();
-    let scene = Scene {
-        targets: vec![icosahedron()],
-        scene_from_target: vec![Pose::IDENTITY],
-        cameras: (0..cameras).map(|_| camera(&mut random)).collect(),
-        camera_from_rig: (0..cameras).map(|index| world_from_rig(index).after(&first)).collect(),
-        views: Vec::new(),
-    };
-    let places = (0..frames).map(|_| Pose {
-        rotation: DQuat::from_scaled_axis(any(&mut random, 3.0)),
-        translation: DVec3::new(0.0, 0.0, 700.0) + any(&mut random, 60.0),
-    });
-    let places: Vec<Pose> = places.collect();
-    scene.photographed(&places, &mut random)
-}
-
 /// Two cameras back to back, each before a board of its own; the rig turns by so much about its axes.
 fn back_to_back(frames: usize, reach_rad: DVec3, seed: u64) -> Scene {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -193,7 +167,8 @@ fn back_to_back(frames: usize, reach_rad: DVec3, seed: u64) -> Scene {
     let targets = vec![board("front", 0), board("back", 100)];
     // The boards as the rig has them where it is not turned.
     let facing = |target: &Target, random: &mut ChaCha8Rng| {
-        let rotation = DQuat::from_scaled_axis(any(random, 0.3)) * DQuat::from_rotation_x(3.14);
+        let rotation = DQuat::from_scaled_axis(any(random, 0.3))
+            * DQuat::from_rotation_x(std::f64::consts::PI);
         let at = DVec3::new(0.0, 0.0, 420.0) + any(random, 20.0);
         Pose { rotation, translation: at - rotation * middle(target) }
     };
@@ -208,10 +183,8 @@ fn back_to_back(frames: usize, reach_rad: DVec3, seed: u64) -> Scene {
     };
     let places = (0..frames).map(|_| {
         let turn = reach_rad * any(&mut random, 1.0);
-        let step = Pose {
-            rotation: DQuat::from_scaled_axis(turn),
-            translation: any(&mut random, 50.0),
-        };
+        let step =
+            Pose { rotation: DQuat::from_scaled_axis(turn), translation: any(&mut random, 50.0) };
         step.after(&front)
     });
     let places: Vec<Pose> = places.collect();
@@ -233,10 +206,9 @@ fn cameras_back_to_back_are_found_by_boards_of_their_own() {
 
 #[test]
 fn motion_that_leaves_cameras_open_is_named() {
-    for (reach, expected) in [
-        (DVec3::new(0.0, 0.4, 0.0), TooPlain::OneAxis),
-        (DVec3::ZERO, TooPlain::NoTurn),
-    ] {
+    for (reach, expected) in
+        [(DVec3::new(0.0, 0.4, 0.0), TooPlain::OneAxis), (DVec3::ZERO, TooPlain::NoTurn)]
+    {
         let mut scene = back_to_back(30, reach, 3);
         // Cameras by themselves need boards that are tilted.
         let calibration = scene.views.iter().zip(&scene.cameras).enumerate().fold(
@@ -249,7 +221,9 @@ fn motion_that_leaves_cameras_open_is_named() {
         );
         scene.views.clear();
         let error = calibration.solve().unwrap_err();
-        let CalibrationError::PlainMotion { camera, target, why } = &error else { panic!("{error}") };
+        let CalibrationError::PlainMotion { camera, target, why } = &error else {
+            panic!("{error}")
+        };
         assert_eq!((camera.as_str(), target.as_str(), *why), ("c1", "back", expected), "{error}");
     }
 }
