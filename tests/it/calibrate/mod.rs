@@ -4,5 +4,6 @@ mod commands;
 mod gross_errors;
 mod models;
 mod rig;
+mod scenes;
 mod target_map;
 mod uncertainty;

@@ -1,21 +1,25 @@
 //! What a calibration starts from: cameras with their views, a target, and what of them is known.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use super::error::CalibrationError;
 use super::estimate::Estimate;
 use super::loss::Loss;
 use super::model::Model;
-use super::view::View;
+use super::panel::PanelRef;
+use super::view::{Sighting, View};
 use super::weights::Weights;
 use crate::camera::{Camera, Pose};
 use crate::targets::PanelPose;
 
-/// Cameras that are fixed to each other, their views of one rigid target, and what of these is known.
+/// Cameras that are fixed to each other, their views of one rigid target or of several that are fixed to each
+/// other, and what of these is known.
 ///
 /// A single camera is a rig of one. Everything that is not said to be known is found by
 /// [`solve`](Self::solve): the cameras without any guess, the poses between them, and where the
-/// target was in each frame; on request also where its panels are on it and how its board is bent.
+/// target was in each frame; on request also where its panels are on it and how its board is bent. Where
+/// there are several targets, see [`of_targets`](Self::of_targets), it is found where they are to each other.
 ///
 /// ```
 /// # use deltille_core::calibrate::{Calibration, CalibrationError, Estimate, Model, PanelPlace, View};
@@ -29,7 +33,9 @@ use crate::targets::PanelPose;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
+    /// Those of all targets, one after the other.
     pub(super) panels: Vec<PanelPlace>,
+    pub(super) targets: Vec<TargetPanels>,
     pub(super) cameras: Vec<CameraViews>,
     pub(super) loss: Loss,
     pub(super) weights: Weights,
@@ -40,6 +46,16 @@ pub struct Calibration {
     pub(super) distances_mm: Vec<f64>,
     /// Which of the model's starts is taken; the best where none is said.
     pub(super) start: Option<usize>,
+}
+
+/// A target of the scene: panels that move together.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct TargetPanels {
+    pub name: String,
+    /// Its panels among all.
+    pub panels: Range<usize>,
+    /// Its place in the scene, where that is known.
+    pub scene_from_target: Option<Pose>,
 }
 
 /// What one camera saw, and what is known of it.
@@ -137,8 +153,27 @@ impl Calibration {
     /// A calibration with a target of these panels, see
     /// [`Reference::panels`](super::Reference::panels), without any camera yet.
     pub fn new(panels: impl IntoIterator<Item = impl Into<PanelPlace>>) -> Self {
+        let panels = panels.into_iter().map(Into::into).collect();
+        Self::of_targets([(String::new(), panels)])
+    }
+
+    /// A calibration with several targets, of these names and panels, that are fixed to each other, nobody knows
+    /// how. [`PanelRef::index`](super::PanelRef::index) counts the panels of all targets, one target after the
+    /// other. The scene's frame is that of the first target.
+    ///
+    /// Two cameras need not see the same target: where each sees one of its own, the cameras and the targets are
+    /// found from how the rig moves, which must turn about two axes.
+    pub fn of_targets(targets: impl IntoIterator<Item = (String, Vec<PanelPlace>)>) -> Self {
+        let (mut panels, mut of_targets) = (Vec::new(), Vec::new());
+        for (name, of_target) in targets {
+            let first = panels.len();
+            panels.extend(of_target);
+            let panels = first..panels.len();
+            of_targets.push(TargetPanels { name, panels, scene_from_target: None });
+        }
         Self {
-            panels: panels.into_iter().map(Into::into).collect(),
+            panels,
+            targets: of_targets,
             cameras: Vec::new(),
             loss: Loss::default(),
             weights: Weights::default(),
@@ -225,6 +260,11 @@ impl Calibration {
         &self.panels
     }
 
+    /// Index of the target of a panel.
+    pub(super) fn target_of(&self, panel: PanelRef) -> usize {
+        self.targets.partition_point(|target| target.panels.end <= panel.index())
+    }
+
     /// Target_from_panel of every panel.
     pub(super) fn panel_poses(&self) -> Vec<Pose> {
         self.panels.iter().map(|panel| panel.target_from_panel).collect()
@@ -232,29 +272,52 @@ impl Calibration {
 
     /// Whether it is one camera with a target that is taken as it is stated.
     pub(super) fn is_single(&self) -> bool {
-        self.cameras.len() == 1 && !self.refine_panels
+        self.cameras.len() == 1 && self.targets.len() == 1 && !self.refine_panels
     }
 
     /// The same with other cameras.
     pub(super) fn of_cameras(&self, cameras: Vec<CameraViews>) -> Self {
-        Self {
-            panels: self.panels.clone(),
-            cameras,
-            distances_mm: self.distances_mm.clone(),
-            ..*self
-        }
+        let (panels, targets) = (self.panels.clone(), self.targets.clone());
+        let distances_mm = self.distances_mm.clone();
+        Self { panels, targets, cameras, distances_mm, ..*self }
     }
 
-    /// One of its cameras by itself, with panels at these places.
+    /// One of its cameras by itself, with panels at these places. What it saw of each target is a view of its own.
     pub(super) fn alone(&self, camera: usize, panels: &[PanelPlace]) -> Self {
-        let cameras = vec![self.cameras[camera].clone()];
+        let mut camera = self.cameras[camera].clone();
+        if self.targets.len() > 1 {
+            camera.views = camera.views.iter().flat_map(|view| self.by_target(view)).collect();
+        }
+        let panels = panels.to_vec();
+        let of_all = 0..panels.len();
+        let all = TargetPanels { name: String::new(), panels: of_all, scene_from_target: None };
         Self {
-            panels: panels.to_vec(),
-            cameras,
+            panels,
+            targets: vec![all],
+            cameras: vec![camera],
             refine_panels: false,
             hold_out: None,
             distances_mm: Vec::new(),
             ..*self
+        }
+    }
+
+    /// What a view shows of each target, by itself.
+    pub(super) fn by_target(&self, view: &View) -> Vec<View> {
+        let of_target = |(index, target): (usize, &TargetPanels)| {
+            let is_of = |sighting: &&Sighting| self.target_of(sighting.panel) == index;
+            let sightings: Vec<Sighting> = view.sightings.iter().filter(is_of).cloned().collect();
+            let name = self.name_on(&view.name, target);
+            (!sightings.is_empty()).then(|| View { name, sightings, ..view.clone() })
+        };
+        self.targets.iter().enumerate().filter_map(of_target).collect()
+    }
+
+    /// What a view of one of several targets is called.
+    pub(super) fn name_on(&self, view: &str, target: &TargetPanels) -> String {
+        match self.targets.len() {
+            1 => view.to_owned(),
+            _ => format!("{view}, target {}", target.name),
         }
     }
 
@@ -310,8 +373,12 @@ impl Calibration {
         });
         let panels = estimate.panels.iter().map(|panel| panel.target_from_panel.into());
         let panels = panels.collect();
+        let targets = self.targets.iter().zip(&estimate.targets).map(|(target, found)| {
+            TargetPanels { scene_from_target: Some(found.scene_from_target), ..target.clone() }
+        });
         Self {
             panels,
+            targets: targets.collect(),
             cameras: cameras.collect(),
             refine_panels: false,
             board_shape: false,

@@ -167,15 +167,14 @@ impl CornerMap {
 
     /// For each corner the group of panels that move as one.
     fn rigid_groups(&self, problem: &Problem) -> Vec<usize> {
-        let mut groups: Vec<PanelRef> = Vec::new();
+        let mut groups: Vec<(usize, Option<PanelRef>)> = Vec::new();
         let is_free = |panel: PanelRef| problem.panels[panel.index()].pose_free;
         let any_is_free = self.corners.iter().any(|corner| is_free(corner.panel));
         let of_corner = |corner: &MappedCorner| {
-            if !any_is_free {
-                return 0;
-            }
-            groups.iter().position(|&panel| panel == corner.panel).unwrap_or_else(|| {
-                groups.push(corner.panel);
+            let target = problem.panels[corner.panel.index()].target;
+            let own = (target, any_is_free.then_some(corner.panel));
+            groups.iter().position(|group| *group == own).unwrap_or_else(|| {
+                groups.push(own);
                 groups.len() - 1
             })
         };

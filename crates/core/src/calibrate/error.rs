@@ -1,3 +1,29 @@
+use std::fmt;
+
+/// How a rig moved too plainly to place cameras that do not see the same target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TooPlain {
+    /// It did not turn.
+    NoTurn,
+    /// It turned about one axis.
+    OneAxis,
+}
+
+impl fmt::Display for TooPlain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoTurn => {
+                "and the rig was moved without being turned: how far the camera is from the others is not \
+                 determined; turn the rig, or the targets before it, by 20° and more about two axes"
+            }
+            Self::OneAxis => {
+                "and the rig was turned about one axis only: where the camera is along that axis is not \
+                 determined; turn the rig, or the targets before it, about a second axis too"
+            }
+        })
+    }
+}
+
 /// Why a camera was not calibrated. Messages say what to do about it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -123,6 +149,33 @@ pub enum CalibrationError {
         shared: usize,
         /// How many are needed.
         needed: usize,
+    },
+    /// One of several targets that no camera saw.
+    #[error("no detection shows target {target}")]
+    TargetNotSeen {
+        /// Its name.
+        target: String,
+    },
+    /// One of several targets that nothing ties to the others.
+    #[error(
+        "target {target}: fewer than {needed} frames show it together with another target, in whichever \
+         cameras: where it is to the others is not known"
+    )]
+    TargetApart {
+        /// Its name.
+        target: String,
+        /// How many frames are needed.
+        needed: usize,
+    },
+    /// A camera that sees a target of its own only, on a rig that moved too plainly.
+    #[error("camera {camera} alone sees target {target}, {why}")]
+    PlainMotion {
+        /// The camera's name.
+        camera: String,
+        /// The target's name.
+        target: String,
+        /// What was missing.
+        why: TooPlain,
     },
     /// Cameras that moved against each other.
     #[error(

@@ -1,16 +1,16 @@
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use glam::DVec2;
 use nalgebra::{DMatrix, Matrix3};
 
 use super::agreement::{Observed, observed};
-use super::calibration::{CameraViews, PanelPlace};
+use super::calibration::{Calibration, CameraViews, PanelPlace};
 use super::error::CalibrationError;
 use super::excluded::Excluded;
 use super::finding::Finding;
 use super::lack_of_fit::{LackOfFit, lack_of_fit};
 use super::lens_end::LensEnd;
-use super::loss::Loss;
 use super::minimise::Minimum;
 use super::model::Model;
 use super::normal::Covariances;
@@ -36,7 +36,9 @@ pub struct Estimate {
     /// The moments at which pictures were taken: in the order of the views of a single camera, by name for
     /// a rig.
     pub frames: Vec<FrameEstimate>,
-    /// The panels of the target; those that were found have a covariance.
+    /// The targets, in the order given; the scene is that of the first one that was seen.
+    pub targets: Vec<TargetEstimate>,
+    /// The panels of all targets; those that were found have a covariance.
     pub panels: Vec<PanelPlace>,
     /// The shape of the board's sheet, where it was to be found.
     pub shape: Option<BoardShape>,
@@ -96,12 +98,26 @@ pub struct CameraEstimate {
     pub rms_px: f64,
 }
 
+/// Where a target is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetEstimate {
+    /// Its name; empty where it is the only one.
+    pub name: String,
+    /// Its panels among all.
+    pub panels: Range<usize>,
+    /// Where it is to the first target.
+    pub scene_from_target: Pose,
+    /// Standard deviations of that: of a turn (rad) and a move (mm) along the first target's axes; `None` where it
+    /// was not to be found, as of the first target.
+    pub pose_sd: Option<[f64; 6]>,
+}
+
 /// A moment at which the cameras took pictures, and the pose of the target in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameEstimate {
     /// Name of the frame: that of its views.
     pub name: String,
-    /// Pose of the target: from the target frame to the rig frame, mm. Of a single camera the rig frame is the camera
+    /// Pose of the target, of several the first: from the target frame to the rig frame, mm. Of a single camera the rig frame is the camera
     /// frame.
     pub rig_from_target: Pose,
     /// Standard deviations of that pose: of a rotation (rad) and a translation (mm) about the rig's axes.
@@ -130,7 +146,7 @@ pub struct ViewEstimate {
     pub image: String,
     /// Index of the frame in which it was taken.
     pub frame: usize,
-    /// Pose of the target: from the target frame to the camera frame, mm.
+    /// Pose of the target, of several the first: from the target frame to the camera frame, mm.
     pub pose: Pose,
     /// Root mean square error of a coordinate, px.
     pub rms_px: f64,
@@ -192,6 +208,22 @@ impl Estimate {
         cameras.get(camera).filter(|_| cameras.len() > 1).map(|camera| camera.name.as_str())
     }
 
+    /// The name of a target where there are several, by which its panels are told from others.
+    pub fn target_name(&self, panel: PanelRef) -> Option<&str> {
+        let of_panel = self.targets.iter().find(|target| target.panels.contains(&panel.index()));
+        of_panel.filter(|_| self.targets.len() > 1).map(|target| target.name.as_str())
+    }
+
+    /// What is known of one of several targets, and of what was seen of it, as if it were the only one.
+    #[must_use]
+    pub fn of_target(&self, target: usize) -> Self {
+        let Some(of) = self.targets.get(target) else { return self.clone() };
+        let panels = self.panels[of.panels.clone()].to_vec();
+        let map = self.map.as_ref().map(|map| map.of_panels(&of.panels));
+        let targets = vec![TargetEstimate { panels: 0..panels.len(), ..of.clone() }];
+        Self { panels, map, targets, ..Self::default() }
+    }
+
     /// Whether panels were to be found.
     pub fn has_refined_panels(&self) -> bool {
         self.panels.iter().any(|panel| panel.covariance.is_some())
@@ -215,7 +247,8 @@ impl Estimate {
             .iter()
             .map(|camera| camera.found().count() + if camera.pose_sd.is_some() { 6 } else { 0 });
         let of_shape = self.shape.map_or(0, |found| found.sd_mm.len());
-        of_cameras.sum::<usize>() + 6 * of_panels + of_shape
+        let of_targets = self.targets.iter().filter(|target| target.pose_sd.is_some()).count();
+        of_cameras.sum::<usize>() + 6 * (of_panels + of_targets) + of_shape
     }
 }
 
@@ -300,12 +333,13 @@ impl Estimate {
     /// # Errors
     /// Where views leave the pose of a frame, a camera or a panel open.
     pub(super) fn new(
-        cameras: &[CameraViews],
+        calibration: &Calibration,
         frames: &[&Frame],
         settled: &Settled,
-        (loss, distances_mm): (Loss, &[f64]),
         f_ratio: f64,
     ) -> Result<Self, CalibrationError> {
+        let Calibration { cameras, loss, distances_mm, .. } = calibration;
+        let loss = *loss;
         let Settled { minimum, whitening, .. } = settled;
         let Minimum { problem, normal, layout, steps } = minimum;
         let open = |parameters: String| CalibrationError::Undetermined { parameters };
@@ -318,7 +352,11 @@ impl Estimate {
         let panels: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
         let of_panels = panels.into_iter().filter(|panel| is_open(layout.panels[panel.index()]));
         let of_panels = of_panels.map(|panel| format!("the pose of panel {panel}"));
-        let poses: Vec<String> = of_cameras.chain(of_panels).collect();
+        let of_targets = calibration.targets.iter().zip(&layout.targets);
+        let of_targets = of_targets.filter(|(_, first)| is_open(**first));
+        let of_targets =
+            of_targets.map(|(target, _)| format!("the pose of target {}", target.name));
+        let poses: Vec<String> = of_cameras.chain(of_panels).chain(of_targets).collect();
         if !poses.is_empty() {
             return Err(open(poses.join(", ")));
         }
@@ -355,8 +393,17 @@ impl Estimate {
                 std::array::from_fn(|i| std::array::from_fn(|j| covariance[(first + i, first + j)]))
             }),
         });
+        let of_targets = calibration.targets.iter().zip(&problem.targets).zip(&layout.targets);
+        let targets = of_targets.map(|((given, target), first)| TargetEstimate {
+            name: given.name.clone(),
+            panels: given.panels.clone(),
+            scene_from_target: target.scene_from_target,
+            pose_sd: first
+                .map(|first| std::array::from_fn(|i| covariance[(first + i, first + i)].sqrt())),
+        });
         Ok(Self {
             frames: of_frames.collect(),
+            targets: targets.collect(),
             panels: panels.collect(),
             shape: board_shape(minimum, &covariance, f_ratio),
             map: target_map(problem, &found.corners, variance, whitening.sigma),

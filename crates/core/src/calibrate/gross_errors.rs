@@ -317,9 +317,9 @@ fn nearest_px(residuals: &[DVec2]) -> f64 {
 /// other, from behind.
 fn mirrored(problem: &Problem) -> Vec<usize> {
     let side = |block: &Block| {
-        let camera_from_target =
+        let camera_from_scene =
             problem.cameras[block.camera].camera_from_rig.after(&problem.frames[block.frame]);
-        let pose = camera_from_target.after(&problem.panels[block.panel.index()].target_from_panel);
+        let pose = camera_from_scene.after(&problem.scene_from_panel(block.panel));
         let corner = block.observations.first().map_or(DVec3::ZERO, |seen| seen.panel_mm);
         (pose.rotation * DVec3::Z).dot(pose.apply(corner)).signum()
     };
@@ -382,10 +382,10 @@ fn place_anew(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRef>) {
         .filter(|block| block.camera == largest.camera)
         .map(|block| Sighting { panel: block.panel, observations: block.observations.clone() });
     let CameraUnknowns { camera, camera_from_rig, .. } = &problem.cameras[largest.camera];
-    let panels: Vec<Pose> = problem.panels.iter().map(|panel| panel.target_from_panel).collect();
+    let panels: Vec<Pose> = problem.panel_places().collect();
     let pose = estimate_pose(camera, &panels, &sightings.collect::<Vec<_>>());
-    let Some(camera_from_target) = pose else { return };
-    let (place, before) = (camera_from_rig.inverse().after(&camera_from_target), off_px(problem));
+    let Some(camera_from_scene) = pose else { return };
+    let (place, before) = (camera_from_rig.inverse().after(&camera_from_scene), off_px(problem));
     let old = std::mem::replace(&mut problem.frames[frame], place);
     if off_px(problem) > before {
         problem.frames[frame] = old;
@@ -482,7 +482,8 @@ fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
     let places = of_panel().filter_map(|block| {
         let unknowns = &problem.cameras[block.camera];
         let camera_from_panel = planar_pose(&unknowns.camera, &block.observations)?;
-        let camera_from_target = unknowns.camera_from_rig.after(&problem.frames[block.frame]);
+        let camera_from_scene = unknowns.camera_from_rig.after(&problem.frames[block.frame]);
+        let camera_from_target = camera_from_scene.after(&problem.scene_from_target(panel));
         Some(camera_from_target.inverse().after(&camera_from_panel))
     });
     let places: Vec<Pose> = places.collect();

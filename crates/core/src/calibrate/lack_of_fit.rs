@@ -155,7 +155,7 @@ fn seen(problem: &Problem, whitening: &Whitening) -> (Vec<Seen>, f64) {
         let cell_px = f64::from(camera.width.max(camera.height)) / CELLS;
         let camera_from_panel = unknowns.camera_from_rig.rotation
             * problem.frames[block.frame].rotation
-            * problem.panels[block.panel.index()].target_from_panel.rotation;
+            * problem.scene_from_panel(block.panel).rotation;
         let panel_from_camera = DMat3::from_quat(camera_from_panel.conjugate());
         for (corner, &w) in block.observations.iter().zip(weights) {
             let at = camera.project_with_derivatives(problem.camera_point(block, corner));

@@ -9,12 +9,13 @@
 //! A pixel is predicted through a chain of frames,
 //!
 //! ```text
-//!   pixel = camera( camera_from_rig · rig_from_target(frame) · target_from_panel · corner )
+//!   pixel = camera( camera_from_rig · rig_from_scene(frame) · scene_from_target · target_from_panel · corner )
 //! ```
 //!
 //! and each link may be unknown. One camera with one target is a rig of one camera that is the rig
 //! frame, and panels that stay where the target's file has them. That fixes the *gauge*: camera 0
-//! is the rig, and the target frame is that of its file; every pose is relative to these.
+//! is the rig, the target frame is that of its file, and that of the first target is the scene; every pose is
+//! relative to these.
 //!
 //! A small change of a pose is (ω, τ): the rotation turns by exp(ω), seen from the frame that the
 //! pose leads to, and the translation grows by τ. Standard deviations of poses are those of ω (rad)
@@ -60,8 +61,10 @@ pub use automatic::Candidate;
 pub use calibration::{Calibration, CameraViews, Intrinsics, PanelPlace};
 pub use comparison::{CameraMotion, Comparison, ComparisonError, Difference, Region};
 pub use diagnosis::Diagnosis;
-pub use error::CalibrationError;
-pub use estimate::{CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, ViewEstimate};
+pub use error::{CalibrationError, TooPlain};
+pub use estimate::{
+    CameraEstimate, Corner, Estimate, FrameEstimate, Parameter, TargetEstimate, ViewEstimate,
+};
 pub use excluded::{Excluded, Reason};
 pub use finding::{Finding, Moved, Shared};
 pub use grid::UntaggedGrid;

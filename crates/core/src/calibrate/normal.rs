@@ -33,6 +33,8 @@ pub(super) struct Layout {
     pub cameras: Vec<Option<usize>>,
     /// First of the six columns of a panel's pose.
     pub panels: Vec<Option<usize>>,
+    /// First of the six columns of a target's pose.
+    pub targets: Vec<Option<usize>>,
     /// First of the columns of the sheet's shape.
     pub shape: Option<usize>,
     /// Number of columns of what all frames share: all of the above.
@@ -60,6 +62,7 @@ impl Layout {
             cameras.push(camera.pose_free.then(|| take(6)));
         }
         let panels = problem.panels.iter().map(|p| p.pose_free.then(|| take(6))).collect();
+        let targets = problem.targets.iter().map(|t| t.pose_free.then(|| take(6))).collect();
         let shape = problem.shape.map(|_| take(shape::COUNT));
         let shared = take(0);
         let of_frames = 6 * problem.frames.len();
@@ -69,7 +72,7 @@ impl Layout {
             Some(of_corners) if of_corners <= of_frames => (None, Some(take(of_corners))),
             Some(_) => (Some(take(of_frames)), None),
         };
-        Self { parameters, cameras, panels, shape, shared, frames, corners, count }
+        Self { parameters, cameras, panels, targets, shape, shared, frames, corners, count }
     }
 }
 
@@ -504,8 +507,8 @@ fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64
 /// Blocks whose equations are held at a time: enough for every thread, little for the memory.
 const BLOCKS_AT_A_TIME: usize = 256;
 
-/// Most columns of a block: parameters and poses of a camera, a panel and a frame, and a shape.
-const MOST_COLUMNS: usize = MAX_PARAMETERS + 18 + shape::COUNT;
+/// Most columns of a block: parameters and poses of a camera, a panel, a target and a frame, and a shape.
+const MOST_COLUMNS: usize = MAX_PARAMETERS + 24 + shape::COUNT;
 
 /// The normal equations of one block, with only the columns that it has.
 pub(super) struct Local {
@@ -539,13 +542,17 @@ impl Local {
         sigma: f64,
     ) -> Option<Self> {
         let camera = &problem.cameras[block.camera];
-        let (rig, target) = (&problem.frames[block.frame], &problem.panels[block.panel.index()]);
+        let (rig, panel) = (&problem.frames[block.frame], &problem.panels[block.panel.index()]);
+        let target = &problem.targets[panel.target].scene_from_target;
         let rig_from_camera = DMat3::from_quat(camera.camera_from_rig.rotation.conjugate());
-        let target_from_rig = DMat3::from_quat(rig.rotation.conjugate());
+        let scene_from_rig = DMat3::from_quat(rig.rotation.conjugate());
+        let target_from_scene = DMat3::from_quat(target.rotation.conjugate());
         let free = &layout.parameters[block.camera];
-        let (of_camera, of_panel) =
-            (layout.cameras[block.camera], layout.panels[block.panel.index()]);
-        let poses = of_camera.into_iter().chain(of_panel).flat_map(|first| first..first + 6);
+        let of_camera = layout.cameras[block.camera];
+        let (of_panel, of_target) =
+            (layout.panels[block.panel.index()], layout.targets[panel.target]);
+        let poses = of_camera.into_iter().chain(of_panel).chain(of_target);
+        let poses = poses.flat_map(|first| first..first + 6);
         let of_shape = layout.shape.into_iter().flat_map(|first| first..first + shape::COUNT);
         let poses = poses.chain(of_shape);
         let columns: Vec<usize> = free.iter().map(|&(_, column)| column).chain(poses).collect();
@@ -557,10 +564,11 @@ impl Local {
         for (seen, &w) in block.observations.iter().zip(whitening) {
             let bends = problem.shape.map(|shape| shape.directions(seen.panel_mm));
             let mapped = problem.map.as_ref().map(|map| map.index(block.panel, seen));
-            let turned_panel = target.target_from_panel.rotation * problem.panel_point(block, seen);
-            let in_target = turned_panel + target.target_from_panel.translation;
-            let turned_target = rig.rotation * in_target;
-            let in_rig = turned_target + rig.translation;
+            let turned_panel = panel.target_from_panel.rotation * problem.panel_point(block, seen);
+            let turned_target =
+                target.rotation * (turned_panel + panel.target_from_panel.translation);
+            let turned_scene = rig.rotation * (turned_target + target.translation);
+            let in_rig = turned_scene + rig.translation;
             let turned_rig = camera.camera_from_rig.rotation * in_rig;
             let in_camera = turned_rig + camera.camera_from_rig.translation;
             let at = camera.camera.project_with_derivatives(in_camera)?;
@@ -583,18 +591,22 @@ impl Local {
                 if of_camera.is_some() {
                     pose(turned_rig, by_camera);
                 }
+                let by_scene = scene_from_rig * by_rig;
+                let by_target = target_from_scene * by_scene;
                 if of_panel.is_some() {
-                    pose(turned_panel, target_from_rig * by_rig);
+                    pose(turned_panel, by_target);
                 }
-                let panel_from_target = target.target_from_panel.rotation.conjugate();
-                by_place[i] = panel_from_target * (target_from_rig * by_rig);
+                if of_target.is_some() {
+                    pose(turned_target, by_scene);
+                }
+                by_place[i] = panel.target_from_panel.rotation.conjugate() * by_target;
                 if let Some(bends) = bends {
                     bends.iter().for_each(|&bend| push(by_place[i].dot(bend)));
                 }
                 let mut pose = |arm: DVec3, by: DVec3| {
                     arm.cross(by).to_array().into_iter().chain(by.to_array()).for_each(&mut push);
                 };
-                pose(turned_target, by_rig);
+                pose(turned_scene, by_rig);
             }
             let residual = seen.pixel - at.pixel;
             let rows = [&rows[0][..n], &rows[1][..n]];
@@ -682,6 +694,12 @@ impl Problem {
                 panel.target_from_panel = moved(&panel.target_from_panel, change);
             }
         }
+        for (target, first) in problem.targets.iter_mut().zip(&layout.targets) {
+            if let Some(first) = *first {
+                let change = &step.shared.as_slice()[first..first + 6];
+                target.scene_from_target = moved(&target.scene_from_target, change);
+            }
+        }
         if let (Some(shape), Some(first)) = (&mut problem.shape, layout.shape) {
             for (mm, change) in
                 shape.coefficients_mm.iter_mut().zip(&step.shared.as_slice()[first..])
@@ -707,22 +725,25 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::calibrate::problem::{CameraUnknowns, Observation, PanelUnknowns, Prior};
+    use crate::calibrate::problem::{
+        CameraUnknowns, Observation, PanelUnknowns, Prior, TargetUnknowns,
+    };
     use crate::calibrate::{PanelRef, Shape};
     use crate::camera::{Camera, Pose};
 
     #[derive(Clone, Copy, PartialEq)]
     enum Kind {
         Rig,
+        Scene,
         Bent,
         Map { frames: usize },
     }
 
-    /// Two cameras and two panels in three frames, every link open that may be, seen with noise; or one camera and a
-    /// panel that is bent, or whose corners are anywhere.
+    /// Two cameras and two panels in three frames, every link open that may be, seen with noise; the same with a target
+    /// for each panel; or one camera and a panel that is bent, or whose corners are anywhere.
     fn problem(kind: Kind) -> Problem {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let count = if kind == Kind::Rig { 2 } else { 1 };
+        let count = if matches!(kind, Kind::Rig | Kind::Scene) { 2 } else { 1 };
         let beside = |x: f64| Pose { translation: DVec3::new(x, 3.0, -2.0), ..Pose::IDENTITY };
         let cameras = (0..count).map(|i| {
             let camera = Camera::pinhole(640 + 80 * i, 480, 1.0);
@@ -737,11 +758,18 @@ mod tests {
             let target_from_panel = beside(70.0 * f64::from(i));
             let prior = Prior::new(beside(70.0 * f64::from(i) + 0.05), covariance);
             let prior = prior.filter(|_| i > 0);
-            PanelUnknowns { target_from_panel, pose_free: i > 0, prior }
+            let target = if kind == Kind::Scene { i as usize } else { 0 };
+            PanelUnknowns { target, target_from_panel, pose_free: i > 0, prior }
         });
+        let turned = Pose::looking_at(DVec3::new(3.0, 7.0, 90.0), DVec3::ONE, DVec3::Y);
+        let other = TargetUnknowns { scene_from_target: turned, pose_free: true };
+        let targets = match kind {
+            Kind::Scene => vec![TargetUnknowns::SCENE, other],
+            _ => vec![TargetUnknowns::SCENE],
+        };
         let moments = match kind {
             Kind::Map { frames } => frames,
-            Kind::Rig | Kind::Bent => 3,
+            Kind::Rig | Kind::Scene | Kind::Bent => 3,
         };
         let frames = (0..moments).map(|i| {
             let (sin, cos) = (2.4 * i as f64).sin_cos();
@@ -756,6 +784,7 @@ mod tests {
         let mut problem = Problem {
             cameras: cameras.collect(),
             frames: frames.collect(),
+            targets,
             panels: panels.collect(),
             blocks: Vec::new(),
             shape,
@@ -835,7 +864,7 @@ mod tests {
     fn equations_are_those_of_the_residuals_differences() {
         // Of few frames corners are eliminated, of many frames.
         let maps = [5, 12].map(|frames| Kind::Map { frames });
-        for kind in [Kind::Rig, Kind::Bent].into_iter().chain(maps) {
+        for kind in [Kind::Rig, Kind::Scene, Kind::Bent].into_iter().chain(maps) {
             let problem = problem(kind);
             let (layout, whitening) = (Layout::of(&problem), whitening(&problem));
             let normal = Normal::of(&problem, &layout, &whitening, Loss::Squared).unwrap();

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::loss::Loss;
 use super::minimise::{Until, minimise};
-use super::problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem};
+use super::problem::{Block, CameraUnknowns, Observation, PanelUnknowns, Problem, TargetUnknowns};
 use super::reweighting::scale;
 use super::view::Sighting;
 use super::weights::{Weights, Whitening};
@@ -162,6 +162,7 @@ fn refine(
     let problem = Problem {
         cameras: vec![CameraUnknowns::alone(camera.clone(), free)],
         frames: vec![pose],
+        targets: vec![TargetUnknowns::SCENE],
         panels: fixed(panels),
         blocks: blocks(sightings, 0).collect(),
         shape: None,
@@ -181,10 +182,14 @@ fn refine(
     Some((minimum.problem.frames[0], cost))
 }
 
-/// Panels that stay where they are.
+/// Panels of one target that stay where they are.
 pub(super) fn fixed(panels: &[Pose]) -> Vec<PanelUnknowns> {
-    let fixed =
-        |&target_from_panel| PanelUnknowns { target_from_panel, pose_free: false, prior: None };
+    let fixed = |&target_from_panel| PanelUnknowns {
+        target: 0,
+        target_from_panel,
+        pose_free: false,
+        prior: None,
+    };
     panels.iter().map(fixed).collect()
 }
 

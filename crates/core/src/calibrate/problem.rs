@@ -35,9 +35,20 @@ pub(super) struct CameraUnknowns {
     pub pose_free: bool,
 }
 
-/// A panel of the target.
+/// A target, whose panels move together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TargetUnknowns {
+    /// Where it is in the scene.
+    pub scene_from_target: Pose,
+    /// Whether that is unknown; one target must stay where it is.
+    pub pose_free: bool,
+}
+
+/// A panel of a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PanelUnknowns {
+    /// Index of its target.
+    pub target: usize,
     /// Where it is on the target.
     pub target_from_panel: Pose,
     /// Whether that is unknown; one panel must stay where it is.
@@ -92,9 +103,11 @@ pub(super) struct Block {
 pub(super) struct Problem {
     /// Cameras.
     pub cameras: Vec<CameraUnknowns>,
-    /// rig_from_target, for each moment at which pictures were taken.
+    /// rig_from_scene, for each moment at which pictures were taken.
     pub frames: Vec<Pose>,
-    /// Panels.
+    /// Targets.
+    pub targets: Vec<TargetUnknowns>,
+    /// Panels of all targets.
     pub panels: Vec<PanelUnknowns>,
     /// Observations.
     pub blocks: Vec<Block>,
@@ -111,7 +124,29 @@ impl CameraUnknowns {
     }
 }
 
+impl TargetUnknowns {
+    /// The target that is the scene's frame.
+    pub const SCENE: Self = Self { scene_from_target: Pose::IDENTITY, pose_free: false };
+}
+
 impl Problem {
+    /// Where the target of a panel is in the scene.
+    pub fn scene_from_target(&self, panel: PanelRef) -> Pose {
+        self.targets[self.panels[panel.index()].target].scene_from_target
+    }
+
+    /// Where a panel is in the scene.
+    pub fn scene_from_panel(&self, panel: PanelRef) -> Pose {
+        self.scene_from_target(panel).after(&self.panels[panel.index()].target_from_panel)
+    }
+
+    /// Where all panels are in the scene.
+    pub fn panel_places(&self) -> impl Iterator<Item = Pose> {
+        self.panels.iter().map(|panel| {
+            self.targets[panel.target].scene_from_target.after(&panel.target_from_panel)
+        })
+    }
+
     /// Where a corner is in the frame of its panel, mm.
     pub fn panel_point(&self, block: &Block, seen: &Observation) -> DVec3 {
         let bent = self.shape.map_or(DVec3::ZERO, |shape| shape.offset(seen.panel_mm));
@@ -123,7 +158,8 @@ impl Problem {
     pub fn camera_point(&self, block: &Block, observation: &Observation) -> DVec3 {
         let at = self.panel_point(block, observation);
         let target = self.panels[block.panel.index()].target_from_panel.apply(at);
-        let rig = self.frames[block.frame].apply(target);
+        let scene = self.scene_from_target(block.panel).apply(target);
+        let rig = self.frames[block.frame].apply(scene);
         self.cameras[block.camera].camera_from_rig.apply(rig)
     }
 
@@ -157,9 +193,7 @@ impl Problem {
             .blocks
             .iter()
             .filter_map(|block| Some(Block { frame: places[block.frame]?, ..block.clone() }));
-        let blocks = blocks.collect();
-        let (cameras, panels) = (self.cameras.clone(), self.panels.clone());
-        Problem { cameras, frames, panels, blocks, shape: self.shape, map: self.map.clone() }
+        Problem { frames, blocks: blocks.collect(), ..self.unknowns() }
     }
 }
 
@@ -205,6 +239,7 @@ impl Problem {
             self.frames[frame] = pose;
         }
         (self.cameras, self.panels) = (problem.cameras, problem.panels);
+        self.targets = problem.targets;
         (self.shape, self.map) = (problem.shape, problem.map);
     }
 
@@ -215,9 +250,10 @@ impl Problem {
 
     /// The same without observations.
     fn unknowns(&self) -> Problem {
-        let Problem { cameras, frames, panels, shape, map, .. } = self;
+        let Problem { cameras, frames, targets, panels, shape, map, .. } = self;
         let (cameras, frames, panels) = (cameras.clone(), frames.clone(), panels.clone());
-        Problem { cameras, frames, panels, blocks: Vec::new(), shape: *shape, map: map.clone() }
+        let (targets, map) = (targets.clone(), map.clone());
+        Problem { cameras, frames, targets, panels, blocks: Vec::new(), shape: *shape, map }
     }
 }
 

@@ -80,7 +80,7 @@ impl Calibration {
         let Start { problem, frames, mut excluded } = Start::of(&own)?;
         let gross = Gross::of(problem).ok_or(CalibrationError::NoStart)?;
         own.check_frames(&gross)?;
-        let prepare = |kept: &mut Kept| panels::hold(kept, &own.panels, own.refine_panels);
+        let prepare = |kept: &mut Kept| panels::hold(kept, &own);
         let (gross, settled) = gross.settled(own.weights, own.loss, prepare)?;
         let of_frames = gross.frames.iter();
         excluded.extend(of_frames.map(|(&frame, why)| {
@@ -97,8 +97,7 @@ impl Calibration {
         };
         findings.extend(gross.findings(&settled, |frame| frames[frame].name.clone()));
         let kept: Vec<&Frame> = gross.belonging().map(|frame| &frames[frame]).collect();
-        let estimate =
-            Estimate::new(&own.cameras, &kept, &settled, (own.loss, &own.distances_mm), f_ratio)?;
+        let estimate = Estimate::new(&own, &kept, &settled, f_ratio)?;
         if let ([camera], [CameraViews { intrinsics: Intrinsics::Unknown(_), .. }]) =
             (estimate.cameras.as_slice(), own.cameras.as_slice())
         {

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::panel::PanelRef;
@@ -77,6 +79,16 @@ impl TargetMap {
             }
         }
         measured
+    }
+
+    /// The map of these panels, as if there were no others.
+    pub(super) fn of_panels(&self, panels: &Range<usize>) -> Self {
+        let own = self.corners.iter().filter(|corner| panels.contains(&corner.panel.index()));
+        let own = own.map(|corner| {
+            let panel = PanelRef::new(corner.panel.index() - panels.start, corner.panel.id());
+            CornerOffset { panel, ..*corner }
+        });
+        Self { corners: own.collect(), expected_mm: self.expected_mm }
     }
 
     /// The corner with a label.

@@ -10,7 +10,7 @@ use super::super::loss::Loss;
 use super::super::minimise::{Until, minimise};
 use super::super::model::Model;
 use super::super::pose::{blocks, estimate_pose, fixed, median_off_px};
-use super::super::problem::{CameraUnknowns, Problem};
+use super::super::problem::{CameraUnknowns, Problem, TargetUnknowns};
 use super::super::reweighting::scale;
 use super::super::view::View;
 use super::first_camera::first_camera;
@@ -126,6 +126,7 @@ impl<'a> Search<'a> {
     fn problem(&self, views: &[View], free: Vec<bool>) -> (Vec<usize>, Problem) {
         let mut problem = Problem {
             cameras: vec![CameraUnknowns::alone(self.camera.clone(), free)],
+            targets: vec![TargetUnknowns::SCENE],
             panels: fixed(self.panels),
             ..Problem::default()
         };

@@ -3,11 +3,14 @@
 //! ```text
 //!   each camera by itself ─→ camera_from_target in its own views
 //!   two cameras, one frame ─→ camera_from_camera: the middle one of all such frames
-//!   from camera 0 on to all others ─→ camera_from_rig, rig_from_target(frame)
+//!   a camera and a target of its own ─→ both, from how the rig moves
+//!   from camera 0 on to all others ─→ camera_from_rig, scene_from_target, rig_from_scene(frame)
 //! ```
 
 mod alone;
 mod first_camera;
+mod linked;
+mod motion;
 mod together;
 
 use super::calibration::Calibration;

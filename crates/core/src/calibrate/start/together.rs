@@ -9,29 +9,17 @@ use super::super::estimate::Estimate;
 use super::super::excluded::Excluded;
 use super::super::loss::Loss;
 use super::super::minimise::{Until, minimise};
-use super::super::panels::unknowns;
+use super::super::panel::PanelRef;
+use super::super::panels::{targets_unknown, unknowns};
 use super::super::problem::{Block, CameraUnknowns, Problem};
 use super::super::reweighting::scale;
+use super::linked::{ByFrame, Places, Seen};
 use super::{Frame, Start};
 use crate::camera::Pose;
 use crate::statistics::median;
 
-/// Frames that two cameras must share: one may be wrong, of three the middle one is not.
-const LEAST_SHARED: usize = 3;
-
-/// A view of a camera by itself.
-struct Seen {
-    camera_from_target: Pose,
-    /// Its index among the camera's views.
-    view: usize,
-    corners: usize,
-}
-
-/// What each camera saw, by the name of the frame.
-type ByFrame<'a> = Vec<BTreeMap<&'a str, Seen>>;
-
 pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
-    let Calibration { cameras, panels, .. } = calibration;
+    let cameras = &calibration.cameras;
     let mut excluded = Vec::new();
     let mut seen = ByFrame::new();
     let mut found = Vec::with_capacity(cameras.len());
@@ -42,27 +30,24 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
         excluded.extend(of_camera.map(|view| (0, Excluded { camera: name.clone(), ..view })));
         let poses: BTreeMap<String, Pose> =
             alone.cameras[0].views.iter().map(|view| (view.name.clone(), view.pose)).collect();
-        let of_views = camera.views.iter().enumerate().filter_map(|(view, of)| {
-            let camera_from_target = *poses.get(&of.name)?;
-            Some((of.name.as_str(), Seen { camera_from_target, view, corners: of.corner_count() }))
-        });
-        seen.push(of_views.collect());
+        seen.push(by_frame(calibration, camera, &poses));
         found.extend(alone.cameras.into_iter().map(|alone| alone.camera));
     }
-    let camera_from_rig = lay_together(cameras, &seen)?;
+    let places = Places::of(calibration, &seen)?;
     let names: BTreeSet<&str> =
-        seen.iter().flat_map(|of_camera| of_camera.keys().copied()).collect();
+        seen.iter().flat_map(|of_camera| of_camera.keys().map(String::as_str)).collect();
     let (mut problem, mut frames) = (Problem::default(), Vec::new());
     for (place, name) in names.into_iter().enumerate() {
         let of_frame = seen.iter().enumerate();
-        let of_frame: Vec<(usize, &Seen)> =
-            of_frame.filter_map(|(camera, seen)| Some((camera, seen.get(name)?))).collect();
-        // Of all cameras the one with the most corners has the best pose.
-        let best = of_frame.iter().max_by_key(|(_, seen)| seen.corners);
-        problem.frames.extend(best.map(|(camera, seen)| {
-            camera_from_rig[*camera].inverse().after(&seen.camera_from_target)
-        }));
-        let views = of_frame.iter().map(|(camera, seen)| (*camera, seen.view)).collect();
+        let of_frame: Vec<(usize, &Seen)> = of_frame
+            .flat_map(|(camera, seen)| {
+                seen.get(name).into_iter().flatten().map(move |s| (camera, s))
+            })
+            .collect();
+        problem.frames.extend(places.rig_from_scene(&of_frame));
+        let mut views: Vec<(usize, usize)> =
+            of_frame.iter().map(|(camera, seen)| (*camera, seen.view)).collect();
+        views.dedup();
         frames.push(Frame { name: name.to_owned(), place, views });
     }
     let mut blocks = Vec::new();
@@ -86,9 +71,10 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
             camera_from_rig: *pose,
             pose_free: index > 0 && given.camera_from_rig.is_none(),
         };
-    let of_cameras = cameras.iter().enumerate().zip(found.into_iter().zip(&camera_from_rig));
+    let of_cameras = cameras.iter().enumerate().zip(found.into_iter().zip(&places.camera_from_rig));
     problem.cameras = of_cameras.map(unknown).collect();
-    problem.panels = unknowns(&blocks, panels, calibration.refine_panels);
+    problem.targets = targets_unknown(&blocks, calibration, &places.scene_from_target);
+    problem.panels = unknowns(&blocks, calibration);
     // What is out of a camera's reach from this start cannot be walked to.
     blocks.retain(|block| problem.residuals(block).is_some());
     problem.blocks = blocks;
@@ -112,38 +98,33 @@ fn alone(calibration: &Calibration, index: usize) -> Result<Estimate, Calibratio
     })
 }
 
-/// camera_from_rig of every camera, along the pairs of cameras that share the most frames.
-fn lay_together(cameras: &[CameraViews], seen: &ByFrame) -> Result<Vec<Pose>, CalibrationError> {
-    let known = |(index, camera): (usize, &CameraViews)| {
-        camera.camera_from_rig.or((index == 0).then_some(Pose::IDENTITY))
-    };
-    let mut placed: Vec<Option<Pose>> = cameras.iter().enumerate().map(known).collect();
-    let shared = |a: usize, b: usize| {
-        seen[a].keys().filter(|name| seen[b].contains_key(*name)).collect::<Vec<_>>()
-    };
-    loop {
-        let from = (0..cameras.len()).filter(|&c| placed[c].is_some());
-        let to =
-            |c: usize| (0..cameras.len()).filter(|&d| placed[d].is_none()).map(move |d| (c, d));
-        let pairs = from.flat_map(to).map(|(c, d)| (shared(c, d), c, d));
-        let Some((common, from, to)) = pairs.max_by_key(|(common, c, d)| {
-            (common.len(), std::cmp::Reverse(*c), std::cmp::Reverse(*d))
-        }) else {
-            return Ok(placed.into_iter().flatten().collect());
-        };
-        if common.len() < LEAST_SHARED {
-            let names = (0..cameras.len()).filter(|&c| placed[c].is_none());
-            return Err(CalibrationError::Apart {
-                cameras: names.map(|c| cameras[c].name.clone()).collect::<Vec<_>>().join(", "),
-                shared: common.len(),
-                needed: LEAST_SHARED,
-            });
+/// What a camera saw, by frame, with the poses that its views have by themselves.
+fn by_frame(
+    calibration: &Calibration,
+    camera: &CameraViews,
+    poses: &BTreeMap<String, Pose>,
+) -> BTreeMap<String, Vec<Seen>> {
+    let mut seen: BTreeMap<String, Vec<Seen>> = BTreeMap::new();
+    for (view, of) in camera.views.iter().enumerate() {
+        let mut of_view = Vec::new();
+        for (target, of_target) in calibration.targets.iter().enumerate() {
+            let is_of = |panel: PanelRef| calibration.target_of(panel) == target;
+            let sightings = of.sightings.iter().filter(|sighting| is_of(sighting.panel));
+            let corners = sightings.map(|sighting| sighting.observations.len()).sum();
+            let name = calibration.name_on(&of.name, of_target);
+            let pose = poses.get(&name).filter(|_| corners > 0);
+            of_view.extend(pose.map(|&camera_from_target| Seen {
+                target,
+                camera_from_target,
+                view,
+                corners,
+            }));
         }
-        let pose = |camera: usize, name: &str| seen[camera][name].camera_from_target;
-        let relative: Vec<Pose> =
-            common.iter().map(|name| pose(to, name).after(&pose(from, name).inverse())).collect();
-        placed[to] = placed[from].map(|from_rig| middle(&relative).after(&from_rig));
+        if !of_view.is_empty() {
+            seen.insert(of.name.clone(), of_view);
+        }
     }
+    seen
 }
 
 /// The pose that lies in the middle of others: its median distance from them is the least. A turn
