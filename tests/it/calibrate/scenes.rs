@@ -2,13 +2,13 @@
 //! found is what was put in, or the culprit is named.
 
 use deltille::calibrate::{
-    Calibration, CalibrationError, Estimate, Model, Observation, PanelPlace, PanelRef, Sighting,
-    TooPlain, View,
+    Calibration, CalibrationError, Diagnosis, Estimate, Model, Observation, PanelPlace, PanelRef,
+    Sighting, TooPlain, View,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
-use deltille::targets::{BoardSpec, TagSpec, Target, TargetSpec};
+use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
 use glam::{DQuat, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -92,10 +92,15 @@ fn seen(
 }
 
 impl Scene {
-    /// The views of all cameras with the rig at these places.
-    fn photographed(mut self, places: &[Pose], random: &mut ChaCha8Rng) -> Self {
+    /// The views of all cameras with the rig at these places, of each those that it shows.
+    fn photographed(
+        mut self,
+        places: &[Pose],
+        shown: &[std::ops::Range<usize>],
+        random: &mut ChaCha8Rng,
+    ) -> Self {
         let views = (0..self.cameras.len()).map(|camera| {
-            let views = places.iter().enumerate();
+            let views = places[shown[camera].clone()].iter().enumerate();
             let views = views
                 .map(|(frame, place)| seen(&self, camera, place, &format!("{frame:03}"), random));
             views.filter(|view| !view.sightings.is_empty()).collect()
@@ -159,6 +164,11 @@ fn is_within(errors: &[f64]) -> bool {
 
 /// Two cameras back to back, each before a board of its own; the rig turns by so much about its axes.
 fn back_to_back(frames: usize, reach_rad: DVec3, seed: u64) -> Scene {
+    back_to_back_late(frames, reach_rad, 0, seed)
+}
+
+/// The same with pictures of the second that show what the first saw so many frames before.
+fn back_to_back_late(frames: usize, reach_rad: DVec3, late: usize, seed: u64) -> Scene {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let behind = Pose {
         rotation: DQuat::from_scaled_axis(any(&mut random, 0.1)) * DQuat::from_rotation_y(3.1),
@@ -181,14 +191,14 @@ fn back_to_back(frames: usize, reach_rad: DVec3, seed: u64) -> Scene {
         camera_from_rig: vec![Pose::IDENTITY, behind],
         views: Vec::new(),
     };
-    let places = (0..frames).map(|_| {
+    let places = (0..frames + late).map(|_| {
         let turn = reach_rad * any(&mut random, 1.0);
         let step =
             Pose { rotation: DQuat::from_scaled_axis(turn), translation: any(&mut random, 50.0) };
         step.after(&front)
     });
     let places: Vec<Pose> = places.collect();
-    scene.photographed(&places, &mut random)
+    scene.photographed(&places, &[late, 0].map(|first| first..first + frames), &mut random)
 }
 
 const ALL_WAYS: DVec3 = DVec3::splat(0.4);
@@ -226,4 +236,160 @@ fn motion_that_leaves_cameras_open_is_named() {
         };
         assert_eq!((camera.as_str(), target.as_str(), *why), ("c1", "back", expected), "{error}");
     }
+}
+
+fn icosahedron() -> Target {
+    let family = Family::shipped(&TagSpec::default().family).unwrap();
+    let spec =
+        TargetSpec::Solid(SolidSpec { edge_mm: 200.0, ..SolidSpec::new(SolidShape::Icosahedron) });
+    Target::build("ico", &spec, Some(&family), None).unwrap()
+}
+
+/// Cameras around an icosahedron that is carried about and turned between frames, little enough to be a motion.
+fn around(cameras: usize, frames: usize, seed: u64) -> Scene {
+    around_late(cameras, frames, &vec![0; cameras], seed)
+}
+
+/// The same with cameras whose pictures show what the others saw so many frames before.
+fn around_late(cameras: usize, frames: usize, late: &[i32], seed: u64) -> Scene {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let target = icosahedron();
+    let camera_from_world = (0..cameras).map(|index| {
+        let angle = index as f64 / cameras as f64 * std::f64::consts::TAU;
+        let eye =
+            DVec3::new(700.0 * angle.cos(), 700.0 * angle.sin(), 0.0) + any(&mut random, 60.0);
+        Pose::looking_at(eye, any(&mut random, 30.0), DVec3::Z)
+    });
+    let camera_from_world: Vec<Pose> = camera_from_world.collect();
+    let rig_from_world = camera_from_world[0];
+    let centre = middle(&target);
+    let scene = Scene {
+        scene_from_target: vec![Pose::IDENTITY],
+        targets: vec![target],
+        cameras: (0..cameras).map(|_| camera(&mut random)).collect(),
+        camera_from_rig: camera_from_world
+            .iter()
+            .map(|pose| pose.after(&rig_from_world.inverse()))
+            .collect(),
+        views: Vec::new(),
+    };
+    let mut turn = DQuat::from_scaled_axis(any(&mut random, 3.0));
+    let most = late.iter().map(|late| late.unsigned_abs()).max().unwrap_or(0) as usize;
+    let places: Vec<Pose> = (0..frames + 2 * most)
+        .map(|_| {
+            turn = DQuat::from_scaled_axis(any(&mut random, 0.3)) * turn;
+            let world_from_target =
+                Pose { rotation: turn, translation: any(&mut random, 60.0) - turn * centre };
+            rig_from_world.after(&world_from_target)
+        })
+        .collect();
+    let shown = late.iter().map(|&late| {
+        let first = most.saturating_add_signed(-late as isize);
+        first..first + frames
+    });
+    scene.photographed(&places, &shown.collect::<Vec<_>>(), &mut random)
+}
+
+/// Faces carry the ids of others, this part of them.
+fn with_wrong_faces(mut scene: Scene, part: f64, seed: u64) -> Scene {
+    let mut random = ChaCha8Rng::seed_from_u64(seed + 1000);
+    let panels = &scene.targets[0].panels;
+    for view in scene.views.iter_mut().flatten() {
+        for sighting in &mut view.sightings {
+            if random.random_bool(part) {
+                let other = random.random_range(0..panels.len());
+                sighting.panel = PanelRef::new(other, panels[other].id);
+            }
+        }
+    }
+    scene
+}
+
+/// Solves scenes of many seeds: errors of all are as their deviations have it, seed by seed and together.
+fn check(seeds: std::ops::Range<u64>, scene: impl Fn(u64) -> Scene, told: impl Fn(&Estimate)) {
+    let mut all = Vec::new();
+    for seed in seeds {
+        let scene = scene(seed);
+        let found = scene.solve().unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        let errors = scene.errors(&found);
+        assert!(is_within(&errors), "seed {seed}: {errors:.1?}");
+        told(&found);
+        all.extend(errors);
+    }
+    let variance = all.iter().map(|error| error * error).sum::<f64>() / all.len() as f64;
+    // Errors of one scene hang together, so that their squares scatter more than χ² does.
+    let scatter = 2.0 * (2.0 / all.len() as f64).sqrt();
+    assert!((variance - 1.0).abs() < 3.0 * scatter, "{variance} of {} errors", all.len());
+    println!("{} errors, their square in deviations {variance:.2}", all.len());
+}
+
+const LATE: [i32; 8] = [0, 0, 0, 1, 0, 0, 0, 0];
+
+fn one_is_late(found: &Estimate) {
+    let delays: Vec<i32> = found.cameras.iter().map(|camera| camera.delay).collect();
+    assert_eq!(delays, LATE);
+    let said = found.inspect();
+    assert!(said.contains(&Diagnosis::Late { camera: 3, frames: 1 }), "{said:?}");
+}
+
+#[test]
+fn a_camera_that_is_a_frame_late_is_named_and_put_in_time() {
+    check(0..2, |seed| around_late(8, 30, &LATE, seed), one_is_late);
+    // The first is late, one is ahead.
+    let delays = [3, 0, 0, -2];
+    let found = around_late(4, 30, &delays, 5).solve().unwrap();
+    assert_eq!(found.cameras.iter().map(|camera| camera.delay).collect::<Vec<_>>(), delays);
+}
+
+#[test]
+fn frames_held_out_are_put_in_time_too() {
+    let scene = around_late(4, 30, &[0, 0, 1, 0], 1);
+    let found = scene.calibration().hold_out(Some(5)).solve().unwrap();
+    let test = found.held_out.unwrap();
+    assert_eq!((found.cameras[2].delay, test.cameras[2].delay), (1, 1));
+    assert!((test.inlier_rms_px() / NOISE_PX - 1.0).abs() < 0.1, "{}", test.inlier_rms_px());
+}
+
+#[test]
+fn a_late_camera_that_sees_a_target_of_its_own_is_put_in_time() {
+    let found = back_to_back_late(40, ALL_WAYS, 2, 1).solve().unwrap();
+    assert_eq!((found.cameras[0].delay, found.cameras[1].delay), (0, 2));
+}
+
+#[test]
+fn faces_with_ids_of_others_are_left_out() {
+    for part in [0.02, 0.1] {
+        check(
+            0..2,
+            |seed| with_wrong_faces(around(3, 30, seed), part, seed),
+            |found| {
+                let is_named = |said: &Diagnosis| matches!(said, Diagnosis::GrossErrors(_));
+                assert!(found.inspect().iter().any(is_named));
+            },
+        );
+    }
+}
+
+#[test]
+#[ignore = "minutes"]
+fn scenes_of_twenty_seeds() {
+    check(
+        0..20,
+        |seed| around(8, 30, seed),
+        |found| {
+            assert!(found.cameras.iter().all(|camera| camera.delay == 0));
+        },
+    );
+    check(0..20, |seed| around_late(8, 30, &LATE, seed), one_is_late);
+    for part in [0.02, 0.05, 0.1] {
+        check(0..20, |seed| with_wrong_faces(around(3, 30, seed), part, seed), |_| ());
+    }
+    check(0..20, |seed| back_to_back(30, ALL_WAYS, seed), |_| ());
+    check(
+        0..20,
+        |seed| back_to_back_late(40, ALL_WAYS, 1, seed),
+        |found| {
+            assert_eq!(found.cameras[1].delay, 1);
+        },
+    );
 }

@@ -8,6 +8,7 @@ use super::estimate::Estimate;
 use super::loss::Loss;
 use super::model::Model;
 use super::panel::PanelRef;
+use super::start::in_order;
 use super::view::{Sighting, View};
 use super::weights::Weights;
 use crate::camera::{Camera, Pose};
@@ -46,6 +47,10 @@ pub struct Calibration {
     pub(super) distances_mm: Vec<f64>,
     /// Which of the model's starts is taken; the best where none is said.
     pub(super) start: Option<usize>,
+    /// Names of all frames in their order, where only a part of them is here.
+    pub(super) order: Vec<String>,
+    /// By how many frames each camera is late, where that is known.
+    pub(super) delays: Option<Vec<i32>>,
 }
 
 /// A target of the scene: panels that move together.
@@ -183,6 +188,8 @@ impl Calibration {
             hold_out: None,
             distances_mm: Vec::new(),
             start: None,
+            order: Vec::new(),
+            delays: None,
         }
     }
 
@@ -278,8 +285,9 @@ impl Calibration {
     /// The same with other cameras.
     pub(super) fn of_cameras(&self, cameras: Vec<CameraViews>) -> Self {
         let (panels, targets) = (self.panels.clone(), self.targets.clone());
-        let distances_mm = self.distances_mm.clone();
-        Self { panels, targets, cameras, distances_mm, ..*self }
+        let (distances_mm, order) = (self.distances_mm.clone(), self.order.clone());
+        let delays = self.delays.clone();
+        Self { panels, targets, cameras, distances_mm, order, delays, ..*self }
     }
 
     /// One of its cameras by itself, with panels at these places. What it saw of each target is a view of its own.
@@ -298,6 +306,8 @@ impl Calibration {
             refine_panels: false,
             hold_out: None,
             distances_mm: Vec::new(),
+            order: Vec::new(),
+            delays: None,
             ..*self
         }
     }
@@ -318,6 +328,17 @@ impl Calibration {
         match self.targets.len() {
             1 => view.to_owned(),
             _ => format!("{view}, target {}", target.name),
+        }
+    }
+
+    /// Names of all frames in the order of their numbers, also of those that are held out.
+    pub(super) fn moments(&self) -> Vec<String> {
+        match self.order.as_slice() {
+            [] => {
+                let views = self.cameras.iter().flat_map(|camera| &camera.views);
+                in_order(views.map(|view| view.name.as_str()).collect())
+            }
+            order => order.to_vec(),
         }
     }
 
@@ -351,7 +372,8 @@ impl Calibration {
                     ..camera.clone()
                 }
             });
-            Self { hold_out: None, ..self.of_cameras(cameras.collect()) }
+            let order = self.moments();
+            Self { hold_out: None, order, ..self.of_cameras(cameras.collect()) }
         };
         Ok((part(false), Some(part(true))))
     }
@@ -384,6 +406,8 @@ impl Calibration {
             board_shape: false,
             measure_target: false,
             distances_mm: Vec::new(),
+            order: self.order.clone(),
+            delays: Some(estimate.cameras.iter().map(|camera| camera.delay).collect()),
             ..*self
         }
     }

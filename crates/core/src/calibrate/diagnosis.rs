@@ -62,6 +62,13 @@ pub enum Diagnosis {
         /// What that leaves, outliers left out, px.
         rms_px: f64,
     },
+    /// A camera whose pictures show what the others saw some frames before; they were put to the right moments.
+    Late {
+        /// The camera.
+        camera: usize,
+        /// By how many frames; negative where it was ahead of the others.
+        frames: i32,
+    },
     /// The lens turns back or runs away within the image.
     LensEnds {
         /// The camera.
@@ -187,6 +194,8 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
         absurd.map(|(camera, of)| Diagnosis::AbsurdFit { camera, rms_px: of.inlier_rms_px() });
     let ends = cameras()
         .filter_map(|(camera, of)| Some(Diagnosis::LensEnds { camera, end: of.lens_end()? }));
+    let late = cameras().filter(|(_, of)| of.delay != 0);
+    let late = late.map(|(camera, of)| Diagnosis::Late { camera, frames: of.delay });
     let gross = found.findings.iter().cloned().map(Diagnosis::GrossErrors);
     let open = cameras().zip(alone).filter(|((_, of), _)| !of.ill_conditioned.is_empty());
     let open = open.map(|((camera, of), alone)| Diagnosis::IllConditioned {
@@ -196,7 +205,7 @@ fn said(found: &Estimate, alone: &[Alone]) -> Vec<Diagnosis> {
     });
     let causes = causes(found, alone);
     let failures = foreign.chain(absurd).chain(many_left_out(found));
-    failures.chain(ends).chain(gross).chain(causes).chain(open).collect()
+    failures.chain(late).chain(ends).chain(gross).chain(causes).chain(open).collect()
 }
 
 /// Whether a camera leaves so much that it cannot be that of the pictures.

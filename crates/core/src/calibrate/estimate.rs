@@ -92,6 +92,9 @@ pub struct CameraEstimate {
     pub pose_sd: Option<[f64; 6]>,
     /// The same as the frames agree with each other; `None` where it was not to be found, or of too few frames.
     pub observed_pose_sd: Option<[f64; 6]>,
+    /// By how many frames its pictures are late, against those of most other cameras: a picture of it shows the moment
+    /// that theirs of so many frames before show.
+    pub delay: i32,
     /// The views that took part, in the order of the frames.
     pub views: Vec<ViewEstimate>,
     /// Root mean square error of a coordinate over all its views, px.
@@ -268,6 +271,7 @@ impl CameraEstimate {
             camera_from_rig: Pose::IDENTITY,
             pose_sd: None,
             observed_pose_sd: None,
+            delay: 0,
             views: Vec::new(),
             rms_px: 0.0,
         }
@@ -483,6 +487,7 @@ fn camera_estimate(
         camera_from_rig: unknowns.camera_from_rig,
         pose_sd: layout.cameras[index].map(|first| std::array::from_fn(|i| sd(first + i))),
         observed_pose_sd: None,
+        delay: 0,
         rms_px: rms_px(views.iter().flat_map(|view| &view.corners)),
         views,
     }

@@ -77,7 +77,7 @@ impl Calibration {
             CameraViews { views, ..camera.clone() }
         });
         let own = self.of_cameras(cameras.collect());
-        let Start { problem, frames, mut excluded } = Start::of(&own)?;
+        let Start { problem, frames, mut excluded, delays } = Start::of(&own)?;
         let gross = Gross::of(problem).ok_or(CalibrationError::NoStart)?;
         own.check_frames(&gross)?;
         let prepare = |kept: &mut Kept| panels::hold(kept, &own);
@@ -97,7 +97,9 @@ impl Calibration {
         };
         findings.extend(gross.findings(&settled, |frame| frames[frame].name.clone()));
         let kept: Vec<&Frame> = gross.belonging().map(|frame| &frames[frame]).collect();
-        let estimate = Estimate::new(&own, &kept, &settled, f_ratio)?;
+        let mut estimate = Estimate::new(&own, &kept, &settled, f_ratio)?;
+        let of_cameras = estimate.cameras.iter_mut().zip(delays);
+        of_cameras.for_each(|(camera, delay)| camera.delay = delay);
         if let ([camera], [CameraViews { intrinsics: Intrinsics::Unknown(_), .. }]) =
             (estimate.cameras.as_slice(), own.cameras.as_slice())
         {

@@ -55,6 +55,7 @@ impl<'a> Words<'a> {
             ),
             Diagnosis::ManyLeftOut { left_out, all } => self.many_left_out(*left_out, *all),
             Diagnosis::OtherMinimum { camera, other, rms_px } => self.other_minimum(*camera, other, *rms_px),
+            Diagnosis::Late { camera, frames } => self.late(*camera, *frames),
             Diagnosis::LensEnds { camera, end } => self.of_camera(*camera, end.to_string()),
             Diagnosis::GrossErrors(finding) => self.finding(finding),
             Diagnosis::Remedied { camera, remedy } => self.remedied(*camera, remedy),
@@ -80,6 +81,19 @@ impl<'a> Words<'a> {
         format!(
             "{left_out} of {all} {what} were left out, more than a fifth: what was found is that of the \
              others only; {lens}, or labels are wrong in so many"
+        )
+    }
+
+    fn late(&self, camera: usize, frames: i32) -> String {
+        let count = counted(frames.unsigned_abs() as usize, "frame");
+        let (is, before) = match frames > 0 {
+            true => ("late", "earlier"),
+            false => ("ahead", "later"),
+        };
+        format!(
+            "camera {} is {count} {is}: its pictures show what those of the others show {count} {before}, and were \
+             put to these; mend the trigger or the numbering before the rig is used",
+            self.estimate.cameras[camera].name
         )
     }
 

@@ -94,6 +94,9 @@ pub(super) struct DiagnosisRecord<'a> {
     rms_px: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_mm: Option<f64>,
+    /// By how many a camera is late.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    frames: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     left_out: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -269,6 +272,12 @@ pub(super) fn diagnoses<'a>(
                 kind: "many_left_out",
                 left_out: Some(*left_out),
                 all: Some(*all),
+                ..text
+            },
+            Diagnosis::Late { camera, frames } => DiagnosisRecord {
+                kind: "late",
+                camera: name(*camera),
+                frames: Some(*frames),
                 ..text
             },
             Diagnosis::OtherMinimum { camera, other, rms_px } => DiagnosisRecord {

@@ -58,6 +58,9 @@ struct Camera<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     projection: Option<ProjectionRecord>,
     camera_from_rig: Motion,
+    /// By how many frames its pictures are late.
+    #[serde(skip_serializing_if = "is_none")]
+    delay_frames: i32,
     /// As the frames agree with each other: of a turn (rad) and a move (mm).
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_pose_sd: Option<[f64; 6]>,
@@ -131,9 +134,14 @@ fn of_camera<'a>(estimate: &Estimate, found: &'a CameraEstimate) -> Camera<'a> {
         loose: &found.ill_conditioned,
         projection: projection(found),
         camera_from_rig: Motion::new(&found.camera_from_rig, found.pose_sd),
+        delay_frames: found.delay,
         observed_pose_sd: found.observed_pose_sd,
         views: views(estimate, found),
     }
+}
+
+fn is_none(frames: &i32) -> bool {
+    *frames == 0
 }
 
 fn seen<'a>(estimate: &Estimate, found: &'a CameraEstimate) -> Seen<'a> {

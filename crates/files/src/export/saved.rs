@@ -147,6 +147,8 @@ struct SavedCamera {
     loose: Vec<String>,
     projection: Option<SavedProjection>,
     camera_from_rig: Option<SavedPose>,
+    #[serde(default)]
+    delay_frames: i32,
     #[serde(default, deserialize_with = "quantity::deviation::de")]
     observed_pose_sd: Option<[f64; 6]>,
     views: Vec<SavedView>,
@@ -426,6 +428,7 @@ impl SavedCamera {
         camera.camera_from_rig = place.map_or(Pose::IDENTITY, SavedPose::pose);
         camera.pose_sd = place.and_then(SavedPose::sd);
         camera.observed_pose_sd = self.observed_pose_sd;
+        camera.delay = self.delay_frames;
         camera.views = estimates(self.views, frame, reference)?;
         camera.rms_px = self.rms_px;
         Ok(camera)

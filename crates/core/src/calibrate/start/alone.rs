@@ -42,7 +42,8 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
     let excluded = out.map(|index| (index, views[index].excluded(Reason::NoPose))).collect();
     let frame =
         |view: usize| Frame { name: views[view].name.clone(), place: view, views: vec![(0, view)] };
-    Ok(Start { problem, frames: used.into_iter().map(frame).collect(), excluded })
+    let frames = used.into_iter().map(frame).collect();
+    Ok(Start { problem, frames, excluded, delays: vec![0] })
 }
 
 /// Refuses too few views to find a camera from.

@@ -2,12 +2,14 @@
 //!
 //! ```text
 //!   each camera by itself ─→ camera_from_target in its own views
+//!   pictures of all cameras ─→ by how many frames each is late
 //!   two cameras, one frame ─→ camera_from_camera: the middle one of all such frames
 //!   a camera and a target of its own ─→ both, from how the rig moves
 //!   from camera 0 on to all others ─→ camera_from_rig, scene_from_target, rig_from_scene(frame)
 //! ```
 
 mod alone;
+mod delay;
 mod first_camera;
 mod linked;
 mod motion;
@@ -19,6 +21,7 @@ use super::excluded::Excluded;
 use super::problem::Problem;
 
 pub(super) use alone::enough;
+pub(super) use delay::in_order;
 pub(super) use first_camera::evenly;
 pub(super) use together::middle;
 
@@ -29,6 +32,8 @@ pub(super) struct Start {
     pub frames: Vec<Frame>,
     /// What takes no part, with its place among the frames as they were given.
     pub excluded: Vec<(usize, Excluded)>,
+    /// By how many frames each camera is late.
+    pub delays: Vec<i32>,
 }
 
 /// A moment at which pictures were taken.

@@ -13,6 +13,7 @@ use super::super::panel::PanelRef;
 use super::super::panels::{targets_unknown, unknowns};
 use super::super::problem::{Block, CameraUnknowns, Problem};
 use super::super::reweighting::scale;
+use super::delay::{delays, in_time};
 use super::linked::{ByFrame, Places, Seen};
 use super::{Frame, Start};
 use crate::camera::Pose;
@@ -33,6 +34,8 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
         seen.push(by_frame(calibration, camera, &poses));
         found.extend(alone.cameras.into_iter().map(|alone| alone.camera));
     }
+    let delays = calibration.delays.clone().unwrap_or_else(|| delays(calibration, &seen));
+    in_time(calibration, &delays, &mut seen);
     let places = Places::of(calibration, &seen)?;
     let names: BTreeSet<&str> =
         seen.iter().flat_map(|of_camera| of_camera.keys().map(String::as_str)).collect();
@@ -82,7 +85,7 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
     let whitening = scale(&problem);
     let first = minimise(problem, &whitening, Loss::Cauchy, Until::Rough)
         .ok_or(CalibrationError::NoStart)?;
-    Ok(Start { problem: first.problem, frames, excluded })
+    Ok(Start { problem: first.problem, frames, excluded, delays })
 }
 
 /// A camera by itself: as it is known, or as its views have it.
@@ -130,6 +133,11 @@ fn by_frame(
 /// The pose that lies in the middle of others: its median distance from them is the least. A turn
 /// counts by how far it moves a point as far away as the translations reach.
 pub(in crate::calibrate) fn middle(poses: &[Pose]) -> Pose {
+    middle_of(poses).0
+}
+
+/// The same with its median distance from the others, mm.
+pub(super) fn middle_of(poses: &[Pose]) -> (Pose, f64) {
     let arm = median(poses.iter().map(|pose| pose.translation.length()).collect())
         .unwrap_or(0.0)
         .max(1.0);
@@ -139,6 +147,6 @@ pub(in crate::calibrate) fn middle(poses: &[Pose]) -> Pose {
     };
     let spread =
         |pose: &Pose| median(poses.iter().map(|other| apart(pose, other)).collect()).unwrap_or(0.0);
-    let best = poses.iter().min_by(|a, b| spread(a).total_cmp(&spread(b)));
-    best.copied().unwrap_or(Pose::IDENTITY)
+    let of_all = poses.iter().map(|pose| (*pose, spread(pose)));
+    of_all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Pose::IDENTITY, 0.0))
 }

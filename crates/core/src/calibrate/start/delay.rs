@@ -1,0 +1,207 @@
+//! Cameras whose pictures are late by some frames: a trigger that was missed once, a recording that began later.
+//!
+//! Two cameras that are fixed to each other see one target always the same way apart, if pictures of one moment are
+//! compared; and turns from one moment to another are as large for every camera, whatever target it sees. So the
+//! delay is sought by which the one, or where no target is common the other, scatters least.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::super::calibration::Calibration;
+use super::linked::{ByFrame, Seen};
+use super::together::middle_of;
+use crate::statistics::median;
+
+/// Delays that are looked for, frames.
+const MOST_DELAY: i32 = 10;
+
+/// Fewest moments by which delays are compared, and the most: more tell no more.
+const LEAST_MOMENTS: usize = 8;
+const MOST_MOMENTS: usize = 60;
+
+/// Pictures of one moment scatter less than others by this factor, or nothing is late: a target that was hardly
+/// moved, or moved the same way from frame to frame, tells no delay, and needs none.
+const DECISIVE: f64 = 3.0;
+
+/// Turns are compared over so many frames and fewer.
+const LONGEST_TURN: usize = 3;
+
+/// What a camera saw in each moment, in the order of the moments.
+type Track<'a> = Vec<&'a [Seen]>;
+
+/// By how many frames each camera is late against most of the others.
+pub(super) fn delays(calibration: &Calibration, seen: &ByFrame) -> Vec<i32> {
+    let order = calibration.moments();
+    let at = |of_camera: &'_ BTreeMap<String, Vec<Seen>>| -> Vec<Vec<Seen>> {
+        order.iter().map(|name| of_camera.get(name).cloned().unwrap_or_default()).collect()
+    };
+    let held: Vec<Vec<Vec<Seen>>> = seen.iter().map(at).collect();
+    let tracks: Vec<Track> =
+        held.iter().map(|of_camera| of_camera.iter().map(Vec::as_slice).collect()).collect();
+    let mut found: Vec<Option<i32>> = vec![None; tracks.len()];
+    found[0] = Some(0);
+    // From camera to camera, along the pairs that tell most.
+    loop {
+        let placed = (0..tracks.len()).filter_map(|from| Some((from, found[from]?)));
+        let pairs = placed.flat_map(|(from, delay)| {
+            let open = (0..tracks.len()).filter(|&to| found[to].is_none());
+            open.map(move |to| (from, delay, to)).collect::<Vec<_>>()
+        });
+        let told = pairs.filter_map(|(from, delay, to)| {
+            let (by, moments) = delay_between(&tracks[from], &tracks[to])?;
+            Some((moments, std::cmp::Reverse(from), std::cmp::Reverse(to), delay + by))
+        });
+        let Some((_, _, to, delay)) = told.max() else { break };
+        found[to.0] = Some(delay);
+    }
+    let found: Vec<i32> = found.into_iter().map(Option::unwrap_or_default).collect();
+    let usual = usual(&found);
+    found.into_iter().map(|delay| delay - usual).collect()
+}
+
+/// The delay that most cameras have; of several that of the first camera, if it is among them.
+fn usual(delays: &[i32]) -> i32 {
+    let count = |delay: &i32| delays.iter().filter(|other| *other == delay).count();
+    let most = delays.iter().map(count).max().unwrap_or_default();
+    delays.iter().find(|&delay| count(delay) == most).copied().unwrap_or_default()
+}
+
+/// By how many frames a camera is later than another, and how many moments tell; `None` where too few do.
+fn delay_between(from: &Track, to: &Track) -> Option<(i32, usize)> {
+    let scatters = |how: fn(&Track, &Track, i32) -> Option<(f64, usize)>| {
+        let all =
+            (-MOST_DELAY..=MOST_DELAY).filter_map(|delay| Some((delay, how(from, to, delay)?)));
+        all.collect::<Vec<(i32, (f64, usize))>>()
+    };
+    let mut all = scatters(scatter_of_poses);
+    if all.is_empty() {
+        all = scatters(scatter_of_turns);
+    }
+    let &(delay, (least, moments)) = all.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let in_time = all.iter().find(|(delay, _)| *delay == 0);
+    let usual = || median(all.iter().map(|(_, (scatter, _))| *scatter).collect());
+    let (compared, of_moments) = match in_time {
+        Some((_, (scatter, moments))) => (*scatter, *moments),
+        None => (usual()?, moments),
+    };
+    // What is seen by chance only a few times is no evidence against what is seen often.
+    match DECISIVE * least < compared && 2 * moments >= of_moments {
+        true => Some((delay, moments)),
+        false => Some((0, of_moments)),
+    }
+}
+
+/// The moments of both tracks if the second is late by so much.
+fn moments<'a>(
+    from: &'a Track,
+    to: &'a Track,
+    delay: i32,
+) -> impl Iterator<Item = (usize, usize)> + 'a {
+    let both = (0..from.len()).filter_map(move |first| {
+        let second = first.checked_add_signed(delay as isize)?;
+        Some((first, second)).filter(|_| second < to.len())
+    });
+    both.filter(|&(first, second)| !from[first].is_empty() && !to[second].is_empty())
+}
+
+/// How much the pose of one camera in the other scatters, mm, by the targets that both see.
+fn scatter_of_poses(from: &Track, to: &Track, delay: i32) -> Option<(f64, usize)> {
+    let relative = moments(from, to, delay).filter_map(|(first, second)| {
+        let mut pairs = from[first].iter().flat_map(|a| to[second].iter().map(move |b| (a, b)));
+        let (a, b) = pairs.find(|(a, b)| a.target == b.target)?;
+        Some(b.camera_from_target.after(&a.camera_from_target.inverse()))
+    });
+    let relative: Vec<_> = relative.collect();
+    let count = relative.len();
+    let poses: Vec<_> = super::evenly(&relative, MOST_MOMENTS).copied().collect();
+    (count >= LEAST_MOMENTS).then(|| (middle_of(&poses).1, count))
+}
+
+/// By how much turns from moment to moment differ between the cameras, rad.
+fn scatter_of_turns(from: &Track, to: &Track, delay: i32) -> Option<(f64, usize)> {
+    let both: Vec<(usize, usize)> = moments(from, to, delay).collect();
+    let mut off = Vec::new();
+    for (index, &(first, second)) in both.iter().enumerate() {
+        let later = both[index + 1..].iter().take_while(|(a, _)| *a <= first + LONGEST_TURN);
+        for &(first_later, second_later) in later {
+            let a = turn_rad(from[first], from[first_later]);
+            let b = turn_rad(to[second], to[second_later]);
+            off.extend(a.zip(b).map(|(a, b)| (a - b).abs()));
+        }
+    }
+    let count = off.len();
+    (count >= LEAST_MOMENTS).then(|| median(off)).flatten().map(|scatter| (scatter, count))
+}
+
+/// How far a target was turned between two moments; `None` where none is seen in both.
+fn turn_rad(before: &[Seen], after: &[Seen]) -> Option<f64> {
+    let mut pairs = before.iter().flat_map(|a| after.iter().map(move |b| (a, b)));
+    let (a, b) = pairs.find(|(a, b)| a.target == b.target)?;
+    Some(a.camera_from_target.rotation.angle_between(b.camera_from_target.rotation))
+}
+
+/// Puts what late cameras saw to the moments that they show.
+pub(super) fn in_time(calibration: &Calibration, delays: &[i32], seen: &mut ByFrame) {
+    let order = calibration.moments();
+    let places: BTreeMap<&str, usize> =
+        order.iter().enumerate().map(|(place, name)| (name.as_str(), place)).collect();
+    for ((of_camera, camera), &delay) in seen.iter_mut().zip(&calibration.cameras).zip(delays) {
+        let moment = |name: String| {
+            let place = places
+                .get(name.as_str())
+                .and_then(|&place| place.checked_add_signed(-(delay as isize)));
+            match place.and_then(|place| order.get(place)) {
+                Some(moment) => moment.clone(),
+                // Before the first moment of the others, or after their last.
+                None => format!("{name} of {}", camera.name),
+            }
+        };
+        if delay != 0 {
+            *of_camera = std::mem::take(of_camera)
+                .into_iter()
+                .map(|(name, views)| (moment(name), views))
+                .collect();
+        }
+    }
+}
+
+/// Names with numbers in the order in which one counts: 2 before 10.
+pub(in crate::calibrate) fn in_order(names: BTreeSet<&str>) -> Vec<String> {
+    let mut names: Vec<&str> = names.into_iter().collect();
+    names.sort_by_cached_key(|name| parts(name));
+    names.into_iter().map(str::to_owned).collect()
+}
+
+/// Text and numbers by turns, numbers as their length without zeros in front, and their digits.
+fn parts(name: &str) -> Vec<(String, usize, String)> {
+    let mut parts = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let (text, from_number) = rest.split_at(digits);
+        let end = from_number.find(|c: char| !c.is_ascii_digit()).unwrap_or(from_number.len());
+        let (number, after) = from_number.split_at(end);
+        let number = number.trim_start_matches('0');
+        parts.push((text.to_owned(), number.len(), number.to_owned()));
+        rest = after;
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_counted() {
+        let names = ["a10", "a9", "a100", "b1", "a010x"];
+        let order = in_order(names.into_iter().collect());
+        assert_eq!(order, ["a9", "a10", "a010x", "a100", "b1"]);
+    }
+
+    #[test]
+    fn most_cameras_are_in_time() {
+        assert_eq!(usual(&[0, -1, -1, -1]), -1);
+        assert_eq!(usual(&[0, 2]), 0);
+        assert_eq!(usual(&[0, 0, 1, 1]), 0);
+    }
+}
