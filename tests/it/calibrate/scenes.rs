@@ -305,14 +305,16 @@ fn with_wrong_faces(mut scene: Scene, part: f64, seed: u64) -> Scene {
     scene
 }
 
-/// Solves scenes of many seeds: errors of all are as their deviations have it, seed by seed and together.
+/// Solves scenes of many seeds: errors are as their deviations have it. Those of one scene hang together: where the
+/// first camera is off all others are, so they are judged over all seeds.
 fn check(seeds: std::ops::Range<u64>, scene: impl Fn(u64) -> Scene, told: impl Fn(&Estimate)) {
     let mut all = Vec::new();
     for seed in seeds {
         let scene = scene(seed);
         let found = scene.solve().unwrap_or_else(|error| panic!("seed {seed}: {error}"));
         let errors = scene.errors(&found);
-        assert!(is_within(&errors), "seed {seed}: {errors:.1?}");
+        let worst = errors.iter().fold(0.0, |worst: f64, error| worst.max(error.abs()));
+        assert!(worst < 4.5, "seed {seed}: {errors:.1?}");
         told(&found);
         all.extend(errors);
     }
@@ -320,7 +322,9 @@ fn check(seeds: std::ops::Range<u64>, scene: impl Fn(u64) -> Scene, told: impl F
     // Errors of one scene hang together, so that their squares scatter more than χ² does.
     let scatter = 2.0 * (2.0 / all.len() as f64).sqrt();
     assert!((variance - 1.0).abs() < 3.0 * scatter, "{variance} of {} errors", all.len());
-    println!("{} errors, their square in deviations {variance:.2}", all.len());
+    let beyond = all.iter().filter(|error| error.abs() > 3.0).count() as f64 / all.len() as f64;
+    assert!(beyond < 0.01 || all.len() < 1000, "{beyond}");
+    println!("{} errors: {variance:.2} squared, {beyond:.4} beyond three", all.len());
 }
 
 const LATE: [i32; 8] = [0, 0, 0, 1, 0, 0, 0, 0];
