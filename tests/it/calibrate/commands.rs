@@ -54,6 +54,7 @@ fn detection(target: &Target, camera: &Camera, pose: &Pose, random: &mut ChaCha8
     let corners = corners.collect();
     let grid = Grid {
         kind: panel.kind,
+        target: None,
         panel: Some(panel.id),
         mirrored: false,
         corners,
@@ -588,7 +589,14 @@ fn of_displaced_panel(target: &Target, count: usize, by_mm: DVec3) -> Vec<Detect
             });
             let corners: Vec<GridCorner> = corners.collect::<Option<_>>()?;
             let (kind, panel) = (panel.kind, Some(panel.id));
-            faces.then(|| Grid { kind, panel, mirrored: false, corners, tags: Vec::new() })
+            faces.then(|| Grid {
+                kind,
+                target: None,
+                panel,
+                mirrored: false,
+                corners,
+                tags: Vec::new(),
+            })
         });
         Detection::new("", [1600, 1200], grids.collect())
     });

@@ -49,6 +49,7 @@ fn seen(target: &Target, camera: &Camera, camera_from_target: &Pose, view: u32) 
         let (kind, panel) = (panel.kind, Some(panel.id));
         towards.then_some(Grid {
             kind,
+            target: None,
             panel,
             mirrored: false,
             corners: corners?,

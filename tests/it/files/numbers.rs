@@ -158,6 +158,7 @@ fn pictures(target: &Target) -> Vec<(String, Detection)> {
             };
             let grid = Grid {
                 kind: panel.kind,
+                target: None,
                 panel: Some(panel.id),
                 mirrored: false,
                 corners: panel.corners.iter().map(corner).collect(),

@@ -32,6 +32,10 @@ const OTHER_KIND: &str =
 /// What follows from labels that are not on the target.
 const OTHER_TARGET: &str = "; the target does not belong to this detection";
 
+/// What is wrong with detections of one target where there are several.
+const OF_ONE_TARGET: &str =
+    "it does not say which target its corners belong to: detect again with all targets at once";
+
 /// Why labels of a grid without panel are not on the target.
 const CUT_OFF: &str = "its rows and columns are not those of the target: without tags they are known \
                        only where the board is seen whole, and here a part of it is";
@@ -41,6 +45,8 @@ const CUT_OFF: &str = "its rows and columns are not those of the target: without
 pub enum Reference<'a> {
     /// A target that its file describes.
     Target(&'a Target),
+    /// Several targets that are fixed to each other; detections say which one a grid belongs to.
+    Scene(&'a [Target]),
     /// An untagged board.
     Grid(UntaggedGrid),
 }
@@ -118,51 +124,73 @@ impl Reference<'_> {
     pub fn panels(&self) -> Vec<PanelPlace> {
         match self {
             Self::Grid(_) => vec![Pose::IDENTITY.into()],
-            Self::Target(target) => target.panels.iter().map(|p| (&p.pose).into()).collect(),
+            Self::Target(_) | Self::Scene(_) => {
+                let panels = self.targets().iter().flat_map(|target| &target.panels);
+                panels.map(|panel| (&panel.pose).into()).collect()
+            }
         }
     }
 
-    /// Its panel with an id, which is 0 on an untagged board.
-    pub fn panel(&self, id: u32) -> Option<PanelRef> {
-        match self {
-            Self::Grid(_) => (id == PanelRef::ONLY.id()).then_some(PanelRef::ONLY),
-            Self::Target(target) => {
-                let index = target.panels.iter().position(|panel| panel.id == id)?;
-                Some(PanelRef::new(index, id))
-            }
+    /// What its file describes, or their files; none of an untagged board.
+    pub fn targets(&self) -> &[Target] {
+        match *self {
+            Self::Grid(_) => &[],
+            Self::Target(target) => std::slice::from_ref(target),
+            Self::Scene(targets) => targets,
         }
+    }
+
+    /// The panel with an id, which is 0 on an untagged board, of the target of a name where there are several.
+    pub fn panel(&self, target: Option<&str>, id: u32) -> Option<PanelRef> {
+        if let Self::Grid(_) = self {
+            return (id == PanelRef::ONLY.id()).then_some(PanelRef::ONLY);
+        }
+        let mut first = 0;
+        for of_scene in self.targets() {
+            let is_it = target.is_none_or(|name| is_named(of_scene, name));
+            let index = of_scene.panels.iter().position(|panel| is_it && panel.id == id);
+            if let Some(index) = index {
+                return Some(PanelRef::new(first + index, id));
+            }
+            first += of_scene.panels.len();
+        }
+        None
     }
 
     /// Whether the labels of a view are those of the target: tags tell them, or that the board is seen
     /// whole.
     pub fn is_sure_of(&self, view: &View) -> bool {
-        let whole = match self {
-            Self::Grid(grid) => grid.size.map(|[rows, cols]| rows as usize * cols as usize),
-            Self::Target(target) => {
-                let tagged = target.panels.iter().all(|panel| !panel.tags.is_empty());
-                let count = target.panels.iter().map(|panel| panel.corners.len()).sum();
-                Some(if tagged { 0 } else { count })
-            }
-        };
-        whole.is_some_and(|count| view.corner_count() >= count)
+        if let Self::Grid(grid) = self {
+            let whole = grid.size.map(|[rows, cols]| rows as usize * cols as usize);
+            return whole.is_some_and(|count| view.corner_count() >= count);
+        }
+        let mut first = 0;
+        self.targets().iter().all(|target| {
+            let of_target = first..first + target.panels.len();
+            first = of_target.end;
+            let seen = view.sightings.iter().filter(|s| of_target.contains(&s.panel.index()));
+            let seen: usize = seen.map(|sighting| sighting.observations.len()).sum();
+            let is_tagged = target.panels.iter().all(|panel| !panel.tags.is_empty());
+            let is_absent = seen == 0 && self.targets().len() > 1;
+            let whole: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
+            is_tagged || is_absent || seen >= whole
+        })
     }
 
     /// Whether its panels are boards that lie about, each for itself.
-    fn is_loose(&self) -> bool {
-        match self {
-            Self::Grid(_) => false,
-            Self::Target(target) => {
-                target.panels.len() > 1
-                    && !matches!(target.spec, TargetSpec::Solid(_) | TargetSpec::Listed(_))
-            }
-        }
+    pub fn is_loose(&self) -> bool {
+        let is_loose = |target: &Target| {
+            target.panels.len() > 1
+                && !matches!(target.spec, TargetSpec::Solid(_) | TargetSpec::Listed(_))
+        };
+        self.targets().iter().any(is_loose)
     }
 
     /// Id of a panel; `None` on an untagged board.
     fn panel_id(&self, panel: PanelRef) -> Option<u32> {
         match self {
             Self::Grid(_) => None,
-            Self::Target(_) => Some(panel.id()),
+            Self::Target(_) | Self::Scene(_) => Some(panel.id()),
         }
     }
 
@@ -181,15 +209,50 @@ impl Reference<'_> {
                 let at = |row, col| board.place(row, col);
                 Ok(vec![Sighting { panel: PanelRef::ONLY, observations: observations(grid, at) }])
             }
-            Self::Target(target) => {
+            Self::Target(_) | Self::Scene(_) => {
                 let grids = detection.grids.iter();
                 let found = grids.filter_map(|grid| {
-                    on_target(target, grid).map_err(|problem| (grid.panel, problem)).transpose()
+                    self.on_targets(grid).map_err(|problem| (grid.panel, problem)).transpose()
                 });
                 found.collect()
             }
         }
     }
+}
+
+impl Reference<'_> {
+    /// The corners of a grid on the panel of its target; `None` where it is none of theirs, or was not labelled.
+    fn on_targets(&self, grid: &Grid) -> Result<Option<Sighting>, String> {
+        let targets = self.targets();
+        let mut first = 0;
+        for target in targets {
+            let is_it = match &grid.target {
+                Some(name) => is_named(target, name),
+                None if targets.len() == 1 => true,
+                None if grid.panel.is_none() => return Ok(None),
+                None => return Err(OF_ONE_TARGET.to_owned()),
+            };
+            if is_it {
+                return on_target(target, first, grid);
+            }
+            first += target.panels.len();
+        }
+        Ok(None)
+    }
+}
+
+/// Whether a target is that of a name: measured or with refined panels it is still the same.
+fn is_named(target: &Target, name: &str) -> bool {
+    let of_print = |name: &str| -> String {
+        let mut name = name;
+        while let Some(shorter) =
+            name.strip_suffix("-measured").or_else(|| name.strip_suffix("-refined"))
+        {
+            name = shorter;
+        }
+        name.to_owned()
+    };
+    of_print(&target.name) == of_print(name)
 }
 
 /// The views of detections.
@@ -301,8 +364,9 @@ fn sightings(
     }
 }
 
-/// The corners of a grid on its panel; `None` where it was not labelled and the target has several.
-fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
+/// The corners of a grid on its panel, which are counted from `first` on; `None` where it was not labelled and the
+/// target has several.
+fn on_target(target: &Target, first: usize, grid: &Grid) -> Result<Option<Sighting>, String> {
     let index = match grid.panel {
         Some(id) => target.panels.iter().position(|panel| panel.id == id),
         None if target.panels.len() == 1 && target.panels[0].tags.is_empty() => Some(0),
@@ -341,7 +405,7 @@ fn on_target(target: &Target, grid: &Grid) -> Result<Option<Sighting>, String> {
         }
     }
     let at = |row, col| places[&(row, col)];
-    let panel = PanelRef::new(index, panel.id);
+    let panel = PanelRef::new(first + index, panel.id);
     Ok(Some(Sighting { panel, observations: observations(grid, at) }))
 }
 

@@ -182,7 +182,14 @@ mod tests {
             cov: None,
         };
         let corners = (0..5).flat_map(|row| (0..6).map(move |col| corner(row, col))).collect();
-        Grid { kind: GridKind::Checker, panel: None, mirrored: false, corners, tags: Vec::new() }
+        Grid {
+            kind: GridKind::Checker,
+            target: None,
+            panel: None,
+            mirrored: false,
+            corners,
+            tags: Vec::new(),
+        }
     }
 
     /// Squares inside the grid's outermost ones, and something beyond.

@@ -35,8 +35,8 @@ pub struct TagAreas {
     /// Distance from the edges of a tile to what it shows of a tag, in edges along the other
     /// edges; the smallest of all panels.
     inset: f64,
-    /// Tiles with a tag, by panel id.
-    tiles: BTreeMap<u32, BTreeSet<Tile>>,
+    /// Tiles with a tag, by panel id, of each target by its name where there are several.
+    targets: Vec<(Option<String>, BTreeMap<u32, BTreeSet<Tile>>)>,
 }
 
 impl TagAreas {
@@ -53,21 +53,36 @@ impl TagAreas {
         let tiles = |panel: &Panel| panel.tags.iter().map(|tag| panel.tag_tile(tag)).collect();
         Self {
             inset: tagged().map(inset).fold(f64::INFINITY, f64::min),
-            tiles: tagged().map(|panel| (panel.id, tiles(panel))).collect(),
+            targets: vec![(None, tagged().map(|panel| (panel.id, tiles(panel))).collect())],
         }
+    }
+
+    /// Those of several targets, by their names.
+    pub fn of_scene(targets: impl IntoIterator<Item = (String, Self)>) -> Self {
+        let mut all = Self { inset: f64::INFINITY, targets: Vec::new() };
+        for (name, of_target) in targets {
+            all.inset = all.inset.min(of_target.inset);
+            let tiles = of_target.targets.into_iter();
+            all.targets.extend(tiles.map(|(_, tiles)| (Some(name.clone()), tiles)));
+        }
+        all
     }
 
     /// Whether no tile shows a tag.
     pub fn is_empty(&self) -> bool {
-        self.tiles.is_empty()
+        self.targets.iter().all(|(_, tiles)| tiles.is_empty())
     }
 
     /// Whether a tile of a grid may show a tag: as its panel has them, or any that could where the
     /// panel is not known.
-    fn has(&self, panel: Option<u32>, tile: Tile) -> bool {
-        match panel {
-            Some(panel) => self.tiles.get(&panel).is_some_and(|tiles| tiles.contains(&tile)),
-            None => !self.tiles.is_empty() && tile == tile.kind().tag_tile(tile.anchor),
+    fn has(&self, grid: &Grid, tile: Tile) -> bool {
+        match grid.panel {
+            Some(panel) => {
+                let of_target = self.targets.iter().find(|(name, _)| *name == grid.target);
+                let tiles = of_target.and_then(|(_, tiles)| tiles.get(&panel));
+                tiles.is_some_and(|tiles| tiles.contains(&tile))
+            }
+            None => !self.is_empty() && tile == tile.kind().tag_tile(tile.anchor),
         }
     }
 }
@@ -194,7 +209,7 @@ pub fn surroundings_of(
                     found.sides.push(line(polygon[i], polygon[j], DVec2::ZERO));
                 }
             }
-            if tags.has(grid.panel, tile) {
+            if tags.has(grid, tile) {
                 found.tags.push(outline(&polygon, tags.inset));
             }
         }
@@ -394,7 +409,14 @@ mod tests {
             let DVec2 { x, y } = image(kind.position(row.into(), col.into()));
             GridCorner { row, col, id: None, x, y, cov: None }
         });
-        Grid { kind, panel: None, mirrored: false, corners: corners.collect(), tags: Vec::new() }
+        Grid {
+            kind,
+            target: None,
+            panel: None,
+            mirrored: false,
+            corners: corners.collect(),
+            tags: Vec::new(),
+        }
     }
 
     #[test]
@@ -437,7 +459,8 @@ mod tests {
         let grid = grid(GridKind::Checker, |place| {
             DVec2::new(100.0 + 40.0 * place.x, 300.0 - 40.0 * place.y)
         });
-        let tags = TagAreas { inset: 0.25, tiles: BTreeMap::from([(0, BTreeSet::new())]) };
+        let tags =
+            TagAreas { inset: 0.25, targets: vec![(None, BTreeMap::from([(0, BTreeSet::new())]))] };
         let around = &surroundings(&grid, &tags, 1.0)[12];
         // Cells begin 10 px from both edges; the blur reaches 2 px.
         let off_tags = around.off_tags(1.0);

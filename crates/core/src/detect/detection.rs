@@ -53,6 +53,9 @@ impl Detection {
 pub struct Grid {
     /// The tiling: triangles or squares.
     pub kind: GridKind,
+    /// Name of the target that it belongs to, where several were looked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<String>,
     /// Id of the panel of the target; `None` where the grid has no labels.
     pub panel: Option<u32>,
     /// Whether it is seen as in a mirror. Its labels, if any, are those of the print.

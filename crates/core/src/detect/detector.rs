@@ -18,6 +18,7 @@ use super::reason::{Reason, ReasonKind};
 use super::refine::{Refinement, Refiner};
 use super::refine_grid::{is_sampled, sharp_level};
 use super::saddles::{SaddleFinder, too_many};
+use super::scene::{SceneError, check_distinct};
 use super::tile_shape::is_of_squares;
 use super::tiling::{CHECKER, DELTILLE, kind};
 use super::why;
@@ -142,6 +143,8 @@ pub struct Detector {
     ink: Option<InkEstimate>,
     /// What the stages are timed with, if at all.
     clock: Option<Clock>,
+    /// That of the targets of the other tiling, where there are such.
+    other: Option<Box<Self>>,
 }
 
 /// Finds the corners of a tiling.
@@ -192,7 +195,8 @@ impl Detector {
         let refiner = refiner(kind, config, None);
         let tag_areas = TagAreas::default();
         let finder = Finder::of(kind);
-        Self { finder, refiner, tag_areas, labels, edge_mm: None, ink: None, clock: None }
+        let (edge_mm, ink, clock, other) = (None, None, None, None);
+        Self { finder, refiner, tag_areas, labels, edge_mm, ink, clock, other }
     }
 
     /// A detector of a target, whose panels are of one kind; `family` is the family that the target
@@ -203,22 +207,88 @@ impl Detector {
     pub fn for_target(target: &Target, family: Option<&Family>, config: DetectorConfig) -> Self {
         let labels = Labels::of_target(target, family, &config);
         let tag_areas = family.map(|family| TagAreas::of(target, family)).unwrap_or_default();
-        let kind = target.panels.first().map_or(GridKind::Deltille, |panel| panel.kind);
-        let edges = || target.panels.iter().map(|panel| panel.edge_mm);
-        let edge_mm = edges().next().filter(|first| edges().all(|edge| edge == *first));
-        let refiner = refiner(kind, config, edge_mm);
-        let finder = Finder::of(kind);
-        Self { finder, refiner, tag_areas, labels, edge_mm, ink: None, clock: None }
+        Self::with(kind_of(target), labels, tag_areas, edge_of(&[target]), config)
+    }
+
+    /// A detector of several targets, each with its family, which looks for all in one pass over a picture;
+    /// [`Grid::target`] says which one a grid belongs to.
+    ///
+    /// # Errors
+    /// Where two targets cannot be told apart.
+    ///
+    /// ```
+    /// use deltille_core::detect::{Detector, DetectorConfig};
+    /// use deltille_core::targets::{BoardSpec, Target};
+    ///
+    /// let [mut front, mut back] = [BoardSpec::deltille(10, 11, 20.0), BoardSpec::deltille(10, 11, 20.0)];
+    /// if let Some(tags) = &mut back.tags {
+    ///     tags.first_id = 100;
+    /// }
+    /// let [front, back] = [Target::new("front", front)?, Target::new("back", back)?];
+    /// let families = [front.family()?, back.family()?];
+    /// let scene = [(&front, families[0].as_ref()), (&back, families[1].as_ref())];
+    /// let detector = Detector::for_targets(&scene, DetectorConfig::default())?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn for_targets(
+        targets: &[(&Target, Option<&Family>)],
+        config: DetectorConfig,
+    ) -> Result<Self, SceneError> {
+        check_distinct(&targets.iter().map(|(target, _)| *target).collect::<Vec<_>>())?;
+        if let [(only, family)] = targets {
+            return Ok(Self::for_target(only, *family, config));
+        }
+        let of_kind = |kind: GridKind| {
+            let own = || targets.iter().filter(move |(target, _)| kind_of(target) == kind);
+            let labels = own().map(|(target, family)| {
+                (target.name.to_string(), Labels::of_target(target, *family, &config))
+            });
+            let tag_areas = own().filter_map(|(target, family)| {
+                Some((target.name.to_string(), TagAreas::of(target, (*family)?)))
+            });
+            let edge_mm = edge_of(&own().map(|(target, _)| *target).collect::<Vec<_>>());
+            let (labels, tag_areas) =
+                (Labels::of_scene(labels.collect()), TagAreas::of_scene(tag_areas));
+            own().next().map(|_| Self::with(kind, labels, tag_areas, edge_mm, config.clone()))
+        };
+        let mut of_kinds = [GridKind::Deltille, GridKind::Checker].into_iter().filter_map(of_kind);
+        let first = of_kinds.next().ok_or(SceneError::Empty)?;
+        Ok(Self { other: of_kinds.next().map(Box::new), ..first })
+    }
+
+    fn with(
+        kind: GridKind,
+        labels: Labels,
+        tag_areas: TagAreas,
+        edge_mm: Option<f64>,
+        config: DetectorConfig,
+    ) -> Self {
+        let (finder, refiner) = (Finder::of(kind), refiner(kind, config, edge_mm));
+        let (ink, clock, other) = (None, None, None);
+        Self { finder, refiner, tag_areas, labels, edge_mm, ink, clock, other }
     }
 
     /// The same detector with a clock, by which it notes how long each stage took, see [`Detection::timing_ms`].
     pub fn with_clock(self, clock: Clock) -> Self {
-        Self { clock: Some(clock), ..self }
+        let other = self.other.map(|other| Box::new(other.with_clock(clock)));
+        Self { clock: Some(clock), other, ..self }
     }
 
     /// The same detector for a print whose spread of ink was estimated before.
     pub fn with_ink(self, ink: InkEstimate) -> Self {
-        Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), ..self }
+        let edge_mm = self.edge_mm;
+        let of_other = |other: Box<Self>| match (edge_mm, other.edge_mm) {
+            // As far on tiles of another size.
+            (Some(edge_mm), Some(other_mm)) => {
+                let edges = |part: f64| part * edge_mm / other_mm;
+                let (part, deviation) = (edges(ink.edges), edges(ink.edges_deviation));
+                let ink = InkEstimate { edges: part, edges_deviation: deviation, ..ink };
+                Box::new(other.with_ink(ink))
+            }
+            _ => other,
+        };
+        let other = self.other.map(of_other);
+        Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), other, ..self }
     }
 
     /// Finds the grids in one image and labels their corners; `name` is only noted in the result.
@@ -230,9 +300,13 @@ impl Detector {
 
     /// [`Self::detect`], compiled here and not in every crate that uses it.
     fn detect_view(&self, image: ImageView, name: &str) -> Detection {
-        match &self.finder {
+        let found = match &self.finder {
             Finder::Deltille(finder) => self.detect_with(finder, image, name),
             Finder::Checker(finder) => self.detect_with(finder, image, name),
+        };
+        match &self.other {
+            Some(other) => both(found, other.detect_view(image, name)),
+            None => found,
         }
     }
 
@@ -363,7 +437,9 @@ impl Detector {
         });
         left_out.extend((grids.len() < count).then(|| Reason::new(ReasonKind::TooManyGrids, [])));
         // Labelled grids by panel, then the others; a stable sort keeps the largest first.
-        grids.sort_by_key(|(grid, _)| grid.panel.unwrap_or(u32::MAX));
+        grids.sort_by_cached_key(|(grid, _)| {
+            (grid.panel.is_none(), grid.target.clone(), grid.panel.unwrap_or(u32::MAX))
+        });
         grids
     }
 
@@ -436,6 +512,40 @@ impl Detector {
         }
         reason
     }
+}
+
+/// The tiling of a target.
+fn kind_of(target: &Target) -> GridKind {
+    target.panels.first().map_or(GridKind::Deltille, |panel| panel.kind)
+}
+
+/// The edge of the tiles, mm, where all have the same.
+fn edge_of(targets: &[&Target]) -> Option<f64> {
+    let edges = || targets.iter().flat_map(|target| &target.panels).map(|panel| panel.edge_mm);
+    edges().next().filter(|first| edges().all(|edge| edge == *first))
+}
+
+/// What was found of both tilings in one picture. What one of them shows is no reason why nothing was found.
+fn both(deltille: Detection, checker: Detection) -> Detection {
+    let is_there = |found: &Detection| found.grids.iter().any(|grid| grid.panel.is_some());
+    let [main, other] = match is_there(&checker) && !is_there(&deltille) {
+        true => [checker, deltille],
+        false => [deltille, checker],
+    };
+    let mut found = main;
+    if is_there(&other) {
+        found.reasons.extend(other.reasons);
+        found.grids.extend(other.grids);
+    } else if !is_there(&found) {
+        found.reasons.extend(other.reasons);
+        found.reasons.retain(|reason| reason.kind != ReasonKind::OtherTiling);
+    }
+    for (stage, ms) in other.timing_ms {
+        *found.timing_ms.entry(stage).or_default() += ms;
+    }
+    found.tone = found.tone.or(other.tone);
+    found.ink = found.ink.or(other.ink);
+    found
 }
 
 /// Whether tags, or the outline of a mirrored board, tell that a grid is one.

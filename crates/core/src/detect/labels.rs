@@ -43,6 +43,8 @@ enum Source {
     Rectangle((u32, u32)),
     /// By the tags of a target, or by the outlines of its untagged panels.
     Target { tags: Option<Box<TagLabeller>>, panels: Vec<TargetPanel> },
+    /// By whichever of several targets a grid belongs to, by their names.
+    Scene(Vec<(String, Labels)>),
 }
 
 /// What the detector must know of a panel.
@@ -90,6 +92,12 @@ impl Labels {
         Self { source, allow_mirrored: config.allow_mirrored }
     }
 
+    /// By the tags and outlines of several targets that can be told apart, each with its name.
+    pub fn of_scene(targets: Vec<(String, Self)>) -> Self {
+        let allow_mirrored = targets.iter().any(|(_, labels)| labels.allow_mirrored);
+        Self { source: Source::Scene(targets), allow_mirrored }
+    }
+
     /// The panels in a grid; the grid itself with relative labels where there are none, and why there are
     /// none.
     pub fn label(
@@ -111,6 +119,7 @@ impl Labels {
                 let expected = rectangle.0 as usize * rectangle.1 as usize;
                 vec![self.on_outline(found, expected, size, fit)]
             }
+            Source::Scene(targets) => in_scene(targets, image, found, budget),
             Source::Target { tags, panels } => {
                 let evidence = tags.as_ref().map(|tags| tags.label(image, grid, budget));
                 let labelled = evidence.as_ref().map_or(&[][..], |evidence| &evidence.found);
@@ -152,6 +161,9 @@ impl Labels {
             Source::Target { panels, .. } => {
                 panels.iter().map(|panel| panel.corner_ids.len()).max().unwrap_or(0)
             }
+            Source::Scene(targets) => {
+                targets.iter().map(|(_, labels)| labels.most_corners()).max().unwrap_or(0)
+            }
         }
     }
 
@@ -178,6 +190,32 @@ impl Labels {
     }
 }
 
+/// The panels in a grid, of the first target that has it: no two have the same tags. Where none has, what a target says
+/// whose tags were read.
+fn in_scene(
+    targets: &[(String, Labels)],
+    image: ImageView,
+    found: FoundGrid,
+    budget: &mut Budget,
+) -> Vec<(Grid, Option<Reason>)> {
+    let mut without = Vec::new();
+    for (name, labels) in targets {
+        let mut grids = labels.label(image, found, budget);
+        let is_of_target =
+            |(grid, _): &(Grid, Option<Reason>)| grid.panel.is_some() || grid.mirrored;
+        if grids.iter().any(is_of_target) {
+            grids.iter_mut().for_each(|(grid, _)| grid.target = Some(name.clone()));
+            return grids;
+        }
+        without.extend(grids);
+    }
+    let of_tags_read = |(_, reason): &(Grid, Option<Reason>)| {
+        reason.as_ref().is_some_and(|reason| reason.kind.is_of_tags_read())
+    };
+    let first = without.iter().position(of_tags_read).unwrap_or_default();
+    without.into_iter().skip(first).take(1).collect()
+}
+
 /// A grid seen as in a mirror, which gets no labels.
 fn in_mirror(found: FoundGrid) -> (Grid, Option<Reason>) {
     let why = Reason::new(ReasonKind::Mirrored, [("corners", found.corners.len() as f64)]);
@@ -202,9 +240,10 @@ pub(super) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) -> Option<Rea
     let mut elsewhere = 0;
     grids.retain_mut(|(grid, _)| {
         if let Some(panel) = grid.panel {
+            let panel = (grid.target.clone(), panel);
             let edge_px = grid.edge_px().unwrap_or(f64::INFINITY);
             grid.corners.retain(|&GridCorner { row, col, x, y, .. }| {
-                let [x0, y0] = match corners.entry((panel, row, col)) {
+                let [x0, y0] = match corners.entry((panel.clone(), row, col)) {
                     Entry::Vacant(entry) => {
                         entry.insert([x, y]);
                         return true;
@@ -214,7 +253,7 @@ pub(super) fn report_once(grids: &mut Vec<(Grid, Option<Reason>)>) -> Option<Rea
                 elsewhere += usize::from((x - x0).hypot(y - y0) > edge_px);
                 false
             });
-            grid.tags.retain(|tag| tags.insert((panel, tag.row, tag.col)));
+            grid.tags.retain(|tag| tags.insert((panel.clone(), tag.row, tag.col)));
         }
         !grid.corners.is_empty()
     });
@@ -276,5 +315,5 @@ fn relabelled(
         })
         .collect();
     corners.sort_by_key(|corner| (corner.row, corner.col));
-    Grid { kind: found.kind, panel, mirrored: false, corners, tags }
+    Grid { kind: found.kind, target: None, panel, mirrored: false, corners, tags }
 }

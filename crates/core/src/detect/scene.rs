@@ -1,0 +1,89 @@
+//! Several targets in one picture: whether they can be told apart.
+
+use std::collections::BTreeSet;
+
+use crate::lattice::GridKind;
+use crate::targets::Target;
+
+/// Why targets cannot be looked for together. Messages say what to do about it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// No target.
+    #[error("there is no target to look for")]
+    Empty,
+    /// Targets of one name, by which results tell them apart.
+    #[error("two targets are named {name}: give each its own name")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// Targets that show the same tags.
+    #[error(
+        "{first} and {second} both show tag {id} of {family}: make one of them with other ids, by \
+         `TagSpec::first_id`"
+    )]
+    SameTag {
+        /// A target.
+        first: String,
+        /// Another one.
+        second: String,
+        /// Id of a tag that both have.
+        id: u32,
+        /// Name of its family.
+        family: String,
+    },
+    /// Targets without tags and of one outline.
+    #[error(
+        "{first} and {second} have no tags and look alike: give one of them tags, or other rows and columns"
+    )]
+    SameOutline {
+        /// A target.
+        first: String,
+        /// Another one.
+        second: String,
+    },
+}
+
+/// Refuses targets that cannot be told apart in a picture.
+pub(super) fn check_distinct(targets: &[&Target]) -> Result<(), SceneError> {
+    if targets.is_empty() {
+        return Err(SceneError::Empty);
+    }
+    for (index, second) in targets.iter().enumerate() {
+        for first in &targets[..index] {
+            check_pair(first, second)?;
+        }
+    }
+    Ok(())
+}
+
+fn check_pair(one: &Target, other: &Target) -> Result<(), SceneError> {
+    let names = || (one.name.to_string(), other.name.to_string());
+    if one.name == other.name {
+        return Err(SceneError::SameName { name: one.name.to_string() });
+    }
+    if let (Some(family), Some(same)) = (&one.family, &other.family)
+        && family.name == same.name
+        && let Some(&id) = ids(one).intersection(&ids(other)).next()
+    {
+        let (first, second) = names();
+        return Err(SceneError::SameTag { first, second, id, family: family.name.clone() });
+    }
+    if let Some((first, second)) =
+        outlines(one).intersection(&outlines(other)).next().map(|_| names())
+    {
+        return Err(SceneError::SameOutline { first, second });
+    }
+    Ok(())
+}
+
+fn ids(target: &Target) -> BTreeSet<u32> {
+    target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect()
+}
+
+/// Tiling, rows and columns of the panels without tags.
+fn outlines(target: &Target) -> BTreeSet<(GridKind, [u32; 2], bool)> {
+    let untagged = target.panels.iter().filter(|panel| panel.tags.is_empty());
+    untagged.map(|panel| (panel.kind, panel.matrix, panel.inverted)).collect()
+}
