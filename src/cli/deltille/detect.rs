@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::ValueEnum;
 
 use super::finder::FinderArgs;
@@ -100,7 +100,10 @@ struct Seen {
 
 /// Detects in all images; an image that cannot be read is reported, and the rest go on.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let (target, detector) = args.finder.detector()?;
+    let (targets, detector) = args.finder.detector()?;
+    if targets.len() > 1 && args.format.contains(&Format::Orpc) {
+        bail!("--format orpc: it has no names of targets: give one --target at a time");
+    }
     let detector = if args.timing { detector.with_clock(clock::now) } else { detector };
     let images = Images::of(&args.images)?;
     // Clashes among images that are named are found before any work is done.
@@ -139,7 +142,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             if args.skip_existing && args.results(&stem).iter().all(|(path, _)| path.exists()) {
                 return Ok(Outcome::Skipped);
             }
-            let found = one_image(&args, target.as_ref(), &detector, &image, &stem)?;
+            let found = one_image(&args, &targets, &detector, &image, &stem)?;
             let looked_at = Seen { index, image, stem, ink: found.ink };
             seen.lock().expect("no thread panics here").push(looked_at);
             Ok(Outcome::Seen(found))
@@ -152,7 +155,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     // In the order of the images, whichever was done first.
     seen.sort_unstable_by_key(|seen| seen.index);
     if !args.stream && args.finder.ink_is_open() && !interrupt::is_raised() {
-        see_again(&args, target.as_ref(), detector, &seen, &threads);
+        see_again(&args, &targets, detector, &seen, &threads);
     }
     if interrupt::is_raised() {
         return Err(Interrupted(report.standing()).into());
@@ -164,7 +167,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// with what all say.
 fn see_again(
     args: &Args,
-    target: Option<&Target>,
+    targets: &[Target],
     detector: Detector,
     seen: &[Seen],
     threads: &rayon::ThreadPool,
@@ -180,7 +183,7 @@ fn see_again(
                 return;
             }
             let Seen { image, stem, .. } = &seen[index];
-            let again = one_image(args, target, &detector, image, stem);
+            let again = one_image(args, targets, &detector, image, stem);
             again.err().iter().for_each(|error| bar.suspend(|| run::report(error)));
             bar.inc(1);
         });
@@ -332,7 +335,7 @@ impl Format {
 /// Detects in one image, writes its results, and says what was found.
 fn one_image(
     args: &Args,
-    target: Option<&Target>,
+    targets: &[Target],
     detector: &Detector,
     path: &Path,
     stem: &str,
@@ -349,16 +352,16 @@ fn one_image(
             atomic::write(&path, |out| out.write_all(content))
         };
         for format in &args.format {
-            save(format.extension(), format.text(&found, target).as_bytes())?;
+            save(format.extension(), format.text(&found, targets.first()).as_bytes())?;
         }
         if args.overlay {
             save("overlay.png", &overlay::png(&image, &found)?)?;
         }
     }
     let line = if args.stream { detection::write_line(&found) } else { summary(path, &found) };
-    let is_there = match target {
-        Some(_) => found.grids.iter().any(|grid| grid.panel.is_some()),
-        None => !found.grids.is_empty(),
+    let is_there = match targets.is_empty() {
+        false => found.grids.iter().any(|grid| grid.panel.is_some()),
+        true => !found.grids.is_empty(),
     };
     Ok(Found { line, ink: found.ink, is_there })
 }
@@ -373,6 +376,16 @@ fn summary(path: &Path, found: &Detection) -> String {
         counted(found.grids.len(), "grid"),
         counted(corners, "corner")
     );
+    let mut of_targets = BTreeMap::new();
+    for grid in &found.grids {
+        let count = grid.target.as_ref().map(|name| of_targets.entry(name).or_insert(0));
+        count.into_iter().for_each(|count| *count += grid.corners.len());
+    }
+    let shares = of_targets.iter().map(|(name, count)| format!("{count} of {name}"));
+    let shares = shares.collect::<Vec<_>>().join(", ");
+    if !shares.is_empty() {
+        line += &format!(" ({shares})");
+    }
     if tags > 0 {
         line += &format!(", {}", counted(tags, "tag"));
     }

@@ -17,9 +17,9 @@ use crate::targets::{SIDES, Target};
 /// Options that say what to look for.
 #[derive(clap::Args)]
 pub struct FinderArgs {
-    /// Description of the target: the .json of `deltille board`, or a .dsc
+    /// Description of the target: the .json of `deltille board`, or a .dsc; may be given for each of several targets
     #[arg(long, value_name = "FILE", conflicts_with = "grid")]
-    pub target: Option<PathBuf>,
+    pub target: Vec<PathBuf>,
     /// Find untagged boards of this tiling instead
     #[arg(long, value_name = "KIND")]
     grid: Option<Kind>,
@@ -73,12 +73,12 @@ impl FinderArgs {
         self.limits.limits()
     }
 
-    /// The target, where one is named, and the detector.
-    pub fn detector(&self) -> anyhow::Result<(Option<Target>, Detector)> {
-        if self.target.is_none() && self.grid.is_none() {
+    /// The targets that are named, and the detector.
+    pub fn detector(&self) -> anyhow::Result<(Vec<Target>, Detector)> {
+        if self.target.is_empty() && self.grid.is_none() {
             bail!("give --target FILE, or --grid deltille or checker for untagged boards");
         }
-        if self.allow_mirrored && self.target.is_none() && self.rows.is_none() {
+        if self.allow_mirrored && self.target.is_empty() && self.rows.is_none() {
             bail!("--allow-mirrored needs labels: give --target FILE, or --rows and --cols");
         }
         let config = DetectorConfig::default()
@@ -87,7 +87,7 @@ impl FinderArgs {
             .refinement(self.refine.into())
             .tone(self.tone)
             .ink(self.ink);
-        let Some(path) = &self.target else {
+        if self.target.is_empty() {
             if matches!(self.ink, Ink::Um(um) if um != 0.0) {
                 bail!("--ink: µm need the size of the tiles: give --target FILE, or --ink none");
             }
@@ -96,20 +96,21 @@ impl FinderArgs {
                 _ => GridKind::Deltille,
             };
             let size = self.rows.zip(self.cols);
-            return Ok((None, Detector::for_grid(kind, size, config)));
-        };
-        let target = target_file::read(path, &self.limits()).context("--target")?;
-        let family = target_file::family(&target, self.family.as_deref())?;
-        if let (Some(limit), Some(family)) = (self.max_errors, &family)
-            && limit > family.correctable()
-        {
-            bail!(
-                "--max-errors: {limit} is more than the {} bits that {} can correct",
-                family.correctable(),
-                family.name()
-            );
+            return Ok((Vec::new(), Detector::for_grid(kind, size, config)));
         }
-        let detector = Detector::for_target(&target, family.as_ref(), config);
-        Ok((Some(target), detector))
+        let targets = target_file::read_all(&self.target, &self.limits()).context("--target")?;
+        let families = target_file::families(&targets, self.family.as_deref())?;
+        for family in families.iter().flatten() {
+            if let Some(limit) = self.max_errors.filter(|limit| *limit > family.correctable()) {
+                bail!(
+                    "--max-errors: {limit} is more than the {} bits that {} can correct",
+                    family.correctable(),
+                    family.name()
+                );
+            }
+        }
+        let each = targets.iter().zip(families.iter().map(Option::as_ref)).collect::<Vec<_>>();
+        let detector = Detector::for_targets(&each, config).context("--target")?;
+        Ok((targets, detector))
     }
 }

@@ -9,12 +9,12 @@ use super::images::Images;
 use super::limits::ImageLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
-use crate::calibrate::{Calibration, Diagnosis, Estimate, PanelPlace, Reference, Words, views};
+use crate::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::FAILED;
 use crate::cli::wording::in_options;
-use crate::detect::{Detector, DetectorConfig};
+use crate::detect::{Detection, Detector, DetectorConfig};
 use crate::export::calibration::Sheet;
 use crate::export::kind::Kind;
 use crate::export::pose;
@@ -28,9 +28,10 @@ pub struct Args {
     /// Photographs: files, folders, patterns, or - for a list on standard input
     #[arg(required = true, value_name = "IMAGES")]
     images: Vec<PathBuf>,
-    /// Description of the target: the .json that was written with it, or a .dsc
-    #[arg(long, value_name = "FILE")]
-    target: PathBuf,
+    /// Description of the target: the .json that was written with it, or a .dsc; may be given for each of several
+    /// targets
+    #[arg(long, required = true, value_name = "FILE")]
+    target: Vec<PathBuf>,
     /// The camera, as `deltille calibrate`, ROS or OpenCV write it
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
@@ -39,7 +40,7 @@ pub struct Args {
     /// Family file, where the target names a family that is not shipped
     #[arg(long)]
     family: Option<String>,
-    /// Write a line for every picture: where there is no pose, camera_from_target is null, and reason says why
+    /// Write a line for every picture, and of several targets for each: where there is no pose, camera_from_target is null, and reason says why
     #[arg(long)]
     every_picture: bool,
     /// Write the lines to a file instead of standard output
@@ -54,18 +55,17 @@ pub struct Args {
 /// Finds the target in each image and says where it is, a line of JSON each.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let limits = args.limits.limits();
-    let target = target_file::read(&args.target, &limits).context("--target")?;
-    let family = target_file::family(&target, args.family.as_deref())?;
+    let targets = target_file::read_all(&args.target, &limits).context("--target")?;
+    let families = target_file::families(&targets, args.family.as_deref())?;
     let sheet = args.sheet.read(&limits)?;
-    let panels = sightings::panels(&Reference::Target(&target), &sheet)?;
-    let finder = Finder {
-        detector: Detector::for_target(&target, family.as_ref(), DetectorConfig::default()),
-        camera: camera_file::read("--camera", &args.camera)?,
-        target: &target,
-        sheet,
-        panels,
-        limits,
-    };
+    if let [_, _, ..] = targets.as_slice() {
+        // Refuses what is known of one sheet alone.
+        sightings::panels(&Reference::Scene(&targets), &sheet)?;
+    }
+    let each = targets.iter().zip(families.iter().map(Option::as_ref)).collect::<Vec<_>>();
+    let detector = Detector::for_targets(&each, DetectorConfig::default()).context("--target")?;
+    let camera = camera_file::read("--camera", &args.camera)?;
+    let finder = Finder { detector, camera, targets, sheet, limits };
     let path =
         args.output.as_ref().map(|path| output::file(path, "poses", "ndjson")).transpose()?;
     if let Some(path) = &path {
@@ -76,23 +76,39 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let image = image?;
         all += 1;
         let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let of_image = match finder.find(&image, &name)? {
-            Found::Pose(found) => {
-                let views = found.cameras.iter().flat_map(|camera| &camera.views);
-                views.map(|view| pose::write_line(&found, view, &target.name) + "\n").collect()
-            }
-            Found::Nothing { why, is_unread } => {
-                match is_unread {
-                    true => tell!("error: {why}"),
-                    false => tell!("{}: {why}", image.display()),
-                }
-                (without, unread) = (without + 1, unread + usize::from(is_unread));
-                match args.every_picture {
-                    true => pose::write_none(&name, &target.name, &in_options(&why)) + "\n",
-                    false => String::new(),
+        let mut of_image = String::new();
+        match finder.find(&image, &name)? {
+            Seen::Unread(why) => {
+                tell!("error: {why}");
+                (without, unread) = (without + 1, unread + 1);
+                for target in finder.targets.iter().filter(|_| args.every_picture) {
+                    of_image += &(pose::write_none(&name, &target.name, &in_options(&why)) + "\n");
                 }
             }
-        };
+            Seen::Targets(found) => {
+                let is_there = found.iter().any(Result::is_ok);
+                without += usize::from(!is_there);
+                for (target, found) in finder.targets.iter().zip(found) {
+                    match found {
+                        Ok(found) => {
+                            let views = found.cameras.iter().flat_map(|camera| &camera.views);
+                            let line = |view| pose::write_line(&found, view, &target.name) + "\n";
+                            of_image += &views.map(line).collect::<String>();
+                        }
+                        Err(why) => {
+                            // Of several targets a picture need not show all.
+                            if !is_there {
+                                tell!("{}: {}{why}", image.display(), finder.of_target(target));
+                            }
+                            if args.every_picture {
+                                let line = pose::write_none(&name, &target.name, &in_options(&why));
+                                of_image += &(line + "\n");
+                            }
+                        }
+                    }
+                }
+            }
+        }
         match path {
             Some(_) => lines += &of_image,
             None => output::print(&of_image)?,
@@ -111,54 +127,73 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(if without > 0 { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
 }
 
-/// Finds a target in pictures of a known camera.
-struct Finder<'a> {
+/// Finds targets in pictures of a known camera.
+struct Finder {
     detector: Detector,
     camera: Camera,
-    target: &'a Target,
+    targets: Vec<Target>,
     sheet: Sheet,
-    panels: Vec<PanelPlace>,
     limits: Limits,
 }
 
-/// What was found in a picture.
-enum Found {
-    Pose(Box<Estimate>),
-    Nothing { why: String, is_unread: bool },
+/// What a picture shows.
+enum Seen {
+    /// Of each target its pose, or why there is none.
+    Targets(Vec<Result<Estimate, String>>),
+    /// The picture cannot be read, and why.
+    Unread(String),
 }
 
-impl Finder<'_> {
-    fn find(&self, image: &Path, name: &str) -> anyhow::Result<Found> {
+impl Finder {
+    /// What a sentence about a target begins with where there are several.
+    fn of_target(&self, target: &Target) -> String {
+        match self.targets.len() {
+            1 => String::new(),
+            _ => format!("{}: ", target.name),
+        }
+    }
+
+    fn find(&self, image: &Path, name: &str) -> anyhow::Result<Seen> {
         let picture = match photograph::read_within(image, &self.limits) {
             Ok(picture) => picture,
-            Err(error) => return Ok(Found::Nothing { why: error.to_string(), is_unread: true }),
+            Err(error) => return Ok(Seen::Unread(error.to_string())),
         };
-        let seen = self.detector.detect(&picture, name);
-        let reason = seen.reasons.first().map(|reason| reason.to_string());
-        let shown = views(&[(name.to_owned(), seen)], &Reference::Target(self.target));
-        let mut views = shown?.views;
-        sightings::put_on(&self.sheet, Some(self.target), &mut views)?;
-        let calibration =
-            Calibration::new(self.panels.iter().copied()).camera("", views, self.camera.clone());
+        let seen = [(name.to_owned(), self.detector.detect(&picture, name))];
+        let found = self.targets.iter().map(|target| self.pose(target, &seen, image));
+        Ok(Seen::Targets(found.collect::<anyhow::Result<_>>()?))
+    }
+
+    /// The pose of a target in a picture, or why there is none.
+    fn pose(
+        &self,
+        target: &Target,
+        seen: &[(String, Detection)],
+        image: &Path,
+    ) -> anyhow::Result<Result<Estimate, String>> {
+        let reference = Reference::Target(target);
+        let mut views = views(seen, &reference)?.views;
+        sightings::put_on(&self.sheet, Some(target), &mut views)?;
+        let panels = sightings::panels(&reference, &self.sheet)?;
+        let calibration = Calibration::new(panels).camera("", views, self.camera.clone());
         let found = calibration.solve().with_context(|| image.display().to_string())?;
         let words = Words::new(&found, None);
         let said = found.inspect();
         let foreign = said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
-        let why = match foreign {
-            Some(foreign) => Some(words.sentence(foreign)),
-            None if found.frames.is_empty() => {
-                let excluded = found.excluded.first().map(|out| out.reason.to_string());
-                Some(excluded.or(reason).unwrap_or_else(|| "no target in it".to_owned()))
-            }
-            None => None,
-        };
-        if let Some(why) = why {
-            return Ok(Found::Nothing { why, is_unread: false });
+        if let Some(foreign) = foreign {
+            return Ok(Err(words.sentence(foreign)));
+        }
+        if found.frames.is_empty() {
+            let excluded = found.excluded.first().map(|out| out.reason.to_string());
+            let reason = || seen[0].1.reasons.first().map(|reason| reason.to_string());
+            return Ok(Err(excluded
+                .or_else(reason)
+                .unwrap_or_else(|| "no target in it".to_owned())));
         }
         // Where the lens ends is the camera's, and the same for every picture.
         for diagnosis in said.iter().filter(|said| !matches!(said, Diagnosis::LensEnds { .. })) {
-            tell!("{}: {}", image.display(), words.sentence(diagnosis));
+            let of_target = self.of_target(target);
+            tell!("{}: {of_target}{}", image.display(), words.sentence(diagnosis));
         }
-        Ok(Found::Pose(Box::new(found)))
+        Ok(Ok(found))
     }
 }

@@ -14,7 +14,7 @@ use super::limits::FileLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
-    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
+    Calibration, CameraViews, Estimate, Excluded, Intrinsics, PanelPlace, Reference, TargetMap,
 };
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
@@ -35,9 +35,10 @@ pub struct Args {
     /// first is the rig's frame. Pictures of one moment have the same file name in each folder
     #[arg(long, required = true, value_name = "NAME=FOLDER", value_parser = named)]
     camera: Vec<(String, PathBuf)>,
-    /// Description of the target: the .json that was written with it
-    #[arg(long, value_name = "FILE")]
-    target: PathBuf,
+    /// Description of the target: the .json that was written with it; once for each of several targets that do not
+    /// move against each other, of which no camera need see more than one
+    #[arg(long, required = true, value_name = "FILE")]
+    target: Vec<PathBuf>,
     /// What is to be found of each camera, see `deltille calibrate`
     #[arg(long, default_value = "radtan")]
     model: ModelChoice,
@@ -97,15 +98,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     check_folders(&args.camera)?;
     check_folder(&args.output).context("-o")?;
     let limits = args.limits.limits();
-    let target = target_file::read(&args.target, &limits).context("--target")?;
-    let reference = Reference::Target(&target);
+    let targets = target_file::read_all(&args.target, &limits).context("--target")?;
+    let reference = match targets.as_slice() {
+        [only] => Reference::Target(only),
+        several => Reference::Scene(several),
+    };
     let sheet = args.sheet.read(&limits)?;
     let panels = sightings::panels(&reference, &sheet)?;
     let cameras = args.camera.iter().map(|(name, _)| args.intrinsics(name));
     let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
-    args.check_files(&cameras, &target)?;
+    args.check_files(&cameras, &targets)?;
     let page = args.solve.page("rig", args.overwrite)?;
-    let mut calibration = Calibration::new(panels).refine_panels(args.refine_target);
+    let mut calibration = scene(&targets, panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
     for ((name, folder), intrinsics) in args.camera.iter().zip(cameras) {
         let read = sightings::read(std::slice::from_ref(folder), &reference, &limits);
@@ -119,7 +123,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 unsure.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }),
             );
         }
-        sightings::put_on(&sheet, Some(&target), &mut views)?;
+        sightings::put_on(&sheet, targets.first(), &mut views)?;
         left_out.extend(out.into_iter().map(|out| Excluded { camera: Some(name.clone()), ..out }));
         ink.extend(of_camera);
         if let Some(folder) = of_name(&args.images, name) {
@@ -152,7 +156,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let cameras = estimate.cameras.iter();
     let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
     let cameras = cameras.collect::<Vec<_>>();
-    let files = args.files(&cameras, &in_options(&json), estimate, &target)?;
+    let files = args.files(&cameras, &in_options(&json), estimate, &targets)?;
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
         let folder = |(name, _): &(String, PathBuf)| of_name(&args.images, name);
@@ -178,14 +182,14 @@ impl Args {
     }
 
     /// Refuses before the work what could not be written after it.
-    fn check_files(&self, cameras: &[Intrinsics], target: &Target) -> anyhow::Result<()> {
+    fn check_files(&self, cameras: &[Intrinsics], targets: &[Target]) -> anyhow::Result<()> {
         let samples: Vec<Camera> = cameras.iter().map(sample).collect();
         let cameras = self.camera.iter().zip(&samples);
         let cameras = cameras.map(|((name, _), camera)| (name.as_str(), camera, Pose::IDENTITY));
         let mut found = Estimate::default();
         found.map = self.solve.measures_target().then(|| TargetMap::new(Vec::new(), [0.0; 2]));
         let json = sample_of(rig::SCHEMA);
-        let files = self.files(&cameras.collect::<Vec<_>>(), &json, &found, target)?;
+        let files = self.files(&cameras.collect::<Vec<_>>(), &json, &found, targets)?;
         check_places(&self.output, &files, self.overwrite)
     }
 
@@ -195,7 +199,7 @@ impl Args {
         cameras: &[(&str, &Camera, Pose)],
         json: &str,
         found: &Estimate,
-        target: &Target,
+        targets: &[Target],
     ) -> anyhow::Result<Vec<File>> {
         let mut files = vec![text_file("rig.json".to_owned(), json.to_owned())];
         for (name, camera, _) in cameras {
@@ -204,23 +208,42 @@ impl Args {
         for format in &self.format {
             files.extend(format.files(cameras).context("--format")?);
         }
-        let refined = self.refine_target.then(|| found.refined(target));
-        let measured = found.map.as_ref().map(|map| map.on(refined.as_ref().unwrap_or(target)));
-        let end = if measured.is_some() { "-measured" } else { "" };
-        if let Some(target) = measured.or(refined) {
-            let name = format!("{}{end}", target.name);
-            let place = self.output.join(format!("{name}.json"));
-            ensure!(
-                !same_file(&place, &self.target),
-                "-o: {} would overwrite the target that was given: choose another folder",
-                place.display()
-            );
-            files.push(text_file(format!("{name}.json"), target.to_json()));
-            let drawn = found.map.as_ref().map(target_map_svg);
-            files.extend(drawn.map(|svg| text_file(format!("{name}.svg"), svg)));
+        for (index, target) in targets.iter().enumerate() {
+            files.extend(self.files_of_target(&found.of_target(index), target)?);
         }
         Ok(files)
     }
+
+    /// A target as it was found, where that was asked for.
+    fn files_of_target(&self, found: &Estimate, target: &Target) -> anyhow::Result<Vec<File>> {
+        let refined = self.refine_target.then(|| found.refined(target));
+        let measured = found.map.as_ref().map(|map| map.on(refined.as_ref().unwrap_or(target)));
+        let end = if measured.is_some() { "-measured" } else { "" };
+        let Some(target) = measured.or(refined) else { return Ok(Vec::new()) };
+        let name = format!("{}{end}", target.name);
+        let place = self.output.join(format!("{name}.json"));
+        ensure!(
+            !self.target.iter().any(|given| same_file(&place, given)),
+            "-o: {} would overwrite the target that was given: choose another folder",
+            place.display()
+        );
+        let file = text_file(format!("{name}.json"), target.to_json());
+        let drawn = found.map.as_ref().map(target_map_svg);
+        let drawn = drawn.map(|svg| text_file(format!("{name}.svg"), svg));
+        Ok([file].into_iter().chain(drawn).collect())
+    }
+}
+
+/// A calibration of one target, or of several, with their panels one target after the other.
+fn scene(targets: &[Target], panels: Vec<PanelPlace>) -> Calibration {
+    if targets.len() == 1 {
+        return Calibration::new(panels);
+    }
+    let mut panels = panels.into_iter();
+    let of_target = |target: &Target| {
+        (target.name.to_string(), panels.by_ref().take(target.panels.len()).collect())
+    };
+    Calibration::of_targets(targets.iter().map(of_target).collect::<Vec<_>>())
 }
 
 /// Refuses names of cameras that cannot be names of files, or not of different ones.
@@ -306,6 +329,12 @@ impl Format {
     }
 }
 
+/// The largest deviations of a place and a turn.
+fn within(sd: &[f64; 6]) -> String {
+    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
+    format!(" ± {:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
+}
+
 fn summary(solved: &Calibrated) -> String {
     let estimate = &solved.estimate;
     let headline = |estimate: &Estimate| {
@@ -321,10 +350,7 @@ fn summary(solved: &Calibrated) -> String {
     for camera in &estimate.cameras {
         let (fx, fy) = camera.camera.focal_px.into();
         let at = camera.camera_from_rig.inverse().translation;
-        let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
-        let deviation = camera.pose_sd.map_or(String::new(), |sd| {
-            format!(" ± {:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
-        });
+        let deviation = camera.pose_sd.map_or(String::new(), |sd| within(&sd));
         lines.push(format!(
             "{}: {} corners, rms {:.4} px{}, fx {fx:.2}, fy {fy:.2}; at ({}) mm{deviation}",
             camera.name,
@@ -334,6 +360,11 @@ fn summary(solved: &Calibrated) -> String {
             at.to_array().map(|mm| fixed(mm, 2)).join(", ")
         ));
         lines.extend(sureness(camera).map(|line| format!("{}: {line}", camera.name)));
+    }
+    for target in estimate.targets.iter().filter(|_| estimate.targets.len() > 1) {
+        let at = target.scene_from_target.translation.to_array().map(|mm| fixed(mm, 2));
+        let deviation = target.pose_sd.map_or(String::new(), |sd| within(&sd));
+        lines.push(format!("target {}: at ({}) mm{deviation}", target.name, at.join(", ")));
     }
     lines.extend(solved.lines());
     lines.extend(estimate.held_out.iter().map(|test| format!("held out: {}", headline(test))));

@@ -189,6 +189,15 @@ const NOT_WHOLE: &str =
 pub fn panels(reference: &Reference, sheet: &Sheet) -> anyhow::Result<Vec<PanelPlace>> {
     let scale = match reference {
         Reference::Target(target) => solid_scale(sheet, target)?,
+        Reference::Scene(_) => {
+            ensure!(sheet.print_scale.is_none(), "--print-scale: it is that of one target");
+            ensure!(sheet.shape.is_none(), "--shape: it is that of one board");
+            ensure!(
+                !reference.is_loose(),
+                "--target: boards of one file that lie about have no place in a scene: make a file for each"
+            );
+            1.0
+        }
         Reference::Grid(_) => 1.0,
     };
     let mut panels = reference.panels();
@@ -328,7 +337,7 @@ pub fn read(paths: &[PathBuf], reference: &Reference, limits: &Limits) -> anyhow
 fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<InkEstimate> {
     let on_print = |ink: InkEstimate| match reference {
         Reference::Grid(grid) => ink.on_print(grid.edge_mm),
-        Reference::Target(_) => ink,
+        Reference::Target(_) | Reference::Scene(_) => ink,
     };
     let found: Vec<InkEstimate> =
         detections.iter().filter_map(|(_, found)| Some(on_print(found.ink?))).collect();

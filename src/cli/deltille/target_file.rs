@@ -1,10 +1,11 @@
 //! Targets from files, and the families that they name.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
 use crate::cli::output;
+use crate::detect::check_distinct;
 use crate::export::dsc;
 use crate::family::{self, Family};
 use crate::limits::Limits;
@@ -24,6 +25,33 @@ pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Target> {
         return dsc::read(&text, &stem).with_context(show);
     }
     Target::from_json(&text).with_context(show)
+}
+
+/// The targets of several files, which can be told apart.
+pub fn read_all(paths: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Target>> {
+    let targets =
+        paths.iter().map(|path| read(path, limits)).collect::<anyhow::Result<Vec<_>>>()?;
+    check_distinct(&targets.iter().collect::<Vec<_>>())?;
+    Ok(targets)
+}
+
+/// The family of each of several targets; a file that is given is that of those which name its family.
+pub fn families(targets: &[Target], given: Option<&str>) -> anyhow::Result<Vec<Option<Family>>> {
+    if let [only] = targets {
+        return Ok(vec![family(only, given)?]);
+    }
+    let name = given.map(|given| family::resolve(given).context("--family")).transpose()?;
+    let name = name.map(|family| family.name().to_owned());
+    let names_it = |target: &Target| {
+        target.family.as_ref().is_some_and(|family| Some(&family.name) == name.as_ref())
+    };
+    if let Some(name) = &name
+        && !targets.iter().any(names_it)
+    {
+        bail!("--family: no target carries tags of {name}");
+    }
+    let own = |target: &Target| family(target, given.filter(|_| names_it(target)));
+    targets.iter().map(own).collect()
 }
 
 /// The family of a target: the file given, else by the name in the target, else by the path in its

@@ -72,4 +72,4 @@ pub use detector::{Detector, DetectorConfig};
 pub use ink::{Ink, InkEstimate};
 pub use reason::{Reason, ReasonKind};
 pub use refine::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};
-pub use scene::SceneError;
+pub use scene::{SceneError, check_distinct};

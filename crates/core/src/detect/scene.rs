@@ -46,7 +46,10 @@ pub enum SceneError {
 }
 
 /// Refuses targets that cannot be told apart in a picture.
-pub(super) fn check_distinct(targets: &[&Target]) -> Result<(), SceneError> {
+///
+/// # Errors
+/// Where there is none, or two have the same name, a tag in common, or no tags and the same outline.
+pub fn check_distinct(targets: &[&Target]) -> Result<(), SceneError> {
     if targets.is_empty() {
         return Err(SceneError::Empty);
     }

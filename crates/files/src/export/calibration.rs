@@ -162,7 +162,7 @@ pub fn write(found: &Estimate, said: &[Diagnosis], print: Print) -> Option<Strin
         print_scale: print.scale,
         ink: print.ink,
         board_shape: found.shape.map(shape),
-        target_map: found.map.as_ref().map(map),
+        target_map: found.map.as_ref().map(|of_target| map(found, of_target)),
         views: views(found, camera),
         held_out: held_out.map(|(test, camera)| HeldOut {
             rms_px: test.rms_px,

@@ -1,7 +1,7 @@
 //! Detections as comma-separated values, one corner a line, for spreadsheets and data frames; and
 //! lists of points, which are read.
 //!
-//! Columns: `grid` (counted from 0 in the image), `kind`, `panel`, `row`, `col`, `id`, `x`, `y`
+//! Columns: `grid` (counted from 0 in the image), `kind`, `panel` (`target:panel` of several targets), `row`, `col`, `id`, `x`, `y`
 //! (px, pixel centres at integers, y down), `cov_xx`, `cov_xy`, `cov_yy` (px²). A cell is empty
 //! where nothing is known.
 
@@ -30,7 +30,11 @@ pub fn write(detection: &Detection) -> String {
             GridKind::Deltille => "deltille",
             GridKind::Checker => "checker",
         };
-        let panel = grid.panel.map_or_else(String::new, |id| id.to_string());
+        let panel = match (&grid.target, grid.panel) {
+            (_, None) => String::new(),
+            (None, Some(id)) => id.to_string(),
+            (Some(target), Some(id)) => format!("{target}:{id}"),
+        };
         for corner in &grid.corners {
             let (row, col, x, y) = (corner.row, corner.col, corner.x, corner.y);
             let id = corner.id.map_or_else(String::new, |id| id.to_string());

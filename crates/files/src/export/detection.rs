@@ -166,7 +166,8 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
             return Err(DetectionFileError::Again { grid, first });
         }
         // Labels without a panel are those of their grid alone.
-        let labels = of_grid.panel.map_or((None, grid), |panel| (Some(panel), 0));
+        let labels =
+            of_grid.panel.map_or((None, grid), |panel| (Some((&of_grid.target, panel)), 0));
         for (corner, found) in of_grid.corners.iter().enumerate() {
             if let Some(problem) = found.cov.and_then(|cov| check_covariance(cov).err()) {
                 return Err(DetectionFileError::Corner { grid, corner, problem });

@@ -48,16 +48,22 @@ struct UncertaintyRecord {
 #[derive(Serialize)]
 pub(super) struct ViewRecord<'a> {
     name: &'a str,
+    /// The frame that it shows, where that is called otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    frame: Option<&'a str>,
     image: &'a str,
     rms_px: f64,
     outliers: usize,
     camera_from_target: Motion,
     /// Row, column, x, y, dx, dy of each corner, by panel.
-    corners: Vec<CornerRecord>,
+    corners: Vec<CornerRecord<'a>>,
 }
 
 #[derive(Serialize)]
-struct CornerRecord {
+struct CornerRecord<'a> {
+    /// Where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target: Option<&'a str>,
     panel: PanelRef,
     row: i32,
     col: i32,
@@ -167,11 +173,14 @@ pub(super) fn correlations(camera: &CameraEstimate) -> Vec<Vec<f64>> {
 }
 
 /// The views of a camera; poses have deviations where the camera is the rig.
-pub(super) fn views<'a>(estimate: &Estimate, camera: &'a CameraEstimate) -> Vec<ViewRecord<'a>> {
+pub(super) fn views<'a>(estimate: &'a Estimate, camera: &'a CameraEstimate) -> Vec<ViewRecord<'a>> {
     let is_rig_frame = camera.pose_sd.is_none() && estimate.cameras.len() == 1;
     let record = |view: &'a ViewEstimate| {
-        let frame = estimate.frames.get(view.frame).filter(|_| is_rig_frame);
+        let of_view = estimate.frames.get(view.frame);
+        let frame = of_view.filter(|_| is_rig_frame);
+        let other = of_view.filter(|frame| camera.delay != 0 && frame.name != view.name);
         let corners = view.corners.iter().map(|corner| CornerRecord {
+            target: estimate.target_name(corner.panel),
             panel: corner.panel,
             row: corner.row,
             col: corner.col,
@@ -183,6 +192,7 @@ pub(super) fn views<'a>(estimate: &Estimate, camera: &'a CameraEstimate) -> Vec<
         });
         ViewRecord {
             name: &view.name,
+            frame: other.map(|frame| frame.name.as_str()),
             image: &view.image,
             rms_px: view.rms_px,
             outliers: view.outlier_count(),
@@ -217,6 +227,8 @@ pub(super) struct MapRecord<'a> {
 
 #[derive(Serialize)]
 struct OffsetRecord<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target: Option<&'a str>,
     panel: PanelRef,
     row: i32,
     col: i32,
@@ -226,8 +238,10 @@ struct OffsetRecord<'a> {
     views: usize,
 }
 
-pub(super) fn map(found: &TargetMap) -> MapRecord<'_> {
+/// The map of what was photographed.
+pub(super) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -> MapRecord<'a> {
     let corners = found.corners().iter().map(|corner| OffsetRecord {
+        target: estimate.target_name(corner.panel),
         panel: corner.panel,
         row: corner.row,
         col: corner.col,

@@ -31,6 +31,8 @@ struct RigFile<'a> {
     board_shape: Option<ShapeRecord>,
     #[serde(skip_serializing_if = "Option::is_none")]
     target_map: Option<MapRecord<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    targets: Vec<TargetRecord<'a>>,
     cameras: Vec<Camera<'a>>,
     frames: Vec<Frame<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -40,6 +42,15 @@ struct RigFile<'a> {
     findings: Vec<FindingRecord>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     diagnoses: Vec<DiagnosisRecord<'a>>,
+}
+
+/// One of several targets.
+#[derive(Serialize)]
+struct TargetRecord<'a> {
+    name: &'a str,
+    /// How many it has.
+    panels: usize,
+    scene_from_target: Motion,
 }
 
 #[derive(Serialize)]
@@ -108,7 +119,8 @@ pub fn write(found: &Estimate, said: &[Diagnosis], model: &str, print: Print) ->
         common_px: found.common_px,
         print_scale: print.scale,
         board_shape: found.shape.map(shape),
-        target_map: found.map.as_ref().map(map),
+        target_map: found.map.as_ref().map(|of_target| map(found, of_target)),
+        targets: targets(found),
         cameras: found.cameras.iter().map(|camera| of_camera(found, camera)).collect(),
         frames: frames(found),
         held_out,
@@ -119,7 +131,17 @@ pub fn write(found: &Estimate, said: &[Diagnosis], model: &str, print: Print) ->
     json::to_text(&file, 4)
 }
 
-fn of_camera<'a>(estimate: &Estimate, found: &'a CameraEstimate) -> Camera<'a> {
+fn targets(found: &Estimate) -> Vec<TargetRecord<'_>> {
+    let several = found.targets.iter().filter(|_| found.targets.len() > 1);
+    let records = several.map(|target| TargetRecord {
+        name: &target.name,
+        panels: target.panels.len(),
+        scene_from_target: Motion::new(&target.scene_from_target, target.pose_sd),
+    });
+    records.collect()
+}
+
+fn of_camera<'a>(estimate: &'a Estimate, found: &'a CameraEstimate) -> Camera<'a> {
     Camera {
         name: &found.name,
         model: found.model.map_or("fixed".to_owned(), |model| model.to_string()),
@@ -144,7 +166,7 @@ fn is_none(frames: &i32) -> bool {
     *frames == 0
 }
 
-fn seen<'a>(estimate: &Estimate, found: &'a CameraEstimate) -> Seen<'a> {
+fn seen<'a>(estimate: &'a Estimate, found: &'a CameraEstimate) -> Seen<'a> {
     Seen { name: &found.name, rms_px: found.rms_px, views: views(estimate, found) }
 }
 

@@ -13,7 +13,7 @@ use super::rig;
 use deltille_core::calibrate::{
     BoardShape, CameraEstimate, Corner, CornerOffset, Estimate, Excluded, FrameEstimate, Model,
     ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
-    SHAPE_COEFFICIENTS as COUNT, TargetMap, ViewEstimate,
+    SHAPE_COEFFICIENTS as COUNT, TargetEstimate, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, Pose};
 use deltille_core::json::{self, ReadError};
@@ -71,9 +71,9 @@ pub fn read_cameras(text: &str) -> Result<Vec<CameraEstimate>, SavedError> {
 /// What was photographed, if that is known.
 type Panels<'a> = Option<&'a Reference<'a>>;
 
-fn panel(panels: Panels, id: u32) -> Result<PanelRef, SavedError> {
+fn panel(panels: Panels, target: Option<&str>, id: u32) -> Result<PanelRef, SavedError> {
     match panels {
-        Some(reference) => reference.panel(id).ok_or(SavedError::Panel(id)),
+        Some(reference) => reference.panel(target, id).ok_or(SavedError::Panel(id)),
         None => Ok(PanelRef::new(id as usize, id)),
     }
 }
@@ -97,11 +97,21 @@ struct SingleHeldOut {
 
 #[derive(Deserialize)]
 struct Rig {
+    #[serde(default)]
+    targets: Vec<SavedTarget>,
     cameras: Vec<SavedCamera>,
     frames: Vec<SavedFrame>,
     #[serde(flatten)]
     fit: Fit,
     held_out: Option<RigHeldOut>,
+}
+
+/// One of several targets.
+#[derive(Deserialize)]
+struct SavedTarget {
+    name: String,
+    panels: usize,
+    scene_from_target: SavedPose,
 }
 
 #[derive(Deserialize)]
@@ -188,6 +198,7 @@ struct SavedFrame {
 #[derive(Deserialize)]
 struct SavedView {
     name: String,
+    frame: Option<String>,
     image: String,
     #[serde(deserialize_with = "quantity::deviation::de")]
     rms_px: f64,
@@ -197,6 +208,7 @@ struct SavedView {
 
 #[derive(Deserialize)]
 struct SavedCorner {
+    target: Option<String>,
     panel: u32,
     row: i32,
     col: i32,
@@ -247,6 +259,7 @@ struct SavedMap {
 
 #[derive(Deserialize)]
 struct SavedOffset {
+    target: Option<String>,
     panel: u32,
     #[serde(deserialize_with = "quantity::place_in_lattice::de")]
     row: i32,
@@ -297,7 +310,7 @@ impl Single {
 
 impl Rig {
     fn estimate(self, reference: Panels) -> Result<Estimate, SavedError> {
-        let Self { cameras, frames, fit, held_out } = self;
+        let Self { targets, cameras, frames, fit, held_out } = self;
         let place =
             |frames: &[SavedFrame], name: &str| frames.iter().position(|frame| frame.name == name);
         let found = cameras.into_iter().map(|camera| {
@@ -322,6 +335,15 @@ impl Rig {
         estimate.held_out = held_out.transpose()?.map(Box::new);
         estimate.frames = frames.into_iter().map(SavedFrame::read).collect();
         estimate.cameras = cameras;
+        let mut first = 0;
+        let targets = targets.into_iter().map(|target| {
+            let panels = first..target.panels.saturating_add(first);
+            first = panels.end;
+            let place = &target.scene_from_target;
+            let (scene_from_target, pose_sd) = (place.pose(), place.sd());
+            TargetEstimate { name: target.name, panels, scene_from_target, pose_sd }
+        });
+        estimate.targets = targets.collect();
         let (sum, count) = estimate.corners().fold((0.0, 0), |(sum, count), corner| {
             (sum + corner.residual.length_squared(), count + 2)
         });
@@ -373,12 +395,13 @@ fn estimates(
     reference: Panels,
 ) -> Result<Vec<ViewEstimate>, SavedError> {
     let read = |(index, view): (usize, SavedView)| {
-        let frame = frame(index, &view.name).ok_or_else(|| SavedError::Field {
+        let shown = view.frame.as_ref().unwrap_or(&view.name);
+        let frame = frame(index, shown).ok_or_else(|| SavedError::Field {
             field: "views".to_owned(),
-            problem: format!("{} is no frame", view.name),
+            problem: format!("{shown} is no frame"),
         })?;
         let corners = view.corners.iter().map(|corner| {
-            let panel = panel(reference, corner.panel)?;
+            let panel = panel(reference, corner.target.as_deref(), corner.panel)?;
             Ok(corner.read(panel))
         });
         Ok(ViewEstimate {
@@ -515,7 +538,7 @@ impl SavedShape {
 impl SavedMap {
     fn read(self, reference: Panels) -> Result<TargetMap, SavedError> {
         let corners = self.corners.into_iter().map(|corner| {
-            let panel = panel(reference, corner.panel)?;
+            let panel = panel(reference, corner.target.as_deref(), corner.panel)?;
             let SavedOffset { row, col, covariance_mm2, views, .. } = corner;
             let [panel_mm, offset_mm] = [corner.panel_mm, corner.offset_mm].map(DVec3::from);
             Ok(CornerOffset { panel, row, col, panel_mm, offset_mm, covariance_mm2, views })
