@@ -1,11 +1,14 @@
 //! Rigs in which something is not as it should be, and scenes of several targets: simulated with exact truth, what is
 //! found is what was put in, or the culprit is named.
 
+use std::fs;
+
 use deltille::calibrate::{
     Calibration, CalibrationError, Diagnosis, Estimate, Model, Observation, PanelPlace, PanelRef,
-    Sighting, TooPlain, View,
+    Reference, Sighting, TooPlain, View,
 };
 use deltille::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille::export::saved;
 use deltille::family::Family;
 use deltille::lattice::GridKind;
 use deltille::targets::{BoardSpec, SolidShape, SolidSpec, TagSpec, Target, TargetSpec};
@@ -13,6 +16,8 @@ use glam::{DQuat, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
+
+use crate::common::command::deltille;
 
 /// Deviation of the simulated corners, px.
 const NOISE_PX: f64 = 0.07;
@@ -26,6 +31,8 @@ struct Scene {
     scene_from_target: Vec<Pose>,
     cameras: Vec<Camera>,
     camera_from_rig: Vec<Pose>,
+    /// Of the scene on the rig, in each moment.
+    places: Vec<Pose>,
     /// By camera.
     views: Vec<Vec<View>>,
 }
@@ -106,6 +113,7 @@ impl Scene {
             views.filter(|view| !view.sightings.is_empty()).collect()
         });
         self.views = views.collect();
+        self.places = places.to_vec();
         self
     }
 
@@ -189,6 +197,7 @@ fn back_to_back_late(frames: usize, reach_rad: DVec3, late: usize, seed: u64) ->
         targets,
         cameras: (0..2).map(|_| camera(&mut random)).collect(),
         camera_from_rig: vec![Pose::IDENTITY, behind],
+        places: Vec::new(),
         views: Vec::new(),
     };
     let places = (0..frames + late).map(|_| {
@@ -271,6 +280,7 @@ fn around_late(cameras: usize, frames: usize, late: &[i32], seed: u64) -> Scene 
             .iter()
             .map(|pose| pose.after(&rig_from_world.inverse()))
             .collect(),
+        places: Vec::new(),
         views: Vec::new(),
     };
     let mut turn = DQuat::from_scaled_axis(any(&mut random, 3.0));
@@ -396,4 +406,42 @@ fn scenes_of_twenty_seeds() {
             assert_eq!(found.cameras[1].delay, 1);
         },
     );
+}
+
+/// Photographs by the two cameras, and what the programs make of them.
+#[test]
+fn programs_find_cameras_back_to_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let scene = back_to_back(14, ALL_WAYS, 11);
+    // Each sees the target of its own.
+    for (index, (target, camera)) in scene.targets.iter().zip(&scene.cameras).enumerate() {
+        fs::write(folder.join(format!("{}.json", target.name)), target.to_json()).unwrap();
+        fs::write(folder.join(format!("c{index}.yaml")), camera.to_yaml()).unwrap();
+        fs::create_dir(folder.join(format!("c{index}"))).unwrap();
+        let camera_from_target = |place: &Pose| {
+            scene.camera_from_rig[index].after(place).after(&scene.scene_from_target[index])
+        };
+        for (frame, place) in scene.places.iter().enumerate() {
+            let pose = camera_from_target(place);
+            let turn = pose.rotation.to_scaled_axis();
+            let [turn, at] = [turn, pose.translation].map(|v| format!("{},{},{}", v.x, v.y, v.z));
+            let (name, camera) = (&target.name, format!("c{index}"));
+            let of_frame = format!("--pose={turn},{at} -o {camera}/{frame:02}.png");
+            deltille(folder, &format!("render {name}.json --camera {camera}.yaml {of_frame}"))
+                .success();
+        }
+    }
+    let targets = "--target front.json --target back.json";
+    for camera in ["c0", "c1"] {
+        deltille(folder, &format!("detect {camera}/*.png {targets} -o seen/{camera}")).success();
+    }
+    let cameras = "--camera c0=seen/c0 --camera c1=seen/c1";
+    let told = deltille(folder, &format!("rig {cameras} {targets} -o found")).success();
+    let told = String::from_utf8(told.get_output().stdout.clone()).unwrap();
+    assert!(told.contains("target back: at ("), "{told}");
+    let rig = fs::read_to_string(folder.join("found/rig.json")).unwrap();
+    let found = saved::read(&rig, &Reference::Scene(&scene.targets)).unwrap();
+    let errors = scene.errors(&found);
+    assert!(errors.len() > 20 && errors.iter().all(|e| e.abs() < 4.5), "{errors:.1?}");
 }
