@@ -33,12 +33,12 @@ pub use deltille_core::{
     Clock, Name, artwork, calibrate, camera, detect, glam, json, lattice, nalgebra, name, quantity,
     raster, reading, statistics, synth, targets, words,
 };
-#[cfg(feature = "photographs")]
-pub use deltille_files::photograph;
 #[cfg(feature = "report")]
 pub use deltille_files::report;
 #[cfg(feature = "files")]
 pub use deltille_files::{clock, export, limits};
+#[cfg(feature = "photographs")]
+pub use deltille_files::{photograph, remap};
 #[cfg(feature = "verify")]
 pub use deltille_verify as verify;
 

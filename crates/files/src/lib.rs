@@ -15,5 +15,7 @@ pub mod family_file;
 pub mod limits;
 #[cfg(feature = "photographs")]
 pub mod photograph;
+#[cfg(feature = "photographs")]
+pub mod remap;
 #[cfg(feature = "report")]
 pub mod report;

@@ -160,6 +160,23 @@ pub fn read_with_notes(
     limits: &Limits,
     accept_damaged: bool,
 ) -> Result<Photograph, ImageError> {
+    let (image, notes) = decoded(path, limits, accept_damaged)?;
+    Ok(Photograph { image: from_dynamic(image), notes })
+}
+
+/// Reads a photograph with its colours, within limits, where the sensor had its pixels.
+///
+/// # Errors
+/// Where the file cannot be read, is no picture, is damaged, or is larger than the limits allow.
+pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageError> {
+    Ok(decoded(path, limits, false)?.0)
+}
+
+fn decoded(
+    path: &Path,
+    limits: &Limits,
+    accept_damaged: bool,
+) -> Result<(DynamicImage, FileNotes), ImageError> {
     let broken = |source| ImageError::Broken { path: path.to_owned(), source };
     limits::caught(|| {
         let decode = |source| ImageError::Decode { path: path.to_owned(), source };
@@ -176,8 +193,7 @@ pub fn read_with_notes(
             Err(problem) => (DynamicImage::from_decoder(decoder).map_err(decode)?, Some(problem)),
         };
         let exif_orientation = (orientation != 1).then_some(orientation);
-        let notes = FileNotes { exif_orientation, damage };
-        Ok(Photograph { image: from_dynamic(image), notes })
+        Ok((image, FileNotes { exif_orientation, damage }))
     })
     .map_err(broken)?
 }

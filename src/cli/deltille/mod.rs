@@ -22,6 +22,7 @@ pub mod settings;
 mod sightings;
 mod solid;
 mod target_file;
+mod undistort;
 mod verify;
 
 use std::process::ExitCode;
@@ -73,6 +74,10 @@ enum Command {
     Rig(rig::Args),
     /// Take a synthetic photograph of a target, with the true positions of its corners
     Render(render::Args),
+    /// Take the distortion of a camera out of photographs: pictures as of a pinhole, or maps
+    Undistort(undistort::Args),
+    /// Rectify two cameras of a rig, so that a point is in the same row of both pictures
+    Rectify(undistort::PairArgs),
     /// Compare the files of a target with its description
     Verify(verify::Args),
 }
@@ -95,6 +100,8 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Pose(args) => pose::run(args),
         Command::Rig(args) => rig::run(args),
         Command::Render(args) => render::run(args),
+        Command::Undistort(args) => undistort::run(args),
+        Command::Rectify(args) => undistort::run_pair(args),
         Command::Verify(args) => verify::run(args),
     }
 }

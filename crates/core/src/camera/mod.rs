@@ -16,6 +16,8 @@ mod lens;
 mod pose;
 mod pupil;
 mod reach;
+mod rectification;
+mod undistortion;
 
 use glam::{DVec2, DVec3};
 
@@ -28,6 +30,8 @@ pub use kannala_brandt::KannalaBrandt;
 pub use lens::{Imaged, Lens, MAX_LENS_PARAMETERS, Ray};
 pub use pose::Pose;
 pub use pupil::Pupil;
+pub use rectification::{Rectification, RectificationError};
+pub use undistortion::{Field, PixelMap, Undistortion, UndistortionError};
 
 /// The parameters that every camera has, before those of its lens.
 pub const PROJECTION_PARAMETERS: [&str; 4] = ["fx", "fy", "cx", "cy"];

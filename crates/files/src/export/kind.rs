@@ -66,6 +66,8 @@ impl Kind {
             let Png { software, is_to_scale } = Png::of(content);
             let is_own = software.is_some_and(|by| by.starts_with(b"deltille "));
             signed(if is_to_scale && is_own { "PNG to scale" } else { "PNG" }, is_own)
+        } else if content.starts_with(super::npy::MAGIC) {
+            Self::words("an array of NumPy")
         } else if content.starts_with(b"glTF") {
             signed("glTF", contains(glb_json(content), b"\"generator\":\"deltille "))
         } else if content.starts_with(b"deltille ") && content.get(80..84).is_some() {

@@ -20,6 +20,7 @@ pub mod kind;
 #[cfg(feature = "meshes")]
 pub mod mesh;
 mod motion;
+pub mod npy;
 #[cfg(feature = "meshes")]
 pub mod obj;
 pub mod orpc;
@@ -39,6 +40,7 @@ mod supersample;
 #[cfg(feature = "print")]
 pub mod svg;
 pub mod truth;
+pub mod undistortion;
 
 use std::path::PathBuf;
 

@@ -1,0 +1,195 @@
+//! Two cameras of a rig seen as if they stood side by side, with parallel axes: a point then lies in the same row of both
+//! pictures, or in the same column where one camera is above the other.
+
+use glam::{DMat3, DMat4, DQuat, DVec3};
+
+use super::undistortion::{Field, Undistortion, UndistortionError};
+use super::{Camera, Pose};
+
+/// Two cameras whose baseline is within this angle of their axes, rad, see no common picture from the side.
+const LEAST_ANGLE_RAD: f64 = 0.1;
+
+/// Why two cameras cannot be rectified. Messages say what to do about it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RectificationError {
+    /// No baseline.
+    #[error("both cameras are at the same place")]
+    SamePlace,
+    /// Cameras that look apart.
+    #[error(
+        "the cameras look in directions {degrees:.0}° apart: no common view shows what both see"
+    )]
+    Apart {
+        /// The angle between their axes, degrees.
+        degrees: f64,
+    },
+    /// Cameras one behind the other.
+    #[error("one camera is in front of the other: no common view has them side by side")]
+    Behind,
+    /// A view that does not exist.
+    #[error(transparent)]
+    View(#[from] UndistortionError),
+}
+
+/// Rectified views of two cameras, which have the same size and focal length.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Rectification {
+    /// The view of each camera.
+    pub views: [Undistortion; 2],
+    /// Where the second view's camera is in the frame of the first one's, mm: along x, or along y where one is above the
+    /// other.
+    pub baseline_mm: DVec3,
+}
+
+impl Rectification {
+    /// Rectifies two cameras with their poses, camera_from_rig.
+    ///
+    /// # Errors
+    /// Where they have no common view from the side.
+    ///
+    /// ```
+    /// use deltille_core::camera::{Camera, Field, Pose, Rectification};
+    /// use glam::{DQuat, DVec3};
+    ///
+    /// let camera = Camera::pinhole(640, 480, 1.0);
+    /// let translation = DVec3::new(-120.0, 3.0, 2.0);
+    /// let second = Pose { rotation: DQuat::from_rotation_y(0.05), translation };
+    /// let made = Rectification::new([(&camera, Pose::IDENTITY), (&camera, second)], [640, 480], Field::Inside)?;
+    /// assert!((made.baseline_mm.x - translation.length()).abs() < 1e-9 && made.baseline_mm.y.abs() < 1e-9);
+    /// # Ok::<(), deltille_core::camera::RectificationError>(())
+    /// ```
+    pub fn new(
+        cameras: [(&Camera, Pose); 2],
+        size_px: [u32; 2],
+        field: Field,
+    ) -> Result<Self, RectificationError> {
+        let poses = cameras.map(|(_, pose)| pose);
+        let (view_from_rig, baseline_mm) = common_frame(poses)?;
+        let view = |(camera, pose): (&Camera, Pose), field: Field| {
+            let turn = view_from_rig * pose.rotation.conjugate();
+            Undistortion::turned(camera, turn, size_px, field)
+        };
+        let [first, second] = cameras;
+        let focal = [view(first, field)?, view(second, field)?].map(|v| v.view().focal_px.x);
+        // What is inside for both, or all of both.
+        let common = match field {
+            Field::Whole => focal[0].min(focal[1]),
+            _ => focal[0].max(focal[1]),
+        };
+        let field = Field::Focal(common);
+        Ok(Self { views: [view(first, field)?, view(second, field)?], baseline_mm })
+    }
+
+    /// The matrix Q that takes x, y, disparity, 1 (px, in the first view; the disparity is x of the first view less x of the
+    /// second, or y) to a point in the frame of the first view: X, Y, Z, W, to be divided by W, mm.
+    pub fn depth_matrix(&self) -> DMat4 {
+        let view = self.views[0].view();
+        let (focal, centre) = (view.focal_px.x, view.centre_px);
+        let along = self.baseline_mm.x + self.baseline_mm.y;
+        let rows = [
+            [1.0, 0.0, 0.0, -centre.x],
+            [0.0, 1.0, 0.0, -centre.y],
+            [0.0, 0.0, 0.0, focal],
+            [0.0, 0.0, along.recip(), 0.0],
+        ];
+        DMat4::from_cols_array_2d(&rows).transpose()
+    }
+}
+
+/// The frame in which both cameras look forward side by side, from that of the rig, and where the second is in it from
+/// the first.
+fn common_frame(poses: [Pose; 2]) -> Result<(DQuat, DVec3), RectificationError> {
+    let [from, to] = poses.map(|pose| pose.inverse().translation);
+    let axes = poses.map(|pose| pose.rotation.conjugate());
+    let [forward, right, down] =
+        [DVec3::Z, DVec3::X, DVec3::Y].map(|axis| axes[0] * axis + axes[1] * axis);
+    let angle = (axes[0] * DVec3::Z).angle_between(axes[1] * DVec3::Z);
+    if angle > std::f64::consts::FRAC_PI_2 {
+        return Err(RectificationError::Apart { degrees: angle.to_degrees() });
+    }
+    let apart = to - from;
+    let along = apart.try_normalize().ok_or(RectificationError::SamePlace)?;
+    let to_axis = along.angle_between(forward);
+    if to_axis.min(std::f64::consts::PI - to_axis) < LEAST_ANGLE_RAD {
+        return Err(RectificationError::Behind);
+    }
+    let is_beside = along.dot(right).abs() >= along.dot(down).abs();
+    let [x, y, z] = if is_beside {
+        let x = along * along.dot(right).signum();
+        let z = (forward - forward.dot(x) * x).normalize();
+        [x, z.cross(x), z]
+    } else {
+        let y = along * along.dot(down).signum();
+        let z = (forward - forward.dot(y) * y).normalize();
+        [y.cross(z), y, z]
+    };
+    let rig_from_view = DMat3::from_cols(x, y, z);
+    let view_from_rig = DQuat::from_mat3(&rig_from_view).normalize().conjugate();
+    let mut baseline_mm = view_from_rig * apart;
+    // Exactly along an axis.
+    baseline_mm = if is_beside { baseline_mm * DVec3::X } else { baseline_mm * DVec3::Y };
+    Ok((view_from_rig, baseline_mm))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec4;
+
+    use super::*;
+    use crate::camera::{BrownConrady, KannalaBrandt, Lens};
+
+    #[test]
+    fn a_point_is_in_one_row_of_both_views_and_its_depth_follows() {
+        let radial = [-0.2, 0.05, 0.0];
+        let lens = Lens::BrownConrady(BrownConrady { radial, ..BrownConrady::default() });
+        let left = Camera::centred(800, 600, 600.0, lens);
+        let k = vec![0.02, -0.003, 0.0, 0.0];
+        let right = Camera::centred(900, 700, 640.0, Lens::KannalaBrandt(KannalaBrandt { k }));
+        for (towards, is_beside) in
+            [(DVec3::X, true), (DVec3::NEG_X, true), (DVec3::Y, false), (DVec3::NEG_Y, false)]
+        {
+            let rotation = DQuat::from_scaled_axis(DVec3::new(0.05, -0.08, 0.03));
+            let at = 150.0 * towards + DVec3::new(4.0, -6.0, 9.0);
+            let second = Pose { rotation, translation: -(rotation * at) };
+            let cameras = [(&left, Pose::IDENTITY), (&right, second)];
+            let made = Rectification::new(cameras, [640, 480], Field::Inside).unwrap();
+            let view_from_rig = made.views[0].view_from_camera();
+            for point in [DVec3::new(30.0, -40.0, 900.0), DVec3::new(-100.0, 60.0, 1500.0)] {
+                let first = view_from_rig * point;
+                let second = first - made.baseline_mm;
+                let [a, b] = [(0, first), (1, second)]
+                    .map(|(view, point)| made.views[view].view().project(point).unwrap());
+                let off = a - b;
+                let (same, disparity) = if is_beside { (off.y, off.x) } else { (off.x, off.y) };
+                assert!(same.abs() < 1e-9, "{off}");
+                let found = made.depth_matrix() * DVec4::new(a.x, a.y, disparity, 1.0);
+                assert!((found.truncate() / found.w).distance(first) < 1e-6);
+                // The maps lead to where the cameras themselves see the point.
+                for (index, (camera, pose), pixel) in [(0, cameras[0], a), (1, cameras[1], b)] {
+                    let seen = camera.project(pose.apply(point)).unwrap();
+                    assert!(made.views[index].place(pixel).unwrap().distance(seen) < 1e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cameras_without_a_common_view_are_refused() {
+        let camera = Camera::pinhole(640, 480, 1.0);
+        let made = |rotation: DQuat, translation: DVec3| {
+            let second = Pose { rotation, translation };
+            Rectification::new(
+                [(&camera, Pose::IDENTITY), (&camera, second)],
+                [640, 480],
+                Field::Inside,
+            )
+        };
+        let sideways = DVec3::new(-100.0, 0.0, 0.0);
+        assert_eq!(made(DQuat::IDENTITY, DVec3::ZERO), Err(RectificationError::SamePlace));
+        assert_eq!(made(DQuat::IDENTITY, DVec3::Z), Err(RectificationError::Behind));
+        let apart = made(DQuat::from_rotation_y(3.0), sideways).unwrap_err();
+        assert!(matches!(apart, RectificationError::Apart { .. }));
+    }
+}

@@ -1,0 +1,20 @@
+//! Arrays for NumPy: the `.npy` format, version 1.0.
+
+/// What a file begins with.
+pub const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// The bytes of a two-dimensional array of float32, row by row.
+pub fn float32(rows: usize, columns: usize, values: impl Iterator<Item = f32>) -> Vec<u8> {
+    /// Data begin at a multiple of this.
+    const ALIGNED: usize = 64;
+    let shape = format!("({rows}, {columns})");
+    let mut head = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+    let before = MAGIC.len() + 4;
+    // A line end closes the head.
+    let blanks = (ALIGNED - (before + head.len() + 1) % ALIGNED) % ALIGNED;
+    head.extend(std::iter::repeat_n(' ', blanks));
+    head.push('\n');
+    let mut bytes = [MAGIC, &[1, 0], &(head.len() as u16).to_le_bytes(), head.as_bytes()].concat();
+    bytes.extend(values.flat_map(f32::to_le_bytes));
+    bytes
+}

@@ -1,0 +1,140 @@
+//! Views of what cameras see, as JSON: schemas `deltille/undistortion/1` and `deltille/rectification/1`; of a rectified
+//! pair also what OpenCV calls it.
+
+use std::fmt::Write as _;
+
+use glam::DMat3;
+use serde::Serialize;
+
+use super::GENERATOR;
+use super::npy;
+use deltille_core::camera::{PixelMap, Rectification, Undistortion};
+use deltille_core::json;
+
+/// Schema and version of a view that this crate writes.
+pub const SCHEMA: &str = "deltille/undistortion/1";
+
+/// The same of a pair.
+pub const PAIR_SCHEMA: &str = "deltille/rectification/1";
+
+#[derive(Serialize)]
+struct ViewFile {
+    schema: &'static str,
+    #[serde(flatten)]
+    view: View,
+}
+
+#[derive(Serialize)]
+struct View {
+    width: u32,
+    height: u32,
+    focal_px: f64,
+    centre_px: [f64; 2],
+    horizontal_field_deg: f64,
+    vertical_field_deg: f64,
+    /// Row-major.
+    view_from_camera: [f64; 9],
+    /// The part of its pixels that show something.
+    covered: f64,
+    /// x, y, width, height of the largest rectangle in which all do.
+    whole_px: [usize; 4],
+}
+
+#[derive(Serialize)]
+struct PairFile<'a> {
+    schema: &'static str,
+    baseline_mm: [f64; 3],
+    /// Row-major.
+    depth_matrix: [f64; 16],
+    views: Vec<Named<'a>>,
+}
+
+#[derive(Serialize)]
+struct Named<'a> {
+    camera: &'a str,
+    #[serde(flatten)]
+    view: View,
+}
+
+impl View {
+    fn of(made: &Undistortion, map: &PixelMap) -> Self {
+        let camera = made.view();
+        let field =
+            |side: u32| 2.0 * (f64::from(side) / 2.0 / camera.focal_px.x).atan().to_degrees();
+        Self {
+            width: camera.width,
+            height: camera.height,
+            focal_px: camera.focal_px.x,
+            centre_px: camera.centre_px.to_array(),
+            horizontal_field_deg: field(camera.width),
+            vertical_field_deg: field(camera.height),
+            view_from_camera: rows(made),
+            covered: map.covered(),
+            whole_px: map.whole_rectangle(),
+        }
+    }
+}
+
+/// The rotation of a view, row by row.
+fn rows(made: &Undistortion) -> [f64; 9] {
+    DMat3::from_quat(made.view_from_camera()).transpose().to_cols_array()
+}
+
+/// The text that describes a view.
+pub fn write(made: &Undistortion, map: &PixelMap) -> String {
+    json::to_text(&ViewFile { schema: SCHEMA, view: View::of(made, map) }, 1)
+}
+
+/// The text that describes a pair, with the names of its cameras.
+pub fn write_pair(made: &Rectification, names: [&str; 2], maps: &[PixelMap; 2]) -> String {
+    let views = names.into_iter().zip(&made.views).zip(maps);
+    let views = views.map(|((camera, view), map)| Named { camera, view: View::of(view, map) });
+    let file = PairFile {
+        schema: PAIR_SCHEMA,
+        baseline_mm: made.baseline_mm.to_array(),
+        depth_matrix: made.depth_matrix().transpose().to_cols_array(),
+        views: views.collect(),
+    };
+    json::to_text(&file, 2)
+}
+
+/// R1, R2, P1, P2 and Q of a pair as OpenCV's `stereoRectify` has them, for its `FileStorage`; lengths in mm.
+pub fn opencv_pair(made: &Rectification) -> String {
+    let view = made.views[0].view();
+    let (focal, centre) = (view.focal_px.x, view.centre_px);
+    let projection = |at: [f64; 2]| {
+        let [tx, ty] = at.map(|mm| -focal * mm);
+        [focal, 0.0, centre.x, tx, 0.0, focal, centre.y, ty, 0.0, 0.0, 1.0, 0.0]
+    };
+    let mut text = format!(
+        "%YAML:1.0\n---\n# {GENERATOR}\nimage_width: {}\nimage_height: {}\n",
+        view.width, view.height
+    );
+    let mut add = |name: &str, rows: usize, columns: usize, values: &[f64]| {
+        let values: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {} ]\n",
+            values.join(", ")
+        );
+    };
+    add("R1", 3, 3, &rows(&made.views[0]));
+    add("R2", 3, 3, &rows(&made.views[1]));
+    add("P1", 3, 4, &projection([0.0; 2]));
+    add("P2", 3, 4, &projection([made.baseline_mm.x, made.baseline_mm.y]));
+    add("Q", 4, 4, &made.depth_matrix().transpose().to_cols_array());
+    text
+}
+
+/// The maps of x and y for OpenCV's `remap`, as arrays for NumPy; −1 where a pixel shows nothing.
+pub fn maps(map: &PixelMap) -> [Vec<u8>; 2] {
+    let of = |index: usize| {
+        let values = map.places().iter().map(move |place| match place[index].is_nan() {
+            true => -1.0,
+            false => place[index],
+        });
+        npy::float32(map.height(), map.width(), values)
+    };
+    [of(0), of(1)]
+}

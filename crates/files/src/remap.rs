@@ -1,0 +1,154 @@
+//! Pictures whose pixels lie elsewhere in another one, with their colours and depth.
+
+use image::{DynamicImage, ImageBuffer, Pixel};
+use rayon::prelude::*;
+
+use deltille_core::camera::PixelMap;
+
+/// A pixel that covers more pixels of the other picture is the mean of so many places along each side, at most.
+const MOST_PLACES: f32 = 8.0;
+
+/// Cubic interpolation by Keys (1981), which is of third order: a = −1/2.
+const KEYS: f32 = -0.5;
+
+/// Channels of a pixel, at most.
+const MOST_CHANNELS: usize = 4;
+
+/// The new picture, by cubic interpolation; a pixel that covers several is their mean. Pixels without a place are black.
+pub fn remapped(image: &DynamicImage, map: &PixelMap) -> DynamicImage {
+    use DynamicImage as D;
+    match image {
+        D::ImageLuma8(image) => of(image, map).into(),
+        D::ImageLumaA8(image) => of(image, map).into(),
+        D::ImageRgb8(image) => of(image, map).into(),
+        D::ImageRgba8(image) => of(image, map).into(),
+        D::ImageLuma16(image) => of(image, map).into(),
+        D::ImageLumaA16(image) => of(image, map).into(),
+        D::ImageRgb16(image) => of(image, map).into(),
+        D::ImageRgba16(image) => of(image, map).into(),
+        deep => of(&deep.to_rgb16(), map).into(),
+    }
+}
+
+/// A channel of 8 or 16 bits.
+trait Depth: Copy + Default + Send + Sync {
+    fn light(self) -> f32;
+
+    /// The nearest value that there is.
+    fn of_light(light: f32) -> Self;
+}
+
+impl Depth for u8 {
+    fn light(self) -> f32 {
+        f32::from(self)
+    }
+
+    fn of_light(light: f32) -> Self {
+        // Conversion keeps to the range.
+        light.round() as u8
+    }
+}
+
+impl Depth for u16 {
+    fn light(self) -> f32 {
+        f32::from(self)
+    }
+
+    fn of_light(light: f32) -> Self {
+        light.round() as u16
+    }
+}
+
+type Buffer<P> = ImageBuffer<P, Vec<<P as Pixel>::Subpixel>>;
+
+fn of<P>(image: &Buffer<P>, map: &PixelMap) -> Buffer<P>
+where
+    P: Pixel + Sync,
+    P::Subpixel: Depth,
+{
+    let channels = usize::from(P::CHANNEL_COUNT);
+    let mut pixels = vec![P::Subpixel::default(); map.width() * map.height() * channels];
+    let rows = pixels.par_chunks_mut(map.width() * channels).enumerate();
+    rows.for_each(|(row, pixels)| {
+        for (column, pixel) in pixels.chunks_mut(channels).enumerate() {
+            let Some(light) = seen(image, map, [column, row]) else { continue };
+            for (channel, light) in pixel.iter_mut().zip(light) {
+                *channel = Depth::of_light(light);
+            }
+        }
+    });
+    let [width, height] = [map.width(), map.height()].map(|side| side as u32);
+    ImageBuffer::from_raw(width, height, pixels).expect("as many as were made")
+}
+
+/// The mean of the other picture over a pixel.
+fn seen<P>(
+    image: &Buffer<P>,
+    map: &PixelMap,
+    [column, row]: [usize; 2],
+) -> Option<[f32; MOST_CHANNELS]>
+where
+    P: Pixel,
+    P::Subpixel: Depth,
+{
+    let place = |x: usize, y: usize| map.places()[y * map.width() + x];
+    let here = place(column, row);
+    if here[0].is_nan() {
+        return None;
+    }
+    // How far the place moves from pixel to pixel.
+    let along = |next: Option<[f32; 2]>, sign: f32| {
+        next.filter(|next| !next[0].is_nan()).map(|next| [0, 1].map(|i| sign * (next[i] - here[i])))
+    };
+    let right = (column + 1 < map.width()).then(|| place(column + 1, row));
+    let left = column.checked_sub(1).map(|x| place(x, row));
+    let below = (row + 1 < map.height()).then(|| place(column, row + 1));
+    let above = row.checked_sub(1).map(|y| place(column, y));
+    let across = along(right, 1.0).or_else(|| along(left, -1.0)).unwrap_or_default();
+    let down = along(below, 1.0).or_else(|| along(above, -1.0)).unwrap_or_default();
+    let parts = |step: [f32; 2]| step[0].hypot(step[1]).round().clamp(1.0, MOST_PLACES);
+    let [columns, rows] = [parts(across), parts(down)];
+    let mut sum = [0.0; MOST_CHANNELS];
+    for i in 0..rows as usize {
+        for j in 0..columns as usize {
+            let offset = |index: usize, of: f32| (index as f32 + 0.5) / of - 0.5;
+            let (u, v) = (offset(j, columns), offset(i, rows));
+            let at = [0, 1].map(|k| here[k] + u * across[k] + v * down[k]);
+            for (sum, light) in sum.iter_mut().zip(cubic(image, at)) {
+                *sum += light;
+            }
+        }
+    }
+    Some(sum.map(|sum| sum / (rows * columns)))
+}
+
+/// The weights of four pixels between the middle two of which a place lies.
+fn weights(part: f32) -> [f32; 4] {
+    let near = |d: f32| ((KEYS + 2.0) * d - (KEYS + 3.0)) * d * d + 1.0;
+    let far = |d: f32| ((KEYS * d - 5.0 * KEYS) * d + 8.0 * KEYS) * d - 4.0 * KEYS;
+    [far(1.0 + part), near(part), near(1.0 - part), far(2.0 - part)]
+}
+
+/// The light at a place of a picture that goes on beyond its border as it ends.
+fn cubic<P>(image: &Buffer<P>, [x, y]: [f32; 2]) -> [f32; MOST_CHANNELS]
+where
+    P: Pixel,
+    P::Subpixel: Depth,
+{
+    let (by_column, by_row) = (weights(x - x.floor()), weights(y - y.floor()));
+    let near = |at: f32, step: usize, side: u32| {
+        (at.floor() as i64 + step as i64 - 1).clamp(0, i64::from(side) - 1) as u32
+    };
+    let columns: [u32; 4] = std::array::from_fn(|j| near(x, j, image.width()));
+    let mut sum = [0.0; MOST_CHANNELS];
+    for (i, by_row) in by_row.into_iter().enumerate() {
+        let row = near(y, i, image.height());
+        for (column, by_column) in columns.into_iter().zip(by_column) {
+            let pixel = image.get_pixel(column, row).channels();
+            for (sum, channel) in sum.iter_mut().zip(pixel) {
+                *sum += by_row * by_column * channel.light();
+            }
+        }
+    }
+    sum
+}

@@ -1,0 +1,343 @@
+//! `deltille undistort` and `deltille rectify`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::str::FromStr;
+use std::sync::Mutex;
+
+use anyhow::{Context, anyhow, bail, ensure};
+
+use super::calibrating::distance;
+use super::camera_file;
+use super::files::{File, bytes_file, check_places, same_file, sample_of, text_file, write_all};
+use super::images::{self, Images, Stems};
+use super::in_flight;
+use super::limits::ImageLimits;
+use crate::calibrate::CameraEstimate;
+use crate::camera::{Camera, Field, PixelMap, Rectification, Undistortion};
+use crate::cli::output::{self, Overwrite, say};
+use crate::cli::run::{self, BAD_INPUT, FAILED, Interrupted};
+use crate::cli::{interrupt, progress};
+use crate::export::camera::{opencv, ros};
+use crate::export::kind::{Kind, signed_png};
+use crate::export::{atomic, saved, undistortion};
+use crate::limits::Limits;
+use crate::photograph;
+use crate::remap::remapped;
+use crate::words::counted;
+
+/// How the views are made.
+#[derive(clap::Args)]
+struct ViewArgs {
+    /// How much is shown: inside, as much as leaves nothing black; whole, all that the camera sees, up to 150°; a
+    /// horizontal field of view such as 90deg; or a focal length such as 800px
+    #[arg(long, value_name = "FIELD", default_value = "inside", value_parser = field)]
+    field: Field,
+    /// Width and height of the new pictures, px, such as 1280x960 [default: those of the camera]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+    /// Distance for which pictures of a lens of the pupil model are right, such as 2m [default: infinity]
+    #[arg(long, value_name = "LENGTH", value_parser = distance)]
+    distance: Option<f64>,
+    /// Write the maps for OpenCV's remap too, as arrays of float32 for NumPy
+    #[arg(long)]
+    maps: bool,
+    /// Folder for the results
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
+    output: PathBuf,
+    #[command(flatten)]
+    limits: ImageLimits,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+/// Arguments of `deltille undistort`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Photographs that the camera took: files, folders, patterns, or - for a list on standard input; without, the new
+    /// camera and the maps are made
+    #[arg(value_name = "IMAGES")]
+    images: Vec<PathBuf>,
+    /// The camera, as `deltille calibrate`, ROS or OpenCV write it
+    #[arg(long, value_name = "FILE")]
+    camera: PathBuf,
+    #[command(flatten)]
+    view: ViewArgs,
+}
+
+/// Arguments of `deltille rectify`.
+#[derive(clap::Args)]
+pub struct PairArgs {
+    /// The rig: the .json of `deltille rig`
+    #[arg(value_name = "RIG")]
+    rig: PathBuf,
+    /// Names of the two cameras, such as left,right
+    #[arg(long, value_name = "NAME,NAME", value_parser = pair)]
+    pair: [String; 2],
+    /// Photographs of the first camera: a file, a folder or a pattern
+    #[arg(long, value_name = "IMAGES")]
+    first: Vec<PathBuf>,
+    /// Photographs of the second camera
+    #[arg(long, value_name = "IMAGES")]
+    second: Vec<PathBuf>,
+    #[command(flatten)]
+    view: ViewArgs,
+}
+
+fn field(text: &str) -> Result<Field, String> {
+    let number = |end: &str| text.strip_suffix(end).map(f64::from_str).and_then(Result::ok);
+    match (text, number("deg"), number("px")) {
+        ("inside", ..) => Ok(Field::Inside),
+        ("whole", ..) => Ok(Field::Whole),
+        (_, Some(degrees), _) if degrees > 0.0 && degrees < 180.0 => {
+            Ok(Field::Horizontal(degrees.to_radians()))
+        }
+        (_, Some(_), _) => Err("a pinhole sees more than 0° and less than 180°".to_owned()),
+        (_, _, Some(focal)) if (1.0..=1e6).contains(&focal) => Ok(Field::Focal(focal)),
+        _ => Err("give inside, whole, an angle such as 90deg, or a focal length such as 800px"
+            .to_owned()),
+    }
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let side =
+        |text: &str| text.parse().ok().filter(|side| (2..=u32::from(u16::MAX)).contains(side));
+    let sides =
+        text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?]));
+    sides.ok_or_else(|| format!("`{text}` is no width and height in px, such as 1280x960"))
+}
+
+fn pair(text: &str) -> Result<[String; 2], String> {
+    match text.split_once(',') {
+        Some((first, second)) if first != second && !first.is_empty() && !second.is_empty() => {
+            Ok([first.to_owned(), second.to_owned()])
+        }
+        _ => Err("give the names of two cameras, such as left,right".to_owned()),
+    }
+}
+
+impl ViewArgs {
+    /// The map of a view.
+    fn map(&self, made: &Undistortion) -> PixelMap {
+        match self.distance {
+            Some(distance_mm) => made.clone().at_distance(distance_mm).map(),
+            None => made.map(),
+        }
+    }
+
+    fn size_of(&self, camera: &Camera) -> anyhow::Result<[u32; 2]> {
+        let size = self.size.unwrap_or([camera.width, camera.height]);
+        let (pixels, most) =
+            (u64::from(size[0]) * u64::from(size[1]), self.limits.limits().max_pixels);
+        ensure!(
+            pixels <= most,
+            "--size: {pixels} pixels are more than {most}: --max-pixels allows more"
+        );
+        Ok(size)
+    }
+
+    /// The files of a view beside its pictures.
+    fn files(&self, stem: &str, view: &Camera, map: &PixelMap) -> anyhow::Result<Vec<File>> {
+        let mut files = vec![
+            text_file(format!("{stem}.yaml"), view.to_yaml()),
+            text_file(format!("{stem}-opencv.yaml"), opencv(view)?),
+            text_file(format!("{stem}-ros.yaml"), ros(view, stem)?),
+        ];
+        if self.maps {
+            let [x, y] = undistortion::maps(map);
+            files.push(bytes_file(format!("{stem}-map-x.npy"), x));
+            files.push(bytes_file(format!("{stem}-map-y.npy"), y));
+        }
+        Ok(files)
+    }
+}
+
+/// Makes a pinhole view of a camera, and pictures of it.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let camera = camera_file::read("--camera", &args.camera)?;
+    let stem = args.camera.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stem = format!("{stem}-undistorted");
+    let made = Undistortion::new(&camera, args.view.size_of(&camera)?, args.view.field);
+    let made = made.context("--field")?;
+    let images = Images::of(&args.images)?;
+    let pictures = Pictures { args: &args.view, folder: &args.view.output, camera: &camera };
+    pictures.check(&images)?;
+    let map = args.view.map(&made);
+    let mut files = args.view.files(&stem, made.view(), &map)?;
+    files.insert(0, text_file(format!("{stem}.json"), undistortion::write(&made, &map)));
+    let written = write_all(&args.view.output, &files, args.view.overwrite)?;
+    let view = made.view();
+    say!("{}", told(view, &map));
+    for path in &written {
+        say!("wrote {}", path.display());
+    }
+    pictures.write(&images, &map)
+}
+
+/// A view in a line.
+fn told(view: &Camera, map: &PixelMap) -> String {
+    let field = |side: u32| 2.0 * (f64::from(side) / 2.0 / view.focal_px.x).atan().to_degrees();
+    let [x, y, width, height] = map.whole_rectangle();
+    let whole = match map.covered() {
+        1.0 => "every pixel shows something".to_owned(),
+        part => format!(
+            "{:.1} % of it show something, all in {width} × {height} px from ({x}, {y})",
+            100.0 * part
+        ),
+    };
+    format!(
+        "{} × {} px, focal length {:.2} px, {:.1}° × {:.1}°; {whole}",
+        view.width,
+        view.height,
+        view.focal_px.x,
+        field(view.width),
+        field(view.height)
+    )
+}
+
+/// Pictures to be made from a camera's.
+struct Pictures<'a> {
+    args: &'a ViewArgs,
+    folder: &'a Path,
+    camera: &'a Camera,
+}
+
+impl Pictures<'_> {
+    fn place(&self, image: &Path) -> anyhow::Result<PathBuf> {
+        Ok(self.folder.join(format!("{}-undistorted.png", images::stem(image)?)))
+    }
+
+    /// Refuses before the work what could not be written after it.
+    fn check(&self, images: &Images) -> anyhow::Result<()> {
+        output::check_folder(self.folder).context("-o")?;
+        let mut stems = Stems::default();
+        images.named().iter().try_for_each(|image| {
+            stems.claim(image)?;
+            self.args.overwrite.check(&self.place(image)?, &Kind::own_png())
+        })
+    }
+
+    /// Writes all; a picture that cannot be read is told, and the others go on.
+    fn write(&self, images: &Images, map: &PixelMap) -> anyhow::Result<ExitCode> {
+        let count = images.count().unwrap_or(0);
+        let bar = progress::bar(count as u64, "images");
+        let failed: Mutex<Vec<anyhow::Error>> = Mutex::default();
+        let done: Mutex<usize> = Mutex::default();
+        let pool = rayon::ThreadPoolBuilder::new().build()?;
+        in_flight::for_each(&pool, &self.args.limits.limits(), images.iter(), |_, image| {
+            if interrupt::is_raised() {
+                return;
+            }
+            match image.and_then(|image| self.write_one(&image, map)) {
+                Ok(()) => *done.lock().expect("no thread panics here") += 1,
+                Err(error) => {
+                    bar.suspend(|| run::report(&error));
+                    failed.lock().expect("no thread panics here").push(error);
+                }
+            }
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+        let done = done.into_inner().expect("no thread panics here");
+        let failed = failed.into_inner().expect("no thread panics here").len();
+        if interrupt::is_raised() {
+            return Err(Interrupted(format!("{done} pictures are written")).into());
+        }
+        if done > 0 {
+            say!("wrote {} to {}", counted(done, "picture"), self.folder.display());
+        }
+        Ok(match (done, failed) {
+            (_, 0) => ExitCode::SUCCESS,
+            (0, _) => ExitCode::from(BAD_INPUT),
+            _ => ExitCode::from(FAILED),
+        })
+    }
+
+    fn write_one(&self, image: &Path, map: &PixelMap) -> anyhow::Result<()> {
+        let picture = photograph::read_colours(image, &self.args.limits.limits())?;
+        let size = [picture.width(), picture.height()];
+        ensure!(
+            size == [self.camera.width, self.camera.height],
+            "{}: {} × {} px, the camera has {} × {}: it is another camera's, or of another mode",
+            image.display(),
+            size[0],
+            size[1],
+            self.camera.width,
+            self.camera.height
+        );
+        let place = self.place(image)?;
+        ensure!(!same_file(&place, image), "{} would be overwritten", image.display());
+        let mut png = std::io::Cursor::new(Vec::new());
+        remapped(&picture, map)
+            .write_to(&mut png, image::ImageFormat::Png)
+            .with_context(|| place.display().to_string())?;
+        self.args.overwrite.check(&place, &Kind::own_png())?;
+        let png = signed_png(png.into_inner());
+        Ok(atomic::write(&place, |out| out.write_all(&png))?)
+    }
+}
+
+/// Makes rectified views of two cameras of a rig, and pictures of them.
+pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
+    let cameras = read_rig(&args.rig)?;
+    let named = |name: &String| {
+        cameras.iter().find(|camera| camera.name == *name).ok_or_else(|| {
+            let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
+            anyhow!("--pair: there is no camera {name}: the rig has {}", names.join(", "))
+        })
+    };
+    let [first, second] = [named(&args.pair[0])?, named(&args.pair[1])?];
+    let names = [first.name.as_str(), second.name.as_str()];
+    let size = args.view.size_of(&first.camera)?;
+    let cameras = [first, second].map(|camera| (&camera.camera, camera.camera_from_rig));
+    let made = Rectification::new(cameras, size, args.view.field).context("--pair")?;
+    let folders = names.map(|name| args.view.output.join(name));
+    let images = [Images::of(&args.first)?, Images::of(&args.second)?];
+    let of_camera = |index: usize| Pictures {
+        args: &args.view,
+        folder: &folders[index],
+        camera: cameras[index].0,
+    };
+    of_camera(0).check(&images[0])?;
+    of_camera(1).check(&images[1])?;
+    let stem = format!("{}-{}", names[0], names[1]);
+    let sample = [text_file(format!("{stem}.json"), sample_of(undistortion::PAIR_SCHEMA))];
+    check_places(&args.view.output, &sample, args.view.overwrite)?;
+    let maps = [&made.views[0], &made.views[1]].map(|view| args.view.map(view));
+    let mut files = vec![
+        text_file(format!("{stem}.json"), undistortion::write_pair(&made, names, &maps)),
+        text_file(format!("{stem}-opencv.yaml"), undistortion::opencv_pair(&made)),
+    ];
+    for ((name, view), map) in names.iter().zip(&made.views).zip(&maps) {
+        files.extend(args.view.files(&format!("{name}-rectified"), view.view(), map)?);
+        say!("{name}: {}", told(view.view(), map));
+    }
+    let baseline = made.baseline_mm;
+    let (mm, what) = match baseline.y == 0.0 {
+        true => (baseline.x, "rows"),
+        false => (baseline.y, "columns"),
+    };
+    say!("baseline {mm:.3} mm; a point is in the same of the {what} of both");
+    let written = write_all(&args.view.output, &files, args.view.overwrite)?;
+    for path in &written {
+        say!("wrote {}", path.display());
+    }
+    for (index, images) in images.iter().enumerate().filter(|(_, images)| images.count() != Some(0))
+    {
+        let code = of_camera(index).write(images, &maps[index])?;
+        if code != ExitCode::SUCCESS {
+            return Ok(code);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The cameras of a rig's file.
+fn read_rig(path: &Path) -> anyhow::Result<Vec<CameraEstimate>> {
+    let text = Limits::default().read_text(path)?;
+    let cameras = saved::read_cameras(&text).with_context(|| path.display().to_string())?;
+    if cameras.len() < 2 {
+        bail!("{}: a single camera: give the rig.json of `deltille rig`", path.display());
+    }
+    Ok(cameras)
+}
