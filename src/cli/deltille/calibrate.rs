@@ -8,7 +8,8 @@ use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
 use super::calibrating::{
-    Calibrated, ModelChoice, SolveArgs, check_images, sample, sureness, without_outliers,
+    Calibrated, ModelChoice, SolveArgs, check_images, left_out as formats_left_out, sample,
+    sureness, without_outliers,
 };
 use super::camera_file;
 use super::files::{File, check_places, sample_of, text_file, write_all};
@@ -80,7 +81,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let intrinsics = args.intrinsics()?;
     let folder = output::folder_of(&path);
-    let planned = args.files(&stem, &sample(&intrinsics), &[], &sample_of(calibration::SCHEMA))?;
+    let sample = sample(&intrinsics);
+    let (planned, refused) = args.files(&stem, &sample, &[], &sample_of(calibration::SCHEMA));
+    if let (true, Some(refused)) = (planned.is_empty(), refused.into_iter().next()) {
+        return Err(refused).context("--format");
+    }
     let planned: Vec<File> = planned.into_iter().chain(args.solve.planned(&stem)).collect();
     check_places(folder, &planned, args.overwrite)?;
     let page = args.solve.page(&stem, args.overwrite)?;
@@ -112,12 +117,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::from(FAILED));
     }
     let Calibrated { estimate, diagnoses, print, .. } = &solved;
-    let mut files = Vec::new();
+    let (mut files, mut refused) = (Vec::new(), Vec::new());
     for camera in &estimate.cameras {
         let views = camera.views.iter().map(|view| (view.image.as_str(), view.pose));
         let json = calibration::write(estimate, diagnoses, *print).unwrap_or_default();
-        files =
-            args.files(&stem, &camera.camera, &views.collect::<Vec<_>>(), &in_options(&json))?;
+        let views = views.collect::<Vec<_>>();
+        (files, refused) = args.files(&stem, &camera.camera, &views, &in_options(&json));
     }
     files.extend(solved.measured(&stem, target.as_ref()));
     let mut written = write_all(folder, &files, args.overwrite)?;
@@ -137,7 +142,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let _ = writeln!(text, "wrote {}", shown(&path.display().to_string()));
     }
     output::print(&text)?;
-    Ok(solved.exit_code())
+    Ok(formats_left_out(&refused).unwrap_or(solved.exit_code()))
 }
 
 impl Args {
@@ -150,17 +155,24 @@ impl Args {
         known.context("give --model, or --fixed-intrinsics")
     }
 
-    /// The files of a camera in all formats asked for; `json` is the text that tells all.
+    /// The files of a camera in all formats asked for, and why there are not all; `json` is the text that tells all.
     fn files(
         &self,
         stem: &str,
         camera: &Camera,
         views: &[(&str, Pose)],
         json: &str,
-    ) -> anyhow::Result<Vec<File>> {
-        let texts = self.format.iter().map(|format| format.texts(stem, camera, views, json));
-        let texts = texts.collect::<Result<Vec<_>, FormatError>>().context("--format")?;
-        Ok(texts.into_iter().flatten().map(|(name, text)| text_file(name, text)).collect())
+    ) -> (Vec<File>, Vec<FormatError>) {
+        let (mut files, mut refused) = (Vec::new(), Vec::new());
+        for format in &self.format {
+            match format.texts(stem, camera, views, json) {
+                Ok(texts) => {
+                    files.extend(texts.into_iter().map(|(name, text)| text_file(name, text)))
+                }
+                Err(error) => refused.push(error),
+            }
+        }
+        (files, refused)
     }
 }
 
@@ -181,7 +193,7 @@ impl Format {
             Self::Opencv => vec![named("-opencv.yaml", opencv(camera)?)],
             Self::Ros => vec![named("-ros.yaml", ros(camera, stem)?)],
             Self::Kalibr => {
-                vec![named("-camchain.yaml", kalibr(&[(camera, Pose::IDENTITY)])?)]
+                vec![named("-camchain.yaml", kalibr(&[(camera, Pose::IDENTITY)], &[])?)]
             }
             Self::Colmap => vec![named("-cameras.txt", colmap(&[camera])?)],
             Self::Nerfstudio => vec![named("-transforms.json", nerfstudio(camera, views)?)],

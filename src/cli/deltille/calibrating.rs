@@ -21,6 +21,7 @@ use crate::cli::run::FAILED;
 use crate::cli::values::whole;
 use crate::cli::wording::in_options;
 use crate::export::calibration::Print;
+use crate::export::camera::FormatError;
 use crate::export::kind::Kind;
 use crate::name::is_within;
 use crate::photograph;
@@ -290,6 +291,14 @@ impl Calibrated {
         (report.print, report.thumbnails) = (*print, thumbnails);
         output::write(page, in_options(&report.html()).as_bytes(), overwrite).context("--report")
     }
+}
+
+/// Tells formats that cannot carry what was found; exit code 1 where there are such, as not all is there that was asked for.
+pub fn left_out(refused: &[FormatError]) -> Option<ExitCode> {
+    for error in refused {
+        tell!("error: --format: {error}: left out, all else is written");
+    }
+    (!refused.is_empty()).then(|| ExitCode::from(FAILED))
 }
 
 /// How far a point is, mm.

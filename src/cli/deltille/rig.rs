@@ -1,5 +1,6 @@
 //! `deltille rig`.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -7,7 +8,8 @@ use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
 use super::calibrating::{
-    Calibrated, ModelChoice, SolveArgs, check_images, sample, sureness, without_outliers,
+    Calibrated, ModelChoice, SolveArgs, check_images, left_out as formats_left_out, sample,
+    sureness, without_outliers,
 };
 use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::limits::FileLimits;
@@ -156,7 +158,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let cameras = estimate.cameras.iter();
     let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
     let cameras = cameras.collect::<Vec<_>>();
-    let files = args.files(&cameras, &in_options(&json), estimate, &targets)?;
+    let (files, refused) = args.files(&cameras, &in_options(&json), estimate, &targets)?;
     let mut written = write_all(&args.output, &files, args.overwrite)?;
     if let Some(page) = page {
         let folder = |(name, _): &(String, PathBuf)| of_name(&args.images, name);
@@ -170,7 +172,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for path in written {
         say!("wrote {}", path.display());
     }
-    Ok(solved.exit_code())
+    Ok(formats_left_out(&refused).unwrap_or(solved.exit_code()))
 }
 
 impl Args {
@@ -189,29 +191,33 @@ impl Args {
         let mut found = Estimate::default();
         found.map = self.solve.measures_target().then(|| TargetMap::new(Vec::new(), [0.0; 2]));
         let json = sample_of(rig::SCHEMA);
-        let files = self.files(&cameras.collect::<Vec<_>>(), &json, &found, targets)?;
+        let (files, _) = self.files(&cameras.collect::<Vec<_>>(), &json, &found, targets)?;
         check_places(&self.output, &files, self.overwrite)
     }
 
-    /// All files; `json` is the text that tells all.
+    /// All files, and why some formats have none; `json` is the text that tells all.
     fn files(
         &self,
         cameras: &[(&str, &Camera, Pose)],
         json: &str,
         found: &Estimate,
         targets: &[Target],
-    ) -> anyhow::Result<Vec<File>> {
+    ) -> anyhow::Result<(Vec<File>, Vec<FormatError>)> {
+        let mut refused = Vec::new();
         let mut files = vec![text_file("rig.json".to_owned(), json.to_owned())];
         for (name, camera, _) in cameras {
             files.push(text_file(format!("{name}.yaml"), camera.to_yaml()));
         }
         for format in &self.format {
-            files.extend(format.files(cameras).context("--format")?);
+            match format.files(cameras, found) {
+                Ok(of_format) => files.extend(of_format),
+                Err(error) => refused.push(error),
+            }
         }
         for (index, target) in targets.iter().enumerate() {
             files.extend(self.files_of_target(&found.of_target(index), target)?);
         }
-        Ok(files)
+        Ok((files, refused))
     }
 
     /// A target as it was found, where that was asked for.
@@ -232,6 +238,17 @@ impl Args {
         let drawn = drawn.map(|svg| text_file(format!("{name}.svg"), svg));
         Ok([file].into_iter().chain(drawn).collect())
     }
+}
+
+/// Which other cameras saw the target in the same frames, of each camera.
+fn overlaps(found: &Estimate) -> Vec<Vec<usize>> {
+    let frames = found.cameras.iter().map(|camera| camera.views.iter().map(|view| view.frame));
+    let frames: Vec<BTreeSet<usize>> = frames.map(Iterator::collect).collect();
+    let others = |of: usize| {
+        let others = (0..frames.len()).filter(move |&other| other != of);
+        others.filter(|&other| !frames[of].is_disjoint(&frames[other])).collect()
+    };
+    (0..frames.len()).map(others).collect()
 }
 
 /// A calibration of one target, or of several, with their panels one target after the other.
@@ -316,11 +333,17 @@ fn of_name<'a>(given: &'a [(String, PathBuf)], name: &str) -> Option<&'a Path> {
 }
 
 impl Format {
-    fn files(self, cameras: &[(&str, &Camera, Pose)]) -> Result<Vec<File>, FormatError> {
+    fn files(
+        self,
+        cameras: &[(&str, &Camera, Pose)],
+        found: &Estimate,
+    ) -> Result<Vec<File>, FormatError> {
         let alone: Vec<&Camera> = cameras.iter().map(|(_, camera, _)| *camera).collect();
         let placed: Vec<(&Camera, Pose)> = cameras.iter().map(|(_, c, pose)| (*c, *pose)).collect();
         Ok(match self {
-            Self::Kalibr => vec![text_file("camchain.yaml".to_owned(), kalibr(&placed)?)],
+            Self::Kalibr => {
+                vec![text_file("camchain.yaml".to_owned(), kalibr(&placed, &overlaps(found))?)]
+            }
             Self::Colmap => vec![
                 text_file("cameras.txt".to_owned(), colmap(&alone)?),
                 text_file("rig_config.json".to_owned(), colmap_rig(cameras)?),

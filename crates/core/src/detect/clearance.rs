@@ -29,6 +29,9 @@ const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 /// turn an edge by less than 0.3 rad from one corner to the next.
 const MOST_SAG: f64 = 0.15;
 
+/// Tiles by the id of their panel.
+type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
+
 /// Where the tags of a target lie.
 #[derive(Clone, Debug, Default)]
 pub struct TagAreas {
@@ -36,7 +39,7 @@ pub struct TagAreas {
     /// edges; the smallest of all panels.
     inset: f64,
     /// Tiles with a tag, by panel id, of each target by its name where there are several.
-    targets: Vec<(Option<String>, BTreeMap<u32, BTreeSet<Tile>>)>,
+    targets: Vec<(Option<String>, TilesOfPanels)>,
 }
 
 impl TagAreas {

@@ -143,15 +143,18 @@ pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
     ))
 }
 
-/// Kalibr's camera chain: cameras, each with its camera_from_rig.
+/// Kalibr's camera chain: cameras, each with its camera_from_rig; `overlaps` has for each those that see what it sees, and
+/// may end before. Topics are `/cam0/image_raw` and so on.
 ///
 /// # Errors
 /// Where Kalibr has no such model.
-pub fn kalibr(cameras: &[(&Camera, Pose)]) -> Result<String, FormatError> {
+pub fn kalibr(cameras: &[(&Camera, Pose)], overlaps: &[Vec<usize>]) -> Result<String, FormatError> {
     let mut text = format!("# {GENERATOR}\n");
     for (n, (camera, camera_from_rig)) in cameras.iter().enumerate() {
         // Writing to a String cannot fail.
         let _ = write!(text, "cam{n}:\n{}", kalibr_camera(camera)?);
+        let others = overlaps.get(n).map_or(&[][..], Vec::as_slice);
+        let _ = writeln!(text, "  cam_overlaps: {others:?}\n  rostopic: /cam{n}/image_raw");
         if let Some((_, before_from_rig)) = n.checked_sub(1).map(|before| cameras[before]) {
             let motion = camera_from_rig.after(&before_from_rig.inverse());
             text += "  T_cn_cnm1:\n";
@@ -348,13 +351,14 @@ mod tests {
             let texts = [
                 opencv(&camera),
                 ros(&camera, "camera"),
-                kalibr(&[(&camera, Pose::IDENTITY)]),
+                kalibr(&[(&camera, Pose::IDENTITY)], &[]),
                 colmap(&[&camera]),
                 nerfstudio(&camera, &[("a.png", Pose::IDENTITY)]),
             ];
             assert_eq!(texts.map(|text| text.is_ok()), carried, "{model}");
         }
-        let said = kalibr(&[(&camera(Model::Radtan5, 5), Pose::IDENTITY)]).unwrap_err().to_string();
+        let said =
+            kalibr(&[(&camera(Model::Radtan5, 5), Pose::IDENTITY)], &[]).unwrap_err().to_string();
         assert!(said.starts_with("kalibr cannot carry a perspective lens with k1 k2 p1 p2 k3"));
     }
 
@@ -363,7 +367,8 @@ mod tests {
         let radtan = camera(Model::Radtan, 4);
         let turn = glam::DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2);
         let beside = Pose { rotation: turn, translation: glam::DVec3::new(-120.0, 0.0, 0.0) };
-        let text = kalibr(&[(&radtan, Pose::IDENTITY), (&radtan, beside)]).unwrap();
+        let text =
+            kalibr(&[(&radtan, Pose::IDENTITY), (&radtan, beside)], &[vec![1], vec![0]]).unwrap();
         assert!(text.contains("\ncam1:\n") && text.contains("  T_cn_cnm1:\n  - ["), "{text}");
         let last = text.lines().nth_back(3).unwrap();
         assert!(last.ends_with(", -0.12]"), "{text}");
@@ -381,7 +386,7 @@ mod tests {
     fn texts_are_those_that_the_programs_document() {
         let radtan = camera(Model::Radtan, 4);
         assert_eq!(
-            kalibr(&[(&radtan, Pose::IDENTITY)]).unwrap(),
+            kalibr(&[(&radtan, Pose::IDENTITY)], &[]).unwrap(),
             format!("# {GENERATOR}\n")
                 + "cam0:\n  camera_model: pinhole\n  intrinsics: [500.0, 500.0, 319.5, 239.5]\n  \
              distortion_model: radtan\n  distortion_coeffs: [0.25, 1.0e-5, -1.0e-7, 0.125]\n  \
