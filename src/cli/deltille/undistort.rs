@@ -1,5 +1,6 @@
 //! `deltille undistort` and `deltille rectify`.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -160,7 +161,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let made = Undistortion::new(&camera, args.view.size_of(&camera)?, args.view.field);
     let made = made.context("--field")?;
     let images = Images::of(&args.images)?;
-    let pictures = Pictures { args: &args.view, folder: &args.view.output, camera: &camera };
+    let (folder, end) = (args.view.output.as_path(), "undistorted");
+    let pictures = Pictures { args: &args.view, folder, camera: &camera, end };
     pictures.check(&images)?;
     let map = args.view.map(&made);
     let mut files = args.view.files(&stem, made.view(), &map)?;
@@ -200,11 +202,13 @@ struct Pictures<'a> {
     args: &'a ViewArgs,
     folder: &'a Path,
     camera: &'a Camera,
+    /// What the name of a picture ends with.
+    end: &'static str,
 }
 
 impl Pictures<'_> {
     fn place(&self, image: &Path) -> anyhow::Result<PathBuf> {
-        Ok(self.folder.join(format!("{}-undistorted.png", images::stem(image)?)))
+        Ok(self.folder.join(format!("{}-{}.png", images::stem(image)?, self.end)))
     }
 
     /// Refuses before the work what could not be written after it.
@@ -219,6 +223,10 @@ impl Pictures<'_> {
 
     /// Writes all; a picture that cannot be read is told, and the others go on.
     fn write(&self, images: &Images, map: &PixelMap) -> anyhow::Result<ExitCode> {
+        if images.count() != Some(0) {
+            fs::create_dir_all(self.folder)
+                .with_context(|| format!("-o: cannot write to {}", self.folder.display()))?;
+        }
         let count = images.count().unwrap_or(0);
         let bar = progress::bar(count as u64, "images");
         let failed: Mutex<Vec<anyhow::Error>> = Mutex::default();
@@ -297,6 +305,7 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
         args: &args.view,
         folder: &folders[index],
         camera: cameras[index].0,
+        end: "rectified",
     };
     of_camera(0).check(&images[0])?;
     of_camera(1).check(&images[1])?;

@@ -9,3 +9,4 @@ mod reproducible;
 mod robustness;
 mod sets;
 mod settings;
+mod undistort;
