@@ -68,9 +68,9 @@ for path in sorted((made / "corners").glob("*.json")):
 assert len(after) > 5 and max(after) < 0.1 < min(before), (before, after)
 picture = cv2.imread(str(folder / "photos" / "0.png"), cv2.IMREAD_GRAYSCALE)
 colours = np.dstack([picture, 255 - picture, picture // 2]).astype(np.uint16) * 257
-cv2.imwrite(str(made / "deep.png"), colours)
-run("undistort", "--camera", folder / "camera.yaml", made / "deep.png", "-o", made)
-deep = cv2.imread(str(made / "deep-undistorted.png"), cv2.IMREAD_UNCHANGED)
+cv2.imwrite(str(folder / "deep.png"), colours)
+run("undistort", "--camera", folder / "camera.yaml", folder / "deep.png", "-o", folder / "deep")
+deep = cv2.imread(str(folder / "deep" / "deep-undistorted.png"), cv2.IMREAD_UNCHANGED)
 assert deep.dtype == np.uint16 and deep.shape == colours.shape
 
 # A pair: the second camera 90 mm to the right, turned a little.

@@ -21,8 +21,8 @@ const ALONG: usize = 128;
 /// The view of the camera that is narrower by this factor than its widest is hardly more than a pixel.
 const NARROWEST: f64 = 1e3;
 
-/// Part of the radius at which a lens turns back up to which it is taken.
-const STEADY_PART: f64 = 0.999;
+/// Part of the radius at which a lens turns back up to which it is taken: the angle grows with the root of what is left.
+const STEADY_PART: f64 = 1.0 - 1e-6;
 
 /// How much a pinhole view shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
