@@ -15,6 +15,7 @@ mod field;
 mod page;
 mod plots;
 mod rig;
+mod scene;
 mod survey;
 mod target_map;
 mod thumbnail;

@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 
-use super::{Advice, Report, Survey, SurveyedView, Weight, advice, field, plots, rig, target_map};
+use super::{
+    Advice, Report, Survey, SurveyedView, Weight, advice, field, plots, rig, scene, target_map,
+};
 use deltille_core::calibrate::{
     CameraEstimate, Diagnosis, Excluded, Parameter, Source, TargetMap, ViewEstimate,
 };
@@ -55,6 +57,8 @@ pub(super) fn html(report: &Report) -> String {
     if report.is_rig() {
         page += &rig::places(report);
     }
+    page += &rig::targets(report);
+    page += &in_space(report);
     page += &rig::panels(report);
     page += &report.estimate.map.as_ref().map_or(String::new(), target);
     for (index, (camera, survey)) in cameras.iter().zip(&surveys).enumerate() {
@@ -78,6 +82,22 @@ pub(super) fn html(report: &Report) -> String {
         env!("CARGO_PKG_VERSION")
     );
     page
+}
+
+/// Cameras and targets in space.
+fn in_space(report: &Report) -> String {
+    let svg = scene::drawing(report.estimate);
+    if svg.is_empty() {
+        return String::new();
+    }
+    let what = match report.is_rig() {
+        true => "The cameras, and where they saw the target",
+        false => "The camera, and where it saw the target",
+    };
+    format!(
+        "<section><h2>In space</h2><figure class=\"wide\">{svg}<figcaption>{what}, as far as corners were found; the view that fits \
+         worst is red. Seen from the side and above, without perspective.</figcaption></figure></section>\n"
+    )
 }
 
 /// Good or bad, at a glance.

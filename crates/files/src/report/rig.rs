@@ -42,6 +42,36 @@ pub(super) fn places(report: &Report) -> String {
     )
 }
 
+/// Where targets are to each other, where there are several.
+pub(super) fn targets(report: &Report) -> String {
+    let targets = &report.estimate.targets;
+    if targets.len() < 2 {
+        return String::new();
+    }
+    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
+    let rows = targets.iter().map(|target| {
+        let at = target.scene_from_target.translation.to_array();
+        let at = at.map(|mm| format!("{:.2}", mm + 0.0).replace('-', "−")).join(", ");
+        let [turn, _] = target.scene_from_target.off(&Pose::IDENTITY);
+        let sd = target.pose_sd.map_or("–".to_owned(), |sd| {
+            format!("{:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
+        });
+        format!(
+            "<tr><td>{}</td><td class=\"number\">{at}</td><td class=\"number\">{:.3}°</td>\
+             <td class=\"number\">{sd}</td></tr>",
+            escaped(&target.name),
+            turn.length().to_degrees()
+        )
+    });
+    format!(
+        "<section><h2>Relative target poses</h2><table class=\"plain\"><tr><th>target</th><th>place, mm</th>\
+         <th>turned by</th><th>± standard deviation</th></tr>{}</table><p class=\"note\">Where the frame of each target \
+         is, relative to that of target {}.</p></section>\n",
+        rows.collect::<String>(),
+        escaped(&targets[0].name)
+    )
+}
+
 /// How far the panels of the target are from where its file has them, where that was found.
 pub(super) fn panels(report: &Report) -> String {
     let seen = report.estimate.corners().map(|corner| (corner.panel.index(), corner.panel.id()));

@@ -1,0 +1,222 @@
+//! Cameras and targets in space: a picture, drawn in parallel projection from above and behind the first camera, as one who
+//! stands there sees it.
+
+use std::fmt::Write as _;
+
+use glam::{DQuat, DVec2, DVec3};
+
+use super::page::escaped;
+use deltille_core::calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
+use deltille_core::camera::{Camera, Pose};
+use deltille_core::statistics::median;
+
+/// Width and greatest height of the picture, user units, and its margin.
+const WIDTH: f64 = 900.0;
+const MOST_HEIGHT: f64 = 560.0;
+const MARGIN: f64 = 40.0;
+
+/// How the viewer stands: turned to the side and down by so much, rad.
+const ASIDE: f64 = 0.6;
+const DOWN: f64 = 0.5;
+
+/// Views that are drawn of a camera, evenly over all: more hide each other.
+const MOST_VIEWS: usize = 60;
+
+/// How long a drawn camera is, as a part of the median distance of the target.
+const CAMERA_PART: f64 = 0.12;
+
+/// Half a drawn camera's width where the lens has no ray at the corners of its picture: as of 90°.
+const WIDE: f64 = 1.0;
+
+/// What is drawn: corners in space, mm, in the rig frame.
+struct Shape {
+    corners: Vec<DVec3>,
+    class: &'static str,
+    title: String,
+}
+
+/// The picture; empty where nothing was seen.
+pub(super) fn drawing(estimate: &Estimate) -> String {
+    let mut shapes = targets(estimate);
+    let depths = shapes.iter().map(|shape| shape.middle().length()).collect();
+    let Some(depth) = median(depths).filter(|depth| *depth > 0.0) else { return String::new() };
+    let cameras = estimate.cameras.iter().map(|camera| pyramid(camera, CAMERA_PART * depth));
+    shapes.extend(cameras.flatten());
+    // What is far away first, so that what is near covers it.
+    shapes.sort_by(|a, b| turned(b.middle()).z.total_cmp(&turned(a.middle()).z));
+    let flat = |point: &DVec3| turned(*point).truncate();
+    let all = || shapes.iter().flat_map(|shape| &shape.corners).map(flat);
+    let low = all().fold(DVec2::INFINITY, DVec2::min);
+    let size = all().fold(DVec2::NEG_INFINITY, DVec2::max) - low;
+    let room = DVec2::new(WIDTH, MOST_HEIGHT) - 2.0 * MARGIN;
+    let scale = (room / size.max(DVec2::splat(1.0))).min_element();
+    let place = |point: &DVec3| MARGIN + scale * (flat(point) - low);
+    let height = 2.0 * MARGIN + scale * size.y;
+    let width = (2.0 * MARGIN + scale * size.x).max(320.0);
+    let mut svg = format!(
+        "<svg class=\"scene\" viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" height=\"{height:.0}\" \
+         role=\"img\" aria-label=\"cameras and target in space\">"
+    );
+    for shape in &shapes {
+        let points: Vec<String> = shape
+            .corners
+            .iter()
+            .map(|corner| {
+                let at = place(corner);
+                format!("{:.1},{:.1}", at.x, at.y)
+            })
+            .collect();
+        let (class, title) = (shape.class, escaped(&shape.title));
+        // Writing to a String cannot fail.
+        let _ = write!(
+            svg,
+            "<polygon class=\"{class}\" points=\"{}\"><title>{title}</title></polygon>",
+            points.join(" ")
+        );
+    }
+    for camera in estimate.cameras.iter().filter(|_| estimate.cameras.len() > 1) {
+        let at = place(&camera.camera_from_rig.inverse().translation);
+        let (x, y, name) = (at.x, at.y - 8.0, escaped(&camera.name));
+        let _ = write!(svg, "<text class=\"name\" x=\"{x:.1}\" y=\"{y:.1}\">{name}</text>");
+    }
+    let (mm, y) = (round_length(0.25 * size.x.max(size.y)), height - 14.0);
+    let (from, to) = (MARGIN, MARGIN + scale * mm);
+    let _ = write!(
+        svg,
+        "<path class=\"scale\" d=\"M{from:.1} {y:.1}H{to:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\">{mm} mm</text></svg>",
+        to + 6.0,
+        y + 4.0
+    );
+    svg
+}
+
+/// As the viewer sees the rig frame: x right, y down, z away.
+fn turned(point: DVec3) -> DVec3 {
+    DQuat::from_rotation_x(DOWN) * (DQuat::from_rotation_y(ASIDE) * point)
+}
+
+/// 1, 2 or 5 times a power of ten, at most so much.
+fn round_length(most: f64) -> f64 {
+    let power = 10f64.powf(most.max(f64::MIN_POSITIVE).log10().floor());
+    [5.0, 2.0, 1.0].map(|n| n * power).into_iter().find(|mm| *mm <= most).unwrap_or(power)
+}
+
+impl Shape {
+    fn middle(&self) -> DVec3 {
+        self.corners.iter().sum::<DVec3>() / self.corners.len().max(1) as f64
+    }
+}
+
+/// The pyramid before a camera that it sees along, and its base.
+fn pyramid(camera: &CameraEstimate, long: f64) -> Vec<Shape> {
+    let rig_from_camera = camera.camera_from_rig.inverse();
+    let base = corners_ahead(&camera.camera)
+        .map(|corner| rig_from_camera.apply(long * corner.extend(1.0)));
+    let top = rig_from_camera.translation;
+    let shape = |corners: Vec<DVec3>, class| {
+        let title = if camera.name.is_empty() { "camera" } else { camera.name.as_str() };
+        Shape { corners, class, title: title.to_owned() }
+    };
+    let sides = (0..4).map(|i| shape(vec![top, base[i], base[(i + 1) % 4]], "camera-side"));
+    sides.chain([shape(base.to_vec(), "camera-base")]).collect()
+}
+
+/// Where the corners of the picture are on a plane ahead.
+fn corners_ahead(camera: &Camera) -> [DVec2; 4] {
+    let [a, b, c, d] = camera.corners_px();
+    [a, b, d, c].map(|corner| {
+        let direction = camera.unproject(corner).map(|ray| ray.direction);
+        let flat = direction.filter(|d| d.z > 0.0).map(|d| d.truncate() / d.z);
+        let wide = (corner - camera.centre_px).signum() * WIDE;
+        flat.filter(|flat| flat.abs().max_element() < WIDE).unwrap_or(wide)
+    })
+}
+
+/// The outlines of the panels in all views, as far as corners were seen.
+fn targets(estimate: &Estimate) -> Vec<Shape> {
+    let worst = estimate.frames.iter().map(|frame| frame.rms_px).fold(0.0, f64::max);
+    let of_camera = |camera: &'_ CameraEstimate| {
+        let step = camera.views.len().div_ceil(MOST_VIEWS).max(1);
+        let views = camera.views.iter().step_by(step);
+        let shapes = views.flat_map(|view| {
+            let is_worst = view.rms_px >= worst && estimate.frames.len() > 1;
+            panels(estimate, camera, view, if is_worst { "board worst" } else { "board" })
+        });
+        shapes.collect::<Vec<Shape>>()
+    };
+    estimate.cameras.iter().flat_map(of_camera).collect()
+}
+
+fn panels(
+    estimate: &Estimate,
+    camera: &CameraEstimate,
+    view: &ViewEstimate,
+    class: &'static str,
+) -> Vec<Shape> {
+    let mut seen: Vec<PanelRef> = view.corners.iter().map(|corner| corner.panel).collect();
+    seen.sort();
+    seen.dedup();
+    let shape = |panel: PanelRef| {
+        let target = estimate.targets.iter().find(|t| t.panels.contains(&panel.index()));
+        let scene_from_target = target.map_or(Pose::IDENTITY, |target| target.scene_from_target);
+        let place = estimate.panels.get(panel.index())?.target_from_panel;
+        let camera_from_panel = view.pose.after(&scene_from_target).after(&place);
+        let corners = view.corners.iter().filter(|c| c.panel == panel && !c.outlier);
+        let flat = corners.filter_map(|c| on_plane(&camera.camera, &camera_from_panel, c.pixel));
+        let outline = hull(flat.collect());
+        let rig_from_panel = camera.camera_from_rig.inverse().after(&camera_from_panel);
+        let corners = outline.into_iter().map(|at| rig_from_panel.apply(at.extend(0.0)));
+        let title = format!("{}, rms {:.3} px", view.name, view.rms_px);
+        Some(Shape { corners: corners.collect(), class, title })
+    };
+    seen.into_iter().filter_map(shape).filter(|shape| shape.corners.len() > 2).collect()
+}
+
+/// Where on the plane of a panel a pixel looks, mm.
+fn on_plane(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<DVec2> {
+    let ray = camera.unproject(pixel)?;
+    let panel_from_camera = camera_from_panel.inverse();
+    let (origin, direction) =
+        (panel_from_camera.apply(ray.origin), panel_from_camera.rotation * ray.direction);
+    let far = -origin.z / direction.z;
+    (far.is_finite() && far > 0.0).then(|| (origin + far * direction).truncate())
+}
+
+/// The convex hull, in the order along it (Andrew's monotone chain).
+fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let half = |points: &mut dyn Iterator<Item = DVec2>| {
+        let mut chain: Vec<DVec2> = Vec::new();
+        for point in points {
+            while let [.., a, b] = chain[..]
+                && (b - a).perp_dot(point - b) <= 0.0
+            {
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        chain.pop();
+        chain
+    };
+    let lower = half(&mut points.iter().copied());
+    let upper = half(&mut points.iter().rev().copied());
+    [lower, upper].concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hull_of_a_grid_is_its_four_corners() {
+        let grid = (0..12).map(|i| DVec2::new(f64::from(i % 4), f64::from(i / 4)));
+        let expected = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]].map(DVec2::from);
+        assert_eq!(hull(grid.collect()), expected);
+    }
+
+    #[test]
+    fn lengths_of_the_scale_are_round() {
+        let lengths = [730.0, 38.0, 19.0, 1.2].map(round_length);
+        assert_eq!(lengths, [500.0, 20.0, 10.0, 1.0]);
+    }
+}
