@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::Camera;
 
-/// The widest pinhole view that is chosen without being asked for: half of it is 75°, where the middle of a pixel's
-/// solid angle is four times smaller across than in the centre.
+/// The widest pinhole view that is chosen without being asked for: half of it is 75°, where a pixel
+/// covers a fifteenth of the angle that one in the middle does.
 const WIDEST_RAD: f64 = 150.0 / 180.0 * std::f64::consts::PI;
 
 /// No pinhole sees more than half the world, and hardly anything at its border.

@@ -13,7 +13,7 @@ use deltille_core::statistics::median;
 /// Width and greatest height of the picture, user units, and its margin.
 const WIDTH: f64 = 900.0;
 const MOST_HEIGHT: f64 = 560.0;
-const MARGIN: f64 = 40.0;
+const MARGIN: f64 = 60.0;
 
 /// How the viewer stands: turned to the side and down by so much, rad.
 const ASIDE: f64 = 0.6;
@@ -76,8 +76,11 @@ pub(super) fn drawing(estimate: &Estimate) -> String {
     }
     for camera in estimate.cameras.iter().filter(|_| estimate.cameras.len() > 1) {
         let at = place(&camera.camera_from_rig.inverse().translation);
-        let (x, y, name) = (at.x, at.y - 8.0, escaped(&camera.name));
-        let _ = write!(svg, "<text class=\"name\" x=\"{x:.1}\" y=\"{y:.1}\">{name}</text>");
+        let (x, y, name) = (at.x - 6.0, at.y + 4.0, escaped(&camera.name));
+        let _ = write!(
+            svg,
+            "<text class=\"name\" text-anchor=\"end\" x=\"{x:.1}\" y=\"{y:.1}\">{name}</text>"
+        );
     }
     let (mm, y) = (round_length(0.25 * size.x.max(size.y)), height - 14.0);
     let (from, to) = (MARGIN, MARGIN + scale * mm);
