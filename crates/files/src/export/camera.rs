@@ -390,7 +390,7 @@ mod tests {
             format!("# {GENERATOR}\n")
                 + "cam0:\n  camera_model: pinhole\n  intrinsics: [500.0, 500.0, 319.5, 239.5]\n  \
              distortion_model: radtan\n  distortion_coeffs: [0.25, 1.0e-5, -1.0e-7, 0.125]\n  \
-             resolution: [640, 480]\n"
+             resolution: [640, 480]\n  cam_overlaps: []\n  rostopic: /cam0/image_raw\n"
         );
         let text = colmap(&[&radtan]).unwrap();
         let last = text.lines().last().unwrap();
