@@ -20,7 +20,7 @@ use super::refine_grid::{is_sampled, sharp_level};
 use super::saddles::{SaddleFinder, too_many};
 use super::scene::{SceneError, check_distinct};
 use super::tile_shape::is_of_squares;
-use super::tiling::{CHECKER, DELTILLE, kind};
+use super::tiling::{CHECKER, DELTILLE, kind, step};
 use super::why;
 use crate::Clock;
 use crate::family::{Family, FamilyError};
@@ -111,6 +111,14 @@ impl DetectorConfig {
         Self { ink, ..self }
     }
 }
+
+/// A level on which the whole board is looked for has so many pixels for each of its corners: where the board covers a
+/// third of the picture, its edges are 18 px long there.
+const LEAST_PX2_A_CORNER: usize = 1000;
+
+/// Edges on such a level are no shorter than this, px: the fit of a corner reads as far, and what it reads of the next
+/// corners displaces it.
+const MIN_COARSE_EDGE_PX: f64 = 7.0;
 
 /// Radius of the polynomial that refines, px: the reference detector's.
 const POLYNOMIAL_RADIUS: usize = 3;
@@ -319,46 +327,13 @@ impl Detector {
         let mut timing = Timing::start(self.clock);
         let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
         timing.lap("pyramid");
-        let saddles = finder.find(&pyramid);
-        timing.lap("saddles");
-        let found = grids(finder, &pyramid, &saddles);
-        let mut left_out = Vec::new();
-        if too_many(&pyramid, saddles.len()) {
-            let edge_px = ((image.width() * image.height()) as f64 / saddles.len() as f64).sqrt();
-            let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
-            left_out.push(match edge_px < MIN_UNTAGGED_EDGE_PX {
-                true => Reason::new(ReasonKind::TooSmall, figures),
-                false => Reason::new(ReasonKind::TooManyGrids, []),
-            });
-        }
-        timing.lap("grids");
-        let least = least_untagged_corners(kind::<N>()) as usize;
-        let mut grids = self.plausible::<N>(image, &pyramid, &found, &mut left_out);
-        timing.lap("labels");
-        if grids.is_empty() && self.labels.are_wanted() {
-            let found = foreshortened_grids(finder, &pyramid);
-            grids = self.plausible::<N>(image, &pyramid, &found, &mut left_out);
-            // Compressed patterns of all kinds have triangles and squares too.
-            grids.retain(|(grid, _)| is_labelled(grid));
-            timing.lap("foreshortened");
-        }
-        let mut fitter = CornerFitter::default();
-        let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
-        let (optics, are_waves) = self.refine(&mut fitter, (image, &pyramid), &mut refined);
-        let refined = refined.into_iter().zip(reasons).zip(are_waves);
-        let mut grids: Vec<(Grid, Option<Reason>)> = refined
-            .filter(|((grid, _), is_wave)| {
-                is_vouched_for(grid) || grid.corners.len() >= least && !is_wave
-            })
-            .map(|(grid, _)| grid)
-            .collect();
-        let may_have_tags = !self.tag_areas.is_empty();
-        grids.retain(|(grid, _)| is_labelled(grid) || is_of_squares(image, grid, may_have_tags));
-        // Of what was no corner, some is gone.
-        refuse_patterns(&pyramid, &mut grids);
-        timing.lap("refine");
+        let whole = self.whole_on_coarser_level(finder, (image, &pyramid), &mut timing);
+        let (grids, optics, left_out, saddles) = match whole {
+            Some((grids, optics)) => (grids, optics, Vec::new(), 0),
+            None => self.all_grids(finder, (image, &pyramid), &mut timing),
+        };
         let mut reasons = if grids.is_empty() {
-            let nothing = || self.nothing_found::<N>(&pyramid, saddles.len());
+            let nothing = || self.nothing_found::<N>(&pyramid, saddles);
             vec![left_out.first().cloned().unwrap_or_else(nothing)]
         } else if self.labels.are_wanted() && grids.iter().all(|(_, reason)| reason.is_some()) {
             let of_grid = |(i, (_, reason)): (usize, &(Grid, Option<Reason>))| {
@@ -388,6 +363,107 @@ impl Detector {
             reasons,
             timing_ms: timing.laps,
         }
+    }
+
+    /// The board, where one alone is looked for, if a coarser level of the pyramid shows all of it and nothing else
+    /// that is like it. What finer levels would add is the places of its corners, and these are refined: if one of them
+    /// is not found then, the finer levels are searched too.
+    fn whole_on_coarser_level<const N: usize>(
+        &self,
+        finder: &SaddleFinder<N>,
+        (image, pyramid): (ImageView, &Pyramid),
+        timing: &mut Timing,
+    ) -> Option<(Vec<(Grid, Option<Reason>)>, Optics)> {
+        let whole = self.labels.whole()?;
+        let levels = pyramid.levels();
+        let least = LEAST_PX2_A_CORNER * whole.corners();
+        let coarsest = levels.iter().rposition(|level| level.pixels().len() >= least)?;
+        let seen = (1..=coarsest).rev().find_map(|level| {
+            let coarse = pyramid.from_level(level);
+            let saddles = finder.find(&coarse);
+            if saddles.len() < whole.corners() {
+                return None;
+            }
+            let mut found = grids(finder, &coarse, &saddles, Some(whole));
+            let is_seen = |grid: &SaddleGrid| {
+                whole.is_shown_by(grid) && shortest_edge_px::<N>(grid) >= MIN_COARSE_EDGE_PX
+            };
+            if found.len() != 1 || !is_seen(&found[0]) {
+                return None;
+            }
+            for placed in found[0].values_mut() {
+                placed.position = Pyramid::to_level_0(level, placed.position);
+            }
+            let mut left_out = Vec::new();
+            let labelled = self.plausible::<N>(image, pyramid, &found, &mut left_out);
+            let is_alone = labelled.len() == 1 && labelled[0].1.is_none() && left_out.is_empty();
+            is_alone.then_some(labelled)
+        });
+        timing.lap("coarse");
+        let refined = seen.map(|seen| self.refined::<N>((image, pyramid), seen));
+        timing.lap("refine");
+        refined.filter(|(grids, _)| {
+            grids.first().is_some_and(|(grid, _)| grid.corners.len() == whole.corners())
+        })
+    }
+
+    /// All grids of a picture with their labels, refined, and what they have in common; why others are left out, and
+    /// how many corners were seen.
+    fn all_grids<const N: usize>(
+        &self,
+        finder: &SaddleFinder<N>,
+        (image, pyramid): (ImageView, &Pyramid),
+        timing: &mut Timing,
+    ) -> (Vec<(Grid, Option<Reason>)>, Optics, Vec<Reason>, usize) {
+        let saddles = finder.find(pyramid);
+        timing.lap("saddles");
+        let found = grids(finder, pyramid, &saddles, self.labels.whole());
+        let mut left_out = Vec::new();
+        if too_many(pyramid, saddles.len()) {
+            let edge_px = ((image.width() * image.height()) as f64 / saddles.len() as f64).sqrt();
+            let figures = [("edge_px", edge_px), ("needed_edge_px", MIN_UNTAGGED_EDGE_PX)];
+            left_out.push(match edge_px < MIN_UNTAGGED_EDGE_PX {
+                true => Reason::new(ReasonKind::TooSmall, figures),
+                false => Reason::new(ReasonKind::TooManyGrids, []),
+            });
+        }
+        timing.lap("grids");
+        let mut grids = self.plausible::<N>(image, pyramid, &found, &mut left_out);
+        timing.lap("labels");
+        if grids.is_empty() && self.labels.are_wanted() {
+            let found = foreshortened_grids(finder, pyramid);
+            grids = self.plausible::<N>(image, pyramid, &found, &mut left_out);
+            // Compressed patterns of all kinds have triangles and squares too.
+            grids.retain(|(grid, _)| is_labelled(grid));
+            timing.lap("foreshortened");
+        }
+        let (grids, optics) = self.refined::<N>((image, pyramid), grids);
+        timing.lap("refine");
+        (grids, optics, left_out, saddles.len())
+    }
+
+    /// Grids with their corners refined, those that are still grids, and what they have in common.
+    fn refined<const N: usize>(
+        &self,
+        (image, pyramid): (ImageView, &Pyramid),
+        grids: Vec<(Grid, Option<Reason>)>,
+    ) -> (Vec<(Grid, Option<Reason>)>, Optics) {
+        let least = least_untagged_corners(kind::<N>()) as usize;
+        let mut fitter = CornerFitter::default();
+        let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
+        let (optics, are_waves) = self.refine(&mut fitter, (image, pyramid), &mut refined);
+        let refined = refined.into_iter().zip(reasons).zip(are_waves);
+        let mut grids: Vec<(Grid, Option<Reason>)> = refined
+            .filter(|((grid, _), is_wave)| {
+                is_vouched_for(grid) || grid.corners.len() >= least && !is_wave
+            })
+            .map(|(grid, _)| grid)
+            .collect();
+        let may_have_tags = !self.tag_areas.is_empty();
+        grids.retain(|(grid, _)| is_labelled(grid) || is_of_squares(image, grid, may_have_tags));
+        // Of what was no corner, some is gone.
+        refuse_patterns(pyramid, &mut grids);
+        (grids, optics)
     }
 
     /// The grids with their labels that may be what is looked for, and why others are left out.
@@ -514,6 +590,15 @@ impl Detector {
     }
 }
 
+/// The shortest distance between neighbours in a grid, px.
+fn shortest_edge_px<const N: usize>(grid: &SaddleGrid) -> f64 {
+    let edges = grid.iter().flat_map(|(&vertex, placed)| {
+        let next = (0..N / 2).filter_map(move |k| grid.get(&(vertex + step::<N>(k))));
+        next.map(|next| next.position.distance(placed.position))
+    });
+    edges.fold(f64::INFINITY, f64::min)
+}
+
 /// The tiling of a target.
 fn kind_of(target: &Target) -> GridKind {
     target.panels.first().map_or(GridKind::Deltille, |panel| panel.kind)
@@ -586,7 +671,7 @@ fn edge_of_small_tiles<const N: usize>(level: &Gray<i16>) -> Option<f64> {
     });
     let pyramid = Pyramid::new(&enlarged, 1, MIN_LEVEL_SIDE);
     let finder = SaddleFinder::<N>::new();
-    let found = grids(&finder, &pyramid, &finder.find(&pyramid));
+    let found = grids(&finder, &pyramid, &finder.find(&pyramid), None);
     let largest = found.iter().max_by_key(|grid| grid.len())?;
     let edge_px = why::edge_px(largest)? / TIMES as f64;
     (largest.len() >= LEAST_OTHER_CORNERS && edge_px < MIN_UNTAGGED_EDGE_PX).then_some(edge_px)
@@ -614,7 +699,7 @@ fn busiest_part(level: &Gray<i16>, size: [usize; 2]) -> [usize; 2] {
 /// Corners of the largest grid of a tiling.
 fn most_corners<const N: usize>(finder: &SaddleFinder<N>, pyramid: &Pyramid) -> usize {
     let saddles = finder.find(pyramid);
-    grids(finder, pyramid, &saddles).iter().map(|grid| grid.len()).max().unwrap_or(0)
+    grids(finder, pyramid, &saddles, None).iter().map(|grid| grid.len()).max().unwrap_or(0)
 }
 
 fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refiner {
@@ -649,7 +734,8 @@ impl Timing {
     fn lap(&mut self, stage: &str) {
         if let Some((clock, last)) = &mut self.last {
             let now = clock();
-            self.laps.insert(stage.to_owned(), now.saturating_sub(*last).as_secs_f64() * 1e3);
+            *self.laps.entry(stage.to_owned()).or_default() +=
+                now.saturating_sub(*last).as_secs_f64() * 1e3;
             *last = now;
         }
     }

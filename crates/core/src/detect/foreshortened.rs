@@ -50,7 +50,7 @@ pub fn foreshortened_grids<const N: usize>(
         let drawn = view.drawn(&levels[level]);
         let compressed = Pyramid::new(&drawn, levels.len() - level, MIN_LEVEL_SIDE);
         let saddles = finder.find(&compressed);
-        let mut found = grids(finder, &compressed, &saddles);
+        let mut found = grids(finder, &compressed, &saddles, None);
         for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
             placed.position = Pyramid::to_level_0(level, view.in_picture(placed.position));
         }

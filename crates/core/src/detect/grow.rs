@@ -14,6 +14,7 @@ use super::edge::{MAX_CHORD_RAD, is_clean_somehow};
 use super::effort::Effort;
 use super::links::{Link, Links, facing_ray, links};
 use super::local_map::{Bend, LocalMap};
+use super::outline::WholeBoard;
 use super::parts::join;
 use super::rectified::Rectified;
 use super::saddles::{Saddle, SaddleFinder, merge_px, too_many};
@@ -70,11 +71,13 @@ impl<const N: usize> GrownSaddle<N> {
 /// A grid while it grows.
 pub type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
 
-/// All grids among the saddles, largest first; none where there are more saddles than any board has.
+/// All grids among the saddles, largest first; none where there are more saddles than any board has. A grid that
+/// shows the `whole` board has no gaps.
 pub fn grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
     saddles: &[Saddle<N>],
+    whole: Option<&WholeBoard>,
 ) -> Vec<SaddleGrid> {
     if too_many(pyramid, saddles.len()) {
         return Vec::new();
@@ -98,7 +101,9 @@ pub fn grids<const N: usize>(
             (vertex, GrownSaddle { saddle: saddles[corner], turn })
         });
         let mut grid: Growing<N> = placed.collect();
-        fill_gaps(finder, pyramid, &mut grid, &mut effort);
+        if !whole.is_some_and(|whole| whole.is_shown_by(&grid)) {
+            fill_gaps(finder, pyramid, &mut grid, &mut effort);
+        }
         // What is found in a gap may have been found before, without its links.
         grid.retain(|&vertex, grown| match same(&index, &grown.saddle) {
             Some(corner) if growth.taken[corner] => false,

@@ -11,13 +11,13 @@ use super::detection::{DecodedTag, Grid, GridCorner};
 use super::detector::DetectorConfig;
 use super::grow::SaddleGrid;
 use super::label::{Budget, Labelled, TagLabeller};
-use super::outline::{fit_outline, fit_rectangle};
+use super::outline::{WholeBoard, fit_outline, fit_rectangle};
 use super::reason::{Reason, ReasonKind};
 use super::why;
 use crate::family::Family;
 use crate::lattice::{GridKind, LatticeMap, Vertex};
 use crate::raster::ImageView;
-use crate::targets::{Target, zigzag_vertices};
+use crate::targets::{Target, board_vertices};
 
 /// A grid of corners without labels, and its tiling.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +30,8 @@ pub struct FoundGrid<'a> {
 #[derive(Clone, Debug)]
 pub struct Labels {
     source: Source,
+    /// The board, where one alone is looked for.
+    whole: Option<WholeBoard>,
     allow_mirrored: bool,
 }
 
@@ -66,20 +68,29 @@ pub(super) const MOST_CORNERS: usize = 20_000;
 impl Labels {
     /// By the rows and columns of an untagged board, where they are known.
     pub fn of_size(kind: GridKind, size: Option<(u32, u32)>, config: &DetectorConfig) -> Self {
+        let outline = size.map(|(rows, cols)| board_vertices(kind, rows, cols));
+        let whole = outline.clone().map(|outline| WholeBoard::new(kind, outline));
         let source = match (size, kind) {
-            (Some((rows, cols)), GridKind::Deltille) => {
-                Source::Outline(zigzag_vertices(rows, cols).collect())
+            (Some(_), GridKind::Deltille) => {
+                Source::Outline(outline.into_iter().flatten().collect())
             }
             (Some(size), GridKind::Checker) => Source::Rectangle(size),
             (None, _) => Source::None,
         };
-        Self { source, allow_mirrored: config.allow_mirrored }
+        Self { source, whole, allow_mirrored: config.allow_mirrored }
     }
 
     /// By the tags of a target, and the outlines of its untagged panels.
     pub fn of_target(target: &Target, family: Option<&Family>, config: &DetectorConfig) -> Self {
         let tags =
             family.and_then(|family| TagLabeller::new(target, family, config.max_bit_errors));
+        let whole = match &target.panels[..] {
+            [only] => {
+                let vertices = only.corners.iter().map(|c| Vertex::new(c.row, c.col));
+                Some(WholeBoard::new(only.kind, vertices))
+            }
+            _ => None,
+        };
         let panels = target.panels.iter().map(|panel| TargetPanel {
             id: panel.id,
             kind: panel.kind,
@@ -89,13 +100,13 @@ impl Labels {
             corner_ids: panel.corners.iter().map(|c| (Vertex::new(c.row, c.col), c.id)).collect(),
         });
         let source = Source::Target { tags: tags.map(Box::new), panels: panels.collect() };
-        Self { source, allow_mirrored: config.allow_mirrored }
+        Self { source, whole, allow_mirrored: config.allow_mirrored }
     }
 
     /// By the tags and outlines of several targets that can be told apart, each with its name.
     pub fn of_scene(targets: Vec<(String, Self)>) -> Self {
         let allow_mirrored = targets.iter().any(|(_, labels)| labels.allow_mirrored);
-        Self { source: Source::Scene(targets), allow_mirrored }
+        Self { source: Source::Scene(targets), whole: None, allow_mirrored }
     }
 
     /// The panels in a grid; the grid itself with relative labels where there are none, and why there are
@@ -144,6 +155,11 @@ impl Labels {
                 labelled.iter().map(|l| (on_panel(found, &panels[l.panel], l), None)).collect()
             }
         }
+    }
+
+    /// The board, where one alone is looked for.
+    pub fn whole(&self) -> Option<&WholeBoard> {
+        self.whole.as_ref()
     }
 
     /// Whether labels are looked for.

@@ -68,7 +68,7 @@ type Directions<const N: usize> = [DVec2; N];
 
 /// The corners to be linked.
 struct Corners<'a, const N: usize> {
-    pyramid: &'a Pyramid,
+    pyramid: &'a Pyramid<'a>,
     saddles: &'a [Saddle<N>],
     directions: &'a [Directions<N>],
 }

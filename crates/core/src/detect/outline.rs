@@ -1,11 +1,44 @@
 //! Rows and columns of an untagged board that is seen whole, from its outline.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
 use super::grow::SaddleGrid;
 use crate::lattice::{GridKind, LatticeMap, Vertex};
+
+/// All corners of the one board that is looked for.
+#[derive(Clone, Debug)]
+pub struct WholeBoard {
+    kind: GridKind,
+    vertices: BTreeSet<Vertex>,
+}
+
+impl WholeBoard {
+    /// A board with corners at these vertices.
+    pub fn new(kind: GridKind, vertices: impl IntoIterator<Item = Vertex>) -> Self {
+        Self { kind, vertices: vertices.into_iter().collect() }
+    }
+
+    /// How many corners it has.
+    pub fn corners(&self) -> usize {
+        self.vertices.len()
+    }
+
+    /// Whether a grid has the board's corners and no others, however it is turned and shifted.
+    pub fn is_shown_by<S>(&self, grid: &BTreeMap<Vertex, S>) -> bool {
+        grid.len() == self.vertices.len()
+            && (0..self.kind.steps().len() as i32).any(|turns| {
+                let turned = LatticeMap::new(self.kind, turns, Vertex::new(0, 0));
+                let first = grid.keys().map(|&v| turned.apply(v)).min();
+                let shift = self.vertices.first().zip(first).map(|(to, from)| *to - from);
+                shift.is_some_and(|shift| {
+                    let map = LatticeMap::new(self.kind, turns, shift);
+                    grid.keys().all(|&v| self.vertices.contains(&map.apply(v)))
+                })
+            })
+    }
+}
 
 /// The motion that puts a whole grid exactly onto an outline, if just one does. `inverted` boards
 /// show their upright tiles bright, so they lie half a turn round.

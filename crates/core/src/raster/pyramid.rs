@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use glam::DVec2;
 use multiversion::multiversion;
 
@@ -11,13 +13,17 @@ pub const PYRAMID_FULL_SCALE: f32 = 1023.0;
 /// Level 0 is the image under a 3×3 binomial, level n+1 the 2×2 mean of level n; all in 10 bits.
 /// Pixel x of level n+1 covers pixels 2x and 2x+1, so `x_n = 2·x_{n+1} + 0.5`.
 #[derive(Clone, Debug)]
-pub struct Pyramid {
-    levels: Vec<Gray<i16>>,
+pub struct Pyramid<'a> {
+    levels: Cow<'a, [Gray<i16>]>,
 }
 
-impl Pyramid {
+impl Pyramid<'_> {
     /// At most `count` levels; stops before a side would fall under `min_side` pixels.
-    pub fn new<'a>(image: impl Into<ImageView<'a>>, count: usize, min_side: usize) -> Self {
+    pub fn new<'a>(
+        image: impl Into<ImageView<'a>>,
+        count: usize,
+        min_side: usize,
+    ) -> Pyramid<'static> {
         let first = of_any!(image.into(), view => binomial(view));
         let mut levels = vec![first];
         while levels.len() < count {
@@ -27,7 +33,12 @@ impl Pyramid {
             }
             levels.push(half(last));
         }
-        Self { levels }
+        Pyramid { levels: Cow::Owned(levels) }
+    }
+
+    /// The levels from one on, which becomes level 0 of it; the coarsest is always there.
+    pub fn from_level(&self, level: usize) -> Pyramid<'_> {
+        Pyramid { levels: Cow::Borrowed(&self.levels[level.min(self.levels.len() - 1)..]) }
     }
 
     /// The levels, finest first; never empty.

@@ -39,11 +39,11 @@ fn rectangle_vertices(rows: u32, cols: u32) -> impl Iterator<Item = Vertex> {
     (0..rows).flat_map(move |row| (0..cols).map(move |col| Vertex::new(row, col)))
 }
 
-/// The corners of a board.
-fn vertices(spec: &BoardSpec) -> Vec<Vertex> {
-    match spec.grid {
-        GridKind::Deltille => zigzag_vertices(spec.rows, spec.cols).collect(),
-        GridKind::Checker => rectangle_vertices(spec.rows, spec.cols).collect(),
+/// The corners of a board of a tiling, by row, then column.
+pub fn board_vertices(kind: GridKind, rows: u32, cols: u32) -> Vec<Vertex> {
+    match kind {
+        GridKind::Deltille => zigzag_vertices(rows, cols).collect(),
+        GridKind::Checker => rectangle_vertices(rows, cols).collect(),
     }
 }
 
@@ -103,7 +103,7 @@ pub(super) fn panels(
     spec.check()?;
     let panels = untied_panels(spec);
     let Some(tags) = &spec.tags else { return Ok((panels, None)) };
-    let vertices = vertices(spec);
+    let vertices = board_vertices(spec.grid, spec.rows, spec.cols);
     let on_each = |spacing| tagged_tiles(spec.grid, &vertices, spacing, tags.tags_in).len() as u64;
     let boards = u64::from(spec.boards);
     let instead = |available: u64| {
@@ -120,7 +120,7 @@ pub(super) fn panels(
 /// The panels of a checked spec, whether or not its family has so many tags.
 pub(super) fn untied_panels(spec: &BoardSpec) -> Vec<Panel> {
     let first_tag = spec.tags.as_ref().map_or(0, |tags| tags.first_id);
-    let vertices = vertices(spec);
+    let vertices = board_vertices(spec.grid, spec.rows, spec.cols);
     let tagged = |tags: &TagSpec| tagged_tiles(spec.grid, &vertices, tags.spacing, tags.tags_in);
     let tiles = spec.tags.as_ref().map_or_else(Vec::new, tagged);
     let matrix = [vertices.iter().map(|v| v.col as u32 + 1).max().unwrap_or(0), spec.rows];
@@ -224,7 +224,7 @@ mod tests {
             let tags_in = if white { TagsIn::White } else { TagsIn::Black };
             let grid = if checker { GridKind::Checker } else { GridKind::Deltille };
             let board = BoardSpec { grid, ..board };
-            let corners = vertices(&board);
+            let corners = board_vertices(board.grid, board.rows, board.cols);
             let tags_in = if checker { tags_in } else { TagsIn::Black };
             let tiles = tagged_tiles(grid, &corners, spacing, tags_in);
             // A board of 2 × 2 corners has one square, a black one.

@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::Name;
 use crate::lattice::GridKind;
 use crate::quantity;
-pub use board::zigzag_vertices;
+pub use board::{board_vertices, zigzag_vertices};
 pub use build::largest_edge_mm;
 pub use closed_mesh::is_coordinate;
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
