@@ -37,7 +37,8 @@ use super::blurred_corner::{
 };
 use super::correlation::Influence;
 use super::curve::{Piece, TONE_PARAMS};
-use super::optics::{INK_UNIT, Optics, STEP};
+use super::optics::{INK_UNIT, Optics, STEP, Spread};
+use super::small_systems::solved;
 use crate::raster::ImageView;
 
 /// Largest radius of a window, px.
@@ -329,6 +330,8 @@ struct Normal {
 /// What the optics make of a corner with K edges.
 #[derive(Clone, Copy, Debug)]
 struct Look<const K: usize> {
+    /// Sines and cosines of the angles.
+    turns: [(f64, f64); K],
     /// 1/s_k, 1/px.
     sharpness: [f64; K],
     /// ∂ ln s_k/∂θ_k.
@@ -370,19 +373,25 @@ fn by_ink<const K: usize>(corner: &Corner<K>, sharpness: [f64; K]) -> [f64; K] {
     })
 }
 
-/// The triangle between three edges that ink displaces, with its derivatives by ln s, the angles and the ink.
-fn triangle<const K: usize>(corner: &Corner<K>, optics: &Optics) -> Triangle {
+/// The triangle between three edges that ink displaces, with its derivatives by ln s, the angles and the ink; beside
+/// the corner the sines and cosines of its angles.
+fn triangle<const K: usize>(
+    (corner, turns): (&Corner<K>, [(f64, f64); K]),
+    optics: &Optics,
+    spread: &Spread,
+) -> Triangle {
     const STEP: f64 = 1e-4;
-    let spread = optics.spread(K);
-    let overlap = |corner: &Corner<K>, ink: f64| {
-        let core_px = corner.blur_px * optics.core();
-        let normals = corner.angles.map(|angle| [-angle.sin(), angle.cos()]);
+    let core = optics.core();
+    let overlap = |blur_px: f64, turns: [(f64, f64); K], ink: f64| {
+        let core_px = blur_px * core;
+        let normals = turns.map(|(sin, cos)| [-sin, cos]);
         let product = |a, b| spread.product(a, b);
         let lengths = normals.map(|n| product(n, n).sqrt());
         let rho = product(normals[0], normals[1]) / (lengths[0] * lengths[1]);
         let displaced = by_ink(corner, lengths.map(|l| 1.0 / (core_px * l))).map(|by| by * ink);
         // n₃ as a sum of n₁ and n₂.
-        let sine = |from: usize, to: usize| (corner.angles[to] - corner.angles[from]).sin();
+        let sine =
+            |from: usize, to: usize| turns[to].0 * turns[from].1 - turns[to].1 * turns[from].0;
         let a = sine(2, 1) / sine(0, 1) * lengths[0] / lengths[2];
         let b = sine(0, 2) / sine(0, 1) * lengths[1] / lengths[2];
         let c = a * displaced[0] + b * displaced[1] - displaced[2];
@@ -391,23 +400,24 @@ fn triangle<const K: usize>(corner: &Corner<K>, optics: &Optics) -> Triangle {
         let cov = [1.0 + x * x / 3.0, rho + x * y / 3.0, 1.0 + y * y / 3.0];
         Overlap::between([a, b, c], cov, displaced[0].signum())
     };
-    let there = std::array::from_fn(|parameter| {
-        let (mut moved, mut ink) = (*corner, optics.ink);
-        match parameter {
-            0 => moved.blur_px *= STEP.exp(),
-            1..=3 => moved.angles[parameter - 1] += STEP,
-            _ => ink += STEP,
+    let there = std::array::from_fn(|parameter| match parameter {
+        0 => overlap(corner.blur_px * STEP.exp(), turns, optics.ink),
+        1..=3 => {
+            let mut turned = turns;
+            turned[parameter - 1] = (corner.angles[parameter - 1] + STEP).sin_cos();
+            overlap(corner.blur_px, turned, optics.ink)
         }
-        overlap(&moved, ink)
+        _ => overlap(corner.blur_px, turns, optics.ink + STEP),
     });
-    Triangle::new(overlap(corner, optics.ink), there, STEP)
+    Triangle::new(overlap(corner.blur_px, turns, optics.ink), there, STEP)
 }
 
 impl<const K: usize> Look<K> {
     fn of(corner: &Corner<K>, optics: &Optics, piece: Piece, limits: [f32; 2]) -> Self {
         let spread = optics.spread(K);
-        let normals = corner.angles.map(|angle| [-angle.sin(), angle.cos()]);
-        let tangents = corner.angles.map(|angle| [-angle.cos(), -angle.sin()]);
+        let turns = corner.angles.map(f64::sin_cos);
+        let normals = turns.map(|(sin, cos)| [-sin, cos]);
+        let tangents = turns.map(|(sin, cos)| [-cos, -sin]);
         let product = |a, b| spread.product(a, b);
         let squares = normals.map(|n| product(n, n));
         let by_turn: [f64; K] =
@@ -440,8 +450,10 @@ impl<const K: usize> Look<K> {
         let sharpness = squares.map(|square| 1.0 / (core_px * square.sqrt()));
         let by_ink = by_ink(corner, sharpness);
         let displaced = by_ink.map(|by| by * optics.ink);
-        let triangle = displaced.iter().any(|d| *d != 0.0).then(|| triangle(corner, optics));
+        let is_inked = displaced.iter().any(|d| *d != 0.0);
+        let triangle = is_inked.then(|| triangle((corner, turns), optics, &spread));
         Self {
+            turns,
             by_astigmatism,
             rho_by_astigmatism,
             sharpness,
@@ -534,7 +546,11 @@ impl CornerFitter {
             for i in 0..PARAMS {
                 damped[(i, i)] *= 1.0 + damping;
             }
-            let step = damped.cholesky()?.solve(&gradient);
+            let rows = std::array::from_fn::<[f64; PARAMS + 1], PARAMS, _>(|i| {
+                std::array::from_fn(|j| if j < PARAMS { damped[(i, j)] } else { gradient[i] })
+            });
+            let solution = solved(rows)?;
+            let step = SVector::from_fn(|i, _| solution[i][PARAMS]);
             let Some(moved) = corner.moved(&step, window.radius) else {
                 damping *= 10.0;
                 continue;
@@ -575,20 +591,27 @@ impl CornerFitter {
             }
         }
         let noise = noise(&normal, &corner, freedom);
-        let factor = with_prior(&normal, &corner, noise).0.cholesky()?;
-        let inverse = factor.solve(&SMatrix::<f64, PARAMS, 2>::identity()) * noise * noise;
+        let matrix = with_prior(&normal, &corner, noise).0;
+        let rows = std::array::from_fn::<[f64; PARAMS + 2], PARAMS, _>(|i| {
+            std::array::from_fn(|j| match j.checked_sub(PARAMS) {
+                None => matrix[(i, j)],
+                Some(column) => f64::from(i == column),
+            })
+        });
+        let solution = solved(rows)?;
+        let cov = |i: usize, j: usize| noise * noise * solution[i][PARAMS + j];
         let way = corner.position.distance(start.position);
         let whiteness = self.whiteness(window);
         let trusted = converged
             && way <= MAX_WAY_PX
             && corner.edges_are_apart()
             && (noise < MAX_RESIDUAL * corner.amplitude.abs() || whiteness > MIN_WHITENESS)
-            && inverse[(X, X)] + inverse[(Y, Y)] < MAX_SIGMA_PX * MAX_SIGMA_PX;
+            && cov(X, X) + cov(Y, Y) < MAX_SIGMA_PX * MAX_SIGMA_PX;
         trusted.then_some(Fitted {
             corner,
             cov: std::array::from_fn(|i| {
-                let at = [(X, X), (X, Y), (Y, Y)][i];
-                optics.inflation * inverse[at] + optics.shift[i]
+                let (row, column) = [(X, X), (X, Y), (Y, Y)][i];
+                optics.inflation * cov(row, column) + optics.shift[i]
             }),
             noise,
             whiteness,
@@ -621,17 +644,16 @@ impl CornerFitter {
     /// Von Neumann's ratio of the residuals along the rows: 1 for white noise.
     fn whiteness(&self, window: &Window) -> f64 {
         let mut rest = &self.columns[PARAMS][..window.count];
-        let (mut differences, mut squares) = ((0.0, 0.0), 0.0);
+        let (mut sum, mut of_steps, mut steps) = (0.0, 0.0, 0);
         for &(_, length) in &window.runs {
             let (run, after) = rest.split_at(length);
-            for pair in run.windows(2) {
-                differences.0 += f64::from(pair[1] - pair[0]).powi(2);
-                differences.1 += 2.0;
-            }
-            squares += run.iter().map(|r| f64::from(r * r)).sum::<f64>();
+            let [square, of_step] = squares(run).map(f64::from);
+            sum += square;
+            of_steps += of_step;
+            steps += length - 1;
             rest = after;
         }
-        differences.0 / differences.1 / (squares / window.count as f64)
+        of_steps / (2 * steps) as f64 / (sum / window.count as f64)
     }
 
     /// The normal equations of the pixels at a corner in window coordinates.
@@ -821,14 +843,53 @@ fn is_within(step: &SVector<f64, PARAMS>, limit: f64) -> bool {
 fn ends(values: &[f32]) -> (f32, f32) {
     let (chunks, rest) = values.as_chunks::<LANES>();
     let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    // Comparisons, as the least of two numbers asks for more where one may be none.
     for chunk in chunks {
         for k in 0..LANES {
-            low[k] = low[k].min(chunk[k]);
-            high[k] = high[k].max(chunk[k]);
+            low[k] = if chunk[k] < low[k] { chunk[k] } else { low[k] };
+            high[k] = if chunk[k] > high[k] { chunk[k] } else { high[k] };
         }
     }
-    let low = low.iter().chain(rest).copied().fold(f32::INFINITY, f32::min);
-    (low, high.iter().chain(rest).copied().fold(f32::NEG_INFINITY, f32::max))
+    for k in 0..rest.len() {
+        low[k] = low[k].min(rest[k]);
+        high[k] = high[k].max(rest[k]);
+    }
+    let mut width = LANES / 2;
+    while width > 0 {
+        for k in 0..width {
+            low[k] = low[k].min(low[k + width]);
+            high[k] = high[k].max(high[k + width]);
+        }
+        width /= 2;
+    }
+    (low[0], high[0])
+}
+
+/// Sums of the squares of the values, and of the differences between those that follow each other.
+#[multiversion(targets("x86_64+avx2"))]
+fn squares(values: &[f32]) -> [f32; 2] {
+    const WIDTH: usize = LANES / 2;
+    let (mut sums, mut sums_of_steps) = ([0.0f32; WIDTH], [0.0f32; WIDTH]);
+    let count = values.len().saturating_sub(1) / WIDTH;
+    for i in 0..count {
+        let nine = &values[i * WIDTH..(i + 1) * WIDTH + 1];
+        for k in 0..WIDTH {
+            sums[k] += nine[k] * nine[k];
+            sums_of_steps[k] += (nine[k + 1] - nine[k]) * (nine[k + 1] - nine[k]);
+        }
+    }
+    let rest = &values[count * WIDTH..];
+    for k in 0..rest.len() {
+        let step = if k + 1 < rest.len() { rest[k + 1] - rest[k] } else { 0.0 };
+        sums[k % WIDTH] += rest[k] * rest[k];
+        sums_of_steps[k % WIDTH] += step * step;
+    }
+    let (mut sum, mut sum_of_steps) = (0.0, 0.0);
+    for k in 0..WIDTH {
+        sum += sums[k];
+        sum_of_steps += sums_of_steps[k];
+    }
+    [sum, sum_of_steps]
 }
 
 impl<const K: usize> Corner<K> {
@@ -1020,10 +1081,8 @@ fn fill<const K: usize, const C: usize, const JOINT: bool>(
 ) {
     let [x, y] = corner.position.as_vec2().to_array();
     // Directions of the edges, in units of the blur across them.
-    let sines: [f32; K] =
-        std::array::from_fn(|k| (corner.angles[k].sin() * look.sharpness[k]) as f32);
-    let cosines: [f32; K] =
-        std::array::from_fn(|k| (corner.angles[k].cos() * look.sharpness[k]) as f32);
+    let sines: [f32; K] = std::array::from_fn(|k| (look.turns[k].0 * look.sharpness[k]) as f32);
+    let cosines: [f32; K] = std::array::from_fn(|k| (look.turns[k].1 * look.sharpness[k]) as f32);
     let bends: [f32; K] = std::array::from_fn(|k| (corner.bends[k] / look.sharpness[k]) as f32);
     let by_turn: [f32; K] = std::array::from_fn(|k| look.by_turn[k] as f32);
     let by_angle: [f32; K] =

@@ -177,17 +177,17 @@ impl Curve {
         };
         let at = |y: f64| ln_slope(y, to_ends(y));
         let (from, to) = (middle - REACH * half, middle + REACH * half);
-        let (at_middle, at_from, at_to) = (at(middle), at(from), at(to));
+        let at_middle = at(middle);
+        let [slope_from, slope_to] = [from, to].map(|y| (at(y) - at_middle).exp());
         let slopes = TO_ENDS.iter().enumerate().map(|(i, &to_ends)| {
             let y = place(i);
-            let here = if y < from {
-                at_from
+            if y < from {
+                slope_from
             } else if y > to {
-                at_to
+                slope_to
             } else {
-                ln_slope(y, to_ends)
-            };
-            (here - at_middle).exp()
+                (ln_slope(y, to_ends) - at_middle).exp()
+            }
         });
         Self::with_slopes(&slopes.collect::<Vec<f64>>())
     }

@@ -57,6 +57,7 @@ mod ring;
 mod saddles;
 mod scene;
 mod sectors;
+mod small_systems;
 mod soft_cells;
 mod tag_words;
 mod tags;

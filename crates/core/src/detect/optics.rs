@@ -15,6 +15,7 @@ use super::corner_model::{COMMON, Common, Corner, CornerFitter, Joint, OWN, Wind
 use super::correlation::{self, Influence};
 use super::curve::{Curve, Piece, TONE_PARAMS, Tone, ToneEstimate};
 use super::ink::InkEstimate;
+use super::small_systems::solved;
 use crate::raster::ImageView;
 use crate::statistics::median;
 
@@ -778,10 +779,17 @@ impl<const K: usize> Problem<'_, K> {
         let mut own = Vec::with_capacity(equations.len());
         for (joint, weight) in equations.iter().zip(weights) {
             own.push(joint.as_ref().and_then(|joint| {
-                let factor = joint.matrix.fixed_view::<OWN, OWN>(0, 0).into_owned().cholesky()?;
+                const ALL: usize = OWN + PARAMS;
+                let rows = std::array::from_fn::<[f64; ALL + 1], OWN, _>(|i| {
+                    std::array::from_fn(|j| match j {
+                        ALL => joint.gradient[i],
+                        _ => joint.matrix[(i, j)],
+                    })
+                });
+                let solution = solved(rows)?;
                 let shared = joint.matrix.fixed_view::<OWN, PARAMS>(0, OWN).into_owned();
-                let constant = factor.solve(&joint.gradient.fixed_rows::<OWN>(0).into_owned());
-                let slope = factor.solve(&shared);
+                let constant = SVector::from_fn(|i, _| solution[i][ALL]);
+                let slope = SMatrix::from_fn(|i, j| solution[i][OWN + j]);
                 let pull = joint.gradient.fixed_rows::<PARAMS>(OWN) - shared.tr_mul(&constant);
                 matrix += *weight
                     * (joint.matrix.fixed_view::<PARAMS, PARAMS>(OWN, OWN) - shared.tr_mul(&slope));

@@ -1,5 +1,7 @@
 //! Images that somebody else holds.
 
+use multiversion::multiversion;
+
 use super::{AnyGray, Gray, Intensity};
 
 /// A part of memory as a grey image, row-major: rows of `width` pixels that begin `stride` pixels apart.
@@ -171,11 +173,19 @@ impl ImageView<'_> {
     pub fn read_row(&self, x: usize, y: usize, out: &mut [f32]) -> Option<()> {
         fn read<T: Intensity>(view: &View<T>, x: usize, y: usize, out: &mut [f32]) -> Option<()> {
             let shown = (y < view.height()).then(|| view.row(y).get(x..x + out.len()))??;
-            let to_one = 1.0 / T::FULL_SCALE;
-            out.iter_mut().zip(shown).for_each(|(to, from)| *to = from.to_f32() * to_one);
+            to_white_as_one(shown, out);
             Some(())
         }
         of_any!(self, view => read(view, x, y, out))
+    }
+}
+
+/// Pixels as floats, white being 1.
+#[multiversion(targets("x86_64+avx2"))]
+fn to_white_as_one<T: Intensity>(pixels: &[T], out: &mut [f32]) {
+    let to_one = 1.0 / T::FULL_SCALE;
+    for i in 0..pixels.len().min(out.len()) {
+        out[i] = pixels[i].to_f32() * to_one;
     }
 }
 
