@@ -173,6 +173,11 @@ fn a_benchmark_tells_every_stage() {
     let result = deltille(folder.path(), "bench detect --target board.json sheet --repeat 2");
     let said = String::from_utf8(result.success().get_output().stdout.clone()).unwrap();
     assert!(said.starts_with("1 images, 3.87 Mpx and 42.0 corners each"), "{said}");
+    for stage in ["pyramid", "coarse", "refine", "all"] {
+        assert!(said.contains(&format!("\n{stage} ")), "{said}");
+    }
+    let result = deltille(folder.path(), "bench detect --grid deltille sheet --repeat 1");
+    let said = String::from_utf8(result.success().get_output().stdout.clone()).unwrap();
     for stage in ["pyramid", "saddles", "grids", "labels", "refine", "all"] {
         assert!(said.contains(&format!("\n{stage} ")), "{said}");
     }

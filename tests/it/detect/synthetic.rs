@@ -137,6 +137,38 @@ fn an_untagged_board_seen_whole_is_labelled_by_its_outline() {
     assert_eq!(found.len(), 72);
 }
 
+/// A board of known size is sought on coarser levels first; one of unknown size on all.
+#[test]
+fn what_a_coarser_level_shows_whole_is_where_the_finest_shows_it() {
+    let camera = Camera::pinhole(1280, 960, 0.9);
+    for kind in [GridKind::Deltille, GridKind::Checker] {
+        let board = BoardSpec { tags: None, ..BoardSpec::new(kind, 8, 9, 18.0) };
+        let spec = TargetSpec::Board(board);
+        let target = Target::build("board", &spec, None, Some(&PaperSpec::default())).unwrap();
+        let sheets = artwork::draw(&target, None).unwrap().sheets;
+        let scene = scene_of_sheet(&target, &sheets[0], 0);
+        let detector = |size| Detector::for_grid(kind, size, DetectorConfig::default());
+        let (whole, any) = (detector(Some((8, 9))), detector(None));
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        for view in 0..6u32 {
+            let (distance_mm, tilt) = (300.0 + 120.0 * f64::from(view), 0.15 * f64::from(view));
+            let pose = tilted(&mut rng, target.panels[0].middle_mm(), distance_mm, tilt);
+            let light = Light::default().seed(view.into());
+            let image = eight_bits(&scene.render(&camera, &pose, &light));
+            let places = |found: Detection| -> Vec<DVec2> {
+                found.grids.iter().flat_map(|grid| &grid.corners).map(|c| c.position()).collect()
+            };
+            let [whole, any] = [&whole, &any].map(|detector| places(detector.detect(&image, "")));
+            assert_eq!(whole.len(), 72, "view {view}");
+            for place in whole {
+                let nearest_px =
+                    any.iter().map(|other| other.distance(place)).fold(f64::INFINITY, f64::min);
+                assert!(nearest_px < 0.01, "{kind:?}, view {view}: {nearest_px} px");
+            }
+        }
+    }
+}
+
 /// A part of the board with one tag in it is enough for absolute labels.
 #[test]
 fn partial_views_are_labelled_by_few_tags() {

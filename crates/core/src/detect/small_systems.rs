@@ -56,8 +56,8 @@ mod tests {
             let root = SMatrix::<f64, 6, 6>::from_fn(|_, _| random.random_range(-1.0..1.0));
             let matrix = root * root.transpose() + SMatrix::identity() * 0.1;
             let right = SVector::<f64, 6>::from_fn(|_, _| random.random_range(-1.0..1.0));
-            let rows = std::array::from_fn(|i| {
-                std::array::from_fn::<f64, 7, _>(|j| if j < 6 { matrix[(i, j)] } else { right[i] })
+            let rows: [[f64; 7]; 6] = std::array::from_fn(|i| {
+                std::array::from_fn(|j| if j < 6 { matrix[(i, j)] } else { right[i] })
             });
             let expected = matrix.cholesky().unwrap().solve(&right);
             let found = solved(rows).unwrap();
