@@ -388,10 +388,10 @@ impl Detector {
             let is_seen = |grid: &SaddleGrid| {
                 whole.is_shown_by(grid) && shortest_edge_px::<N>(grid) >= MIN_COARSE_EDGE_PX
             };
-            if found.len() != 1 || !is_seen(&found[0]) {
+            if !found.first().is_some_and(is_seen) {
                 return None;
             }
-            for placed in found[0].values_mut() {
+            for placed in found.iter_mut().flat_map(|grid| grid.values_mut()) {
                 placed.position = Pyramid::to_level_0(level, placed.position);
             }
             let mut left_out = Vec::new();
