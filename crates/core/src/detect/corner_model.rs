@@ -791,41 +791,38 @@ impl CornerFitter {
     ) {
         let look = Look::of(corner, optics, piece, self.limits);
         let (columns, pixels) = (&mut *self.columns, &*self.pixels);
-        let is_square = look.rho.abs() <= FEW_NODES_RHO;
-        if let Some(way) = look.way {
-            let way: [f32; 3] = std::array::from_fn(|k| way.get(k).copied().unwrap_or(0.0));
-            let way_of_two = [way[0], way[1]];
-            return match K {
-                2 if is_square => {
-                    let with = (Orthant::of_few_nodes(look.rho), way_of_two);
+        // By constants first: what they rule out is not compiled.
+        if K == 2 {
+            let is_square = look.rho.abs() <= FEW_NODES_RHO;
+            match (look.way, is_square) {
+                (Some(way), true) => {
+                    let with = (Orthant::of_few_nodes(look.rho), [way[0], way[1]]);
                     fill_swept_checker::<K, JOINT, 3>(columns, pixels, window, corner, &look, with);
                 }
-                2 => {
-                    let with = (Orthant::new(look.rho), way_of_two);
+                (Some(way), false) => {
+                    let with = (Orthant::new(look.rho), [way[0], way[1]]);
                     fill_swept_checker::<K, JOINT, 6>(columns, pixels, window, corner, &look, with);
                 }
-                _ => fill_swept_deltille::<K, JOINT>(columns, pixels, window, corner, &look, way),
-            };
-        }
-        match (K, JOINT, look.has_halo(), look.triangle) {
-            (2, false, false, _) if is_square => {
-                fill_square(columns, pixels, window, corner, &look);
+                (None, true) => {
+                    fill_square::<K, JOINT>(columns, pixels, window, corner, &look);
+                }
+                (None, false) => {
+                    fill_checker::<K, JOINT>(columns, pixels, window, corner, &look);
+                }
             }
-            (2, false, false, _) => fill_checker(columns, pixels, window, corner, &look),
-            (2, ..) if is_square => {
-                fill_square_with_halo::<K, JOINT>(columns, pixels, window, corner, &look);
-            }
-            (2, ..) => fill_checker_with_halo::<K, JOINT>(columns, pixels, window, corner, &look),
-            (_, false, false, None) => fill_deltille(columns, pixels, window, corner, &look),
-            (_, false, false, Some(triangle)) => {
-                fill_deltille_with_ink(columns, pixels, window, corner, &look, triangle);
-            }
-            (.., None) => {
-                fill_deltille_with_halo::<K, JOINT>(columns, pixels, window, corner, &look);
-            }
-            (.., Some(triangle)) => {
-                let look = (&look, triangle);
-                fill_deltille_with_all::<K, JOINT>(columns, pixels, window, corner, look);
+        } else {
+            match (look.way, look.triangle) {
+                (Some(way), _) => {
+                    let way = std::array::from_fn(|k| way.get(k).copied().unwrap_or(0.0));
+                    fill_swept_deltille::<K, JOINT>(columns, pixels, window, corner, &look, way);
+                }
+                (None, Some(triangle)) => {
+                    let look = (&look, triangle);
+                    fill_inked_deltille::<K, JOINT>(columns, pixels, window, corner, look);
+                }
+                (None, None) => {
+                    fill_deltille::<K, JOINT>(columns, pixels, window, corner, &look);
+                }
             }
         }
     }
@@ -940,96 +937,68 @@ impl<const K: usize> Corner<K> {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn fill_checker<const C: usize>(
+fn fill_checker<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    fill::<2, C, false>(columns, pixels, window, corner, look, Orthant::new(look.rho));
-}
-
-#[multiversion(targets("x86_64+avx2"))]
-fn fill_checker_with_halo<const C: usize, const JOINT: bool>(
-    columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
-    window: &Window,
-    corner: &Corner<C>,
-    look: &Look<C>,
-) {
-    let pattern = look.haloed(Orthant::new(look.rho));
-    fill::<2, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    let still = Orthant::new(look.rho);
+    if JOINT || look.has_halo() {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, look.haloed(still));
+    } else {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, still);
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn fill_square<const C: usize>(
+fn fill_square<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    fill::<2, C, false>(columns, pixels, window, corner, look, Orthant::of_few_nodes(look.rho));
-}
-
-#[multiversion(targets("x86_64+avx2"))]
-fn fill_square_with_halo<const C: usize, const JOINT: bool>(
-    columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
-    window: &Window,
-    corner: &Corner<C>,
-    look: &Look<C>,
-) {
-    let pattern = look.haloed(Orthant::of_few_nodes(look.rho));
-    fill::<2, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    let still = Orthant::of_few_nodes(look.rho);
+    if JOINT || look.has_halo() {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, look.haloed(still));
+    } else {
+        fill::<2, C, JOINT>(columns, pixels, window, corner, look, still);
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn fill_deltille<const C: usize>(
+fn fill_deltille<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
     look: &Look<C>,
 ) {
-    fill::<3, C, false>(columns, pixels, window, corner, look, Deltille);
-}
-
-#[multiversion(targets("x86_64+avx2"))]
-fn fill_deltille_with_halo<const C: usize, const JOINT: bool>(
-    columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
-    window: &Window,
-    corner: &Corner<C>,
-    look: &Look<C>,
-) {
-    fill::<3, C, JOINT>(columns, pixels, window, corner, look, look.haloed(Deltille));
-}
-
-#[multiversion(targets("x86_64+avx2"))]
-fn fill_deltille_with_ink<const C: usize>(
-    columns: &mut Columns,
-    pixels: &[f32; MAX_PIXELS],
-    window: &Window,
-    corner: &Corner<C>,
-    look: &Look<C>,
-    triangle: Triangle,
-) {
-    let pattern = Inked { edges: Deltille, triangle };
-    fill::<3, C, false>(columns, pixels, window, corner, look, pattern);
+    let still = Deltille;
+    if JOINT || look.has_halo() {
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, look.haloed(still));
+    } else {
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, still);
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn fill_deltille_with_all<const C: usize, const JOINT: bool>(
+fn fill_inked_deltille<const C: usize, const JOINT: bool>(
     columns: &mut Columns,
     pixels: &[f32; MAX_PIXELS],
     window: &Window,
     corner: &Corner<C>,
     (look, triangle): (&Look<C>, Triangle),
 ) {
-    let pattern = Inked { edges: look.haloed(Deltille), triangle };
-    fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    if JOINT || look.has_halo() {
+        let pattern = Inked { edges: look.haloed(Deltille), triangle };
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    } else {
+        let pattern = Inked { edges: Deltille, triangle };
+        fill::<3, C, JOINT>(columns, pixels, window, corner, look, pattern);
+    }
 }
 
 #[multiversion(targets("x86_64+avx2"))]
