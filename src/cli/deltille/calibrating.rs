@@ -1,6 +1,6 @@
 //! What commands that calibrate have in common: how they solve, what they tell, and the page.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -26,7 +26,7 @@ use crate::export::kind::Kind;
 use crate::name::is_within;
 use crate::photograph;
 use crate::raster::{AnyGray, Gray};
-use crate::report::{Report, Sample, target_map_svg, thumbnail};
+use crate::report::{Report, Sample, shown_views, target_map_svg, thumbnail};
 use crate::targets::{self, Target, parse_length_mm};
 use crate::words::counted;
 
@@ -81,6 +81,9 @@ enum Weighting {
     /// By the detections' covariances, with a common deviation found beside them
     Covariance,
 }
+
+/// Most small pictures of views that were held out.
+const MOST_HELD_OUT: usize = 100;
 
 /// A model, or the choice of one.
 #[derive(Clone, Copy, PartialEq)]
@@ -308,7 +311,12 @@ impl Calibrated {
             let is_there = |view: &&ViewEstimate| picture_of(&view.image, folder).is_some();
             let shown = Sample::best(camera, is_there).map(|view| view.name.as_str());
             let held_out = self.estimate.held_out.iter().flat_map(|test| test.cameras.get(index));
-            let views = camera.views.iter().chain(held_out.flat_map(|camera| &camera.views));
+            let held_out = held_out.flat_map(|camera| &camera.views).take(MOST_HELD_OUT);
+            // No more than the page shows, and the one that is undistorted.
+            let more = camera.views.iter().filter(|view| shown == Some(view.name.as_str()));
+            let views = shown_views(camera).into_iter().chain(more).chain(held_out);
+            let mut done = BTreeSet::new();
+            let views = views.filter(|view| done.insert(&view.image));
             for view in views {
                 let size_px = [camera.camera.width, camera.camera.height];
                 let picture = picture(&view.image, folder, size_px);

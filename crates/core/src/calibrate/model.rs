@@ -141,9 +141,13 @@ impl Model {
     /// Models to be compared with it, and it: those for lenses of its kind, fewer parameters first.
     pub(super) fn neighbours(self) -> Vec<Self> {
         let of_kind = match self.is_perspective() {
-            true => {
-                [Self::Radtan, Self::Radtan5, Self::KannalaBrandt(4), Self::Rational, Self::ThinPrism]
-            }
+            true => [
+                Self::Radtan,
+                Self::Radtan5,
+                Self::KannalaBrandt(4),
+                Self::Rational,
+                Self::ThinPrism,
+            ],
             false => [
                 Self::Eucm,
                 Self::DoubleSphere,

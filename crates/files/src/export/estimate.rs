@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::calibration::Residuals;
 use super::motion::Motion;
 use deltille_core::calibrate::{
-    BoardShape, CameraEstimate, Coverage, Diagnosis, Estimate, Instead, LackOfFit, LensEnd, PanelRef, Source,
-    TargetMap, ViewEstimate, Words,
+    BoardShape, CameraEstimate, Coverage, Diagnosis, Estimate, Instead, LackOfFit, LensEnd,
+    PanelRef, Source, TargetMap, ViewEstimate, Words,
 };
 
 #[derive(Serialize)]

@@ -178,11 +178,7 @@ fn is_none(frames: &i32) -> bool {
     *frames == 0
 }
 
-fn seen<'a>(
-    estimate: &'a Estimate,
-    found: &'a CameraEstimate,
-    residuals: Residuals,
-) -> Seen<'a> {
+fn seen<'a>(estimate: &'a Estimate, found: &'a CameraEstimate, residuals: Residuals) -> Seen<'a> {
     let views = views(estimate, found, residuals);
     Seen { name: &found.name, rms_px: found.rms_px, views }
 }

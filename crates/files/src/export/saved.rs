@@ -11,8 +11,8 @@ use serde::Deserialize;
 use super::calibration::{self, StoredShape};
 use super::rig;
 use deltille_core::calibrate::{
-    BoardShape, CameraEstimate, Corner, CornerOffset, Coverage, Estimate, Excluded, FrameEstimate, Model,
-    ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
+    BoardShape, CameraEstimate, Corner, CornerOffset, Coverage, Estimate, Excluded, FrameEstimate,
+    Model, ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
     SHAPE_COEFFICIENTS as COUNT, TargetEstimate, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, Pose};

@@ -67,28 +67,35 @@ struct Sums {
     views: usize,
 }
 
-/// The corners that a camera saw, outliers left out, by panel, row and column.
+/// The corners that a camera saw, by panel, row and column. Outliers are left out; but where a corner is one in most of its
+/// views it is no accident, and all of them count.
 pub(super) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<OfCorner> {
     let step = camera.corner_count().div_ceil(MOST_CORNERS).max(1);
-    let mut sums: BTreeMap<(PanelRef, i32, i32), Sums> = BTreeMap::new();
+    // Of those that are no outliers, and of all.
+    let mut sums: BTreeMap<(PanelRef, i32, i32), [Sums; 2]> = BTreeMap::new();
     for view in camera.views.iter().step_by(step) {
         let mut places: BTreeMap<PanelRef, Option<Pose>> = BTreeMap::new();
-        for corner in view.corners.iter().filter(|corner| !corner.outlier) {
+        for corner in &view.corners {
             let place = places.entry(corner.panel);
             let place = place.or_insert_with(|| camera_from_panel(estimate, view, corner.panel));
             let Some(camera_from_panel) = place else { continue };
             let seen = at_corner(&camera.camera, camera_from_panel, corner.pixel - corner.residual);
             let Some((at_mm, by_move)) = seen else { continue };
             let sums = sums.entry((corner.panel, corner.row, corner.col)).or_default();
-            sums.at_mm += at_mm;
-            sums.normal += by_move.transpose() * by_move;
-            sums.right += by_move.transpose() * corner.residual;
-            sums.squares += corner.residual.length_squared();
-            sums.views += 1;
+            for sums in &mut sums[usize::from(corner.outlier)..] {
+                sums.at_mm += at_mm;
+                sums.normal += by_move.transpose() * by_move;
+                sums.right += by_move.transpose() * corner.residual;
+                sums.squares += corner.residual.length_squared();
+                sums.views += 1;
+            }
         }
     }
     let variance = camera.inlier_rms_px().powi(2).max(f64::MIN_POSITIVE);
-    let seen = sums.into_iter().filter(|(_, sums)| sums.views >= LEAST_VIEWS);
+    let seen = sums.into_iter().map(|(corner, [inliers, all])| {
+        (corner, if 2 * inliers.views >= all.views { inliers } else { all })
+    });
+    let seen = seen.filter(|(_, sums)| sums.views >= LEAST_VIEWS);
     let of_corner = |((panel, row, col), sums): ((PanelRef, i32, i32), Sums)| {
         let move_mm = sums.normal.inverse() * sums.right;
         let views = sums.views;
@@ -123,7 +130,8 @@ fn at_corner(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<
     let at_mm = on_plane(camera, camera_from_panel, pixel)?;
     let point = camera_from_panel.apply(at_mm.extend(0.0));
     let [by_x, by_y] = camera.project_with_derivatives(point)?.by_point.map(glam::DVec3::from);
-    let [across, up] = [glam::DVec3::X, glam::DVec3::Y].map(|axis| camera_from_panel.rotation * axis);
+    let [across, up] =
+        [glam::DVec3::X, glam::DVec3::Y].map(|axis| camera_from_panel.rotation * axis);
     let column = |axis: glam::DVec3| DVec2::new(by_x.dot(axis), by_y.dot(axis));
     Some((at_mm, DMat2::from_cols(column(across), column(up))))
 }

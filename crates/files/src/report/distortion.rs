@@ -213,7 +213,8 @@ pub(super) fn curve_plot(found: &CameraEstimate, survey: &Survey) -> Option<(Str
         of.iter().map(|at| DVec2::new(at.angle_rad.to_degrees(), px(at))).collect()
     };
     let around = points(&far, |at| at.least_px).into_iter();
-    let around: Vec<DVec2> = around.chain(points(&far, |at| at.most_px).into_iter().rev()).collect();
+    let around: Vec<DVec2> =
+        around.chain(points(&far, |at| at.most_px).into_iter().rev()).collect();
     axes.line(&around, "band");
     if let Some((_, near)) = &near {
         axes.line(&points(near, |at| at.mean_px), "curve second");
@@ -230,8 +231,8 @@ pub(super) fn curve_plot(found: &CameraEstimate, survey: &Survey) -> Option<(Str
     if let Some((mm, _)) = &near {
         foot += &key(150.0, "curve second", &format!("{mm:.0} mm away"));
     }
-    foot += "<rect class=\"beyond-corners\" x=\"290\" y=\"4\" width=\"22\" height=\"12\"/>\
-             <text x=\"318\" y=\"14\">no corners: extrapolated</text>";
+    foot += "<rect class=\"beyond-corners\" x=\"272\" y=\"4\" width=\"22\" height=\"12\"/>\
+             <text x=\"300\" y=\"14\">beyond the corners</text>";
     axes.foot(FOOT, foot);
     let shown = axes.svg(
         ["angle from the axis, °", &format!("radius less {}, px", ideal.law())],
@@ -267,7 +268,8 @@ pub(super) fn grid_plot(found: &CameraEstimate, survey: &Survey) -> (String, Str
             points.map(move |t| middle + along * t * reach).collect::<Vec<DVec2>>()
         })
     };
-    let lines: Vec<Vec<DVec2>> = lines(DVec2::X, DVec2::Y).chain(lines(DVec2::Y, DVec2::X)).collect();
+    let lines: Vec<Vec<DVec2>> =
+        lines(DVec2::X, DVec2::Y).chain(lines(DVec2::Y, DVec2::X)).collect();
     let moves = lines.iter().flatten().filter(|at| camera.sees(**at, 0.0));
     let moves = moves.filter_map(|&at| Some((warped(at)? - at).length()));
     let most = moves.fold(0.0, f64::max);
@@ -294,8 +296,8 @@ pub(super) fn grid_plot(found: &CameraEstimate, survey: &Survey) -> (String, Str
         FOOT,
         format!(
             "<path class=\"grid ideal\" d=\"M0 10H22\"/><text x=\"28\" y=\"14\">{}</text>\
-             <path class=\"grid bent\" d=\"M150 10H172\"/><text x=\"178\" y=\"14\">this lens</text>\
-             <circle class=\"view\" cx=\"290\" cy=\"10\" r=\"3\"/><text x=\"298\" y=\"14\">principal point</text>",
+             <path class=\"grid bent\" d=\"M165 10H187\"/><text x=\"193\" y=\"14\">this lens</text>\
+             <circle class=\"view\" cx=\"300\" cy=\"10\" r=\"3\"/><text x=\"308\" y=\"14\">principal point</text>",
             ideal.name()
         ),
     );
@@ -364,7 +366,8 @@ mod tests {
     #[test]
     fn ideal_lenses_take_their_directions_back() {
         for widest in [0.8, 1.8] {
-            let ideal = Ideal::of(&camera(Lens::BrownConrady(BrownConrady::default()), 500.0), widest);
+            let ideal =
+                Ideal::of(&camera(Lens::BrownConrady(BrownConrady::default()), 500.0), widest);
             let pixel = DVec2::new(300.0, 900.0);
             let back = ideal.pixel(ideal.direction(pixel).unwrap()).unwrap();
             assert!(back.abs_diff_eq(pixel, 1e-9), "{back}");

@@ -27,7 +27,8 @@ pub(super) fn residuals(estimate: &Estimate, camera: &CameraEstimate, survey: &S
     ));
     figures.push((
         plots::coverage(survey),
-        "Corners in each part of the image. Where there are none (red) distortion is extrapolated.".to_owned(),
+        "Corners in each part of the image. Where there are none (red) distortion is extrapolated."
+            .to_owned(),
     ));
     figures.push((
         plots::of_views(camera, survey),
@@ -62,7 +63,7 @@ pub(super) fn uncertainty(camera: &CameraEstimate) -> String {
         ))
     });
     let body = format!(
-        "{}<div class=\"wide-table\"><table class=\"plain\"><tr><th>distance</th><th>deviation</th><th>px</th></tr>{}</table></div>\
+        "{}<div class=\"wide-table\"><table class=\"plain\"><tr><th>distance</th><th class=\"words\">deviation</th><th>px</th></tr>{}</table></div>\
          <p class=\"note\">Standard deviation of a coordinate where corners were, after the motion of the camera that explains \
          the corners best.</p>",
         page::figures(drawn),

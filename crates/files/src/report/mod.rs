@@ -32,9 +32,7 @@ mod views;
 use std::collections::BTreeMap;
 
 use crate::export::calibration::Print;
-use deltille_core::calibrate::{
-    CameraEstimate, Candidate, Diagnosis, Estimate, PanelPlace, Words,
-};
+use deltille_core::calibrate::{CameraEstimate, Candidate, Diagnosis, Estimate, PanelPlace, Words};
 
 pub use advice::{Advice, Weight, advice};
 pub use field::{comparison_svg, uncertainty_svg};
@@ -42,6 +40,7 @@ pub use sample::Sample;
 pub use survey::{Survey, SurveyedView};
 pub use target_map::target_map_svg;
 pub use thumbnail::thumbnail;
+pub use views::shown_views;
 
 /// What the page about a calibration shows.
 #[derive(Clone, Debug)]

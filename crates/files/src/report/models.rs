@@ -24,7 +24,9 @@ pub(super) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
         (Some(best), Some(own)) => {
             let is_as_good = tried.iter().any(|one| one.model == own && one.holds);
             match is_as_good {
-                true => format!("{own} holds the lens; {best} does so with fewer parameters, or surer."),
+                true => {
+                    format!("{own} holds the lens; {best} does so with fewer parameters, or surer.")
+                }
                 false => format!("{own} was taken, and {best} holds the lens better: try it."),
             }
         }
@@ -36,7 +38,7 @@ pub(super) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
          <th>differs by, px</th><th></th></tr>{}</table></div><p class=\"note\">Each was found from two thirds of some views \
          and held against the others, where only poses are found: a model that is too small leaves more there, one that \
          is too large does not leave less. The difference (rms, and the largest) is that of projections at infinity from the \
-         camera of this page, where corners were, after the turn that makes it least.</p></section>\n",
+         camera of this page, where corners were, after the turn that makes it least; that of the model of this page is what fewer views make.</p></section>\n",
         escaped(&told),
         rows.collect::<String>()
     )
@@ -44,10 +46,11 @@ pub(super) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
 
 fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
     let own = camera.model == Some(one.model);
-    let held_out = one.held_out_px.map_or("no camera".to_owned(), |px| {
-        format!("{px:.4}{}", meter(px / worst))
-    });
-    let rms = one.found.as_ref().map_or("–".to_owned(), |of| format!("{:.4}", of.inlier_rms_px()));
+    let held_out = one
+        .held_out_px
+        .map_or("no camera".to_owned(), |px| format!("{px:.4}{}", meter(px / worst)));
+    let rms =
+        one.found.as_ref().map_or("–".to_owned(), |of| format!("{:.4}", of.inlier_rms_px()));
     let against = one.found.as_ref().and_then(|of| against(camera, of));
     let against = against.map_or("–".to_owned(), |Against { rms_px, largest_px }| {
         format!("{rms_px:.3}, {largest_px:.2}")
@@ -58,7 +61,8 @@ fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
         (one.holds && !one.chosen, "as good"),
         (one.held_out_px.is_some() && !one.is_stable, "parameters not told apart"),
     ];
-    let notes: Vec<&str> = notes.iter().filter(|(is_so, _)| *is_so).map(|(_, note)| *note).collect();
+    let notes: Vec<&str> =
+        notes.iter().filter(|(is_so, _)| *is_so).map(|(_, note)| *note).collect();
     format!(
         "<tr{}><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{held_out}</td>\
          <td class=\"number\">{rms}</td><td class=\"number\">{against}</td><td>{}</td></tr>",

@@ -6,8 +6,8 @@ use base64::Engine as _;
 use glam::DVec2;
 
 use super::{
-    Advice, Report, Sample, Survey, Weight, advice, distortion, fit, models, parameters, rig, scene,
-    target_map, views,
+    Advice, Report, Sample, Survey, Weight, advice, distortion, fit, models, parameters, rig,
+    scene, target_map, views,
 };
 use deltille_core::calibrate::{CameraEstimate, Diagnosis, Excluded, Source, TargetMap};
 use deltille_core::words::{counted, places};
@@ -120,7 +120,8 @@ fn verdict(report: &Report, advice: &[Advice]) -> String {
         (true, _) => ("warning", "✕", "Not to be used", "See why below.".to_owned()),
         (false, 0) => ("good", "✓", "Good", "Nothing speaks against it.".to_owned()),
         (false, n) => {
-            ("hint", "!", "Use with care", format!("See the {} below.", counted(n, "warning")))
+            let warnings = if n == 1 { "warning".to_owned() } else { counted(n, "warning") };
+            ("hint", "!", "Use with care", format!("See the {warnings} below."))
         }
     };
     let sureness = if is_failure { String::new() } else { sureness(report) };
@@ -152,7 +153,7 @@ fn of_camera(report: &Report, index: usize, found: &CameraEstimate) -> Vec<Figur
     let mut cells = vec![
         (format!("{:.4} px", found.rms_px), "rms of a coordinate"),
         (escaped(&model), "model"),
-        (format!("{} × {}", camera.width, camera.height), "image, px"),
+        (format!("{}\u{a0}×\u{a0}{}", camera.width, camera.height), "image, px"),
         (found.views.len().to_string(), "views"),
         (found.corner_count().to_string(), "corners"),
     ];

@@ -127,9 +127,8 @@ impl<'a> Panels<'a> {
 /// Least and largest places of marks, mm.
 fn extent_mm(marks: &[Mark]) -> [DVec2; 2] {
     let places = marks.iter().map(|mark| mark.at_mm);
-    places.fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], at| {
-        [low.min(at), high.max(at)]
-    })
+    places
+        .fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], at| [low.min(at), high.max(at)])
 }
 
 fn size_mm(marks: &[Mark]) -> DVec2 {

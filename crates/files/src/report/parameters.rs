@@ -5,6 +5,9 @@ use std::fmt::Write as _;
 use super::page::{self, escaped, rounded};
 use deltille_core::calibrate::{CameraEstimate, Parameter, Source};
 
+/// More parameters than this have their correlations in small print.
+const FEW: usize = 12;
+
 /// Correlations from here on are drawn in a blue on which white is read better than ink.
 const STRONG: f64 = 0.85;
 
@@ -52,8 +55,9 @@ pub(super) fn section(camera: &CameraEstimate) -> String {
             let _ =
                 write!(matrix, "<tr><th>{}</th>{}</tr>", escaped(name), cells.collect::<String>());
         }
+        let many = if names.len() > FEW { " many" } else { "" };
         matrix = format!(
-            "<figure><div class=\"wide-table\"><table class=\"matrix\">{matrix}</table></div><figcaption>Correlations. \
+            "<figure><div class=\"wide-table\"><table class=\"matrix{many}\">{matrix}</table></div><figcaption>Correlations. \
              Parameters that are strongly correlated are known only together.</figcaption></figure>"
         );
     }

@@ -128,7 +128,8 @@ pub(super) fn residual_map(survey: &Survey) -> (String, String) {
     let means = || survey.means_px.iter().flatten();
     let longest = means().map(|cell| cell.mean_px.length()).fold(0.0, f64::max);
     // Round numbers, to be read in the caption and below.
-    let enlarged = if longest > 0.0 { round_down(ARROW_CELLS * cell / longest).max(1.0) } else { 1.0 };
+    let enlarged =
+        if longest > 0.0 { round_down(ARROW_CELLS * cell / longest).max(1.0) } else { 1.0 };
     let mut axes = Axes::of_image(survey.size_px);
     for (index, mean) in survey.means_px.iter().enumerate() {
         let Some(mean) = mean else { continue };
@@ -225,8 +226,7 @@ pub(super) fn against_tilt(camera: &CameraEstimate, survey: &Survey) -> Option<S
         .collect::<Option<_>>()?;
     let steepest = tilts.iter().copied().fold(10.0, f64::max);
     let worst = camera.views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
-    let mut axes =
-        Axes::new(frame(survey.size_px), [0.0, 1.05 * steepest], [0.0, 1.1 * worst]);
+    let mut axes = Axes::new(frame(survey.size_px), [0.0, 1.05 * steepest], [0.0, 1.1 * worst]);
     for (view, tilt) in camera.views.iter().zip(&tilts) {
         axes.dot(DVec2::new(*tilt, view.rms_px), 3.0, "view");
     }
@@ -237,7 +237,8 @@ pub(super) fn against_tilt(camera: &CameraEstimate, survey: &Survey) -> Option<S
 pub(super) fn of_views(camera: &CameraEstimate, survey: &Survey) -> String {
     let views = &camera.views;
     let worst = views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
-    let mut axes = Axes::new(frame(survey.size_px), [0.5, views.len() as f64 + 0.5], [0.0, 1.1 * worst]);
+    let mut axes =
+        Axes::new(frame(survey.size_px), [0.5, views.len() as f64 + 0.5], [0.0, 1.1 * worst]);
     // Of many views each bar is the worst of several.
     let step = views.len().div_ceil(MOST_BARS).max(1);
     for (bar, views) in views.chunks(step).enumerate() {

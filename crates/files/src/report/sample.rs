@@ -19,6 +19,9 @@ const SIDE: usize = 520;
 /// The widest view that is shown, rad: beyond, its border takes all the room.
 const WIDEST_RAD: f64 = 110.0 / 180.0 * std::f64::consts::PI;
 
+/// What is nearer to the axis is within that view, rad.
+const AHEAD_RAD: f64 = 45.0 / 180.0 * std::f64::consts::PI;
+
 /// A line is drawn through so many corners and more.
 const LEAST_IN_LINE: usize = 3;
 
@@ -38,7 +41,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// The view of a camera, of those that are meant, whose corners fill most of the picture.
+    /// The view of a camera, of those that are meant, whose corners fill most of the picture, as far as a pinhole shows them.
     pub fn best(
         camera: &CameraEstimate,
         is_meant: impl Fn(&&ViewEstimate) -> bool,
@@ -46,7 +49,13 @@ impl Sample {
         let area = |view: &ViewEstimate| {
             let pixels = || view.corners.iter().map(|corner| corner.pixel);
             let low = pixels().fold(DVec2::INFINITY, DVec2::min);
-            (pixels().fold(DVec2::NEG_INFINITY, DVec2::max) - low).element_product()
+            let high = pixels().fold(DVec2::NEG_INFINITY, DVec2::max);
+            let is_ahead = |pixel: &DVec2| {
+                let ray = camera.camera.unproject(*pixel);
+                ray.is_some_and(|ray| ray.direction.angle_between(DVec3::Z) < AHEAD_RAD)
+            };
+            let part = pixels().filter(is_ahead).count() as f64 / pixels().count().max(1) as f64;
+            part.powi(4) * (high - low).element_product()
         };
         let mut views: Vec<&ViewEstimate> = camera.views.iter().collect();
         views.sort_by(|a, b| area(b).total_cmp(&area(a)));

@@ -38,9 +38,7 @@ impl Fixed {
     /// As the viewer sees a point: x right, y down, z away; turned to the side and down, rad.
     fn turned(self, point: DVec3) -> DVec3 {
         match self {
-            Self::Rig => {
-                DQuat::from_rotation_x(0.5) * (DQuat::from_rotation_y(0.6) * point)
-            }
+            Self::Rig => DQuat::from_rotation_x(0.5) * (DQuat::from_rotation_y(0.6) * point),
             // A target has y up and z towards the camera.
             Self::Target => {
                 let faced = DVec3::new(point.x, -point.y, -point.z);
@@ -69,7 +67,8 @@ pub(super) fn drawing(estimate: &Estimate, fixed: Fixed, image_px: DVec2) -> Str
     let mut shapes = match fixed {
         Fixed::Rig => {
             let cameras = estimate.cameras.iter();
-            let cameras = cameras.flat_map(|camera| pyramid(camera, &Pose::IDENTITY, CAMERA_PART * depth));
+            let cameras =
+                cameras.flat_map(|camera| pyramid(camera, &Pose::IDENTITY, CAMERA_PART * depth));
             targets(estimate).into_iter().chain(cameras).collect()
         }
         Fixed::Target => around_target(estimate, SMALL_CAMERA_PART * depth),
@@ -162,7 +161,7 @@ fn around_target(estimate: &Estimate, long: f64) -> Vec<Shape> {
         let step = camera.views.len().div_ceil(MOST_VIEWS).max(1);
         for view in camera.views.iter().step_by(step) {
             let target_from_rig = view.pose.inverse().after(&camera.camera_from_rig);
-            for (panel, shape) in panels(estimate, camera, view, "board") {
+            for (panel, shape) in panels(estimate, camera, view, "board fixed") {
                 let corners = shape.corners.iter().map(|at| target_from_rig.apply(*at)).collect();
                 let shape = Shape { corners, title: "target".to_owned(), ..shape };
                 let size = shape.corners.iter().map(|at| at.distance(shape.corners[0]));

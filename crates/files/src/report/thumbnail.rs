@@ -5,7 +5,7 @@ use image::GrayImage;
 use deltille_core::raster::Gray;
 
 /// Longest side of a small picture, px.
-const SIDE: usize = 160;
+const SIDE: usize = 240;
 
 /// A small picture of an image as PNG: each pixel the mean of those that it stands for.
 pub fn thumbnail(image: &Gray<u8>) -> Option<Vec<u8>> {
