@@ -8,11 +8,12 @@ use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
 use super::calibrating::{
-    Calibrated, ModelChoice, SolveArgs, check_images, chosen, left_out as formats_left_out, sample,
-    sureness, without_outliers,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, sureness,
+    without_outliers,
 };
 use super::camera_file;
 use super::files::{File, check_places, sample_of, text_file, write_all};
+use super::page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Source};
 use crate::camera::{Camera, Pose};

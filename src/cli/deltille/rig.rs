@@ -8,11 +8,12 @@ use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
 use super::calibrating::{
-    Calibrated, ModelChoice, SolveArgs, check_images, chosen, left_out as formats_left_out, sample,
-    sureness, without_outliers,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, sureness,
+    without_outliers,
 };
 use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::limits::FileLimits;
+use super::page::check_images;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{

@@ -491,7 +491,11 @@ fn a_rig_is_calibrated_from_pictures() {
     let page = std::fs::read_to_string(at.join("held/rig-report.html")).unwrap();
     let of_cameras = page.match_indices("class=\"camera\">").count();
     let pictures = page.matches("data:image/png").count();
-    assert_eq!((of_cameras, pictures), (2, 5), "sections of cameras and pictures of the left one");
+    assert_eq!(
+        (of_cameras, pictures),
+        (2, 7),
+        "sections of cameras, pictures and a sample of the left one"
+    );
 
     // A wild corner, and a picture of another target.
     let path = at.join("corners/right/1.json");

@@ -34,13 +34,8 @@ pub(super) fn residuals(estimate: &Estimate, camera: &CameraEstimate, survey: &S
         plots::of_views(camera, survey),
         "The rms of each view in their order: steps show that something changed, peaks a bad picture.".to_owned(),
     ));
-    if let Some(tilt) = plots::against_tilt(camera, survey) {
-        figures.push((
-            tilt,
-            "The rms of each view over its tilt: steep views are blurred and coarse, and all tilts should occur."
-                .to_owned(),
-        ));
-    }
+    let (place, caption) = plots::against_place(camera, survey);
+    figures.push((place, caption.to_owned()));
     page::section("Residuals and coverage", &page::figures(figures))
 }
 

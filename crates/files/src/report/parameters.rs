@@ -8,6 +8,9 @@ use deltille_core::calibrate::{CameraEstimate, Parameter, Source};
 /// More parameters than this have their correlations in small print.
 const FEW: usize = 12;
 
+/// Of more than this, as a lens of splines has, no table of correlations is readable, and their values are folded.
+const READABLE: usize = 24;
+
 /// Correlations from here on are drawn in a blue on which white is read better than ink.
 const STRONG: f64 = 0.85;
 
@@ -37,7 +40,7 @@ pub(super) fn section(camera: &CameraEstimate) -> String {
     };
     let names: Vec<&str> = camera.found().collect();
     let mut matrix = String::new();
-    if !names.is_empty() {
+    if (1..=READABLE).contains(&names.len()) {
         let heads = names.iter().map(|name| format!("<th>{}</th>", escaped(name)));
         let _ = write!(matrix, "<tr><th></th>{}</tr>", heads.collect::<String>());
         for (i, name) in names.iter().enumerate() {
@@ -61,9 +64,12 @@ pub(super) fn section(camera: &CameraEstimate) -> String {
              Parameters that are strongly correlated are known only together.</figcaption></figure>"
         );
     }
-    let body = format!(
-        "<div class=\"plots\"><div class=\"wide-table\"><table class=\"plain\"><tr><th>name</th><th>value</th>{heads}</tr>{rows}\
-         </table></div>{matrix}</div>"
+    let table = format!(
+        "<div class=\"wide-table\"><table class=\"plain\"><tr><th>name</th><th>value</th>{heads}</tr>{rows}</table></div>"
     );
-    page::section("Parameters", &body)
+    let table = match names.len() > READABLE {
+        true => format!("<details><summary>{} parameters</summary>{table}</details>", names.len()),
+        false => table,
+    };
+    page::section("Parameters", &format!("<div class=\"plots\">{table}{matrix}</div>"))
 }

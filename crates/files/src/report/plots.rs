@@ -217,20 +217,34 @@ pub(super) fn against_radius(camera: &CameraEstimate, survey: &Survey) -> String
     axes.svg(["distance from the principal point, px", "error, px"], "Error against radius")
 }
 
-/// Error of each view against its tilt; `None` for solids.
-pub(super) fn against_tilt(camera: &CameraEstimate, survey: &Survey) -> Option<String> {
-    let tilts: Vec<f64> = survey
-        .views
-        .iter()
-        .map(|view| view.tilt_rad.map(f64::to_degrees))
-        .collect::<Option<_>>()?;
-    let steepest = tilts.iter().copied().fold(10.0, f64::max);
+/// Error of each view against its tilt, or of solids, which show faces at all tilts, against their distance; and in words
+/// what it is.
+pub(super) fn against_place(camera: &CameraEstimate, survey: &Survey) -> (String, &'static str) {
+    let tilts = survey.views.iter().map(|view| view.tilt_rad.map(f64::to_degrees));
+    let (places, least, name, shows, caption) = match tilts.collect::<Option<Vec<f64>>>() {
+        Some(tilts) => (
+            tilts,
+            10.0,
+            "tilt of the board, °",
+            "Error against tilt",
+            "The rms of each view over its tilt: steep views are blurred and coarse, and all tilts should occur.",
+        ),
+        None => (
+            survey.views.iter().map(|view| view.distance_mm).collect(),
+            1.0,
+            "distance of the target, mm",
+            "Error against distance",
+            "The rms of each view over the distance of the target: near and far should occur.",
+        ),
+    };
+    let farthest = places.iter().copied().fold(least, f64::max);
     let worst = camera.views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
-    let mut axes = Axes::new(frame(survey.size_px), [0.0, 1.05 * steepest], [0.0, 1.1 * worst]);
-    for (view, tilt) in camera.views.iter().zip(&tilts) {
-        axes.dot(DVec2::new(*tilt, view.rms_px), 3.0, "view");
+    let ranges = [[0.0, 1.05 * farthest], [0.0, 1.1 * worst]];
+    let mut axes = Axes::new(frame(survey.size_px), ranges[0], ranges[1]);
+    for (view, place) in camera.views.iter().zip(&places) {
+        axes.dot(DVec2::new(*place, view.rms_px), 3.0, "view");
     }
-    Some(axes.svg(["tilt of the board, °", "rms of the view, px"], "Error against tilt"))
+    (axes.svg([name, "rms of the view, px"], shows), caption)
 }
 
 /// Error of each view, in their order.

@@ -46,14 +46,21 @@ pub(super) fn section(report: &Report, index: usize, survey: &Survey) -> String 
     let enlarged = enlarged(camera, &in_pictures);
     let cards = in_pictures.iter().map(|&of_view| {
         let (view, stands) = (&camera.views[of_view], &survey.views[of_view]);
-        card(report, index, view, stands, worst, enlarged)
+        let shown = Shown::First { id: id(index, of_view), enlarged };
+        card(report, index, view, stands, worst, shown)
     });
     let cards: String = cards.collect();
     let rows = order.into_iter().map(|of_view| {
-        row(report, index, &camera.views[of_view], &survey.views[of_view], worst, "")
+        let (view, stands) = (&camera.views[of_view], &survey.views[of_view]);
+        let shown = match in_pictures.contains(&of_view) {
+            true => Shown::Again(id(index, of_view)),
+            false => Shown::Only,
+        };
+        row(report, index, view, stands, worst, shown, "")
     });
-    let tests =
-        of_test.iter().map(|(view, stands)| row(report, index, view, stands, worst, " (held out)"));
+    let tests = of_test
+        .iter()
+        .map(|(view, stands)| row(report, index, view, stands, worst, Shown::Only, " (held out)"));
     let rows: String = rows.chain(tests).collect();
     let is_here = |out: &&Excluded| match &out.camera {
         Some(name) => *name == camera.name,
@@ -99,7 +106,7 @@ fn card(
     view: &ViewEstimate,
     stands: &SurveyedView,
     worst: f64,
-    enlarged: f64,
+    shown: Shown,
 ) -> String {
     let outliers = match view.outlier_count() {
         0 => String::new(),
@@ -110,7 +117,7 @@ fn card(
     format!(
         "<figure class=\"card\">{}<figcaption><span class=\"head\"><b class=\"name\">{}</b><span class=\"number\">{:.4} px{}\
          </span></span>{}{outliers}{tilt}, {:.0} mm</figcaption></figure>",
-        picture(report, camera, view, Some(enlarged)),
+        picture(report, camera, view, shown),
         escaped(&view.name),
         view.rms_px,
         meter(view.rms_px / worst),
@@ -126,6 +133,7 @@ fn row(
     view: &ViewEstimate,
     stands: &SurveyedView,
     worst: f64,
+    shown: Shown,
     note: &str,
 ) -> String {
     let tilt = stands.tilt_rad.map_or("–".to_owned(), |t| format!("{:.0}°", t.to_degrees()));
@@ -135,7 +143,7 @@ fn row(
          <td class=\"number\">{:.4}{}</td>\
          <td class=\"number{}\">{outliers}</td><td class=\"number\">{tilt}</td>\
          <td class=\"number\">{:.0}</td></tr>",
-        picture(report, camera, view, None),
+        picture(report, camera, view, shown),
         escaped(&view.name),
         view.corners.len(),
         view.rms_px,
@@ -145,9 +153,24 @@ fn row(
     )
 }
 
+/// How a picture is shown.
+enum Shown {
+    /// In the table alone.
+    Only,
+    /// In a card, with residuals so many times enlarged.
+    First { id: String, enlarged: f64 },
+    /// In the table, after a card with this id.
+    Again(String),
+}
+
+/// What a card's picture is called on the page.
+fn id(camera: usize, of_view: usize) -> String {
+    format!("picture-{camera}-{of_view}")
+}
+
 /// The small picture of a view with its corners, and with their residuals so many times enlarged; these alone where there is
 /// no picture.
-fn picture(report: &Report, index: usize, view: &ViewEstimate, enlarged: Option<f64>) -> String {
+fn picture(report: &Report, index: usize, view: &ViewEstimate, shown: Shown) -> String {
     let camera = &report.estimate.cameras[index].camera;
     let (width, height) = (camera.width, camera.height);
     let unit = f64::from(width) / 240.0;
@@ -155,8 +178,8 @@ fn picture(report: &Report, index: usize, view: &ViewEstimate, enlarged: Option<
     for corner in &view.corners {
         let (x, y) = corner.pixel.into();
         let class = if corner.outlier { "out" } else { "seen" };
-        match enlarged {
-            Some(enlarged) => {
+        match shown {
+            Shown::First { enlarged, .. } => {
                 let to = corner.pixel + enlarged * corner.residual;
                 let _ = write!(
                     drawn,
@@ -168,7 +191,7 @@ fn picture(report: &Report, index: usize, view: &ViewEstimate, enlarged: Option<
                     0.9 * unit
                 );
             }
-            None => {
+            Shown::Only | Shown::Again(_) => {
                 let _ = write!(
                     drawn,
                     "<circle class=\"{class}\" cx=\"{x:.0}\" cy=\"{y:.0}\" r=\"{:.1}\"/>",
@@ -177,10 +200,21 @@ fn picture(report: &Report, index: usize, view: &ViewEstimate, enlarged: Option<
             }
         }
     }
-    let image = report.thumbnails.get(&(index, view.name.clone())).map_or(String::new(), |png| {
-        let url = data_url(png);
-        format!("<image href=\"{url}\" width=\"{width}\" height=\"{height}\"/>")
-    });
+    let image =
+        report.thumbnails.get(&(index, view.name.clone())).map_or(
+            String::new(),
+            |png| match &shown {
+                Shown::Again(id) => format!("<use href=\"#{id}\"/>"),
+                Shown::Only | Shown::First { .. } => {
+                    let id = match &shown {
+                        Shown::First { id, .. } => format!(" id=\"{id}\""),
+                        _ => String::new(),
+                    };
+                    let url = data_url(png);
+                    format!("<image{id} href=\"{url}\" width=\"{width}\" height=\"{height}\"/>")
+                }
+            },
+        );
     format!(
         "<svg class=\"picture\" role=\"img\" aria-label=\"corners of the view\" viewBox=\"0 0 {width} {height}\">{image}\
          {drawn}</svg>"
