@@ -8,11 +8,12 @@ use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
 use super::calibrating::{
-    Calibrated, ModelChoice, SolveArgs, check_images, left_out as formats_left_out, sample,
-    sureness, without_outliers,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, sureness,
+    without_outliers,
 };
 use super::camera_file;
 use super::files::{File, check_places, sample_of, text_file, write_all};
+use super::page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Source};
 use crate::camera::{Camera, Pose};
@@ -58,8 +59,8 @@ pub struct Args {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// <name>.yaml, which every command here reads, and <name>.json with uncertainties, poses and
-    /// residuals
+    /// <name>.yaml, which every command here reads, and <name>.json with uncertainties, poses and,
+    /// with --residuals, every corner
     Own,
     /// <name>-opencv.yaml
     Opencv,
@@ -102,9 +103,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut calibration = Calibration::new(panels).camera(&stem, views, intrinsics);
     let tried = match args.model {
         Some(model) => model.choose(&mut calibration, 0)?,
-        None => String::new(),
+        None => Vec::new(),
     };
-    let mut solved = args.solve.solve(calibration, print)?;
+    let listed = chosen(&tried);
+    let mut solved = args.solve.solve(calibration, print, vec![tried])?;
     ensure!(!solved.estimate.frames.is_empty(), "no view shows the target as this camera sees it");
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
     for out in solved.estimate.excluded.iter().chain(of_test) {
@@ -120,7 +122,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut files, mut refused) = (Vec::new(), Vec::new());
     for camera in &estimate.cameras {
         let views = camera.views.iter().map(|view| (view.image.as_str(), view.pose));
-        let json = calibration::write(estimate, diagnoses, *print).unwrap_or_default();
+        let json = calibration::write(estimate, diagnoses, *print, args.solve.residuals());
+        let json = json.unwrap_or_default();
         let views = views.collect::<Vec<_>>();
         (files, refused) = args.files(&stem, &camera.camera, &views, &in_options(&json));
     }
@@ -130,7 +133,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         solved.write_page(&page, &stem, &[args.images.as_deref()], args.overwrite)?;
         written.push(page);
     }
-    let mut text = tried + &table(&solved.estimate);
+    let mut text = listed + &table(&solved.estimate);
     for line in solved.lines() {
         text += &(line + "\n");
     }

@@ -1,8 +1,7 @@
-//! What commands that calibrate have in common: how they solve, what they tell, and the page.
+//! What commands that calibrate have in common: how they solve, and what they tell.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::str::FromStr;
 
@@ -12,21 +11,17 @@ use clap::ValueEnum;
 use super::files::{File, sample_of, text_file};
 use crate::calibrate::{
     BoardShape, Calibration, CalibrationError, CameraEstimate, Candidate, Diagnosis, Estimate,
-    Intrinsics, LEAST_TO_MEASURE, Loss, Model, ModelError, PanelPlace, Source, TargetMap, View,
-    Weights, Words,
+    Intrinsics, LEAST_TO_MEASURE, Loss, Model, ModelError, PanelPlace, Source, TargetMap, Weights,
+    Words,
 };
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::FAILED;
 use crate::cli::values::whole;
-use crate::cli::wording::in_options;
-use crate::export::calibration::Print;
+use crate::export::calibration::{Print, Residuals};
 use crate::export::camera::FormatError;
 use crate::export::kind::Kind;
-use crate::name::is_within;
-use crate::photograph;
-use crate::raster::AnyGray;
-use crate::report::{Report, target_map_svg, thumbnail};
+use crate::report::target_map_svg;
 use crate::targets::{self, Target, parse_length_mm};
 use crate::words::counted;
 
@@ -54,6 +49,9 @@ pub struct SolveArgs {
     /// several may be given, separated by commas [default: the median distance of the corners]
     #[arg(long, value_name = "LENGTH", value_delimiter = ',', value_parser = distance)]
     uncertainty_at: Vec<f64>,
+    /// List every corner with its residual in the .json, too, 150 bytes each
+    #[arg(long)]
+    residuals: bool,
     /// Write a page that shows what the calibration is worth, and what would make it better
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -118,19 +116,26 @@ impl ModelChoice {
         }
     }
 
-    /// Sets the model of a camera that is not known; returns in lines what was tried where it was to be chosen.
-    pub fn choose(self, calibration: &mut Calibration, camera: usize) -> anyhow::Result<String> {
+    /// Sets the model of a camera that is not known; returns what was tried where it was to be chosen.
+    pub fn choose(
+        self,
+        calibration: &mut Calibration,
+        camera: usize,
+    ) -> anyhow::Result<Vec<Candidate>> {
         let (Self::Auto, Some(_)) = (self, calibration.cameras()[camera].intrinsics.model()) else {
-            return Ok(String::new());
+            return Ok(Vec::new());
         };
         let (model, tried) = calibration.choose_model(camera).context("--model auto")?;
         calibration.set_intrinsics(camera, model);
-        Ok(chosen(&tried))
+        Ok(tried)
     }
 }
 
-/// What models that were tried leave on views that took no part.
-fn chosen(tried: &[Candidate]) -> String {
+/// What models that were tried leave on views that took no part, in lines; none where none were.
+pub fn chosen(tried: &[Candidate]) -> String {
+    if tried.is_empty() {
+        return String::new();
+    }
     let mut text = "model            parameters  held out px\n".to_owned();
     for candidate in tried {
         let held_out =
@@ -159,6 +164,8 @@ pub struct Calibrated {
     /// Where the target's file has its panels.
     pub stated: Vec<PanelPlace>,
     pub print: Print,
+    /// Models that were tried, by camera.
+    pub models: Vec<Vec<Candidate>>,
 }
 
 impl SolveArgs {
@@ -177,8 +184,18 @@ impl SolveArgs {
         self.measure_target
     }
 
-    /// Solves, and says what is to be said about it.
-    pub fn solve(&self, calibration: Calibration, print: Print) -> anyhow::Result<Calibrated> {
+    /// Whether files list every corner with its residual.
+    pub fn residuals(&self) -> Residuals {
+        if self.residuals { Residuals::Listed } else { Residuals::LeftOut }
+    }
+
+    /// Solves, and says what is to be said about it; `tried` are the models that were tried, by camera.
+    pub fn solve(
+        &self,
+        calibration: Calibration,
+        print: Print,
+        tried: Vec<Vec<Candidate>>,
+    ) -> anyhow::Result<Calibrated> {
         let loss = match self.robust {
             Robust::None => Loss::Squared,
             Robust::Huber => Loss::Huber,
@@ -209,7 +226,13 @@ impl SolveArgs {
         })?;
         let diagnoses = calibration.diagnose(&estimate);
         let stated = calibration.panels().to_vec();
-        Ok(Calibrated { estimate, diagnoses, stated, print })
+        // The page compares models where none were to be chosen from; too few views for that are no error.
+        let compared = |(camera, tried): (usize, Vec<Candidate>)| match tried.is_empty() {
+            true if self.report.is_some() => calibration.compare_models(camera).unwrap_or_default(),
+            _ => tried,
+        };
+        let models = tried.into_iter().enumerate().map(compared).collect();
+        Ok(Calibrated { estimate, diagnoses, stated, print, models })
     }
 
     /// Where the page goes, `<stem>-report.html` in a folder. What would be refused is refused here, before the
@@ -265,32 +288,6 @@ impl Calibrated {
         let map = self.estimate.map.as_ref().map(|map| mapped(map, views));
         shape.into_iter().chain(map).chain(ink).collect()
     }
-
-    /// Writes the page; `folders` are those of each camera's photographs.
-    pub fn write_page(
-        &self,
-        page: &Path,
-        title: &str,
-        folders: &[Option<&Path>],
-        overwrite: Overwrite,
-    ) -> anyhow::Result<()> {
-        let mut thumbnails = BTreeMap::new();
-        for (index, (camera, folder)) in self.estimate.cameras.iter().zip(folders).enumerate() {
-            let Some(folder) = folder else { continue };
-            let held_out = self.estimate.held_out.iter().flat_map(|test| test.cameras.get(index));
-            let views = camera.views.iter().chain(held_out.flat_map(|camera| &camera.views));
-            for view in views {
-                let size_px = [camera.camera.width, camera.camera.height];
-                let picture = small_picture(&view.image, folder, size_px);
-                thumbnails.extend(picture.map(|picture| ((index, view.name.clone()), picture)));
-            }
-        }
-        let Self { estimate, diagnoses, stated, print } = self;
-        let mut report = Report::new(title, estimate);
-        (report.diagnoses, report.stated) = (diagnoses, stated);
-        (report.print, report.thumbnails) = (*print, thumbnails);
-        output::write(page, in_options(&report.html()).as_bytes(), overwrite).context("--report")
-    }
 }
 
 /// Tells formats that cannot carry what was found; exit code 1 where there are such, as not all is there that was asked for.
@@ -335,55 +332,6 @@ pub fn sample(intrinsics: &Intrinsics) -> Camera {
         }
         Intrinsics::Known(camera) | Intrinsics::Near { camera, .. } => camera.clone(),
     }
-}
-
-/// The small picture of a view. One that is not there leaves its place to the corners, as does one that cannot be
-/// read or is not of the size that the camera has, which is told.
-fn small_picture(image: &str, folder: &Path, size_px: [u32; 2]) -> Option<Vec<u8>> {
-    let path = picture_of(image, folder)?;
-    let picture = match photograph::read(&path) {
-        Ok(picture) => picture,
-        Err(error) => {
-            tell!("warning: --images: {error}");
-            return None;
-        }
-    };
-    if [picture.width(), picture.height()] != size_px.map(|side| side as usize) {
-        tell!(
-            "warning: --images: {} has {} × {} px, the camera {} × {}",
-            path.display(),
-            picture.width(),
-            picture.height(),
-            size_px[0],
-            size_px[1]
-        );
-        return None;
-    }
-    match picture {
-        AnyGray::U8(image) => thumbnail(&image),
-        AnyGray::U16(image) => thumbnail(&image.map(|v| (v >> 8) as u8)),
-    }
-}
-
-/// The picture of a view in a folder, or in one within it. What a file calls the picture leads nowhere else.
-fn picture_of(image: &str, folder: &Path) -> Option<PathBuf> {
-    is_within(image).then(|| folder.join(image)).filter(|path| path.is_file())
-}
-
-/// Refuses what is no folder, and tells which pictures of the views are not in it.
-pub fn check_images(folder: &Path, views: &[View]) -> anyhow::Result<()> {
-    ensure!(folder.is_dir(), "--images: {} is no folder", folder.display());
-    let missing = views.iter().filter(|view| picture_of(&view.image, folder).is_none());
-    let missing: Vec<&str> = missing.map(|view| view.image.as_str()).collect();
-    if let Some(first) = missing.first() {
-        tell!(
-            "warning: --images: {} of {} are not in {}, such as {first}",
-            missing.len(),
-            counted(views.len(), "picture"),
-            folder.display()
-        );
-    }
-    Ok(())
 }
 
 /// The places of the corners, and whether they are more than chance.

@@ -14,6 +14,7 @@ mod finder;
 mod images;
 mod in_flight;
 mod limits;
+mod page;
 mod pose;
 mod refine;
 mod render;

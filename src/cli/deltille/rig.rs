@@ -8,11 +8,12 @@ use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
 use super::calibrating::{
-    Calibrated, ModelChoice, SolveArgs, check_images, left_out as formats_left_out, sample,
-    sureness, without_outliers,
+    Calibrated, ModelChoice, SolveArgs, chosen, left_out as formats_left_out, sample, sureness,
+    without_outliers,
 };
 use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::limits::FileLimits;
+use super::page::check_images;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
@@ -133,16 +134,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         calibration = calibration.with(CameraViews::new(name, views, intrinsics));
     }
-    let mut tried = String::new();
+    let (mut tried, mut text) = (Vec::new(), String::new());
     for (index, (name, _)) in args.camera.iter().enumerate() {
         let of_camera = args.model.choose(&mut calibration, index);
         let of_camera = of_camera.with_context(|| format!("--camera {name}"))?;
         if !of_camera.is_empty() {
-            tried += &format!("{name}:\n{of_camera}");
+            text += &format!("{name}:\n{}", chosen(&of_camera));
         }
+        tried.push(of_camera);
     }
     let print = Print { scale: sheet.print_scale, ink: InkEstimate::of_all(&ink) };
-    let mut solved = args.solve.solve(calibration, print)?;
+    let mut solved = args.solve.solve(calibration, print, tried)?;
     let of_test = solved.estimate.held_out.iter().flat_map(|test| &test.excluded);
     for out in solved.estimate.excluded.iter().chain(of_test) {
         tell!("{}: left out: {}", out.shown(), out.reason);
@@ -151,10 +153,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         report(&foreign.context("--known"));
         return Ok(ExitCode::from(FAILED));
     }
-    let text = tried + &summary(&solved);
+    text += &summary(&solved);
     solved.estimate.excluded.splice(0..0, left_out);
     let Calibrated { estimate, diagnoses, print, .. } = &solved;
-    let json = rig::write(estimate, diagnoses, &args.model.name(), *print);
+    let residuals = args.solve.residuals();
+    let json = rig::write(estimate, diagnoses, &args.model.name(), *print, residuals);
     let cameras = estimate.cameras.iter();
     let cameras = cameras.map(|c| (c.name.as_str(), &c.camera, c.camera_from_rig));
     let cameras = cameras.collect::<Vec<_>>();

@@ -5,7 +5,7 @@ use deltille::calibrate::{
     Observation, PanelRef, Reference, Remedy, Sighting, UntaggedGrid, View,
 };
 use deltille::camera::{Camera, Pose};
-use deltille::export::calibration::{self, Print};
+use deltille::export::calibration::{self, Print, Residuals};
 use deltille::export::{rig, saved};
 use deltille::lattice::GridKind;
 use glam::{DQuat, DVec3};
@@ -121,7 +121,10 @@ fn a_rig_finds_the_shape_of_a_sheet() {
     let right = Pose::looking_at(eye, DVec3::new(0.0, 0.0, 350.0), DVec3::NEG_Y);
     let of_right = views_of(&right, bent, 1);
     let alone = of(&views(bent, 1)).board_shape(true).hold_out(Some(4)).solve().unwrap();
-    check_read_back(&alone, &calibration::write(&alone, &[], Print::default()).unwrap());
+    check_read_back(
+        &alone,
+        &calibration::write(&alone, &[], Print::default(), Residuals::Listed).unwrap(),
+    );
     let both = of(&views(bent, 1)).camera("right", of_right, Model::Radtan);
     let found = both.clone().board_shape(true).hold_out(Some(5)).solve().unwrap();
     check_shape(&found);
@@ -134,7 +137,7 @@ fn a_rig_finds_the_shape_of_a_sheet() {
     }
     let [turn, step] = found.cameras[1].camera_from_rig.off(&right);
     assert!(turn.length() < 1e-3 && step.length() < 0.5, "{turn} {step}");
-    let text = rig::write(&found, &[], "radtan", Print::default());
+    let text = rig::write(&found, &[], "radtan", Print::default(), Residuals::Listed);
     check_read_back(&found, &text);
     // Without the shape the board is to blame.
     let flat = both.solve().unwrap();

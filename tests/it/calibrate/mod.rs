@@ -3,6 +3,7 @@ mod cameras;
 mod commands;
 mod gross_errors;
 mod models;
+mod page;
 mod rig;
 mod scenes;
 mod target_map;

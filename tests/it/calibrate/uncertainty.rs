@@ -3,7 +3,7 @@
 
 use deltille::calibrate::{CameraEstimate, Comparison, Estimate, Model, Region, Source, View};
 use deltille::camera::{Camera, Pose};
-use deltille::export::calibration::{self, Print};
+use deltille::export::calibration::{self, Print, Residuals};
 use deltille::export::saved;
 use glam::{DQuat, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector};
@@ -216,7 +216,7 @@ fn what_is_known_of_projections_is_read_back() {
         .distances_mm(vec![250.0, 4000.0])
         .solve()
         .unwrap();
-    let text = calibration::write(&found, &[], Print::default()).unwrap();
+    let text = calibration::write(&found, &[], Print::default(), Residuals::LeftOut).unwrap();
     let read = saved::read_cameras(&text).unwrap().remove(0);
     let camera = &found.cameras[0];
     let [one, other] = [camera, &read].map(CameraEstimate::uncertainty_maps);

@@ -144,7 +144,8 @@ fn only_ids_are_seen() {
                 .unwrap();
         }
     }
-    let text = said(at, "calibrate left --target ico.json --model radtan --report page.html");
+    let text =
+        said(at, "calibrate left --target ico.json --model radtan --residuals --report page.html");
     is_id(&named(&text), &text);
     assert!(named(&text).contains(&MISPLACED.into()), "{text}");
     is_id(&of_json(&at.join("camera.json")), "calibration");
@@ -155,7 +156,7 @@ fn only_ids_are_seen() {
     let text = said(at, &format!("{rig} -o stated"));
     is_id(&named(&text), &text);
     assert!(named(&text).contains(&MISPLACED.into()), "{text}");
-    said(at, &format!("{rig} --refine-target -o refined"));
+    said(at, &format!("{rig} --refine-target --residuals -o refined"));
     let refined = std::fs::read_to_string(at.join("refined/ico-refined.json")).unwrap();
     let refined = Target::from_json(&refined).unwrap();
     let moved = |panel: &Panel| {

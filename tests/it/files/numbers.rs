@@ -5,7 +5,7 @@ use crate::common::view::tilted;
 use deltille::calibrate::{Calibration, Model, Reference, views};
 use deltille::camera::Camera;
 use deltille::detect::{Detection, Grid, GridCorner};
-use deltille::export::calibration::{self, Print};
+use deltille::export::calibration::{self, Print, Residuals};
 use deltille::export::{camera, detection, dsc, orpc};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
@@ -299,7 +299,8 @@ fn detections() {
             Err(error) => is_told(&error.to_string(), &what),
             Ok(found) => {
                 let said = calibration.diagnose(&found);
-                let text = calibration::write(&found, &said, Print::default()).unwrap();
+                let text =
+                    calibration::write(&found, &said, Print::default(), Residuals::Listed).unwrap();
                 is_finite_json(&text, &what);
                 let camera = &found.cameras[0].camera;
                 is_finite(&camera.to_yaml(), &what);

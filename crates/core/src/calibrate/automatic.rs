@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use super::calibration::{Calibration, CameraViews};
 use super::error::CalibrationError;
-use super::estimate::{Estimate, ViewEstimate};
+use super::estimate::{CameraEstimate, Estimate, ViewEstimate};
 use super::model::Model;
 use super::start::evenly;
 use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
@@ -29,6 +29,9 @@ const TRIED: [Model; 9] = [
 
 /// Views that take part in the choice, evenly over the sequence.
 const MOST_VIEWS: usize = 60;
+
+/// Views that take part where nothing is to be chosen, only told.
+const VIEWS_TO_TELL: usize = 24;
 
 /// Every so many views are held out.
 const HELD_OUT: usize = 3;
@@ -53,6 +56,8 @@ pub struct Candidate {
     pub holds: bool,
     /// Whether it was chosen.
     pub chosen: bool,
+    /// The camera that was found from the views that were not held out.
+    pub found: Option<CameraEstimate>,
 }
 
 /// The errors of a model on views that took no part.
@@ -60,6 +65,7 @@ struct Tried {
     /// By view, px².
     squares: BTreeMap<String, Vec<f64>>,
     is_stable: bool,
+    camera: CameraEstimate,
 }
 
 impl Calibration {
@@ -69,14 +75,38 @@ impl Calibration {
     /// # Errors
     /// Where there are too few views to hold some out, or no model explains them.
     pub fn choose_model(&self, camera: usize) -> Result<(Model, Vec<Candidate>), CalibrationError> {
-        let views = evenly(&self.cameras[camera].views, MOST_VIEWS).cloned().collect();
+        let candidates = self.tried(camera, &TRIED, MOST_VIEWS)?;
+        let chosen = candidates.iter().find(|candidate| candidate.chosen);
+        let model = chosen.map(|chosen| chosen.model).ok_or(CalibrationError::NoStart)?;
+        Ok((model, candidates))
+    }
+
+    /// What the models beside that of a camera leave on views that took no part, for comparison: of few views, so that
+    /// it takes no longer than the calibration. None of a camera that is known.
+    ///
+    /// # Errors
+    /// Where there are too few views to hold some out, or no model explains them.
+    pub fn compare_models(&self, camera: usize) -> Result<Vec<Candidate>, CalibrationError> {
+        match self.cameras[camera].intrinsics.model() {
+            Some(model) => self.tried(camera, &model.neighbours(), VIEWS_TO_TELL),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    fn tried(
+        &self,
+        camera: usize,
+        models: &[Model],
+        most_views: usize,
+    ) -> Result<Vec<Candidate>, CalibrationError> {
+        let views = evenly(&self.cameras[camera].views, most_views).cloned().collect();
         let alone = self.alone(camera, &self.panels);
         let of_model = |model: Model| {
             let only = CameraViews::new("", Vec::clone(&views), model);
             let calibration = alone.of_cameras(vec![only]).hold_out(Some(HELD_OUT));
             calibration.board_shape(false).measure_target(false).solve()
         };
-        let tried = TRIED.map(|model| (model, of_model(model)));
+        let tried = models.iter().map(|&model| (model, of_model(model)));
         let mut error = CalibrationError::NoStart;
         let mut found = Vec::new();
         for (model, estimate) in tried {
@@ -90,9 +120,9 @@ impl Calibration {
             found.push((model, of_model));
         }
         let candidates = judged(&found);
-        match candidates.iter().find(|candidate| candidate.chosen) {
-            Some(chosen) => Ok((chosen.model, candidates)),
-            None => Err(error),
+        match candidates.iter().any(|candidate| candidate.chosen) {
+            true => Ok(candidates),
+            false => Err(error),
         }
     }
 }
@@ -107,6 +137,7 @@ impl Tried {
         Some(Self {
             squares: views.map(|view| (view.name.clone(), of_view(view))).collect(),
             is_stable: found.cameras.iter().all(|camera| camera.ill_conditioned.is_empty()),
+            camera: found.cameras.first()?.clone(),
         })
     }
 }
@@ -143,6 +174,7 @@ fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
         let own = own.as_deref().map(mean);
         let is_stable = found.as_ref().is_some_and(|found| found.is_stable);
         Candidate {
+            found: found.as_ref().map(|found| found.camera.clone()),
             holds: own.zip(best).is_some_and(|(own, best)| own <= (1.0 + SAME) * best),
             ..candidate(*model, own.map(|own| (own / 2.0).sqrt()), is_stable)
         }
@@ -156,5 +188,6 @@ fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
 
 fn candidate(model: Model, held_out_px: Option<f64>, is_stable: bool) -> Candidate {
     let parameters = model.free().into_iter().filter(|free| *free).count();
-    Candidate { model, parameters, held_out_px, is_stable, holds: false, chosen: false }
+    let (holds, chosen, found) = (false, false, None);
+    Candidate { model, parameters, held_out_px, is_stable, holds, chosen, found }
 }

@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 use glam::{DQuat, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector};
 
+use super::coverage::Coverage;
 use super::estimate::CameraEstimate;
 use super::uncertainty::{INFINITY_MM, Source, by_motion, by_parameters, seen_at};
 use crate::camera::Pose;
@@ -296,10 +297,10 @@ impl Grid {
     ) -> impl Fn(usize) -> bool + 'a {
         let counts = |of: &CameraEstimate| {
             let mut counts: BTreeMap<[i64; 2], usize> = BTreeMap::new();
-            for corner in of.corners().filter(|corner| !corner.outlier) {
-                let [x, y] = self.place(corner.pixel);
+            for (pixel, count) in Coverage::of(of).places(of) {
+                let [x, y] = self.place(pixel);
                 let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
-                around.for_each(|place| *counts.entry(place).or_default() += 1);
+                around.for_each(|place| *counts.entry(place).or_default() += count as usize);
             }
             counts
         };

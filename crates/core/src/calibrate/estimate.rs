@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, Matrix3};
 
 use super::agreement::{Observed, observed};
 use super::calibration::{Calibration, CameraViews, PanelPlace};
+use super::coverage::Coverage;
 use super::error::CalibrationError;
 use super::excluded::Excluded;
 use super::finding::Finding;
@@ -97,6 +98,8 @@ pub struct CameraEstimate {
     pub delay: i32,
     /// The views that took part, in the order of the frames.
     pub views: Vec<ViewEstimate>,
+    /// Where corners were seen, of a camera whose views do not list them, as one that was read from a file.
+    pub coverage: Option<Coverage>,
     /// Root mean square error of a coordinate over all its views, px.
     pub rms_px: f64,
 }
@@ -273,6 +276,7 @@ impl CameraEstimate {
             observed_pose_sd: None,
             delay: 0,
             views: Vec::new(),
+            coverage: None,
             rms_px: 0.0,
         }
     }
@@ -490,6 +494,7 @@ fn camera_estimate(
         delay: 0,
         rms_px: rms_px(views.iter().flat_map(|view| &view.corners)),
         views,
+        coverage: None,
     }
 }
 

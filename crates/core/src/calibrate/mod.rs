@@ -27,6 +27,7 @@ mod calibration;
 mod comparison;
 mod consensus;
 mod corner_map;
+mod coverage;
 mod diagnosis;
 mod error;
 mod estimate;
@@ -60,6 +61,7 @@ mod words;
 pub use automatic::Candidate;
 pub use calibration::{Calibration, CameraViews, Intrinsics, PanelPlace};
 pub use comparison::{CameraMotion, Comparison, ComparisonError, Difference, Region};
+pub use coverage::Coverage;
 pub use diagnosis::Diagnosis;
 pub use error::{CalibrationError, TooPlain};
 pub use estimate::{

@@ -138,6 +138,28 @@ impl Model {
         }
     }
 
+    /// Models to be compared with it, and it: those for lenses of its kind, fewer parameters first.
+    pub(super) fn neighbours(self) -> Vec<Self> {
+        let of_kind = match self.is_perspective() {
+            true => [
+                Self::Radtan,
+                Self::Radtan5,
+                Self::KannalaBrandt(4),
+                Self::Rational,
+                Self::ThinPrism,
+            ],
+            false => [
+                Self::Eucm,
+                Self::DoubleSphere,
+                Self::KannalaBrandt(TERMS),
+                Self::KannalaBrandt(MORE_TERMS),
+                Self::Pupil,
+            ],
+        };
+        let own = Some(self).filter(|own| !of_kind.contains(own));
+        of_kind.into_iter().chain(own).collect()
+    }
+
     /// The parameters that are found first, while poses are rough: focal lengths and the two
     /// coarsest of the lens.
     pub(super) fn coarse(self) -> Vec<bool> {

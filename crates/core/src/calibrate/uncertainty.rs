@@ -206,14 +206,19 @@ impl CameraEstimate {
     /// seen. `None` where it is not known.
     pub fn projection_sd_px(&self, distance_mm: Option<f64>, source: Source) -> Option<f64> {
         let every = self.corner_count().div_ceil(ENOUGH_CORNERS).max(1);
-        let variances = self.corners().step_by(every).filter_map(|corner| {
-            let [[xx, _], [_, yy]] =
-                self.projection_covariance(corner.pixel, distance_mm, source)?;
-            Some(f64::midpoint(xx, yy))
-        });
-        let variances: Vec<f64> = variances.collect();
-        let mean = variances.iter().sum::<f64>() / variances.len() as f64;
-        (!variances.is_empty()).then(|| mean.sqrt())
+        let corners = self.corners().step_by(every).map(|corner| (corner.pixel, 1));
+        let mut places: Vec<(DVec2, u32)> = corners.collect();
+        if let (true, Some(coverage)) = (places.is_empty(), &self.coverage) {
+            places = coverage.places(self).collect();
+        }
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (pixel, count) in places {
+            let found = self.projection_covariance(pixel, distance_mm, source);
+            let Some([[xx, _], [_, yy]]) = found else { continue };
+            sum += f64::from(count) * f64::midpoint(xx, yy);
+            total += f64::from(count);
+        }
+        (total > 0.0).then(|| (sum / total).sqrt())
     }
 
     /// Standard deviation of each of its parameters as the frames agree with each other; `None` of those that were

@@ -1,12 +1,12 @@
 //! Calibrations as JSON, schema `deltille/calibration/1`: the camera with standard deviations and
-//! correlations, and every view with its pose and residuals.
+//! correlations, and every view with its pose, and where that was asked for its residuals.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::estimate::{
-    DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord, ViewRecord,
-    correlations, diagnoses, map, parameters, projection, shape, views,
+    CoverageRecord, DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord,
+    ViewRecord, correlations, coverage, diagnoses, map, parameters, projection, shape, views,
 };
 use super::finding::{FindingRecord, records};
 use deltille_core::calibrate::{Diagnosis, Estimate, Excluded, SHAPE_COEFFICIENTS as COUNT, Shape};
@@ -30,6 +30,16 @@ pub struct Print {
     pub scale: Option<[f64; 2]>,
     /// The spread of ink, from the detections; `None` where it was not estimated.
     pub ink: Option<InkEstimate>,
+}
+
+/// Whether a file lists every corner with its residual, which makes nearly all of its length.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Residuals {
+    /// Views have how many corners there were, and the root mean square of their errors.
+    #[default]
+    LeftOut,
+    /// Views have all corners.
+    Listed,
 }
 
 /// Why a file tells of no sheet.
@@ -112,7 +122,9 @@ struct CalibrationFile<'a> {
     projection: Option<ProjectionRecord>,
     rms_px: f64,
     inlier_rms_px: f64,
+    corners: usize,
     outliers: usize,
+    coverage: CoverageRecord,
     sigma: f64,
     common_px: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -141,7 +153,12 @@ struct HeldOut<'a> {
 }
 
 /// The text of the file of a single camera; `None` where there is none.
-pub fn write(found: &Estimate, said: &[Diagnosis], print: Print) -> Option<String> {
+pub fn write(
+    found: &Estimate,
+    said: &[Diagnosis],
+    print: Print,
+    residuals: Residuals,
+) -> Option<String> {
     let camera = found.cameras.first()?;
     let held_out = found.held_out.as_deref();
     let held_out = held_out.and_then(|test| Some((test, test.cameras.first()?)));
@@ -156,17 +173,19 @@ pub fn write(found: &Estimate, said: &[Diagnosis], print: Print) -> Option<Strin
         projection: projection(camera),
         rms_px: found.rms_px,
         inlier_rms_px: found.inlier_rms_px(),
+        corners: found.corner_count(),
         outliers: found.outlier_count(),
+        coverage: coverage(camera),
         sigma: found.sigma,
         common_px: found.common_px,
         print_scale: print.scale,
         ink: print.ink,
         board_shape: found.shape.map(shape),
         target_map: found.map.as_ref().map(|of_target| map(found, of_target)),
-        views: views(found, camera),
+        views: views(found, camera, residuals),
         held_out: held_out.map(|(test, camera)| HeldOut {
             rms_px: test.rms_px,
-            views: views(test, camera),
+            views: views(test, camera, residuals),
             excluded: &test.excluded,
         }),
         excluded: &found.excluded,

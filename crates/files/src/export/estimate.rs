@@ -6,10 +6,11 @@ use glam::DVec3;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use super::calibration::Residuals;
 use super::motion::Motion;
 use deltille_core::calibrate::{
-    BoardShape, CameraEstimate, Diagnosis, Estimate, Instead, LackOfFit, LensEnd, PanelRef, Source,
-    TargetMap, ViewEstimate, Words,
+    BoardShape, CameraEstimate, Coverage, Diagnosis, Estimate, Instead, LackOfFit, LensEnd,
+    PanelRef, Source, TargetMap, ViewEstimate, Words,
 };
 
 #[derive(Serialize)]
@@ -54,9 +55,19 @@ pub(super) struct ViewRecord<'a> {
     image: &'a str,
     rms_px: f64,
     outliers: usize,
+    corner_count: usize,
     camera_from_target: Motion,
-    /// Row, column, x, y, dx, dy of each corner, by panel.
-    corners: Vec<CornerRecord<'a>>,
+    /// Row, column, x, y, dx, dy of each corner, by panel, where they are listed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    corners: Option<Vec<CornerRecord<'a>>>,
+}
+
+/// How many corners a camera saw in each part of its image, row by row.
+#[derive(Serialize)]
+pub(super) struct CoverageRecord {
+    columns: usize,
+    rows: usize,
+    corners: Vec<u32>,
 }
 
 #[derive(Serialize)]
@@ -172,8 +183,18 @@ pub(super) fn correlations(camera: &CameraEstimate) -> Vec<Vec<f64>> {
     correlations_of(&camera.covariance)
 }
 
+pub(super) fn coverage(camera: &CameraEstimate) -> CoverageRecord {
+    let of = Coverage::of(camera);
+    let [columns, rows] = of.cells();
+    CoverageRecord { columns, rows, corners: of.counts().to_vec() }
+}
+
 /// The views of a camera; poses have deviations where the camera is the rig.
-pub(super) fn views<'a>(estimate: &'a Estimate, camera: &'a CameraEstimate) -> Vec<ViewRecord<'a>> {
+pub(super) fn views<'a>(
+    estimate: &'a Estimate,
+    camera: &'a CameraEstimate,
+    residuals: Residuals,
+) -> Vec<ViewRecord<'a>> {
     let is_rig_frame = camera.pose_sd.is_none() && estimate.cameras.len() == 1;
     let record = |view: &'a ViewEstimate| {
         let of_view = estimate.frames.get(view.frame);
@@ -196,8 +217,9 @@ pub(super) fn views<'a>(estimate: &'a Estimate, camera: &'a CameraEstimate) -> V
             image: &view.image,
             rms_px: view.rms_px,
             outliers: view.outlier_count(),
+            corner_count: view.corners.len(),
             camera_from_target: Motion::new(&view.pose, frame.map(|frame| frame.pose_sd)),
-            corners: corners.collect(),
+            corners: (residuals == Residuals::Listed).then(|| corners.collect()),
         }
     };
     camera.views.iter().map(record).collect()

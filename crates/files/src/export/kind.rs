@@ -93,7 +93,7 @@ impl Kind {
 
     /// That of the pages written here.
     pub fn own_page() -> Self {
-        Self::of(b"<!DOCTYPE html>\n<!-- deltille ")
+        Self::of(b"<!DOCTYPE html>\n<!-- deltille 0 -->")
     }
 
     /// That of the PNG files written here to be looked at: overlays, renderings, plots.

@@ -3,10 +3,10 @@
 
 use serde::Serialize;
 
-use super::calibration::Print;
+use super::calibration::{Print, Residuals};
 use super::estimate::{
-    DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord, ViewRecord,
-    correlations, diagnoses, map, parameters, projection, shape, views,
+    CoverageRecord, DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord,
+    ViewRecord, correlations, coverage, diagnoses, map, parameters, projection, shape, views,
 };
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;
@@ -63,6 +63,7 @@ struct Camera<'a> {
     inlier_rms_px: f64,
     corners: usize,
     outliers: usize,
+    coverage: CoverageRecord,
     parameters: Vec<ParameterRecord<'a>>,
     correlations: Vec<Vec<f64>>,
     loose: &'a [String],
@@ -102,10 +103,16 @@ struct Seen<'a> {
 }
 
 /// The text of a rig's file; `model` is that of its cameras, if nothing else was said of them.
-pub fn write(found: &Estimate, said: &[Diagnosis], model: &str, print: Print) -> String {
+pub fn write(
+    found: &Estimate,
+    said: &[Diagnosis],
+    model: &str,
+    print: Print,
+    residuals: Residuals,
+) -> String {
     let held_out = found.held_out.as_deref().map(|test| HeldOut {
         rms_px: test.rms_px,
-        cameras: test.cameras.iter().map(|camera| seen(test, camera)).collect(),
+        cameras: test.cameras.iter().map(|camera| seen(test, camera, residuals)).collect(),
         frames: frames(test),
         excluded: &test.excluded,
     });
@@ -121,7 +128,7 @@ pub fn write(found: &Estimate, said: &[Diagnosis], model: &str, print: Print) ->
         board_shape: found.shape.map(shape),
         target_map: found.map.as_ref().map(|of_target| map(found, of_target)),
         targets: targets(found),
-        cameras: found.cameras.iter().map(|camera| of_camera(found, camera)).collect(),
+        cameras: found.cameras.iter().map(|camera| of_camera(found, camera, residuals)).collect(),
         frames: frames(found),
         held_out,
         excluded: &found.excluded,
@@ -141,7 +148,11 @@ fn targets(found: &Estimate) -> Vec<TargetRecord<'_>> {
     records.collect()
 }
 
-fn of_camera<'a>(estimate: &'a Estimate, found: &'a CameraEstimate) -> Camera<'a> {
+fn of_camera<'a>(
+    estimate: &'a Estimate,
+    found: &'a CameraEstimate,
+    residuals: Residuals,
+) -> Camera<'a> {
     Camera {
         name: &found.name,
         model: found.model.map_or("fixed".to_owned(), |model| model.to_string()),
@@ -151,6 +162,7 @@ fn of_camera<'a>(estimate: &'a Estimate, found: &'a CameraEstimate) -> Camera<'a
         inlier_rms_px: found.inlier_rms_px(),
         corners: found.corner_count(),
         outliers: found.outlier_count(),
+        coverage: coverage(found),
         parameters: parameters(found),
         correlations: correlations(found),
         loose: &found.ill_conditioned,
@@ -158,7 +170,7 @@ fn of_camera<'a>(estimate: &'a Estimate, found: &'a CameraEstimate) -> Camera<'a
         camera_from_rig: Motion::new(&found.camera_from_rig, found.pose_sd),
         delay_frames: found.delay,
         observed_pose_sd: found.observed_pose_sd,
-        views: views(estimate, found),
+        views: views(estimate, found, residuals),
     }
 }
 
@@ -166,8 +178,9 @@ fn is_none(frames: &i32) -> bool {
     *frames == 0
 }
 
-fn seen<'a>(estimate: &'a Estimate, found: &'a CameraEstimate) -> Seen<'a> {
-    Seen { name: &found.name, rms_px: found.rms_px, views: views(estimate, found) }
+fn seen<'a>(estimate: &'a Estimate, found: &'a CameraEstimate, residuals: Residuals) -> Seen<'a> {
+    let views = views(estimate, found, residuals);
+    Seen { name: &found.name, rms_px: found.rms_px, views }
 }
 
 fn frames(estimate: &Estimate) -> Vec<Frame<'_>> {

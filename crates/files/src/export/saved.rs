@@ -1,6 +1,6 @@
 //! Calibrations and rigs, read back from their JSON.
 //!
-//! What a file does not hold stays empty: findings and patterns of the residuals, which are told there in
+//! What a file does not hold stays empty: corners where residuals were not asked for, findings and patterns of the residuals, which are told there in
 //! words, and where refined panels are, which stands in the refined target. Reasons why views took no
 //! part are the words of the file.
 
@@ -11,8 +11,8 @@ use serde::Deserialize;
 use super::calibration::{self, StoredShape};
 use super::rig;
 use deltille_core::calibrate::{
-    BoardShape, CameraEstimate, Corner, CornerOffset, Estimate, Excluded, FrameEstimate, Model,
-    ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
+    BoardShape, CameraEstimate, Corner, CornerOffset, Coverage, Estimate, Excluded, FrameEstimate,
+    Model, ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
     SHAPE_COEFFICIENTS as COUNT, TargetEstimate, TargetMap, ViewEstimate,
 };
 use deltille_core::camera::{Camera, Lens, Pose};
@@ -97,6 +97,8 @@ struct SingleHeldOut {
 
 #[derive(Deserialize)]
 struct Rig {
+    #[serde(default, deserialize_with = "quantity::deviation::de")]
+    rms_px: Option<f64>,
     #[serde(default)]
     targets: Vec<SavedTarget>,
     cameras: Vec<SavedCamera>,
@@ -161,7 +163,16 @@ struct SavedCamera {
     delay_frames: i32,
     #[serde(default, deserialize_with = "quantity::deviation::de")]
     observed_pose_sd: Option<[f64; 6]>,
+    /// In files of later than 2026-11-24.
+    coverage: Option<SavedCoverage>,
     views: Vec<SavedView>,
+}
+
+#[derive(Deserialize)]
+struct SavedCoverage {
+    columns: usize,
+    rows: usize,
+    corners: Vec<u32>,
 }
 
 #[derive(Deserialize)]
@@ -203,6 +214,8 @@ struct SavedView {
     #[serde(deserialize_with = "quantity::deviation::de")]
     rms_px: f64,
     camera_from_target: SavedPose,
+    /// Left out unless residuals were asked for.
+    #[serde(default)]
     corners: Vec<SavedCorner>,
 }
 
@@ -310,7 +323,7 @@ impl Single {
 
 impl Rig {
     fn estimate(self, reference: Panels) -> Result<Estimate, SavedError> {
-        let Self { targets, cameras, frames, fit, held_out } = self;
+        let Self { rms_px, targets, cameras, frames, fit, held_out } = self;
         let place =
             |frames: &[SavedFrame], name: &str| frames.iter().position(|frame| frame.name == name);
         let found = cameras.into_iter().map(|camera| {
@@ -347,7 +360,10 @@ impl Rig {
         let (sum, count) = estimate.corners().fold((0.0, 0), |(sum, count), corner| {
             (sum + corner.residual.length_squared(), count + 2)
         });
-        estimate.rms_px = (sum / f64::from(count.max(1))).sqrt();
+        estimate.rms_px = match count {
+            0 => rms_px.unwrap_or_default(),
+            _ => (sum / f64::from(count)).sqrt(),
+        };
         Ok(estimate)
     }
 }
@@ -452,6 +468,11 @@ impl SavedCamera {
         camera.pose_sd = place.and_then(SavedPose::sd);
         camera.observed_pose_sd = self.observed_pose_sd;
         camera.delay = self.delay_frames;
+        let coverage = self.coverage.map(|of| {
+            Coverage::new(of.columns, of.rows, of.corners)
+                .ok_or_else(|| field("coverage", "there is not a number for each cell"))
+        });
+        camera.coverage = coverage.transpose()?;
         camera.views = estimates(self.views, frame, reference)?;
         camera.rms_px = self.rms_px;
         Ok(camera)

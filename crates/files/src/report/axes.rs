@@ -1,4 +1,14 @@
-//! A pair of axes in an SVG, in user units.
+//! A pair of axes in an SVG, in user units. All plots of a page are equally wide, and drawn into equally large frames
+//! where they stand beside a picture of the same camera.
+//!
+//! ```text
+//!     ┌──────────────────┐  ABOVE
+//!   y │ frame: inset     │
+//!     │ within the room  │
+//!     └──────────────────┘
+//!             x             BELOW
+//!     what colours and arrows mean: foot
+//! ```
 
 use std::fmt::Write as _;
 
@@ -9,6 +19,10 @@ const LEFT: f64 = 64.0;
 const BELOW: f64 = 40.0;
 const ABOVE: f64 = 10.0;
 const RIGHT: f64 = 12.0;
+
+/// Width of the frames of all plots, and how high they are at least and at most.
+const FRAME: f64 = 444.0;
+const FRAME_HEIGHTS: [f64; 2] = [240.0, 444.0];
 
 /// Width of a digit, room between numbers side by side, and height of a line.
 const DIGIT: f64 = 7.0;
@@ -21,25 +35,90 @@ const STEPS: f64 = 7.0;
 /// Steps are tried over so many powers of ten.
 const DECADES: i32 = 4;
 
+/// The frame of all plots about a camera whose image is so large: an image of usual shape fills it.
+pub(super) fn frame(image_px: DVec2) -> DVec2 {
+    let [low, high] = FRAME_HEIGHTS;
+    DVec2::new(FRAME, (FRAME * image_px.y / image_px.x).clamp(low, high).round())
+}
+
 /// A frame with axes, to draw into.
 pub(super) struct Axes {
     x: [f64; 2],
     y: [f64; 2],
+    /// Of the frame, and of the room in whose middle it is.
     size: DVec2,
+    room: DVec2,
     body: String,
+    foot: (f64, String),
+    /// Whether there is a frame, with ticks and names.
+    is_framed: bool,
 }
 
 impl Axes {
     /// Axes over two ranges; `y` grows upwards.
     pub(super) fn new(size: DVec2, x: [f64; 2], y: [f64; 2]) -> Self {
-        Self { x, y, size, body: String::new() }
+        let (body, foot) = (String::new(), (0.0, String::new()));
+        Self { x, y, size, room: size, body, foot, is_framed: true }
+    }
+
+    /// Axes over an image, from its upper left corner; y runs downwards.
+    pub(super) fn of_image(image_px: DVec2) -> Self {
+        let room = frame(image_px);
+        let size = image_px * (room / image_px).min_element();
+        let far = image_px - 0.5;
+        Self { room, ..Self::new(size, [-0.5, far.x], [far.y, -0.5]) }
+    }
+
+    /// As much room as [`Self::of_image`] has, without a frame.
+    pub(super) fn bare(image_px: DVec2) -> Self {
+        Self { is_framed: false, ..Self::new(frame(image_px), [0.0, 1.0], [0.0, 1.0]) }
+    }
+
+    /// The upper left corner and the size of what may be drawn into: of one without a frame also where others have numbers.
+    pub(super) fn bounds(&self) -> [DVec2; 2] {
+        match self.is_framed {
+            true => [self.corner(), self.size],
+            false => [DVec2::ZERO, self.room + DVec2::new(LEFT + RIGHT, ABOVE + BELOW)],
+        }
     }
 
     /// Place of a point.
     pub(super) fn at(&self, DVec2 { x, y }: DVec2) -> DVec2 {
         let part = |v: f64, [low, high]: [f64; 2]| (v - low) / (high - low);
         let parts = DVec2::new(part(x, self.x), 1.0 - part(y, self.y));
-        DVec2::new(LEFT, ABOVE) + parts * self.size
+        self.corner() + parts * self.size
+    }
+
+    /// The upper left corner of the frame.
+    fn corner(&self) -> DVec2 {
+        DVec2::new(LEFT, ABOVE) + ((self.room - self.size) / 2.0).floor()
+    }
+
+    /// How long something is in the picture.
+    pub(super) fn scale(&self) -> DVec2 {
+        self.size / DVec2::new(self.x[1] - self.x[0], self.y[1] - self.y[0]).abs()
+    }
+
+    /// Adds what is shown only as far as it is within the frame: all that `draw` adds.
+    pub(super) fn within(&mut self, draw: impl FnOnce(&mut Self)) {
+        let (DVec2 { x, y }, DVec2 { x: w, y: h }) = (self.corner(), self.size);
+        let _ = write!(
+            self.body,
+            "<svg x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" \
+             viewBox=\"{x:.1} {y:.1} {w:.1} {h:.1}\">"
+        );
+        draw(self);
+        self.body.push_str("</svg>");
+    }
+
+    /// Sets what is below the axes, so high: elements of SVG whose origin is below the left end of the frame.
+    pub(super) fn foot(&mut self, height: f64, elements: String) {
+        self.foot = (height, elements);
+    }
+
+    /// How wide the foot may be.
+    pub(super) fn foot_width(&self) -> f64 {
+        self.room.x
     }
 
     /// Adds an element of SVG.
@@ -53,6 +132,15 @@ impl Axes {
         let _ = write!(
             self.body,
             "<circle class=\"{class}\" cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"{radius}\"/>"
+        );
+    }
+
+    /// Adds a text of a class at a place, `anchor` as SVG has it.
+    pub(super) fn text(&mut self, point: DVec2, by: DVec2, anchor: &str, text: &str) {
+        let DVec2 { x, y } = self.at(point) + by;
+        let _ = write!(
+            self.body,
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>"
         );
     }
 
@@ -80,10 +168,22 @@ impl Axes {
 
     /// The picture, with the names of its axes, for readers without eyes with what it shows.
     pub(super) fn svg(self, names: [&str; 2], shows: &str) -> String {
-        let DVec2 { x: w, y: h } = self.size;
-        let (width, height) = (LEFT + w + RIGHT, ABOVE + h + BELOW);
+        self.svg_with(names, shows, "", "")
+    }
+
+    /// The same with attributes of the picture and a style of its own.
+    pub(super) fn svg_with(
+        self,
+        names: [&str; 2],
+        shows: &str,
+        attributes: &str,
+        style: &str,
+    ) -> String {
+        let (DVec2 { x: w, y: h }, DVec2 { x: left, y: top }) = (self.size, self.corner());
+        let (width, end) = (LEFT + self.room.x + RIGHT, ABOVE + self.room.y + BELOW);
+        let height = end + self.foot.0;
         let mut marks = format!(
-            "<rect class=\"frame\" x=\"{LEFT}\" y=\"{ABOVE}\" width=\"{w}\" height=\"{h}\"/>"
+            "<rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{w:.1}\" height=\"{h:.1}\"/>"
         );
         let side_by_side = |text: &str| DIGIT * text.chars().count() as f64 + APART;
         for (value, text) in ticks(self.x, w, side_by_side) {
@@ -110,17 +210,25 @@ impl Axes {
         let _ = write!(
             marks,
             "<text class=\"name\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
-             <text class=\"name\" transform=\"translate(12 {:.1}) rotate(-90)\" \
+             <text class=\"name\" transform=\"translate({:.1} {:.1}) rotate(-90)\" \
              text-anchor=\"middle\">{}</text>",
-            LEFT + w / 2.0,
-            height - 6.0,
+            left + w / 2.0,
+            top + h + BELOW - 6.0,
             names[0],
-            ABOVE + h / 2.0,
+            left - LEFT + 14.0,
+            top + h / 2.0,
             names[1]
         );
+        if !self.is_framed {
+            marks.clear();
+        }
+        let foot = match self.foot {
+            (0.0, _) => String::new(),
+            (_, elements) => format!("<g transform=\"translate({LEFT} {end:.1})\">{elements}</g>"),
+        };
         format!(
-            "<svg viewBox=\"0 0 {width} {height}\" width=\"{width}\" role=\"img\" \
-             aria-label=\"{shows}\">{marks}{}</svg>",
+            "<svg{attributes} viewBox=\"0 0 {width} {height:.1}\" width=\"{width}\" role=\"img\" \
+             aria-label=\"{shows}\">{style}{marks}{}{foot}</svg>",
             self.body
         )
     }

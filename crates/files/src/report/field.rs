@@ -6,19 +6,22 @@ use std::fmt::Write as _;
 
 use glam::DVec2;
 
-use super::target_map::round_down;
+use super::axes::Axes;
+use super::panels::round_down;
 use deltille_core::calibrate::{CameraEstimate, Comparison, Source, UncertaintyMap};
 use deltille_core::statistics::quantile;
 
-/// Width of the picture, user units, and room for the scales below it.
-const WIDTH: f64 = 480.0;
+/// Room for the scales below the picture, user units.
 const SCALES: f64 = 58.0;
+
+/// Widest part of the scale for a colour, user units.
+const WIDEST: f64 = 46.0;
 
 /// Where colours change, px, from the finest on.
 const LEVELS: [f64; 10] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
 
 /// The colours between them, light where little is: told apart by those who see no red or no green.
-const COLOURS: [&str; 11] = [
+pub(super) const COLOURS: [&str; 11] = [
     "#ffffe5", "#f0f9c8", "#d5eeb3", "#a9ddb7", "#73c9bd", "#45b4c2", "#2897bf", "#2073b2",
     "#234da0", "#1e2f88", "#081d58",
 ];
@@ -30,13 +33,15 @@ const NEARLY_ALL: f64 = 0.95;
 /// Arrows along a row at most.
 const ARROWS: usize = 20;
 
-/// Colours for viewers in the light and in the dark.
-const STYLE: &str = "\
+/// Colours for viewers in the light and in the dark, of a picture by itself; a page has its own.
+const STYLE: &str = "<style>\
 .field text{font:11px system-ui,sans-serif;fill:#556}\
+.field .frame,.field .tick{stroke:#99a;fill:none}\
 .field .outline{stroke:#c21f2b;stroke-width:1.5;fill:none}\
-.field .by{stroke:#c21f2b;stroke-width:1.4;fill:none;stroke-linecap:round}\
+.field .arrow{stroke:#c21f2b;stroke-width:1.4;fill:none;stroke-linecap:round}\
+.field .foot{fill:#c21f2b}\
 .field .none{fill:#888;fill-opacity:.25}\
-@media(prefers-color-scheme:dark){.field text{fill:#a9b2bd}}";
+@media(prefers-color-scheme:dark){.field text{fill:#a9b2bd}}</style>";
 
 /// Values over an image, row by row.
 struct Field {
@@ -52,7 +57,7 @@ struct Field {
 
 /// How sure a camera is over its image, as a file of its own.
 pub fn uncertainty_svg(camera: &CameraEstimate, map: &UncertaintyMap) -> String {
-    uncertainty(camera, map, SPACE)
+    of_uncertainty(camera, map).by_itself(UNCERTAIN)
 }
 
 /// How two cameras differ over their image, as a file of its own.
@@ -76,14 +81,17 @@ pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
             .filter_map(|(_, place)| place.map(|place| (place.pixel, place.by)))
             .collect(),
     };
-    field.drawing("Differences of two cameras over the image", SPACE)
+    field.by_itself("Differences of two cameras over the image")
 }
 
-/// What files of their own need.
-const SPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
+const UNCERTAIN: &str = "How sure the camera is over its image";
 
-/// How sure a camera is over its image; `space` is an attribute that files of their own need.
-pub(super) fn uncertainty(camera: &CameraEstimate, map: &UncertaintyMap, space: &str) -> String {
+/// How sure a camera is over its image, for a page.
+pub(super) fn uncertainty(camera: &CameraEstimate, map: &UncertaintyMap) -> String {
+    of_uncertainty(camera, map).axes().svg(NAMES, UNCERTAIN)
+}
+
+fn of_uncertainty(camera: &CameraEstimate, map: &UncertaintyMap) -> Field {
     let size = DVec2::new(f64::from(camera.camera.width), f64::from(camera.camera.height));
     let parts = DVec2::new(map.columns as f64, map.rows as f64);
     let seen: BTreeSet<[i64; 2]> = camera
@@ -96,15 +104,14 @@ pub(super) fn uncertainty(camera: &CameraEstimate, map: &UncertaintyMap, space: 
     let places = 0..map.columns * map.rows;
     let is_seen =
         |place: usize| seen.contains(&[(place % map.columns) as i64, (place / map.columns) as i64]);
-    let field = Field {
+    Field {
         size,
         columns: map.columns,
         values: map.sd_px.clone(),
         outlined: places.map(is_seen).collect(),
         outline: "outlined: where corners were",
         arrows: Vec::new(),
-    };
-    field.drawing("How sure the camera is over its image", space)
+    }
 }
 
 /// What a map of uncertainty shows, in words.
@@ -120,70 +127,53 @@ pub(super) fn caption(map: &UncertaintyMap) -> String {
     format!("Standard deviation of projections {distance}, along the worst direction, {source}.")
 }
 
+const NAMES: [&str; 2] = ["x, px", "y, px"];
+
 impl Field {
-    fn drawing(&self, shows: &str, space: &str) -> String {
-        let scale = WIDTH / self.size.x;
-        let height = self.size.y * scale;
-        let mut body =
-            self.cells(scale) + &self.outline_lines(scale) + &levels(&self.values, height);
+    /// As a file of its own.
+    fn by_itself(&self, shows: &str) -> String {
+        let attributes = " xmlns=\"http://www.w3.org/2000/svg\" class=\"field\"";
+        self.axes().svg_with(NAMES, shows, attributes, STYLE)
+    }
+
+    fn axes(&self) -> Axes {
+        let mut axes = Axes::of_image(self.size);
+        for (index, value) in self.values.iter().enumerate() {
+            let [low, high] = self.sides(index);
+            match value {
+                Some(value) => {
+                    let fill = format!("fill=\"{0}\" stroke=\"{0}\"", COLOURS[level(*value)]);
+                    axes.bar(low, high, "value", &fill);
+                }
+                None => axes.bar(low, high, "none", ""),
+            }
+        }
+        let outline = self.outline_lines(&axes);
+        axes.add(&outline);
         let enlarged = self.enlarged();
         for &(pixel, by) in &self.arrows {
-            let from = (pixel + 0.5) * scale;
-            let to = from + by * enlarged * scale;
-            let _ = write!(
-                body,
-                "<line class=\"by\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>\
-                 <circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"1.2\" fill=\"#c21f2b\"/>",
-                from.x, from.y, to.x, to.y, from.x, from.y
-            );
+            axes.line(&[pixel, pixel + by * enlarged], "arrow");
+            axes.dot(pixel, 1.2, "foot");
         }
         let said = match self.arrows.is_empty() {
             true => self.outline.to_owned(),
             false => format!("arrows: {enlarged} times enlarged; {}", self.outline),
         };
-        let total = height + SCALES;
-        format!(
-            "<svg{space} class=\"field\" viewBox=\"0 0 {WIDTH} {total:.1}\" width=\"{WIDTH}\" role=\"img\" \
-             aria-label=\"{shows}\"><style>{STYLE}</style>{body}\
-             <text x=\"0\" y=\"{:.1}\">{said}</text></svg>",
-            height + 50.0
-        )
+        let foot = levels(&self.values, axes.foot_width());
+        axes.foot(SCALES, format!("{foot}<text x=\"0\" y=\"50\">{said}</text>"));
+        axes
     }
 
-    /// The size of a place in the picture.
-    fn place(&self, scale: f64) -> DVec2 {
+    /// Two corners of a place, px.
+    fn sides(&self, index: usize) -> [DVec2; 2] {
         let rows = self.values.len().div_ceil(self.columns.max(1));
-        self.size * scale / DVec2::new(self.columns as f64, rows as f64)
-    }
-
-    fn at(&self, index: usize, scale: f64) -> DVec2 {
+        let side = self.size / DVec2::new(self.columns as f64, rows as f64);
         let place = DVec2::new((index % self.columns) as f64, (index / self.columns) as f64);
-        place * self.place(scale)
-    }
-
-    fn cells(&self, scale: f64) -> String {
-        let side = self.place(scale);
-        let mut drawn = String::new();
-        for (index, value) in self.values.iter().enumerate() {
-            let DVec2 { x, y } = self.at(index, scale);
-            let fill = match value {
-                Some(value) => format!("fill=\"{}\"", COLOURS[level(*value)]),
-                None => "class=\"none\"".to_owned(),
-            };
-            // A little larger, so that no lines show between them.
-            let _ = write!(
-                drawn,
-                "<rect {fill} x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>",
-                side.x + 0.3,
-                side.y + 0.3
-            );
-        }
-        drawn
+        [place * side - 0.5, (place + 1.0) * side - 0.5]
     }
 
     /// Lines between places that are outlined and others.
-    fn outline_lines(&self, scale: f64) -> String {
-        let side = self.place(scale);
+    fn outline_lines(&self, axes: &Axes) -> String {
         let rows = self.values.len() / self.columns.max(1);
         let is_in = |row: i64, column: i64| {
             let is_there =
@@ -193,8 +183,7 @@ impl Field {
         let mut path = String::new();
         for index in (0..self.outlined.len()).filter(|&index| self.outlined[index]) {
             let (row, column) = ((index / self.columns) as i64, (index % self.columns) as i64);
-            let low = self.at(index, scale);
-            let high = low + side;
+            let [low, high] = self.sides(index).map(|corner| axes.at(corner));
             let sides = [
                 (is_in(row - 1, column), low, DVec2::new(high.x, low.y)),
                 (is_in(row + 1, column), DVec2::new(low.x, high.y), high),
@@ -222,32 +211,28 @@ fn level(value: f64) -> usize {
     LEVELS.iter().filter(|&&level| value >= level).count()
 }
 
-/// The colours that occur and what they mean, below a picture.
-fn levels(values: &[Option<f64>], top: f64) -> String {
+/// The colours that occur and what they mean, over a width.
+fn levels(values: &[Option<f64>], width: f64) -> String {
     let found = values.iter().flatten().map(|&value| level(value));
     let (first, last) = found.fold((usize::MAX, 0), |(low, high), at| (low.min(at), high.max(at)));
     let mut drawn = String::new();
     let shown: Vec<usize> = (first.min(last)..=last).collect();
-    let width = ((WIDTH - 30.0) / shown.len() as f64).min(46.0);
+    let width = ((width - 30.0) / shown.len() as f64).min(WIDEST);
     for (place, &at) in shown.iter().enumerate() {
         let x = place as f64 * width;
         let _ = write!(
             drawn,
-            "<rect x=\"{x:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"10\" fill=\"{}\" \
-             stroke=\"#888\" stroke-width=\".4\"/>",
-            top + 8.0,
+            "<rect x=\"{x:.1}\" y=\"8\" width=\"{width:.1}\" height=\"10\" fill=\"{}\" stroke=\"#888\" \
+             stroke-width=\".4\"/>",
             COLOURS[at]
         );
         if let Some(limit) = LEVELS.get(at).filter(|_| place + 1 < shown.len()) {
-            let _ = write!(
-                drawn,
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{limit}</text>",
-                x + width,
-                top + 31.0
-            );
+            let x = x + width;
+            let _ =
+                write!(drawn, "<text x=\"{x:.1}\" y=\"31\" text-anchor=\"middle\">{limit}</text>");
         }
     }
     let end = shown.len() as f64 * width + 8.0;
-    let _ = write!(drawn, "<text x=\"{end:.1}\" y=\"{:.1}\">px</text>", top + 17.0);
+    let _ = write!(drawn, "<text x=\"{end:.1}\" y=\"17\">px</text>");
     drawn
 }

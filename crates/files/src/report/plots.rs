@@ -2,15 +2,13 @@
 
 use glam::DVec2;
 
-use super::axes::Axes;
+use super::axes::{Axes, frame};
+use super::panels::round_down;
 use super::survey::Survey;
 use deltille_core::calibrate::{CameraEstimate, Corner};
 
-/// Size of the small plots, user units.
-const SMALL: DVec2 = DVec2::new(330.0, 250.0);
-
-/// Width of the maps of the image, user units.
-const MAP: f64 = 430.0;
+/// Room for scales below a map, user units.
+const FOOT: f64 = 58.0;
 
 /// Most dots of a scatter plot: more only make the page heavy.
 const MOST_DOTS: usize = 6000;
@@ -20,6 +18,9 @@ const BEYOND: f64 = 3.0;
 
 /// Bins of the histogram on either side of zero.
 const BINS: usize = 20;
+
+/// Most bars of views.
+const MOST_BARS: usize = 200;
 
 /// Bins of the radial curve.
 const RINGS: usize = 12;
@@ -42,31 +43,33 @@ fn thinned(camera: &CameraEstimate) -> impl Iterator<Item = &Corner> {
 }
 
 /// Residuals as a cloud.
-pub(super) fn scatter(camera: &CameraEstimate) -> String {
-    let range = range_px(camera);
-    let mut axes = Axes::new(DVec2::splat(SMALL.y), [-range, range], [-range, range]);
+pub(super) fn scatter(camera: &CameraEstimate, survey: &Survey) -> String {
+    let size = frame(survey.size_px);
+    // As many pixels in all directions, however wide the frame is.
+    let range = range_px(camera) * size / size.min_element();
+    let mut axes = Axes::new(size, [-range.x, range.x], [-range.y, range.y]);
     for axis in [DVec2::X, DVec2::Y] {
         axes.line(&[-range * axis, range * axis], "guide");
     }
     // Residuals run down in the image.
     let up = |corner: &Corner| corner.residual * DVec2::new(1.0, -1.0);
     for corner in thinned(camera) {
-        if corner.residual.abs().max_element() <= range {
+        if (corner.residual / range).abs().max_element() <= 1.0 {
             axes.dot(up(corner), 1.3, if corner.outlier { "dot out" } else { "dot" });
         }
     }
     for corner in camera.corners() {
         // On the way from the middle, where it leaves the plot.
-        let beyond = corner.residual.abs().max_element() / range;
+        let beyond = (corner.residual / range).abs().max_element();
         if beyond > 1.0 {
             axes.dot(up(corner) / beyond, BEYOND, "beyond");
         }
     }
-    axes.svg(["right, px", "up, px"], "Residuals of all corners")
+    axes.svg(["residual to the right, px", "residual upwards, px"], "Residuals of all corners")
 }
 
 /// Residuals of both coordinates, with the normal distribution of the same deviation.
-pub(super) fn histogram(camera: &CameraEstimate) -> String {
+pub(super) fn histogram(camera: &CameraEstimate, survey: &Survey) -> String {
     let range = range_px(camera);
     let width = range / BINS as f64;
     let mut counts = vec![0usize; 2 * BINS];
@@ -86,7 +89,7 @@ pub(super) fn histogram(camera: &CameraEstimate) -> String {
         100.0 * density * width
     };
     let highest = counts.iter().map(|&count| part(count)).fold(normal(0.0), f64::max);
-    let mut axes = Axes::new(SMALL, [-range, range], [0.0, 1.08 * highest]);
+    let mut axes = Axes::new(frame(survey.size_px), [-range, range], [0.0, 1.08 * highest]);
     for (bin, &count) in counts.iter().enumerate() {
         let x = bin as f64 * width - range;
         axes.bar(DVec2::new(x, 0.0), DVec2::new(x + width, part(count)), "bar", "");
@@ -95,12 +98,6 @@ pub(super) fn histogram(camera: &CameraEstimate) -> String {
     let curve: Vec<DVec2> = curve.map(|x| DVec2::new(x, normal(x))).collect();
     axes.line(&curve, "curve");
     axes.svg(["residual of a coordinate, px", "% of coordinates"], "Histogram of residuals")
-}
-
-/// The image from its upper left corner; y runs downwards.
-fn map(survey: &Survey) -> Axes {
-    let DVec2 { x: w, y: h } = survey.size_px;
-    Axes::new(DVec2::new(MAP, MAP * h / w), [-0.5, w - 0.5], [h - 0.5, -0.5])
 }
 
 /// Columns and rows of the maps.
@@ -125,33 +122,45 @@ fn within(survey: &Survey, from: DVec2, arrow: DVec2) -> DVec2 {
     room(0).min(room(1)).min(1.0) * arrow
 }
 
-/// Mean residuals over the image, and by how much the arrows are enlarged.
-pub(super) fn residual_map(survey: &Survey) -> (String, f64) {
+/// Mean residuals over the image, and in words what it is.
+pub(super) fn residual_map(survey: &Survey) -> (String, String) {
     let cell = survey.size_px.x / survey.cells[0] as f64;
-    let length = |v: DVec2| v.x.hypot(v.y);
     let means = || survey.means_px.iter().flatten();
-    let longest = means().map(|cell| length(cell.mean_px)).fold(0.0, f64::max);
-    let scale = if longest > 0.0 { ARROW_CELLS * cell / longest } else { 1.0 };
-    // A round number, to be read in the caption.
-    let decade = 10f64.powf(scale.log10().floor());
-    let scale = (scale / decade).floor() * decade;
-    let mut axes = map(survey);
+    let longest = means().map(|cell| cell.mean_px.length()).fold(0.0, f64::max);
+    // Round numbers, to be read in the caption and below.
+    let enlarged =
+        if longest > 0.0 { round_down(ARROW_CELLS * cell / longest).max(1.0) } else { 1.0 };
+    let mut axes = Axes::of_image(survey.size_px);
     for (index, mean) in survey.means_px.iter().enumerate() {
         let Some(mean) = mean else { continue };
         let foot = middle(survey, index);
-        let arrow = within(survey, foot, mean.mean_px * scale);
+        let arrow = within(survey, foot, mean.mean_px * enlarged);
         // Means that chance explains are pale.
-        let chance = length(mean.mean_px) < 3.0 * mean.sd_px;
+        let chance = mean.mean_px.length() < 3.0 * mean.sd_px;
         axes.line(&[foot, foot + arrow], if chance { "arrow pale" } else { "arrow" });
         axes.dot(foot, 1.6, "foot");
     }
-    (axes.svg(["x, px", "y, px"], "Mean residuals over the image"), scale)
+    if longest > 0.0 {
+        let example = round_down(longest);
+        let end = example * enlarged * axes.scale().x;
+        let key = format!(
+            "<path class=\"arrow\" d=\"M0 13H{end:.1}\"/><text x=\"0\" y=\"31\">{example} px</text>\
+             <path class=\"arrow pale\" d=\"M110 13H{:.1}\"/><text x=\"110\" y=\"31\">no more than chance makes</text>",
+            110.0 + end
+        );
+        axes.foot(FOOT, key);
+    }
+    let caption = format!(
+        "Mean residual (seen less predicted) of each part of the image, {enlarged} times enlarged. A pattern of long arrows \
+         is the lens's, which the model does not hold."
+    );
+    (axes.svg(["x, px", "y, px"], "Mean residuals over the image"), caption)
 }
 
 /// Corners in each part of the image.
 pub(super) fn coverage(survey: &Survey) -> String {
     let most = survey.counts.iter().copied().max().unwrap_or(0).max(1) as f64;
-    let mut axes = map(survey);
+    let mut axes = Axes::of_image(survey.size_px);
     for (index, &count) in survey.counts.iter().enumerate() {
         let middle = middle(survey, index);
         let half = survey.size_px / cells(survey) / 2.0;
@@ -173,12 +182,12 @@ pub(super) fn coverage(survey: &Survey) -> String {
 }
 
 /// Error against the distance from the principal point: every corner, and the rms of rings.
-pub(super) fn against_radius(camera: &CameraEstimate) -> String {
+pub(super) fn against_radius(camera: &CameraEstimate, survey: &Survey) -> String {
     let radius = |corner: &Corner| camera.camera.radius_px(corner.pixel);
     let error = |corner: &Corner| corner.residual.x.hypot(corner.residual.y);
     let farthest = camera.corners().map(radius).fold(1.0, f64::max);
     let top = range_px(camera);
-    let mut axes = Axes::new(SMALL, [0.0, farthest], [0.0, top]);
+    let mut axes = Axes::new(frame(survey.size_px), [0.0, farthest], [0.0, top]);
     for corner in thinned(camera) {
         let point = DVec2::new(radius(corner), error(corner));
         if point.y <= top {
@@ -208,18 +217,52 @@ pub(super) fn against_radius(camera: &CameraEstimate) -> String {
     axes.svg(["distance from the principal point, px", "error, px"], "Error against radius")
 }
 
-/// Error of each view against its tilt; `None` for solids.
-pub(super) fn against_tilt(camera: &CameraEstimate, survey: &Survey) -> Option<String> {
-    let tilts: Vec<f64> = survey
-        .views
-        .iter()
-        .map(|view| view.tilt_rad.map(f64::to_degrees))
-        .collect::<Option<_>>()?;
-    let steepest = tilts.iter().copied().fold(10.0, f64::max);
+/// Error of each view against its tilt, or of solids, which show faces at all tilts, against their distance; and in words
+/// what it is.
+pub(super) fn against_place(camera: &CameraEstimate, survey: &Survey) -> (String, &'static str) {
+    let tilts = survey.views.iter().map(|view| view.tilt_rad.map(f64::to_degrees));
+    let (places, least, name, shows, caption) = match tilts.collect::<Option<Vec<f64>>>() {
+        Some(tilts) => (
+            tilts,
+            10.0,
+            "tilt of the board, °",
+            "Error against tilt",
+            "The rms of each view over its tilt: steep views are blurred and coarse, and all tilts should occur.",
+        ),
+        None => (
+            survey.views.iter().map(|view| view.distance_mm).collect(),
+            1.0,
+            "distance of the target, mm",
+            "Error against distance",
+            "The rms of each view over the distance of the target: near and far should occur.",
+        ),
+    };
+    let farthest = places.iter().copied().fold(least, f64::max);
     let worst = camera.views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
-    let mut axes = Axes::new(SMALL, [0.0, 1.05 * steepest], [0.0, 1.1 * worst]);
-    for (view, tilt) in camera.views.iter().zip(&tilts) {
-        axes.dot(DVec2::new(*tilt, view.rms_px), 3.0, "view");
+    let ranges = [[0.0, 1.05 * farthest], [0.0, 1.1 * worst]];
+    let mut axes = Axes::new(frame(survey.size_px), ranges[0], ranges[1]);
+    for (view, place) in camera.views.iter().zip(&places) {
+        axes.dot(DVec2::new(*place, view.rms_px), 3.0, "view");
     }
-    Some(axes.svg(["tilt of the board, °", "rms of the view, px"], "Error against tilt"))
+    (axes.svg([name, "rms of the view, px"], shows), caption)
+}
+
+/// Error of each view, in their order.
+pub(super) fn of_views(camera: &CameraEstimate, survey: &Survey) -> String {
+    let views = &camera.views;
+    let worst = views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);
+    let mut axes =
+        Axes::new(frame(survey.size_px), [0.5, views.len() as f64 + 0.5], [0.0, 1.1 * worst]);
+    // Of many views each bar is the worst of several.
+    let step = views.len().div_ceil(MOST_BARS).max(1);
+    for (bar, views) in views.chunks(step).enumerate() {
+        let px = views.iter().map(|view| view.rms_px).fold(0.0, f64::max);
+        let first = (bar * step) as f64 + 0.5;
+        let gap = 0.1 * step as f64;
+        let high = DVec2::new(first + views.len() as f64 - gap, px);
+        axes.bar(DVec2::new(first + gap, 0.0), high, "bar", "");
+    }
+    let all = DVec2::new(views.len() as f64 + 0.5, camera.rms_px);
+    axes.line(&[DVec2::new(0.5, camera.rms_px), all], "curve");
+    axes.svg(["view, in their order", "rms of the view, px"], "Error of each view")
 }

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::Report;
-use super::page::{MOST_VIEWS, escaped, out_row, rounded};
+use super::page::{escaped, meter, out_row, rounded};
+use super::views::MOST_VIEWS;
 use deltille_core::calibrate::{FrameEstimate, PanelPlace};
 use deltille_core::camera::Pose;
 
@@ -33,9 +34,9 @@ pub(super) fn places(report: &Report) -> String {
         )
     });
     format!(
-        "<section><h2>Relative camera poses</h2><table class=\"plain\"><tr><th>camera</th>\
+        "<section><h2>Relative camera poses</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>camera</th>\
          <th>place, mm</th><th>turned by</th><th>± standard deviation</th><th>rms, px</th><th>corners</th></tr>{}\
-         </table><p class=\"note\">Places of the optical centres, and angles of rotation, relative to \
+         </table></div><p class=\"note\">Places of the optical centres, and angles of rotation, relative to \
          camera {}.</p></section>\n",
         rows.collect::<String>(),
         escaped(first)
@@ -64,8 +65,8 @@ pub(super) fn targets(report: &Report) -> String {
         )
     });
     format!(
-        "<section><h2>Relative target poses</h2><table class=\"plain\"><tr><th>target</th><th>place, mm</th>\
-         <th>turned by</th><th>± standard deviation</th></tr>{}</table><p class=\"note\">Where the frame of each target \
+        "<section><h2>Relative target poses</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>target</th><th>place, mm</th>\
+         <th>turned by</th><th>± standard deviation</th></tr>{}</table></div><p class=\"note\">Where the frame of each target \
          is, relative to that of target {}.</p></section>\n",
         rows.collect::<String>(),
         escaped(&targets[0].name)
@@ -93,8 +94,8 @@ pub(super) fn panels(report: &Report) -> String {
         return rows;
     }
     format!(
-        "<section><h2>Refined panels</h2><table class=\"plain\"><tr><th>panel</th>\
-         <th>moved by, mm</th><th>±</th><th>turned by</th><th>±</th></tr>{rows}</table>\
+        "<section><h2>Refined panels</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>panel</th>\
+         <th>moved by, mm</th><th>±</th><th>turned by</th><th>±</th></tr>{rows}</table></div>\
          <p class=\"note\">Origins of the panels against where the target's file has them, with standard \
          deviations. A panel that is not listed stays in place, or was not seen.</p></section>\n"
     )
@@ -139,8 +140,8 @@ pub(super) fn frames(report: &Report) -> String {
     let excluded = estimate.excluded.iter().filter(|out| out.camera.is_none());
     let excluded = excluded.map(|out| format!("<tr>{}", out_row(out, 3)));
     format!(
-        "<section><h2 class=\"frames\">Frames</h2>{note}<table class=\"plain\"><tr><th>frame</th>\
-         <th>cameras</th><th>corners</th><th>rms, px</th></tr>{}</table></section>\n",
+        "<section><h2 class=\"frames\">Frames</h2>{note}<div class=\"wide-table\"><table class=\"plain\"><tr><th>frame</th>\
+         <th>cameras</th><th>corners</th><th>rms, px</th></tr>{}</table></div></section>\n",
         rows.chain(excluded).collect::<String>()
     )
 }
@@ -154,11 +155,11 @@ fn row(report: &Report, index: usize, frame: &FrameEstimate, worst: f64) -> Stri
     let (cameras, corners): (Vec<String>, Vec<usize>) = views.unzip();
     format!(
         "<tr><td class=\"name\">{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
-         <td class=\"number\">{:.4}<div class=\"meter\" style=\"width:{:.0}%\"></div></td></tr>",
+         <td class=\"number\">{:.4}{}</td></tr>",
         escaped(&frame.name),
         cameras.join(", "),
         corners.iter().sum::<usize>(),
         frame.rms_px,
-        100.0 * frame.rms_px / worst
+        meter(frame.rms_px / worst)
     )
 }

@@ -1,29 +1,52 @@
-//! Cameras and targets in space: a picture, drawn in parallel projection from above and behind the first camera, as one who
-//! stands there sees it.
+//! Cameras and targets in space: pictures in parallel projection, one with the cameras at rest, one with the target.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use glam::{DQuat, DVec2, DVec3};
 
+use super::axes::Axes;
+use super::board_residuals::{camera_from_panel, on_plane};
 use super::page::escaped;
 use deltille_core::calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::statistics::median;
 
-/// Width and greatest height of the picture, user units, and its margin.
-const WIDTH: f64 = 900.0;
-const MOST_HEIGHT: f64 = 560.0;
-const MARGIN: f64 = 60.0;
-
-/// How the viewer stands: turned to the side and down by so much, rad.
-const ASIDE: f64 = 0.6;
-const DOWN: f64 = 0.5;
+/// Margin of the picture, user units.
+const MARGIN: f64 = 36.0;
 
 /// Views that are drawn of a camera, evenly over all: more hide each other.
 const MOST_VIEWS: usize = 60;
 
-/// How long a drawn camera is, as a part of the median distance of the target.
+/// How long a drawn camera is, as a part of the median distance of the target: one, and each of many.
 const CAMERA_PART: f64 = 0.12;
+const SMALL_CAMERA_PART: f64 = 0.07;
+
+/// More views than this are drawn as outlines alone.
+const FEW_VIEWS: usize = 12;
+
+/// What stays where it is in the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fixed {
+    /// The cameras, and the viewer stands above and behind the first.
+    Rig,
+    /// The target, and the viewer stands before and below it.
+    Target,
+}
+
+impl Fixed {
+    /// As the viewer sees a point: x right, y down, z away; turned to the side and down, rad.
+    fn turned(self, point: DVec3) -> DVec3 {
+        match self {
+            Self::Rig => DQuat::from_rotation_x(0.5) * (DQuat::from_rotation_y(0.6) * point),
+            // A target has y up and z towards the camera.
+            Self::Target => {
+                let faced = DVec3::new(point.x, -point.y, -point.z);
+                DQuat::from_rotation_x(0.9) * (DQuat::from_rotation_y(0.5) * faced)
+            }
+        }
+    }
+}
 
 /// Half a drawn camera's width where the lens has no ray at the corners of its picture: as of 90°.
 const WIDE: f64 = 1.0;
@@ -35,27 +58,36 @@ struct Shape {
     title: String,
 }
 
-/// The picture; empty where nothing was seen.
-pub(super) fn drawing(estimate: &Estimate) -> String {
-    let mut shapes = targets(estimate);
-    let depths = shapes.iter().map(|shape| shape.middle().length()).collect();
+/// The picture, as large as other plots of a camera with so large an image; empty where nothing was seen.
+pub(super) fn drawing(estimate: &Estimate, fixed: Fixed, image_px: DVec2) -> String {
+    let [_, size_px] = Axes::bare(image_px).bounds();
+    let (width, height) = (size_px.x, size_px.y);
+    let depths = targets(estimate).iter().map(|shape| shape.middle().length()).collect();
     let Some(depth) = median(depths).filter(|depth| *depth > 0.0) else { return String::new() };
-    let cameras = estimate.cameras.iter().map(|camera| pyramid(camera, CAMERA_PART * depth));
-    shapes.extend(cameras.flatten());
+    let mut shapes = match fixed {
+        Fixed::Rig => {
+            let cameras = estimate.cameras.iter();
+            let cameras =
+                cameras.flat_map(|camera| pyramid(camera, &Pose::IDENTITY, CAMERA_PART * depth));
+            targets(estimate).into_iter().chain(cameras).collect()
+        }
+        Fixed::Target => around_target(estimate, SMALL_CAMERA_PART * depth),
+    };
+    let turned = |point: DVec3| fixed.turned(point);
     // What is far away first, so that what is near covers it.
     shapes.sort_by(|a, b| turned(b.middle()).z.total_cmp(&turned(a.middle()).z));
     let flat = |point: &DVec3| turned(*point).truncate();
     let all = || shapes.iter().flat_map(|shape| &shape.corners).map(flat);
     let low = all().fold(DVec2::INFINITY, DVec2::min);
     let size = all().fold(DVec2::NEG_INFINITY, DVec2::max) - low;
-    let room = DVec2::new(WIDTH, MOST_HEIGHT) - 2.0 * MARGIN;
+    let room = size_px - 2.0 * MARGIN;
     let scale = (room / size.max(DVec2::splat(1.0))).min_element();
-    let place = |point: &DVec3| MARGIN + scale * (flat(point) - low);
-    let height = 2.0 * MARGIN + scale * size.y;
-    let width = (2.0 * MARGIN + scale * size.x).max(320.0);
+    let aside = (room - scale * size) / 2.0;
+    let place = |point: &DVec3| MARGIN + aside + scale * (flat(point) - low);
+    let many = if estimate.frames.len() > FEW_VIEWS { " many" } else { "" };
     let mut svg = format!(
-        "<svg class=\"scene\" viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" height=\"{height:.0}\" \
-         role=\"img\" aria-label=\"cameras and target in space\">"
+        "<svg class=\"scene{many}\" viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" role=\"img\" \
+         aria-label=\"cameras and target in space\">"
     );
     for shape in &shapes {
         let points: Vec<String> = shape
@@ -74,7 +106,8 @@ pub(super) fn drawing(estimate: &Estimate) -> String {
             points.join(" ")
         );
     }
-    for camera in estimate.cameras.iter().filter(|_| estimate.cameras.len() > 1) {
+    let is_named = estimate.cameras.len() > 1 && fixed == Fixed::Rig;
+    for camera in estimate.cameras.iter().filter(|_| is_named) {
         let at = place(&camera.camera_from_rig.inverse().translation);
         let (x, y, name) = (at.x - 6.0, at.y + 4.0, escaped(&camera.name));
         let _ = write!(
@@ -93,11 +126,6 @@ pub(super) fn drawing(estimate: &Estimate) -> String {
     svg
 }
 
-/// As the viewer sees the rig frame: x right, y down, z away.
-fn turned(point: DVec3) -> DVec3 {
-    DQuat::from_rotation_x(DOWN) * (DQuat::from_rotation_y(ASIDE) * point)
-}
-
 /// 1, 2 or 5 times a power of ten, at most so much.
 fn round_length(most: f64) -> f64 {
     let power = 10f64.powf(most.max(f64::MIN_POSITIVE).log10().floor());
@@ -110,18 +138,50 @@ impl Shape {
     }
 }
 
-/// The pyramid before a camera that it sees along, and its base.
-fn pyramid(camera: &CameraEstimate, long: f64) -> Vec<Shape> {
-    let rig_from_camera = camera.camera_from_rig.inverse();
+/// The pyramid before a camera that it sees along, and its base, in another frame than that of the rig.
+fn pyramid(camera: &CameraEstimate, frame_from_rig: &Pose, long: f64) -> Vec<Shape> {
+    let frame_from_camera = frame_from_rig.after(&camera.camera_from_rig.inverse());
     let base = corners_ahead(&camera.camera)
-        .map(|corner| rig_from_camera.apply(long * corner.extend(1.0)));
-    let top = rig_from_camera.translation;
+        .map(|corner| frame_from_camera.apply(long * corner.extend(1.0)));
+    let top = frame_from_camera.translation;
     let shape = |corners: Vec<DVec3>, class| {
         let title = if camera.name.is_empty() { "camera" } else { camera.name.as_str() };
         Shape { corners, class, title: title.to_owned() }
     };
     let sides = (0..4).map(|i| shape(vec![top, base[i], base[(i + 1) % 4]], "camera-side"));
     sides.chain([shape(base.to_vec(), "camera-base")]).collect()
+}
+
+/// The panels of the target as far as they were seen, and the cameras in all frames.
+fn around_target(estimate: &Estimate, long: f64) -> Vec<Shape> {
+    let worst = estimate.frames.iter().map(|frame| frame.rms_px).fold(0.0, f64::max);
+    let mut widest: BTreeMap<PanelRef, (f64, Shape)> = BTreeMap::new();
+    let mut cameras = Vec::new();
+    for camera in &estimate.cameras {
+        let step = camera.views.len().div_ceil(MOST_VIEWS).max(1);
+        for view in camera.views.iter().step_by(step) {
+            let target_from_rig = view.pose.inverse().after(&camera.camera_from_rig);
+            for (panel, shape) in panels(estimate, camera, view, "board fixed") {
+                let corners = shape.corners.iter().map(|at| target_from_rig.apply(*at)).collect();
+                let shape = Shape { corners, title: "target".to_owned(), ..shape };
+                let size = shape.corners.iter().map(|at| at.distance(shape.corners[0]));
+                let size = size.fold(0.0, f64::max);
+                match widest.get(&panel) {
+                    Some((most, _)) if *most >= size => {}
+                    _ => drop(widest.insert(panel, (size, shape))),
+                }
+            }
+            let is_worst = view.rms_px >= worst && estimate.frames.len() > 1;
+            let title = format!("{} {}, rms {:.3} px", camera.name, view.name, view.rms_px);
+            let drawn = pyramid(camera, &target_from_rig, long).into_iter().map(|shape| Shape {
+                class: if is_worst { "camera-side worst" } else { shape.class },
+                title: title.clone(),
+                ..shape
+            });
+            cameras.extend(drawn);
+        }
+    }
+    widest.into_values().map(|(_, shape)| shape).chain(cameras).collect()
 }
 
 /// Where the corners of the picture are on a plane ahead.
@@ -143,7 +203,8 @@ fn targets(estimate: &Estimate) -> Vec<Shape> {
         let views = camera.views.iter().step_by(step);
         let shapes = views.flat_map(|view| {
             let is_worst = view.rms_px >= worst && estimate.frames.len() > 1;
-            panels(estimate, camera, view, if is_worst { "board worst" } else { "board" })
+            let class = if is_worst { "board worst" } else { "board" };
+            panels(estimate, camera, view, class).into_iter().map(|(_, shape)| shape)
         });
         shapes.collect::<Vec<Shape>>()
     };
@@ -155,34 +216,21 @@ fn panels(
     camera: &CameraEstimate,
     view: &ViewEstimate,
     class: &'static str,
-) -> Vec<Shape> {
+) -> Vec<(PanelRef, Shape)> {
     let mut seen: Vec<PanelRef> = view.corners.iter().map(|corner| corner.panel).collect();
     seen.sort();
     seen.dedup();
     let shape = |panel: PanelRef| {
-        let target = estimate.targets.iter().find(|t| t.panels.contains(&panel.index()));
-        let scene_from_target = target.map_or(Pose::IDENTITY, |target| target.scene_from_target);
-        let place = estimate.panels.get(panel.index())?.target_from_panel;
-        let camera_from_panel = view.pose.after(&scene_from_target).after(&place);
+        let camera_from_panel = camera_from_panel(estimate, view, panel)?;
         let corners = view.corners.iter().filter(|c| c.panel == panel && !c.outlier);
         let flat = corners.filter_map(|c| on_plane(&camera.camera, &camera_from_panel, c.pixel));
         let outline = hull(flat.collect());
         let rig_from_panel = camera.camera_from_rig.inverse().after(&camera_from_panel);
         let corners = outline.into_iter().map(|at| rig_from_panel.apply(at.extend(0.0)));
         let title = format!("{}, rms {:.3} px", view.name, view.rms_px);
-        Some(Shape { corners: corners.collect(), class, title })
+        Some((panel, Shape { corners: corners.collect(), class, title }))
     };
-    seen.into_iter().filter_map(shape).filter(|shape| shape.corners.len() > 2).collect()
-}
-
-/// Where on the plane of a panel a pixel looks, mm.
-fn on_plane(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<DVec2> {
-    let ray = camera.unproject(pixel)?;
-    let panel_from_camera = camera_from_panel.inverse();
-    let (origin, direction) =
-        (panel_from_camera.apply(ray.origin), panel_from_camera.rotation * ray.direction);
-    let far = -origin.z / direction.z;
-    (far.is_finite() && far > 0.0).then(|| (origin + far * direction).truncate())
+    seen.into_iter().filter_map(shape).filter(|(_, shape)| shape.corners.len() > 2).collect()
 }
 
 /// The convex hull, in the order along it (Andrew's monotone chain).

@@ -3,18 +3,16 @@
 
 use std::fmt::Write as _;
 
-use deltille_core::calibrate::{CornerOffset, PanelRef, TargetMap};
-use deltille_core::statistics::{median, quantile};
+use super::panels::{Mark, Panels, round_down};
+use deltille_core::calibrate::{CornerOffset, TargetMap};
+use deltille_core::statistics::quantile;
 
 /// Width of the picture, user units.
 const WIDTH: f64 = 720.0;
 
-/// Room around every panel, and below all of them for the scales, user units.
+/// Room beside and below the panels for the scales, user units.
 const MARGIN: f64 = 26.0;
 const SCALES: f64 = 44.0;
-
-/// Most panels beside each other.
-const PANELS_IN_A_ROW: usize = 5;
 
 /// Nearly all arrows are at most as long as this part of the distance between corners.
 const ARROW_PART: f64 = 0.9;
@@ -40,33 +38,33 @@ pub fn target_map_svg(map: &TargetMap) -> String {
 
 /// The picture; `space` is an attribute that files of their own need.
 pub(super) fn drawing(map: &TargetMap, space: &str) -> String {
-    let scale = Scale::of(map);
-    let panels: Vec<&[CornerOffset]> = map.corners().chunk_by(|a, b| a.panel == b.panel).collect();
-    let in_a_row = panels.len().clamp(1, PANELS_IN_A_ROW);
-    let cell = WIDTH / in_a_row as f64;
-    // All panels at one scale, that of the largest.
-    let sizes = panels.iter().map(|corners| size_mm(corners));
-    let largest =
-        sizes.fold([1.0f64; 2], |most, size| [most[0].max(size[0]), most[1].max(size[1])]);
-    // Arrows may reach to where the next corner would be.
-    let around = spacing_mm(map);
-    let per_mm = (cell - 2.0 * MARGIN) / (largest[0] + 2.0 * around);
-    let margin = MARGIN + around * per_mm;
-    let height = largest[1] * per_mm + 2.0 * margin;
-    let mut body = String::new();
-    for (index, corners) in panels.iter().enumerate() {
-        let at = [(index % in_a_row) as f64 * cell, (index / in_a_row) as f64 * height];
-        let name = (panels.len() > 1).then(|| corners[0].panel);
-        body +=
-            &panel(corners, map, &scale, per_mm, [at[0] + margin, at[1] + height - margin], name);
+    let mut marks: Vec<Mark> = map.corners().iter().map(|corner| mark(map, corner)).collect();
+    let panels = Panels::new(&marks, WIDTH, f64::INFINITY);
+    let (scale, per_mm) = (Scale::of(map, panels.spacing_mm()), panels.per_mm());
+    for (mark, corner) in marks.iter_mut().zip(map.corners()) {
+        mark.colour = scale.colour(corner.offset_mm.z);
     }
-    let below = panels.len().div_ceil(in_a_row) as f64 * height;
+    let panels = Panels::new(&marks, WIDTH, f64::INFINITY);
+    let (mut body, below) = (panels.drawn(scale.enlarged), panels.height());
     body += &scale.drawn(per_mm, below);
     let total = below + SCALES;
     format!(
         "<svg{space} class=\"target-map\" viewBox=\"0 0 {WIDTH} {total:.1}\" width=\"{WIDTH}\" role=\"img\" \
          aria-label=\"Offsets of the target's corners\"><style>{STYLE}</style>{body}</svg>"
     )
+}
+
+fn mark(map: &TargetMap, corner: &CornerOffset) -> Mark {
+    Mark {
+        panel: corner.panel,
+        row: corner.row,
+        col: corner.col,
+        at_mm: corner.panel_mm.truncate(),
+        by_mm: corner.offset_mm.truncate(),
+        is_sure: map.is_significant(corner),
+        colour: String::new(),
+        title: String::new(),
+    }
 }
 
 /// By how much arrows are enlarged, and which heights have full colours.
@@ -78,14 +76,14 @@ struct Scale {
 }
 
 impl Scale {
-    fn of(map: &TargetMap) -> Self {
+    fn of(map: &TargetMap, spacing_mm: f64) -> Self {
         let corners = map.corners().iter();
         let mut lengths: Vec<f64> = corners.map(|c| c.offset_mm.truncate().length()).collect();
         let mut heights: Vec<f64> = map.corners().iter().map(|c| c.offset_mm.z.abs()).collect();
         let most = |values: &mut [f64]| quantile(values, NEARLY_ALL).unwrap_or(0.0).max(1e-6);
         let longest = most(&mut lengths);
         Self {
-            enlarged: round_down(ARROW_PART * spacing_mm(map) / longest),
+            enlarged: round_down(ARROW_PART * spacing_mm / longest),
             example_mm: round_down(longest),
             height_mm: round_down(1.3 * most(&mut heights)),
         }
@@ -131,67 +129,4 @@ impl Scale {
         );
         drawn
     }
-}
-
-/// The corners of a panel whose lower left end is at a place of the picture.
-fn panel(
-    corners: &[CornerOffset],
-    map: &TargetMap,
-    scale: &Scale,
-    per_mm: f64,
-    [left, bottom]: [f64; 2],
-    name: Option<PanelRef>,
-) -> String {
-    let [least, _] = extent_mm(corners);
-    let radius = (0.16 * spacing_mm(map) * per_mm).clamp(1.2, 7.0);
-    let mut drawn = String::new();
-    for corner in corners {
-        let x = left + (corner.panel_mm.x - least[0]) * per_mm;
-        let y = bottom - (corner.panel_mm.y - least[1]) * per_mm;
-        let by = corner.offset_mm * scale.enlarged * per_mm;
-        let class = if map.is_significant(corner) { "offset" } else { "offset chance" };
-        let _ = write!(
-            drawn,
-            "<circle class=\"place\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" fill=\"{}\"/>\
-             <line class=\"{class}\" x1=\"{x:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>",
-            scale.colour(corner.offset_mm.z),
-            x + by.x,
-            y - by.y
-        );
-    }
-    if let Some(name) = name {
-        let _ =
-            write!(drawn, "<text x=\"{left:.1}\" y=\"{:.1}\">panel {name}</text>", bottom + 20.0);
-    }
-    drawn
-}
-
-/// Least and largest places of corners, mm.
-fn extent_mm(corners: &[CornerOffset]) -> [[f64; 2]; 2] {
-    let places = corners.iter().map(|corner| [corner.panel_mm.x, corner.panel_mm.y]);
-    places.fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], [x, y]| {
-        [[low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]]
-    })
-}
-
-fn size_mm(corners: &[CornerOffset]) -> [f64; 2] {
-    let [low, high] = extent_mm(corners);
-    [high[0] - low[0], high[1] - low[1]]
-}
-
-/// The usual distance from a corner to the next in its row, mm.
-fn spacing_mm(map: &TargetMap) -> f64 {
-    let pairs = map.corners().windows(2).filter(|pair| {
-        (pair[0].panel, pair[0].row, pair[0].col + 1) == (pair[1].panel, pair[1].row, pair[1].col)
-    });
-    median(pairs.map(|pair| pair[0].panel_mm.distance(pair[1].panel_mm)).collect()).unwrap_or(1.0)
-}
-
-/// The largest of 1, 2 and 5 times a power of ten that is no more.
-pub(super) fn round_down(value: f64) -> f64 {
-    let decade = 10f64.powf(value.log10().floor());
-    let digit = [5.0, 2.0].into_iter().find(|digit| digit * decade <= value * (1.0 + 1e-9));
-    let rounded = digit.unwrap_or(1.0) * decade;
-    // Without the digits that a power leaves.
-    format!("{rounded:.6}").parse().unwrap_or(rounded)
 }

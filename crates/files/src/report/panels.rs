@@ -1,0 +1,153 @@
+//! The corners of a target with something to say of each: a coloured dot at its place on its panel, and an arrow.
+
+use std::fmt::Write as _;
+
+use glam::DVec2;
+
+use deltille_core::calibrate::PanelRef;
+use deltille_core::statistics::median;
+
+/// Room around every panel, user units, and below those that have a name.
+const MARGIN: f64 = 26.0;
+
+/// Most panels beside each other.
+const PANELS_IN_A_ROW: usize = 5;
+
+/// A dot is at most so large, as a part of the distance between corners, and at most and least in user units.
+const DOT_PART: f64 = 0.16;
+const DOTS: [f64; 2] = [1.2, 7.0];
+
+/// What is shown of a corner.
+#[derive(Clone, Debug)]
+pub(super) struct Mark {
+    pub panel: PanelRef,
+    pub row: i32,
+    pub col: i32,
+    /// Where it is on its panel, mm.
+    pub at_mm: DVec2,
+    /// Its arrow before that is enlarged, mm.
+    pub by_mm: DVec2,
+    /// Whether the arrow is more than chance makes.
+    pub is_sure: bool,
+    pub colour: String,
+    /// What is said where a mouse rests on it.
+    pub title: String,
+}
+
+/// Marks on panels beside each other, sorted by panel.
+pub(super) struct Panels<'a> {
+    panels: Vec<&'a [Mark]>,
+    /// Of a panel with its margins, user units.
+    cell: DVec2,
+    margin: f64,
+    per_mm: f64,
+    spacing_mm: f64,
+}
+
+impl<'a> Panels<'a> {
+    /// As large as a width and a height allow.
+    pub(super) fn new(marks: &'a [Mark], width: f64, most_height: f64) -> Self {
+        let panels: Vec<&[Mark]> = marks.chunk_by(|a, b| a.panel == b.panel).collect();
+        let in_a_row = panels.len().clamp(1, PANELS_IN_A_ROW);
+        let rows = panels.len().div_ceil(in_a_row).max(1);
+        // All panels at one scale, that of the largest. Arrows may reach to where the next corner would be.
+        let largest = panels.iter().map(|marks| size_mm(marks)).fold(DVec2::ONE, DVec2::max);
+        let spacing_mm = spacing_mm(marks);
+        let room = DVec2::new(width / in_a_row as f64, most_height / rows as f64) - 2.0 * MARGIN;
+        let per_mm = (room / (largest + 2.0 * spacing_mm)).min_element().max(1e-9);
+        let margin = MARGIN + spacing_mm * per_mm;
+        let high = largest.y * per_mm + 2.0 * margin;
+        let cell = DVec2::new(width / in_a_row as f64, high);
+        Self { panels, cell, margin, per_mm, spacing_mm }
+    }
+
+    /// The usual distance from a corner to the next in its row, mm.
+    pub(super) fn spacing_mm(&self) -> f64 {
+        self.spacing_mm
+    }
+
+    /// User units of a millimetre.
+    pub(super) fn per_mm(&self) -> f64 {
+        self.per_mm
+    }
+
+    /// The height of all, user units.
+    pub(super) fn height(&self) -> f64 {
+        let in_a_row = self.panels.len().clamp(1, PANELS_IN_A_ROW);
+        self.panels.len().div_ceil(in_a_row) as f64 * self.cell.y
+    }
+
+    /// The picture, with arrows so many times enlarged.
+    pub(super) fn drawn(&self, enlarged: f64) -> String {
+        let in_a_row = self.panels.len().clamp(1, PANELS_IN_A_ROW);
+        let mut drawn = String::new();
+        for (index, marks) in self.panels.iter().enumerate() {
+            let at = DVec2::new((index % in_a_row) as f64, (index / in_a_row) as f64) * self.cell;
+            let [low, high] = extent_mm(marks);
+            // In the middle of its cell.
+            let wide = (high.x - low.x) * self.per_mm;
+            let left = at.x + (self.cell.x - wide) / 2.0;
+            let bottom = at.y + self.cell.y - self.margin;
+            drawn += &self.panel(marks, low, DVec2::new(left, bottom), enlarged);
+            if self.panels.len() > 1 {
+                let (name, y) = (marks[0].panel, bottom + 20.0);
+                let _ = write!(drawn, "<text x=\"{left:.1}\" y=\"{y:.1}\">panel {name}</text>");
+            }
+        }
+        drawn
+    }
+
+    /// A panel whose lower left corner of all, mm, is at a place of the picture.
+    fn panel(&self, marks: &[Mark], low: DVec2, origin: DVec2, enlarged: f64) -> String {
+        let up = DVec2::new(1.0, -1.0);
+        let [least, most] = DOTS;
+        let radius = (DOT_PART * self.spacing_mm * self.per_mm).clamp(least, most);
+        let mut drawn = String::new();
+        for mark in marks {
+            let DVec2 { x, y } = origin + up * (mark.at_mm - low) * self.per_mm;
+            let by = up * mark.by_mm * enlarged * self.per_mm;
+            let class = if mark.is_sure { "offset" } else { "offset chance" };
+            let title = match mark.title.as_str() {
+                "" => String::new(),
+                title => format!("<title>{title}</title>"),
+            };
+            let _ = write!(
+                drawn,
+                "<circle class=\"place\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" fill=\"{}\">{title}</circle>\
+                 <line class=\"{class}\" x1=\"{x:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>",
+                mark.colour,
+                x + by.x,
+                y + by.y
+            );
+        }
+        drawn
+    }
+}
+
+/// Least and largest places of marks, mm.
+fn extent_mm(marks: &[Mark]) -> [DVec2; 2] {
+    let places = marks.iter().map(|mark| mark.at_mm);
+    places
+        .fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], at| [low.min(at), high.max(at)])
+}
+
+fn size_mm(marks: &[Mark]) -> DVec2 {
+    let [low, high] = extent_mm(marks);
+    high - low
+}
+
+fn spacing_mm(marks: &[Mark]) -> f64 {
+    let pairs = marks.windows(2).filter(|pair| {
+        (pair[0].panel, pair[0].row, pair[0].col + 1) == (pair[1].panel, pair[1].row, pair[1].col)
+    });
+    median(pairs.map(|pair| pair[0].at_mm.distance(pair[1].at_mm)).collect()).unwrap_or(1.0)
+}
+
+/// The largest of 1, 2 and 5 times a power of ten that is no more.
+pub(super) fn round_down(value: f64) -> f64 {
+    let decade = 10f64.powf(value.log10().floor());
+    let digit = [5.0, 2.0].into_iter().find(|digit| digit * decade <= value * (1.0 + 1e-9));
+    let rounded = digit.unwrap_or(1.0) * decade;
+    // Without the digits that a power leaves.
+    format!("{rounded:.6}").parse().unwrap_or(rounded)
+}

@@ -1,0 +1,75 @@
+//! The parameters of a camera, with their deviations and correlations.
+
+use std::fmt::Write as _;
+
+use super::page::{self, escaped, rounded};
+use deltille_core::calibrate::{CameraEstimate, Parameter, Source};
+
+/// More parameters than this have their correlations in small print.
+const FEW: usize = 12;
+
+/// Of more than this, as a lens of splines has, no table of correlations is readable, and their values are folded.
+const READABLE: usize = 24;
+
+/// Correlations from here on are drawn in a blue on which white is read better than ink.
+const STRONG: f64 = 0.85;
+
+/// Parameters with their deviations, and their correlations.
+pub(super) fn section(camera: &CameraEstimate) -> String {
+    let mut rows = String::new();
+    let told = |(p, _): &(&Parameter, Option<f64>)| p.sd.is_some() || p.value != 0.0;
+    let is_observed = camera.covariance_from(Source::Observed).is_some();
+    for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()).filter(told) {
+        let (value, sd) = rounded(parameter.value, parameter.sd);
+        let observed = match (is_observed, observed) {
+            (false, _) => String::new(),
+            (true, None) => "<td></td>".to_owned(),
+            (true, Some(_)) => {
+                format!("<td class=\"number\">{}</td>", rounded(parameter.value, observed).1)
+            }
+        };
+        let _ = write!(
+            rows,
+            "<tr><td>{}</td><td class=\"number\">{value}</td><td class=\"number\">{sd}</td>{observed}</tr>",
+            escaped(&parameter.name)
+        );
+    }
+    let heads = match is_observed {
+        true => "<th>± from noise</th><th>± observed</th>",
+        false => "<th>± from noise</th>",
+    };
+    let names: Vec<&str> = camera.found().collect();
+    let mut matrix = String::new();
+    if (1..=READABLE).contains(&names.len()) {
+        let heads = names.iter().map(|name| format!("<th>{}</th>", escaped(name)));
+        let _ = write!(matrix, "<tr><th></th>{}</tr>", heads.collect::<String>());
+        for (i, name) in names.iter().enumerate() {
+            let cells = (0..names.len()).map(|j| {
+                let c = camera.correlation(i, j);
+                let hue = if c < 0.0 { "var(--below)" } else { "var(--above)" };
+                // Ink is hard to read on the full blue.
+                let strong = if c > STRONG { " class=\"strong\"" } else { "" };
+                let share = (100.0 * c.abs()).round();
+                format!(
+                    "<td{strong} style=\"background:color-mix(in srgb,{hue} {share}%,transparent)\">{}</td>",
+                    format!("{c:.2}").replace('-', "−")
+                )
+            });
+            let _ =
+                write!(matrix, "<tr><th>{}</th>{}</tr>", escaped(name), cells.collect::<String>());
+        }
+        let many = if names.len() > FEW { " many" } else { "" };
+        matrix = format!(
+            "<figure><div class=\"wide-table\"><table class=\"matrix{many}\">{matrix}</table></div><figcaption>Correlations. \
+             Parameters that are strongly correlated are known only together.</figcaption></figure>"
+        );
+    }
+    let table = format!(
+        "<div class=\"wide-table\"><table class=\"plain\"><tr><th>name</th><th>value</th>{heads}</tr>{rows}</table></div>"
+    );
+    let table = match names.len() > READABLE {
+        true => format!("<details><summary>{} parameters</summary>{table}</details>", names.len()),
+        false => table,
+    };
+    page::section("Parameters", &format!("<div class=\"plots\">{table}{matrix}</div>"))
+}
