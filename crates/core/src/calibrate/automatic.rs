@@ -2,7 +2,8 @@
 //!
 //! Each model is found from two thirds of the views and held against the others, where poses alone are found. Of
 //! those that hold the views as well as the best one does, to 5 % in the error, the one with the fewest parameters is
-//! taken; one whose parameters the views do not tell apart only where there is no other.
+//! taken; one whose parameters the views do not tell apart only where there is no other. A spline, which has hundreds of
+//! parameters, is among them where there are corners enough for each of them.
 
 use std::collections::BTreeMap;
 
@@ -11,11 +12,12 @@ use super::error::CalibrationError;
 use super::estimate::{Estimate, ViewEstimate};
 use super::model::Model;
 use super::start::evenly;
+use super::view::View;
 use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use crate::statistics::median;
 
 /// Models that are tried, those with fewer parameters first.
-const TRIED: [Model; 9] = [
+const TRIED: [Model; 10] = [
     Model::Radtan,
     Model::Eucm,
     Model::DoubleSphere,
@@ -25,7 +27,12 @@ const TRIED: [Model; 9] = [
     Model::Rational,
     Model::Pupil,
     Model::ThinPrism,
+    Model::SPLINE,
 ];
+
+/// A spline is tried where corners have so many coordinates for each of its parameters: with fewer what is expected of
+/// its knots would hold it as much as they do, which tells nothing that a smaller model does not.
+const COORDINATES_A_PARAMETER: usize = 10;
 
 /// Views that take part in the choice, evenly over the sequence.
 const MOST_VIEWS: usize = 60;
@@ -69,14 +76,21 @@ impl Calibration {
     /// # Errors
     /// Where there are too few views to hold some out, or no model explains them.
     pub fn choose_model(&self, camera: usize) -> Result<(Model, Vec<Candidate>), CalibrationError> {
-        let views = evenly(&self.cameras[camera].views, MOST_VIEWS).cloned().collect();
+        let views: Vec<View> =
+            evenly(&self.cameras[camera].views, MOST_VIEWS).cloned().collect();
         let alone = self.alone(camera, &self.panels);
         let of_model = |model: Model| {
-            let only = CameraViews::new("", Vec::clone(&views), model);
+            let only = CameraViews::new("", views.clone(), model);
             let calibration = alone.of_cameras(vec![only]).hold_out(Some(HELD_OUT));
             calibration.board_shape(false).measure_target(false).solve()
         };
-        let tried = TRIED.map(|model| (model, of_model(model)));
+        let coordinates: usize = views.iter().map(|view: &View| 2 * view.corner_count()).sum();
+        let of_fit = coordinates - coordinates / HELD_OUT;
+        let is_enough = |model: &Model| {
+            let is_spline = matches!(model, Model::Spline { .. });
+            !is_spline || of_fit >= COORDINATES_A_PARAMETER * parameters(*model)
+        };
+        let tried = TRIED.into_iter().filter(is_enough).map(|model| (model, of_model(model)));
         let mut error = CalibrationError::NoStart;
         let mut found = Vec::new();
         for (model, estimate) in tried {
@@ -154,7 +168,10 @@ fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
     candidates
 }
 
+fn parameters(model: Model) -> usize {
+    model.free().into_iter().filter(|free| *free).count()
+}
+
 fn candidate(model: Model, held_out_px: Option<f64>, is_stable: bool) -> Candidate {
-    let parameters = model.free().into_iter().filter(|free| *free).count();
-    Candidate { model, parameters, held_out_px, is_stable, holds: false, chosen: false }
+    Candidate { model, parameters: parameters(model), held_out_px, is_stable, holds: false, chosen: false }
 }

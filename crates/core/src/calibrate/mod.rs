@@ -47,6 +47,7 @@ mod panels;
 mod pose;
 mod problem;
 mod reweighting;
+mod roughness;
 mod shape;
 mod solve;
 mod start;

@@ -8,12 +8,13 @@ use super::super::error::CalibrationError;
 use super::super::excluded::Reason;
 use super::super::loss::Loss;
 use super::super::minimise::{Until, minimise};
-use super::super::model::Model;
+use super::super::model::{Model, spline_knots};
 use super::super::pose::{blocks, estimate_pose, fixed, median_off_px};
 use super::super::problem::{CameraUnknowns, Problem, TargetUnknowns};
 use super::super::reweighting::scale;
 use super::super::view::View;
 use super::first_camera::first_camera;
+use super::splined::splined;
 use super::{Frame, Start};
 use crate::camera::{Camera, Lens, Pose};
 use crate::statistics::median;
@@ -72,6 +73,10 @@ impl<'a> Search<'a> {
         model: Model,
         start: Option<usize>,
     ) -> Result<Self, CalibrationError> {
+        if let (Some(forerunner), Model::Spline { degree, knots }) = (model.forerunner(), model) {
+            let search = Self::without_guess(views, panels, forerunner, start)?;
+            return search.splined(degree, knots).ok_or(CalibrationError::NoStart);
+        }
         enough(views.len(), views.len())?;
         let agreeing: Vec<View> = views.iter().map(agreeing).collect();
         let ideal = first_camera(&agreeing, model).ok_or(CalibrationError::NoStart)?;
@@ -100,6 +105,15 @@ impl<'a> Search<'a> {
             check_tilts(&search.poses)?;
         }
         Ok(search)
+    }
+
+    /// The same with a spline that images as the camera does.
+    fn splined(self, degree: usize, knots: Option<[usize; 2]>) -> Option<Self> {
+        let knots = spline_knots(knots, [self.camera.width, self.camera.height]);
+        let sightings = self.views.iter().flat_map(|view| &view.sightings);
+        let seen = sightings.flat_map(|sighting| &sighting.observations).map(|seen| seen.pixel);
+        let camera = splined(&self.camera, seen, degree, knots)?;
+        Some(Self { camera, ..self })
     }
 
     /// The poses of the views of a camera.
