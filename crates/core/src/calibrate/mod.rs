@@ -37,6 +37,7 @@ mod gross_errors;
 mod image_circle;
 mod lack_of_fit;
 mod lens_end;
+mod local_share;
 mod loss;
 mod minimise;
 mod model;

@@ -22,7 +22,7 @@ use super::loss::Loss;
 use super::problem::{Block, Observation, Problem, moved};
 use super::shape;
 use super::weights::Whitening;
-use crate::camera::{MAX_PARAMETERS, MOST_TOUCHED, PROJECTION_PARAMETERS, Projection};
+use crate::camera::{Lens, MAX_PARAMETERS, MOST_TOUCHED, PROJECTION_PARAMETERS, Projection};
 
 /// Which column of the unknowns that are kept belongs to what.
 #[derive(Clone, Debug, PartialEq)]
@@ -636,13 +636,13 @@ impl Local {
             let at = camera.camera.project_with_derivatives(in_camera)?;
             Some((turned_panel, turned_target, turned_scene, turned_rig, at))
         };
-        let support = match camera.roughness {
-            Some(_) => {
+        let support = match camera.camera.lens {
+            Lens::Spline(_) if !free.is_empty() => {
                 let seen = block.observations.iter().map(|seen| Some(chain(seen)?.4));
                 let seen = seen.collect::<Option<Vec<Projection>>>()?;
                 Support::of(free, &seen, camera.free.len())
             }
-            None => None,
+            _ => None,
         };
         let columns: Vec<usize> = match &support {
             Some(support) => support.touched.iter().copied().chain(poses).collect(),

@@ -128,6 +128,11 @@ impl CameraUnknowns {
         let roughness = Roughness::of(&camera, &free);
         Self { camera, free, camera_from_rig: Pose::IDENTITY, pose_free: false, roughness }
     }
+
+    /// Without what is expected of it.
+    pub(super) fn forget_expected(&mut self) {
+        self.roughness = None;
+    }
 }
 
 impl TargetUnknowns {

@@ -60,6 +60,9 @@ fn refuse<T>(
         Lens::ExtendedUnified(_) => "an EUCM lens",
         Lens::DoubleSphere(_) => "a double sphere lens",
         Lens::Pupil(_) => "a fisheye with a moving pupil",
+        Lens::Spline(_) => {
+            return Err(FormatError { format, lens: "a spline".to_owned(), models });
+        }
     };
     Err(FormatError { format, lens: format!("{lens} with {}", names[..used].join(" ")), models })
 }
@@ -346,6 +349,7 @@ mod tests {
             (Model::Eucm, 0, [false, false, true, false, false]),
             (Model::DoubleSphere, 0, [false, false, true, false, false]),
             (Model::Pupil, 10, [false; 5]),
+            (Model::SPLINE, 0, [false; 5]),
         ] {
             let camera = camera(model, count);
             let texts = [

@@ -11,6 +11,15 @@ use deltille_core::calibrate::{
     BoardShape, CameraEstimate, Diagnosis, Estimate, Instead, LackOfFit, LensEnd, PanelRef, Source,
     TargetMap, ViewEstimate, Words,
 };
+use deltille_core::camera::{Lens, SplineGrid};
+
+/// The grid of a camera whose lens is a spline.
+pub(super) fn spline(camera: &CameraEstimate) -> Option<SplineGrid> {
+    match &camera.camera.lens {
+        Lens::Spline(spline) => Some(spline.grid()),
+        _ => None,
+    }
+}
 
 #[derive(Serialize)]
 pub(super) struct ParameterRecord<'a> {

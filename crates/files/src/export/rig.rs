@@ -6,11 +6,12 @@ use serde::Serialize;
 use super::calibration::Print;
 use super::estimate::{
     DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord, ViewRecord,
-    correlations, diagnoses, map, parameters, projection, shape, views,
+    correlations, diagnoses, map, parameters, projection, shape, spline, views,
 };
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;
 use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Excluded};
+use deltille_core::camera::SplineGrid;
 use deltille_core::json;
 
 /// Schema and version that this crate writes.
@@ -63,6 +64,9 @@ struct Camera<'a> {
     inlier_rms_px: f64,
     corners: usize,
     outliers: usize,
+    /// The grid of a spline.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spline: Option<SplineGrid>,
     parameters: Vec<ParameterRecord<'a>>,
     correlations: Vec<Vec<f64>>,
     loose: &'a [String],
@@ -151,6 +155,7 @@ fn of_camera<'a>(estimate: &'a Estimate, found: &'a CameraEstimate) -> Camera<'a
         inlier_rms_px: found.inlier_rms_px(),
         corners: found.corner_count(),
         outliers: found.outlier_count(),
+        spline: spline(found),
         parameters: parameters(found),
         correlations: correlations(found),
         loose: &found.ill_conditioned,

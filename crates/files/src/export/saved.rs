@@ -15,7 +15,7 @@ use deltille_core::calibrate::{
     ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
     SHAPE_COEFFICIENTS as COUNT, TargetEstimate, TargetMap, ViewEstimate,
 };
-use deltille_core::camera::{Camera, Lens, Pose};
+use deltille_core::camera::{Camera, Lens, Pose, Spline, SplineGrid};
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
 
@@ -151,6 +151,7 @@ struct SavedCamera {
     height: u32,
     #[serde(deserialize_with = "quantity::deviation::de")]
     rms_px: f64,
+    spline: Option<SplineGrid>,
     parameters: Vec<SavedParameter>,
     #[serde(deserialize_with = "quantity::figure::de")]
     correlations: Vec<Vec<f64>>,
@@ -428,7 +429,9 @@ impl SavedCamera {
             problem: problem.to_owned(),
         };
         let names: Vec<&str> = self.parameters.iter().map(|p| p.name.as_str()).collect();
-        let blank = lens_of(&names)
+        let spline = self.spline.map(SplineGrid::checked).transpose();
+        let spline = spline.map_err(|problem| field("spline", &problem.to_string()))?;
+        let blank = lens_of(&names, spline)
             .map(|lens| Camera::centred(self.width, self.height, 1.0, lens))
             .ok_or_else(|| field("parameters", "they are those of no lens here"))?;
         let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
@@ -484,7 +487,7 @@ impl SavedProjection {
 }
 
 /// The lens whose camera has parameters of these names.
-fn lens_of(names: &[&str]) -> Option<Lens> {
+fn lens_of(names: &[&str], spline: Option<SplineGrid>) -> Option<Lens> {
     let terms = names.len().saturating_sub(4);
     let models = [
         Model::Radtan,
@@ -493,7 +496,8 @@ fn lens_of(names: &[&str]) -> Option<Lens> {
         Model::Pupil,
         Model::KannalaBrandt(terms),
     ];
-    let mut lenses = models.into_iter().map(Model::lens);
+    let spline = spline.map(|grid| Lens::Spline(Spline::new(grid)));
+    let mut lenses = models.into_iter().map(Model::lens).chain(spline);
     lenses.find(|lens| Camera::centred(1, 1, 1.0, lens.clone()).parameter_names() == names)
 }
 
