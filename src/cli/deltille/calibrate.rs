@@ -20,7 +20,7 @@ use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
 use crate::cli::wording::in_options;
 use crate::export::calibration;
-use crate::export::camera::{FormatError, colmap, kalibr, nerfstudio, opencv, ros};
+use crate::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
 use crate::words::{counted, places, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
@@ -72,6 +72,8 @@ enum Format {
     Colmap,
     /// <name>-transforms.json
     Nerfstudio,
+    /// <name>.cameramodel
+    Mrcal,
 }
 
 /// Calibrates, writes the camera, and tells how good it is.
@@ -197,6 +199,7 @@ impl Format {
                 vec![named("-camchain.yaml", kalibr(&[(camera, Pose::IDENTITY)], &[])?)]
             }
             Self::Colmap => vec![named("-cameras.txt", colmap(&[camera])?)],
+            Self::Mrcal => vec![named(".cameramodel", mrcal(camera)?)],
             Self::Nerfstudio => vec![named("-transforms.json", nerfstudio(camera, views)?)],
         })
     }

@@ -5,5 +5,6 @@ mod gross_errors;
 mod models;
 mod rig;
 mod scenes;
+mod splines;
 mod target_map;
 mod uncertainty;

@@ -67,6 +67,8 @@ struct Tried {
     /// By view, px².
     squares: BTreeMap<String, Vec<f64>>,
     is_stable: bool,
+    /// How many parameters were found.
+    parameters: usize,
 }
 
 impl Calibration {
@@ -120,6 +122,7 @@ impl Tried {
         };
         Some(Self {
             squares: views.map(|view| (view.name.clone(), of_view(view))).collect(),
+            parameters: found.cameras.iter().map(|camera| camera.found().count()).sum(),
             is_stable: found.cameras.iter().all(|camera| camera.ill_conditioned.is_empty()),
         })
     }
@@ -157,6 +160,7 @@ fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
         let own = own.as_deref().map(mean);
         let is_stable = found.as_ref().is_some_and(|found| found.is_stable);
         Candidate {
+            parameters: found.as_ref().map_or(parameters(*model), |found| found.parameters),
             holds: own.zip(best).is_some_and(|(own, best)| own <= (1.0 + SAME) * best),
             ..candidate(*model, own.map(|own| (own / 2.0).sqrt()), is_stable)
         }

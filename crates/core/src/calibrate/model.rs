@@ -15,8 +15,7 @@ const TERMS: usize = 4;
 /// Terms that hold the fisheyes which [`TERMS`] do not; from there on it is not for want of terms.
 const MORE_TERMS: usize = 6;
 
-/// Knots of a spline unless said otherwise, along the longer and the shorter side of the image: the correction of a lens
-/// changes little within a sixteenth of the image, and a board that fills a third of it has its corners closer.
+/// Knots of a spline whose lens is not known yet; a perspective one of 4 : 3 has about as many.
 const SPLINE_KNOTS: [usize; 2] = [16, 12];
 
 /// The degree of a spline unless said otherwise.
@@ -45,13 +44,13 @@ pub enum Model {
     DoubleSphere,
     /// Equidistant polynomial with a moving entrance pupil.
     Pupil,
-    /// Stereographic with a correction by a spline, see [`Spline`]. fx, fy, cx, cy are not found: they are those of a
-    /// Kannala–Brandt lens.
+    /// Stereographic with a correction by a spline, see [`Spline`]. fx, fy, cx, cy are not found: they are those of the
+    /// parametric lens from which the search starts.
     Spline {
         /// Degree of the polynomials, 2 or 3.
         degree: usize,
-        /// Knots along x and y; where none are said as many as there usually are, more along the longer side of
-        /// the image.
+        /// Knots along x and y; where none are said as many as it takes for them to be a twelfth of the image's longer
+        /// side apart in its middle.
         knots: Option<[usize; 2]>,
     },
 }
@@ -78,7 +77,7 @@ impl Model {
         ("spline", Self::SPLINE),
     ];
 
-    /// A cubic spline with as many knots as there usually are.
+    /// A cubic spline with as many knots as it takes.
     pub const SPLINE: Self = Self::Spline { degree: SPLINE_DEGREE, knots: None };
 
     /// A lens of this model to start from: near the axis its radius is that of the angle.
@@ -100,10 +99,6 @@ impl Model {
         }
     }
 
-    /// The model by which a search for this one starts, where that is another.
-    pub(super) fn forerunner(self) -> Option<Self> {
-        matches!(self, Self::Spline { .. }).then_some(Self::KannalaBrandt(TERMS))
-    }
 
     /// The lenses to start from, each with its focal length over that of an ideal camera.
     ///
@@ -233,12 +228,6 @@ fn spline(text: &str) -> Option<Model> {
     Some(Model::Spline { degree, knots })
 }
 
-/// The knots of a spline for an image of a size, px: the longer side has more.
-pub(super) fn spline_knots(knots: Option<[usize; 2]>, [width, height]: [u32; 2]) -> [usize; 2] {
-    let [longer, shorter] = SPLINE_KNOTS;
-    knots.unwrap_or(if width >= height { [longer, shorter] } else { [shorter, longer] })
-}
-
 /// Which parameters of a camera are found of those that are to be, without those that others make up for.
 ///
 /// Of a spline that is fx, fy, cx, cy; and as any turn of the camera is a spline too, three numbers hold it: the knot in
@@ -249,6 +238,11 @@ pub(super) fn without_gauge(lens: &Lens, mut free: Vec<bool>) -> Vec<bool> {
         return free;
     }
     let (grid, of_lens) = (spline.grid(), PROJECTION_PARAMETERS.len());
+    // A model does not know how many knots it takes.
+    free = match free.len() == of_lens + 2 * grid.count() {
+        true => free,
+        false => vec![true; of_lens + 2 * grid.count()],
+    };
     free[..of_lens].fill(false);
     let middle = of_lens + 2 * (grid.rows / 2 * grid.columns + grid.columns / 2);
     // dx and dy of the middle, and dy of the next.

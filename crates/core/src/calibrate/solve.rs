@@ -191,6 +191,12 @@ const SAME_PRIOR: f64 = 0.05;
 /// Rounds in which offsets and what is expected of them are fitted to one another.
 const PRIOR_ROUNDS: usize = 10;
 
+/// The same of the knots of a spline, whose rounds are shorter.
+const KNOT_ROUNDS: usize = 15;
+
+/// A size of second differences is found when it changes by less than this part.
+const SAME_SIZE: f64 = 0.1;
+
 impl Calibration {
     /// With splines as smooth as the corners have them.
     fn smoothed(&self, gross: &Gross, settled: Settled) -> Result<Settled, CalibrationError> {
@@ -211,7 +217,7 @@ impl Calibration {
                 camera.roughness = Some(found);
             }
             rounds += 1;
-            if change < SAME_PRIOR || rounds > PRIOR_ROUNDS {
+            if change < SAME_SIZE || rounds > KNOT_ROUNDS {
                 break;
             }
             minimum = minimise(next, &whitening, self.loss, Until::Rough)

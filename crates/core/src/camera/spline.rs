@@ -143,6 +143,14 @@ impl SplineGrid {
         Self::new(self.degree, [self.columns, self.rows], self.fov_x_deg)
     }
 
+    /// The grid of knots at most so far apart, as long as it has few enough, that is determined over |u| up to `reach`.
+    pub fn dense(degree: usize, distance: f64, reach: DVec2) -> Self {
+        let (least, most) = (*KNOTS.start() as f64, *KNOTS.end() as f64);
+        let knots = (2.0 * reach / distance).ceil() + degree as f64;
+        let knots = knots.to_array().map(|knots| knots.clamp(least, most) as usize);
+        Self::over(degree, knots, reach)
+    }
+
     /// The narrowest grid that is determined over |u| up to `reach`.
     pub fn over(degree: usize, [columns, rows]: [usize; 2], reach: DVec2) -> Self {
         let intervals = |knots: usize| (knots - degree) as f64;

@@ -464,8 +464,11 @@ impl SavedCamera {
 /// What correlations and deviations make; `None` where there is not a correlation for each pair.
 fn covariance(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
     let n = sds.len();
-    let is_square = rows.len() == n && rows.iter().all(|row| row.len() == n);
-    is_square.then(|| DMatrix::from_fn(n, n, |i, j| rows[i][j] * sds[i] * sds[j]))
+    // Of a spline the lower triangle is there.
+    let has_all = |(i, row): (usize, &Vec<f64>)| row.len() == n || row.len() == i + 1;
+    let is_whole = rows.len() == n && rows.iter().enumerate().all(has_all);
+    let of = |i: usize, j: usize| rows[i].get(j).copied().unwrap_or_else(|| rows[j][i]);
+    is_whole.then(|| DMatrix::from_fn(n, n, |i, j| of(i, j) * sds[i] * sds[j]))
 }
 
 impl SavedProjection {
