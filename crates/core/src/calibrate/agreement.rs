@@ -73,11 +73,7 @@ pub(super) fn observed(
 }
 
 /// LᵀPL of what is expected of the knots of splines; `None` where there are none.
-fn expected(
-    minimum: &Minimum,
-    whitening: &Whitening,
-    found: &Covariances,
-) -> Option<DMatrix<f64>> {
+fn expected(minimum: &Minimum, whitening: &Whitening, found: &Covariances) -> Option<DMatrix<f64>> {
     let Minimum { problem, layout, .. } = minimum;
     let (mut matrix, mut right) =
         (DMatrix::zeros(layout.shared, layout.shared), DVector::zeros(layout.shared));

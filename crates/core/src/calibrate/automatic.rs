@@ -78,8 +78,7 @@ impl Calibration {
     /// # Errors
     /// Where there are too few views to hold some out, or no model explains them.
     pub fn choose_model(&self, camera: usize) -> Result<(Model, Vec<Candidate>), CalibrationError> {
-        let views: Vec<View> =
-            evenly(&self.cameras[camera].views, MOST_VIEWS).cloned().collect();
+        let views: Vec<View> = evenly(&self.cameras[camera].views, MOST_VIEWS).cloned().collect();
         let alone = self.alone(camera, &self.panels);
         let of_model = |model: Model| {
             let only = CameraViews::new("", views.clone(), model);
@@ -177,5 +176,12 @@ fn parameters(model: Model) -> usize {
 }
 
 fn candidate(model: Model, held_out_px: Option<f64>, is_stable: bool) -> Candidate {
-    Candidate { model, parameters: parameters(model), held_out_px, is_stable, holds: false, chosen: false }
+    Candidate {
+        model,
+        parameters: parameters(model),
+        held_out_px,
+        is_stable,
+        holds: false,
+        chosen: false,
+    }
 }

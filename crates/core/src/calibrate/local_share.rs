@@ -29,9 +29,8 @@ impl LocalShare {
         let touched: Vec<usize> = (0..own.nrows()).filter(|&i| own[(i, i)] > 0.0).collect();
         let n = touched.len();
         let sd = DVector::from_fn(n, |i, _| covariance[(touched[i], touched[i])].sqrt());
-        let correlations = DMatrix::from_fn(n, n, |i, j| {
-            covariance[(touched[i], touched[j])] / (sd[i] * sd[j])
-        });
+        let correlations =
+            DMatrix::from_fn(n, n, |i, j| covariance[(touched[i], touched[j])] / (sd[i] * sd[j]));
         let root = correlations.cholesky()?;
         let own = DMatrix::from_fn(n, n, |i, j| own[(touched[i], touched[j])] * sd[i] * sd[j]);
         let lower = root.l();

@@ -99,7 +99,6 @@ impl Model {
         }
     }
 
-
     /// The lenses to start from, each with its focal length over that of an ideal camera.
     ///
     /// The cost of double sphere has two valleys, one on either side of ξ = 0, and no way between

@@ -528,7 +528,8 @@ const BLOCKS_AT_A_TIME: usize = 256;
 const LONGEST_ROW: usize = MOST_OF_LENS + 24 + shape::COUNT;
 
 /// Most parameters of a camera that a corner depends on.
-const MOST_OF_LENS: usize = if MAX_PARAMETERS > MOST_TOUCHED { MAX_PARAMETERS } else { MOST_TOUCHED };
+const MOST_OF_LENS: usize =
+    if MAX_PARAMETERS > MOST_TOUCHED { MAX_PARAMETERS } else { MOST_TOUCHED };
 
 /// Of a block that a spline images, which columns it has, and which of them each of its corners has.
 struct Support {
@@ -567,7 +568,8 @@ impl Support {
     /// The columns of a block of n that a point depends on.
     fn places(&self, at: &Projection, n: usize, places: &mut Vec<usize>) {
         places.clear();
-        let of_knots = self.knots(at).map(|(column, ..)| self.touched.partition_point(|&c| c < column));
+        let of_knots =
+            self.knots(at).map(|(column, ..)| self.touched.partition_point(|&c| c < column));
         places.extend(of_knots);
         places.extend(self.touched.len()..n);
     }
@@ -884,7 +886,11 @@ mod tests {
             let free = vec![true; camera.parameters().len()];
             let free = free.iter().enumerate().map(|(i, _)| i < 6).collect();
             let camera_from_rig = beside(-60.0 * f64::from(i));
-            CameraUnknowns { camera_from_rig, pose_free: i > 0, ..CameraUnknowns::alone(camera, free) }
+            CameraUnknowns {
+                camera_from_rig,
+                pose_free: i > 0,
+                ..CameraUnknowns::alone(camera, free)
+            }
         });
         let mut covariance = [[0.0; 6]; 6];
         (0..6).for_each(|i| covariance[i][i] = if i < 3 { 1e-6 } else { 1e-2 });

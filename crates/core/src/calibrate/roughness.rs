@@ -155,7 +155,10 @@ impl Roughness {
                     .iter()
                     .filter_map(|&(knot, part)| Some((columns[2 * knot + axis]?, part)));
                 for (i, part_i) in found.clone() {
-                    open += found.clone().map(|(j, part)| part_i * part * covariance[(i, j)]).sum::<f64>();
+                    open += found
+                        .clone()
+                        .map(|(j, part)| part_i * part * covariance[(i, j)])
+                        .sum::<f64>();
                 }
             }
         }
@@ -164,7 +167,8 @@ impl Roughness {
             squares -= dot(direction, &off).powi(2);
             let found = self.open(direction, &columns);
             for &(i, part_i) in &found {
-                open -= found.iter().map(|&(j, part)| part_i * part * covariance[(i, j)]).sum::<f64>();
+                open -=
+                    found.iter().map(|&(j, part)| part_i * part * covariance[(i, j)]).sum::<f64>();
             }
         }
         let determined = self.rank() as f64 - open * (sigma / self.size).powi(2);
@@ -181,9 +185,8 @@ impl Roughness {
     /// The columns of a direction with its parts.
     fn open(&self, direction: &[Vec<f64>; 2], columns: &[Option<usize>]) -> Vec<(usize, f64)> {
         let knots = (0..self.grid.count()).flat_map(|knot| [(knot, 0), (knot, 1)]);
-        let parts = knots.filter_map(|(knot, axis)| {
-            Some((columns[2 * knot + axis]?, direction[axis][knot]))
-        });
+        let parts = knots
+            .filter_map(|(knot, axis)| Some((columns[2 * knot + axis]?, direction[axis][knot])));
         parts.collect()
     }
 
@@ -220,9 +223,8 @@ pub(super) fn differences(grid: &SplineGrid) -> impl Iterator<Item = Difference>
     let all = (0..rows).flat_map(move |row| (0..columns).map(move |column| (row, column)));
     all.flat_map(move |(row, column)| {
         let here = at(row, column);
-        let straight = |before: usize, after: usize| {
-            [(before, 1.0), (here, -2.0), (after, 1.0), (here, 0.0)]
-        };
+        let straight =
+            |before: usize, after: usize| [(before, 1.0), (here, -2.0), (after, 1.0), (here, 0.0)];
         let has = |beside: usize, count: usize| beside >= 1 && beside + 1 < count;
         let along = has(column, columns).then(|| straight(here - 1, here + 1));
         let down = has(row, rows).then(|| straight(here - columns, here + columns));
@@ -277,8 +279,7 @@ mod tests {
         let equations = |knots: Vec<DVec2>| {
             let mut matrix = DMatrix::zeros(2 * count, 2 * count);
             let mut right = DVector::zeros(2 * count);
-            let cost =
-                roughness.add(&camera(knots), &parameters, 0.7, &mut matrix, &mut right);
+            let cost = roughness.add(&camera(knots), &parameters, 0.7, &mut matrix, &mut right);
             (cost, matrix, right)
         };
         let of_family =

@@ -201,9 +201,9 @@ impl Camera {
         }
         let spline = spline.map(SplineGrid::checked).transpose();
         let spline = spline.map_err(|problem| key("spline", problem.to_string()))?;
-        let lens = model.lens(distortion.len(), spline).ok_or_else(|| {
-            key("spline", "the model `spline` has it, and no other".to_owned())
-        })?;
+        let lens = model
+            .lens(distortion.len(), spline)
+            .ok_or_else(|| key("spline", "the model `spline` has it, and no other".to_owned()))?;
         let count = lens.names().len();
         while model != Model::Spline && distortion.len() > count && distortion.last() == Some(&0.0)
         {

@@ -32,8 +32,8 @@ pub use lens::{Imaged, Lens, MAX_LENS_PARAMETERS, Ray};
 pub use pose::Pose;
 pub use pupil::Pupil;
 pub use rectification::{Rectification, RectificationError};
-pub(crate) use spline::{MOST_TOUCHED, direction as stereographic_direction};
 pub use spline::{Knots, Spline, SplineGrid, SplineGridError};
+pub(crate) use spline::{MOST_TOUCHED, direction as stereographic_direction};
 pub use undistortion::{Field, PixelMap, Undistortion, UndistortionError};
 
 /// The parameters that every camera has, before those of its lens.

@@ -168,7 +168,8 @@ impl SplineGrid {
 
     /// The distance h of neighbouring knots on the plane.
     pub fn distance(&self) -> f64 {
-        4.0 * (f64::from(self.fov_x_deg).to_radians() / 4.0).tan() / (self.columns - self.degree) as f64
+        4.0 * (f64::from(self.fov_x_deg).to_radians() / 4.0).tan()
+            / (self.columns - self.degree) as f64
     }
 
     /// The largest |u| along both axes where the spline is determined.
@@ -221,8 +222,7 @@ fn basis(degree: usize, place: f64, count: usize) -> Basis {
             (t * (t * (3.0 - 3.0 * t) + 3.0) + 1.0) / 6.0,
             t * t * t / 6.0,
         ];
-        let slope =
-            [-s * s / 2.0, t * (1.5 * t - 2.0), t * (1.0 - 1.5 * t) + 0.5, t * t / 2.0];
+        let slope = [-s * s / 2.0, t * (1.5 * t - 2.0), t * (1.0 - 1.5 * t) + 0.5, t * t / 2.0];
         Basis { first: knot as usize - 1, value, slope }
     } else {
         let knot = nearest(0.5, count - 2);
@@ -347,7 +347,8 @@ impl LensLaw for Spline {
         let sum_by = point / length + DVec3::Z;
         let u_by = [0, 1].map(|axis| (2.0 * DVec3::AXES[axis] - u[axis] * sum_by) / sum);
         let rows = by_u.transpose();
-        let by_point = [rows.x_axis, rows.y_axis].map(|by| (by.x * u_by[0] + by.y * u_by[1]).to_array());
+        let by_point =
+            [rows.x_axis, rows.y_axis].map(|by| (by.x * u_by[0] + by.y * u_by[1]).to_array());
         Some(Imaged { at, by_point })
     }
 
@@ -385,7 +386,8 @@ impl LensLaw for Spline {
     fn steady_radius(&self) -> Option<f64> {
         let (reach, step) = (self.grid.reach(), self.grid.distance() / STEPS_A_KNOT);
         let fold = |direction: usize| {
-            let along = DVec2::from_angle(direction as f64 / DIRECTIONS as f64 * std::f64::consts::TAU);
+            let along =
+                DVec2::from_angle(direction as f64 / DIRECTIONS as f64 * std::f64::consts::TAU);
             let places = (0..).map(|i| step * f64::from(i) * along);
             let mut within = places.take_while(|u| u.abs().cmple(reach).all());
             let folded = within.find(|&u| self.bent(u).1.determinant() <= 0.0)?;

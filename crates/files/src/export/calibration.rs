@@ -10,8 +10,8 @@ use super::estimate::{
 };
 use super::finding::{FindingRecord, records};
 use deltille_core::calibrate::{Diagnosis, Estimate, Excluded, SHAPE_COEFFICIENTS as COUNT, Shape};
-use deltille_core::detect::InkEstimate;
 use deltille_core::camera::SplineGrid;
+use deltille_core::detect::InkEstimate;
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
 

@@ -10,6 +10,7 @@ use super::{
 use deltille_core::calibrate::{
     CameraEstimate, Diagnosis, Excluded, Parameter, Source, TargetMap, ViewEstimate,
 };
+use deltille_core::camera::{Lens, SplineGrid};
 use deltille_core::words::{counted, places};
 
 /// Views in the table: all, or where there are more the worst ones.
@@ -193,6 +194,13 @@ pub(super) fn out_row(out: &Excluded, columns: usize) -> String {
 }
 
 fn parameters(camera: &CameraEstimate) -> String {
+    if let Lens::Spline(spline) = &camera.camera.lens {
+        let SplineGrid { degree, columns, rows, fov_x_deg } = spline.grid();
+        return format!(
+            "<p>The lens is a spline of degree {degree} with {columns} × {rows} knots over {fov_x_deg}° across. \
+             Single knots mean nothing by themselves: see how sure projections are.</p>"
+        );
+    }
     let mut rows = String::new();
     let told = |(p, _): &(&Parameter, Option<f64>)| p.sd.is_some() || p.value != 0.0;
     let is_observed = camera.covariance_from(Source::Observed).is_some();

@@ -118,7 +118,11 @@ mod tests {
             (Lens::KannalaBrandt(KannalaBrandt { k: vec![-0.02, 0.002, -1e-4, 1e-5] }), 297.0),
         ] {
             let camera = Camera::centred(1600, 1200, focal, lens);
-            let seen = || (1..12).flat_map(|i| (1..12).map(move |j| DVec2::new(f64::from(i) * 130.0, f64::from(j) * 95.0)));
+            let seen = || {
+                (1..12).flat_map(|i| {
+                    (1..12).map(move |j| DVec2::new(f64::from(i) * 130.0, f64::from(j) * 95.0))
+                })
+            };
             for degree in [2, 3] {
                 let (made, _) = splined(&camera, &[], seen(), degree, None).unwrap();
                 for pixel in seen() {
