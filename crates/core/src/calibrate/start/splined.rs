@@ -130,8 +130,8 @@ mod tests {
                     let off = made.project(ray).unwrap().distance(pixel);
                     let most = if degree == 2 { 1.0 } else { 0.1 };
                     assert!(off < most, "{degree}: {off} at {pixel}");
-                    let back = made.unproject(pixel).unwrap().direction;
-                    assert!(back.angle_between(ray) < 1e-3, "{degree}");
+                    let back = made.unproject(made.project(ray).unwrap()).unwrap().direction;
+                    assert!(back.angle_between(ray) < 1e-6, "{degree}");
                 }
             }
         }
