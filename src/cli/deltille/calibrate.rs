@@ -16,12 +16,12 @@ use super::files::{File, check_places, sample_of, text_file, write_all};
 use super::page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Source};
-use crate::camera::{Camera, Pose};
+use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Pose, SplineGrid};
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{FAILED, report};
 use crate::cli::wording::in_options;
 use crate::export::calibration;
-use crate::export::camera::{FormatError, colmap, kalibr, nerfstudio, opencv, ros};
+use crate::export::camera::{FormatError, colmap, kalibr, mrcal, nerfstudio, opencv, ros};
 use crate::words::{counted, places, shown};
 
 /// Correlations from here on are told: such parameters are hardly told apart.
@@ -34,8 +34,9 @@ pub struct Args {
     sightings: SightingsArgs,
     /// What is to be found beside fx, fy, cx, cy: radtan (k1 k2 p1 p2), radtan5 (and k3), rational
     /// (and k4 k5 k6), thin-prism (and s1 … s4), kannala-brandt (4 terms; kannala-brandt-5 …),
-    /// eucm, double-sphere, or pupil (fisheye with a moving entrance pupil); auto takes the one that
-    /// holds views best that took no part in finding it
+    /// eucm, double-sphere, pupil (fisheye with a moving entrance pupil), or spline (any smooth lens, of
+    /// degree 3; spline-2; spline-3-16x12 with so many knots), whose fx, fy, cx, cy are kept; auto takes
+    /// the one that holds views best that took no part in finding it
     #[arg(long, required_unless_present = "fixed_intrinsics")]
     model: Option<ModelChoice>,
     /// Find only the poses of this camera: its file, as written by this command, ROS or OpenCV
@@ -72,6 +73,8 @@ enum Format {
     Colmap,
     /// <name>-transforms.json
     Nerfstudio,
+    /// <name>.cameramodel
+    Mrcal,
 }
 
 /// Calibrates, writes the camera, and tells how good it is.
@@ -199,6 +202,7 @@ impl Format {
                 vec![named("-camchain.yaml", kalibr(&[(camera, Pose::IDENTITY)], &[])?)]
             }
             Self::Colmap => vec![named("-cameras.txt", colmap(&[camera])?)],
+            Self::Mrcal => vec![named(".cameramodel", mrcal(camera)?)],
             Self::Nerfstudio => vec![named("-transforms.json", nerfstudio(camera, views)?)],
         })
     }
@@ -212,11 +216,18 @@ fn table(estimate: &Estimate) -> String {
 fn of_camera(camera: &CameraEstimate) -> String {
     let mut text = String::new();
     let is_observed = camera.covariance_from(Source::Observed).is_some();
-    if camera.covariance_from(Source::Noise).is_some() {
+    let spline = match &camera.camera.lens {
+        Lens::Spline(spline) => Some(spline.grid()),
+        _ => None,
+    };
+    if camera.covariance_from(Source::Noise).is_some() && spline.is_none() {
         let observed = if is_observed { "    observed" } else { "" };
         let _ = writeln!(text, "                        ± from noise{observed}");
     }
     for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()) {
+        if spline.is_some() {
+            break;
+        }
         let Some(sd) = parameter.sd else { continue };
         let digits = places(sd).max(1);
         let observed = observed
@@ -227,10 +238,20 @@ fn of_camera(camera: &CameraEstimate) -> String {
             parameter.name, parameter.value
         );
     }
+    if let Some(SplineGrid { degree, columns, rows, fov_x_deg }) = spline {
+        for parameter in &camera.parameters[..PROJECTION_PARAMETERS.len()] {
+            let _ = writeln!(text, "{:5} {:>16.3}, kept", parameter.name, parameter.value);
+        }
+        let _ = writeln!(
+            text,
+            "spline of degree {degree} with {columns} × {rows} knots, {fov_x_deg}° across"
+        );
+    }
     if let Some(line) = sureness(camera) {
         let _ = writeln!(text, "{line}");
     }
-    let found: Vec<&str> = camera.found().collect();
+    // Of neighbouring knots nobody asks.
+    let found: Vec<&str> = camera.found().filter(|_| spline.is_none()).collect();
     for i in 0..found.len() {
         for j in i + 1..found.len() {
             let correlation = camera.correlation(i, j);

@@ -1,7 +1,8 @@
 //! Laws that every camera model obeys.
 
 use deltille::camera::{
-    BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, Pupil,
+    BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, Pupil, Spline,
+    SplineGrid,
 };
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
@@ -36,10 +37,23 @@ fn cameras() -> Vec<(Camera, f64)> {
         (Lens::DoubleSphere(DoubleSphere { xi: -0.2, alpha: 0.6 }), 1.9),
         (Lens::DoubleSphere(DoubleSphere { xi: 0.3, alpha: 0.3 }), 1.5),
         (Lens::Pupil(pupil), 1.9),
+        (spline(3, [9, 9], 240), 1.9),
+        (spline(2, [9, 9], 240), 1.9),
+        (spline(3, [6, 6], 80), 0.6),
     ];
     let focal_px = DVec2::new(501.0, 497.0);
     let camera = |lens| Camera { focal_px, ..Camera::centred(1600, 1200, 1.0, lens) };
     lenses.into_iter().map(|(lens, reach)| (camera(lens), reach)).collect()
+}
+
+/// A spline whose knots are bent by a tenth of their distance.
+fn spline(degree: usize, knots: [usize; 2], fov_x_deg: u32) -> Lens {
+    let grid = SplineGrid::new(degree, knots, fov_x_deg).unwrap();
+    let bend = |i: usize| {
+        let turn = 1.7 * i as f64;
+        0.1 * grid.distance() * DVec2::new(turn.sin(), (1.3 * turn).cos())
+    };
+    Lens::Spline(Spline::new(grid).with_knots((0..grid.count()).map(bend).collect()))
 }
 
 /// A point at an angle from the axis, a turn around it, and a distance.
@@ -81,7 +95,7 @@ proptest! {
                     camera.with_parameters(&values).project(point)
                 };
                 let expected = differences(moved(h), moved(-h), h);
-                for (by, expected) in at.by_parameters[k].iter().zip(expected) {
+                for (by, expected) in at.by_parameter(k).iter().zip(expected) {
                     let off = (by - expected).abs();
                     let size = 1.0 + expected.abs();
                     prop_assert!(off < 1e-5 * size, "{:?} {name}: {off}", camera.lens);

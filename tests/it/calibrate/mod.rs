@@ -6,5 +6,6 @@ mod models;
 mod page;
 mod rig;
 mod scenes;
+mod splines;
 mod target_map;
 mod uncertainty;

@@ -11,12 +11,16 @@
 //!     S = L (Σᵥ yᵥ yᵥᵀ) Lᵀ
 //! ```
 //!
+//! What is expected beforehand, of the knots of a spline, is no frame's to tell: with P its part of the normal equations,
+//! frames scatter only as I − LᵀPL, and LᵀPL is added as it is expected.
+//!
 //! F frames tell at most F − 1 directions, and each roughly; so S is drawn towards a multiple of the covariance
 //! that follows from noise, as far as its own scatter calls for (Ledoit & Wolf 2004).
 
 use nalgebra::{DMatrix, DVector, Matrix6};
 use rayon::prelude::*;
 
+use super::local_share::LocalShare;
 use super::loss::Loss;
 use super::minimise::Minimum;
 use super::normal::{Covariances, Local};
@@ -53,14 +57,33 @@ pub(super) fn observed(
     let mean = pulls.column_mean();
     pulls.column_iter_mut().for_each(|mut pull| pull -= &mean);
     let count = frames as f64;
-    let (scatter, share) = shrunk(&pulls);
-    let scatter = scatter * (count / (count - 1.0));
+    let expected = expected(minimum, whitening, found);
+    let (scatter, share) = shrunk(&pulls, expected.as_ref());
+    let mut scatter = scatter * (count / (count - 1.0));
     // The level that is common to all directions is known from all of them.
-    let directions = minimum.layout.shared as f64;
+    let mut directions = minimum.layout.shared as f64;
+    if let Some(expected) = expected {
+        directions -= expected.trace();
+        scatter += expected * whitening.sigma.powi(2);
+    }
     Some(Observed {
         covariance: &found.root.half * scatter * found.root.half.transpose(),
         freedom: (count - 1.0) * (1.0 + share * (directions - 1.0)),
     })
+}
+
+/// LᵀPL of what is expected of the knots of splines; `None` where there are none.
+fn expected(minimum: &Minimum, whitening: &Whitening, found: &Covariances) -> Option<DMatrix<f64>> {
+    let Minimum { problem, layout, .. } = minimum;
+    let (mut matrix, mut right) =
+        (DMatrix::zeros(layout.shared, layout.shared), DVector::zeros(layout.shared));
+    let mut is_some = false;
+    for (camera, parameters) in problem.cameras.iter().zip(&layout.parameters) {
+        let Some(roughness) = &camera.roughness else { continue };
+        roughness.add(&camera.camera, parameters, whitening.sigma, &mut matrix, &mut right);
+        is_some = true;
+    }
+    is_some.then(|| found.root.half.tr_mul(&matrix) * &found.root.half)
 }
 
 /// By how much a frame moves what all frames share, in units of what noise does.
@@ -108,6 +131,10 @@ fn pull_of(
         pose.fill_upper_triangle_with_lower_triangle();
         let through = pose.cholesky()?.solve(&across.transpose());
         let own: DMatrix<f64> = own - &across * through;
+        // Of a spline's knots a frame touches a few.
+        if problem.cameras.iter().any(|camera| camera.roughness.is_some()) {
+            return by_some(&own, &pull, found);
+        }
         let share = (root.half.tr_mul(&own) * &root.half).symmetric_eigen();
         let grown =
             share.eigenvalues.map(|part| (1.0 - part.clamp(0.0, MOST_OF_ONE)).sqrt().recip());
@@ -117,12 +144,30 @@ fn pull_of(
     pull.iter().all(|v| v.is_finite()).then_some(pull)
 }
 
-/// The sum of x xᵀ over columns, drawn towards a multiple of the identity (Ledoit & Wolf 2004), and how far, from 0 to 1.
-fn shrunk(columns: &DMatrix<f64>) -> (DMatrix<f64>, f64) {
+/// The same where a frame tells only of some of the unknowns.
+fn by_some(own: &DMatrix<f64>, pull: &DVector<f64>, found: &Covariances) -> Option<DVector<f64>> {
+    let share = LocalShare::of(own, &found.shared)?;
+    let more = |part: f64| (1.0 - part.clamp(0.0, MOST_OF_ONE)).sqrt().recip() - 1.0;
+    let more = share.along(pull).component_mul(&share.parts.map(more));
+    let pull = found.root.half.tr_mul(pull) + share.spread(&more, &found.root.half);
+    pull.iter().all(|v| v.is_finite()).then_some(pull)
+}
+
+/// The sum of x xᵀ over columns, drawn towards a multiple of the identity (Ledoit & Wolf 2004), and how far, from 0 to 1;
+/// where something is expected beforehand, of what that leaves of the identity.
+fn shrunk(columns: &DMatrix<f64>, expected: Option<&DMatrix<f64>>) -> (DMatrix<f64>, f64) {
     let (n, count) = (columns.nrows() as f64, columns.ncols() as f64);
     let columns = columns * count.sqrt();
     let mean = &columns * columns.transpose() / count;
-    let level = DMatrix::identity(columns.nrows(), columns.nrows()) * (mean.trace() / n);
+    let identity = DMatrix::identity(columns.nrows(), columns.nrows());
+    let level = match expected {
+        Some(expected) => {
+            let left = identity - expected;
+            let level = mean.trace() / left.trace();
+            left * level
+        }
+        None => identity * (mean.trace() / n),
+    };
     let spread = (&mean - &level).norm_squared();
     let scatter = columns.column_iter().map(|x| (x * x.transpose() - &mean).norm_squared());
     let uncertain = (scatter.sum::<f64>() / (count * count)).min(spread);

@@ -2,7 +2,8 @@
 //!
 //! Each model is found from two thirds of the views and held against the others, where poses alone are found. Of
 //! those that hold the views as well as the best one does, to 5 % in the error, the one with the fewest parameters is
-//! taken; one whose parameters the views do not tell apart only where there is no other.
+//! taken; one whose parameters the views do not tell apart only where there is no other. A spline, which has hundreds of
+//! parameters, is among them where there are corners enough for each of them.
 
 use std::collections::BTreeMap;
 
@@ -11,11 +12,12 @@ use super::error::CalibrationError;
 use super::estimate::{CameraEstimate, Estimate, ViewEstimate};
 use super::model::Model;
 use super::start::evenly;
+use super::view::View;
 use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use crate::statistics::median;
 
 /// Models that are tried, those with fewer parameters first.
-const TRIED: [Model; 9] = [
+const TRIED: [Model; 10] = [
     Model::Radtan,
     Model::Eucm,
     Model::DoubleSphere,
@@ -25,7 +27,12 @@ const TRIED: [Model; 9] = [
     Model::Rational,
     Model::Pupil,
     Model::ThinPrism,
+    Model::SPLINE,
 ];
+
+/// A spline is tried where corners have so many coordinates for each of its parameters: with fewer what is expected of
+/// its knots would hold it as much as they do, which tells nothing that a smaller model does not.
+const COORDINATES_A_PARAMETER: usize = 10;
 
 /// Views that take part in the choice, evenly over the sequence.
 const MOST_VIEWS: usize = 60;
@@ -66,6 +73,8 @@ struct Tried {
     squares: BTreeMap<String, Vec<f64>>,
     is_stable: bool,
     camera: CameraEstimate,
+    /// How many parameters were found.
+    parameters: usize,
 }
 
 impl Calibration {
@@ -99,14 +108,20 @@ impl Calibration {
         models: &[Model],
         most_views: usize,
     ) -> Result<Vec<Candidate>, CalibrationError> {
-        let views = evenly(&self.cameras[camera].views, most_views).cloned().collect();
+        let views: Vec<View> = evenly(&self.cameras[camera].views, most_views).cloned().collect();
         let alone = self.alone(camera, &self.panels);
         let of_model = |model: Model| {
-            let only = CameraViews::new("", Vec::clone(&views), model);
+            let only = CameraViews::new("", views.clone(), model);
             let calibration = alone.of_cameras(vec![only]).hold_out(Some(HELD_OUT));
             calibration.board_shape(false).measure_target(false).solve()
         };
-        let tried = models.iter().map(|&model| (model, of_model(model)));
+        let coordinates: usize = views.iter().map(|view: &View| 2 * view.corner_count()).sum();
+        let of_fit = coordinates - coordinates / HELD_OUT;
+        let is_enough = |model: &&Model| {
+            let is_spline = matches!(model, Model::Spline { .. });
+            !is_spline || of_fit >= COORDINATES_A_PARAMETER * parameters(**model)
+        };
+        let tried = models.iter().filter(is_enough).map(|&model| (model, of_model(model)));
         let mut error = CalibrationError::NoStart;
         let mut found = Vec::new();
         for (model, estimate) in tried {
@@ -136,6 +151,7 @@ impl Tried {
         };
         Some(Self {
             squares: views.map(|view| (view.name.clone(), of_view(view))).collect(),
+            parameters: found.cameras.iter().map(|camera| camera.found().count()).sum(),
             is_stable: found.cameras.iter().all(|camera| camera.ill_conditioned.is_empty()),
             camera: found.cameras.first()?.clone(),
         })
@@ -175,6 +191,7 @@ fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
         let is_stable = found.as_ref().is_some_and(|found| found.is_stable);
         Candidate {
             found: found.as_ref().map(|found| found.camera.clone()),
+            parameters: found.as_ref().map_or(parameters(*model), |found| found.parameters),
             holds: own.zip(best).is_some_and(|(own, best)| own <= (1.0 + SAME) * best),
             ..candidate(*model, own.map(|own| (own / 2.0).sqrt()), is_stable)
         }
@@ -186,8 +203,11 @@ fn judged(tried: &[(Model, Option<Tried>)]) -> Vec<Candidate> {
     candidates
 }
 
+fn parameters(model: Model) -> usize {
+    model.free().into_iter().filter(|free| *free).count()
+}
+
 fn candidate(model: Model, held_out_px: Option<f64>, is_stable: bool) -> Candidate {
-    let parameters = model.free().into_iter().filter(|free| *free).count();
-    let (holds, chosen, found) = (false, false, None);
+    let (parameters, holds, chosen, found) = (parameters(model), false, false, None);
     Candidate { model, parameters, held_out_px, is_stable, holds, chosen, found }
 }

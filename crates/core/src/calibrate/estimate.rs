@@ -18,6 +18,7 @@ use super::normal::Covariances;
 use super::panel::PanelRef;
 use super::problem::Problem;
 use super::reweighting::{Settled, variance};
+use super::roughness::Roughness;
 use super::shape::{BoardShape, Shape};
 use super::start::Frame;
 use super::target_map::{CornerOffset, TargetMap};
@@ -102,6 +103,8 @@ pub struct CameraEstimate {
     pub coverage: Option<Coverage>,
     /// Root mean square error of a coordinate over all its views, px.
     pub rms_px: f64,
+    /// What was expected of the knots of a spline that was found.
+    pub(super) roughness: Option<Roughness>,
 }
 
 /// Where a target is.
@@ -278,6 +281,7 @@ impl CameraEstimate {
             views: Vec::new(),
             coverage: None,
             rms_px: 0.0,
+            roughness: None,
         }
     }
 
@@ -468,9 +472,11 @@ fn camera_estimate(
     let unknowns = &problem.cameras[index];
     let columns = &layout.parameters[index];
     let names = unknowns.camera.parameter_names();
+    // Of a spline no number means anything by itself.
+    let is_spline = unknowns.roughness.is_some();
     let is_loose = |&(i, column): &(usize, usize)| {
         found.loose.contains(&column)
-            || i >= PROJECTION_PARAMETERS.len() && found.tied.contains(&column)
+            || i >= PROJECTION_PARAMETERS.len() && !is_spline && found.tied.contains(&column)
     };
     let loose = columns.iter().copied().filter(is_loose).map(|(i, _)| names[i].clone());
     let sd = |column: usize| covariance[(column, column)].sqrt();
@@ -495,6 +501,7 @@ fn camera_estimate(
         rms_px: rms_px(views.iter().flat_map(|view| &view.corners)),
         views,
         coverage: None,
+        roughness: unknowns.roughness.clone(),
     }
 }
 

@@ -2,9 +2,11 @@ use std::f64::consts::FRAC_PI_2;
 use std::fmt;
 use std::str::FromStr;
 
+use glam::DVec2;
+
 use crate::camera::{
     BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
-    PROJECTION_PARAMETERS, Pupil,
+    PROJECTION_PARAMETERS, Pupil, Spline, SplineGrid,
 };
 
 /// Terms of a Kannala–Brandt polynomial unless said otherwise.
@@ -12,6 +14,12 @@ const TERMS: usize = 4;
 
 /// Terms that hold the fisheyes which [`TERMS`] do not; from there on it is not for want of terms.
 const MORE_TERMS: usize = 6;
+
+/// Knots of a spline whose lens is not known yet; a perspective one of 4 : 3 has about as many.
+const SPLINE_KNOTS: [usize; 2] = [16, 12];
+
+/// The degree of a spline unless said otherwise.
+const SPLINE_DEGREE: usize = 3;
 
 /// ξ in the two valleys of double sphere.
 const VALLEYS: [f64; 2] = [-0.3, 0.3];
@@ -36,18 +44,28 @@ pub enum Model {
     DoubleSphere,
     /// Equidistant polynomial with a moving entrance pupil.
     Pupil,
+    /// Stereographic with a correction by a spline, see [`Spline`]. fx, fy, cx, cy are not found: they are those of the
+    /// parametric lens from which the search starts.
+    Spline {
+        /// Degree of the polynomials, 2 or 3.
+        degree: usize,
+        /// Knots along x and y; where none are said as many as it takes for them to be a twelfth of the image's longer
+        /// side apart in its middle.
+        knots: Option<[usize; 2]>,
+    },
 }
 
 /// A text that is no model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is no model: radtan, radtan5, rational, thin-prism, kannala-brandt (with 4 terms; \
-     kannala-brandt-5 and so on up to 12), eucm, double-sphere or pupil"
+     kannala-brandt-5 and so on up to 12), eucm, double-sphere, pupil, or spline (of degree 3; spline-2; \
+     with as many knots as you say: spline-3-16x12)"
 )]
 pub struct ModelError(String);
 
 impl Model {
-    const NAMED: [(&str, Model); 8] = [
+    const NAMED: [(&str, Model); 9] = [
         ("radtan", Self::Radtan),
         ("radtan5", Self::Radtan5),
         ("rational", Self::Rational),
@@ -56,7 +74,11 @@ impl Model {
         ("eucm", Self::Eucm),
         ("double-sphere", Self::DoubleSphere),
         ("pupil", Self::Pupil),
+        ("spline", Self::SPLINE),
     ];
+
+    /// A cubic spline with as many knots as it takes.
+    pub const SPLINE: Self = Self::Spline { degree: SPLINE_DEGREE, knots: None };
 
     /// A lens of this model to start from: near the axis its radius is that of the angle.
     pub fn lens(self) -> Lens {
@@ -70,6 +92,10 @@ impl Model {
             Self::Eucm => Lens::ExtendedUnified(ExtendedUnified::default()),
             Self::DoubleSphere => Lens::DoubleSphere(DoubleSphere::default()),
             Self::Pupil => Lens::Pupil(Pupil::default()),
+            Self::Spline { degree, knots } => {
+                let grid = SplineGrid::over(degree, knots.unwrap_or(SPLINE_KNOTS), DVec2::ONE);
+                Lens::Spline(Spline::new(grid))
+            }
         }
     }
 
@@ -103,7 +129,8 @@ impl Model {
             _ => self.lens().names().len(),
         };
         let count = PROJECTION_PARAMETERS.len();
-        (0..count + self.lens().names().len()).map(|i| i < count + lens).collect()
+        let free = (0..count + self.lens().names().len()).map(|i| i < count + lens).collect();
+        without_gauge(&self.lens(), free)
     }
 
     /// The next one that has fewer of the same parameters, where there is one.
@@ -117,7 +144,8 @@ impl Model {
             | Self::KannalaBrandt(_)
             | Self::Eucm
             | Self::DoubleSphere
-            | Self::Pupil => None,
+            | Self::Pupil
+            | Self::Spline { .. } => None,
         }
     }
 
@@ -134,7 +162,7 @@ impl Model {
             }
             Self::KannalaBrandt(_) => &[Self::Pupil],
             Self::Eucm | Self::DoubleSphere => &[Self::KannalaBrandt(TERMS), Self::Pupil],
-            Self::Pupil => &[],
+            Self::Pupil | Self::Spline { .. } => &[],
         }
     }
 
@@ -180,6 +208,9 @@ impl FromStr for Model {
         if let Some(&(_, model)) = Self::NAMED.iter().find(|(name, _)| *name == text) {
             return Ok(model);
         }
+        if let Some(spline) = text.strip_prefix("spline-").and_then(spline) {
+            return Ok(spline);
+        }
         let terms = text.strip_prefix("kannala-brandt-").and_then(|terms| terms.parse().ok());
         match terms.filter(|terms| (TERMS..=MAX_LENS_PARAMETERS).contains(terms)) {
             Some(terms) => Ok(Self::KannalaBrandt(terms)),
@@ -193,7 +224,51 @@ impl fmt::Display for Model {
         match (Self::NAMED.iter().find(|(_, model)| model == self), self) {
             (Some((name, _)), _) => f.write_str(name),
             (None, Self::KannalaBrandt(terms)) => write!(f, "kannala-brandt-{terms}"),
+            (None, Self::Spline { degree, knots: None }) => write!(f, "spline-{degree}"),
+            (None, Self::Spline { degree, knots: Some([columns, rows]) }) => {
+                write!(f, "spline-{degree}-{columns}x{rows}")
+            }
             (None, other) => write!(f, "{other:?}"),
         }
     }
+}
+
+/// The model of what follows `spline-`.
+fn spline(text: &str) -> Option<Model> {
+    let (degree, knots) = match text.split_once('-') {
+        Some((degree, knots)) => (degree, Some(knots.split_once('x')?)),
+        None => (text, None),
+    };
+    let degree: usize = degree.parse().ok()?;
+    let knots = match knots {
+        Some((columns, rows)) => Some([columns.parse().ok()?, rows.parse().ok()?]),
+        None => None,
+    };
+    // Any field of view: it is found later.
+    SplineGrid::new(degree, knots.unwrap_or(SPLINE_KNOTS), 90).ok()?;
+    Some(Model::Spline { degree, knots })
+}
+
+/// Which parameters of a camera are found of those that are to be, without those that others make up for.
+///
+/// Of a spline that is fx, fy, cx, cy; and as any turn of the camera is a spline too, three numbers hold it: the knot in
+/// the middle stays where it is, and the one to its right in its row.
+pub(super) fn without_gauge(lens: &Lens, mut free: Vec<bool>) -> Vec<bool> {
+    let Lens::Spline(spline) = lens else { return free };
+    if !free.contains(&true) {
+        return free;
+    }
+    let (grid, of_lens) = (spline.grid(), PROJECTION_PARAMETERS.len());
+    // A model does not know how many knots it takes.
+    free = match free.len() == of_lens + 2 * grid.count() {
+        true => free,
+        false => vec![true; of_lens + 2 * grid.count()],
+    };
+    free[..of_lens].fill(false);
+    let middle = of_lens + 2 * (grid.rows / 2 * grid.columns + grid.columns / 2);
+    // dx and dy of the middle, and dy of the next.
+    for held in [middle, middle + 1, middle + 3] {
+        free[held] = false;
+    }
+    free
 }

@@ -19,10 +19,10 @@ use rayon::prelude::*;
 
 use super::corner_map::CornerMap;
 use super::loss::Loss;
-use super::problem::{Block, Problem, moved};
+use super::problem::{Block, Observation, Problem, moved};
 use super::shape;
 use super::weights::Whitening;
-use crate::camera::MAX_PARAMETERS;
+use crate::camera::{Lens, MAX_PARAMETERS, MOST_TOUCHED, PROJECTION_PARAMETERS, Projection};
 
 /// Which column of the unknowns that are kept belongs to what.
 #[derive(Clone, Debug, PartialEq)]
@@ -177,6 +177,13 @@ impl Normal {
         for (panel, first) in problem.panels.iter().zip(&layout.panels) {
             if let (Some(prior), Some(first)) = (&panel.prior, *first) {
                 normal.add_prior(prior.off(&panel.target_from_panel), first, whitening.sigma);
+            }
+        }
+        for (camera, parameters) in problem.cameras.iter().zip(&layout.parameters) {
+            if let Some(roughness) = &camera.roughness {
+                let (matrix, right) = (&mut normal.a, &mut normal.right);
+                normal.cost +=
+                    roughness.add(&camera.camera, parameters, whitening.sigma, matrix, right);
             }
         }
         normal.cost.is_finite().then_some(normal)
@@ -364,6 +371,16 @@ impl Normal {
         Some(Covariances { shared, across, root, frames, corners, loose, tied })
     }
 
+    /// The covariance of what is kept for residuals of variance 1; `None` where something is open.
+    pub(super) fn covariance_of_kept(&self) -> Option<DMatrix<f64>> {
+        let matrix = self.reduced(0.0)?.matrix;
+        let n = matrix.nrows();
+        let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt());
+        let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+        let inverse = scaled.cholesky()?.inverse();
+        Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+    }
+
     /// Adds the pull of a corner in one block to that of all that are kept.
     pub(super) fn pull_of_corner(
         &self,
@@ -507,8 +524,63 @@ fn solve_scaled(matrix: DMatrix<f64>, right: DVector<f64>) -> Option<DVector<f64
 /// Blocks whose equations are held at a time: enough for every thread, little for the memory.
 const BLOCKS_AT_A_TIME: usize = 256;
 
-/// Most columns of a block: parameters and poses of a camera, a panel, a target and a frame, and a shape.
-const MOST_COLUMNS: usize = MAX_PARAMETERS + 24 + shape::COUNT;
+/// Most columns that a corner depends on: parameters and poses of a camera, a panel, a target and a frame, and a shape.
+const LONGEST_ROW: usize = MOST_OF_LENS + 24 + shape::COUNT;
+
+/// Most parameters of a camera that a corner depends on.
+const MOST_OF_LENS: usize =
+    if MAX_PARAMETERS > MOST_TOUCHED { MAX_PARAMETERS } else { MOST_TOUCHED };
+
+/// Of a block that a spline images, which columns it has, and which of them each of its corners has.
+struct Support {
+    /// The column of each parameter of the lens, if it is unknown.
+    columns: Vec<Option<usize>>,
+    /// The columns of the lens on which any corner depends, ascending.
+    touched: Vec<usize>,
+}
+
+impl Support {
+    /// `None` of another lens, or where nothing of it is unknown.
+    fn of(free: &[(usize, usize)], seen: &[Projection], parameters: usize) -> Option<Self> {
+        seen.first()?.knots?;
+        let mut columns = vec![None; parameters - PROJECTION_PARAMETERS.len()];
+        for &(parameter, column) in free {
+            columns[parameter - PROJECTION_PARAMETERS.len()] = Some(column);
+        }
+        let knots = seen.iter().filter_map(|at| at.knots);
+        let knots: BTreeSet<usize> =
+            knots.flat_map(|knots| knots.iter().map(|(knot, _)| knot)).collect();
+        let of_knots = knots.iter().flat_map(|&knot| [columns[2 * knot], columns[2 * knot + 1]]);
+        let touched = of_knots.flatten().collect();
+        Some(Self { columns, touched })
+    }
+
+    /// Whether dx and dy of each knot of a point are unknown, and its part.
+    fn knots(&self, at: &Projection) -> impl Iterator<Item = (usize, usize, f64)> {
+        let knots = at.knots.into_iter().flat_map(|knots| knots.iter());
+        knots.flat_map(move |(knot, part)| {
+            [0, 1].into_iter().filter_map(move |axis| {
+                self.columns[2 * knot + axis].map(|column| (column, axis, part))
+            })
+        })
+    }
+
+    /// The columns of a block of n that a point depends on.
+    fn places(&self, at: &Projection, n: usize, places: &mut Vec<usize>) {
+        places.clear();
+        let of_knots =
+            self.knots(at).map(|(column, ..)| self.touched.partition_point(|&c| c < column));
+        places.extend(of_knots);
+        places.extend(self.touched.len()..n);
+    }
+
+    /// The derivatives of a coordinate by the knots.
+    fn derivatives(&self, at: &Projection, coordinate: usize, push: &mut impl FnMut(f64)) {
+        for (_, axis, part) in self.knots(at) {
+            push(if axis == coordinate { at.by_image(axis) * part } else { 0.0 });
+        }
+    }
+}
 
 /// The normal equations of one block, with only the columns that it has.
 pub(super) struct Local {
@@ -555,15 +627,7 @@ impl Local {
         let poses = poses.flat_map(|first| first..first + 6);
         let of_shape = layout.shape.into_iter().flat_map(|first| first..first + shape::COUNT);
         let poses = poses.chain(of_shape);
-        let columns: Vec<usize> = free.iter().map(|&(_, column)| column).chain(poses).collect();
-        let n = columns.len() + 6;
-        let matrix = vec![0.0; n * (n + 1) / 2];
-        let mut local =
-            Self { cost: 0.0, columns, matrix, right: vec![0.0; n], corners: Vec::new() };
-        let mut rows = [[0.0; MOST_COLUMNS]; 2];
-        for (seen, &w) in block.observations.iter().zip(whitening) {
-            let bends = problem.shape.map(|shape| shape.directions(seen.panel_mm));
-            let mapped = problem.map.as_ref().map(|map| map.index(block.panel, seen));
+        let chain = |seen: &Observation| {
             let turned_panel = panel.target_from_panel.rotation * problem.panel_point(block, seen);
             let turned_target =
                 target.rotation * (turned_panel + panel.target_from_panel.translation);
@@ -572,15 +636,48 @@ impl Local {
             let turned_rig = camera.camera_from_rig.rotation * in_rig;
             let in_camera = turned_rig + camera.camera_from_rig.translation;
             let at = camera.camera.project_with_derivatives(in_camera)?;
+            Some((turned_panel, turned_target, turned_scene, turned_rig, at))
+        };
+        let support = match camera.camera.lens {
+            Lens::Spline(_) if !free.is_empty() => {
+                let seen = block.observations.iter().map(|seen| Some(chain(seen)?.4));
+                let seen = seen.collect::<Option<Vec<Projection>>>()?;
+                Support::of(free, &seen, camera.free.len())
+            }
+            _ => None,
+        };
+        let columns: Vec<usize> = match &support {
+            Some(support) => support.touched.iter().copied().chain(poses).collect(),
+            None => free.iter().map(|&(_, column)| column).chain(poses).collect(),
+        };
+        let n = columns.len() + 6;
+        let matrix = vec![0.0; n * (n + 1) / 2];
+        let mut local =
+            Self { cost: 0.0, columns, matrix, right: vec![0.0; n], corners: Vec::new() };
+        let mut rows = [[0.0; LONGEST_ROW]; 2];
+        // Of a spline the columns of the block that a corner has: of its knots, and all after those of the lens.
+        let mut places: Vec<usize> = Vec::new();
+        for (seen, &w) in block.observations.iter().zip(whitening) {
+            let bends = problem.shape.map(|shape| shape.directions(seen.panel_mm));
+            let mapped = problem.map.as_ref().map(|map| map.index(block.panel, seen));
+            let (turned_panel, turned_target, turned_scene, turned_rig, at) = chain(seen)?;
             let mut by_place = [DVec3::ZERO; 2];
+            if let Some(support) = &support {
+                support.places(&at, n, &mut places);
+            }
             for (i, row) in rows.iter_mut().enumerate() {
                 let mut next = 0;
                 let mut push = |value: f64| {
                     row[next] = value;
                     next += 1;
                 };
-                for &(parameter, _) in free {
-                    push(at.by_parameters[parameter][i]);
+                match &support {
+                    Some(support) => support.derivatives(&at, i, &mut push),
+                    None => {
+                        for &(parameter, _) in free {
+                            push(at.by_parameters[parameter][i]);
+                        }
+                    }
                 }
                 // For y = exp(ω) a + t + τ a derivative j by y is a × j by ω, and j by τ.
                 let mut pose = |arm: DVec3, by: DVec3| {
@@ -609,10 +706,18 @@ impl Local {
                 pose(turned_scene, by_rig);
             }
             let residual = seen.pixel - at.pixel;
-            let rows = [&rows[0][..n], &rows[1][..n]];
-            let weight = local.add(rows, residual, w, loss, sigma);
+            let count = if support.is_some() { places.len() } else { n };
+            let rows = [&rows[0][..count], &rows[1][..count]];
+            let weight = match support {
+                Some(_) => local.add_some(&places, rows, residual, w, loss, sigma),
+                None => local.add(rows, residual, w, loss, sigma),
+            };
             if let Some(index) = mapped {
-                local.corners.push(OfCorner::new(index, rows, by_place, residual, w, weight));
+                let mut corner = OfCorner::new(index, rows, by_place, residual, w, weight);
+                if support.is_some() {
+                    corner.spread(&places, n);
+                }
+                local.corners.push(corner);
             }
         }
         Some(local)
@@ -621,6 +726,32 @@ impl Local {
     /// A row of the lower triangle, up to the diagonal.
     pub(super) fn row(&self, i: usize) -> &[f64] {
         &self.matrix[i * (i + 1) / 2..][..=i]
+    }
+
+    /// Adds a corner's two rows in some columns, ascending; returns the weight that the loss gives it.
+    fn add_some(
+        &mut self,
+        places: &[usize],
+        [along_x, along_y]: [&[f64]; 2],
+        residual: DVec2,
+        w: [f64; 3],
+        loss: Loss,
+        sigma: f64,
+    ) -> f64 {
+        let r = Whitening::apply(w, residual);
+        let (cost, weight) = loss.of(r.length_squared(), sigma);
+        self.cost += cost;
+        let [a, b, c] = w;
+        for (i, &place) in places.iter().enumerate() {
+            let (x, y) = (weight * a * along_x[i], weight * (b * along_x[i] + c * along_y[i]));
+            self.right[place] += x * r.x + y * r.y;
+            let (by_x, by_y) = (a * x + b * y, c * y);
+            let row = &mut self.matrix[place * (place + 1) / 2..];
+            for (j, &column) in places[..=i].iter().enumerate() {
+                row[column] += by_x * along_x[j] + by_y * along_y[j];
+            }
+        }
+        weight
     }
 
     /// Adds a corner's two rows; returns the weight that the loss gives it.
@@ -652,6 +783,13 @@ impl Local {
 }
 
 impl OfCorner {
+    /// For all columns of a block of which it has some.
+    fn spread(&mut self, places: &[usize], n: usize) {
+        let mut cross = vec![[0.0; 3]; n];
+        places.iter().zip(&self.cross).for_each(|(&place, values)| cross[place] = *values);
+        self.cross = cross;
+    }
+
     fn new(
         index: usize,
         [along_x, along_y]: [&[f64]; 2],
@@ -725,9 +863,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::calibrate::problem::{
-        CameraUnknowns, Observation, PanelUnknowns, Prior, TargetUnknowns,
-    };
+    use crate::calibrate::problem::{CameraUnknowns, PanelUnknowns, Prior, TargetUnknowns};
     use crate::calibrate::{PanelRef, Shape};
     use crate::camera::{Camera, Pose};
 
@@ -750,7 +886,11 @@ mod tests {
             let free = vec![true; camera.parameters().len()];
             let free = free.iter().enumerate().map(|(i, _)| i < 6).collect();
             let camera_from_rig = beside(-60.0 * f64::from(i));
-            CameraUnknowns { camera, free, camera_from_rig, pose_free: i > 0 }
+            CameraUnknowns {
+                camera_from_rig,
+                pose_free: i > 0,
+                ..CameraUnknowns::alone(camera, free)
+            }
         });
         let mut covariance = [[0.0; 6]; 6];
         (0..6).for_each(|i| covariance[i][i] = if i < 3 { 1e-6 } else { 1e-2 });

@@ -2,7 +2,9 @@ use glam::{DVec2, DVec3};
 use nalgebra::{Matrix6, Vector6};
 
 use super::corner_map::CornerMap;
+use super::model::without_gauge;
 use super::panel::PanelRef;
+use super::roughness::Roughness;
 use super::shape::Shape;
 use super::view::LEAST_CORNERS;
 use crate::camera::{Camera, Pose};
@@ -33,6 +35,8 @@ pub(super) struct CameraUnknowns {
     pub camera_from_rig: Pose,
     /// Whether that is unknown; one camera must stay where it is.
     pub pose_free: bool,
+    /// What is expected of the knots of a spline.
+    pub roughness: Option<Roughness>,
 }
 
 /// A target, whose panels move together.
@@ -120,7 +124,14 @@ pub(super) struct Problem {
 impl CameraUnknowns {
     /// A single camera, which is the rig.
     pub fn alone(camera: Camera, free: Vec<bool>) -> Self {
-        Self { camera, free, camera_from_rig: Pose::IDENTITY, pose_free: false }
+        let free = without_gauge(&camera.lens, free);
+        let roughness = Roughness::of(&camera, &free);
+        Self { camera, free, camera_from_rig: Pose::IDENTITY, pose_free: false, roughness }
+    }
+
+    /// Without what is expected of it.
+    pub(super) fn forget_expected(&mut self) {
+        self.roughness = None;
     }
 }
 

@@ -222,7 +222,10 @@ pub(super) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f6
 pub(super) fn variance(minimum: &Minimum, whitening: &Whitening, loss: Loss) -> f64 {
     let Minimum { problem, normal, layout, .. } = minimum;
     // Offsets of corners are as many unknowns as expectations of them.
-    let unknowns = layout.shared + 6 * problem.frames.len();
+    let expected = problem.cameras.iter().filter_map(|camera| camera.roughness.as_ref());
+    // As are second differences of knots.
+    let unknowns = layout.shared + 6 * problem.frames.len()
+        - expected.map(|roughness| roughness.rank()).sum::<usize>();
     let freedom = (2 * problem.count()).saturating_sub(unknowns).max(1) as f64;
     if loss == Loss::Squared {
         return normal.cost / freedom;

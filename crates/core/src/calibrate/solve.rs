@@ -8,6 +8,7 @@ use super::excluded::{Excluded, Reason};
 use super::gross_errors::{Gross, Kept, WrongFrame, within_pictures};
 use super::minimise::{Minimum, Until, minimise};
 use super::panels;
+use super::problem::Problem;
 use super::reweighting::{Settled, settle, variance};
 use super::shape::{self, Shape};
 use super::start::{Frame, Start, enough};
@@ -87,6 +88,7 @@ impl Calibration {
             (frames[frame].place, own.without_frame(&frames[frame], &gross, frame, why))
         }));
         excluded.sort_by_key(|(place, _)| *place);
+        let settled = own.smoothed(&gross, settled)?;
         let (settled, f_ratio) = match own.board_shape {
             true => own.bent(&gross, settled)?,
             false => (settled, 0.0),
@@ -189,7 +191,42 @@ const SAME_PRIOR: f64 = 0.05;
 /// Rounds in which offsets and what is expected of them are fitted to one another.
 const PRIOR_ROUNDS: usize = 10;
 
+/// The same of the knots of a spline, whose rounds are shorter.
+const KNOT_ROUNDS: usize = 15;
+
+/// A size of second differences is found when it changes by less than this part.
+const SAME_SIZE: f64 = 0.1;
+
 impl Calibration {
+    /// With splines as smooth as the corners have them.
+    fn smoothed(&self, gross: &Gross, settled: Settled) -> Result<Settled, CalibrationError> {
+        let has_splines = |problem: &Problem| problem.cameras.iter().any(|c| c.roughness.is_some());
+        if !has_splines(&settled.problem) {
+            return Ok(settled);
+        }
+        let Settled { minimum, whitening, problem: all, .. } = settled;
+        let (mut minimum, mut rounds) = (minimum, 0);
+        loop {
+            let Minimum { problem, normal, layout, .. } = &minimum;
+            let covariance = normal.covariance_of_kept().ok_or(CalibrationError::NoStart)?;
+            let (mut next, mut change): (_, f64) = (problem.clone(), 0.0);
+            for (camera, parameters) in next.cameras.iter_mut().zip(&layout.parameters) {
+                let Some(now) = &camera.roughness else { continue };
+                let found = now.fitted(&camera.camera, parameters, whitening.sigma, &covariance);
+                change = change.max(now.change(&found));
+                camera.roughness = Some(found);
+            }
+            rounds += 1;
+            if change < SAME_SIZE || rounds > KNOT_ROUNDS {
+                break;
+            }
+            minimum = minimise(next, &whitening, self.loss, Until::Rough)
+                .ok_or(CalibrationError::NoStart)?;
+        }
+        let problem = all.at(&minimum.problem);
+        settle(Kept { problem, ..gross.kept() }, self.weights, self.loss)
+    }
+
     /// Finds the place of every corner of the target too.
     fn measured(&self, gross: &Gross, settled: Settled) -> Result<Settled, CalibrationError> {
         let mut problem = settled.problem.clone();

@@ -135,7 +135,7 @@ pub(super) fn by_motion(at: &Projection, point: DVec3) -> SMatrix<f64, 2, 6> {
 
 /// Derivatives of a pixel by some parameters.
 pub(super) fn by_parameters(at: &Projection, free: &[usize]) -> OMatrix<f64, U2, Dyn> {
-    OMatrix::<f64, U2, Dyn>::from_fn(free.len(), |i, j| at.by_parameters[free[j]][i])
+    OMatrix::<f64, U2, Dyn>::from_fn(free.len(), |i, j| at.by_parameter(free[j])[i])
 }
 
 /// WᵀW of a pixel.

@@ -15,6 +15,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::lack_of_fit::deviate_of_f;
+use super::local_share::LocalShare;
 use super::loss::Loss;
 use super::normal::{Layout, Normal, Reduced};
 use super::problem::Problem;
@@ -49,6 +50,25 @@ struct Pull {
     freedom: f64,
     /// By how many deviations the camera moves without the view.
     moves: f64,
+}
+
+impl Pull {
+    /// Of the parts of directions that the view tells, and its pull along them.
+    fn of(directions: impl Iterator<Item = (f64, f64)>, variance: f64) -> Self {
+        let mut found = Self { strange: 0.0, freedom: 0.0, moves: 0.0 };
+        for (part, along) in directions {
+            let others = 1.0 - part;
+            if part > LEAST_PART && others > LEAST_PART {
+                let along = along.powi(2) / variance;
+                found.strange += along / (part * others);
+                found.moves += along / (others * others);
+                found.freedom += 1.0;
+            }
+        }
+        found.strange /= found.freedom.max(1.0);
+        found.moves = found.moves.sqrt();
+        found
+    }
 }
 
 /// What frames say of the cameras.
@@ -88,6 +108,9 @@ impl Opinions {
 /// What each frame says; `None` where one says nothing by itself.
 fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     let problem = &settled.minimum.problem;
+    if problem.cameras.iter().any(|camera| camera.roughness.is_some()) {
+        return pulls_of_some(settled, loss);
+    }
     let all = settled.minimum.normal.reduced(0.0)?.matrix;
     let whiten = whitener(&all)?;
     let variance = settled.whitening.sigma.powi(2);
@@ -95,19 +118,22 @@ fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
         let (matrix, right) = reduced_of(problem, settled, loss, frame)?;
         let pull = &whiten * right;
         let eigen = (&whiten * matrix * whiten.transpose()).symmetric_eigen();
-        let mut found = Pull { strange: 0.0, freedom: 0.0, moves: 0.0 };
-        for (&part, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            let others = 1.0 - part;
-            if part > LEAST_PART && others > LEAST_PART {
-                let along = direction.dot(&pull).powi(2) / variance;
-                found.strange += along / (part * others);
-                found.moves += along / (others * others);
-                found.freedom += 1.0;
-            }
-        }
-        found.strange /= found.freedom.max(1.0);
-        found.moves = found.moves.sqrt();
-        Some(found)
+        let along = eigen.eigenvectors.column_iter().map(|direction| direction.dot(&pull));
+        Some(Pull::of(eigen.eigenvalues.iter().copied().zip(along), variance))
+    };
+    Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
+}
+
+/// The same where a frame tells only of some of the unknowns.
+fn pulls_of_some(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
+    let problem = &settled.minimum.problem;
+    let all = settled.minimum.normal.covariance_of_kept()?;
+    let variance = settled.whitening.sigma.powi(2);
+    let of_frame = |frame: usize| {
+        let (matrix, right) = reduced_of(problem, settled, loss, frame)?;
+        let share = LocalShare::of(&matrix, &all)?;
+        let along = share.along(&right);
+        Some(Pull::of(share.parts.iter().copied().zip(along.iter().copied()), variance))
     };
     Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
 }
@@ -119,7 +145,8 @@ fn reduced_of(
     loss: Loss,
     frame: usize,
 ) -> Option<(DMatrix<f64>, DVector<f64>)> {
-    let part = problem.with_frames(|other| other == frame);
+    let mut part = problem.with_frames(|other| other == frame);
+    part.cameras.iter_mut().for_each(|camera| camera.forget_expected());
     let whitening = settled.whitening.of(&part);
     let found = Normal::of(&part, &Layout::of(&part), &whitening, loss)?.reduced(0.0);
     let found = found.map(|Reduced { matrix, right, .. }| (matrix, right));

@@ -23,6 +23,7 @@
 //! | `eucm` | α β |
 //! | `double-sphere` | ξ α |
 //! | `pupil` | k1 k2 k3 k4 k5 p1 p2 e1 e2 e3 |
+//! | `spline` | dx dy of each knot, row by row; `spline` has `degree`, `columns`, `rows`, `fov_x_deg` |
 //!
 //! A ROS or OpenCV file has `image_width`, `image_height`, `camera_matrix`, `distortion_model`
 //! (`plumb_bob`, `rational_polynomial`, `equidistant`; OpenCV names none) and
@@ -38,7 +39,7 @@ use crate::reading::in_words;
 
 use super::{
     BrownConrady, Camera, DoubleSphere, ExtendedUnified, KannalaBrandt, Lens, MAX_LENS_PARAMETERS,
-    Pupil,
+    Pupil, Spline, SplineGrid,
 };
 
 /// Most bytes of a camera file. A hundredth of it is more than most have, and readers of YAML take time with the square
@@ -77,6 +78,9 @@ struct Own {
     centre_px: DVec2,
     #[serde(default)]
     model: Model,
+    /// The grid of a spline.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    spline: Option<SplineGrid>,
     #[serde(default)]
     distortion: Vec<f64>,
 }
@@ -90,6 +94,7 @@ enum Model {
     Eucm,
     DoubleSphere,
     Pupil,
+    Spline,
 }
 
 #[derive(Deserialize)]
@@ -132,12 +137,17 @@ impl Model {
             Lens::ExtendedUnified(_) => Self::Eucm,
             Lens::DoubleSphere(_) => Self::DoubleSphere,
             Lens::Pupil(_) => Self::Pupil,
+            Lens::Spline(_) => Self::Spline,
         }
     }
 
-    /// A lens of this model that has `count` parameters, or as many as it always has.
-    fn lens(self, count: usize) -> Lens {
-        match self {
+    /// A lens of this model that has `count` parameters, or as many as it always has; `None` where that is a spline
+    /// without grid, or another lens with one.
+    fn lens(self, count: usize, grid: Option<SplineGrid>) -> Option<Lens> {
+        if (self == Self::Spline) != grid.is_some() {
+            return None;
+        }
+        Some(match self {
             Self::Pinhole => Lens::BrownConrady(BrownConrady::default()),
             Self::Fisheye => {
                 let terms = count.clamp(LEAST_TERMS, MAX_LENS_PARAMETERS);
@@ -146,7 +156,8 @@ impl Model {
             Self::Eucm => Lens::ExtendedUnified(ExtendedUnified::default()),
             Self::DoubleSphere => Lens::DoubleSphere(DoubleSphere::default()),
             Self::Pupil => Lens::Pupil(Pupil::default()),
-        }
+            Self::Spline => Lens::Spline(Spline::new(grid?)),
+        })
     }
 
     /// The ranges of the parameters of its lens, from the first; those without one have that of coefficients.
@@ -154,7 +165,7 @@ impl Model {
         match self {
             Self::Eucm => &[quantity::alpha::RANGE, quantity::beta::RANGE],
             Self::DoubleSphere => &[quantity::xi::RANGE, quantity::alpha::RANGE],
-            Self::Pinhole | Self::Fisheye | Self::Pupil => &[],
+            Self::Pinhole | Self::Fisheye | Self::Pupil | Self::Spline => &[],
         }
     }
 
@@ -174,7 +185,7 @@ impl Camera {
         // OpenCV writes a version directive and a tag that no other reader of YAML knows.
         let foreign = text.contains("camera_matrix");
         let own = if foreign { from_foreign(text)? } else { parse(text)? };
-        let Own { width, height, focal_px, centre_px, model, mut distortion } = own;
+        let Own { width, height, focal_px, centre_px, model, spline, mut distortion } = own;
         let key = |key, problem: String| CameraFileError::Key { key, problem };
         let numbers = [
             ("width", vec![f64::from(width)], quantity::side_px::RANGE),
@@ -188,10 +199,19 @@ impl Camera {
                 range.check(number).map_err(|problem| key(name, problem.to_string()))?;
             }
         }
-        let lens = model.lens(distortion.len());
+        let spline = spline.map(SplineGrid::checked).transpose();
+        let spline = spline.map_err(|problem| key("spline", problem.to_string()))?;
+        let lens = model
+            .lens(distortion.len(), spline)
+            .ok_or_else(|| key("spline", "the model `spline` has it, and no other".to_owned()))?;
         let count = lens.names().len();
-        while distortion.len() > count && distortion.last() == Some(&0.0) {
+        while model != Model::Spline && distortion.len() > count && distortion.last() == Some(&0.0)
+        {
             distortion.pop();
+        }
+        if model == Model::Spline && distortion.len() != count {
+            let problem = format!("there are {} numbers, the grid has {count}", distortion.len());
+            return Err(key("distortion", problem));
         }
         if distortion.len() > count || distortion.len() < count && !model.ends_early() {
             let names = lens.names().join(" ");
@@ -216,7 +236,11 @@ impl Camera {
             distortion.pop();
         }
         let Camera { width, height, focal_px, centre_px, .. } = *self;
-        let own = Own { width, height, focal_px, centre_px, model, distortion };
+        let spline = match &self.lens {
+            Lens::Spline(lens) => Some(lens.grid()),
+            _ => None,
+        };
+        let own = Own { width, height, focal_px, centre_px, model, spline, distortion };
         let yaml = serde_yaml_ng::to_string(&own).expect("plain data has a YAML form");
         format!("# deltille {}, camera\n{yaml}", env!("CARGO_PKG_VERSION"))
     }
@@ -270,6 +294,7 @@ fn from_foreign(text: &str) -> Result<Own, CameraFileError> {
         focal_px: DVec2::new(m[0], m[4]),
         centre_px: DVec2::new(m[2], m[5]),
         model,
+        spline: None,
         distortion: coefficients.data,
     })
 }
@@ -287,8 +312,10 @@ mod tests {
             (Model::Eucm, vec![0.6, 1.1]),
             (Model::DoubleSphere, vec![-0.2, 0.6]),
             (Model::Pupil, (1..=10).map(|i| f64::from(i) / 7.0).collect()),
+            (Model::Spline, (1..=40).map(|i| f64::from(i) / 700.0).collect()),
         ] {
-            let lens = model.lens(values.len());
+            let grid = SplineGrid::new(3, [5, 4], 90).ok().filter(|_| model == Model::Spline);
+            let lens = model.lens(values.len(), grid).unwrap();
             let mut all = values.clone();
             all.resize(lens.names().len(), 0.0);
             let camera = Camera::centred(640, 480, 321.0, lens.with_parameters(&all));

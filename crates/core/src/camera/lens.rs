@@ -1,8 +1,8 @@
 use glam::{DVec2, DVec3};
 
-use super::{BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Pupil};
+use super::{BrownConrady, DoubleSphere, ExtendedUnified, KannalaBrandt, Knots, Pupil, Spline};
 
-/// Most parameters that a lens has.
+/// Most parameters that a lens has which all matter everywhere: of a spline only some do.
 pub const MAX_LENS_PARAMETERS: usize = 12;
 
 /// How a point of the camera frame becomes a point of the normalised image plane.
@@ -18,6 +18,8 @@ pub enum Lens {
     DoubleSphere(DoubleSphere),
     /// Equidistant polynomial with a moving entrance pupil: not central.
     Pupil(Pupil),
+    /// Stereographic with a correction by a spline; sees more than 180°.
+    Spline(Spline),
 }
 
 /// A half-line in the camera frame, along which a pixel looks.
@@ -84,6 +86,7 @@ impl Lens {
             Self::ExtendedUnified(lens) => lens,
             Self::DoubleSphere(lens) => lens,
             Self::Pupil(lens) => lens,
+            Self::Spline(lens) => lens,
         }
     }
 
@@ -94,6 +97,7 @@ impl Lens {
             Self::ExtendedUnified(lens) => lens,
             Self::DoubleSphere(lens) => lens,
             Self::Pupil(lens) => lens,
+            Self::Spline(lens) => lens,
         }
     }
 
@@ -115,10 +119,19 @@ impl Lens {
     }
 
     /// The image of a point of the camera frame with all derivatives; `by_parameters` takes one
-    /// pair for each parameter. `None` where the formula has no value that a search may pass through;
+    /// pair for each parameter, of a spline none: see [`Self::knots`]. `None` where the formula has no value that a search may pass through;
     /// rational lenses have one beyond their domain too.
     pub fn image(&self, point: DVec3, by_parameters: &mut [[f64; 2]]) -> Option<Imaged> {
         self.law().image(point, by_parameters)
+    }
+
+    /// The knots on which the image of a point depends, of a spline; other lenses have their derivatives from
+    /// [`Self::image`].
+    pub fn knots(&self, point: DVec3) -> Option<Knots> {
+        match self {
+            Self::Spline(lens) => lens.knots_of(point),
+            _ => None,
+        }
     }
 
     /// Whether a point that has an image lies in the domain of the model.

@@ -17,6 +17,7 @@ mod pose;
 mod pupil;
 mod reach;
 mod rectification;
+mod spline;
 mod undistortion;
 
 use glam::{DVec2, DVec3};
@@ -31,12 +32,14 @@ pub use lens::{Imaged, Lens, MAX_LENS_PARAMETERS, Ray};
 pub use pose::Pose;
 pub use pupil::Pupil;
 pub use rectification::{Rectification, RectificationError};
+pub use spline::{Knots, Spline, SplineGrid, SplineGridError};
+pub(crate) use spline::{MOST_TOUCHED, direction as stereographic_direction};
 pub use undistortion::{Field, PixelMap, Undistortion, UndistortionError};
 
 /// The parameters that every camera has, before those of its lens.
 pub const PROJECTION_PARAMETERS: [&str; 4] = ["fx", "fy", "cx", "cy"];
 
-/// Most parameters of a camera.
+/// Most parameters of a camera whose lens is no spline.
 pub const MAX_PARAMETERS: usize = PROJECTION_PARAMETERS.len() + MAX_LENS_PARAMETERS;
 
 /// A camera: image size, focal lengths, principal point, and the law of its lens.
@@ -62,8 +65,35 @@ pub struct Projection {
     /// Derivatives by the coordinates X, Y, Z of the point in the camera frame, px/mm.
     pub by_point: [[f64; 3]; 2],
     /// Derivatives of x and y by each parameter, in the order of [`Camera::parameter_names`]; entries beyond the
-    /// parameters that the camera has are not filled.
+    /// parameters that the camera has are not filled. Of a spline only the first four are there: see
+    /// [`Self::by_parameter`].
     pub by_parameters: [[f64; 2]; MAX_PARAMETERS],
+    /// The knots of a spline that it depends on.
+    pub knots: Option<Knots>,
+    /// Focal lengths, px: by how much the pixel moves with the image.
+    focal_px: DVec2,
+}
+
+impl Projection {
+    /// By how much a coordinate of the pixel moves with that of the image.
+    pub(crate) fn by_image(&self, coordinate: usize) -> f64 {
+        self.focal_px[coordinate]
+    }
+
+    /// Derivatives of x and y by a parameter of the camera, whatever its lens.
+    pub fn by_parameter(&self, index: usize) -> [f64; 2] {
+        let of_lens = index.checked_sub(PROJECTION_PARAMETERS.len());
+        match (self.knots, of_lens) {
+            (Some(knots), Some(of_lens)) => {
+                let part = knots.part(of_lens / 2);
+                match of_lens % 2 {
+                    0 => [self.focal_px.x * part, 0.0],
+                    _ => [0.0, self.focal_px.y * part],
+                }
+            }
+            _ => self.by_parameters[index],
+        }
+    }
 }
 
 impl Camera {
@@ -141,7 +171,9 @@ impl Camera {
         by_parameters[..4].copy_from_slice(&[[at.x, 0.0], [0.0, at.y], [1.0, 0.0], [0.0, 1.0]]);
         let pixel = focal * at + self.centre_px;
         let by_point = [by_point[0].map(|v| focal.x * v), by_point[1].map(|v| focal.y * v)];
-        pixel.is_finite().then_some(Projection { pixel, by_point, by_parameters })
+        let knots = self.lens.knots(point);
+        let found = Projection { pixel, by_point, by_parameters, knots, focal_px: focal };
+        pixel.is_finite().then_some(found)
     }
 
     /// The ray along which a pixel looks; `None` where the model does not reach.

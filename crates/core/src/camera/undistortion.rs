@@ -171,7 +171,7 @@ impl Undistortion {
     fn focal_inside(&self) -> Result<f64, UndistortionError> {
         let is_inside = |focal: f64| {
             let view = self.clone().with_focal(focal);
-            view.view.border().all(|pixel| view.place(pixel).is_some())
+            view.view.border(ALONG).all(|pixel| view.place(pixel).is_some())
         };
         let mut low = self.view.focal_px.x;
         if is_inside(low) {
@@ -191,7 +191,7 @@ impl Undistortion {
     /// The longest focal length with which all that the camera sees is shown, no shorter than that of the widest view.
     fn focal_whole(&self) -> Result<f64, UndistortionError> {
         let half = [self.view.width, self.view.height].map(|side| (f64::from(side) - 1.0) / 2.0);
-        let seen = self.camera.border().filter_map(|pixel| {
+        let seen = self.camera.border(ALONG).filter_map(|pixel| {
             let ray = self.camera.unproject(pixel)?;
             (ray.direction.angle_between(DVec3::Z) < self.steady_rad).then_some(ray.direction)
         });
@@ -225,11 +225,11 @@ fn steady_rad(camera: &Camera) -> f64 {
 }
 
 impl Camera {
-    /// Pixels along the border of the image.
-    fn border(&self) -> impl Iterator<Item = DVec2> {
+    /// So many steps of pixels along each border of the image.
+    pub(crate) fn border(&self, along: usize) -> impl Iterator<Item = DVec2> {
         let last = DVec2::new(f64::from(self.width) - 1.0, f64::from(self.height) - 1.0);
-        (0..=ALONG).flat_map(move |i| {
-            let part = i as f64 / ALONG as f64;
+        (0..=along).flat_map(move |i| {
+            let part = i as f64 / along as f64;
             let (x, y) = (part * last.x, part * last.y);
             [[x, 0.0], [x, last.y], [0.0, y], [last.x, y]].map(DVec2::from)
         })
@@ -320,7 +320,7 @@ mod tests {
             ] {
                 let made = Undistortion::turned(&camera, turn, [640, 480], field).unwrap();
                 let (mut seen, mut worst): (_, f64) = (0, 0.0);
-                for pixel in made.view.border().chain([DVec2::new(300.0, 200.0)]) {
+                for pixel in made.view.border(ALONG).chain([DVec2::new(300.0, 200.0)]) {
                     let Some(place) = made.place(pixel) else { continue };
                     let ray = camera.unproject(place).unwrap().direction;
                     let back = made.view.project(1e3 * (turn * ray)).unwrap();
@@ -344,7 +344,7 @@ mod tests {
             assert!(wider.covered() < 1.0);
             let whole = Undistortion::new(&camera, [800, 600], Field::Whole).unwrap();
             assert!(whole.view.focal_px.x < inside.view.focal_px.x);
-            for pixel in camera.border() {
+            for pixel in camera.border(ALONG) {
                 let ray = camera.unproject(pixel).unwrap().direction;
                 let at = whole.view.project(ray).unwrap();
                 assert!(whole.view.sees(at, 0.499), "{at}");

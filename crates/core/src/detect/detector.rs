@@ -127,6 +127,20 @@ const POLYNOMIAL_RADIUS: usize = 3;
 /// window gains.
 const MODEL_RADIUS: usize = 10;
 
+/// Grids, each with why it has no labels.
+type Judged = Vec<(Grid, Option<Reason>)>;
+
+/// What a picture shows.
+struct Found {
+    grids: Judged,
+    /// What the grids have in common.
+    optics: Optics,
+    /// Why others are left out.
+    left_out: Vec<Reason>,
+    /// How many corners were seen.
+    saddles: usize,
+}
+
 /// Finds grids in images and labels their corners.
 ///
 /// ```
@@ -328,8 +342,8 @@ impl Detector {
         let pyramid = Pyramid::new(image, levels_of(image), MIN_LEVEL_SIDE);
         timing.lap("pyramid");
         let whole = self.whole_on_coarser_level(finder, (image, &pyramid), &mut timing);
-        let (grids, optics, left_out, saddles) = match whole {
-            Some((grids, optics)) => (grids, optics, Vec::new(), 0),
+        let Found { grids, optics, left_out, saddles } = match whole {
+            Some((grids, optics)) => Found { grids, optics, left_out: Vec::new(), saddles: 0 },
             None => self.all_grids(finder, (image, &pyramid), &mut timing),
         };
         let mut reasons = if grids.is_empty() {
@@ -373,7 +387,7 @@ impl Detector {
         finder: &SaddleFinder<N>,
         (image, pyramid): (ImageView, &Pyramid),
         timing: &mut Timing,
-    ) -> Option<(Vec<(Grid, Option<Reason>)>, Optics)> {
+    ) -> Option<(Judged, Optics)> {
         let whole = self.labels.whole()?;
         let levels = pyramid.levels();
         let least = LEAST_PX2_A_CORNER * whole.corners();
@@ -407,14 +421,13 @@ impl Detector {
         })
     }
 
-    /// All grids of a picture with their labels, refined, and what they have in common; why others are left out, and
-    /// how many corners were seen.
+    /// All grids of a picture with their labels, refined.
     fn all_grids<const N: usize>(
         &self,
         finder: &SaddleFinder<N>,
         (image, pyramid): (ImageView, &Pyramid),
         timing: &mut Timing,
-    ) -> (Vec<(Grid, Option<Reason>)>, Optics, Vec<Reason>, usize) {
+    ) -> Found {
         let saddles = finder.find(pyramid);
         timing.lap("saddles");
         let found = grids(finder, pyramid, &saddles, self.labels.whole());
@@ -439,21 +452,21 @@ impl Detector {
         }
         let (grids, optics) = self.refined::<N>((image, pyramid), grids);
         timing.lap("refine");
-        (grids, optics, left_out, saddles.len())
+        Found { grids, optics, left_out, saddles: saddles.len() }
     }
 
     /// Grids with their corners refined, those that are still grids, and what they have in common.
     fn refined<const N: usize>(
         &self,
         (image, pyramid): (ImageView, &Pyramid),
-        grids: Vec<(Grid, Option<Reason>)>,
-    ) -> (Vec<(Grid, Option<Reason>)>, Optics) {
+        grids: Judged,
+    ) -> (Judged, Optics) {
         let least = least_untagged_corners(kind::<N>()) as usize;
         let mut fitter = CornerFitter::default();
         let (mut refined, reasons): (Vec<Grid>, Vec<Option<Reason>>) = grids.into_iter().unzip();
         let (optics, are_waves) = self.refine(&mut fitter, (image, pyramid), &mut refined);
         let refined = refined.into_iter().zip(reasons).zip(are_waves);
-        let mut grids: Vec<(Grid, Option<Reason>)> = refined
+        let mut grids: Judged = refined
             .filter(|((grid, _), is_wave)| {
                 is_vouched_for(grid) || grid.corners.len() >= least && !is_wave
             })
@@ -473,10 +486,10 @@ impl Detector {
         pyramid: &Pyramid,
         found: &[SaddleGrid],
         left_out: &mut Vec<Reason>,
-    ) -> Vec<(Grid, Option<Reason>)> {
+    ) -> Judged {
         let mut budget = Budget::default();
         let found = found.iter().map(|corners| FoundGrid { kind: kind::<N>(), corners });
-        let mut grids: Vec<(Grid, Option<Reason>)> =
+        let mut grids: Judged =
             found.flat_map(|grid| self.labels.label(image, grid, &mut budget)).collect();
         let least = least_untagged_corners(kind::<N>()) as usize;
         let most = self.labels.most_corners();
@@ -644,7 +657,7 @@ fn is_labelled(grid: &Grid) -> bool {
 }
 
 /// Leaves out grids that go on where they end, unless they are known.
-fn refuse_patterns(pyramid: &Pyramid, grids: &mut Vec<(Grid, Option<Reason>)>) {
+fn refuse_patterns(pyramid: &Pyramid, grids: &mut Judged) {
     loop {
         let all: Vec<&Grid> = grids.iter().map(|(grid, _)| grid).collect();
         let mut goes_on = go_on(&pyramid.levels()[0], &all).into_iter();

@@ -3,6 +3,8 @@
 //! A picture takes some thousand of them, of ten unknowns; as loops over arrays of fixed size they work on whole rows
 //! at once.
 
+#![allow(clippy::needless_range_loop, reason = "one index for two rows, so that vectors show")]
+
 use multiversion::multiversion;
 
 /// Rows (A | B) of N equations A X = B with a positive definite A become (· | X); `None` where A is not that.

@@ -6,10 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use super::estimate::{
     CoverageRecord, DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord,
-    ViewRecord, correlations, coverage, diagnoses, map, parameters, projection, shape, views,
+    ViewRecord, correlations, coverage, diagnoses, map, parameters, projection, shape, spline,
+    views,
 };
 use super::finding::{FindingRecord, records};
 use deltille_core::calibrate::{Diagnosis, Estimate, Excluded, SHAPE_COEFFICIENTS as COUNT, Shape};
+use deltille_core::camera::SplineGrid;
 use deltille_core::detect::InkEstimate;
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
@@ -115,6 +117,9 @@ struct CalibrationFile<'a> {
     model: String,
     width: u32,
     height: u32,
+    /// The grid of a spline.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spline: Option<SplineGrid>,
     parameters: Vec<ParameterRecord<'a>>,
     correlations: Vec<Vec<f64>>,
     loose: &'a [String],
@@ -167,6 +172,7 @@ pub fn write(
         model: camera.model.map_or("fixed".to_owned(), |model| model.to_string()),
         width: camera.camera.width,
         height: camera.camera.height,
+        spline: spline(camera),
         parameters: parameters(camera),
         correlations: correlations(camera),
         loose: &camera.ill_conditioned,

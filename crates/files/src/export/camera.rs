@@ -9,7 +9,7 @@ use glam::{DMat3, DMat4};
 use serde_json::json;
 
 use super::GENERATOR;
-use deltille_core::camera::{Camera, Lens, Pose};
+use deltille_core::camera::{Camera, Lens, Pose, SplineGrid};
 use deltille_core::name;
 
 /// A format that cannot say what a camera is.
@@ -60,6 +60,9 @@ fn refuse<T>(
         Lens::ExtendedUnified(_) => "an EUCM lens",
         Lens::DoubleSphere(_) => "a double sphere lens",
         Lens::Pupil(_) => "a fisheye with a moving pupil",
+        Lens::Spline(_) => {
+            return Err(FormatError { format, lens: "a spline".to_owned(), models });
+        }
     };
     Err(FormatError { format, lens: format!("{lens} with {}", names[..used].join(" ")), models })
 }
@@ -189,6 +192,35 @@ fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
          distortion_coeffs: [{}]\n  resolution: [{}, {}]\n",
         list(&intrinsics),
         list(&coefficients),
+        camera.width,
+        camera.height,
+    ))
+}
+
+/// mrcal's camera model, in the place of the reference; the only format here that carries splines.
+///
+/// # Errors
+/// Where mrcal has no such model.
+pub fn mrcal(camera: &Camera) -> Result<String, FormatError> {
+    let parameters = camera.lens.parameters();
+    let (model, coefficients) = match (&camera.lens, Shared::of(camera, &parameters)) {
+        (Lens::Spline(spline), _) => {
+            let SplineGrid { degree, columns, rows, fov_x_deg } = spline.grid();
+            let of_grid = format!("order={degree}_Nx={columns}_Ny={rows}_fov_x_deg={fov_x_deg}");
+            (format!("SPLINED_STEREOGRAPHIC_{of_grid}"), &parameters[..])
+        }
+        (_, Shared::Perspective(k, needed)) => {
+            let count = [4, 5, 8, 12].into_iter().find(|&count| count >= needed).unwrap_or(12);
+            (format!("OPENCV{count}"), &k[..count])
+        }
+        _ => return refuse(camera, "mrcal", "radtan, radtan5, rational, thin-prism, spline"),
+    };
+    let [focal, centre] = [camera.focal_px, camera.centre_px].map(|v| v.to_array());
+    let intrinsics = [&focal, &centre, coefficients].concat();
+    Ok(format!(
+        "# {GENERATOR}\n{{\n    'lensmodel': 'LENSMODEL_{model}',\n    'intrinsics': [ {} ],\n    \
+         'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ {}, {} ]\n}}\n",
+        list(&intrinsics),
         camera.width,
         camera.height,
     ))
@@ -346,6 +378,7 @@ mod tests {
             (Model::Eucm, 0, [false, false, true, false, false]),
             (Model::DoubleSphere, 0, [false, false, true, false, false]),
             (Model::Pupil, 10, [false; 5]),
+            (Model::SPLINE, 0, [false; 5]),
         ] {
             let camera = camera(model, count);
             let texts = [

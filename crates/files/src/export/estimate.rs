@@ -12,6 +12,15 @@ use deltille_core::calibrate::{
     BoardShape, CameraEstimate, Coverage, Diagnosis, Estimate, Instead, LackOfFit, LensEnd,
     PanelRef, Source, TargetMap, ViewEstimate, Words,
 };
+use deltille_core::camera::{Lens, SplineGrid};
+
+/// The grid of a camera whose lens is a spline.
+pub(super) fn spline(camera: &CameraEstimate) -> Option<SplineGrid> {
+    match &camera.camera.lens {
+        Lens::Spline(spline) => Some(spline.grid()),
+        _ => None,
+    }
+}
 
 #[derive(Serialize)]
 pub(super) struct ParameterRecord<'a> {
@@ -166,21 +175,29 @@ pub(super) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
     });
     Some(ProjectionRecord {
         alignment: (0..rows).map(row).collect(),
-        observed_correlations: known.observed.as_ref().map(|of| correlations_of(&of.covariance)),
+        observed_correlations: known
+            .observed
+            .as_ref()
+            .map(|of| correlations_of(&of.covariance, spline(camera).is_some())),
         observed_freedom: known.observed.as_ref().map(|of| of.freedom),
         distances_mm: known.distances_mm.clone(),
         maps: maps.collect(),
     })
 }
 
-fn correlations_of(covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
+/// Of many parameters only the lower triangle, to nine digits: the file of a fisheye would have 30 MB.
+fn correlations_of(covariance: &DMatrix<f64>, are_many: bool) -> Vec<Vec<f64>> {
     let c = covariance;
     let of = |i: usize, j: usize| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
+    if are_many {
+        let rounded = |i: usize, j: usize| (of(i, j) * 1e9).round() / 1e9;
+        return (0..c.nrows()).map(|i| (0..=i).map(|j| rounded(i, j)).collect()).collect();
+    }
     (0..c.nrows()).map(|i| (0..c.nrows()).map(|j| of(i, j)).collect()).collect()
 }
 
 pub(super) fn correlations(camera: &CameraEstimate) -> Vec<Vec<f64>> {
-    correlations_of(&camera.covariance)
+    correlations_of(&camera.covariance, spline(camera).is_some())
 }
 
 pub(super) fn coverage(camera: &CameraEstimate) -> CoverageRecord {

@@ -6,11 +6,13 @@ use serde::Serialize;
 use super::calibration::{Print, Residuals};
 use super::estimate::{
     CoverageRecord, DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord,
-    ViewRecord, correlations, coverage, diagnoses, map, parameters, projection, shape, views,
+    ViewRecord, correlations, coverage, diagnoses, map, parameters, projection, shape, spline,
+    views,
 };
 use super::finding::{FindingRecord, records};
 use super::motion::Motion;
 use deltille_core::calibrate::{CameraEstimate, Diagnosis, Estimate, Excluded};
+use deltille_core::camera::SplineGrid;
 use deltille_core::json;
 
 /// Schema and version that this crate writes.
@@ -64,6 +66,9 @@ struct Camera<'a> {
     corners: usize,
     outliers: usize,
     coverage: CoverageRecord,
+    /// The grid of a spline.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spline: Option<SplineGrid>,
     parameters: Vec<ParameterRecord<'a>>,
     correlations: Vec<Vec<f64>>,
     loose: &'a [String],
@@ -163,6 +168,7 @@ fn of_camera<'a>(
         corners: found.corner_count(),
         outliers: found.outlier_count(),
         coverage: coverage(found),
+        spline: spline(found),
         parameters: parameters(found),
         correlations: correlations(found),
         loose: &found.ill_conditioned,

@@ -15,7 +15,7 @@ use deltille_core::calibrate::{
     Model, ObservedCovariance, PanelRef, Parameter, ProjectionUncertainty, Reason, Reference,
     SHAPE_COEFFICIENTS as COUNT, TargetEstimate, TargetMap, ViewEstimate,
 };
-use deltille_core::camera::{Camera, Lens, Pose};
+use deltille_core::camera::{Camera, Lens, Pose, Spline, SplineGrid};
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
 
@@ -153,6 +153,7 @@ struct SavedCamera {
     height: u32,
     #[serde(deserialize_with = "quantity::deviation::de")]
     rms_px: f64,
+    spline: Option<SplineGrid>,
     parameters: Vec<SavedParameter>,
     #[serde(deserialize_with = "quantity::figure::de")]
     correlations: Vec<Vec<f64>>,
@@ -444,7 +445,9 @@ impl SavedCamera {
             problem: problem.to_owned(),
         };
         let names: Vec<&str> = self.parameters.iter().map(|p| p.name.as_str()).collect();
-        let blank = lens_of(&names)
+        let spline = self.spline.map(SplineGrid::checked).transpose();
+        let spline = spline.map_err(|problem| field("spline", &problem.to_string()))?;
+        let blank = lens_of(&names, spline)
             .map(|lens| Camera::centred(self.width, self.height, 1.0, lens))
             .ok_or_else(|| field("parameters", "they are those of no lens here"))?;
         let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
@@ -482,8 +485,11 @@ impl SavedCamera {
 /// What correlations and deviations make; `None` where there is not a correlation for each pair.
 fn covariance(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
     let n = sds.len();
-    let is_square = rows.len() == n && rows.iter().all(|row| row.len() == n);
-    is_square.then(|| DMatrix::from_fn(n, n, |i, j| rows[i][j] * sds[i] * sds[j]))
+    // Of a spline the lower triangle is there.
+    let has_all = |(i, row): (usize, &Vec<f64>)| row.len() == n || row.len() == i + 1;
+    let is_whole = rows.len() == n && rows.iter().enumerate().all(has_all);
+    let of = |i: usize, j: usize| rows[i].get(j).copied().unwrap_or_else(|| rows[j][i]);
+    is_whole.then(|| DMatrix::from_fn(n, n, |i, j| of(i, j) * sds[i] * sds[j]))
 }
 
 impl SavedProjection {
@@ -505,7 +511,7 @@ impl SavedProjection {
 }
 
 /// The lens whose camera has parameters of these names.
-fn lens_of(names: &[&str]) -> Option<Lens> {
+fn lens_of(names: &[&str], spline: Option<SplineGrid>) -> Option<Lens> {
     let terms = names.len().saturating_sub(4);
     let models = [
         Model::Radtan,
@@ -514,7 +520,8 @@ fn lens_of(names: &[&str]) -> Option<Lens> {
         Model::Pupil,
         Model::KannalaBrandt(terms),
     ];
-    let mut lenses = models.into_iter().map(Model::lens);
+    let spline = spline.map(|grid| Lens::Spline(Spline::new(grid)));
+    let mut lenses = models.into_iter().map(Model::lens).chain(spline);
     lenses.find(|lens| Camera::centred(1, 1, 1.0, lens.clone()).parameter_names() == names)
 }
 

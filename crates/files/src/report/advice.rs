@@ -2,6 +2,7 @@
 
 use super::{Report, Survey};
 use deltille_core::calibrate::{CameraEstimate, Diagnosis, Excluded, Parameter};
+use deltille_core::camera::Lens;
 use deltille_core::statistics::median;
 use deltille_core::words::counted;
 
@@ -296,6 +297,10 @@ fn superfluous(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
 }
 
 fn correlated(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
+    // Of neighbouring knots nobody asks.
+    if matches!(camera.camera.lens, Lens::Spline(_)) {
+        return;
+    }
     let is_loose = |name: &str| camera.ill_conditioned.iter().any(|loose| loose == name);
     let names: Vec<&str> = camera.found().collect();
     let mut pairs = Vec::new();

@@ -4,18 +4,24 @@ use std::fmt::Write as _;
 
 use super::page::{self, escaped, rounded};
 use deltille_core::calibrate::{CameraEstimate, Parameter, Source};
+use deltille_core::camera::{Lens, SplineGrid};
 
 /// More parameters than this have their correlations in small print.
 const FEW: usize = 12;
-
-/// Of more than this, as a lens of splines has, no table of correlations is readable, and their values are folded.
-const READABLE: usize = 24;
 
 /// Correlations from here on are drawn in a blue on which white is read better than ink.
 const STRONG: f64 = 0.85;
 
 /// Parameters with their deviations, and their correlations.
 pub(super) fn section(camera: &CameraEstimate) -> String {
+    if let Lens::Spline(spline) = &camera.camera.lens {
+        let SplineGrid { degree, columns, rows, fov_x_deg } = spline.grid();
+        let told = format!(
+            "<p>The lens is a spline of degree {degree} with {columns} × {rows} knots over {fov_x_deg}° across. \
+             Single knots mean nothing by themselves: see how sure projections are.</p>"
+        );
+        return page::section("Parameters", &told);
+    }
     let mut rows = String::new();
     let told = |(p, _): &(&Parameter, Option<f64>)| p.sd.is_some() || p.value != 0.0;
     let is_observed = camera.covariance_from(Source::Observed).is_some();
@@ -40,7 +46,7 @@ pub(super) fn section(camera: &CameraEstimate) -> String {
     };
     let names: Vec<&str> = camera.found().collect();
     let mut matrix = String::new();
-    if (1..=READABLE).contains(&names.len()) {
+    if !names.is_empty() {
         let heads = names.iter().map(|name| format!("<th>{}</th>", escaped(name)));
         let _ = write!(matrix, "<tr><th></th>{}</tr>", heads.collect::<String>());
         for (i, name) in names.iter().enumerate() {
@@ -67,9 +73,5 @@ pub(super) fn section(camera: &CameraEstimate) -> String {
     let table = format!(
         "<div class=\"wide-table\"><table class=\"plain\"><tr><th>name</th><th>value</th>{heads}</tr>{rows}</table></div>"
     );
-    let table = match names.len() > READABLE {
-        true => format!("<details><summary>{} parameters</summary>{table}</details>", names.len()),
-        false => table,
-    };
     page::section("Parameters", &format!("<div class=\"plots\">{table}{matrix}</div>"))
 }

@@ -12,8 +12,10 @@ use super::super::model::Model;
 use super::super::pose::{blocks, estimate_pose, fixed, median_off_px};
 use super::super::problem::{CameraUnknowns, Problem, TargetUnknowns};
 use super::super::reweighting::scale;
+use super::super::roughness::Roughness;
 use super::super::view::View;
 use super::first_camera::first_camera;
+use super::splined::splined;
 use super::{Frame, Start};
 use crate::camera::{Camera, Lens, Pose};
 use crate::statistics::median;
@@ -21,6 +23,9 @@ use crate::statistics::median;
 /// Two views of a plane determine focal lengths and principal point if nothing is off; a third
 /// shows whether something is.
 const LEAST_VIEWS: usize = 3;
+
+/// Lenses from which a spline may start: one bends lines as fisheyes do, one as other lenses.
+const FORERUNNERS: [Model; 2] = [Model::KannalaBrandt(4), Model::Radtan5];
 
 /// Boards whose normals differ by less count as parallel. A corner's noise of a twentieth of a
 /// pixel on a board of 500 px already looks like a tilt of one degree.
@@ -60,6 +65,8 @@ struct Search<'a> {
     views: Vec<View>,
     panels: &'a [Pose],
     camera: Camera,
+    /// What is expected of the knots of a spline, where it was started from another lens.
+    roughness: Option<Roughness>,
     /// `None` where a view has no pose that the camera can have seen, or does not belong.
     poses: Vec<Option<Pose>>,
 }
@@ -72,6 +79,9 @@ impl<'a> Search<'a> {
         model: Model,
         start: Option<usize>,
     ) -> Result<Self, CalibrationError> {
+        if let Model::Spline { degree, knots } = model {
+            return Self::of_spline(views, panels, degree, knots);
+        }
         enough(views.len(), views.len())?;
         let agreeing: Vec<View> = views.iter().map(agreeing).collect();
         let ideal = first_camera(&agreeing, model).ok_or(CalibrationError::NoStart)?;
@@ -81,7 +91,7 @@ impl<'a> Search<'a> {
         let from = |(lens, scale): (Lens, f64)| {
             let camera = Camera::centred(width, height, scale * ideal.focal_px.x, lens);
             let (views, poses) = (agreeing.clone(), poses.clone());
-            let mut search = Search { views, panels, camera, poses };
+            let mut search = Search { views, panels, camera, roughness: None, poses };
             search.adjust(model.coarse())?;
             search.adjust(model.free())?;
             search.look_again();
@@ -102,6 +112,32 @@ impl<'a> Search<'a> {
         Ok(search)
     }
 
+    /// A spline that images as the parametric lens does that explains the views best.
+    fn of_spline(
+        views: &[View],
+        panels: &'a [Pose],
+        degree: usize,
+        knots: Option<[usize; 2]>,
+    ) -> Result<Self, CalibrationError> {
+        let found = FORERUNNERS.map(|model| {
+            let search = Self::without_guess(views, panels, model, None)?;
+            Ok((search.error_px(), search.splined(model, degree, knots)))
+        });
+        let error = |found: &Result<(f64, Option<Self>), _>| {
+            found.as_ref().map_or(f64::INFINITY, |(error, _)| *error)
+        };
+        let best = found.into_iter().min_by(|a, b| error(a).total_cmp(&error(b)));
+        best.ok_or(CalibrationError::NoStart)??.1.ok_or(CalibrationError::NoStart)
+    }
+
+    /// The same with a spline that images as the camera does.
+    fn splined(self, model: Model, degree: usize, knots: Option<[usize; 2]>) -> Option<Self> {
+        let sightings = self.views.iter().flat_map(|view| &view.sightings);
+        let seen = sightings.flat_map(|sighting| &sighting.observations).map(|seen| seen.pixel);
+        let (camera, roughness) = splined(&self.camera, &model.free(), seen, degree, knots)?;
+        Some(Self { camera, roughness: Some(roughness), ..self })
+    }
+
     /// The poses of the views of a camera.
     fn with_camera(
         views: &[View],
@@ -119,14 +155,18 @@ impl<'a> Search<'a> {
         let views: Vec<View> = views.iter().map(agreeing).collect();
         let pose = |view: &View| estimate_pose(camera, panels, &view.sightings);
         let poses = views.iter().map(pose).collect();
-        Ok(Self { views, panels, camera: camera.clone(), poses })
+        Ok(Self { views, panels, camera: camera.clone(), roughness: None, poses })
     }
 
     /// The views that have a pose and are within the camera's reach, and the problem of what is seen in
     /// them.
     fn problem(&self, views: &[View], free: Vec<bool>) -> (Vec<usize>, Problem) {
+        let mut camera = CameraUnknowns::alone(self.camera.clone(), free);
+        if let Some(roughness) = &self.roughness {
+            camera.roughness = Some(roughness.clone());
+        }
         let mut problem = Problem {
-            cameras: vec![CameraUnknowns::alone(self.camera.clone(), free)],
+            cameras: vec![camera],
             targets: vec![TargetUnknowns::SCENE],
             panels: fixed(self.panels),
             ..Problem::default()

@@ -13,6 +13,7 @@ mod delay;
 mod first_camera;
 mod linked;
 mod motion;
+mod splined;
 mod together;
 
 use super::calibration::Calibration;

@@ -16,7 +16,7 @@ use super::super::reweighting::scale;
 use super::delay::{delays, in_time};
 use super::linked::{ByFrame, Places, Seen};
 use super::{Frame, Start};
-use crate::camera::Pose;
+use crate::camera::{Camera, Pose};
 use crate::statistics::median;
 
 pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError> {
@@ -32,7 +32,7 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
         let poses: BTreeMap<String, Pose> =
             alone.cameras[0].views.iter().map(|view| (view.name.clone(), view.pose)).collect();
         seen.push(by_frame(calibration, camera, &poses));
-        found.extend(alone.cameras.into_iter().map(|alone| alone.camera));
+        found.extend(alone.cameras.into_iter().map(|alone| (alone.camera, alone.roughness)));
     }
     let delays = calibration.delays.clone().unwrap_or_else(|| delays(calibration, &seen));
     in_time(calibration, &delays, &mut seen);
@@ -68,11 +68,14 @@ pub(super) fn start(calibration: &Calibration) -> Result<Start, CalibrationError
         }
     }
     let unknown =
-        |((index, given), (camera, pose)): ((usize, &CameraViews), (_, &Pose))| CameraUnknowns {
-            camera,
-            free: given.intrinsics.free(),
-            camera_from_rig: *pose,
-            pose_free: index > 0 && given.camera_from_rig.is_none(),
+        |((index, given), (found, pose)): ((usize, &CameraViews), ((Camera, _), &Pose))| {
+            let (camera, roughness) = found;
+            CameraUnknowns {
+                roughness,
+                camera_from_rig: *pose,
+                pose_free: index > 0 && given.camera_from_rig.is_none(),
+                ..CameraUnknowns::alone(camera, given.intrinsics.free())
+            }
         };
     let of_cameras = cameras.iter().enumerate().zip(found.into_iter().zip(&places.camera_from_rig));
     problem.cameras = of_cameras.map(unknown).collect();

@@ -1,0 +1,85 @@
+//! What one frame tells of the unknowns that all frames share, where it tells only of some of them.
+//!
+//! Of the knots of a spline a frame touches a few. With V the covariance of all shared unknowns, H what the frame adds to
+//! their equations, which is zero but in those rows and columns t that it touches, and V_tt = G Gᵀ,
+//!
+//! ```text
+//!     W H Wᵀ = Q (Gᵀ H_tt G) Qᵀ,    Q = W_t G⁻ᵀ,  QᵀQ = 1        for any W with WᵀW = V
+//! ```
+//!
+//! so that its eigenvalues but zeros are those of a small matrix.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// The eigenvalues and directions of a frame's share.
+pub(super) struct LocalShare {
+    touched: Vec<usize>,
+    /// Deviations of the touched unknowns; G is that of their correlations.
+    sd: DVector<f64>,
+    root: Cholesky<f64, Dyn>,
+    /// Eigenvalues of Gᵀ H_tt G: of what is known of a direction the part that the frame tells.
+    pub parts: DVector<f64>,
+    directions: DMatrix<f64>,
+}
+
+impl LocalShare {
+    /// Of a frame's H, of which only the rows and columns of unknowns that it touches are not zero, and V. `None` where
+    /// V is singular.
+    pub fn of(own: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Option<Self> {
+        let touched: Vec<usize> = (0..own.nrows()).filter(|&i| own[(i, i)] > 0.0).collect();
+        let n = touched.len();
+        let sd = DVector::from_fn(n, |i, _| covariance[(touched[i], touched[i])].sqrt());
+        let correlations =
+            DMatrix::from_fn(n, n, |i, j| covariance[(touched[i], touched[j])] / (sd[i] * sd[j]));
+        let root = correlations.cholesky()?;
+        let own = DMatrix::from_fn(n, n, |i, j| own[(touched[i], touched[j])] * sd[i] * sd[j]);
+        let lower = root.l();
+        let eigen = (lower.tr_mul(&own) * &lower).symmetric_eigen();
+        Some(Self { touched, sd, root, parts: eigen.eigenvalues, directions: eigen.eigenvectors })
+    }
+
+    /// The components of Qᵀ W g along the directions, for g that is zero but where the frame touches.
+    pub fn along(&self, pull: &DVector<f64>) -> DVector<f64> {
+        let own = DVector::from_fn(self.touched.len(), |i, _| pull[self.touched[i]] * self.sd[i]);
+        self.directions.tr_mul(&self.root.l().tr_mul(&own))
+    }
+
+    /// W_tᵀ-weighted sum of directions with these components: Q E a, with W the transpose of `half`.
+    pub fn spread(&self, components: &DVector<f64>, half: &DMatrix<f64>) -> DVector<f64> {
+        let turned = &self.directions * components;
+        let Some(mut own) = self.root.l().tr_solve_lower_triangular(&turned) else {
+            return DVector::zeros(half.ncols());
+        };
+        own.component_div_assign(&self.sd);
+        let mut whole = DVector::zeros(half.nrows());
+        self.touched.iter().zip(own.iter()).for_each(|(&i, value)| whole[i] = *value);
+        half.tr_mul(&whole)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same as of the whole matrices.
+    #[test]
+    fn a_share_of_some_unknowns_is_that_of_all() {
+        let n = 7;
+        let any = |i: usize, j: usize| (((i * 31 + j * 17) % 13) as f64 - 6.0) / 7.0;
+        let half = DMatrix::from_fn(n, n, |i, j| any(i, j) + if i == j { 2.0 } else { 0.0 });
+        let covariance = &half * half.transpose();
+        let rows = DMatrix::from_fn(4, 3, |i, j| any(i + 3, j + 5));
+        let mut own = DMatrix::zeros(n, n);
+        own.view_mut((2, 2), (3, 3)).copy_from(&(rows.tr_mul(&rows) * 0.01));
+        let mut pull = DVector::zeros(n);
+        pull.rows_mut(2, 3).copy_from(&DVector::from_vec(vec![0.3, -1.0, 0.7]));
+        let whole = (half.tr_mul(&own) * &half).symmetric_eigen();
+        let grown = |part: f64| (1.0 - part).sqrt().recip();
+        let turned = whole.eigenvectors.tr_mul(&half.tr_mul(&pull));
+        let expected = &whole.eigenvectors * turned.component_mul(&whole.eigenvalues.map(grown));
+        let share = LocalShare::of(&own, &covariance).unwrap();
+        let more = share.along(&pull).component_mul(&share.parts.map(|part| grown(part) - 1.0));
+        let found = half.tr_mul(&pull) + share.spread(&more, &half);
+        assert!((found - expected).amax() < 1e-10);
+    }
+}
