@@ -41,7 +41,7 @@ pub(super) fn html(report: &Report) -> String {
         let _ = write!(
             page,
             "<li class=\"{class}\"><span class=\"sign\">{sign}</span><span>{}</span></li>",
-            escaped(&piece.text)
+            with_whole_options(&piece.text)
         );
     }
     page += "</ul></section>\n";
@@ -259,6 +259,15 @@ fn target(map: &TargetMap) -> String {
          and its scale are not in it: poses and distances take them up.</figcaption></figure>"
     );
     section("The target, measured", &body)
+}
+
+/// Escaped text in which no line breaks within an option such as `--board-shape`.
+fn with_whole_options(text: &str) -> String {
+    let word = |word: &str| match word.starts_with("--") {
+        true => format!("<span class=\"option\">{}</span>", escaped(word)),
+        false => escaped(word),
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// A text as it stands in HTML.

@@ -58,7 +58,8 @@ pub(super) fn section(camera: &CameraEstimate) -> String {
                 let share = (100.0 * c.abs()).round();
                 format!(
                     "<td{strong} style=\"background:color-mix(in srgb,{hue} {share}%,transparent)\">{}</td>",
-                    format!("{c:.2}").replace('-', "−")
+                    // Nothing is no minus nothing.
+                    format!("{:.2}", if c.abs() < 0.005 { 0.0 } else { c }).replace('-', "−")
                 )
             });
             let _ =
