@@ -122,11 +122,13 @@ fn whatever_else_is_found_a_spline_may_be_found_too() {
     }
 }
 
+/// Whether no more than noise is left: a spline that is expected to be smooth leaves a part of the waves, here up to a
+/// tenth of the noise.
 #[track_caller]
 fn is_noise(found: &Estimate) {
     let rms = found.inlier_rms_px() / NOISE_PX;
     assert!(
-        (0.9..1.1).contains(&rms),
+        (0.85..1.15).contains(&rms),
         "{rms}, {} outliers, {:?}",
         found.outlier_count(),
         found.excluded
