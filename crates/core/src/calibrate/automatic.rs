@@ -84,7 +84,15 @@ impl Calibration {
     /// # Errors
     /// Where there are too few views to hold some out, or no model explains them.
     pub fn choose_model(&self, camera: usize) -> Result<(Model, Vec<Candidate>), CalibrationError> {
-        let candidates = self.tried(camera, &TRIED, MOST_VIEWS)?;
+        let views = evenly(&self.cameras[camera].views, MOST_VIEWS);
+        let coordinates: usize = views.map(|view: &View| 2 * view.corner_count()).sum();
+        let of_fit = coordinates - coordinates / HELD_OUT;
+        let is_enough = |model: &Model| {
+            let is_spline = matches!(model, Model::Spline { .. });
+            !is_spline || of_fit >= COORDINATES_A_PARAMETER * parameters(*model)
+        };
+        let models: Vec<Model> = TRIED.into_iter().filter(is_enough).collect();
+        let candidates = self.tried(camera, &models, MOST_VIEWS)?;
         let chosen = candidates.iter().find(|candidate| candidate.chosen);
         let model = chosen.map(|chosen| chosen.model).ok_or(CalibrationError::NoStart)?;
         Ok((model, candidates))
@@ -115,13 +123,7 @@ impl Calibration {
             let calibration = alone.of_cameras(vec![only]).hold_out(Some(HELD_OUT));
             calibration.board_shape(false).measure_target(false).solve()
         };
-        let coordinates: usize = views.iter().map(|view: &View| 2 * view.corner_count()).sum();
-        let of_fit = coordinates - coordinates / HELD_OUT;
-        let is_enough = |model: &&Model| {
-            let is_spline = matches!(model, Model::Spline { .. });
-            !is_spline || of_fit >= COORDINATES_A_PARAMETER * parameters(**model)
-        };
-        let tried = models.iter().filter(is_enough).map(|&model| (model, of_model(model)));
+        let tried = models.iter().map(|&model| (model, of_model(model)));
         let mut error = CalibrationError::NoStart;
         let mut found = Vec::new();
         for (model, estimate) in tried {

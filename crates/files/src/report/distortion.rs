@@ -71,14 +71,17 @@ pub(super) struct Displacement {
 impl Ideal {
     /// Of a camera whose image shows so much, rad from the axis.
     pub(super) fn of(camera: &Camera, widest_rad: f64) -> Self {
+        // A spline has the axis where its knots say, not at cx and cy.
+        let on_axis = camera.project(INFINITY_MM * DVec3::Z);
+        let centre_px = on_axis.unwrap_or(camera.centre_px);
         let near = |axis: DVec3| {
             let direction = (DVec3::Z + NEAR_AXIS_RAD * axis).normalize();
             let at = camera.project(INFINITY_MM * direction)?;
-            Some(at.distance(camera.centre_px) / NEAR_AXIS_RAD)
+            Some(at.distance(centre_px) / NEAR_AXIS_RAD)
         };
         let focal = near(DVec3::X).zip(near(DVec3::Y));
         let focal_px = focal.map_or(camera.focal_px, DVec2::from);
-        Self { focal_px, centre_px: camera.centre_px, is_pinhole: widest_rad < PINHOLE_RAD }
+        Self { focal_px, centre_px, is_pinhole: widest_rad < PINHOLE_RAD }
     }
 
     /// Where it has a direction; `None` behind a pinhole.
@@ -148,8 +151,9 @@ pub(super) fn curve(
             let pixel = camera.project(distance_mm * direction)?;
             // Beyond where it turns back it is no lens.
             let radius = ((pixel - camera.centre_px) / camera.focal_px).length();
-            let ideal = ideal.pixel(direction)?.distance(camera.centre_px);
-            (radius <= steady).then(|| pixel.distance(camera.centre_px) - ideal)
+            let centre_px = ideal.centre_px;
+            let ideal = ideal.pixel(direction)?.distance(centre_px);
+            (radius <= steady).then(|| pixel.distance(centre_px) - ideal)
         });
         let all: Vec<f64> = displacements.collect::<Option<_>>()?;
         Some(Displacement {
@@ -264,7 +268,7 @@ pub(super) fn grid_plot(found: &CameraEstimate, survey: &Survey) -> (String, Str
         (-beyond..=beyond).map(move |line| {
             let reach = size.max_element() * 1.2;
             let points = (0..=POINTS).map(move |i| 2.0 * i as f64 / POINTS as f64 - 1.0);
-            let middle = camera.centre_px + across * line as f64 * step;
+            let middle = ideal.centre_px + across * line as f64 * step;
             points.map(move |t| middle + along * t * reach).collect::<Vec<DVec2>>()
         })
     };
@@ -291,7 +295,7 @@ pub(super) fn grid_plot(found: &CameraEstimate, survey: &Survey) -> (String, Str
             }
         }
     });
-    axes.dot(camera.centre_px, 3.0, "view");
+    axes.dot(ideal.centre_px, 3.0, "view");
     axes.foot(
         FOOT,
         format!(

@@ -21,15 +21,13 @@ pub(super) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
         (Some(best), Some(own)) if best == own => {
             format!("{own} is the smallest that holds the lens.")
         }
-        (Some(best), Some(own)) => {
-            let is_as_good = tried.iter().any(|one| one.model == own && one.holds);
-            match is_as_good {
-                true => {
-                    format!("{own} holds the lens; {best} does so with fewer parameters, or surer.")
-                }
-                false => format!("{own} was taken, and {best} holds the lens better: try it."),
+        (Some(best), Some(own)) => match tried.iter().find(|one| one.model == own) {
+            Some(one) if one.holds => {
+                format!("{own} holds the lens; {best} does so with fewer parameters, or surer.")
             }
-        }
+            Some(_) => format!("{own} was taken, and {best} holds the lens better: try it."),
+            None => String::new(),
+        },
         _ => String::new(),
     };
     format!(
