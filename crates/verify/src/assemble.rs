@@ -1,7 +1,7 @@
-//! The pages of a sheet that is larger than the paper, laid together to one picture.
+//! Assembly of the pages of a sheet that is larger than the paper into one picture.
 //!
-//! Every pixel of the sheet is taken from the page in whose window it lies deepest; what the other
-//! pages show there must be the same.
+//! Every pixel of the sheet is taken from the page in whose window it lies deepest; the other pages
+//! that show it must agree.
 
 use glam::DVec2;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! Check bars measured in a picture, without knowledge of how they were drawn.
+//! Measurement of check bars in a picture, independent of how they were drawn.
 
 use glam::DVec2;
 

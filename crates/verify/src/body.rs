@@ -1,8 +1,9 @@
-//! Bodies to print, as STL: closed, outside out, of the stated shape.
+//! Verification of bodies to print, as STL: a closed surface with its normals outwards and of the
+//! stated shape.
 //!
-//! A skeleton is felt from outside with rays: on the ribs they meet the planes of the faces, in the
-//! seats they stop at the thickness of a panel below, and in the windows they pass. Then it is compared
-//! triangle by triangle, as the bare solid is.
+//! A skeleton is probed from outside with rays: on the ribs they hit the planes of the faces, in
+//! the seats they stop at the thickness of a panel below, and in the windows they pass. Then it is
+//! compared triangle by triangle, as the solid is.
 
 use std::path::Path;
 

@@ -1,9 +1,9 @@
-//! Where the edges of tiles and cells lie, to a fraction of a pixel.
+//! Subpixel positions of the edges of tiles and cells.
 //!
-//! A pixel that an edge crosses may have any grey and tells little by itself. But an edge that lies d px beside its
-//! place has d px² of ink too much or too little along each px of its length, whichever pixels it
-//! crosses: over a square of pixels these add up, and what rounding and smear do to single pixels
-//! does not.
+//! A pixel that an edge crosses may have any grey value and tells little by itself. But an edge
+//! that is displaced by d px has d px² of ink too much or too little along each px of its length,
+//! whichever pixels it crosses: over a square of pixels these add up, while rounding and smear of
+//! single pixels do not.
 
 use std::collections::BTreeMap;
 

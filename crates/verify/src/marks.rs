@@ -1,7 +1,9 @@
-//! What lies outside the tiles: every text, check bar and line has its ink, and nothing else is on the sheet.
+//! Verification outside the tiles: every text, check bar and line has its ink, and there is nothing
+//! else on the sheet.
 //!
-//! Outlines of marks come from the same place as those printed; what is proved is that the sheet has
-//! what the description says, and no more. The length of check bars is measured by itself.
+//! The expected outlines come from the same code as the printed ones; so this proves that the sheet
+//! has what the description states, and no more. The length of check bars is measured
+//! independently.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -41,12 +43,12 @@ const MOST_SPOTS: usize = 200;
 /// How finely curves are turned into lines, mm.
 const FLATNESS_MM: f64 = 0.002;
 
-/// What is wrong beside the tiles of a sheet. Lengths in mm in the page frame.
+/// A deviation outside the tiles of a sheet. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum MarkFinding {
-    /// A check bar has another length, or is not there.
+    /// A check bar has another length, or is missing.
     #[error("check bar {bar} {}", measured(*found_mm, *stated_mm))]
     CheckBar {
         /// Which bar, from 1.
@@ -62,20 +64,20 @@ pub enum MarkFinding {
         /// Which bar, from 1.
         bar: usize,
     },
-    /// A text is not there, or reads otherwise.
+    /// A text is missing, or differs.
     #[error("label {text} differs from the description")]
     TextDiffers {
         /// Which text of the sheet, from 1.
         text: usize,
-        /// What it should say.
+        /// The stated text.
         stated: Label,
     },
-    /// A line is not there, or drawn otherwise.
+    /// A line is missing, or differs.
     #[error("line {line}, to {}, differs from the description", purpose.name())]
     LineDiffers {
         /// Which line of the sheet, from 1.
         line: usize,
-        /// What it is for.
+        /// Its purpose.
         purpose: LineKind,
     },
     /// Ink, or on a black field a lack of it, outside the tiles, texts and check bars.
@@ -89,7 +91,7 @@ pub enum MarkFinding {
 }
 
 impl MarkFinding {
-    /// The same with its place told in another frame.
+    /// The same finding with its position converted to another frame.
     pub(super) fn moved(self, place: impl Fn(DVec2) -> DVec2) -> Self {
         match self {
             Self::Spot { at_mm, area_mm2 } => Self::Spot { at_mm: place(at_mm), area_mm2 },

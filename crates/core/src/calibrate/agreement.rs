@@ -7,7 +7,7 @@
 //! where there are no model errors (Bell & McCaffrey 2002).
 //!
 //! ```text
-//!     yᵥ = (I − LᵀHᵥL)^−½ Lᵀ gᵥ,    Σ = LLᵀ       Hᵥ, gᵥ: what frame v adds to the normal equations and their right side
+//!     yᵥ = (I − LᵀHᵥL)^−½ Lᵀ gᵥ,    Σ = LLᵀ       Hᵥ, gᵥ: normal equations and gradient of frame v
 //!     S = L (Σᵥ yᵥ yᵥᵀ) Lᵀ
 //! ```
 //!

@@ -1,14 +1,16 @@
-//! What residuals say of each corner of the target: where it would have to be on its panel, and how well it fits.
+//! Residuals by corner of the target: the offset on its panel that would explain them, and their
+//! RMS.
 //!
-//! A residual r of a corner is what a move d of the corner in the plane of its panel does there, J d, with J the change of
-//! its pixel by that move. Of all views of the corner together the move is
+//! An offset d of a corner in the plane of its panel causes the residual r = J d, with J the
+//! derivative of the pixel by the offset. The least-squares offset over all views of the corner is
 //!
 //! ```text
 //!     d = (Σ JᵀJ)⁻¹ Σ Jᵀ r      covariance σ² (Σ JᵀJ)⁻¹
 //! ```
 //!
-//! Poses take up what all corners of a panel have in common. Heights and the covariances of offsets are found by
-//! `Calibration::measure_target`; this is a look at what is left, at no cost.
+//! Poses absorb what all corners of a panel have in common. `Calibration::measure_target` estimates
+//! heights and covariances of offsets as well; this is a quick approximation from the residuals
+//! that are left.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -67,8 +69,8 @@ struct Sums {
     views: usize,
 }
 
-/// The corners that a camera saw, by panel, row and column. Outliers are left out; but where a corner is one in most of its
-/// views it is no accident, and all of them count.
+/// The corners that a camera saw, by panel, row and column. Outliers are excluded; but where a
+/// corner is an outlier in most of its views, this is no accident, and all of them count.
 pub(super) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<OfCorner> {
     let step = camera.corner_count().div_ceil(MOST_CORNERS).max(1);
     // Of those that are no outliers, and of all.

@@ -1,12 +1,14 @@
-//! How a lens bends what it sees: its radius over the angle from the axis, and a grid over the image, both beside those of
-//! a lens that is ideal.
+//! Distortion of a lens: its radial displacement over the angle from the axis, and a grid over the
+//! image, both compared with an ideal lens.
 //!
 //! ```text
 //!     displacement(θ) = mean over φ of |p(θ, φ) − c| − |i(θ, φ) − c|       px
 //! ```
 //!
-//! p is where the camera has a direction θ from its axis, in the direction φ around it, i where an ideal lens of the same
-//! focal length near the axis has it: a pinhole, f tan θ, or where the image shows more than that does well, f θ.
+//! p is the pixel of the camera for the direction at the angle θ from its axis and the azimuth φ, i
+//! that of an ideal lens with the same focal length near the axis: a pinhole, f tan θ, or for
+//! images that show more than a pinhole represents well, equidistant, f θ; c is the principal
+//! point.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -35,8 +37,8 @@ const ANGLES: usize = 96;
 /// Bins in which corners are counted by their angle.
 const BINS: usize = 40;
 
-/// Where points at the distance of the corners are seen elsewhere by so much, px, than those at infinity, they have a curve
-/// of their own.
+/// Least difference, px, between the projections of points at the distance of the corners and at
+/// infinity for which both have a curve.
 const APART_PX: f64 = 0.05;
 
 /// Lines of the grid over the longer side, and points of each.

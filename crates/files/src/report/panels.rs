@@ -1,4 +1,5 @@
-//! The corners of a target with something to say of each: a coloured dot at its place on its panel, and an arrow.
+//! Plot of values at the corners of a target: a coloured dot at the place of each corner on its
+//! panel, and an arrow.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,5 @@
-//! Cameras and targets in space: pictures in parallel projection, one with the cameras at rest, one with the target.
+//! Drawings of cameras and targets in space, in parallel projection: one with the cameras fixed,
+//! one with the target fixed.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

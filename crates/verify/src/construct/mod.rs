@@ -1,9 +1,9 @@
-//! What a file is built of, held against a list of what every viewer shows alike.
+//! Inspection of the constructs of a file against a list of those that every viewer shows alike.
 //!
-//! A picture of a file proves what one program shows. Scripts, animations, rules for print, layers,
-//! blend modes, vertex colours or a second scene make another program show something else. So each
-//! format has a list of what its writer here uses and the reader interprets exactly; anything else
-//! is named and refused, known as harmful or not. What is refused is not drawn.
+//! Rendering a file proves what one program shows. Scripts, animations, rules for print, layers,
+//! blend modes, vertex colours or a second scene make other programs show something else. So each
+//! format has a list of the constructs that its writer here uses and the reader interprets exactly;
+//! anything else is named and refused, known as harmful or not. A refused file is not rendered.
 
 mod glb;
 mod glb_json;
@@ -37,13 +37,13 @@ const MOST_DIGITS: usize = 40;
 /// More than this of a file is not listed.
 const MOST_LISTED: usize = 64;
 
-/// What is wrong with what a file is built of.
+/// A construct that is not permitted, or hidden content.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ConstructFinding {
-    /// The file has something that not every viewer shows alike, so that what is seen here need
-    /// not be what is seen elsewhere.
+    /// The file has a construct that not every viewer shows alike, so that other programs may show
+    /// something else than is seen here.
     #[error("{place}: {construct}: not every viewer shows that alike")]
     Construct {
         /// Where it is, in the words of the format.
@@ -51,7 +51,8 @@ pub enum ConstructFinding {
         /// What it is.
         construct: String,
     },
-    /// What no picture of the page shows: words that are not those of the target, or marks beside the page.
+    /// Content that no picture of the page shows: texts that are not those of the target, or marks
+    /// beside the page.
     #[error("{place}: {problem}")]
     Unseen {
         /// Where it is, in the words of the format.
@@ -61,7 +62,7 @@ pub enum ConstructFinding {
     },
 }
 
-/// What is not on the list, as it is met on the way through a file.
+/// Constructs that are not permitted, collected while a file is inspected.
 #[derive(Default)]
 struct Findings(Vec<Finding>);
 
@@ -126,7 +127,7 @@ pub(super) fn refuse(findings: &[Finding]) -> bool {
     })
 }
 
-/// What files say of their target in words, for people and programs that do not look at the picture.
+/// Texts about the target in files, for people and programs that do not look at the picture.
 struct Words {
     /// Its name.
     title: String,
@@ -156,8 +157,8 @@ fn is_creator(words: &str) -> bool {
     !version.is_empty() && version.chars().all(|c| c.is_ascii_digit() || c == '.')
 }
 
-/// What of a drawn page, a mesh or a body is not on the list of its format, or says in words
-/// what the target is not; and the files that belong to it, as an OBJ names them. An error means that
+/// Inspects a printed page, a mesh or a body: constructs that are not permitted, texts that are not
+/// those of the target, and the files that belong to it, as an OBJ names them. An error means that
 /// a file cannot be read at all.
 pub(super) fn check(
     reader: &Reader,
@@ -202,8 +203,8 @@ fn decimal(word: &str) -> Option<f64> {
     plain.then(|| word.parse().ok()).flatten()
 }
 
-/// Unpacks what is packed by zlib, block by block, and tells its length: `None` unless it ends with the
-/// last of these bytes, its check sum is right, and it is no longer than `most`.
+/// Decompresses zlib data block by block and returns its length: `None` unless the stream ends with
+/// the last byte, its checksum is right, and it is no longer than `most`.
 fn unpack(packed: &[u8], most: u64, mut each: impl FnMut(&[u8])) -> Option<u64> {
     let mut stream = Decompress::new(true);
     let mut block = vec![0; 1 << 16];
@@ -221,7 +222,7 @@ fn unpack(packed: &[u8], most: u64, mut each: impl FnMut(&[u8])) -> Option<u64> 
                 return Some(stream.total_out());
             }
             Status::StreamEnd => return None,
-            // Nothing goes on: the end is missing.
+            // No progress: the end is missing.
             _ if length == 0 && stream.total_in() == read => return None,
             _ => {}
         }
