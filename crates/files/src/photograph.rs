@@ -147,7 +147,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<AnyGray, ImageError> {
 /// Reads a photograph as [`read`] does, within other limits than the default.
 ///
 /// # Errors
-/// Where the file cannot be read, is no picture, is damaged, or is larger than the limits allow.
+/// When the file cannot be read, is not a picture, is damaged, or exceeds the limits.
 pub fn read_within(path: &Path, limits: &Limits) -> Result<AnyGray, ImageError> {
     Ok(read_with_notes(path, limits, false)?.image)
 }
@@ -170,7 +170,7 @@ pub fn read_with_notes(
 /// Reads a photograph with its colours, within limits, in sensor orientation.
 ///
 /// # Errors
-/// Where the file cannot be read, is no picture, is damaged, or is larger than the limits allow.
+/// When the file cannot be read, is not a picture, is damaged, or exceeds the limits.
 pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageError> {
     Ok(decoded(path, limits, false)?.0)
 }
@@ -211,7 +211,7 @@ pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
     Some(u64::from(width) * u64::from(height))
 }
 
-/// Where decoders read.
+/// A source from which decoders read.
 trait Source: BufRead + Seek {}
 
 impl<T: BufRead + Seek> Source for T {}

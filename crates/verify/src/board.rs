@@ -19,14 +19,16 @@ use deltille_core::words::counted;
 /// way to the next.
 const MATCH_EDGES: f64 = 0.25;
 
-/// With a larger share of tiles of the wrong colour the picture does not show the panel, and to
-/// name them one by one would say nothing.
+/// Greatest share of tiles of the wrong colour that are named one by one; with more, the picture
+/// does not show the panel.
 const MAX_WRONG_TILES: f64 = 0.25;
 
-/// With a larger share of corners missing, or more than stated, it is another board.
+/// Greatest share of corners missing, or more than stated; beyond it the picture shows another
+/// board.
 const MAX_MISSING: f64 = 0.25;
 
-/// How far the ink in the middle of a tile may be from 0 or 1: what rounding leaves of 255 grey values.
+/// Tolerance of the ink in the middle of a tile from 0 or 1: the effect of rounding to 255 grey
+/// values.
 const MAX_TONE_ERROR: f64 = 0.01;
 
 /// Difference of ink below which a sheet is called blank rather than faint.

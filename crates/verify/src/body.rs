@@ -21,7 +21,7 @@ use deltille_core::targets::{
 };
 use deltille_files::export::stl::skeleton_name;
 
-/// How far a unit normal may be from that of its triangle: single precision on small triangles.
+/// Tolerance of a unit normal: single precision on small triangles.
 const NORMAL_SLACK: f64 = 1e-3;
 
 /// Relative difference of volumes: single precision.
@@ -212,7 +212,7 @@ fn check_seats(
     findings
 }
 
-/// How far a ray gets, mm.
+/// Distance at which a ray hits the surface, mm.
 fn depth(facets: &[Facet], from: DVec3, direction: DVec3) -> f64 {
     let meets = facets.iter().filter_map(|facet| {
         let [a, b, c] = facet.vertices_mm;

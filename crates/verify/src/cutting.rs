@@ -31,7 +31,7 @@ pub enum CutFinding {
     PathOff {
         /// Its layer.
         layer: &'static str,
-        /// Where it should begin.
+        /// Its stated start.
         at_mm: DVec2,
         /// Largest distance of a point.
         by_mm: f64,
@@ -41,7 +41,7 @@ pub enum CutFinding {
     PathMissing {
         /// Its layer.
         layer: &'static str,
-        /// Where it should begin.
+        /// Its stated start.
         at_mm: DVec2,
     },
     /// A path that the target does not have.
@@ -52,7 +52,7 @@ pub enum CutFinding {
     PathExtra {
         /// Its layer.
         layer: &'static str,
-        /// Where it begins.
+        /// Its start.
         at_mm: DVec2,
     },
 }
@@ -79,7 +79,7 @@ pub(super) fn verify(
     Ok(Verdict { cut: Some(cut), ..Verdict::new(path, Format::Dxf, findings) })
 }
 
-/// What is to be cut.
+/// The drawing that the target states.
 fn stated(verifier: &Verifier, path: &Path) -> Result<CutDrawing, VerifyError> {
     let target = verifier.target;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();

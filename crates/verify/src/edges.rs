@@ -22,7 +22,7 @@ const NEAR: usize = 2;
 /// Samples per pixel and axis of a pixel that an edge crosses.
 const SAMPLES: usize = 4;
 
-/// An edge that lies elsewhere than stated.
+/// An edge that is displaced.
 pub(super) struct MovedEdge {
     pub tile: Tile,
     pub at_mm: DVec2,
@@ -54,7 +54,8 @@ impl LatticeFromPx {
 }
 
 impl PlacedPanel<'_> {
-    /// The edges that lie further beside their place than `tolerance_px`: of each tile the one that does most.
+    /// The edges that are displaced by more than `tolerance_px`: for each tile the one that is
+    /// displaced most.
     pub fn moved_edges(
         &self,
         expected: &BTreeMap<Tile, Expected>,
@@ -108,8 +109,8 @@ impl PlacedPanel<'_> {
         moved.collect()
     }
 
-    /// How far edges lie beside their place in the square of pixels whose first is `low`, px, positive where there is
-    /// too much ink; `None` where there is no edge.
+    /// Displacement of edges in the square of pixels whose first is `low`, px, positive where there
+    /// is too much ink; `None` where there is no edge.
     fn displaced(&self, low: [usize; 2], is_black: &impl Fn(DVec2) -> bool) -> Option<f64> {
         const SIDE: usize = SQUARE + 2 * NEAR;
         // Corner of a pixel, counted from that of the nearest pixel that counts.

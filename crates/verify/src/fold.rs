@@ -147,8 +147,8 @@ pub(super) fn is_net(target: &Target) -> bool {
     matches!(target.spec, TargetSpec::Solid(_)) && target.sheets.iter().any(folds)
 }
 
-/// Folds the net that was found, and adds to the verdicts what that shows. Where a face was not
-/// found there is nothing to prove.
+/// Folds the detected net, and adds findings to the verdicts. Faces that were not detected cannot
+/// be checked.
 pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict]) {
     let Some(net) = Net::new(target, seen) else { return };
     let mut carried = vec![None; net.faces.len()];
@@ -218,7 +218,7 @@ struct Rigid {
 }
 
 impl Rigid {
-    /// The motion of least squares: with centred p and q as complex numbers, turn ∝ Σ p̄ q.
+    /// The least-squares rigid motion: with centred p and q as complex numbers, turn ∝ Σ p̄ q.
     fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
         let n = pairs.len() as f64;
         let p0 = pairs.iter().map(|(p, _)| *p).sum::<DVec2>() / n;
@@ -246,7 +246,7 @@ impl SpaceFromPage {
         self.linear * p.extend(0.0) + self.shift
     }
 
-    /// The same turned about the line through two points of the page.
+    /// The same map rotated about the line through two points of the page.
     fn folded(&self, [p, q]: [DVec2; 2], angle_rad: f64) -> Self {
         let (a, b) = (self.apply(p), self.apply(q));
         let turn = DMat3::from_axis_angle((b - a).normalize_or(DVec3::X), angle_rad);
@@ -525,8 +525,8 @@ impl Net {
         both.map(|sides| Edge { sides }).collect()
     }
 
-    /// How far the two sides of an edge are apart in space, if they belong together: folded
-    /// against each other on the page, or cut and carrying the same number, with a tab on one.
+    /// Distance in space of the two sides of an edge, if they belong together: folded against each
+    /// other on the page, or cut and carrying the same number, with a tab on one.
     fn check_edge(
         &self,
         edge: &Edge,
@@ -556,7 +556,7 @@ impl Net {
         }
     }
 
-    /// What is wrong with the name of a face and with the names that its tabs carry.
+    /// Findings about the number of a face and the numbers on its tabs.
     fn check_words(&self, index: usize) -> Vec<FoldFinding> {
         let face = &self.faces[index];
         let mut findings = Vec::new();

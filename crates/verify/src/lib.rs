@@ -182,7 +182,7 @@ pub enum VerifyError {
     Family {
         /// Name and fingerprint of the family of the target.
         needed: String,
-        /// What was given instead.
+        /// The family that was given instead.
         given: String,
     },
 }

@@ -40,7 +40,7 @@ const WINDOW_BLANK_PX: f64 = 3.0;
 /// More spots of a page are not listed: it is dirty all over.
 const MOST_SPOTS: usize = 200;
 
-/// How finely curves are turned into lines, mm.
+/// Greatest deviation of the line segments that replace curves, mm.
 const FLATNESS_MM: f64 = 0.002;
 
 /// A deviation outside the tiles of a sheet. Lengths in mm in the page frame.
@@ -100,7 +100,7 @@ impl MarkFinding {
     }
 }
 
-/// What was measured of a check bar.
+/// The measurement of a check bar in words.
 fn measured(found_mm: Option<f64>, stated_mm: f64) -> String {
     match found_mm {
         Some(found_mm) => format!("measures {found_mm:.3} mm instead of {stated_mm:.3} mm"),
@@ -155,7 +155,7 @@ pub(super) fn check(
     verdict.findings.extend(spots(page, &known, panels).into_iter().map(Finding::from));
 }
 
-/// What a mark is, with its index.
+/// Kind and index of a mark.
 #[derive(Clone, Copy)]
 enum What {
     Text(usize),
@@ -164,7 +164,7 @@ enum What {
 }
 
 impl What {
-    /// That a mark is not as the layout has it.
+    /// The finding that a mark differs from the layout.
     fn differs(self, layout: &SheetLayout) -> MarkFinding {
         match self {
             Self::Text(i) => {
@@ -181,9 +181,9 @@ impl What {
 /// A mark beside the panels.
 struct Mark {
     what: What,
-    /// What is black, on the page, mm.
+    /// Its black outlines, in the page frame, mm.
     outlines: Vec<Vec<DVec2>>,
-    /// What belongs to it, in pieces.
+    /// Its area, in pieces.
     areas: Vec<Area>,
 }
 
@@ -279,7 +279,7 @@ impl Area {
 /// An outline in the picture, by the rectangle around it, and whether it is of a letter.
 type Outline = GeomWithData<Rectangle<[f64; 2]>, (Vec<DVec2>, bool)>;
 
-/// What a page should show of marks.
+/// The marks that a page should show.
 struct Drawn<'a> {
     page: &'a Page,
     outlines: RTree<Outline>,

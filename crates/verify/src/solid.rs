@@ -41,7 +41,7 @@ const MAX_SIDE_PX: f64 = 4000.0;
 const DISTANCE: f64 = 6.0;
 const ASIDE: f64 = 1.2;
 
-/// How far a unit normal may be from that of its triangle.
+/// Tolerance of a unit normal.
 const NORMAL_SLACK: f64 = 1e-4;
 
 /// A mesh this much larger or smaller, relative, is not looked at any further.
@@ -96,7 +96,7 @@ pub enum MeshFinding {
     },
 }
 
-/// How a tag was read.
+/// The reading of a tag in words.
 fn how_read(errors: Option<u32>) -> String {
     match errors {
         Some(errors) => format!("read with {}", counted(errors as usize, "wrong bit")),
@@ -104,7 +104,7 @@ fn how_read(errors: Option<u32>) -> String {
     }
 }
 
-/// What there is to say of a mesh that has not the stated number of triangles.
+/// The finding about a mesh with another number of triangles than stated.
 pub(super) fn other_count(found: usize, stated: usize) -> Option<Finding> {
     let problem = || format!("{} instead of {stated}", counted(found, "triangle"));
     (found != stated).then(|| MeshFinding::Body { problem: problem() }.into())

@@ -143,12 +143,12 @@ impl TileFinding {
     }
 }
 
-/// What a tag reads that is not as stated.
+/// The reading of a tag in words, where it differs.
 fn what_reads(id: u32, reads: u32) -> String {
     if id == reads { "is turned".to_owned() } else { format!("reads {reads}") }
 }
 
-/// How many bits differ.
+/// The number of differing bits in words.
 fn bits_differ(bits: usize) -> String {
     let differ = if bits == 1 { "bit differs" } else { "bits differ" };
     format!("{bits} {differ}")
@@ -182,7 +182,7 @@ impl Tally {
     }
 }
 
-/// What a tile should look like.
+/// The expected appearance of a tile.
 pub(super) struct Expected<'a> {
     /// Black, as a whole or around its tag.
     black: bool,
@@ -209,7 +209,7 @@ struct ExpectedTag<'a> {
     looks: &'a TagLooks,
 }
 
-/// Where the cells of a panel's tags are, in tile coordinates.
+/// The places of the cells of the tags of a panel, in tile coordinates.
 pub(super) struct TagLooks {
     cells: TagCells,
     /// From the edges of the tile to the border, and to the cells, bit-widths.
@@ -238,7 +238,7 @@ impl TagLooks {
         Self { cells, margin, inset, width, bits }
     }
 
-    /// What is at tile coordinates.
+    /// The region at tile coordinates.
     fn region(&self, p: DVec2) -> Region {
         if let Some(bit) = self.bit(p) {
             return Region::Cell(bit);
@@ -487,7 +487,7 @@ impl PlacedPanel<'_> {
     }
 }
 
-/// What is wrong with a tag whose cells `flipped` have the wrong colour.
+/// The finding about a tag whose cells `flipped` have the wrong colour.
 fn read_tag(
     tag: &ExpectedTag,
     flipped: &[u32],

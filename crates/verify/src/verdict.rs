@@ -91,15 +91,15 @@ pub struct FaceVerdict {
     pub px_per_mm: f64,
     /// Corners that the target has on this face.
     pub corners: usize,
-    /// Those that were found with the right label.
+    /// Corners that were found with the right label.
     pub corners_found: usize,
     /// Tags that the target has on this face.
     pub tags: usize,
-    /// Those that read without a wrong bit.
+    /// Tags that read without a wrong bit.
     pub tags_exact: usize,
     /// Largest distance of a found corner on the mesh from its stated position, mm.
     pub max_deviation_mm: f64,
-    /// What is wrong.
+    /// The findings.
     pub findings: Vec<Finding>,
 }
 
@@ -117,11 +117,11 @@ pub struct SheetVerdict {
     pub check_bars_mm: Vec<(f64, Option<f64>)>,
     /// Corners that the target has on this sheet.
     pub corners: usize,
-    /// Those that were found with the right label.
+    /// Corners that were found with the right label.
     pub corners_found: usize,
     /// Tags that the target has on this sheet.
     pub tags: usize,
-    /// Those that read exactly as stated, every cell.
+    /// Tags that read exactly as stated, in every cell.
     pub tags_exact: usize,
     /// Largest distance of a found corner from its stated position, mm.
     pub max_deviation_mm: f64,
@@ -130,7 +130,7 @@ pub struct SheetVerdict {
     /// Result of folding a net.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fold: Option<FoldVerdict>,
-    /// What is wrong.
+    /// The findings.
     pub findings: Vec<Finding>,
 }
 

@@ -59,13 +59,14 @@ const LEAST_PANELS: usize = 3;
 /// Corners farther outside their picture than this many times its size cannot have been seen in it.
 const BEYOND: f64 = 1.0;
 
-/// Corners seen together do not belong with the others when their median error is more than this
-/// many times the usual median. Blur, light and distance change it by a small factor; labels that
-/// are off by a tile, and pictures that were not taken at the same moment, by about a hundred.
+/// Corners that one camera sees in one frame contradict the others when their median error is more
+/// than this many times the usual median. Blur, light and distance change it by a small factor;
+/// labels that are off by a tile, and pictures that were not taken at the same moment, by about a
+/// hundred.
 const WRONG_RATIO: f64 = 10.0;
 
-/// Nor are they wrong with a median error below this, px: a corner that was detected at all is
-/// located to a pixel.
+/// Corners are not called wrong with a median error below this, px: a corner that was detected at
+/// all is located to a pixel.
 const WRONG_PX: f64 = 1.0;
 
 /// A problem at the estimate on which most of its corners agree, and the parts that contradict it.

@@ -50,8 +50,8 @@ use crate::targets::{Panel, TagsIn, Target};
 const SPOILT: f64 = 1.0 / 16.0;
 
 /// Probabilities that a tile without a tag is dirty or misread, so that its cells have no
-/// information: causes such as an underestimated blur affect all tiles, and the picture decides
-/// which of these applies.
+/// information: a cause such as a picture without blur affects all tiles alike, and the picture
+/// decides which of these applies.
 const DIRTY: [f64; 3] = [SPOILT, 1.0 / 2.0, 1.0 - SPOILT];
 
 /// Least evidence after correction for the number of placements, nats: 6 bits, so that a picture
@@ -181,10 +181,10 @@ struct Sight {
     shown: Vec<Shown>,
 }
 
-/// What a tile shows, whatever a placement predicts: logarithms of likelihoods, over that of drawn cells.
+/// The contents of a tile regardless of placements: log-likelihood ratios over drawn cells.
 #[derive(Clone, Copy, Debug)]
 struct Shown {
-    /// If it should be plain, by how many such tiles are dirty.
+    /// If it is predicted to be plain, for each of [`DIRTY`].
     if_plain: [f64; DIRTY.len()],
     /// The word of the target that fits best.
     word: usize,
@@ -194,12 +194,12 @@ struct Shown {
     of_board: [[f64; PLAIN_PARTS.len()]; 2],
 }
 
-/// A tile under a placement: logarithms of likelihoods, over that of drawn cells.
+/// A tile under a placement: log-likelihood ratios over drawn cells.
 #[derive(Clone, Copy, Debug)]
 struct Judged {
-    /// As the placement predicts it, by how many plain tiles are dirty.
+    /// As the placement predicts it, for each of [`DIRTY`].
     predicted: [f64; DIRTY.len()],
-    /// The same on a board with another code in this tile.
+    /// On a board with another code in this tile.
     other_code: [f64; DIRTY.len()],
     /// On a board that shows what it likes, as far as the tile is of the panel.
     of_board: Option<[f64; PLAIN_PARTS.len()]>,
@@ -507,7 +507,7 @@ impl TagLabeller {
         mean(predicted) - greatest(of_board).max(mean(other_codes))
     }
 
-    /// How many tiles agree with a placement, and how many do not.
+    /// Numbers of tiles that agree and that disagree with a placement.
     fn agreement(&self, sight: &Sight, placement: &Placement) -> [usize; 2] {
         let against = |tile: &Judged| {
             greatest(tile.predicted) < tile.of_board.map_or(0.0, greatest) - PROPOSING
@@ -853,8 +853,8 @@ mod tests {
         }
     }
 
-    /// A part of the board with one tag, as a photograph of nothing else shows it, is labelled; not so if just one other
-    /// tile says clearly that it belongs to another board.
+    /// A part of the board with one tag, as a photograph of nothing else shows it, is labelled; but
+    /// not if just one other tile clearly belongs to another board.
     #[test]
     fn one_tag_labels_where_nothing_contradicts_it() {
         let family = Family::shipped("delTag25h7").unwrap();

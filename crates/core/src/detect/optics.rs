@@ -97,7 +97,8 @@ pub struct Optics {
     is_ink_open: bool,
     curve: Option<Curve>,
     params: [f64; TONE_PARAMS],
-    /// Grey values of black and white for which a tone curve was estimated.
+    /// Range of grey values, from the blackest to the whitest corner, for which a tone curve is
+    /// estimated.
     range: [f64; 2],
     /// Astigmatism: e₁, e₂ of the shape M = (1 + e₁, e₂; e₂, 1 − e₁) of the squared blur.
     pub astigmatism: [f64; 2],

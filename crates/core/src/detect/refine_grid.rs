@@ -45,7 +45,7 @@ const MIN_RESIDUAL: f64 = 0.05;
 /// Residuals above this many times the median show something beside noise, whose scatter in a window is a tenth.
 const UNUSUAL: f64 = 1.3;
 
-/// Greatest correlation of neighbouring residuals that is used; above it, the residuals are one
+/// Greatest correlation of neighbouring residuals that is distinguished: from there on they are one
 /// shape all over the window.
 const MOST_CORRELATED: f64 = 0.9;
 
@@ -53,7 +53,7 @@ const MOST_CORRELATED: f64 = 0.9;
 /// ten-thousandth at the highest frequency.
 const SHARP_PX: f64 = 1.4;
 
-/// Number of corners for each task of a thread.
+/// Least number of corners for a task on a thread of its own.
 const PART: usize = 128;
 
 /// A corner whose blur exceeds that of its neighbours by more than this factor is the rim of a

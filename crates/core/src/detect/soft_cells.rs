@@ -389,7 +389,8 @@ mod tests {
         bit.map_or(0.0, |bit| f32::from(u8::from(word >> bit & 1 == 1)))
     }
 
-    /// The samples of a tag under a blur that is the same in all directions on the print, drawn at random, and the blur.
+    /// Random samples of a tag under a blur that is the same in all directions on the print, and
+    /// that blur.
     fn seen(
         model: &CellModel,
         cells: &TagCells,
@@ -423,8 +424,8 @@ mod tests {
         TileBlur { covariance, area_px2: 16.0, noise: 0.05 }
     }
 
-    /// What is drawn and blurred without this model is read by it: all cells under a weak blur, and under a strong one no
-    /// more are wrong than the odds say.
+    /// The model reads tags that are drawn and blurred without it: all cells under a weak blur, and
+    /// under a strong one no more are wrong than the odds say.
     #[test]
     fn cells_are_as_often_wrong_as_their_odds_say() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);

@@ -233,7 +233,7 @@ pub fn mrcal(camera: &Camera) -> Result<String, FormatError> {
 /// The `cameras.txt` of COLMAP, with cameras numbered from 1.
 ///
 /// # Errors
-/// Where COLMAP has no such model.
+/// When COLMAP has no such lens model.
 pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
     let mut text = format!("# {GENERATOR}\n# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n");
     for (n, camera) in (1..).zip(cameras) {
@@ -251,7 +251,7 @@ pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
 /// folder of the name of their camera. The first camera is the reference sensor of the rig.
 ///
 /// # Errors
-/// Where COLMAP has no such model.
+/// When COLMAP has no such lens model.
 pub fn colmap_rig(cameras: &[(&str, &Camera, Pose)]) -> Result<String, FormatError> {
     let mut entries = Vec::with_capacity(cameras.len());
     for (n, (name, camera, camera_from_rig)) in cameras.iter().enumerate() {

@@ -82,7 +82,7 @@ pub(super) struct CoverageRecord {
 
 #[derive(Serialize)]
 struct CornerRecord<'a> {
-    /// Where there are several.
+    /// Name of the target, where there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     target: Option<&'a str>,
     panel: PanelRef,
@@ -208,7 +208,7 @@ pub(super) fn coverage(camera: &CameraEstimate) -> CoverageRecord {
     CoverageRecord { columns, rows, corners: of.counts().to_vec() }
 }
 
-/// The views of a camera; poses have standard deviations where the rig is this single camera.
+/// The views of a camera; poses have standard deviations for a single camera.
 pub(super) fn views<'a>(
     estimate: &'a Estimate,
     camera: &'a CameraEstimate,

@@ -28,7 +28,8 @@ use deltille_core::statistics::quantile;
 /// Corners that are taken into account, of views evenly over all: more say no more.
 const MOST_CORNERS: usize = 200_000;
 
-/// A move in the plane is sure beyond this (chi squared of two coordinates, one in a thousand by chance).
+/// Threshold of a significant offset (χ² of two coordinates, exceeded by chance once in a thousand
+/// times).
 const SURE: f64 = 13.8;
 
 /// Fewest views of a corner.
@@ -42,17 +43,17 @@ const NEARLY_ALL: f64 = 0.95;
 const FOOT: f64 = 58.0;
 const STEPS: usize = 22;
 
-/// What is known of a corner of the target.
+/// Statistics of a corner of the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct OfCorner {
     pub panel: PanelRef,
     pub row: i32,
     pub col: i32,
-    /// Where it is on its panel, mm.
+    /// Its position on the panel, mm.
     pub at_mm: DVec2,
-    /// Where its residuals would have it, from there, mm.
+    /// The least-squares offset d from that position, mm.
     pub move_mm: DVec2,
-    /// Whether that is more than chance makes.
+    /// Whether the offset is significant.
     pub is_sure: bool,
     /// Root mean square of its residuals, of a coordinate, px.
     pub rms_px: f64,
@@ -115,7 +116,7 @@ pub(super) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<Of
     seen.filter_map(of_corner).collect()
 }
 
-/// Where a panel was in a view.
+/// The pose of a panel in a view.
 pub(super) fn camera_from_panel(
     estimate: &Estimate,
     view: &ViewEstimate,
@@ -127,7 +128,8 @@ pub(super) fn camera_from_panel(
     Some(view.pose.after(&scene_from_target).after(&place))
 }
 
-/// Where on a panel a pixel looks, mm, and how a pixel there changes by a move in its plane, px/mm.
+/// The point of a panel that a pixel sees, mm, and the derivative of the pixel by an offset in the
+/// plane, px/mm.
 fn at_corner(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<(DVec2, DMat2)> {
     let at_mm = on_plane(camera, camera_from_panel, pixel)?;
     let point = camera_from_panel.apply(at_mm.extend(0.0));
@@ -138,7 +140,7 @@ fn at_corner(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<
     Some((at_mm, DMat2::from_cols(column(across), column(up))))
 }
 
-/// Where on the plane of a panel a pixel looks, mm.
+/// The point of the plane of a panel that a pixel sees, mm.
 pub(super) fn on_plane(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<DVec2> {
     let ray = camera.unproject(pixel)?;
     let panel_from_camera = camera_from_panel.inverse();

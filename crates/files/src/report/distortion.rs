@@ -20,10 +20,11 @@ use super::survey::Survey;
 use deltille_core::calibrate::CameraEstimate;
 use deltille_core::camera::Camera;
 
-/// A pinhole is what a lens is held against up to this angle, rad: there its radius is 2.7 times the focal length.
+/// Widest field for which a lens is compared with a pinhole, rad from the axis: there its radius is
+/// 2.7 times the focal length.
 const PINHOLE_RAD: f64 = 70.0 / 180.0 * PI;
 
-/// Nobody builds a lens that sees more, rad.
+/// Widest field that is considered, rad from the axis: no lens sees more.
 const MOST_RAD: f64 = 130.0 / 180.0 * PI;
 
 /// How far away what is seen at infinity is, mm; how near the axis the focal length is taken, rad.
@@ -51,7 +52,7 @@ const SEEN_PART: f64 = 0.03;
 /// Room for what lines mean, user units.
 const FOOT: f64 = 24.0;
 
-/// What a lens is held against.
+/// The ideal lens with which a lens is compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ideal {
     focal_px: DVec2,
@@ -83,7 +84,7 @@ impl Ideal {
         Self { focal_px, centre_px: camera.centre_px, is_pinhole: widest_rad < PINHOLE_RAD }
     }
 
-    /// Where it has a direction; `None` behind a pinhole.
+    /// The pixel of a direction; `None` behind a pinhole.
     fn pixel(&self, direction: DVec3) -> Option<DVec2> {
         let angle = direction.angle_between(DVec3::Z);
         let around = direction.truncate().try_normalize().unwrap_or(DVec2::ZERO);
@@ -95,7 +96,7 @@ impl Ideal {
         Some(self.centre_px + self.focal_px * radius * around)
     }
 
-    /// The direction that it has at a pixel; `None` where there is none.
+    /// The direction of a pixel; `None` where there is none.
     fn direction(&self, pixel: DVec2) -> Option<DVec3> {
         let flat = (pixel - self.centre_px) / self.focal_px;
         let angle = if self.is_pinhole { flat.length().atan() } else { flat.length() };
@@ -113,7 +114,8 @@ impl Ideal {
     }
 }
 
-/// How far from the axis the image shows something, rad: at its sides or its image circle, and in its corners.
+/// The angle from the axis that the image shows, rad: at its sides or its image circle, and in its
+/// corners.
 pub(super) fn shown_rad(camera: &Camera, survey: &Survey) -> [f64; 2] {
     let angle = |pixel: DVec2| {
         let ray = camera.unproject(pixel)?;
@@ -148,7 +150,7 @@ pub(super) fn curve(
             let around = DVec2::from_angle(TAU * i as f64 / AROUND as f64);
             let direction = (around * angle_rad.sin()).extend(angle_rad.cos());
             let pixel = camera.project(distance_mm * direction)?;
-            // Beyond where it turns back it is no lens.
+            // Beyond the point where the radius decreases it is no lens.
             let radius = ((pixel - camera.centre_px) / camera.focal_px).length();
             let ideal = ideal.pixel(direction)?.distance(camera.centre_px);
             (radius <= steady).then(|| pixel.distance(camera.centre_px) - ideal)

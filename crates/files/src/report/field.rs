@@ -17,7 +17,7 @@ const SCALES: f64 = 58.0;
 /// Widest part of the scale for a colour, user units.
 const WIDEST: f64 = 46.0;
 
-/// Where colours change, px, from the finest on.
+/// Limits between colours, px, from the finest on.
 const LEVELS: [f64; 10] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
 
 /// The colours between them, light where little is: told apart by those who see no red or no green.

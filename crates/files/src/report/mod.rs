@@ -1,10 +1,10 @@
 //! The report of a calibration: a self-contained HTML page with plots, tables and advice.
 //!
 //! ```text
-//!   estimate ─── survey ─→ coverage and mean residuals of each camera ─┬─ fit, distortion, board_residuals, scene ─→ SVG
-//!   diagnoses ───────────→ reasons for lack of fit ───────────────────├─ advice ───────────────────→ words
-//!   photographs ─────────→ thumbnails and a sample ───────────────────├─ models, parameters, views ─→ tables
-//!   models that were tried ───────────────────────────────────────────┴─ page ─────────────────────→ HTML
+//!  estimate ─── survey ─→ coverage and mean residuals of a camera ───┬─ fit, distortion, board_residuals, scene ─→ SVG
+//!  diagnoses ───────────→ reasons for lack of fit ───────────────────├─ advice ───────────────────→ words
+//!  photographs ─────────→ thumbnails and a sample ───────────────────├─ models, parameters, views ─→ tables
+//!  models that were tried ───────────────────────────────────────────┴─ page ─────────────────────→ HTML
 //! ```
 //!
 //! Limits: the tilt of a view is shown for planar targets only, as a solid shows faces at all

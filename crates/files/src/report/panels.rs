@@ -24,7 +24,7 @@ pub(super) struct Mark {
     pub panel: PanelRef,
     pub row: i32,
     pub col: i32,
-    /// Where it is on its panel, mm.
+    /// Its position on the panel, mm.
     pub at_mm: DVec2,
     /// Its arrow before that is enlarged, mm.
     pub by_mm: DVec2,

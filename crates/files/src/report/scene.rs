@@ -185,7 +185,7 @@ fn around_target(estimate: &Estimate, long: f64) -> Vec<Shape> {
     widest.into_values().map(|(_, shape)| shape).chain(cameras).collect()
 }
 
-/// Where the corners of the picture are on a plane ahead.
+/// The corners of the picture projected onto a plane ahead.
 fn corners_ahead(camera: &Camera) -> [DVec2; 4] {
     let [a, b, c, d] = camera.corners_px();
     [a, b, d, c].map(|corner| {

@@ -1,5 +1,5 @@
-//! How much there is to draw on a page. Lines that cross it a thousand times, or a thousand areas
-//! on top of each other, keep a renderer busy for hours, and no target has them.
+//! Bounds on the amount of drawing on a page. Lines that cross it a thousand times, or a thousand
+//! areas on top of each other, keep a renderer busy for hours, and no target has them.
 
 use std::collections::HashSet;
 
@@ -105,8 +105,8 @@ impl Ink {
     }
 }
 
-/// The length of a path, and how many segments it has. Of a curve it is that of its control points, which is no less and
-/// takes no time.
+/// The length of a path, and its number of segments. For a curve it is the length of its control
+/// polygon, which is an upper bound and quick to compute.
 fn length(path: &BezPath) -> (f64, f64) {
     let lengths = path.segments().map(|segment| {
         let points = segment.to_cubic();

@@ -28,13 +28,13 @@ use deltille_core::artwork::subject;
 use deltille_core::targets::Target;
 use deltille_files::export::mesh::extras;
 
-/// Of marks that a viewer which shows more than the page shows too.
+/// Problem of marks outside the page, which viewers that show more than the page show, too.
 const OFF_PAGE: &str = "a mark that reaches over the edge of the page";
 
 /// Most characters of a number.
 const MOST_DIGITS: usize = 40;
 
-/// More than this of a file is not listed.
+/// Most findings that are listed for a file.
 const MOST_LISTED: usize = 64;
 
 /// A construct that is not permitted, or hidden content.
@@ -46,18 +46,18 @@ pub enum ConstructFinding {
     /// something else than is seen here.
     #[error("{place}: {construct}: not every viewer shows that alike")]
     Construct {
-        /// Where it is, in the words of the format.
+        /// Its place, in the terms of the format.
         place: String,
-        /// What it is.
+        /// The construct or problem.
         construct: String,
     },
     /// Content that no picture of the page shows: texts that are not those of the target, or marks
     /// beside the page.
     #[error("{place}: {problem}")]
     Unseen {
-        /// Where it is, in the words of the format.
+        /// Its place, in the terms of the format.
         place: String,
-        /// What it is.
+        /// The construct or problem.
         problem: String,
     },
 }
@@ -133,7 +133,7 @@ struct Words {
     title: String,
     /// One line on what it is.
     subject: String,
-    /// The same for programs.
+    /// The same facts as JSON, for programs.
     extras: Value,
 }
 

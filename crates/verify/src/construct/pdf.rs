@@ -20,7 +20,7 @@ const PAGE: [&str; 8] =
     ["Type", "Parent", "MediaBox", "TrimBox", "CropBox", "Resources", "Contents", "Annots"];
 /// Kinds of resources that may be listed, as long as there are none.
 const RESOURCES: [&str; 4] = ["Font", "XObject", "ExtGState", "Shading"];
-/// Where the content of a stream begins.
+/// The bytes before the content of a stream.
 const STREAM_BEGINS: &[u8] = b">>stream";
 const STREAM: [&str; 2] = ["Length", "Filter"];
 
@@ -116,7 +116,7 @@ fn trailer(bytes: &[u8], found: &mut Findings) {
     found.unless(tables < 2, "the end", "a second revision");
 }
 
-/// Where a word stands in a file.
+/// The offsets of a word in a file.
 fn positions(bytes: &[u8], word: &[u8]) -> Vec<usize> {
     let windows = bytes.windows(word.len()).enumerate();
     windows.filter(|(_, window)| *window == word).map(|(at, _)| at).collect()

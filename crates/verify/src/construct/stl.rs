@@ -1,5 +1,5 @@
-//! What every reader of binary STL takes alike: the head that is written, and triangles without
-//! attributes, which some readers take for colours.
+//! Inspection of binary STL for what every reader takes alike: the header that is written here, and
+//! triangles without attributes, which some readers take for colours.
 
 use super::Findings;
 use deltille_files::export::stl::header;

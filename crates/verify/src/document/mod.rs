@@ -18,11 +18,11 @@ use deltille_files::limits::{Guard, Limits, ReadError};
 /// Largest picture that is drawn for a check, px.
 pub(super) const MAX_PIXELS: f64 = 60.0e6;
 
-/// How far the ink of an area may be from 0 or 1 on a page that is drawn or read: what rounding leaves of 255 grey
-/// values.
+/// Tolerance of the ink of an area from 0 or 1 on a page that is rendered or read: the effect of
+/// rounding to 255 grey values.
 pub(super) const MAX_INK_ERROR: f64 = 0.01;
 
-/// The same so near to an edge that its smear reaches there.
+/// The tolerance near an edge, within reach of its smear.
 pub(super) const SMEARED_INK_ERROR: f64 = 0.3;
 
 /// The format of an artifact.
@@ -92,7 +92,7 @@ pub enum DocumentError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
 }
@@ -192,7 +192,7 @@ impl Document {
         }
     }
 
-    /// What is said of a page that is far larger than it should be.
+    /// The error about a page that is far larger than stated.
     pub(super) fn too_large(&self, found_mm: DVec2, stated_mm: DVec2) -> DocumentError {
         let problem = format!(
             "a page of {} x {} mm instead of {} x {} mm is not looked at",
@@ -258,7 +258,7 @@ impl Page {
     }
 
     /// The page blurred as by a lens: each pixel with its neighbours, weighted 1 2 1 along both
-    /// axes, which is a Gaussian blur of about 0.71 px, in 16 bits.
+    /// axes, which is a blur with a standard deviation of 0.71 px, in 16 bits.
     ///
     /// Corners are located by a model of blurred edges; of a sharp edge along the pixels a single
     /// grey value determines the place, and the model is then off by up to a quarter of a pixel.
