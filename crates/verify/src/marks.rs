@@ -37,7 +37,7 @@ const PIECE_MM: f64 = 20.0;
 /// through pixels and through the width of lines.
 const WINDOW_BLANK_PX: f64 = 3.0;
 
-/// More spots of a page are not listed: it is dirty all over.
+/// Most spots of a page that are listed; with more it is dirty all over.
 const MOST_SPOTS: usize = 200;
 
 /// Greatest deviation of the line segments that replace curves, mm.
@@ -133,7 +133,7 @@ pub(super) fn check(
         let is_right = mark.areas.iter().all(|area| drawn.is_in(area, is_own));
         (!is_right).then(|| mark.what.differs(layout))
     }));
-    // Of a bar of another length there is no more to say.
+    // A bar of another length has been reported.
     let is_said = |differs: &MarkFinding| {
         let is_same = |found: &Finding| match (found, differs) {
             (
@@ -195,7 +195,7 @@ struct Area {
     bounds: Rect,
 }
 
-/// All marks of a layout; of texts that cannot be drawn it is said that they differ.
+/// All marks of a layout, and findings for texts that cannot be drawn.
 fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
     let (mut marks, mut findings) = (Vec::new(), Vec::new());
     for (index, text) in layout.texts.iter().enumerate() {

@@ -222,7 +222,7 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
     let is_off =
         |finding: &Finding| matches!(finding, Finding::Mesh(MeshFinding::CornerOff3d { .. }));
     if verdict.findings.iter().any(is_off) {
-        // What else is wrong follows from that.
+        // All other deviations follow from that.
         return verdict;
     }
     check_print(verifier, model, panel, px_per_mm, &mut verdict);

@@ -194,7 +194,8 @@ pub fn surroundings_of(
         let here = places.get(vertex)?;
         let seen = |step: Vertex| places.get(vertex + step).map(|place| place - here);
         let near = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))));
-        // Of a corner by itself those beyond its neighbours tell where these would be.
+        // For a single corner the corners beyond its neighbours predict where missing neighbours
+        // would be.
         let map = match &near {
             Some(_) => None,
             None => Some(places.map_about(grid.kind, vertex, *bend)?),

@@ -169,7 +169,7 @@ struct LabelPanel {
     tiles: BTreeSet<Tile>,
 }
 
-/// What the tiles of a grid say, all read alike and seen from the same side.
+/// The readings of the tiles of a grid, all read alike and seen from the same side.
 struct Sight {
     reader: usize,
     inverted: bool,
@@ -205,7 +205,7 @@ struct Judged {
     of_board: Option<[f64; PLAIN_PARTS.len()]>,
 }
 
-/// How a grid lies on a panel: `map` takes the grid, in a mirror if `sight` is mirrored, to the panel.
+/// A placement of a grid on a panel: `map` takes the grid, mirrored if `sight` is, to the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Placement {
     sight: usize,
@@ -367,7 +367,8 @@ impl TagLabeller {
         Sight { reader, inverted, mirrored, index, readings, evidence, shown }
     }
 
-    /// What a tile shows, by its evidence for all words; `plain` is what it shows without a tag.
+    /// The contents of a tile by its evidence for all words; `plain` is the word that it has
+    /// without a tag.
     fn shown(
         &self,
         (reading, plain): (&Reading, u64),
@@ -532,9 +533,9 @@ impl TagLabeller {
         tiles.filter_map(move |index| self.judge(sight, placement, index))
     }
 
-    /// What all tiles of a grid that show codes say of all that is placed in it together, each panel but once: how much
-    /// better it explains them than a board that has the same codes wherever it likes, nats, and how many agree and
-    /// disagree.
+    /// The joint evidence of all tiles of a grid that show codes, for all its placements together,
+    /// each panel only once: how much better they explain the codes than a board that has the same
+    /// codes anywhere, nats; and the numbers of tiles that agree and disagree.
     fn together(&self, sights: &[Sight], placements: &[Placement]) -> (f64, [usize; 2]) {
         let mut panels = BTreeSet::new();
         let once: Vec<&Placement> = placements.iter().filter(|p| panels.insert(p.panel)).collect();
@@ -656,7 +657,8 @@ fn mean<const N: usize>(logs: [f64; N]) -> f64 {
     most + (logs.iter().map(|log| (log - most).exp()).sum::<f64>() / N as f64).ln()
 }
 
-/// How often a tag is turned counter-clockwise, by 120° or 90°, in a grid tile that this map puts on a panel.
+/// Number of counter-clockwise turns, by 120° or 90°, of a tag in a grid tile that this map puts on
+/// a panel.
 fn turns_of(panel_from_grid: LatticeMap, on_grid: Tile) -> usize {
     let a = panel_from_grid.inverse().apply(panel_from_grid.apply_tile(on_grid).frame()[0]);
     on_grid.vertices().position(|v| v == a).unwrap_or(0)

@@ -195,7 +195,7 @@ pub struct Sample {
     pub centre: DVec2,
     /// Its estimate by itself.
     pub corner: Corner<3>,
-    /// What it leaves, over half the contrast.
+    /// Its residual, over half the contrast.
     pub residual: f64,
 }
 
@@ -449,7 +449,7 @@ struct Estimate {
     information: DMatrix<f64>,
     /// Derivatives of κ₀ by the parameters of the curve.
     kappa_slopes: [f64; TONE_PARAMS],
-    /// How many they come from.
+    /// Number of corners from which they come.
     pixels: usize,
 }
 
@@ -554,8 +554,8 @@ struct Reduced {
 }
 
 impl Reduced {
-    /// What the common parameters, known to this covariance, move corners by: the mean of the covariances of their
-    /// positions, over corners that count.
+    /// The covariance of corner positions, xx, xy, yy, px², that follows from this covariance of
+    /// the common parameters: the mean over corners with weight.
     fn shift(&self, cov: &DMatrix<f64>, weights: &[f64]) -> [f64; 3] {
         let counting = self.own.iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
         let mut sum = DMatrix::zeros(2, 2);
@@ -586,7 +586,8 @@ impl<const K: usize> Problem<'_, K> {
         (estimate, covariance(&reduced).unwrap_or(unknown))
     }
 
-    /// What these values of the parameters say, near these optics, if the active ones have this covariance.
+    /// The estimate with these values of the parameters, near these optics, given the covariance of
+    /// the active ones.
     fn estimate(&self, optics: &Optics, vector: [f64; PARAMS], cov: &DMatrix<f64>) -> Estimate {
         let active = self.active.clone();
         let inverse = cov.clone().cholesky().map(|factor| factor.inverse());
@@ -596,7 +597,7 @@ impl<const K: usize> Problem<'_, K> {
         Estimate { vector, active, information, kappa_slopes, pixels }
     }
 
-    /// What was found of the ink; `None` where it was not looked for.
+    /// The estimated ink spread; `None` where it was not estimated.
     fn ink(&self, optics: &Optics, cov: &DMatrix<f64>, used: bool) -> Option<InkEstimate> {
         let at = self.active.iter().position(|&p| p == INK)?;
         Some(InkEstimate {
@@ -764,7 +765,7 @@ impl<const K: usize> Problem<'_, K> {
             .collect()
     }
 
-    /// What the equations of all parameters say of the active ones.
+    /// The equations of the active parameters, from those of all.
     fn equations_of(&self, all: &[usize], equations: Vec<Option<Joint>>) -> Vec<Option<Joint>> {
         let places = self.active.iter().filter_map(|p| all.iter().position(|a| a == p));
         let places: Vec<usize> = places.collect();

@@ -227,7 +227,7 @@ impl Refiner {
         self.window(image, corner.position(), room).count() >= MIN_PIXELS
     }
 
-    /// All corners of a grid, each by itself.
+    /// Refines all corners of a grid, each by itself.
     fn refine_each(
         &self,
         image: ImageView,
@@ -258,7 +258,7 @@ impl Refiner {
         places.iter().map(Option::is_some).collect()
     }
 
-    /// All that is clear around a corner, in the largest window.
+    /// All of the clear area around a corner, in the largest window.
     fn whole<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
         Room { around, blur_px, reach_px: self.largest_radius(), optics }
     }
@@ -277,7 +277,7 @@ impl Refiner {
         grid: &Grid,
         tags: &TagAreas,
     ) -> Option<f64> {
-        // Of a grid without tags nothing says that its tiles are not plain.
+        // In a grid without tags nothing indicates that its tiles are not plain.
         let plain = TagAreas::default();
         let shown = if grid.tags.is_empty() { &plain } else { tags };
         let most_px = MAX_BLUR * self.largest_radius();
@@ -342,7 +342,8 @@ impl Refiner {
     }
 }
 
-/// What `work` makes of each of so many corners, in their order, in the threads of the pool at hand.
+/// The results of `work` for corners 0 to `count` − 1, in order, on the threads of the current
+/// pool.
 fn each<F: Send>(count: usize, work: impl Fn(&mut CornerFitter, usize) -> F + Sync) -> Vec<F> {
     let parts = (0..count).into_par_iter().with_min_len(PART);
     parts.map_init(CornerFitter::default, |fitter, i| work(fitter, i)).collect()

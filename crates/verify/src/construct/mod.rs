@@ -75,14 +75,14 @@ impl Findings {
         }
     }
 
-    /// Adds a construct unless something holds.
+    /// Adds a construct unless `holds`.
     fn unless(&mut self, holds: bool, place: impl Into<String>, construct: impl Into<String>) {
         if !holds {
             self.add(place, construct);
         }
     }
 
-    /// Adds, unless something holds, what no picture shows; what is drawn is compared all the same.
+    /// Adds hidden content unless `holds`; the file is rendered and compared all the same.
     fn unseen_unless(&mut self, holds: bool, place: impl Into<String>, problem: impl Into<String>) {
         if !holds && !self.is_full() {
             let (place, problem) = (place.into(), problem.into());
@@ -100,7 +100,7 @@ impl Findings {
         self.0.len() >= MOST_LISTED
     }
 
-    /// Adds what a file that belongs to this one has, with its name.
+    /// Adds the findings of a file that belongs to this one, with its name.
     fn add_of(&mut self, file: &str, other: Findings) {
         for finding in other.0 {
             match finding {
