@@ -1,9 +1,9 @@
-//! The clock of the machine.
+//! The monotonic clock of the machine.
 
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-/// The time since this was first asked for.
+/// The time since the first call of this function in the process.
 pub fn now() -> Duration {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     START.elapsed()

@@ -1,4 +1,4 @@
-//! Families from files.
+//! Tag families by name or from family files.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use deltille_core::family::{Family, FamilyError};
 
 use crate::limits::{self, MAX_FAMILY_BYTES, ReadError};
 
-/// A family that is not there, or whose file is not read.
+/// Why a family cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FamilyFileError {
@@ -16,13 +16,13 @@ pub enum FamilyFileError {
     /// The file cannot be read.
     #[error(transparent)]
     Read(ReadError),
-    /// The file is not even text.
+    /// The file is not UTF-8 text.
     #[error("{}: not a family file (it is not UTF-8 text); name a .json family file", path.display())]
     NotText {
         /// The file.
         path: PathBuf,
     },
-    /// Something is wrong inside the file.
+    /// The content of the file is not a valid family.
     #[error("{}: {error}", path.display())]
     In {
         /// The file.
@@ -33,16 +33,18 @@ pub enum FamilyFileError {
 }
 
 impl FamilyFileError {
-    /// Whether a file was read whole, and what it claims does not hold.
+    /// Whether the file was read completely, but its claims (codes, distance, fingerprint) do not
+    /// hold.
     pub fn is_broken_claim(&self) -> bool {
         matches!(self, Self::In { error, .. } if error.is_broken_claim())
     }
 }
 
-/// A shipped family by its name, or a family file by its path.
+/// Returns a shipped family by its name, or reads a family file by its path.
 ///
 /// # Errors
-/// Where no family of that name is shipped and no file is there, or the file is no family.
+/// When no family of that name is shipped and no such file exists, or the file is not a valid
+/// family.
 pub fn resolve(name_or_path: &str) -> Result<Family, FamilyFileError> {
     match Family::shipped(name_or_path) {
         Err(FamilyError::Unknown { name }) => {
@@ -59,7 +61,7 @@ pub fn resolve(name_or_path: &str) -> Result<Family, FamilyFileError> {
 /// Reads a family file.
 ///
 /// # Errors
-/// Where the file cannot be read, or is no family.
+/// When the file cannot be read or is not a valid family.
 pub fn read(path: &Path) -> Result<Family, FamilyFileError> {
     let json = match limits::read_short_text(path, MAX_FAMILY_BYTES) {
         Err(ReadError::NotText { path }) => return Err(FamilyFileError::NotText { path }),

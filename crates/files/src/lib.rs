@@ -1,13 +1,14 @@
-//! Calibration targets to files and back.
+//! Reading and writing the files of calibration targets: artwork, targets, photographs, detections
+//! and calibrations.
 //!
 //! | module | its one job |
 //! |---|---|
-//! | [`clock`] | the clock of the machine |
-//! | [`limits`] | how much of a file is read, regular files only; panics and endless work of other code |
+//! | [`clock`] | the monotonic clock of the machine |
+//! | [`limits`] | bounds on the size of files that are read; panics and endless work of third-party readers |
 //! | [`family_file`] | families by name or from their files |
-//! | [`photograph`] | photographs of any common format as grey images |
-//! | [`export`] | artwork, targets and results to files and back, one module a format |
-//! | [`report`] | a calibration as a page to look at |
+//! | [`photograph`] | photographs in common formats as grey images |
+//! | [`export`] | artwork, targets and results to files and back, one module for each format |
+//! | [`report`] | a calibration as an HTML page |
 
 pub mod clock;
 pub mod export;

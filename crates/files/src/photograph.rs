@@ -1,14 +1,15 @@
-//! Reading photographs of any common format as grey images.
+//! Reading photographs in common formats as grey images.
 //!
-//! What a file says beside its pixels does not change them:
+//! Metadata does not change the pixels:
 //!
-//! - pixels stay where the sensor had them, whatever orientation EXIF asks a viewer for, as they do for COLMAP and for
+//! - pixels stay in sensor orientation, whatever orientation EXIF states for viewers, as they do for COLMAP and for
 //!   OpenCV with `IMREAD_IGNORE_ORIENTATION`; the orientation is noted;
-//! - colour profiles and gamma chunks are not applied: corners come with an estimate of the tone curve of their own;
-//! - of a TIFF there must be one page, thumbnails (reduced images) aside, and of an animation the first picture is taken;
-//! - a JPEG that holds fewer pixels than it says, or more, is damaged, and not read unless that is asked for; all other
-//!   formats are read whole or not at all. Neither JPEG nor WebP has check sums: of changed bytes nothing tells that make
-//!   as many pixels, nor of those of a WebP that make more.
+//! - colour profiles and gamma chunks are not applied, since the detector estimates the tone curve;
+//! - a TIFF must have one page, not counting thumbnails (reduced images); of an animation the first picture is taken;
+//! - a JPEG that holds fewer pixels than its header states, or more, is damaged, and refused unless
+//!   damage is accepted; all other formats are read completely or not at all. Neither JPEG nor WebP
+//!   has checksums: changed bytes that decode to the stated number of pixels are not noticed, nor,
+//!   in a WebP, bytes that decode to more.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek};
@@ -28,41 +29,41 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 use crate::limits::{self, Exceeded, Limits};
 use deltille_core::raster::{AnyGray, FileNotes, Gray};
 
-/// What a PNG may hold beside its pixels, unpacked: profiles and words.
+/// Most bytes of decompressed metadata in a PNG: profiles and texts.
 const MAX_BESIDE_BYTES: u64 = 32 << 20;
 
-/// Pages of a TIFF that are counted.
+/// Most pages of a TIFF that are counted.
 const MAX_PAGES: usize = 1000;
 
-/// Bytes from which a format is told.
+/// Bytes from which the format is recognised.
 const HEAD_BYTES: u64 = 64;
 
-/// What strict readers of JPEG refuse although no pixel depends on it.
+/// Message of the strict JPEG decoder about bytes that do not affect any pixel.
 const PADDING: &str = "Extra bytes between headers";
 
 /// The marker that ends a JPEG.
 const END_OF_IMAGE: &[u8] = &[0xFF, 0xD9];
 
-/// Bytes of noise: more than any block of pixels has.
+/// Bytes of noise that replace the end of the data: more than any block of pixels has.
 const NOISE_BYTES: u32 = 1000;
 
-/// What makes noise, whose first bits differ.
+/// Multipliers that generate noise, with different first bits.
 const NOISES: [u32; 3] = [0x9E37_79B9, 0x45EB_CA6B, 0xF1BB_CDCB];
 
-/// The last bytes of a picture cannot be replaced by noise, as many as these, without that it shows: the last byte alone
-/// may hold but a bit of it, and some noise may say the same.
+/// Replacing this many of the last bytes of a picture by noise must change its pixels. The last
+/// byte alone may hold a single bit of it, which noise may happen to match.
 const SURPLUS_BYTES: usize = 3;
 
-/// A photograph, and what its file says beside its pixels.
+/// A photograph with the metadata that matter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Photograph {
-    /// The pixels, where the sensor had them.
+    /// The grey values, in sensor orientation.
     pub image: AnyGray,
-    /// What else there is to say.
+    /// EXIF orientation and damage of the file.
     pub notes: FileNotes,
 }
 
-/// An image file that cannot be read.
+/// Why an image file cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -74,7 +75,7 @@ pub enum ImageError {
         /// Why.
         source: std::io::Error,
     },
-    /// The file is not an image that can be decoded.
+    /// The file is not an image in a format that can be decoded.
     #[error(
         "{}: not a readable PNG, JPEG, TIFF, BMP, PGM or WebP image ({source})",
         path.display()
@@ -85,7 +86,7 @@ pub enum ImageError {
         /// Why.
         source: image::ImageError,
     },
-    /// The image is larger than what is read.
+    /// The image exceeds a limit.
     #[error("{}: {exceeded}", path.display())]
     Exceeded {
         /// The file.
@@ -93,7 +94,7 @@ pub enum ImageError {
         /// The limit.
         exceeded: Exceeded,
     },
-    /// Not all pixels are in the file.
+    /// The JPEG does not hold exactly its stated pixels.
     #[error("{}: a damaged JPEG ({problem}): take it anew, or accept it by `photograph::read_with_notes`", path.display())]
     Damaged {
         /// The file.
@@ -101,15 +102,16 @@ pub enum ImageError {
         /// What is wrong.
         problem: String,
     },
-    /// The file holds several pictures.
+    /// The TIFF holds several pages.
     #[error("{}: {pages} pages in one TIFF: save each as a file of its own", path.display())]
     Pages {
         /// The file.
         path: PathBuf,
-        /// How many there are.
+        /// Number of pages.
         pages: usize,
     },
-    /// Its pixels are deep, so that they take more memory than those of a larger image may.
+    /// The image, or its file, takes more memory than the limits allow, although its number of
+    /// pixels does not exceed them.
     #[error(
         "{}: takes more than {bytes} bytes of memory; `Limits::max_pixels` sets how many, 4 for each",
         path.display()
@@ -117,44 +119,45 @@ pub enum ImageError {
     Memory {
         /// The file.
         path: PathBuf,
-        /// How many it may take.
+        /// The most bytes that it may take.
         bytes: u64,
     },
-    /// The decoder fails within.
+    /// The decoder panicked.
     #[error("{}: {source}", path.display())]
     Broken {
         /// The file.
         path: PathBuf,
-        /// How.
+        /// The failure.
         source: limits::Broken,
     },
 }
 
-/// Reads a PNG, JPEG, TIFF, BMP, PGM/PPM or WebP file; colour becomes luma (Rec. 709 weights),
-/// transparency is ignored, depth beyond 8 bits is kept as 16 bits.
+/// Reads a PNG, JPEG, TIFF, BMP, PGM/PPM or WebP file as a grey image in sensor orientation. Colour
+/// becomes luma (Rec. 709 weights), transparency is ignored, and a depth beyond 8 bits is kept as
+/// 16 bits.
 ///
-/// The format is told from the content, not from the name.
+/// The format is recognised by the content, not by the name.
 ///
 /// # Errors
-/// Where the file cannot be read, is no picture, is damaged, or is larger than the usual limits allow.
+/// When the file cannot be read, is not a picture, is damaged, or exceeds the default [`Limits`].
 pub fn read(path: impl AsRef<Path>) -> Result<AnyGray, ImageError> {
     read_within(path.as_ref(), &Limits::default())
 }
 
-/// The same within other limits than the default.
+/// Reads a photograph as [`read`] does, within other limits than the default.
 ///
 /// # Errors
-/// Where the file cannot be read, is no picture, is damaged, or is larger than the limits allow.
+/// When the file cannot be read, is not a picture, is damaged, or exceeds the limits.
 pub fn read_within(path: &Path, limits: &Limits) -> Result<AnyGray, ImageError> {
     Ok(read_with_notes(path, limits, false)?.image)
 }
 
-/// Reads a photograph with what its file says of it. A damaged JPEG is refused unless it is accepted; the pixels that
-/// it does not have are grey then.
+/// Reads a photograph with its metadata. A damaged JPEG is refused unless `accept_damaged` is set; the pixels that
+/// are missing in it are grey then.
 ///
 /// # Errors
-/// Where the file cannot be read, is no picture, is larger than the limits allow, or is damaged and that is not
-/// accepted.
+/// When the file cannot be read, is not a picture, exceeds the limits, or is damaged and that is
+/// not accepted.
 pub fn read_with_notes(
     path: &Path,
     limits: &Limits,
@@ -164,10 +167,10 @@ pub fn read_with_notes(
     Ok(Photograph { image: from_dynamic(image), notes })
 }
 
-/// Reads a photograph with its colours, within limits, where the sensor had its pixels.
+/// Reads a photograph with its colours, within limits, in sensor orientation.
 ///
 /// # Errors
-/// Where the file cannot be read, is no picture, is damaged, or is larger than the limits allow.
+/// When the file cannot be read, is not a picture, is damaged, or exceeds the limits.
 pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageError> {
     Ok(decoded(path, limits, false)?.0)
 }
@@ -198,7 +201,8 @@ fn decoded(
     .map_err(broken)?
 }
 
-/// How many pixels an image has by its head, as far as that can be told without using up a pipe.
+/// The number of pixels that the header of an image states; `None` where it cannot be read, and for
+/// pipes, which reading would use up.
 pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
     limits::check_file(path).ok()?;
     let dimensions =
@@ -207,7 +211,7 @@ pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
     Some(u64::from(width) * u64::from(height))
 }
 
-/// Where decoders read.
+/// A source from which decoders read.
 trait Source: BufRead + Seek {}
 
 impl<T: BufRead + Seek> Source for T {}
@@ -215,9 +219,10 @@ impl<T: BufRead + Seek> Source for T {}
 /// An image file, opened.
 struct ImageFile<'a> {
     path: &'a Path,
-    /// What is read as a whole: a JPEG, as its decoders take it so, and what comes through a pipe.
+    /// The whole file where it is read at once: a JPEG, as its decoders require, and what comes
+    /// through a pipe.
     bytes: Option<Vec<u8>>,
-    /// How many bytes the file has.
+    /// Size of the file, bytes.
     length: u64,
     format: Option<ImageFormat>,
 }
@@ -236,7 +241,7 @@ impl<'a> ImageFile<'a> {
         (&mut file).take(HEAD_BYTES).read_to_end(&mut bytes).map_err(io)?;
         let format = image::guess_format(&bytes).ok();
         let is_whole = format == Some(ImageFormat::Jpeg) || !metadata.is_file();
-        // What is no image is not read on: it may never end.
+        // A pipe that is not an image is not read on, as it may never end.
         if is_whole && format.is_some() {
             file.take(most).read_to_end(&mut bytes).map_err(io)?;
             if bytes.len() as u64 > most {
@@ -261,7 +266,7 @@ impl<'a> ImageFile<'a> {
         })
     }
 
-    /// A decoder that has read the head of the file, whose picture is within the limits.
+    /// A decoder that has read the header, for a picture within the limits.
     fn decoder(&self, limits: &Limits) -> Result<impl ImageDecoder, ImageError> {
         let path = || self.path.to_owned();
         let decode = |source| ImageError::Decode { path: path(), source };
@@ -286,20 +291,20 @@ impl<'a> ImageFile<'a> {
         Ok(decoder)
     }
 
-    /// Refuses a TIFF of which nobody knows which page is meant.
+    /// Refuses a TIFF of several pages, as it is not known which is meant.
     fn check_pages(&self) -> Result<(), ImageError> {
         if self.format != Some(ImageFormat::Tiff) {
             return Ok(());
         }
         match pages(self.source()?) {
-            // What is wrong with it the decoder tells.
+            // The decoder reports what is wrong with it.
             Ok(0 | 1) | Err(_) => Ok(()),
             Ok(pages) => Err(ImageError::Pages { path: self.path.to_owned(), pages }),
         }
     }
 
-    /// The pixels of a whole JPEG, or what is missing; `None` for other files, and for colours that need their
-    /// profile.
+    /// The pixels of an undamaged JPEG, or what is wrong with it; `None` for other files, and for
+    /// colour spaces that need their profile.
     fn jpeg(&self) -> Result<Option<DynamicImage>, String> {
         let (Some(ImageFormat::Jpeg), Some(bytes)) = (self.format, &self.bytes) else {
             return Ok(None);
@@ -331,8 +336,9 @@ fn jpeg_decoder(bytes: &[u8], strict: bool) -> JpegDecoder<ZCursor<&[u8]>> {
     JpegDecoder::new_with_options(ZCursor::new(bytes), options)
 }
 
-/// Refuses a JPEG of which some pixels are not in the file, or that makes more than it has. Its decoder says neither, so
-/// it is asked again: noise behind the last byte must not show, and noise for the last bytes must.
+/// Refuses a JPEG in which some pixels are missing, or that has data beyond its last pixel. The
+/// decoder reports neither, so it is run again on modified data: noise after the last byte must not
+/// change a pixel, and noise in place of the last bytes must.
 fn check_scans(bytes: &[u8], pixels: &[u8]) -> Result<(), String> {
     let Scans { end, is_one_run } = Scans::of(bytes);
     // Without 0xFF, with which markers begin; in a scan it is followed by 0.
@@ -347,7 +353,7 @@ fn check_scans(bytes: &[u8], pixels: &[u8]) -> Result<(), String> {
     if !is_shown_by(scans, &noises[0], false) {
         return Err("not all pixels are in it".to_owned());
     }
-    // Some cameras fill up the last words.
+    // Some cameras pad the last words.
     let used = trimmed(scans, |byte| matches!(byte, 0 | 0xFF));
     let used = &used[..used.len().saturating_sub(SURPLUS_BYTES)];
     if is_one_run && noises.iter().all(|noise| is_shown_by(used, noise, true)) {
@@ -356,24 +362,24 @@ fn check_scans(bytes: &[u8], pixels: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// The bytes without the last of these.
+/// The bytes without the trailing ones that satisfy `of`.
 fn trimmed(bytes: &[u8], of: impl Fn(u8) -> bool) -> &[u8] {
     let end = bytes.iter().rposition(|&byte| !of(byte)).map_or(0, |last| last + 1);
     &bytes[..end]
 }
 
-/// How long a RIFF file says that it is, from its first bytes.
+/// The length that the header of a RIFF file states, bytes.
 fn riff_bytes(head: &[u8]) -> Option<u64> {
     let beyond = head.get(4..)?.first_chunk::<4>()?;
     Some(8 + u64::from(u32::from_le_bytes(*beyond)))
 }
 
-/// Where the pixels of a JPEG are.
+/// Position and kind of the entropy-coded data of a JPEG.
 struct Scans {
-    /// Where the marker is that ends the picture, if there is one.
+    /// Offset of the marker that ends the picture, if there is one.
     end: Option<usize>,
-    /// Whether they are one run of codes in which each begins where the last ends: not refined step by step, nor begun
-    /// anew on the way.
+    /// Whether the data are one run of codes, each beginning where the last ends: neither
+    /// progressive nor with restarts.
     is_one_run: bool,
 }
 
@@ -398,13 +404,13 @@ impl Scans {
     }
 }
 
-/// The decoder's words without their quotation marks, in one line.
+/// The message of the decoder in one line, without quotation marks.
 fn told(problem: &str) -> String {
     let words: Vec<&str> = problem.trim_matches('"').split_whitespace().collect();
     words.join(" ")
 }
 
-/// Pages of a TIFF, smaller copies of another one aside.
+/// Number of pages of a TIFF, without reduced copies of others.
 fn pages(source: impl BufRead + Seek) -> tiff::TiffResult<usize> {
     let mut file = tiff::decoder::Decoder::new(source)?;
     let mut pages = 0;

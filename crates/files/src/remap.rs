@@ -1,20 +1,27 @@
-//! Pictures whose pixels lie elsewhere in another one, with their colours and depth.
+//! Resampling of pictures through a map of pixels, such as an undistortion, keeping colours and
+//! depth.
+//!
+//! Interpolation is bicubic (Keys 1981). Where the map reduces the picture, several samples are
+//! averaged against aliasing, up to a reduction of eight along each axis.
 
 use image::{DynamicImage, ImageBuffer, Pixel};
 use rayon::prelude::*;
 
 use deltille_core::camera::PixelMap;
 
-/// A pixel that covers more pixels of the other picture is the mean of so many places along each side, at most.
+/// Most samples along each side of a pixel; a pixel that covers more pixels of the source is
+/// averaged over so many.
 const MOST_PLACES: f32 = 8.0;
 
-/// Cubic interpolation by Keys (1981), which is of third order: a = −1/2.
+/// Parameter a of the cubic convolution of Keys (1981) for which it is of third order.
 const KEYS: f32 = -0.5;
 
-/// Channels of a pixel, at most.
+/// Most channels of a pixel.
 const MOST_CHANNELS: usize = 4;
 
-/// The new picture, by cubic interpolation; a pixel that covers several is their mean. Pixels without a place are black.
+/// Resamples `image` at the places of `map`, px in `image` for each pixel of the result, by bicubic
+/// interpolation; a pixel that covers several is their mean. Pixels without a place are black.
+/// Depth and channels are kept, except that floating-point pictures become 16-bit RGB.
 pub fn remapped(image: &DynamicImage, map: &PixelMap) -> DynamicImage {
     use DynamicImage as D;
     match image {
@@ -34,7 +41,7 @@ pub fn remapped(image: &DynamicImage, map: &PixelMap) -> DynamicImage {
 trait Depth: Copy + Default + Send + Sync {
     fn light(self) -> f32;
 
-    /// The nearest value that there is.
+    /// The nearest representable value.
     fn of_light(light: f32) -> Self;
 }
 
@@ -44,7 +51,7 @@ impl Depth for u8 {
     }
 
     fn of_light(light: f32) -> Self {
-        // Conversion keeps to the range.
+        // The conversion saturates.
         light.round() as u8
     }
 }
@@ -81,7 +88,8 @@ where
     ImageBuffer::from_raw(width, height, pixels).expect("as many as were made")
 }
 
-/// The mean of the other picture over a pixel.
+/// The mean of the source over a pixel of the result, for each channel; `None` where it has no
+/// place.
 fn seen<P>(
     image: &Buffer<P>,
     map: &PixelMap,
@@ -96,7 +104,7 @@ where
     if here[0].is_nan() {
         return None;
     }
-    // How far the place moves from pixel to pixel.
+    // Derivative of the place from pixel to pixel.
     let along = |next: Option<[f32; 2]>, sign: f32| {
         next.filter(|next| !next[0].is_nan()).map(|next| [0, 1].map(|i| sign * (next[i] - here[i])))
     };
@@ -122,14 +130,15 @@ where
     Some(sum.map(|sum| sum / (rows * columns)))
 }
 
-/// The weights of four pixels between the middle two of which a place lies.
+/// The weights of four pixels in a row for a place between the middle two.
 fn weights(part: f32) -> [f32; 4] {
     let near = |d: f32| ((KEYS + 2.0) * d - (KEYS + 3.0)) * d * d + 1.0;
     let far = |d: f32| ((KEYS * d - 5.0 * KEYS) * d + 8.0 * KEYS) * d - 4.0 * KEYS;
     [far(1.0 + part), near(part), near(1.0 - part), far(2.0 - part)]
 }
 
-/// The light at a place of a picture that goes on beyond its border as it ends.
+/// The interpolated value at a place of a picture, px; beyond the border the outermost pixels are
+/// repeated.
 fn cubic<P>(image: &Buffer<P>, [x, y]: [f32; 2]) -> [f32; MOST_CHANNELS]
 where
     P: Pixel,

@@ -1,7 +1,7 @@
-//! The pages of a sheet that is larger than the paper, laid together to one picture.
+//! Assembly of the pages of a sheet that is larger than the paper into one picture.
 //!
-//! Every pixel of the sheet is taken from the page in whose window it lies deepest; what the other
-//! pages show there must be the same.
+//! Every pixel of the sheet is taken from the page in whose window it lies deepest; the other pages
+//! that show it must agree.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ const MAX_DIFFERENCE: f64 = 0.7;
 /// Nearer than this to the rim of a window nothing is compared, mm: it cuts through pixels.
 const RIM_MM: f64 = 0.3;
 
-/// Where two pages of a sheet differ, the first such place from above.
+/// The first place, from above, where two pages of a sheet differ.
 struct Difference {
     pages: [usize; 2],
     at_px: [usize; 2],
@@ -89,7 +89,7 @@ pub(super) fn assemble(
     (sheet, findings)
 }
 
-/// How deep a position of the sheet lies in the window of a page; negative outside.
+/// Depth of a position of the sheet in the window of a page, mm; negative outside.
 fn depth_mm(page: &SheetPage, place: DVec2) -> f64 {
     let [left, lower, right, upper] = page.window_mm;
     let DVec2 { x, y } = place + page.sheet_at_mm;

@@ -1,4 +1,4 @@
-//! Check bars measured in a picture, without knowledge of how they were drawn.
+//! Measurement of check bars in a picture, independent of how they were drawn.
 
 use glam::DVec2;
 
@@ -24,7 +24,7 @@ const PAPER_INK: f64 = 0.5 / 255.0;
 /// Distances from the middle of a stroke at which the bar's line is met inwards and is not met
 /// outwards, mm.
 const LINE_MM: f64 = 0.6;
-/// How far beside its expected place the line may lie, mm.
+/// Greatest offset of the line from its expected place, mm.
 const LINE_BESIDE_MM: f64 = 0.25;
 
 /// The distance between the outer edges of the end strokes of a bar near `ends_mm` on the page, mm;
@@ -43,8 +43,8 @@ pub(super) fn measure(page: &Page, ends_mm: [DVec2; 2]) -> Option<f64> {
     Some((length + start + end) / page.px_per_mm)
 }
 
-/// How far beyond `end`, in direction `outwards`, the outer edge of the stroke lies, px; negative
-/// where it lies inwards.
+/// Distance of the outer edge of the stroke beyond `end` in direction `outwards`, px; negative
+/// inwards.
 ///
 /// Ink is sampled at whole pixels along lines parallel to the bar. A stroke is what is dark on all
 /// of them, with the bar's line on its inner side alone; the one nearest to the expected end counts.

@@ -1,4 +1,4 @@
-//! The panels of a page: detection against statement.
+//! Verification of the panels of a page: detected against stated corners.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,20 +19,22 @@ use deltille_core::words::counted;
 /// way to the next.
 const MATCH_EDGES: f64 = 0.25;
 
-/// With a larger share of tiles of the wrong colour the picture does not show the panel, and to
-/// name them one by one would say nothing.
+/// Greatest share of tiles of the wrong colour that are named one by one; with more, the picture
+/// does not show the panel.
 const MAX_WRONG_TILES: f64 = 0.25;
 
-/// With a larger share of corners missing, or more than stated, it is another board.
+/// Greatest share of corners missing, or more than stated; beyond it the picture shows another
+/// board.
 const MAX_MISSING: f64 = 0.25;
 
-/// How far the ink in the middle of a tile may be from 0 or 1: what rounding leaves of 255 grey values.
+/// Tolerance of the ink in the middle of a tile from 0 or 1: the effect of rounding to 255 grey
+/// values.
 const MAX_TONE_ERROR: f64 = 0.01;
 
 /// Difference of ink below which a sheet is called blank rather than faint.
 const MIN_CONTRAST: f64 = 0.03;
 
-/// What is wrong with a board, or with its corners. Lengths in mm in the page frame.
+/// A deviation of a board or of its corners. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -96,15 +98,15 @@ pub enum BoardFinding {
         /// Found over stated length along x and y.
         scale: [f64; 2],
     },
-    /// The panel is turned on the page.
+    /// The panel is rotated on the page.
     #[error("turned by {:.3}°", shown_angle(*angle_deg))]
     Turned {
         /// Its id.
         panel: u32,
-        /// Counter-clockwise.
+        /// Angle, degrees, counter-clockwise.
         angle_deg: f64,
     },
-    /// The panel lies elsewhere on the page.
+    /// The panel is shifted on the page.
     #[error("shifted by ({:.3}, {:.3}) mm", shown(by_mm.x), shown(by_mm.y))]
     Shifted {
         /// Its id.
@@ -122,7 +124,7 @@ pub enum BoardFinding {
         /// Lattice column.
         col: i32,
     },
-    /// A corner lies elsewhere, all else being right.
+    /// A single corner is displaced on an otherwise correct panel.
     #[error(
         "corner {id} at row {row} col {col} off by ({:.3}, {:.3}) mm",
         shown(by_mm.x), shown(by_mm.y)
@@ -140,7 +142,7 @@ pub enum BoardFinding {
     /// A corner was found where the target has none.
     #[error("a corner at ({:.2}, {:.2}) mm where none should be", at_mm.x, at_mm.y)]
     CornerExtra {
-        /// Where.
+        /// Its position.
         at_mm: DVec2,
     },
     /// The detector reads a tag that the target does not have there.

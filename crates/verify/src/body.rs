@@ -1,8 +1,9 @@
-//! Bodies to print, as STL: closed, outside out, of the stated shape.
+//! Verification of bodies to print, as STL: a closed surface with its normals outwards and of the
+//! stated shape.
 //!
-//! A skeleton is felt from outside with rays: on the ribs they meet the planes of the faces, in the
-//! seats they stop at the thickness of a panel below, and in the windows they pass. Then it is compared
-//! triangle by triangle, as the bare solid is.
+//! A skeleton is probed from outside with rays: on the ribs they hit the planes of the faces, in
+//! the seats they stop at the thickness of a panel below, and in the windows they pass. Then it is
+//! compared triangle by triangle, as the solid is.
 
 use std::path::Path;
 
@@ -20,7 +21,7 @@ use deltille_core::targets::{
 };
 use deltille_files::export::stl::skeleton_name;
 
-/// How far a unit normal may be from that of its triangle: single precision on small triangles.
+/// Tolerance of a unit normal: single precision on small triangles.
 const NORMAL_SLACK: f64 = 1e-3;
 
 /// Relative difference of volumes: single precision.
@@ -211,7 +212,7 @@ fn check_seats(
     findings
 }
 
-/// How far a ray gets, mm.
+/// Distance at which a ray hits the surface, mm.
 fn depth(facets: &[Facet], from: DVec3, direction: DVec3) -> f64 {
     let meets = facets.iter().filter_map(|facet| {
         let [a, b, c] = facet.vertices_mm;

@@ -1,5 +1,5 @@
-//! Drawings for a cutter, as `.dxf`: the same outlines, folds and numbers as those of the target,
-//! each on its layer and in its place.
+//! Verification of drawings for a cutter, as `.dxf`: outlines, folds and numbers must be those of
+//! the target, each on its layer and in its place.
 
 use std::path::Path;
 
@@ -12,18 +12,18 @@ use super::{CutVerdict, DocumentError, Finding, Format, Verdict, Verifier, Verif
 use deltille_core::artwork::{self, CutDrawing, CutLayer, CutPath};
 use deltille_files::export::dxf::{self, DxfError};
 
-/// Largest deviation of a point, mm: a hundredth of what a cutter keeps to.
+/// Largest deviation of a point, mm: a hundredth of the accuracy of a cutter.
 const CUT_TOLERANCE_MM: f64 = 0.001;
 
-/// A path that is nearer to a stated one than this is that path, moved, mm.
+/// A path within this distance of a stated one is that path, moved, mm.
 const MOVED_MM: f64 = 20.0;
 
-/// What is wrong with a drawing for a cutter. Lengths in mm.
+/// A deviation of a drawing for a cutter. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum CutFinding {
-    /// A path to cut, fold or engrave lies elsewhere.
+    /// A path to cut, fold or engrave is displaced.
     #[error(
         "the path on {layer} from ({:.2}, {:.2}) mm is off by {by_mm:.3} mm",
         at_mm.x, at_mm.y
@@ -31,17 +31,17 @@ pub enum CutFinding {
     PathOff {
         /// Its layer.
         layer: &'static str,
-        /// Where it should begin.
+        /// Its stated start.
         at_mm: DVec2,
         /// Largest distance of a point.
         by_mm: f64,
     },
-    /// A path to cut, fold or engrave is not there.
+    /// A path to cut, fold or engrave is missing.
     #[error("the path on {layer} from ({:.2}, {:.2}) mm is missing", at_mm.x, at_mm.y)]
     PathMissing {
         /// Its layer.
         layer: &'static str,
-        /// Where it should begin.
+        /// Its stated start.
         at_mm: DVec2,
     },
     /// A path that the target does not have.
@@ -52,7 +52,7 @@ pub enum CutFinding {
     PathExtra {
         /// Its layer.
         layer: &'static str,
-        /// Where it begins.
+        /// Its start.
         at_mm: DVec2,
     },
 }
@@ -79,7 +79,7 @@ pub(super) fn verify(
     Ok(Verdict { cut: Some(cut), ..Verdict::new(path, Format::Dxf, findings) })
 }
 
-/// What is to be cut.
+/// The drawing that the target states.
 fn stated(verifier: &Verifier, path: &Path) -> Result<CutDrawing, VerifyError> {
     let target = verifier.target;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();

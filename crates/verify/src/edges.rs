@@ -1,9 +1,9 @@
-//! Where the edges of tiles and cells lie, to a fraction of a pixel.
+//! Subpixel positions of the edges of tiles and cells.
 //!
-//! A pixel that an edge crosses may have any grey and tells little by itself. But an edge that lies d px beside its
-//! place has d px² of ink too much or too little along each px of its length, whichever pixels it
-//! crosses: over a square of pixels these add up, and what rounding and smear do to single pixels
-//! does not.
+//! A pixel that an edge crosses may have any grey value and tells little by itself. But an edge
+//! that is displaced by d px has d px² of ink too much or too little along each px of its length,
+//! whichever pixels it crosses: over a square of pixels these add up, while rounding and smear of
+//! single pixels do not.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ const NEAR: usize = 2;
 /// Samples per pixel and axis of a pixel that an edge crosses.
 const SAMPLES: usize = 4;
 
-/// An edge that lies elsewhere than stated.
+/// An edge that is displaced.
 pub(super) struct MovedEdge {
     pub tile: Tile,
     pub at_mm: DVec2,
@@ -54,7 +54,8 @@ impl LatticeFromPx {
 }
 
 impl PlacedPanel<'_> {
-    /// The edges that lie further beside their place than `tolerance_px`: of each tile the one that does most.
+    /// The edges that are displaced by more than `tolerance_px`: for each tile the one that is
+    /// displaced most.
     pub fn moved_edges(
         &self,
         expected: &BTreeMap<Tile, Expected>,
@@ -108,8 +109,8 @@ impl PlacedPanel<'_> {
         moved.collect()
     }
 
-    /// How far edges lie beside their place in the square of pixels whose first is `low`, px, positive where there is
-    /// too much ink; `None` where there is no edge.
+    /// Displacement of edges in the square of pixels whose first is `low`, px, positive where there
+    /// is too much ink; `None` where there is no edge.
     fn displaced(&self, low: [usize; 2], is_black: &impl Fn(DVec2) -> bool) -> Option<f64> {
         const SIDE: usize = SQUARE + 2 * NEAR;
         // Corner of a pixel, counted from that of the nearest pixel that counts.

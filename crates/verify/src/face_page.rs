@@ -1,4 +1,4 @@
-//! The printed side of a face of a mesh, laid out flat.
+//! The texture of a face of a mesh, laid out flat.
 
 use glam::{DVec2, DVec3};
 
@@ -7,17 +7,18 @@ use super::model::Model;
 use deltille_core::raster::Gray;
 use deltille_core::targets::{Panel, Placement};
 
-/// Triangles this near to the panel's plane are its face, mm.
+/// Greatest distance of the triangles of a face from the plane of its panel, mm.
 const IN_PLANE_MM: f64 = 0.25;
 
 /// Samples per pixel and axis.
 const SAMPLES: usize = 2;
 
-/// What the texture of a loaded mesh shows on the face of a panel, seen from its front, and where
-/// the panel lies on that page; white where the mesh has no triangle in the face.
+/// The texture of a loaded mesh on the face of a panel, seen from its front, as a page, and the
+/// placement of the panel on that page; white where the mesh has no triangle in the face.
 ///
-/// `outline` is that of the face, counter-clockwise in the panel frame, mm: triangles that lie in its
-/// plane beside it belong to another face. `area_mm` is the left, lower, right and upper end of the page in the panel frame.
+/// `outline` is that of the face, counter-clockwise in the panel frame, mm: triangles in its plane
+/// outside it belong to another face. `area_mm` is the left, lower, right and upper end of the page
+/// in the panel frame.
 pub(super) fn face_page(
     model: &Model,
     panel: &Panel,

@@ -1,5 +1,5 @@
-//! What can be wrong with an artifact, each named with its place and its figures: typed where it is
-//! found, and put together here.
+//! Findings: the deviations of an artifact, each with its place and figures, collected from the
+//! modules that check them.
 
 use glam::DVec2;
 use serde::Serialize;
@@ -15,42 +15,42 @@ pub use super::marks::MarkFinding;
 pub use super::solid::MeshFinding;
 pub use super::tiles::TileFinding;
 
-/// One way in which an artifact is not what the target says; in files its `kind` is that of what was
-/// found.
+/// One deviation of an artifact from its target; in JSON its `kind` is that of the specific
+/// finding.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(untagged)]
 #[non_exhaustive]
 pub enum Finding {
-    /// Of what the file is built.
+    /// About the constructs of the file.
     #[error(transparent)]
     Construct(#[from] ConstructFinding),
-    /// Of its pages.
+    /// About its pages.
     #[error(transparent)]
     Page(#[from] PageFinding),
-    /// Of what is beside the tiles.
+    /// About marks outside the tiles.
     #[error(transparent)]
     Mark(#[from] MarkFinding),
-    /// Of a board.
+    /// About a board.
     #[error(transparent)]
     Board(#[from] BoardFinding),
-    /// Of a tile.
+    /// About a tile.
     #[error(transparent)]
     Tile(#[from] TileFinding),
-    /// Of the fold of a net.
+    /// About the fold of a net.
     #[error(transparent)]
     Fold(#[from] FoldFinding),
-    /// Of a mesh or a body.
+    /// About a mesh or a body.
     #[error(transparent)]
     Mesh(#[from] MeshFinding),
-    /// Of a list for other detectors.
+    /// About a list for other detectors.
     #[error(transparent)]
     List(#[from] ListFinding),
-    /// Of a drawing for a cutter.
+    /// About a drawing for a cutter.
     #[error(transparent)]
     Cut(#[from] CutFinding),
 }
 
-/// What is wrong with the pages of a file. Lengths in mm.
+/// A deviation of the pages of a file. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -63,7 +63,7 @@ pub enum PageFinding {
         /// Sheets of the target.
         stated: usize,
     },
-    /// A page in a file of its own is not there, or was not named with the others.
+    /// A page that is a file of its own is missing, or was not named with the others.
     #[error("{page} is missing, or not named with the others")]
     PageMissing {
         /// File name of the page.
@@ -80,12 +80,12 @@ pub enum PageFinding {
         /// Width and height in the target.
         stated_mm: DVec2,
     },
-    /// Something is wrong on one of the pages that a sheet is printed on.
+    /// A deviation on one of the pages on which a sheet is printed.
     #[error("page {page}: {finding}")]
     OnPage {
         /// The page's label.
         page: String,
-        /// What is wrong.
+        /// The deviation.
         finding: Box<Finding>,
     },
     /// Two pages show different things where they overlap.
@@ -96,7 +96,7 @@ pub enum PageFinding {
     PagesDiffer {
         /// Labels of the pages.
         pages: [String; 2],
-        /// Where on the sheet.
+        /// Position on the sheet.
         at_mm: DVec2,
     },
 }

@@ -1,4 +1,4 @@
-//! The affine map between where corners are stated and where they were found.
+//! Least-squares affine map from stated to found positions of corners.
 
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
@@ -16,7 +16,8 @@ impl AffineMap {
     pub const IDENTITY: AffineMap =
         AffineMap { linear: [[1.0, 0.0], [0.0, 1.0]], shift: DVec2::ZERO };
 
-    /// Least squares over pairs (stated, found); `None` unless three pairs span the plane.
+    /// Least-squares fit over pairs (stated, found); `None` unless the stated points span the
+    /// plane.
     pub fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
         if pairs.len() < 3 {
             return None;
@@ -41,7 +42,7 @@ impl AffineMap {
         DVec2::from(self.linear.map(|[by_x, by_y]| by_x * x + by_y * y)) + self.shift
     }
 
-    /// The map back; `None` of one that leaves no area.
+    /// The inverse map; `None` for a degenerate map.
     pub fn inverse(&self) -> Option<Self> {
         let [[a, b], [c, d]] = self.linear;
         let det = a * d - b * c;
@@ -51,12 +52,12 @@ impl AffineMap {
         (det != 0.0 && det.is_finite()).then_some(Self { linear, shift })
     }
 
-    /// Lengths of the images of the unit vectors.
+    /// Lengths of the images of the unit vectors: the scales along x and y.
     pub fn scales(&self) -> [f64; 2] {
         [0, 1].map(|i| self.linear[0][i].hypot(self.linear[1][i]))
     }
 
-    /// Counter-clockwise turn of the mean of both axes, radians.
+    /// Counter-clockwise rotation of the mean of both axes, rad.
     pub fn turn_rad(&self) -> f64 {
         let [[a, b], [c, d]] = self.linear;
         (c - b).atan2(a + d)

@@ -1,6 +1,5 @@
-//! The fold of a net, from what was found on the paper: the faces, each with the pose that its
-//! detected corners have there, are folded about the edges that they share, and must come to lie
-//! where the target says.
+//! Verification of the net of a solid: the faces, each with the pose that its detected corners have
+//! on the paper, are folded about their common edges, and must come to lie where the target states.
 //!
 //! ```text
 //!    page            R_child = turn(edge, dihedral angle) · R_parent       solid
@@ -9,9 +8,9 @@
 //!  ────────         about their edge by the angle between the two faces     ‾‾‾‾‾
 //! ```
 //!
-//! Of the layout only the fold lines and the numbers of edges are used, and the ink of both is
-//! compared by itself; where a face lies, its corners say. A face that comes to lie in the place of
-//! another, or turned in its own, is named as that.
+//! Only the fold lines and the numbers of edges are taken from the layout, and the ink of both is
+//! compared separately; the places of faces follow from their corners. A face that comes to lie in
+//! the place of another, or rotated in its own, is named as such.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -24,29 +23,29 @@ use deltille_core::artwork;
 use deltille_core::targets::{Label, SheetLayout, Target, TargetSpec};
 use deltille_core::words::counted;
 
-/// Largest distance of a folded corner, or of an end of an edge, from where it belongs, mm: that
+/// Largest distance of a folded corner, or of an end of an edge, from its stated position, mm: that
 /// of meshes, see [`MESH_TOLERANCE_MM`](super::MESH_TOLERANCE_MM).
 pub const FOLD_TOLERANCE_MM: f64 = 0.05;
 
-/// Two sides within this of each other on the paper are one fold, mm: more than any print that
-/// passes is off, less than the width of any tab.
+/// Two sides within this distance of each other on the paper are one fold, mm: more than the error
+/// of any acceptable print, less than the width of any tab.
 const COMMON_MM: f64 = 0.2;
 
-/// Roots tried where the first leads to a contradiction: it may be the misprinted face itself.
+/// Most roots tried where the first leads to a contradiction: it may be the misprinted face itself.
 const MOST_ROOTS: usize = 32;
 
-/// What is wrong with the fold of a net. Lengths in mm.
+/// A deviation in the fold of a net. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum FoldFinding {
-    /// A face of a net hangs on no other.
+    /// A face is connected to no other by a fold.
     #[error("board {panel} hangs on no other by a fold")]
     FaceLoose {
         /// Panel id.
         panel: u32,
     },
-    /// A face of a net is printed where another one belongs.
+    /// A face is printed in the place of another.
     #[error("board {panel} is printed where board {instead} belongs")]
     FaceElsewhere {
         /// Panel id.
@@ -54,15 +53,15 @@ pub enum FoldFinding {
         /// Panel that belongs there.
         instead: u32,
     },
-    /// A face of a net is turned in its place.
+    /// A face is rotated in its place.
     #[error("board {panel} is turned by {angle_deg:.0}° in its place")]
     FaceTurned {
         /// Panel id.
         panel: u32,
-        /// Counter-clockwise.
+        /// Angle, degrees, counter-clockwise.
         angle_deg: f64,
     },
-    /// Corners of a face, folded, are not where they are stated to be.
+    /// Corners of a face, after folding, are not at their stated positions.
     #[error("board {panel}, folded, is off by {by_mm:.3} mm")]
     FoldOff {
         /// Panel id.
@@ -78,10 +77,10 @@ pub enum FoldFinding {
     EdgeOpen {
         /// Panels of the faces.
         panels: [u32; 2],
-        /// How far they are apart.
+        /// Their distance.
         gap_mm: f64,
     },
-    /// Two sides that meet do not carry one number, the same.
+    /// Two sides that meet do not carry the same single number.
     #[error(
         "the edge between boards {} and {} has {} on the first, {} on the second",
         panels[0], panels[1], enumerate(&numbers[0]), enumerate(&numbers[1])
@@ -92,7 +91,7 @@ pub enum FoldFinding {
         /// The numbers found along each.
         numbers: [Vec<usize>; 2],
     },
-    /// A face of a net does not carry its number, once.
+    /// A face does not carry its number exactly once.
     #[error("board {panel} carries {} instead of face {stated}", enumerate(names))]
     FaceNumber {
         /// Panel id.
@@ -102,14 +101,14 @@ pub enum FoldFinding {
         /// Its number.
         stated: usize,
     },
-    /// A tab says that it goes under another face than the one that its edge leads to.
+    /// A tab names another face than the one under which its edge leads.
     #[error("a tab of board {panel} names face {named} instead of {stated}")]
     TabNames {
-        /// Panel id of the face that it hangs on.
+        /// Panel id of the face that the tab is attached to.
         panel: u32,
         /// The face that it names.
         named: usize,
-        /// The face that it goes under.
+        /// The face under which it is to be glued.
         stated: usize,
     },
     /// A cut edge has no tab, or two.
@@ -120,15 +119,15 @@ pub enum FoldFinding {
     EdgeTabs {
         /// Panels of the faces.
         panels: [u32; 2],
-        /// How many tabs.
+        /// Number of tabs.
         tabs: usize,
     },
-    /// More than two sides carry a number.
+    /// More than two sides carry the same number.
     #[error("edge number {number} is on {}", counted(*sides, "side"))]
     EdgeNumberAgain {
         /// The number.
         number: usize,
-        /// How many sides.
+        /// Number of sides.
         sides: usize,
     },
 }
@@ -148,8 +147,8 @@ pub(super) fn is_net(target: &Target) -> bool {
     matches!(target.spec, TargetSpec::Solid(_)) && target.sheets.iter().any(folds)
 }
 
-/// Folds the net that was found, and adds to the verdicts what that shows. Where a face was not
-/// found there is nothing to prove.
+/// Folds the detected net, and adds findings to the verdicts. Faces that were not detected cannot
+/// be checked.
 pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict]) {
     let Some(net) = Net::new(target, seen) else { return };
     let mut carried = vec![None; net.faces.len()];
@@ -219,7 +218,7 @@ struct Rigid {
 }
 
 impl Rigid {
-    /// The motion of least squares: with centred p and q as complex numbers, turn ∝ Σ p̄ q.
+    /// The least-squares rigid motion: with centred p and q as complex numbers, turn ∝ Σ p̄ q.
     fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
         let n = pairs.len() as f64;
         let p0 = pairs.iter().map(|(p, _)| *p).sum::<DVec2>() / n;
@@ -247,7 +246,7 @@ impl SpaceFromPage {
         self.linear * p.extend(0.0) + self.shift
     }
 
-    /// The same turned about the line through two points of the page.
+    /// The same map rotated about the line through two points of the page.
     fn folded(&self, [p, q]: [DVec2; 2], angle_rad: f64) -> Self {
         let (a, b) = (self.apply(p), self.apply(q));
         let turn = DMat3::from_axis_angle((b - a).normalize_or(DVec3::X), angle_rad);
@@ -526,8 +525,8 @@ impl Net {
         both.map(|sides| Edge { sides }).collect()
     }
 
-    /// How far the two sides of an edge are apart in space, if they belong together: folded
-    /// against each other on the page, or cut and carrying the same number, with a tab on one.
+    /// Distance in space of the two sides of an edge, if they belong together: folded against each
+    /// other on the page, or cut and carrying the same number, with a tab on one.
     fn check_edge(
         &self,
         edge: &Edge,
@@ -557,7 +556,7 @@ impl Net {
         }
     }
 
-    /// What is wrong with the name of a face and with the names that its tabs carry.
+    /// Findings about the number of a face and the numbers on its tabs.
     fn check_words(&self, index: usize) -> Vec<FoldFinding> {
         let face = &self.faces[index];
         let mut findings = Vec::new();

@@ -1,46 +1,49 @@
-//! An artifact read back, seen, detected and compared with its target.
+//! Verification of artifacts: a file is read back, rendered, detected and compared with its target.
 //!
-//! [`verify`] takes files as bytes: it opens none, starts no program and asks for no time (threads
-//! are those of the pool at hand, if there is one), so that it does where there is no file system. [`Verifier::verify_path`] is the same for files on
-//! disk, which are read within [`Limits`]; code of others then has a thread with an end in time.
+//! [`verify`] takes files as bytes: it opens none, starts no program and needs no clock (threads
+//! are those of the current pool, if there is one), so that it works without a file system.
+//! [`Verifier::verify_path`] does the same for files on disk, which are read within [`Limits`];
+//! third-party code then runs on a thread with a time limit.
 //!
-//! Nothing here knows how a file was drawn: a PDF is rasterised by hayro, an SVG by resvg, and the
-//! picture goes through the detector like a photograph. Then, for each page:
+//! The verification is independent of how a file was drawn: a PDF is rasterised by hayro, an SVG by
+//! resvg, and the picture goes through the detector like a photograph. Then it is checked for each
+//! page that
 //!
-//! - the page size that the file states is the target's;
+//! - the page size that the file states is that of the target;
 //! - each check bar, measured in the picture, has its stated length;
 //! - every corner is found, once, with its label, within [`TOLERANCE_MM`] of its stated position,
-//!   and no other corner is;
+//!   and there is no other corner;
 //! - every tile, and every cell of every tag, has its colour over its whole area, also where
-//!   decoding would correct a wrong cell, and its edges lie within a quarter of a pixel of their places: 0.02 mm at
-//!   300 dpi;
-//! - the sheet has the words of the description, and no ink beside the tiles, words and bars.
+//!   decoding would correct a wrong cell, and its edges lie within a quarter of a pixel of their
+//!   places: 0.02 mm at 300 dpi;
+//! - the sheet has the texts of the description, and no ink beside the tiles, texts and bars.
 //!
-//! What is wrong is named by its cause where one cause explains it: a scale, a mirror image, a
-//! turn, a shift of the whole board rather than a list of all corners.
+//! A deviation is named by its cause where one cause explains it: a scale, a mirror image, a
+//! rotation or a shift of the whole board instead of a list of all corners.
 //!
-//! The pages of a sheet that is larger than the paper are laid together by their stated places;
-//! where they overlap they must show the same. The net of a solid is folded: the faces, each with
-//! the pose that its detected corners have on the paper, are turned about the fold lines, and must
-//! come to lie within [`FOLD_TOLERANCE_MM`] of their stated positions in space; the two sides of
-//! each edge must meet, and carry the same number where they are cut.
+//! The pages of a sheet that is larger than the paper are assembled by their stated places; where
+//! they overlap they must agree. The net of a solid is folded: the faces, each with the pose that
+//! its detected corners have on the paper, are rotated about the fold lines, and must come to lie
+//! within [`FOLD_TOLERANCE_MM`] of their stated positions in space; the two sides of each edge must
+//! meet, and carry the same number where they are cut.
 //!
-//! A mesh (`.glb`, `.obj`) is loaded, its texture included, and looked at by a camera before each
-//! face; every corner is followed along its ray onto the loaded triangles and must lie within
-//! [`MESH_TOLERANCE_MM`] of its stated position in space. The texture on each face is then laid out
-//! flat and compared like a sheet: every tile, every cell of every tag, and no other mark. A body
-//! to print (`.stl`) must be closed, outside out, and of the stated shape.
+//! A mesh (`.glb`, `.obj`) is loaded with its texture, and rendered by a virtual camera before each
+//! face; every detected corner is projected along its ray onto the loaded triangles and must lie
+//! within [`MESH_TOLERANCE_MM`] of its stated position in space. The texture on each face is then
+//! laid out flat and compared like a sheet: every tile, every cell of every tag, and no other mark.
+//! A body to print (`.stl`) must be a closed surface with its normals outwards and of the stated
+//! shape.
 //!
-//! What is drawn here must be what is seen elsewhere. So before a file is drawn it is gone through,
-//! and anything in it that not every viewer shows alike is a finding: files are accepted by a list
-//! of what may be in them, not refused by a list of what may not. Titles and descriptions must be those of
-//! the target, and there is nothing that is of no use.
+//! What is rendered here must be what other programs show. So a file is inspected before it is
+//! rendered, and anything in it that not every viewer shows alike is a finding: files are accepted
+//! by a list of permitted constructs, not refused by a list of forbidden ones. Titles and
+//! descriptions must be those of the target, and unused content is refused.
 //!
 //! Lists for other detectors (`.dsc`) and drawings for a cutter (`.dxf`) are read and compared with
 //! the target number by number.
 //!
-//! Limits: words and stray ink are compared only where the boards lie as stated and are recognised;
-//! dirt within a few pixels of a word or a bar counts to it.
+//! Limits: texts and stray ink are compared only where the boards lie as stated and are recognised;
+//! dirt within a few pixels of a text or a bar is attributed to it.
 
 mod assemble;
 mod bars;
@@ -92,30 +95,31 @@ pub use verdict::{
     BodyVerdict, CutVerdict, FaceVerdict, FoldVerdict, ListVerdict, SheetVerdict, Verdict,
 };
 
-/// Largest deviation of a position or a length, mm: a fifth of what a good printer adds.
+/// Largest deviation of a position or a length on paper, mm: a fifth of the error of a good
+/// printer.
 pub const TOLERANCE_MM: f64 = 0.02;
 
 /// Print resolution of 300 dpi, px/mm: 0.02 mm is a quarter of a pixel.
 const PRINT_PX_PER_MM: f64 = 300.0 / 25.4;
 
-/// Least edge of a tag's cell in the picture, px: its inside is then more than a few pixels.
+/// Least edge of a cell of a tag in the picture, px, so that more than a few pixels lie inside it.
 const CELL_PX: f64 = 8.0;
 
-/// A page with a side so many times as long as stated is not looked at: at the resolution that is
-/// left for it nothing would be seen of its boards.
+/// A page with a side this many times as long as stated is not rendered: at the resolution that is
+/// possible for it nothing of its boards could be seen.
 const MOST_ENLARGED: f64 = 10.0;
 
-/// Why an artifact cannot be compared.
+/// Why an artifact cannot be compared with its target.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerifyError {
     /// The artifact cannot be read.
     #[error(transparent)]
     Document(#[from] DocumentError),
-    /// The comparison was stopped from outside.
+    /// The comparison was cancelled by the caller.
     #[error("interrupted before all was compared")]
     Cancelled,
-    /// The target says nothing about paper.
+    /// The target has no sheets of paper.
     #[error("{}: target {target} has no sheets: it was not laid out on paper", path.display())]
     NoSheets {
         /// The file.
@@ -123,7 +127,7 @@ pub enum VerifyError {
         /// Name of the target.
         target: String,
     },
-    /// A file of another kind.
+    /// The file name has no extension of a known [`Format`].
     #[error(
         "{}: only .pdf, .svg, .png, .glb, .obj, .stl, .dsc and .dxf files are compared with their \
          target",
@@ -133,7 +137,7 @@ pub enum VerifyError {
         /// The file.
         path: PathBuf,
     },
-    /// The file is a part of another one.
+    /// The file is a part of another artifact.
     #[error("{}: it is compared with {whole}: name that", path.display())]
     PartOf {
         /// The file.
@@ -141,7 +145,7 @@ pub enum VerifyError {
         /// The file that it is a part of.
         whole: String,
     },
-    /// The file name does not tell which sheet is on it.
+    /// The file name does not tell which sheet the file shows.
     #[error(
         "{}: the target has {sheets} sheets; name the file {example} for the first",
         path.display()
@@ -151,10 +155,10 @@ pub enum VerifyError {
         path: PathBuf,
         /// Number of sheets.
         sheets: usize,
-        /// A name that tells.
+        /// An example of a name that does.
         example: String,
     },
-    /// The file name does not tell what is cut.
+    /// The file name does not tell what is cut: panels or net.
     #[error(
         "{}: name the file {target}-panels.dxf or {target}-net.dxf, for what it shows",
         path.display()
@@ -165,7 +169,7 @@ pub enum VerifyError {
         /// Name of the target.
         target: String,
     },
-    /// The target says nothing about what the file shows.
+    /// The target has no such drawing for a cutter.
     #[error("{}: {source}", path.display())]
     NothingToCut {
         /// The file.
@@ -173,29 +177,29 @@ pub enum VerifyError {
         /// Why.
         source: CuttingError,
     },
-    /// The family needed is not the one given.
+    /// The target needs another family than the one given.
     #[error("the target needs family {needed}: {given}")]
     Family {
         /// Name and fingerprint of the family of the target.
         needed: String,
-        /// What was given instead.
+        /// The family that was given instead.
         given: String,
     },
 }
 
-/// Compares the artifact of that name among files in memory with its target, whose family must be
-/// given if it has tags. The extension of the name tells the [`Format`].
+/// Compares the artifact named `name` among `files` in memory with its target. `family` must be
+/// given if the target has tags. The extension of the name tells the [`Format`].
 ///
-/// An artifact may be several files. Those that belong to it must be among `files`, in any order: the
-/// other pages of a net (`net-1.svg`, `net-2.svg`), the material library and the texture that an OBJ
-/// names. Others are not looked at.
+/// An artifact may consist of several files. All of them must be among `files`, in any order: the
+/// other pages of a net (`net-1.svg`, `net-2.svg`), the material library and the texture that an
+/// OBJ names. Other files are ignored.
 ///
-/// What is wrong is in the [`Verdict`]. An error means that there is nothing to compare: a file that is
-/// not given or cannot be read, or a target that has no such artifact.
+/// Deviations of the artifact are in the [`Verdict`]. An error means that nothing can be compared:
+/// a file is missing or cannot be read, or the target has no such artifact.
 ///
 /// # Errors
-/// Where the family is another one, the name tells no format or sheet, or a file is missing or cannot be read at all.
-/// What is wrong with an artifact is its verdict.
+/// When the family is not that of the target, the name tells no format or sheet, or a file is
+/// missing or cannot be read at all.
 ///
 /// ```
 /// use deltille_core::artwork;
@@ -226,7 +230,7 @@ pub fn verify(
     Verifier::new(target, family)?.verify(name, files)
 }
 
-/// Compares artifacts with their target.
+/// Compares artifacts with one target.
 pub struct Verifier<'a> {
     target: &'a Target,
     family: Option<&'a Family>,
@@ -237,10 +241,10 @@ pub struct Verifier<'a> {
 }
 
 impl<'a> Verifier<'a> {
-    /// A verifier for the artifacts of `target`, whose family must be given if it has tags.
+    /// A verifier for the artifacts of `target`; `family` must be given if the target has tags.
     ///
     /// # Errors
-    /// Where the target needs another family.
+    /// When the target needs another family.
     pub fn new(target: &'a Target, family: Option<&'a Family>) -> Result<Self, VerifyError> {
         if let Some(needed) = &target.family {
             // A .dsc file names its family without a fingerprint.
@@ -279,20 +283,21 @@ impl<'a> Verifier<'a> {
         Self { limits, ..self }
     }
 
-    /// The same, and running code of others so for artifacts in memory: [`Guard::Here`] unless this
-    /// is called. Where there are threads and files come from anybody, take [`Guard::Timed`].
+    /// The same verifier, running third-party code on artifacts in memory under this guard; the
+    /// default is [`Guard::Here`]. Take [`Guard::Timed`] where threads are available and files are
+    /// not trusted.
     pub fn guarded_by(self, guard: Guard) -> Self {
         Self { guard, ..self }
     }
 
-    /// The same, and looking at `flag` before each page: once it is set, [`verify`](Self::verify)
-    /// ends with [`VerifyError::Cancelled`].
+    /// The same verifier, which checks `flag` before each page: once it is set,
+    /// [`verify`](Self::verify) returns [`VerifyError::Cancelled`].
     pub fn stopped_by(self, flag: &'a AtomicBool) -> Self {
         Self { cancel: Some(flag), ..self }
     }
 
-    /// The files that are verified together with one: the pages of a net, each in a file of its
-    /// own, belong together. Any other file is verified by itself.
+    /// The files that are verified together with `path`: all pages of a net, where each is a file
+    /// of its own. Any other file is verified by itself.
     pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
         match fold::is_net(self.target) {
             true => self.pages_with(path),
@@ -300,7 +305,7 @@ impl<'a> Verifier<'a> {
         }
     }
 
-    /// The files of all pages of which one is in this file; the file alone where it holds all.
+    /// The files of all pages when `path` holds one of them; `path` alone when it holds all.
     pub fn pages_with(&self, path: &Path) -> Vec<PathBuf> {
         let single = matches!(Format::of(path), Some(Format::Svg | Format::Png));
         let count = self.target.page_count();
@@ -314,7 +319,7 @@ impl<'a> Verifier<'a> {
         (0..count).map(file).collect()
     }
 
-    /// Pages of which some are missing.
+    /// The verdict on a set of pages of which some are missing.
     fn without(pages: &[PathBuf], format: Format, missing: &[&PathBuf]) -> Verdict {
         let findings =
             missing.iter().map(|page| PageFinding::PageMissing { page: file_name(page) }.into());
@@ -322,19 +327,19 @@ impl<'a> Verifier<'a> {
         Verdict { artifact: of_all(pages), ..verdict }
     }
 
-    /// Compares the artifact of that name among files in memory. A PDF shows all sheets, an SVG or
-    /// PNG the one that its name tells. What belongs to the artifact must be among the files too:
-    /// all pages of [`set_of`](Self::set_of) for one of a net, its material library and texture for
+    /// Compares the artifact named `name` among files in memory with the target. A PDF shows all
+    /// sheets, an SVG or PNG the one that its name tells. All files of the artifact must be among
+    /// `files`: all pages of [`set_of`](Self::set_of) for a net, material library and texture for
     /// an OBJ.
     ///
     /// # Errors
-    /// Where the name tells no format or sheet, or a file is missing or cannot be read at all.
+    /// When the name tells no format or sheet, or a file is missing or cannot be read at all.
     pub fn verify(&self, name: &str, files: &[Artifact]) -> Result<Verdict, VerifyError> {
         let reader = Reader { files: &files, limits: self.limits, guard: self.guard };
         self.verify_by(&reader, Path::new(name))
     }
 
-    /// Compares an artifact, wherever it is.
+    /// Compares an artifact whose files come from `reader`.
     fn verify_by(&self, reader: &Reader, path: &Path) -> Result<Verdict, VerifyError> {
         let name = file_name(path);
         let of_mesh = [".mtl", &obj::texture_name("")].map(|end| name.strip_suffix(end));
@@ -391,7 +396,7 @@ impl<'a> Verifier<'a> {
         let documents: Vec<Document> =
             files.iter().map(|file| Document::read_by(reader, file)).collect::<Result<_, _>>()?;
         let stated = self.target.page_count();
-        // Where each page of the target is to be seen.
+        // For each page of the target the page of a file that shows it.
         let sources: Vec<Option<Source>> = match format {
             Format::Pdf => {
                 let found = documents[0].pages();
@@ -438,7 +443,7 @@ impl<'a> Verifier<'a> {
         Ok(Verdict { sheets: verdicts, ..verdict })
     }
 
-    /// What is not on the list of a format in files that belong together.
+    /// Constructs that are not permitted, in files that belong together.
     fn refused(
         &self,
         reader: &Reader,
@@ -505,8 +510,8 @@ impl<'a> Verifier<'a> {
         Ok((verdict, seen))
     }
 
-    /// Compares a sheet that is printed on several pages: what is around the window of each, then
-    /// all that the windows show, laid together.
+    /// Compares a sheet that is printed on several pages: first the area around the window of each
+    /// page, then the sheet assembled from all windows.
     fn verify_pages(
         &self,
         sources: &[Source],

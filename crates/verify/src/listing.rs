@@ -1,5 +1,5 @@
-//! Corner lists for other detectors, as `.dsc`: the same boards, corners and tags as the target's,
-//! every position in millimetres.
+//! Verification of corner lists for other detectors, as `.dsc`: boards, corners and tags must be
+//! those of the target, with positions in millimetres.
 
 use std::path::Path;
 
@@ -11,18 +11,18 @@ use super::{DocumentError, Finding, Format, ListVerdict, Verdict, Verifier};
 use deltille_core::targets::{Panel, Target};
 use deltille_files::export::dsc::{self, Dialect};
 
-/// Largest deviation of a position or an edge, mm: what written digits leave.
+/// Largest deviation of a position or an edge, mm, by the number of digits.
 const LIST_TOLERANCE_MM: f64 = 1e-6;
 
-/// What is wrong with a list for other detectors.
+/// A deviation of a list for other detectors.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ListFinding {
-    /// A list for other detectors is not that of the target.
+    /// The list is not that of the target.
     #[error("{problem}")]
     Listed {
-        /// What differs.
+        /// The difference in words.
         problem: String,
     },
 }

@@ -1,7 +1,9 @@
-//! What lies outside the tiles: every text, check bar and line has its ink, and nothing else is on the sheet.
+//! Verification outside the tiles: every text, check bar and line has its ink, and there is nothing
+//! else on the sheet.
 //!
-//! Outlines of marks come from the same place as those printed; what is proved is that the sheet has
-//! what the description says, and no more. The length of check bars is measured by itself.
+//! The expected outlines come from the same code as the printed ones; so this proves that the sheet
+//! has what the description states, and no more. The length of check bars is measured
+//! independently.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -35,18 +37,18 @@ const PIECE_MM: f64 = 20.0;
 /// through pixels and through the width of lines.
 const WINDOW_BLANK_PX: f64 = 3.0;
 
-/// More spots of a page are not listed: it is dirty all over.
+/// Most spots of a page that are listed; with more it is dirty all over.
 const MOST_SPOTS: usize = 200;
 
-/// How finely curves are turned into lines, mm.
+/// Greatest deviation of the line segments that replace curves, mm.
 const FLATNESS_MM: f64 = 0.002;
 
-/// What is wrong beside the tiles of a sheet. Lengths in mm in the page frame.
+/// A deviation outside the tiles of a sheet. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum MarkFinding {
-    /// A check bar has another length, or is not there.
+    /// A check bar has another length, or is missing.
     #[error("check bar {bar} {}", measured(*found_mm, *stated_mm))]
     CheckBar {
         /// Which bar, from 1.
@@ -62,20 +64,20 @@ pub enum MarkFinding {
         /// Which bar, from 1.
         bar: usize,
     },
-    /// A text is not there, or reads otherwise.
+    /// A text is missing, or differs.
     #[error("label {text} differs from the description")]
     TextDiffers {
         /// Which text of the sheet, from 1.
         text: usize,
-        /// What it should say.
+        /// The stated text.
         stated: Label,
     },
-    /// A line is not there, or drawn otherwise.
+    /// A line is missing, or differs.
     #[error("line {line}, to {}, differs from the description", purpose.name())]
     LineDiffers {
         /// Which line of the sheet, from 1.
         line: usize,
-        /// What it is for.
+        /// Its purpose.
         purpose: LineKind,
     },
     /// Ink, or on a black field a lack of it, outside the tiles, texts and check bars.
@@ -89,7 +91,7 @@ pub enum MarkFinding {
 }
 
 impl MarkFinding {
-    /// The same with its place told in another frame.
+    /// The same finding with its position converted to another frame.
     pub(super) fn moved(self, place: impl Fn(DVec2) -> DVec2) -> Self {
         match self {
             Self::Spot { at_mm, area_mm2 } => Self::Spot { at_mm: place(at_mm), area_mm2 },
@@ -98,7 +100,7 @@ impl MarkFinding {
     }
 }
 
-/// What was measured of a check bar.
+/// The measurement of a check bar in words.
 fn measured(found_mm: Option<f64>, stated_mm: f64) -> String {
     match found_mm {
         Some(found_mm) => format!("measures {found_mm:.3} mm instead of {stated_mm:.3} mm"),
@@ -131,7 +133,7 @@ pub(super) fn check(
         let is_right = mark.areas.iter().all(|area| drawn.is_in(area, is_own));
         (!is_right).then(|| mark.what.differs(layout))
     }));
-    // Of a bar of another length there is no more to say.
+    // A bar of another length has been reported.
     let is_said = |differs: &MarkFinding| {
         let is_same = |found: &Finding| match (found, differs) {
             (
@@ -153,7 +155,7 @@ pub(super) fn check(
     verdict.findings.extend(spots(page, &known, panels).into_iter().map(Finding::from));
 }
 
-/// What a mark is, with its index.
+/// Kind and index of a mark.
 #[derive(Clone, Copy)]
 enum What {
     Text(usize),
@@ -162,7 +164,7 @@ enum What {
 }
 
 impl What {
-    /// That a mark is not as the layout has it.
+    /// The finding that a mark differs from the layout.
     fn differs(self, layout: &SheetLayout) -> MarkFinding {
         match self {
             Self::Text(i) => {
@@ -179,9 +181,9 @@ impl What {
 /// A mark beside the panels.
 struct Mark {
     what: What,
-    /// What is black, on the page, mm.
+    /// Its black outlines, in the page frame, mm.
     outlines: Vec<Vec<DVec2>>,
-    /// What belongs to it, in pieces.
+    /// Its area, in pieces.
     areas: Vec<Area>,
 }
 
@@ -193,7 +195,7 @@ struct Area {
     bounds: Rect,
 }
 
-/// All marks of a layout; of texts that cannot be drawn it is said that they differ.
+/// All marks of a layout, and findings for texts that cannot be drawn.
 fn marks(layout: &SheetLayout) -> (Vec<Mark>, Vec<MarkFinding>) {
     let (mut marks, mut findings) = (Vec::new(), Vec::new());
     for (index, text) in layout.texts.iter().enumerate() {
@@ -277,7 +279,7 @@ impl Area {
 /// An outline in the picture, by the rectangle around it, and whether it is of a letter.
 type Outline = GeomWithData<Rectangle<[f64; 2]>, (Vec<DVec2>, bool)>;
 
-/// What a page should show of marks.
+/// The marks that a page should show.
 struct Drawn<'a> {
     page: &'a Page,
     outlines: RTree<Outline>,

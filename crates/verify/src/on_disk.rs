@@ -1,5 +1,5 @@
-//! Artifacts on disk: their files are read within the limits, code of others has a thread and an
-//! end in time, and all else is as for artifacts in memory.
+//! Verification of artifacts on disk: files are read within the limits, and third-party code runs
+//! on a thread with a time limit; the rest is as for artifacts in memory.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use super::reader::{Files, Reader};
 use super::{Document, DocumentError, Format, Verdict, Verifier, VerifyError};
 use deltille_files::limits::{Guard, Limits};
 
-/// The files on disk, of which so much is read.
+/// The files on disk, read within limits.
 struct OnDisk(Limits);
 
 impl Files for OnDisk {
@@ -23,18 +23,18 @@ impl Files for OnDisk {
 }
 
 impl Document {
-    /// Opens a `.pdf`, `.svg` or `.png` file.
+    /// Opens a `.pdf`, `.svg` or `.png` file within the default limits.
     ///
     /// # Errors
-    /// Where the file cannot be read, or is not of this format.
+    /// When the file cannot be read, is not of the format of its extension, or exceeds a limit.
     pub fn open(path: &Path) -> Result<Self, DocumentError> {
         Self::open_within(path, &Limits::default())
     }
 
-    /// The same within other limits than the default.
+    /// Opens a `.pdf`, `.svg` or `.png` file within other limits than the default.
     ///
     /// # Errors
-    /// Where the file cannot be read, is not of this format, or passes a limit.
+    /// When the file cannot be read, is not of the format of its extension, or exceeds a limit.
     pub fn open_within(path: &Path, limits: &Limits) -> Result<Self, DocumentError> {
         let files = OnDisk(*limits);
         Self::read_by(&Reader { files: &files, limits: *limits, guard: Guard::Timed }, path)
@@ -43,18 +43,19 @@ impl Document {
 
 impl Verifier<'_> {
     /// Reads an artifact from disk, with the files beside it that belong to it, and compares it as
-    /// [`verify`](Self::verify) does. Readers of others have their own thread and, for each step,
-    /// [`Limits::max_seconds`].
+    /// [`verify`](Self::verify) does. Third-party readers run on a thread of their own, for at most
+    /// [`Limits::max_seconds`] in each step.
     ///
     /// # Errors
-    /// Where the name tells no format or sheet, or a file is missing or cannot be read at all.
+    /// When the name tells no format or sheet, or a file is missing or cannot be read at all.
     pub fn verify_path(&self, path: &Path) -> Result<Verdict, VerifyError> {
         let files = OnDisk(self.limits);
         self.verify_by(&Reader { files: &files, limits: self.limits, guard: Guard::Timed }, path)
     }
 
-    /// What is wrong with files that are named together: pages are left out that belong to others.
-    /// One page may be named alone where it can be verified so and `alone` says that it is meant to.
+    /// Verdicts on sets of pages that `named` does not name completely. A single page may be named
+    /// alone if it can be verified by itself and `alone` is set; pages of a net are always
+    /// completed by [`set_of`](Self::set_of).
     pub fn left_out(&self, named: &[PathBuf], alone: bool) -> Vec<Verdict> {
         // A folder may be named in several ways.
         let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());

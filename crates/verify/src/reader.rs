@@ -1,4 +1,4 @@
-//! Where artifacts come from, and how they are read.
+//! Sources of artifacts, in memory or on disk, and how they are read.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,22 +14,22 @@ pub struct Artifact {
 }
 
 impl Artifact {
-    /// A file of that name, such as `board-2.svg`, and with these bytes.
+    /// A file with this name, such as `board-2.svg`, and these bytes.
     pub fn new(name: impl Into<String>, bytes: impl Into<Vec<u8>>) -> Self {
         Self { name: name.into(), bytes: Arc::new(bytes.into()) }
     }
 
-    /// The same of bytes that others have too.
+    /// A file whose bytes are shared.
     pub(super) fn of(name: String, bytes: Arc<Vec<u8>>) -> Self {
         Self { name, bytes }
     }
 
-    /// Its name, which tells its format, and its place among others.
+    /// The name, whose extension tells the format and whose number tells the page.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What is in it.
+    /// The content.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -82,7 +82,7 @@ impl Reader<'_> {
         text.map_err(|_| ReadError::NotText { path: path.to_owned() }.into())
     }
 
-    /// Goes through the file of that name by code of others, which may panic, or never end.
+    /// Runs third-party code on the file of that name; it may panic, or never end.
     pub fn run<T: Send + 'static>(
         &self,
         path: &Path,
@@ -92,7 +92,7 @@ impl Reader<'_> {
     }
 }
 
-/// Runs code of others on the file of that name.
+/// Runs third-party code on the file of that name.
 pub(super) fn run<T: Send + 'static>(
     path: &Path,
     limits: &Limits,

@@ -1,4 +1,5 @@
-//! Meshes of solids: every face looked at by a camera, every corner followed back onto the mesh.
+//! Verification of meshes of solids: every face is rendered by a virtual camera, and every detected
+//! corner is projected back onto the mesh.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -22,7 +23,7 @@ use deltille_core::raster::Gray;
 use deltille_core::targets::{Corner, Panel, TargetSpec};
 use deltille_core::words::counted;
 
-/// Largest deviation of a corner of a mesh, mm: a tenth of what a well glued panel is off.
+/// Largest deviation of a corner of a mesh, mm: a tenth of the error of a well glued panel.
 pub const MESH_TOLERANCE_MM: f64 = 0.05;
 
 /// Deviation of a corner of a neighbouring face, seen at a grazing angle, mm: less than half a
@@ -40,7 +41,7 @@ const MAX_SIDE_PX: f64 = 4000.0;
 const DISTANCE: f64 = 6.0;
 const ASIDE: f64 = 1.2;
 
-/// How far a unit normal may be from that of its triangle.
+/// Tolerance of a unit normal.
 const NORMAL_SLACK: f64 = 1e-4;
 
 /// A mesh this much larger or smaller, relative, is not looked at any further.
@@ -49,12 +50,12 @@ const MAX_SCALE_ERROR: f64 = 0.05;
 /// A mesh with so many times the stated triangles is not looked at any further either.
 const MOST_TRIANGLES: usize = 2;
 
-/// What is wrong with a mesh or a body to print. Lengths in mm.
+/// A deviation of a mesh or a body to print. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum MeshFinding {
-    /// A corner of a mesh lies elsewhere.
+    /// A corner of a mesh is displaced.
     #[error(
         "corner {id} at row {row} col {col} off by ({:.3}, {:.3}, {:.3}) mm",
         shown(by_mm.x), shown(by_mm.y), shown(by_mm.z)
@@ -72,16 +73,16 @@ pub enum MeshFinding {
     /// The surface of a body is not the stated one.
     #[error("{problem}")]
     Body {
-        /// In which way.
+        /// The deviation in words.
         problem: String,
     },
-    /// Triangles of a mesh whose normals are not theirs.
+    /// Triangles of a mesh have wrong normals.
     #[error("{} with wrong normals", counted(*triangles, "triangle"))]
     Normals {
-        /// How many.
+        /// Number of triangles.
         triangles: usize,
     },
-    /// A tag of a mesh is not read, or with wrong bits.
+    /// A tag of a mesh is not read, or reads with wrong bits.
     #[error("tag {id} at row {row} col {col} {}", how_read(*errors))]
     TagInexact {
         /// Stated id.
@@ -90,12 +91,12 @@ pub enum MeshFinding {
         row: i32,
         /// Lattice column.
         col: i32,
-        /// Wrong bits; `None` when it was not read.
+        /// Number of wrong bits; `None` when the tag was not read.
         errors: Option<u32>,
     },
 }
 
-/// How a tag was read.
+/// The reading of a tag in words.
 fn how_read(errors: Option<u32>) -> String {
     match errors {
         Some(errors) => format!("read with {}", counted(errors as usize, "wrong bit")),
@@ -103,7 +104,7 @@ fn how_read(errors: Option<u32>) -> String {
     }
 }
 
-/// What there is to say of a mesh that has not the stated number of triangles.
+/// The finding about a mesh with another number of triangles than stated.
 pub(super) fn other_count(found: usize, stated: usize) -> Option<Finding> {
     let problem = || format!("{} instead of {stated}", counted(found, "triangle"));
     (found != stated).then(|| MeshFinding::Body { problem: problem() }.into())
@@ -221,7 +222,7 @@ fn check_face(verifier: &Verifier, model: &Model, panel: &Panel) -> FaceVerdict 
     let is_off =
         |finding: &Finding| matches!(finding, Finding::Mesh(MeshFinding::CornerOff3d { .. }));
     if verdict.findings.iter().any(is_off) {
-        // What else is wrong follows from that.
+        // All other deviations follow from that.
         return verdict;
     }
     check_print(verifier, model, panel, px_per_mm, &mut verdict);

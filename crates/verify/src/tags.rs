@@ -1,4 +1,5 @@
-//! A page of single tags: no corners to detect, so each tag is compared where it is stated.
+//! Verification of a sheet of single tags: without corners to detect, each tag is compared at its
+//! stated position.
 
 use super::tiles::TileFinding;
 use super::{Finding, SheetVerdict, Verifier};

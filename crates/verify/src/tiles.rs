@@ -1,4 +1,4 @@
-//! Every tile and every cell of a tag compared with the picture, pixel by pixel.
+//! Verification of every tile and every cell of a tag, pixel by pixel.
 //!
 //! This is independent of detection, and stricter: a cell that decoding would correct, a hairline
 //! or a spot inside a tile is found.
@@ -17,12 +17,12 @@ use deltille_core::lattice::{GridKind, TagCells, Tile, Vertex};
 use deltille_core::statistics::median;
 use deltille_core::targets::{Panel, Placement, TagPlacement};
 
-/// Pixels nearer than this to a change of colour are left out, px: the half diagonal of a pixel
-/// (0.71), over which an edge is smeared, and 0.02 mm at 300 dpi (0.24), and some blur.
+/// Pixels nearer than this to a change of colour are ignored, px: the half diagonal of a pixel
+/// (0.71), over which an edge is smeared, 0.02 mm at 300 dpi (0.24), and some blur.
 pub(super) const EDGE_PX: f64 = 1.25;
 
-/// Directions in which an edge is looked for beside a pixel: so fine that no tip of a tile or cell, of 60°, slips between
-/// two of them and reaches the pixel.
+/// Directions in which an edge is looked for beside a pixel: so many that no tip of a tile or cell,
+/// of 60°, fits between two of them and reaches the pixel.
 pub(super) const PROBES: u32 = 24;
 
 /// Every so many of these are enough to count pixels.
@@ -31,12 +31,12 @@ const COARSE: usize = 3;
 /// Tiles of one colour are alike where the ink of nine in ten is so near to their median.
 const TONE_SPREAD: f64 = 0.1;
 
-/// Edges may lie so far beside their place, px: twice what rounding does to edges along pixels, on pages as they are
-/// drawn (0.02 mm at 300 dpi), and on those that are put together from pixels of others.
+/// Tolerance of the positions of edges, px: twice the effect of rounding on edges along pixels, on
+/// pages as they are drawn (0.02 mm at 300 dpi), and on pages that are resampled from others.
 const MOVED_EDGE_PX: f64 = 0.25;
 const SMEARED_MOVED_EDGE_PX: f64 = 0.5;
 
-/// What is wrong with a tile or the tag in it. Lengths in mm in the page frame.
+/// A deviation of a tile or of the tag in it. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -66,7 +66,7 @@ pub enum TileFinding {
         /// Its area, mm².
         area_mm2: f64,
     },
-    /// An edge of a tile, or of a cell in it, lies elsewhere than stated.
+    /// An edge of a tile, or of a cell in it, is displaced.
     #[error(
         "an edge at ({:.2}, {:.2}) mm in the tile at row {row} col {col} is {:.3} mm beside its \
          place, towards {}",
@@ -77,9 +77,9 @@ pub enum TileFinding {
         row: i32,
         /// Column of the tile's lower-left vertex.
         col: i32,
-        /// Where.
+        /// Its position.
         at_mm: DVec2,
-        /// How far, mm, positive where more is black.
+        /// Displacement, mm, positive where there is more black.
         by_mm: f64,
     },
     /// A tag reads as another one of its family.
@@ -93,7 +93,7 @@ pub enum TileFinding {
         col: i32,
         /// The id that it reads.
         reads: u32,
-        /// By how many thirds of a turn it is turned counter-clockwise.
+        /// Counter-clockwise rotation, in thirds of a turn.
         turns: u8,
     },
     /// A tag has too many wrong cells to be corrected.
@@ -120,7 +120,7 @@ pub enum TileFinding {
         /// Wrong cells, by bit.
         bits: Vec<u32>,
     },
-    /// A tag that stands alone is not where it should be.
+    /// A tag on a sheet of single tags is not at its stated position.
     #[error("tag {id} is not where it should be")]
     TagMissing {
         /// Stated id.
@@ -129,7 +129,7 @@ pub enum TileFinding {
 }
 
 impl TileFinding {
-    /// The same with its place told in another frame.
+    /// The same finding with its position converted to another frame.
     pub(super) fn moved(self, place: impl Fn(DVec2) -> DVec2) -> Self {
         match self {
             Self::Blemish { row, col, at_mm, area_mm2 } => {
@@ -143,12 +143,12 @@ impl TileFinding {
     }
 }
 
-/// What a tag reads that is not as stated.
+/// The reading of a tag in words, where it differs.
 fn what_reads(id: u32, reads: u32) -> String {
     if id == reads { "is turned".to_owned() } else { format!("reads {reads}") }
 }
 
-/// How many bits differ.
+/// The number of differing bits in words.
 fn bits_differ(bits: usize) -> String {
     let differ = if bits == 1 { "bit differs" } else { "bits differ" };
     format!("{bits} {differ}")
@@ -182,7 +182,7 @@ impl Tally {
     }
 }
 
-/// What a tile should look like.
+/// The expected appearance of a tile.
 pub(super) struct Expected<'a> {
     /// Black, as a whole or around its tag.
     black: bool,
@@ -209,7 +209,7 @@ struct ExpectedTag<'a> {
     looks: &'a TagLooks,
 }
 
-/// Where the cells of a panel's tags are, in tile coordinates.
+/// The places of the cells of the tags of a panel, in tile coordinates.
 pub(super) struct TagLooks {
     cells: TagCells,
     /// From the edges of the tile to the border, and to the cells, bit-widths.
@@ -238,7 +238,7 @@ impl TagLooks {
         Self { cells, margin, inset, width, bits }
     }
 
-    /// What is at tile coordinates.
+    /// The region at tile coordinates.
     fn region(&self, p: DVec2) -> Region {
         if let Some(bit) = self.bit(p) {
             return Region::Cell(bit);
@@ -487,7 +487,7 @@ impl PlacedPanel<'_> {
     }
 }
 
-/// What is wrong with a tag whose cells `flipped` have the wrong colour.
+/// The finding about a tag whose cells `flipped` have the wrong colour.
 fn read_tag(
     tag: &ExpectedTag,
     flipped: &[u32],

@@ -1,4 +1,4 @@
-//! What was found of an artifact: as a whole, on its sheets, on its faces; and in words.
+//! Verdicts: the result for an artifact as a whole, for its sheets and its faces, and as text.
 
 use std::fmt;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::document::Format;
 use super::finding::Finding;
 use deltille_core::words::counted;
 
-/// What was found in one artifact.
+/// The result for one artifact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Verdict {
@@ -20,7 +20,7 @@ pub struct Verdict {
     pub format: Format,
     /// Whether the artifact is what the target says; true when nothing was found wrong.
     pub passed: bool,
-    /// What is wrong with the file as a whole.
+    /// Findings about the file as a whole.
     pub findings: Vec<Finding>,
     /// The pages of a document, in order; empty for other files.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -28,18 +28,18 @@ pub struct Verdict {
     /// The faces of a mesh, in order; empty for other files.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faces: Vec<FaceVerdict>,
-    /// What was found of a body to print; `None` for other files.
+    /// Result for a body to print; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body: Option<BodyVerdict>,
-    /// What was found of a list for other detectors; `None` for other files.
+    /// Result for a list for other detectors; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub list: Option<ListVerdict>,
-    /// What was found of a drawing for a cutter; `None` for other files.
+    /// Result for a drawing for a cutter; `None` for other files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cut: Option<CutVerdict>,
 }
 
-/// What was found in a list of boards.
+/// The result for a list of boards.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ListVerdict {
@@ -53,7 +53,7 @@ pub struct ListVerdict {
     pub max_deviation_mm: f64,
 }
 
-/// What was found in a drawing for a cutter.
+/// The result for a drawing for a cutter.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct CutVerdict {
@@ -67,7 +67,7 @@ pub struct CutVerdict {
     pub max_deviation_mm: f64,
 }
 
-/// What was found of a body to print.
+/// The result for a body to print.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct BodyVerdict {
@@ -81,7 +81,7 @@ pub struct BodyVerdict {
     pub max_deviation_mm: f64,
 }
 
-/// What was found on one face of a mesh.
+/// The result for one face of a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct FaceVerdict {
@@ -91,19 +91,19 @@ pub struct FaceVerdict {
     pub px_per_mm: f64,
     /// Corners that the target has on this face.
     pub corners: usize,
-    /// Those that were found with the right label.
+    /// Corners that were found with the right label.
     pub corners_found: usize,
     /// Tags that the target has on this face.
     pub tags: usize,
-    /// Those that read without a wrong bit.
+    /// Tags that read without a wrong bit.
     pub tags_exact: usize,
     /// Largest distance of a found corner on the mesh from its stated position, mm.
     pub max_deviation_mm: f64,
-    /// What is wrong.
+    /// The findings.
     pub findings: Vec<Finding>,
 }
 
-/// What was found on one page.
+/// The result for one sheet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct SheetVerdict {
@@ -117,24 +117,24 @@ pub struct SheetVerdict {
     pub check_bars_mm: Vec<(f64, Option<f64>)>,
     /// Corners that the target has on this sheet.
     pub corners: usize,
-    /// Those that were found with the right label.
+    /// Corners that were found with the right label.
     pub corners_found: usize,
     /// Tags that the target has on this sheet.
     pub tags: usize,
-    /// Those that read exactly as stated, every cell.
+    /// Tags that read exactly as stated, in every cell.
     pub tags_exact: usize,
     /// Largest distance of a found corner from its stated position, mm.
     pub max_deviation_mm: f64,
-    /// On how many pages the sheet is printed.
+    /// Number of pages on which the sheet is printed.
     pub pages: usize,
-    /// What the fold of a net proves.
+    /// Result of folding a net.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fold: Option<FoldVerdict>,
-    /// What is wrong.
+    /// The findings.
     pub findings: Vec<Finding>,
 }
 
-/// What folding the faces found on one sheet of a net shows.
+/// The result of folding the faces on one sheet of a net.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct FoldVerdict {
@@ -145,7 +145,7 @@ pub struct FoldVerdict {
     pub edges: usize,
 }
 
-/// Findings named on the line for people; the report has all.
+/// Most findings named in the line for people; the JSON report has all.
 const NAMED: usize = 4;
 
 impl Verdict {

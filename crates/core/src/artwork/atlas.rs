@@ -1,3 +1,5 @@
+//! Texture atlas of a solid: all faces packed in rows on one sheet.
+
 use std::f64::consts::PI;
 
 use glam::DVec2;
@@ -7,10 +9,10 @@ use super::{ArtworkError, Sheet};
 use crate::family::Family;
 use crate::targets::{Face, Placement, Target};
 
-/// White between two faces, texels: more than any filter of the first mipmap levels reaches.
+/// White between two faces, px: more than the filters of the first mipmap levels reach.
 const PADDING_PX: f64 = 16.0;
 
-/// All faces of a solid on one picture, the texture of its mesh.
+/// All faces of a solid on one picture, which is the texture of its mesh.
 ///
 /// ```text
 ///    ╱╲‾‾╱╲‾‾╱      Faces stand alternately upright and upside down in rows. Their own margins and
@@ -18,21 +20,24 @@ const PADDING_PX: f64 = 16.0;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Atlas {
-    /// The picture; its sides are whole pixels.
+    /// The drawing of all faces, mm; each side is a whole number of pixels.
     pub sheet: Sheet,
     /// Resolution, pixels per metre.
     pub px_per_m: u32,
-    /// Width and height, px.
+    /// Width and height of the texture, px.
     pub size_px: [u32; 2],
-    /// Vertices of each face on the sheet, mm.
+    /// Vertices of each face on the sheet, mm, in the order of the faces.
     pub outlines_mm: Vec<[DVec2; 3]>,
 }
 
 impl Atlas {
-    /// Lays out the faces of a target, in the order of its panels.
+    /// Lays out the faces of a target, one for each of its panels and in their order, at a
+    /// resolution of `px_per_m` pixels per metre. `family` holds the codes of the tags; it may be
+    /// `None` for a target without tags only.
     ///
     /// # Errors
-    /// Where a family is missing, or the texture would be too large.
+    /// When the target has tags and the family is missing or lacks a code. The size of the texture
+    /// is not limited here.
     pub fn new(
         target: &Target,
         faces: &[Face],
@@ -57,15 +62,16 @@ impl Atlas {
     }
 }
 
-/// Faces in rows of so many, alternately upright and upside down.
+/// Faces packed in rows of equal number, alternately upright and upside down.
 pub(super) struct Packing {
     pub size_mm: DVec2,
-    /// Turns of the panels, and places of their origins.
+    /// Rotation of each panel, rad, and position of its origin, mm.
     places: Vec<(f64, DVec2)>,
 }
 
 impl Packing {
-    /// The rows whose longer side is the shortest.
+    /// The packing whose longer side is the shortest, over all numbers of faces in a row; `padding`
+    /// in mm.
     pub fn tightest(faces: &[Face], padding: f64) -> Self {
         let packings = (1..=faces.len()).map(|columns| Self::new(faces, columns, padding));
         let side = |packing: &Self| packing.size_mm.max_element();
@@ -73,14 +79,15 @@ impl Packing {
         tightest.unwrap_or(Self { size_mm: DVec2::ZERO, places: Vec::new() })
     }
 
-    /// Where the faces lie.
+    /// The placement of each face on the sheet, numbered from 0.
     pub fn placements(&self) -> impl Iterator<Item = Placement> {
         let places = self.places.iter().zip(0..);
         places.map(|(&(angle_rad, origin_mm), panel)| Placement { panel, angle_rad, origin_mm })
     }
 
     fn new(faces: &[Face], columns: usize, padding: f64) -> Self {
-        // Along a row slanted edges keep the padding between them, the flattest one as well.
+        // Slanted edges keep the padding, measured across them, along a row; so does the flattest
+        // one.
         let slants = faces.iter().flat_map(|Face { outline_mm: [a, b, c], .. }| {
             [a, b].map(|end| {
                 let slant = c - end;
@@ -99,7 +106,8 @@ impl Packing {
             }
             let upright = (index % columns).is_multiple_of(2);
             let turn = if upright { 1.0 } else { -1.0 };
-            // The lower edge of an upright face, or the apex of the others, starts the row.
+            // The lower edge of an upright face, or the apex of an inverted one, lies at the bottom
+            // of the row.
             let lowest = if upright { face.outline_mm[0].y } else { -face.outline_mm[2].y };
             let y = packing.size_mm.y - lowest;
             let shape = face.outline_mm.map(|p| turn * p + DVec2::Y * y);
@@ -119,10 +127,10 @@ impl Packing {
     }
 }
 
-/// How far a triangle must be moved along x to touch another one from the right.
+/// The shift along x, mm, with which `shape` touches `before` from the right.
 ///
-/// The right outline of one and the left outline of the other are straight between the vertices of
-/// both, so that they touch at the height of a vertex.
+/// The right outline of one triangle and the left outline of the other are straight between the
+/// vertices of both, so that they touch at the height of a vertex.
 fn shift_beside(before: &[DVec2; 3], shape: &[DVec2; 3]) -> f64 {
     let heights = before.iter().chain(shape).map(|p| p.y);
     let needed = heights.filter_map(|y| {
@@ -133,7 +141,7 @@ fn shift_beside(before: &[DVec2; 3], shape: &[DVec2; 3]) -> f64 {
     needed.fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Left and right end of a triangle at a height.
+/// Left and right end of a triangle at height y; `None` where it does not reach that height.
 fn extent_at(triangle: &[DVec2; 3], y: f64) -> Option<[f64; 2]> {
     let mut extent: Option<[f64; 2]> = None;
     for i in 0..3 {

@@ -1,3 +1,5 @@
+//! Shapes of the sheets and pages of a target: tiles with tags, check bars, lines and texts.
+
 use std::collections::BTreeMap;
 
 use glam::DVec2;
@@ -10,7 +12,7 @@ use crate::targets::{
     Panel, Placement, SheetLayout, SheetLine, SheetPage, SheetText, TagPlacement, TagsIn, Target,
 };
 
-/// The shapes of sheet `index` of a target.
+/// Draws sheet `index` of a target, in the frame of the whole sheet, mm.
 pub(super) fn sheet(
     target: &Target,
     family: Option<&Family>,
@@ -28,7 +30,7 @@ pub(super) fn sheet(
     Ok(Sheet { width_mm: layout.width_mm, height_mm: layout.height_mm, shapes })
 }
 
-/// A page that shows a part of a sheet.
+/// Draws a page that shows a part of a sheet, in the frame of the page, mm.
 pub(super) fn page(
     sheet: &Sheet,
     layout: &SheetLayout,
@@ -41,7 +43,7 @@ pub(super) fn page(
         window::clip(Shape { path, ..shape.clone() }, Rect::new(x0, y0, x1, y1))
     });
     let mut shapes: Vec<Shape> = in_window.collect();
-    // The page's own lines and texts are counted on from those of the sheet.
+    // Lines and texts of the page itself are numbered on from those of the sheet.
     let (lines, texts) = (layout.lines.len(), layout.texts.len());
     shapes.extend(marks(&page.marks)?.into_iter().map(|shape| {
         let part = match shape.part {
@@ -55,7 +57,7 @@ pub(super) fn page(
     Ok(Sheet { width_mm, height_mm, shapes })
 }
 
-/// Check bars, lines and texts.
+/// Draws the check bars, lines and texts of a layout.
 fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
     let mut shapes = Vec::new();
     for (index, bar) in layout.check_bars.iter().enumerate() {
@@ -78,20 +80,21 @@ fn marks(layout: &SheetLayout) -> Result<Vec<Shape>, ArtworkError> {
     Ok(shapes)
 }
 
-/// The lines that are drawn, with their indices. Faces that touch without hanging together each have their line to
-/// cut, there and back; it is drawn once.
+/// The lines of a layout that are drawn, with their indices. Faces that touch without hanging
+/// together have one line to cut each, in opposite directions; only the first is drawn.
 pub fn drawn_lines(layout: &SheetLayout) -> impl Iterator<Item = (usize, &SheetLine)> {
     let lines = layout.lines.iter().enumerate();
     lines.filter(|(index, line)| !layout.lines[..*index].iter().any(|drawn| is_back(drawn, line)))
 }
 
-/// Whether a line runs where another does, from its end to its beginning.
+/// Whether a line runs along another in the opposite direction, to within half a line width.
 fn is_back(line: &SheetLine, other: &SheetLine) -> bool {
     let near = |p: DVec2, q: DVec2| p.distance(q) < line.width_mm.min(other.width_mm) / 2.0;
     line.kind == other.kind && near(line.from_mm, other.to_mm) && near(line.to_mm, other.from_mm)
 }
 
-/// The tiles of a panel on its page: one shape each, or one field on an inverted panel.
+/// Draws the tiles of a panel on its page, mm: one shape for each tile, or one field for an
+/// inverted panel.
 pub(super) fn draw_panel(
     target: &Target,
     panel: &Panel,
@@ -127,7 +130,7 @@ pub(super) fn draw_panel(
     Ok(shapes.collect())
 }
 
-/// Cells and code of a tag.
+/// The cells and the code word of a tag.
 fn tag_word(
     target: &Target,
     tag: &TagPlacement,
@@ -147,7 +150,7 @@ fn tag_word(
     Ok((family.cells(), word))
 }
 
-/// A polygon given in the coordinates of a tile, in the panel frame, mm.
+/// A polygon in the frame of its panel, mm, from points in the coordinates of a tile.
 fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = DVec2>) -> BezPath {
     let (row, col) = (f64::from(tile.anchor.row), f64::from(tile.anchor.col));
     polygon(outline.into_iter().map(|DVec2 { x: u, y: v }| {
@@ -156,7 +159,8 @@ fn in_tile(panel: &Panel, tile: Tile, outline: impl IntoIterator<Item = DVec2>) 
     }))
 }
 
-/// The outline of a dark tile, or of a square, moved inside by a part of its edge.
+/// The outline of a tile in the frame of its panel, mm, moved inwards by the fraction `inside` of
+/// its edge.
 fn tile_outline(panel: &Panel, tile: Tile, inside: f64) -> BezPath {
     let middle = panel.kind.middle();
     let left = 1.0 - panel.kind.insets() * inside;
@@ -165,8 +169,8 @@ fn tile_outline(panel: &Panel, tile: Tile, inside: f64) -> BezPath {
     in_tile(panel, tile, corners.map(|corner| middle + left * (corner - middle)))
 }
 
-/// The outlines of a tag's white areas in tile coordinates (u along the lower edge, v along the
-/// left edge, 0..1).
+/// The outlines of the white areas of a tag in tile coordinates (u along the lower edge, v along
+/// the left edge, 0..1).
 pub(super) fn tag_outlines(
     cells: &TagCells,
     word: u64,
@@ -179,7 +183,7 @@ pub(super) fn tag_outlines(
         .map(move |outline| outline.into_iter().map(|v| DVec2::new(at(v.col), at(v.row))).collect())
 }
 
-/// A text on its page, set smaller where it would be too long.
+/// The outline of a text on its page, mm, scaled down where it would exceed its maximum width.
 pub(super) fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph> {
     let size = label.cap_height_mm / text::CAP_HEIGHT;
     let (path, width) = text::outline(&label.text.to_string(), size)?;
@@ -188,7 +192,7 @@ pub(super) fn draw_text(label: &SheetText) -> Result<BezPath, text::MissingGlyph
     Ok(place * Affine::scale(fit) * path)
 }
 
-/// A closed polygon.
+/// A closed polygon through the points.
 pub(super) fn polygon(points: impl IntoIterator<Item = Point>) -> BezPath {
     let mut path = BezPath::new();
     for (i, point) in points.into_iter().enumerate() {

@@ -1,9 +1,11 @@
+//! Outlines of the white areas of a tag.
+
 use std::collections::BTreeMap;
 
 use crate::lattice::{GridKind, TagCells, Tile, Vertex};
 
-/// The outlines of a tag's white areas, as vertices of the lattice of its cells, triangles or
-/// squares.
+/// The outlines of the white areas of a tag, as vertices of the lattice of its cells (triangles or
+/// squares).
 ///
 /// ```text
 ///      ·───·───·            White cells that share an edge form one area. Its outline runs with
@@ -13,8 +15,8 @@ use crate::lattice::{GridKind, TagCells, Tile, Vertex};
 /// ```
 ///
 /// A vertex (row, col) lies at tile coordinates u = (inset + col) / width, v = (inset + row) /
-/// width, with the width of [`TagCells::width`]. Vertices on a straight run are left out. The order of the loops is
-/// fixed.
+/// width, with `width` as [`TagCells::width`] gives it. Vertices on a straight run are left out.
+/// The order of the loops is the same in every run.
 pub fn white_outlines(cells: &TagCells, word: u64) -> Vec<Vec<Vertex>> {
     let mut edges = boundary_edges(cells, word);
     let mut loops = Vec::new();
@@ -25,8 +27,8 @@ pub fn white_outlines(cells: &TagCells, word: u64) -> Vec<Vec<Vertex>> {
     loops
 }
 
-/// Edges between white and black, white on the left: from each vertex the directions, as indices
-/// into [`GridKind::steps`], in ascending order.
+/// Edges between white and black cells, white on the left: for each vertex the directions of the
+/// edges that start there, as indices into [`GridKind::steps`], ascending.
 fn boundary_edges(cells: &TagCells, word: u64) -> BTreeMap<Vertex, Vec<usize>> {
     let white = cells.cells().iter().enumerate().filter(|&(bit, _)| word >> bit & 1 == 1);
     let mut edges = BTreeMap::<Vertex, Vec<usize>>::new();
@@ -65,9 +67,9 @@ fn remove(edges: &mut BTreeMap<Vertex, Vec<usize>>, from: Vertex, direction: usi
     true
 }
 
-/// Follows an outline from its first step, turning left as sharply as possible at every vertex:
-/// that stays on the white area it started on where several meet. Each time the walk comes to a
-/// vertex for the second time, what lies between is cut off as a loop of its own.
+/// Follows an outline from its first step, turning left as sharply as possible at every vertex,
+/// which keeps to the same white area where several meet. When the walk reaches a vertex for the
+/// second time, the part in between is cut off as a loop of its own.
 fn trace(
     kind: GridKind,
     edges: &mut BTreeMap<Vertex, Vec<usize>>,
@@ -84,7 +86,7 @@ fn trace(
                 break;
             }
         }
-        // All headings but the way back.
+        // All directions except straight back, from the sharpest left turn on.
         let full = kind.steps().len();
         let left_first = (1..full).map(|right| (heading + full / 2 + full - right) % full);
         let next = left_first.into_iter().find(|turn| edges[&at].contains(turn));

@@ -1,4 +1,4 @@
-//! What a cutter follows: closed outlines and lines by what is done along them.
+//! Drawings for a cutter: outlines and lines in layers by operation (cut, fold, engrave).
 
 use std::f64::consts::TAU;
 
@@ -11,26 +11,26 @@ use crate::targets::{
     edge_text, upright_number,
 };
 
-/// Blank between panels, mm: more than any cutter is wide.
+/// Blank between panels, mm: more than the width of any cut.
 const GAP_MM: f64 = 4.0;
 
-/// Height of the number of a face, in inradii, and the most of it, mm.
+/// Height of the number of a face, as a fraction of the inradius, and its maximum, mm.
 const FACE_CAP: (f64, f64) = (0.25, 8.0);
 
-/// Width of a capital with its blank, in its height.
+/// Advance width of a digit, in heights of a capital.
 const ADVANCE_CAPS: f64 = 0.84;
 
 /// Distance of the number of an edge from it, mm.
 const EDGE_GAP_MM: f64 = 1.5;
 
-/// Letters are replaced by chords that leave them by less than this, mm.
+/// Greatest deviation of the line segments that replace the curves of letters, mm.
 const FLATTENING_MM: f64 = 0.02;
 
-/// Lines of an outline that end and begin this near to each other are joined, mm: between a face
-/// and its tab pieces shorter than the width of a line are left out.
+/// Lines of an outline whose ends are nearer than this are joined, mm: pieces between a face and
+/// its tab that are shorter than a line is wide are left out of a net.
 const JOIN_MM: f64 = 0.2;
 
-/// What is done along a path.
+/// The operation along a path, one layer of the drawing each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum CutLayer {
     /// Cut through.
@@ -43,14 +43,14 @@ pub enum CutLayer {
     Engrave,
 }
 
-/// A path of straight pieces.
+/// A polyline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CutPath {
-    /// What is done along it.
+    /// The operation along it.
     pub layer: CutLayer,
-    /// Whether the last point is joined to the first.
+    /// Whether the last point is joined to the first one.
     pub closed: bool,
-    /// Points, mm, x right, y up.
+    /// Points in the frame of the drawing, mm, x right, y up.
     pub points_mm: Vec<DVec2>,
 }
 
@@ -61,11 +61,11 @@ pub struct CutDrawing {
     pub paths: Vec<CutPath>,
 }
 
-/// Why there is nothing to cut.
+/// Why a target has no drawing for a cutter.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CuttingError {
-    /// No solid.
+    /// The target is not a solid.
     #[error("{0} is no solid made by `deltille`: it has no panels to cut")]
     NotSolid(String),
     /// The sheets of the solid are not those of its net, or there are none.
@@ -74,18 +74,19 @@ pub enum CuttingError {
     /// The solid cannot be made.
     #[error(transparent)]
     Target(#[from] TargetError),
-    /// A number cannot be written.
+    /// The font lacks a character of a number.
     #[error(transparent)]
     Text(#[from] MissingGlyph),
 }
 
-/// The panels of a solid side by side, as seen from outside: outlines to cut in true size, with the
-/// numbers of the face and of its edges to engrave. Edges of the same number meet.
+/// The panels of a solid side by side, seen from outside: outlines to cut in true size, and the
+/// numbers of each face and of its edges to engrave. Edges of the same number meet on the solid.
 ///
-/// Panels are whole faces; with a skeleton in the spec they are what its seats take.
+/// Panels are whole faces, or the plates that fit the seats of the skeleton where the specification
+/// has one.
 ///
 /// # Errors
-/// Where the target is no solid, or its skeleton has no seats for its faces.
+/// When the target is not a solid, or its skeleton has no seats for the faces.
 pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     let TargetSpec::Solid(spec) = &target.spec else {
         return Err(CuttingError::NotSolid(target.name.to_string()));
@@ -117,12 +118,12 @@ pub fn panels_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     Ok(drawing)
 }
 
-/// The net of a solid to cut, score and fold, as its sheets have it, however many pages these are
-/// printed on: the outline of each piece with its tabs, the lines to fold, and the numbers of faces
+/// The net of a solid to cut, score and fold, in true size and independent of the pages on which it
+/// is printed: the outline of each piece with its tabs, the lines to fold, and the numbers of faces
 /// and edges to engrave. Pieces lie side by side.
 ///
 /// # Errors
-/// Where the target is no solid that was laid out as a net.
+/// When the target was not laid out as a net of closed outlines.
 pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     let no_net = || CuttingError::NotNet(target.name.to_string());
     let mut drawing = CutDrawing::default();
@@ -154,11 +155,12 @@ pub fn net_to_cut(target: &Target) -> Result<CutDrawing, CuttingError> {
     if drawing.paths.is_empty() { Err(no_net()) } else { Ok(drawing) }
 }
 
-/// The closed outlines that the lines to cut of a net's sheet make; `None` when they make none.
+/// The closed outlines that the cut lines of a sheet form, mm; `None` when a line does not
+/// continue.
 ///
-/// Every line runs with the paper on its left. Where an outline touches itself more than one line
-/// begins; it goes on with the one that leaves the least angle of paper between, which no other
-/// line can divide.
+/// Every line runs with the paper on its left. Where an outline touches itself, more than one line
+/// begins; the outline continues with the line that encloses the least angle of paper, which no
+/// other line can divide.
 fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
     let cuts = sheet.lines.iter().filter(|line| line.kind == LineKind::Cut);
     let mut left: Vec<[DVec2; 2]> = cuts.map(|line| [line.from_mm, line.to_mm]).collect();
@@ -170,14 +172,14 @@ fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
             let paper_rad = |[from, to]: [DVec2; 2]| {
                 let back = (last[0] - last[1]).to_angle();
                 let on = (to - from).to_angle();
-                // Lines one on the other leave a whole turn, not none.
+                // Coincident lines enclose a whole turn of paper, not none.
                 TAU - (on - back).rem_euclid(TAU)
             };
             let near = |a: DVec2, b: DVec2| a.distance(b) < JOIN_MM;
             let next = (0..left.len())
                 .filter(|&n| near(left[n][0], last[1]))
                 .min_by(|&a, &b| paper_rad(left[a]).total_cmp(&paper_rad(left[b])));
-            // The outline may also be back where it began.
+            // The outline may also be closed here.
             let closing = near(first[0], last[1]).then(|| paper_rad(first));
             let next = next.filter(|&n| closing.is_none_or(|angle| paper_rad(left[n]) < angle));
             match next {
@@ -194,7 +196,7 @@ fn outlines(sheet: &SheetLayout) -> Option<Vec<Vec<DVec2>>> {
     Some(outlines)
 }
 
-/// The number of a face around the middle of its outline.
+/// The number of a face, centred on its incircle.
 fn face_number(
     placement: &Placement,
     outline: [DVec2; 3],
@@ -215,14 +217,14 @@ fn face_number(
 }
 
 impl CutDrawing {
-    /// Left, lower, right and upper end, mm; `None` when nothing is drawn.
+    /// Bounding box, mm: left, lower, right and upper end; `None` for an empty drawing.
     pub fn bounds_mm(&self) -> Option<[f64; 4]> {
         let points = || self.paths.iter().flat_map(|path| &path.points_mm).copied();
         let (least, most) = (points().reduce(DVec2::min)?, points().reduce(DVec2::max)?);
         Some([least.x, least.y, most.x, most.y])
     }
 
-    /// Adds the outlines of letters.
+    /// Adds outlines of letters to the engraving layer.
     fn engrave(&mut self, letters: kurbo::BezPath) {
         kurbo::flatten(letters, FLATTENING_MM, |element| match element {
             kurbo::PathEl::MoveTo(p) => self.paths.push(CutPath {

@@ -1,3 +1,5 @@
+//! Sheets that show single tags with their ids.
+
 use glam::DVec2;
 use kurbo::{Affine, Point};
 
@@ -6,14 +8,14 @@ use super::{Paint, Part, Shape, Sheet, text};
 use crate::family::Family;
 use crate::lattice::{ROW_HEIGHT, TagCells};
 
-/// How tags are laid out for looking at.
+/// Layout of a gallery of tags.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GalleryTile {
     /// Length of a tag's edge, mm.
     pub edge_mm: f64,
-    /// Border in bit-widths along the edge.
+    /// Black border of a tag, in widths of a bit along the edge.
     pub border_bits: f64,
-    /// Tags in a row.
+    /// Number of tags in a row.
     pub columns: usize,
 }
 
@@ -23,17 +25,19 @@ impl Default for GalleryTile {
     }
 }
 
-/// Text size over edge length.
+/// Size of the text (em), in edge lengths.
 const TEXT: f64 = 0.13;
-/// Space between two tags, and around all of them, over edge length.
+/// Space between two tags, and around all of them, in edge lengths.
 const GAP: f64 = 0.25;
 
-/// Draws the tags `ids` of a family, each with its id below, on a page that just holds them.
+/// Draws the tags `ids` of a family, each with its id below, on a sheet of just the size needed,
+/// mm.
 ///
-/// Ids that the family does not have are left out; the caller checks them first.
+/// Ids that the family does not have are left out; the caller should check them first. Tags are
+/// drawn as triangles, whatever the dimension of the family.
 ///
 /// # Errors
-/// Where a name has a letter that the font lacks.
+/// When the font lacks a character of an id; it has all digits.
 pub fn tag_gallery(
     family: &Family,
     ids: &[u32],

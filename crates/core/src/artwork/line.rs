@@ -1,26 +1,27 @@
+//! Dash patterns of the lines to cut and to fold along.
+
 use glam::DVec2;
 
 use crate::targets::{LineKind, SheetLine};
 
-/// Dashes of a fold, and the gaps between them, mm, from one end of the line to the other; both
-/// ends are dashes, so that they can be laid against a ruler.
+/// Dash and gap of a mountain fold, mm; both ends of the line are dashes, so that a ruler can be
+/// laid against them.
 const DASH_MM: [f64; 2] = [3.0, 2.0];
 
 /// Dash, gap, dot and gap of a valley fold, mm.
 const DASH_DOT_MM: [f64; 4] = [3.0, 1.2, 0.6, 1.2];
 
-/// Dots between faces in one plane, and the gaps between them, mm.
+/// Dot and gap of a line between faces in one plane, mm.
 const DOT_MM: [f64; 2] = [0.6, 3.0];
 
-/// The strokes that a line is drawn of, mm.
+/// The strokes of which a line is drawn: start and end of each, in the frame of its page, mm.
 ///
 /// ```text
 ///   cut, align  ────────────────    fold  ──── ──── ────    valley  ──── · ──── · ────
 ///   flat  ·   ·   ·   ·
 /// ```
 ///
-/// The period of a pattern is stretched so that a whole number of them and a last dash fill the
-/// line.
+/// A dash pattern is stretched so that a whole number of periods and a last dash fill the line.
 pub fn strokes_mm(line: &SheetLine) -> Vec<[DVec2; 2]> {
     let pattern = match line.kind {
         LineKind::Cut | LineKind::Align => return vec![[line.from_mm, line.to_mm]],

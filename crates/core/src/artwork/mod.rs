@@ -1,12 +1,11 @@
-//! What is drawn, in millimetres, independent of file type.
+//! The drawing of a target in millimetres, independent of the file type.
 //!
-//! [`draw`] turns a target and the codes of its tags into sheets of shapes; every exporter writes
-//! the same shapes, and text is part of them as glyph outlines, so that PDF, SVG and PNG show the
-//! same marks without any font on the reader's side.
+//! [`draw`] turns a target and the codes of its tags into sheets of shapes. Every exporter writes
+//! the same shapes, and text is included as glyph outlines, so that PDF, SVG and PNG show the same
+//! marks whatever fonts the reader has.
 //!
-//! Nothing is drawn twice: a black tile is one path whose holes are the merged white cells of its
-//! tag, and white is paper left bare. Two tiles touch in a vertex only, so no renderer has a seam
-//! to show.
+//! No two shapes overlap: a black tile is one path whose holes are the merged white cells of its
+//! tag, and white is bare paper. Two tiles share only a vertex, so that no renderer shows a seam.
 //!
 //! Frame: the page frame of [`SheetLayout`](crate::targets::SheetLayout), origin at the lower-left
 //! corner of the page, x right, y up.
@@ -37,18 +36,18 @@ pub use cutting::{CutDrawing, CutLayer, CutPath, CuttingError, net_to_cut, panel
 pub use gallery::{GalleryTile, tag_gallery};
 pub use line::strokes_mm;
 
-/// Everything that is drawn of one target.
+/// The drawing of one target: all its pages.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Artwork {
     /// Title of the document: the target's name.
     pub title: String,
-    /// One line on what it is.
+    /// One line that describes the target; see [`subject`].
     pub subject: String,
     /// The pages, in the order of the target's sheets and of the pages of each.
     pub sheets: Vec<Sheet>,
 }
 
-/// One page.
+/// One page with its shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sheet {
     /// Page width, mm.
@@ -62,7 +61,7 @@ pub struct Sheet {
 /// A mark in solid black.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
-    /// What it is, for files with names or layers.
+    /// Which mark it is, for file formats with names or layers.
     pub part: Part,
     /// How its path is painted.
     pub paint: Paint,
@@ -82,11 +81,11 @@ pub enum Paint {
     },
 }
 
-/// What a shape is.
+/// Which mark of a target a shape is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
-    /// A black tile of a panel with the holes of its tag, or a tag in a white square, named by panel
-    /// id and lower-left vertex.
+    /// A black tile of a panel with the holes of its tag, or a tag in a white square; named by
+    /// panel id and lower-left lattice vertex.
     Tile {
         /// Panel id.
         panel: u32,
@@ -107,14 +106,15 @@ pub enum Part {
     },
     /// A line to cut or to fold along, by index.
     Line {
-        /// What it is for.
+        /// Its purpose.
         kind: LineKind,
-        /// Position in [`SheetLayout::lines`](crate::targets::SheetLayout::lines).
+        /// Position in [`SheetLayout::lines`](crate::targets::SheetLayout::lines), lines of a page
+        /// after those of its sheet.
         index: usize,
     },
     /// A line of text.
     Label {
-        /// Position among the texts of the sheet.
+        /// Position among the texts of the sheet, those of a page after those of its sheet.
         index: usize,
     },
 }
@@ -151,16 +151,17 @@ pub enum ArtworkError {
     /// A text holds a character that the built-in font lacks.
     #[error(transparent)]
     Text(#[from] text::MissingGlyph),
-    /// A family that is not shipped, and which are.
+    /// The family is not shipped with the library; the message names those that are.
     #[error("{0}")]
     UnknownFamily(String),
 }
 
 impl Target {
-    /// Draws every sheet of a target whose family is shipped.
+    /// Draws every page of a target whose family, if any, is shipped with the library.
     ///
     /// # Errors
-    /// Where it is not, or a text has letters that the font lacks.
+    /// When the family is not shipped or lacks a code, a sheet shows an unknown panel, or the font
+    /// lacks a character of a text.
     ///
     /// ```
     /// use deltille_core::targets::{BoardSpec, Target};
@@ -175,12 +176,13 @@ impl Target {
     }
 }
 
-/// Draws every sheet of a target.
+/// Draws every page of a target, in the page frame, mm.
 ///
-/// `family` holds the codes of the tags; it may be `None` for an untagged target only.
+/// `family` holds the codes of the tags; it may be `None` for a target without tags only.
 ///
 /// # Errors
-/// Where the family is missing or lacks a code, or a text has a letter that the font lacks.
+/// When the family is missing or lacks a code, a sheet shows an unknown panel, or the font lacks a
+/// character of a text.
 pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, ArtworkError> {
     let mut sheets = Vec::with_capacity(target.page_count());
     for (index, layout) in target.sheets.iter().enumerate() {
@@ -196,10 +198,10 @@ pub fn draw(target: &Target, family: Option<&Family>) -> Result<Artwork, Artwork
     Ok(Artwork { title: target.name.to_string(), subject: subject(target), sheets })
 }
 
-/// The tiles of one panel in its own frame.
+/// Draws the tiles of one panel in the frame of the panel, mm.
 ///
 /// # Errors
-/// Where the family is missing or lacks a code.
+/// When the panel has tags and the family is missing or lacks a code.
 pub fn panel_shapes(
     target: &Target,
     panel: &Panel,
@@ -209,15 +211,15 @@ pub fn panel_shapes(
     board::draw_panel(target, panel, &placement, family)
 }
 
-/// The outline of a text on its page, mm; filled by the even-odd rule.
+/// The outline of a text in the frame of its page, mm; to be filled by the even-odd rule.
 ///
 /// # Errors
-/// Where the font lacks a letter.
+/// When the font lacks a character of the text.
 pub fn text_outline(text: &SheetText) -> Result<BezPath, text::MissingGlyph> {
     board::draw_text(text)
 }
 
-/// One line on what a target is.
+/// One line that describes a target: kind, number of corners and tags, family with fingerprint.
 pub fn subject(target: &Target) -> String {
     let corners: usize = target.panels.iter().map(|panel| panel.corners.len()).sum();
     let tags: usize = target.panels.iter().map(|panel| panel.tags.len()).sum();

@@ -1,6 +1,6 @@
 //! Text as glyph outlines of one built-in font: Inter, cut down to ASCII and `° ± · × – −`.
 //!
-//! No kerning and no shaping: labels are short and plain.
+//! There is no kerning and no shaping, which short labels do not need.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -10,7 +10,7 @@ use kurbo::{Affine, BezPath};
 /// Inter Regular, SIL Open Font License 1.1, see `font/LICENSE-Inter.txt`; made by `font/outlines.py`.
 static OUTLINES: &str = include_str!("font/inter-outlines.txt");
 
-/// Units of the outlines in an em.
+/// Font units in an em.
 const UNITS_PER_EM: f64 = 2816.0;
 
 static GLYPHS: LazyLock<BTreeMap<char, Glyph>> = LazyLock::new(|| {
@@ -18,13 +18,13 @@ static GLYPHS: LazyLock<BTreeMap<char, Glyph>> = LazyLock::new(|| {
     lines.map(|line| glyph(line).expect("the built-in font is whole")).collect()
 });
 
-/// A character of the font, in its units.
+/// Advance width and outline of a character, in font units.
 struct Glyph {
     advance: f64,
     outline: BezPath,
 }
 
-/// Height of a capital letter over the size of the text.
+/// Height of a capital letter as a fraction of the text size (em).
 pub const CAP_HEIGHT: f64 = 0.727;
 
 /// A character that the built-in font does not have.
@@ -32,13 +32,13 @@ pub const CAP_HEIGHT: f64 = 0.727;
 #[error("the built-in font has no {0:?}: use ASCII and ° ± · × – − in names and labels")]
 pub struct MissingGlyph(pub char);
 
-/// The outlines of one line of text and its advance width in mm.
+/// The outline of one line of text, mm, and its advance width, mm.
 ///
-/// The text starts at the origin and its base line runs along x; `size_mm` is the em, a capital is
-/// [`CAP_HEIGHT`] times as high. Fill by the non-zero or even-odd rule.
+/// The text starts at the origin and its base line runs along x, with y up; `size_mm` is the em, of
+/// which a capital letter is [`CAP_HEIGHT`] high. Fill by the non-zero or the even-odd rule.
 ///
 /// # Errors
-/// Where the font lacks a letter.
+/// When the font lacks a character of the text.
 pub fn outline(text: &str, size_mm: f64) -> Result<(BezPath, f64), MissingGlyph> {
     let mut path = BezPath::new();
     let mut advance = 0.0;
@@ -51,7 +51,8 @@ pub fn outline(text: &str, size_mm: f64) -> Result<(BezPath, f64), MissingGlyph>
     Ok((Affine::scale(scale) * path, advance * scale))
 }
 
-/// A character in hexadecimal, its advance, and its outline as an SVG path.
+/// Parses a line of the built-in font: a character in hexadecimal, its advance width, and its
+/// outline as an SVG path.
 fn glyph(line: &str) -> Option<(char, Glyph)> {
     let mut words = line.splitn(3, ' ');
     let character = char::from_u32(u32::from_str_radix(words.next()?, 16).ok()?)?;

@@ -1,14 +1,14 @@
-//! Windows onto sheets that are larger than the paper: shapes cut off at the rim.
+//! Clipping of shapes to a rectangle, for sheets that are larger than the paper.
 
 use kurbo::{BezPath, PathEl, Point, Rect, Shape as _};
 
 use super::{Paint, Shape};
 
-/// How finely curves that cross the rim are turned into lines, mm.
+/// Greatest deviation of the line segments that replace curves across the border of a window, mm.
 const FLATNESS_MM: f64 = 0.001;
 
-/// What of a shape lies in a window; `None` where nothing does. Curves of shapes that lie within
-/// stay curves.
+/// The part of a shape inside a window, mm; `None` when there is none. Shapes that lie entirely
+/// inside keep their curves.
 pub(super) fn clip(shape: Shape, window: Rect) -> Option<Shape> {
     let bounds = shape.path.bounding_box();
     if window.union(bounds) == window {
@@ -44,7 +44,7 @@ fn append(path: &mut BezPath, points: &[Point], close: bool) {
     }
 }
 
-/// The contours of a path as points.
+/// The contours of a path as polylines.
 fn polylines(path: &BezPath) -> Vec<Vec<Point>> {
     let mut lines = Vec::<Vec<Point>>::new();
     kurbo::flatten(path, FLATNESS_MM, |element| match element {
@@ -55,13 +55,13 @@ fn polylines(path: &BezPath) -> Vec<Vec<Point>> {
     lines
 }
 
-/// How far a point lies inside each side of a rectangle.
+/// Distances of a point from the four sides of a rectangle, positive inside.
 fn depths(p: Point, window: Rect) -> [f64; 4] {
     [p.x - window.x0, window.x1 - p.x, p.y - window.y0, window.y1 - p.y]
 }
 
-/// The part of a polygon in a rectangle, side by side (Sutherland and Hodgman 1974). Where the
-/// polygon is in several parts there, lines along the rim join them; they enclose nothing.
+/// The part of a polygon inside a rectangle, clipped side by side (Sutherland and Hodgman 1974).
+/// Where that is several parts, coincident lines along the border join them; they enclose no area.
 fn clip_polygon(mut polygon: Vec<Point>, window: Rect) -> Vec<Point> {
     for side in 0..4 {
         let depth = |p: Point| depths(p, window)[side];
@@ -85,7 +85,7 @@ fn clip_polygon(mut polygon: Vec<Point>, window: Rect) -> Vec<Point> {
     polygon
 }
 
-/// The part of a segment in a rectangle.
+/// The part of a line segment inside a rectangle; `None` when there is none.
 fn clip_segment([from, to]: [Point; 2], window: Rect) -> Option<[Point; 2]> {
     let (mut start, mut end) = (0.0f64, 1.0f64);
     for (a, b) in depths(from, window).into_iter().zip(depths(to, window)) {

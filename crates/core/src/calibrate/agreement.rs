@@ -1,21 +1,22 @@
-//! How far the frames of a calibration agree with each other.
+//! Empirical covariance of the shared unknowns, from the scatter between frames.
 //!
-//! Deviations that follow from the noise of corners take the model of cameras and target for true. What is
-//! not, such as a board that is not quite flat, pulls at the estimate in every frame another way. So the pull of
-//! each frame is taken for one draw of what pulls, and the scatter of all for the covariance that is observed:
-//! the cluster-robust covariance with the correction CR2, which is that of the noise where noise is all there is
-//! (Bell & McCaffrey 2002).
+//! Standard deviations that follow from the noise of corners take the model of cameras and target
+//! for exact. Model errors, such as a board that is not quite flat, bias the estimate differently
+//! in every frame. So the gradient of each frame is taken for one draw, and the scatter of all
+//! gives the cluster-robust covariance with the correction CR2, which equals that of the noise
+//! where there are no model errors (Bell & McCaffrey 2002).
 //!
 //! ```text
-//!     yᵥ = (I − LᵀHᵥL)^−½ Lᵀ gᵥ,    Σ = LLᵀ       Hᵥ, gᵥ: what frame v adds to the normal equations and their right side
+//!     yᵥ = (I − LᵀHᵥL)^−½ Lᵀ gᵥ,    Σ = LLᵀ       Hᵥ, gᵥ: normal equations and gradient of frame v
 //!     S = L (Σᵥ yᵥ yᵥᵀ) Lᵀ
 //! ```
 //!
-//! What is expected beforehand, of the knots of a spline, is no frame's to tell: with P its part of the normal equations,
-//! frames scatter only as I − LᵀPL, and LᵀPL is added as it is expected.
+//! The prior on the knots of a spline does not come from any frame: with P its part of the normal
+//! equations, frames scatter only as I − LᵀPL, and LᵀPL is added with its nominal size.
 //!
-//! F frames tell at most F − 1 directions, and each roughly; so S is drawn towards a multiple of the covariance
-//! that follows from noise, as far as its own scatter calls for (Ledoit & Wolf 2004).
+//! F frames determine at most F − 1 directions, and each only roughly; so S is shrunk towards a
+//! multiple of the covariance that follows from noise, as far as its own scatter calls for (Ledoit
+//! & Wolf 2004).
 
 use nalgebra::{DMatrix, DVector, Matrix6};
 use rayon::prelude::*;
@@ -26,20 +27,22 @@ use super::minimise::Minimum;
 use super::normal::{Covariances, Local};
 use super::weights::Whitening;
 
-/// With fewer frames nothing is observed.
+/// Least number of frames for an empirical covariance.
 const LEAST_FRAMES: usize = 5;
 
-/// The most of what is known of a direction that one frame may tell: beyond, nothing holds it to account.
+/// Greatest leverage of one frame on a direction that is corrected for: beyond it no other frame
+/// tests it.
 const MOST_OF_ONE: f64 = 0.9;
 
-/// A covariance as frames show it.
+/// An empirical covariance.
 pub(super) struct Observed {
     pub covariance: DMatrix<f64>,
-    /// From so many squares a variance of it is known.
+    /// Degrees of freedom from which a variance of it is known.
     pub freedom: f64,
 }
 
-/// The covariance of what all frames share as the frames show it; `None` of too few frames, or where nothing is shared.
+/// The empirical covariance of the unknowns that all frames share (n × n, in the order of the
+/// layout); `None` with too few frames, or where nothing is shared.
 pub(super) fn observed(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -53,14 +56,14 @@ pub(super) fn observed(
     let pull = |frame: usize| pull_of(minimum, whitening, loss, found, frame);
     let columns = (0..frames).into_par_iter().map(pull).collect::<Option<Vec<_>>>()?;
     let mut pulls = DMatrix::from_columns(&columns);
-    // At the minimum they cancel; what the search left is no scatter.
+    // At the minimum they sum to zero; the remainder of the minimisation is no scatter.
     let mean = pulls.column_mean();
     pulls.column_iter_mut().for_each(|mut pull| pull -= &mean);
     let count = frames as f64;
     let expected = expected(minimum, whitening, found);
     let (scatter, share) = shrunk(&pulls, expected.as_ref());
     let mut scatter = scatter * (count / (count - 1.0));
-    // The level that is common to all directions is known from all of them.
+    // The common level is known from all directions together.
     let mut directions = minimum.layout.shared as f64;
     if let Some(expected) = expected {
         directions -= expected.trace();
@@ -72,7 +75,7 @@ pub(super) fn observed(
     })
 }
 
-/// LᵀPL of what is expected of the knots of splines; `None` where there are none.
+/// LᵀPL of the priors on the knots of splines; `None` where there are none.
 fn expected(minimum: &Minimum, whitening: &Whitening, found: &Covariances) -> Option<DMatrix<f64>> {
     let Minimum { problem, layout, .. } = minimum;
     let (mut matrix, mut right) =
@@ -86,7 +89,8 @@ fn expected(minimum: &Minimum, whitening: &Whitening, found: &Covariances) -> Op
     is_some.then(|| found.root.half.tr_mul(&matrix) * &found.root.half)
 }
 
-/// By how much a frame moves what all frames share, in units of what noise does.
+/// The gradient of a frame on the shared unknowns with the correction CR2, in units of the effect
+/// of noise.
 fn pull_of(
     minimum: &Minimum,
     whitening: &Whitening,
@@ -116,14 +120,15 @@ fn pull_of(
             local.columns.iter().zip(of_shared).for_each(|(&row, v)| across[(row, i)] += v);
             of_pose.iter().enumerate().for_each(|(j, value)| pose[(i, j)] += value);
         }
-        // The pose of the frame is where its own pull is zero.
+        // The pose of the frame is at its own optimum.
         for corner in &local.corners {
             normal.pull_of_corner(layout, corner, &mut pull);
         }
     }
     let root = &found.root;
     let pull = if problem.map.is_some() {
-        // Corners take up most of what a frame tells of itself, and each frame tells of all of them alike.
+        // Corner offsets absorb most of what a frame tells by itself, and each frame has the same
+        // leverage on all of them.
         let frames = problem.frames.len() as f64;
         &root.inverse * (&found.across * pull) * (frames / (frames - 1.0)).sqrt()
     } else {
@@ -131,7 +136,7 @@ fn pull_of(
         pose.fill_upper_triangle_with_lower_triangle();
         let through = pose.cholesky()?.solve(&across.transpose());
         let own: DMatrix<f64> = own - &across * through;
-        // Of a spline's knots a frame touches a few.
+        // A frame touches only a few knots of a spline.
         if problem.cameras.iter().any(|camera| camera.roughness.is_some()) {
             return by_some(&own, &pull, found);
         }
@@ -144,7 +149,7 @@ fn pull_of(
     pull.iter().all(|v| v.is_finite()).then_some(pull)
 }
 
-/// The same where a frame tells only of some of the unknowns.
+/// The same for a frame that touches only some of the unknowns.
 fn by_some(own: &DMatrix<f64>, pull: &DVector<f64>, found: &Covariances) -> Option<DVector<f64>> {
     let share = LocalShare::of(own, &found.shared)?;
     let more = |part: f64| (1.0 - part.clamp(0.0, MOST_OF_ONE)).sqrt().recip() - 1.0;
@@ -153,8 +158,9 @@ fn by_some(own: &DMatrix<f64>, pull: &DVector<f64>, found: &Covariances) -> Opti
     pull.iter().all(|v| v.is_finite()).then_some(pull)
 }
 
-/// The sum of x xᵀ over columns, drawn towards a multiple of the identity (Ledoit & Wolf 2004), and how far, from 0 to 1;
-/// where something is expected beforehand, of what that leaves of the identity.
+/// The sum of x xᵀ over the columns, shrunk towards a multiple of the identity (Ledoit & Wolf
+/// 2004), and the degree of shrinkage from 0 to 1; with a prior (`expected`), towards a multiple of
+/// the identity less that.
 fn shrunk(columns: &DMatrix<f64>, expected: Option<&DMatrix<f64>>) -> (DMatrix<f64>, f64) {
     let (n, count) = (columns.nrows() as f64, columns.ncols() as f64);
     let columns = columns * count.sqrt();

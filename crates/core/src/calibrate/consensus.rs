@@ -1,15 +1,16 @@
-//! Corners of a picture that agree with each other, before anything is known of the camera.
+//! Consensus among the corners of a picture, before anything is known of the camera.
 //!
-//! Through any lens three neighbours in a row lie nearly in a row, at nearly equal distances:
+//! Through any lens three neighbours in a row are imaged nearly in a row, at nearly equal
+//! distances:
 //!
 //! ```text
 //!     a ───── b ───── c        |a − 2b + c| < ¼ |c − a|
 //! ```
 //!
-//! Corners that such triples tie to each other are one smooth map of the board. The largest set of them
-//! is right where most corners are: wrong places tie to nothing, and labels that are off by a tile tie
-//! to each other only. It is where a calibration starts from; what takes part in its end is judged
-//! again, by the camera.
+//! Corners that such triples connect belong to one smooth map of the board. The largest connected
+//! set is correct where most corners are: wrong positions connect to nothing, and labels that are
+//! off by a tile connect to each other only. A calibration starts from this set; the final set of
+//! corners is decided again with the estimated camera.
 
 use std::collections::BTreeMap;
 
@@ -17,24 +18,24 @@ use super::problem::Observation;
 use super::view::{LEAST_CORNERS, Sighting, View};
 use crate::statistics::median;
 
-/// How far the middle of three may lie from the middle, as a part of the whole: the two ways are then as
-/// 5 to 3 at most, which a board shows only where it nearly touches the lens. A label that is off
-/// by a tile makes a third.
+/// Greatest deviation of the middle corner from the mean of its neighbours, as a fraction of their
+/// distance: the two distances are then as 5 to 3 at most, which a board shows only where it nearly
+/// touches the lens. A label that is off by a tile gives a third.
 const UNEVEN: f64 = 0.25;
 
-/// Steps along which neighbours lie, on either lattice.
+/// Steps (rows, columns) between neighbours, on either lattice.
 const STEPS: [(i32, i32); 4] = [(0, 1), (1, 0), (1, -1), (1, 1)];
 
-/// The longest of these, by the shortest: the diagonals of squares are among them, the long ones of
-/// rhombi are not.
+/// Longest of these steps relative to the shortest: this admits the diagonals of squares, but not
+/// the long ones of rhombi.
 const LONGEST_STEP: f64 = 1.5;
 
-/// Three wrong corners may lie in a row, but hardly at the distance of neighbours: a triple is no longer
-/// than so many times the usual.
+/// Longest triple relative to the usual length: three wrong corners may lie in a row, but hardly at
+/// the distance of neighbours.
 const LONGEST_TRIPLE: f64 = 4.0;
 
-/// The view with only those corners of each sighting that agree, and only sightings of which some do; as
-/// it is where that is none, as on panels of a few corners.
+/// The view with only the corners of each sighting that agree, and only the sightings that have
+/// some; the view unchanged where none has, as on panels of a few corners.
 pub(super) fn agreeing(view: &View) -> View {
     let of_sighting = |sighting: &Sighting| {
         let agree = largest_agreement(&sighting.observations)?;
@@ -48,10 +49,11 @@ pub(super) fn agreeing(view: &View) -> View {
     }
 }
 
-/// The largest set of corners that triples tie to each other; `None` where it is too small for a pose.
+/// Indices of the largest set of corners that triples connect; `None` where it is too small for a
+/// pose.
 fn largest_agreement(corners: &[Observation]) -> Option<Vec<usize>> {
     let triples = agreeing_triples(corners);
-    // The set of each corner, by one of its members.
+    // Disjoint sets (union-find): each corner points to another member of its set.
     let mut sets: Vec<usize> = (0..corners.len()).collect();
     let find = |sets: &[usize], mut corner: usize| {
         while sets[corner] != corner {

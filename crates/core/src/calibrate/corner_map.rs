@@ -1,8 +1,9 @@
-//! Corners that are not where the target's plan has them, each by itself.
+//! Offsets of single corners from their places in the plan of the target.
 //!
-//! What is expected beforehand of an offset is normal, with one deviation in the plane of the panels and one
-//! out of it. Both are found from the data (empirical Bayes, MacKay 1992): with γ the number of offsets
-//! that the views determine better than the expectation, σ² = Σ offset² / γ.
+//! The prior of an offset is normal, with one standard deviation in the plane of the panels and one
+//! out of it. Both are estimated from the data by maximising the marginal likelihood (empirical
+//! Bayes, MacKay 1992): with γ the number of offsets that the views determine better than the
+//! prior, σ² = Σ offset² / γ.
 
 use std::collections::BTreeMap;
 
@@ -13,10 +14,10 @@ use super::panel::PanelRef;
 use super::problem::{Observation, Problem};
 use crate::statistics::median;
 
-/// What is expected first, in edges: more than any print is off.
+/// First prior standard deviation, in edges: more than the error of any print.
 const FIRST_PRIOR: f64 = 0.01;
 
-/// The least that corners are expected to be off, mm: a hundredth of what the best print resolves.
+/// Least prior standard deviation, mm: a hundredth of what the best print resolves.
 const LEAST_PRIOR_MM: f64 = 1e-4;
 
 /// A corner of a panel: index of the panel, row, column.
@@ -26,11 +27,11 @@ type Label = (usize, i32, i32);
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct CornerMap {
     index: BTreeMap<Label, usize>,
-    /// Which corners.
+    /// The corners, ordered by label.
     pub corners: Vec<MappedCorner>,
-    /// How far each is from its place in the plan, in its panel's frame, mm.
+    /// The offset of each corner from its place in the plan, in the frame of its panel, mm.
     pub offsets_mm: Vec<DVec3>,
-    /// The deviation that is expected of that, along x, y and z.
+    /// The prior standard deviation of an offset along x, y and z of the panel, mm.
     pub prior_mm: DVec3,
 }
 
@@ -40,12 +41,12 @@ pub(super) struct MappedCorner {
     pub panel: PanelRef,
     pub row: i32,
     pub col: i32,
-    /// Its place in the plan, mm.
+    /// Its place in the plan, in the frame of its panel, mm.
     pub panel_mm: DVec3,
 }
 
 impl CornerMap {
-    /// All corners that a problem has observations of, at their places.
+    /// All corners that a problem has observations of, with zero offsets and the first prior.
     pub fn flat(problem: &Problem) -> Self {
         let mut index = BTreeMap::new();
         let mut corners: Vec<MappedCorner> = Vec::new();
@@ -67,17 +68,17 @@ impl CornerMap {
         Self { index, corners, offsets_mm, prior_mm }
     }
 
-    /// The same with another expectation.
+    /// The same map with another prior, mm.
     pub fn expecting(self, prior_mm: DVec3) -> Self {
         Self { prior_mm, ..self }
     }
 
-    /// How many corners it has.
+    /// Number of corners.
     pub fn len(&self) -> usize {
         self.corners.len()
     }
 
-    /// In how many blocks each of its corners is.
+    /// For each corner the number of blocks that observe it.
     pub fn views(&self, problem: &Problem) -> Vec<usize> {
         let mut views = vec![0; self.len()];
         for block in &problem.blocks {
@@ -86,18 +87,19 @@ impl CornerMap {
         views
     }
 
-    /// The place of a corner in it.
+    /// The index of a corner, which the map must have.
     pub fn index(&self, panel: PanelRef, seen: &Observation) -> usize {
         self.index[&(panel.index(), seen.row, seen.col)]
     }
 
-    /// The offset of a corner; zero of one that it does not have.
+    /// The offset of a corner, mm; zero for a corner that the map does not have.
     pub fn offset(&self, panel: PanelRef, seen: &Observation) -> DVec3 {
         let index = self.index.get(&(panel.index(), seen.row, seen.col));
         index.map_or(DVec3::ZERO, |&index| self.offsets_mm[index])
     }
 
-    /// The expectation that fits the offsets; `covariances` and `sigma` are as in [`Self::without_gauge`].
+    /// The prior that maximises the marginal likelihood of the offsets, mm; `covariances` and
+    /// `sigma` are as in [`Self::without_gauge`].
     pub fn fitted_prior(&self, covariances: &[Matrix3<f64>], sigma: f64) -> DVec3 {
         let of_axes = |axes: &[usize]| {
             let (mut squares, mut determined) = (0.0, 0.0);
@@ -113,12 +115,14 @@ impl CornerMap {
         DVec3::new(plane, plane, out)
     }
 
-    /// The covariances, as the equations have them, without what poses and distances take up: the expectation
-    /// is all that is known of these directions, and holds them at zero. `sigma` is the deviation of a
-    /// whitened coordinate, the unit in which costs are counted.
+    /// The covariances of the offsets less the share of the directions that poses and distances
+    /// absorb (the gauge): in these directions only the prior determines the offsets, and holds
+    /// them at zero. `covariances` are 3 × 3 for each corner, from the normal equations; `sigma` is
+    /// the standard deviation of a whitened coordinate, the unit in which costs are counted.
     ///
-    /// A move and a turn of everything are such; of each panel by itself, where panels are found; and a
-    /// common scale, where nothing else tells lengths.
+    /// These directions are a translation and a rotation of the whole target, or of each panel by
+    /// itself where panel poses are estimated, and a common scale where nothing else determines
+    /// lengths.
     pub fn without_gauge(
         &self,
         covariances: &[Matrix3<f64>],
@@ -158,14 +162,15 @@ impl CornerMap {
         covariances.iter().enumerate().map(of_corner).collect()
     }
 
-    /// A field in the target's frame as it moves a corner, from where it is, in the frame of its panel.
+    /// The displacement of a corner, in the frame of its panel, that a vector field in the frame of
+    /// the target gives at its present place.
     fn on_panel(&self, problem: &Problem, index: usize, field: &dyn Fn(DVec3) -> DVec3) -> DVec3 {
         let MappedCorner { panel, panel_mm, .. } = self.corners[index];
         let pose = problem.panels[panel.index()].target_from_panel;
         pose.rotation.conjugate() * field(pose.apply(panel_mm + self.offsets_mm[index]))
     }
 
-    /// For each corner the group of panels that move as one.
+    /// For each corner the index of the group of panels that moves rigidly.
     fn rigid_groups(&self, problem: &Problem) -> Vec<usize> {
         let mut groups: Vec<(usize, Option<PanelRef>)> = Vec::new();
         let is_free = |panel: PanelRef| problem.panels[panel.index()].pose_free;
@@ -182,7 +187,7 @@ impl CornerMap {
     }
 }
 
-/// The usual distance of a corner to the next in its row, mm; of corners without, 1.
+/// The median distance of a corner to the next in its row, mm; 1 without such pairs.
 fn nearest_mm(corners: &[MappedCorner]) -> f64 {
     let pairs = corners.iter().zip(corners.iter().skip(1));
     let in_a_row = pairs.filter(|(a, b)| (a.panel, a.row, a.col + 1) == (b.panel, b.row, b.col));
@@ -190,7 +195,7 @@ fn nearest_mm(corners: &[MappedCorner]) -> f64 {
     median(distances).unwrap_or(1.0)
 }
 
-/// Whether nothing but the target's plan tells lengths: no distance between cameras is known.
+/// Whether only the plan of the target determines lengths: no distance between cameras is known.
 fn has_free_scale(problem: &Problem) -> bool {
     problem.cameras.iter().filter(|camera| !camera.pose_free).count() <= 1
 }

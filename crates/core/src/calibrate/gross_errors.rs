@@ -1,19 +1,20 @@
-//! Gross errors, found before the last adjustment: panels, views, and panels in views that do not belong
-//! with the others.
+//! Detection of gross errors before the final adjustment: panels, views, and panels in single views
+//! that contradict the majority.
 //!
 //! ```text
-//!   agree: all corners, with a loss that lets go of those far off, ever narrower
-//!      └─→ the panel of which most corners are off, where others are not, goes; again
-//!   wrong: medians of the rest, by view, and by panel in it
-//!   settled: what is left is adjusted
-//!      ├─→ a panel that then has no more outliers than others comes back; wrong again
-//!      └─→ a view that speaks for another camera than all others goes; settled again
+//!   agree: all corners, with a redescending loss (Cauchy) of ever smaller scale
+//!      └─→ the panel with the largest share of outliers is removed, if it stands out; repeat
+//!   wrong: median error of the rest for each view, and for each panel in each view
+//!   settled: the corners that are left are adjusted
+//!      ├─→ a removed panel with no more outliers than others returns; back to wrong
+//!      └─→ a view that contradicts the camera of all others (Chow test) is removed; back to settled
 //! ```
 //!
-//! What is wrong pulls what is right with it, least where the scale is the narrowest that still
-//! holds most corners. So the scale is walked down to before anything is called wrong. Where corners are off
-//! alike, the walk may rest between them and the others; from there the nearest are followed, which are
-//! mostly those of the larger crowd.
+//! Gross errors bias the estimate of correct corners, least where the scale of the loss is the
+//! smallest that still holds most corners. So the scale is reduced step by step before anything is
+//! called wrong. Where many corners are displaced alike, this may come to rest between the two
+//! groups of corners; from there the nearest corners of every frame are followed, which mostly
+//! belong to the larger group. All decisions assume that most corners are correct.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -35,45 +36,49 @@ use super::weights::{Weights, Whitening};
 use crate::camera::Pose;
 use crate::statistics::median;
 
-/// The loss while the scale is walked down, as a part of the usual one: 1.5 deviations. A loss that
-/// lets go later comes to rest between two crowds of corners.
+/// Scale of the loss during the reduction, as a fraction of the usual one: 1.5 deviations. A wider
+/// loss comes to rest between two groups of corners.
 const NARROW: f64 = 0.5;
 
-/// The walk ends when a round leaves more than this part of the scale, or after so many rounds.
+/// The reduction ends when a round leaves more than this fraction of the scale, or after
+/// [`MOST_ROUNDS`].
 const STILL: f64 = 0.98;
 const MOST_ROUNDS: usize = 12;
 
-/// Of each frame this part of the corners is followed away from between two crowds, as most corners are right.
+/// Fraction of the corners of each frame that are followed from between two groups, as most corners
+/// are right.
 const FOLLOWED: f64 = 0.5;
 
-/// There were two crowds if that leaves less than this part of the scale: noise without crowds hardly shrinks.
+/// There were two groups of corners if following leaves less than this fraction of the scale: noise
+/// alone hardly shrinks.
 const SHRUNK: f64 = 0.5;
 
-/// Panels of which one can be wrong: of two nothing tells which.
+/// Least number of panels of which one can be identified as wrong: of two it is not known which.
 const LEAST_PANELS: usize = 3;
 
-/// Corners farther outside their picture than it is large, by this factor, were not seen in it.
+/// Corners farther outside their picture than this many times its size cannot have been seen in it.
 const BEYOND: f64 = 1.0;
 
-/// Corners seen together do not belong with the others when their median error is more than so many
-/// times the usual: blur, light and distance make a few times as much of it, labels that are off by a
-/// tile a hundred times, as pictures do that were not taken at the same moment.
+/// Corners that one camera sees in one frame contradict the others when their median error is more
+/// than this many times the usual median. Blur, light and distance change it by a small factor;
+/// labels that are off by a tile, and pictures that were not taken at the same moment, by about a
+/// hundred.
 const WRONG_RATIO: f64 = 10.0;
 
-/// Nor are they wrong below this: a corner that was found at all is found to the pixel, however much
-/// better the others are.
+/// Corners are not called wrong with a median error below this, px: a corner that was detected at
+/// all is located to a pixel.
 const WRONG_PX: f64 = 1.0;
 
-/// A problem where most of its corners agree, and what does not belong.
+/// A problem at the estimate on which most of its corners agree, and the parts that contradict it.
 pub(super) struct Gross {
     pub problem: Problem,
     /// Blocks that take no part.
     pub left_out: Vec<bool>,
-    /// Frames that do not belong.
+    /// Frames that contradict the others, by index, with the reason.
     pub frames: BTreeMap<usize, WrongFrame>,
-    /// The median error of frames that do, px.
+    /// The usual median error of a picture, px.
     pub usual_px: f64,
-    /// Panels that take no part.
+    /// Panels that are excluded in all frames.
     panels: BTreeSet<PanelRef>,
     /// The median error of every block, px.
     off_px: Vec<f64>,
@@ -81,56 +86,58 @@ pub(super) struct Gross {
     some_stand_out: bool,
 }
 
-/// What of a problem belongs.
+/// The parts of a problem that belong together.
 #[derive(Clone, Debug)]
 pub(super) struct Kept {
     pub problem: Problem,
     /// Blocks that take no part.
     pub left_out: Vec<bool>,
-    /// Whether corners with gross errors stand out from the others at once. Then they must not pull even at first:
-    /// two fifths that are off alike pull so much that they would no longer stand out.
+    /// Whether corners with gross errors stand out from the start. They must then have no influence
+    /// even in the first round: if two fifths of the corners are displaced alike, they bias the
+    /// estimate so much that they no longer stand out.
     pub some_stand_out: bool,
 }
 
-/// Where a walk to where most corners agree ended.
+/// The estimate on which most corners agree.
 #[derive(Clone, Debug)]
 struct Walked {
     problem: Problem,
-    /// The deviation of a coordinate.
+    /// The standard deviation of a coordinate, px.
     sigma: f64,
     /// See [`Kept::some_stand_out`].
     some_stand_out: bool,
 }
 
-/// Of so many frames one may be of another camera; where more are it is not clear which.
+/// One frame in so many may be of another camera; with more, it is not clear which ones are.
 const FEW: usize = 10;
 
-/// Why a frame does not belong.
+/// Why a frame is excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum WrongFrame {
-    /// The corners of a camera are off by so much.
+    /// The corners of one camera have this median error, px.
     Off { camera: usize, off_px: f64 },
     /// Its corners are seen as in a mirror.
     Mirrored,
-    /// It shows nothing but panels that take no part.
+    /// It shows only panels that are excluded.
     OnlyWrongPanels,
-    /// It speaks for other cameras than the others do, and would move them by so many deviations.
+    /// It contradicts the cameras of the other frames, and shifts their estimate by this many
+    /// standard deviations.
     Stranger { deviations: f64 },
 }
 
 impl Gross {
-    /// Walks to where most corners of a problem agree, and finds what does not; `None` where nothing
-    /// can be adjusted.
+    /// Estimates where most corners of a problem agree, and finds the parts that do not; `None`
+    /// where nothing can be adjusted.
     pub(super) fn of(problem: Problem) -> Option<Self> {
         agree(problem).map(|(walked, panels)| Self::without(walked, panels))
     }
 
-    /// Finds what does not belong where most corners agree, beside panels that do not.
+    /// Finds the frames and blocks that contradict the estimate, besides the excluded `panels`.
     fn without(walked: Walked, panels: BTreeSet<PanelRef>) -> Self {
         let Walked { problem, some_stand_out, .. } = walked;
         let residuals = residuals(&problem);
         let off_px: Vec<f64> = residuals.iter().map(median_px).collect();
-        // Of every camera in every frame.
+        // The blocks of every picture: of each camera in each frame.
         let mut pictures: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
         for (index, block) in problem.blocks.iter().enumerate() {
             if !panels.contains(&block.panel) {
@@ -171,8 +178,11 @@ impl Gross {
         Self { problem, left_out, frames, usual_px, panels, off_px, some_stand_out }
     }
 
-    /// What belongs, adjusted after `prepare`. A panel that looked wrong beside what is may be right, which
-    /// shows where all that is wrong has gone: it is let back in then.
+    /// Adjusts the parts that belong, after `prepare`. A panel that looked wrong may be right once
+    /// gross errors have been removed; it is then included again.
+    ///
+    /// # Errors
+    /// When nothing can be adjusted.
     pub(super) fn settled(
         mut self,
         weights: Weights,
@@ -195,7 +205,8 @@ impl Gross {
         }
     }
 
-    /// Without the few frames that speak for other cameras than the others do, if these then agree.
+    /// Excludes the few frames that contradict the cameras of the others, if the remaining frames
+    /// then agree.
     fn without_strangers(
         mut self,
         settled: Settled,
@@ -206,7 +217,8 @@ impl Gross {
         let before = self.frames.clone();
         let mut without = None;
         for _ in 0..=most {
-            // Views are strange by panels that are displaced, a board that is bent, or another lens, too.
+            // Displaced panels, a board that is bent, or an unsuitable lens model make views
+            // contradict each other, too.
             let now = without.as_ref().unwrap_or(&settled);
             let can_tell = self.panels.is_empty() && has_no_pattern(now);
             let Some(opinions) = can_tell.then(|| Opinions::of(now, loss)).flatten() else { break };
@@ -227,12 +239,12 @@ impl Gross {
         (self, settled)
     }
 
-    /// The frames that belong.
+    /// The frames that are not excluded.
     pub(super) fn belonging(&self) -> impl Iterator<Item = usize> {
         (0..self.problem.frames.len()).filter(|frame| !self.frames.contains_key(frame))
     }
 
-    /// Which of the panels that took no part have more outliers than others in what was settled.
+    /// The excluded panels that still have more outliers than others in the adjusted problem.
     fn wrong_in(&self, settled: &Settled) -> BTreeSet<PanelRef> {
         let mut others = Count::default();
         let mut counts: BTreeMap<PanelRef, Count> = BTreeMap::new();
@@ -249,7 +261,7 @@ impl Gross {
         counts.into_keys().collect()
     }
 
-    /// The problem without the frames that do not belong.
+    /// The problem without its excluded frames.
     pub(super) fn kept(&self) -> Kept {
         let belongs = |frame: usize| !self.frames.contains_key(&frame);
         let of_blocks = self.problem.blocks.iter().zip(&self.left_out);
@@ -258,7 +270,8 @@ impl Gross {
         Kept { problem, left_out, some_stand_out: self.some_stand_out }
     }
 
-    /// What the outliers share; `names` are those of the frames, of the problem as it was at first.
+    /// Findings: what the outliers have in common. `names` gives the name of a frame by its index
+    /// in the original problem.
     pub(super) fn findings(
         &self,
         settled: &Settled,
@@ -296,25 +309,27 @@ impl Gross {
     }
 }
 
-/// The median error of corners, px.
+/// The median length of the residuals, px.
 fn median_px<'a>(residuals: impl IntoIterator<Item = &'a DVec2>) -> f64 {
     median(residuals.into_iter().map(|r| r.x.hypot(r.y)).collect()).unwrap_or(0.0)
 }
 
-/// The median error beyond which corners do not belong with the others, px, from those of all.
+/// The median error beyond which corners contradict the others, px, from the medians of all
+/// pictures.
 fn limit_px(medians: &[f64]) -> f64 {
     f64::max(WRONG_RATIO * median(medians.to_vec()).unwrap_or(0.0), WRONG_PX)
 }
 
-/// What a quarter of the corners are off by at most, px: labels that are wrong fit none.
+/// The lower quartile of the lengths of the residuals, px: with wrong labels not even a quarter of
+/// the corners fit.
 fn nearest_px(residuals: &[DVec2]) -> f64 {
     let mut off: Vec<f64> = residuals.iter().map(|r| r.x.hypot(r.y)).collect();
     off.sort_by(f64::total_cmp);
     off.get(off.len() / 4).copied().unwrap_or(f64::INFINITY)
 }
 
-/// The blocks of which the other side is seen than of most: a plane in a mirror has a pose like any
-/// other, from behind.
+/// The blocks whose panel shows the other side than most do: a plane seen in a mirror has a valid
+/// pose, from behind.
 fn mirrored(problem: &Problem) -> Vec<usize> {
     let side = |block: &Block| {
         let camera_from_scene =
@@ -328,7 +343,7 @@ fn mirrored(problem: &Problem) -> Vec<usize> {
     (0..sides.len()).filter(|&block| sides[block] * most < 0.0).collect()
 }
 
-/// Walks to where most corners agree, without the panels that most others speak against.
+/// Estimates where most corners agree, without the panels that contradict most others.
 fn agree(problem: Problem) -> Option<(Walked, BTreeSet<PanelRef>)> {
     let seen: BTreeSet<PanelRef> = problem.blocks.iter().map(|block| block.panel).collect();
     let mut wrong: BTreeSet<PanelRef> = BTreeSet::new();
@@ -339,7 +354,7 @@ fn agree(problem: Problem) -> Option<(Walked, BTreeSet<PanelRef>)> {
     let mut walked = all.clone();
     while let Some(panel) = worst_panel(&walked.problem, walked.sigma, &wrong) {
         wrong.insert(panel);
-        // Where as many are wrong as right, the target is another one.
+        // Where half of the panels are wrong, it is another target.
         if 2 * wrong.len() >= seen.len() {
             return Some((all, BTreeSet::new()));
         }
@@ -348,7 +363,8 @@ fn agree(problem: Problem) -> Option<(Walked, BTreeSet<PanelRef>)> {
     Some((walked, wrong))
 }
 
-/// Walks to where most corners agree without some panels, by which frames that show them were misplaced.
+/// Estimates where most corners agree without the panels in `wrong`; frames that show them are
+/// placed anew first, as they were misplaced by them.
 fn walked_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Walked> {
     let of_wrong = problem.blocks.iter().filter(|block| wrong.contains(&block.panel));
     let frames: BTreeSet<usize> = of_wrong.map(|block| block.frame).collect();
@@ -360,12 +376,14 @@ fn walked_without(mut problem: Problem, wrong: &BTreeSet<PanelRef>) -> Option<Wa
     Some(Walked { problem, ..walked })
 }
 
-/// Whether residuals depend neither on the place in the image nor on that on the target.
+/// Whether residuals show no lack of fit: they depend neither on the position in the image nor on
+/// that on the target.
 fn has_no_pattern(settled: &Settled) -> bool {
     lack_of_fit(&settled.minimum.problem, &settled.whitening).is_empty()
 }
 
-/// Estimates the pose of a frame anew, from the panels that are not wrong, and keeps the better one.
+/// Estimates the pose of a frame anew from the panels that are not wrong, and keeps the better one
+/// by median residual.
 fn place_anew(problem: &mut Problem, frame: usize, wrong: &BTreeSet<PanelRef>) {
     let is_right = |block: &&Block| block.frame == frame && !wrong.contains(&block.panel);
     let off_px = |problem: &Problem| {
@@ -407,7 +425,8 @@ fn panel_counts(problem: &Problem, sigma: f64) -> BTreeMap<PanelRef, Count> {
     counts
 }
 
-/// The panel that stands out most among those that are not known to be wrong.
+/// The panel with the largest share of outliers among those not yet known to be wrong, if it stands
+/// out.
 fn worst_panel(problem: &Problem, sigma: f64, wrong: &BTreeSet<PanelRef>) -> Option<PanelRef> {
     let mut counts = panel_counts(problem, sigma);
     counts.retain(|panel, _| !wrong.contains(panel));
@@ -416,8 +435,7 @@ fn worst_panel(problem: &Problem, sigma: f64, wrong: &BTreeSet<PanelRef>) -> Opt
     most.max_by(|a, b| a.1.share().total_cmp(&b.1.share())).map(|(panel, _)| panel)
 }
 
-/// Walks to where most corners agree: with a loss that lets go of those far off, narrower in every
-/// round.
+/// Estimates where most corners agree, with a redescending loss whose scale shrinks in every round.
 fn narrowed(mut problem: Problem) -> Option<Walked> {
     let mut sigma = f64::INFINITY;
     for _ in 0..MOST_ROUNDS {
@@ -439,7 +457,8 @@ fn narrowed(mut problem: Problem) -> Option<Walked> {
     Some(Walked { problem, sigma: whitening.sigma, some_stand_out })
 }
 
-/// Follows the nearest corners of every frame away from between two crowds; `None` where there are not two.
+/// Re-estimates from the nearest corners of every frame, away from an estimate between two groups
+/// of corners; `None` where there are not two.
 fn to_larger_crowd(problem: &Problem) -> Option<(Problem, Whitening)> {
     let between = scale(problem);
     let (mut found, mut whitening) = (problem.clone(), between.clone());
@@ -455,7 +474,7 @@ fn to_larger_crowd(problem: &Problem) -> Option<(Problem, Whitening)> {
     (whitening.sigma < SHRUNK * between.sigma).then_some((found, whitening))
 }
 
-/// Which corners are the nearest of their frames, [`FOLLOWED`] of them or as many as a pose needs.
+/// Marks the nearest corners of each frame: the fraction [`FOLLOWED`], or as many as a pose needs.
 fn nearest_of_frames(problem: &Problem, whitening: &Whitening) -> Vec<Vec<bool>> {
     let off = deviations(problem, whitening);
     let mut of_frames = vec![Vec::new(); problem.frames.len()];
@@ -474,8 +493,9 @@ fn nearest_of_frames(problem: &Problem, whitening: &Whitening) -> Vec<Vec<bool>>
     problem.blocks.iter().zip(&off).map(of_block).collect()
 }
 
-/// How far a panel that took no part is from its place: where its own corners have it while all
-/// others stay. `None` where no place explains them.
+/// How far an excluded panel is displaced: the difference of its stated pose from the one that its
+/// own corners determine while the inliers of all others count. `None` where no pose explains its
+/// corners.
 fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
     let Settled { problem, whitening, outliers, .. } = settled;
     let of_panel = || problem.blocks.iter().filter(|block| block.panel == panel);
@@ -514,7 +534,8 @@ fn moved(settled: &Settled, panel: PanelRef) -> Option<Moved> {
     })
 }
 
-/// The views without corners that lie far beyond their pictures, and what was left out.
+/// The views of a camera without the corners that lie far outside their pictures, and a finding for
+/// each view that had such corners. Views with too few corners left are omitted.
 pub(super) fn within_pictures(views: &[View], camera: usize) -> (Vec<View>, Vec<Finding>) {
     let mut found = Vec::new();
     let of_view = |view: &View| {

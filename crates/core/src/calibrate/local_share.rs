@@ -1,30 +1,34 @@
-//! What one frame tells of the unknowns that all frames share, where it tells only of some of them.
+//! The contribution of one frame to the unknowns that all frames share, computed in the subspace of
+//! the unknowns that it touches.
 //!
-//! Of the knots of a spline a frame touches a few. With V the covariance of all shared unknowns, H what the frame adds to
-//! their equations, which is zero but in those rows and columns t that it touches, and V_tt = G Gᵀ,
+//! A frame touches only a few knots of a spline. With V the covariance of all shared unknowns, H
+//! the part of the normal equations that the frame contributes, which is zero outside the rows and
+//! columns t that it touches, and V_tt = G Gᵀ,
 //!
 //! ```text
 //!     W H Wᵀ = Q (Gᵀ H_tt G) Qᵀ,    Q = W_t G⁻ᵀ,  QᵀQ = 1        for any W with WᵀW = V
 //! ```
 //!
-//! so that its eigenvalues but zeros are those of a small matrix.
+//! so that the non-zero eigenvalues of W H Wᵀ are those of a small matrix.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// The eigenvalues and directions of a frame's share.
+/// The eigenvalues and eigenvectors of a frame's contribution.
 pub(super) struct LocalShare {
     touched: Vec<usize>,
-    /// Deviations of the touched unknowns; G is that of their correlations.
+    /// Standard deviations of the touched unknowns; `root` is the Cholesky factor of their
+    /// correlations.
     sd: DVector<f64>,
     root: Cholesky<f64, Dyn>,
-    /// Eigenvalues of Gᵀ H_tt G: of what is known of a direction the part that the frame tells.
+    /// Eigenvalues of Gᵀ H_tt G: the fraction of the information on a direction that the frame
+    /// contributes.
     pub parts: DVector<f64>,
     directions: DMatrix<f64>,
 }
 
 impl LocalShare {
-    /// Of a frame's H, of which only the rows and columns of unknowns that it touches are not zero, and V. `None` where
-    /// V is singular.
+    /// From a frame's H (`own`, n × n, non-zero only in rows and columns of unknowns that it
+    /// touches) and V (`covariance`, n × n). `None` where V is singular there.
     pub fn of(own: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Option<Self> {
         let touched: Vec<usize> = (0..own.nrows()).filter(|&i| own[(i, i)] > 0.0).collect();
         let n = touched.len();
@@ -38,13 +42,15 @@ impl LocalShare {
         Some(Self { touched, sd, root, parts: eigen.eigenvalues, directions: eigen.eigenvectors })
     }
 
-    /// The components of Qᵀ W g along the directions, for g that is zero but where the frame touches.
+    /// The components of Qᵀ W g along the eigenvectors, for a gradient g (`pull`, length n) that is
+    /// zero outside the unknowns that the frame touches.
     pub fn along(&self, pull: &DVector<f64>) -> DVector<f64> {
         let own = DVector::from_fn(self.touched.len(), |i, _| pull[self.touched[i]] * self.sd[i]);
         self.directions.tr_mul(&self.root.l().tr_mul(&own))
     }
 
-    /// W_tᵀ-weighted sum of directions with these components: Q E a, with W the transpose of `half`.
+    /// The sum Q E a of the eigenvectors E with the components a, where W is the transpose of
+    /// `half`.
     pub fn spread(&self, components: &DVector<f64>, half: &DMatrix<f64>) -> DVector<f64> {
         let turned = &self.directions * components;
         let Some(mut own) = self.root.l().tr_solve_lower_triangular(&turned) else {

@@ -1,4 +1,8 @@
-//! What would make a calibration fit that does not: what it takes for given is found instead.
+//! Model selection: which assumption of a calibration explains its lack of fit (lens model, flat
+//! board, panel poses, known camera), and which smaller lens model suffices.
+//!
+//! Each alternative is fitted to a sample of the views and compared by an F test; an alternative
+//! has to be significant and large enough to matter.
 
 use std::collections::BTreeSet;
 
@@ -13,58 +17,58 @@ use super::weights::{MEDIAN_OF_CHI_SQUARED_2, OUTLIER_SIGMA};
 use crate::camera::{Camera, PROJECTION_PARAMETERS};
 use crate::statistics::median;
 
-/// Where detections explain at least this part of the squares of the residuals, nothing is sought: what is
-/// left beside them does not matter, whatever it is.
+/// Where the noise of detections explains at least this fraction of the squares of the residuals,
+/// nothing is sought: the rest does not matter.
 const EXPLAINED: f64 = 1.0 / (1.0 + MATTERS * MATTERS);
 
-/// A remedy is as good as the best if it gains this part of what that does: squares of a thousand corners
-/// are known to a few in a hundred.
+/// A remedy counts as equal to the best from this fraction of its gain on: squares of a thousand
+/// corners are known to a few per cent.
 const AS_GOOD: f64 = 0.9;
 
-/// Views that are calibrated anew, evenly over the sequence: what matters shows in so many, and trying must
-/// not take longer than the calibration itself.
+/// Number of views in the sample, evenly over the sequence: a lack of fit that matters shows in so
+/// many, and a trial must not take longer than the calibration.
 const TRIAL_VIEWS: usize = 12;
 
-/// What makes the residuals of a calibration smaller.
+/// A change of assumptions that makes the residuals of a calibration significantly smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Remedy {
-    /// What was found that had been given.
+    /// The quantity that was estimated and had been taken for given.
     pub instead: Instead,
-    /// Root mean square error of a coordinate as it is, outliers left out, px.
+    /// RMS residual of a coordinate without the remedy, outliers excluded, px.
     pub from_px: f64,
-    /// The same with the remedy.
+    /// RMS residual of a coordinate with the remedy, outliers excluded, px.
     pub to_px: f64,
 }
 
-/// What is to be found instead of taken for given.
+/// The quantity to estimate instead of taking it for given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Instead {
-    /// A lens of another model.
+    /// The lens, with this richer model.
     Model(Model),
-    /// The shape of the board's sheet.
+    /// The deviation of the board from a plane.
     Shape,
-    /// The places of the target's panels.
+    /// The poses of the panels on the target.
     Panels,
-    /// The camera itself.
+    /// The intrinsics of the camera, which had been given.
     Camera,
 }
 
 impl Calibration {
-    /// The camera of a calibration of one, with other views.
+    /// This calibration of one camera with other views.
     pub(super) fn of_views(&self, views: Vec<View>) -> Self {
         self.of_cameras(vec![CameraViews { views, ..self.cameras[0].clone() }])
     }
 
-    /// The same of which this is known.
+    /// This calibration of one camera with other intrinsics.
     fn of_intrinsics(&self, intrinsics: impl Into<Intrinsics>) -> Self {
         let intrinsics = intrinsics.into();
         self.of_cameras(vec![CameraViews { intrinsics, ..self.cameras[0].clone() }])
     }
 
-    /// The model that a calibration of one camera finds with fewer views, so that others can be tried, and what
-    /// comes of it.
+    /// A sample of the views of a calibration of one camera, on which alternatives are tried, and
+    /// its estimate.
     fn trial(&self, found: &Estimate) -> Option<(Self, Estimate)> {
         let views = &self.cameras[0].views;
         let sample = self.of_views(evenly(views, TRIAL_VIEWS).cloned().collect());
@@ -75,8 +79,9 @@ impl Calibration {
         Some((sample, of_sample))
     }
 
-    /// What explains the residuals of a calibration of one camera better, by more than chance and so much
-    /// that it matters; `None` where they are what detections lead to expect, or nothing here does.
+    /// The alternative that explains the residuals of a calibration of one camera better,
+    /// significantly and by an amount that matters; `None` where the noise of detections explains
+    /// them, or no alternative does.
     pub(super) fn remedy(&self, found: &Estimate) -> Option<Remedy> {
         if is_explained(found) {
             return None;
@@ -94,7 +99,7 @@ impl Calibration {
             .richer()
             .iter()
             .map(|&model| (Instead::Model(model), trial.of_intrinsics(model).adjusted().ok()));
-        // No sheet is bent so far that nothing fits.
+        // A board cannot be bent so far that nothing fits.
         let bends = self.panels.len() == 1 && !self.board_shape && !is_absurd(&found.cameras[0]);
         let shape =
             bends.then(|| (Instead::Shape, trial.clone().board_shape(true).adjusted().ok()));
@@ -107,7 +112,8 @@ impl Calibration {
         Some(Remedy { from_px, ..best })
     }
 
-    /// The same where the camera was given: whether it is another one, or the board is bent.
+    /// The same where the camera was given: whether the camera is another one, or the board is
+    /// bent.
     fn remedy_of_known(&self, camera: &Camera, found: &Estimate) -> Option<Remedy> {
         let values = camera.parameters().into_iter().enumerate();
         let of_lens = |(i, value): (usize, f64)| i < PROJECTION_PARAMETERS.len() || value != 0.0;
@@ -118,9 +124,9 @@ impl Calibration {
         best(found, bent.into_iter().chain(other.map(|other| (Instead::Camera, other))))
     }
 
-    /// The estimate with the panels where the views have them.
+    /// The estimate with the poses of the panels as the views determine them.
     fn with_panels_found(&self) -> Option<Estimate> {
-        // Each view is a frame of its own, whatever it is called.
+        // Each view becomes a frame of its own, whatever its name.
         let views = self.cameras[0].views.iter().enumerate();
         let views = views.map(|(index, view)| View { name: format!("{index:06}"), ..view.clone() });
         let panels = self.of_views(views.collect()).refine_panels(true).adjusted().ok()?.panels;
@@ -129,8 +135,8 @@ impl Calibration {
         Self { panels, ..self.clone() }.adjusted().ok()
     }
 
-    /// The cameras of a rig that were given and that their own pictures speak against: other ones, or changed
-    /// since.
+    /// Indices of the cameras of a rig that were given and are contradicted by their own pictures:
+    /// other cameras, or changed since. Empty for a single camera.
     pub(super) fn foreign_cameras(&self) -> Vec<usize> {
         let is_foreign = |&index: &usize| {
             let alone = self.alone(index, &self.panels);
@@ -144,16 +150,17 @@ impl Calibration {
         }
     }
 
-    /// The model with the fewest parameters that holds the lens of a camera as well as its own, of those that
-    /// have fewer of the same parameters; `None` where all of its own are needed.
+    /// The smallest lens model, among those with a subset of the parameters, that fits camera
+    /// `camera` as well as the model of `found` by an F test; `None` when all parameters are
+    /// needed, or the intrinsics were given.
     pub fn sufficient_model(&self, camera: usize, found: &Estimate) -> Option<Model> {
         let (alone, found) = self.and_alone(camera, found)?;
         alone.sufficient(&found)
     }
 
-    /// The same of a calibration of one camera.
+    /// The same for a calibration of one camera.
     ///
-    /// With q parameters less the squares of the residuals grow by F q of their variances, and by chance F
+    /// With q parameters less the sum of squares grows by F q variances of a residual; by chance F
     /// is about 1.
     pub(super) fn sufficient(&self, found: &Estimate) -> Option<Model> {
         let (trial, of_trial) = self.trial(found)?;
@@ -171,7 +178,7 @@ impl Calibration {
     }
 }
 
-/// Whether residuals are what detections lead to expect.
+/// Whether the noise of detections explains the residuals.
 pub(super) fn is_explained(found: &Estimate) -> bool {
     let of_noise = |common: f64| 1.0 - (common / found.inlier_rms_px()).powi(2);
     found.common_px.is_some_and(|common| of_noise(common) > EXPLAINED)
@@ -185,12 +192,13 @@ fn best(found: &Estimate, tried: impl Iterator<Item = (Instead, Estimate)>) -> O
     });
     let better: Vec<_> = better.collect();
     let most = better.iter().map(|(gain, _)| *gain).fold(0.0, f64::max);
-    // Those with fewer parameters come first.
+    // Alternatives with fewer parameters come first.
     better.into_iter().find(|(gain, _)| *gain > AS_GOOD * most).map(|(_, remedy)| remedy)
 }
 
-/// How many times smaller the mean square is. What is an outlier where the fit is better counts as just
-/// one in both, so that wild corners are no gain; nor is it one to call more of them wild.
+/// The factor by which the mean square residual shrinks; `None` where that is not significant or
+/// does not matter. Outliers of the better fit count as a residual at the outlier limit in both, so
+/// that neither wild corners nor calling more corners wild is a gain.
 fn gain(found: &Estimate, other: &Estimate, instead: Instead) -> Option<f64> {
     let squares = |estimate: &Estimate| -> Vec<f64> {
         estimate.corners().map(|corner| corner.residual.length_squared()).collect()
@@ -219,7 +227,7 @@ fn gain(found: &Estimate, other: &Estimate, instead: Instead) -> Option<f64> {
     (is_of_all && is_sure && is_smaller && gain > 1.0 + MATTERS * MATTERS).then_some(gain)
 }
 
-/// How many panels were seen.
+/// Number of panels that were seen.
 fn panel_count(estimate: &Estimate) -> f64 {
     estimate.corners().map(|corner| corner.panel.index()).collect::<BTreeSet<usize>>().len() as f64
 }
@@ -233,7 +241,7 @@ fn holds_as_well(smaller: &Estimate, found: &Estimate) -> bool {
     }
     let (mut own, mut other, mut count) = (0.0, 0.0, 0.0);
     for (a, b) in found.corners().zip(smaller.corners()) {
-        // An outlier of the smaller model may be what it does not hold.
+        // An outlier of the smaller model may be its lack of fit.
         if !a.outlier {
             own += a.residual.length_squared();
             other += b.residual.length_squared();

@@ -1,3 +1,9 @@
+//! Iteratively reweighted adjustment: the weights of corners, the set of corners that count, and
+//! the unknowns are estimated in turn until they are consistent.
+//!
+//! Robust losses are M-estimators. Corners with gross errors, beyond a gap in the distribution of
+//! residuals, are excluded; smooth deviations, as an unsuitable lens model leaves, are not.
+
 use std::collections::BTreeMap;
 
 use glam::DVec2;
@@ -10,56 +16,61 @@ use super::problem::{Block, Observation, Problem};
 use super::view::LEAST_CORNERS;
 use super::weights::{OUTLIER_SIGMA, Weights, Whitening};
 
-/// Rounds in which weights and solution are fitted to one another; the third changes no digit that
-/// matters.
+/// Least number of rounds in which weights and solution are fitted to each other; the third changes
+/// no significant digit.
 const WEIGHT_ROUNDS: usize = 3;
 
-/// Rounds until no corner changes sides between those that count and those that do not; a corner
-/// that lies on the border may change for ever.
+/// Most rounds until the set of corners that count is stable; a corner at the limit may change
+/// sides for ever.
 const MOST_ROUNDS: usize = 12;
 
-/// Gross errors are at least so many deviations. From [`OUTLIER_SIGMA`] on a corner is called an outlier.
+/// Least size of a gross error, in deviations. Beyond [`OUTLIER_SIGMA`] a corner is called an
+/// outlier.
 const GROSS_SIGMA: f64 = 2.0 * OUTLIER_SIGMA;
 
-/// Between the corners that belong and those with gross errors there is a gap: half as far off are at most this
-/// part as many. A lens that the model does not quite hold leaves a tail at its rim, where nearer corners
-/// are more than farther ones; without its rim the model would hold it less and less.
+/// Gross errors are separated from the other corners by a gap: between half the limit and the limit
+/// lie at most this fraction of the number of corners beyond it. A lens that the model does not
+/// represent well leaves a tail of residuals at its rim instead, with more corners nearer than
+/// farther; excluding the rim would make the fit there ever worse.
 const IN_THE_GAP: f64 = 0.25;
 
-/// What a lens leaves is smooth: of the neighbours of corners that are far off more than this part are off
-/// towards the same side, by more than this part as much and by more than so many deviations. Wrong places are
-/// smooth nowhere, and of labels or corners that are off alike so many have such neighbours as there are such
-/// corners.
+/// Lens model errors are smooth: of the neighbours of corners that are far off, more than the
+/// fraction `SMOOTH` are off towards the same side, by more than the fraction `FALLS_OFF` as much
+/// and by more than `LEAST_SMOOTH_SIGMA` deviations. Wrong positions are smooth nowhere; where
+/// labels or corners are displaced alike, only the displaced corners are such neighbours.
 const SMOOTH: f64 = 0.5;
 const FALLS_OFF: f64 = 0.05;
 const LEAST_SMOOTH_SIGMA: f64 = 3.0;
 
-/// Seen less predicted positions; empty blocks where a corner is out of reach, which problems that
-/// were started do not have.
+/// Residuals (observed minus predicted positions), px, for each block; empty for a block with a
+/// corner that its camera cannot image, which problems with valid initial values do not have.
 pub(super) fn residuals(problem: &Problem) -> Vec<Vec<DVec2>> {
     problem.blocks.iter().map(|block| problem.residuals(block).unwrap_or_default()).collect()
 }
 
-/// Corners that are all alike, with the deviation of their coordinates.
+/// Whitening with equal weights for all corners, and the standard deviation of their coordinates.
 pub(super) fn scale(problem: &Problem) -> Whitening {
     Whitening::fit(problem, Weights::Equal, &residuals(problem))
 }
 
-/// Where weights, corners that count, and unknowns fit each other.
+/// A consistent solution of weights, set of corners that count, and unknowns.
 pub(super) struct Settled {
-    /// Of the corners that count.
+    /// The minimum over the corners that count.
     pub minimum: Minimum,
-    /// Of the same.
+    /// The whitening of the corners that count.
     pub whitening: Whitening,
     /// The same unknowns with all corners.
     pub problem: Problem,
-    /// Which of all corners are farther off than corners are by chance.
+    /// For each block, which of all its corners are outliers: farther off than by chance.
     pub outliers: Vec<Vec<bool>>,
 }
 
-/// The minimum of a problem whose weights fit its own residuals. Corners with gross errors take no part, nor
-/// do blocks that are left out, so that deviations are those of what does; with [`Loss::Squared`] every
-/// corner takes part.
+/// Minimises with weights that are consistent with the residuals at the minimum. Corners with gross
+/// errors, and blocks that are left out, do not take part, so that deviations are those of the
+/// corners that do; with [`Loss::Squared`] every corner takes part.
+///
+/// # Errors
+/// When the normal equations cannot be formed or solved from the initial values.
 pub(super) fn settle(
     kept: Kept,
     weights: Weights,
@@ -82,8 +93,8 @@ pub(super) fn settle(
     }
     let mut part = counting(&all, &gross);
     let mut whitening = Whitening::fit(&part, weights, &residuals(&part));
-    // In the first round all corners pull but those that stand out, so that a lens is judged as its rim bends
-    // it. Where corners are alike and losses square, weights change nothing.
+    // In the first round all corners count except those that stand out, so that a lens is judged
+    // with its rim. With equal weights and squared loss, reweighting changes nothing.
     let rounds = match whitening.common_px.is_some() || loss != Loss::Squared {
         true => MOST_ROUNDS,
         false => 0,
@@ -114,7 +125,8 @@ pub(super) fn settle(
     Ok(Settled { minimum, whitening, problem, outliers })
 }
 
-/// Which corners have gross errors. A frame keeps as many of its corners as a pose needs, the nearest.
+/// Marks the corners with gross errors, for each block. Every frame keeps at least its nearest
+/// corners, as many as a pose needs.
 pub(super) fn with_gross_errors(
     problem: &Problem,
     left_out: &[bool],
@@ -153,8 +165,8 @@ pub(super) fn with_gross_errors(
     gross
 }
 
-/// Of every corner with a gross error how many of its neighbours are off, and towards the same side, and not by much
-/// less, and how many it has.
+/// For every corner with a gross error: the number of neighbours that are off towards the same side
+/// by a comparable amount, and the number of neighbours. Zero for all other corners.
 fn smooth_neighbours(
     problem: &Problem,
     block: &Block,
@@ -180,7 +192,7 @@ fn smooth_neighbours(
     block.observations.iter().enumerate().map(of_corner).collect()
 }
 
-/// Where gross errors begin: at the first gap.
+/// The whitened residual from which errors are gross: the first gap; `f64::MAX` without one.
 fn gross_limit(off: &[f64], sigma: f64) -> f64 {
     let beyond = |limit: f64| off.iter().filter(|&&off| off > limit).count() as f64;
     let mut limit = GROSS_SIGMA * sigma;
@@ -189,7 +201,7 @@ fn gross_limit(off: &[f64], sigma: f64) -> f64 {
             return limit;
         }
         limit *= 2.0;
-        // What is out of its camera's reach is off by more than any number.
+        // Corners that a camera cannot image are off by an infinite amount.
         if limit.is_infinite() {
             break;
         }
@@ -197,7 +209,7 @@ fn gross_limit(off: &[f64], sigma: f64) -> f64 {
     f64::MAX
 }
 
-/// How far each corner is off, whitened; infinitely where it is out of its camera's reach.
+/// Length of the whitened residual of each corner; infinite where its camera cannot image it.
 pub(super) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f64>> {
     let weights = whitening.of(problem).blocks;
     let of_block = |(block, weights): (&Block, &Vec<[f64; 3]>)| {
@@ -210,27 +222,28 @@ pub(super) fn deviations(problem: &Problem, whitening: &Whitening) -> Vec<Vec<f6
     problem.blocks.iter().zip(&weights).map(of_block).collect()
 }
 
-/// The variance by which the inverse of the normal equations is to be multiplied, for a robust loss by the
-/// asymptotic formula of an M-estimate (Huber & Ronchetti 2009, 7.6),
+/// The variance factor by which the inverse of the normal equations is multiplied to give the
+/// covariance; for a robust loss by the asymptotic formula of an M-estimator (Huber & Ronchetti
+/// 2009, 7.6),
 ///
 /// ```text
 ///     σ² = Σψ² / (2N − p) · mean w / (mean ψ′)²
 /// ```
 ///
-/// with the pull ψ = w e of each coordinate. Where every corner counts in full that is what the residuals cost
-/// for each of their degrees of freedom.
+/// with the influence ψ = w e of each coordinate. Where every corner counts in full, this is the
+/// sum of squares divided by the degrees of freedom.
 pub(super) fn variance(minimum: &Minimum, whitening: &Whitening, loss: Loss) -> f64 {
     let Minimum { problem, normal, layout, .. } = minimum;
-    // Offsets of corners are as many unknowns as expectations of them.
+    // Priors on corner offsets add as many observations as there are unknowns.
     let expected = problem.cameras.iter().filter_map(|camera| camera.roughness.as_ref());
-    // As are second differences of knots.
+    // The prior on second differences of knots adds as many as its rank.
     let unknowns = layout.shared + 6 * problem.frames.len()
         - expected.map(|roughness| roughness.rank()).sum::<usize>();
     let freedom = (2 * problem.count()).saturating_sub(unknowns).max(1) as f64;
     if loss == Loss::Squared {
         return normal.cost / freedom;
     }
-    // Expectations of poses and offsets cost, too.
+    // Priors on poses and offsets contribute to the cost, too.
     let (mut cost, mut pull, mut weight, mut slope) = (0.0, 0.0, 0.0, 0.0);
     for (block, weights) in problem.blocks.iter().zip(&whitening.blocks) {
         for (seen, &w) in block.observations.iter().zip(weights) {

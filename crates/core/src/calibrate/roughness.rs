@@ -1,55 +1,62 @@
-//! How smooth the knots of a spline are expected to be: what holds them where no corner does.
+//! The smoothness prior of the knots of a spline lens, which determines them where there are no
+//! corners.
 //!
-//! Expected is a spline that images as some lens of a parametric family, whichever, and of the difference d from it that
-//! it has small second differences, along both axes and across (a thin plate of knots),
+//! The prior expects a spline that images like some lens of a parametric family, and penalises the
+//! second differences of the difference d from it, along both axes and across (a discrete thin
+//! plate):
 //!
 //! ```text
 //!     |D d|² = Σ (d₋ − 2 d + d₊)²  along rows and columns  +  2 Σ (d − d→ − d↓ + d↘)²
 //!     d = knots − expected − T k,    k: what makes |D d|² least
 //! ```
 //!
-//! T being how the expected knots change with the family's parameters. With R = DᵀD and T made so that TᵀRT = 1 that is
-//! dᵀ (R − RT TᵀR) d without k. Each difference is normal with one deviation s, which is found from the data
-//! (empirical Bayes, MacKay 1992): with r the rank of that matrix and V the covariance of the knots,
-//! γ = r − tr((R − RT TᵀR) V)/s² is the number of differences that the corners determine better than the expectation, and
-//! s² = |D d|²/γ. What is linear in the plane costs nothing either: three numbers for each coordinate, which any
-//! corners determine.
+//! T holds the derivatives of the expected knots by the parameters of the family. With R = DᵀD and
+//! T made orthonormal, TᵀRT = 1, the penalty is dᵀ (R − RT TᵀR) d after elimination of k. Each
+//! difference is normal with one standard deviation s, which is estimated by maximising the
+//! marginal likelihood (empirical Bayes, MacKay 1992): with r the rank of that matrix and V the
+//! covariance of the knots, γ = r − tr((R − RT TᵀR) V)/s² is the number of differences that the
+//! corners determine better than the prior, and s² = |D d|²/γ. Functions that are linear in the
+//! plane have no penalty: three numbers for each coordinate, which any corners determine.
 
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
 
 use crate::camera::{Camera, Lens, PROJECTION_PARAMETERS, Spline, SplineGrid};
 
-/// What is expected first of a second difference, in distances of knots: a tenth is more than any lens differs from
-/// its parametric model, and leaves the corners to decide.
+/// First standard deviation of a second difference, in distances of knots: a tenth is more than any
+/// lens differs from its parametric model, so that the corners decide.
 const FIRST_PART: f64 = 0.1;
 
-/// The least that is expected, in distances of knots: at a hundred pixels from knot to knot a ten-thousandth of a pixel.
+/// Least standard deviation of a second difference, in distances of knots: with a hundred pixels
+/// from knot to knot, a ten-thousandth of a pixel.
 const LEAST_PART: f64 = 1e-6;
 
-/// A size goes so much farther than its equation says, as a power: these steps are small, and all in one direction.
+/// Over-relaxation of the update of s, as a power: the plain fixed-point steps are small, and all
+/// in one direction.
 const FARTHER: f64 = 1.5;
 
-/// A direction of the family is one of its own if this part of it is none of those before.
+/// A direction of the family counts as independent if this fraction of its squared length is
+/// orthogonal to those before.
 const ITS_OWN: f64 = 1e-6;
 
-/// What is expected of the knots of a spline.
+/// The smoothness prior of the knots of one spline.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Roughness {
     grid: SplineGrid,
-    /// The knots that are expected, row by row.
+    /// The expected knots, row by row.
     expected: Vec<DVec2>,
-    /// R T: of each direction dx and dy of each knot.
+    /// R T: for each direction the components dx and dy of each knot.
     family: Vec<[Vec<f64>; 2]>,
-    /// s, without unit as the knots are.
+    /// The standard deviation s; like the knots it has no unit.
     size: f64,
 }
 
-/// Knots of a second difference, and by what each counts in it.
+/// Knots of a second difference, and the factor of each.
 type Difference = [(usize, f64); 4];
 
 impl Roughness {
-    /// Around a spline, or any that differs from it by directions of a family.
+    /// A prior around a spline and all splines that differ from it by the `directions` of a family,
+    /// each with one vector for each knot.
     pub fn around(spline: &Spline, directions: &[Vec<DVec2>]) -> Self {
         let grid = spline.grid();
         let mut family: Vec<[Vec<f64>; 2]> = Vec::new();
@@ -76,7 +83,7 @@ impl Roughness {
         Self { grid, expected: spline.knots().to_vec(), family, size }
     }
 
-    /// Of a camera of which some knots are to be found; `None` of others.
+    /// A prior around the spline of a camera that has free parameters; `None` for other cameras.
     pub fn of(camera: &Camera, free: &[bool]) -> Option<Self> {
         match &camera.lens {
             Lens::Spline(spline) if free.contains(&true) => Some(Self::around(spline, &[])),
@@ -84,20 +91,21 @@ impl Roughness {
         }
     }
 
-    /// The rank of what is expected: what is linear in the plane is left, and the family.
+    /// The rank r of the prior: all coordinates of knots, without the linear functions and the
+    /// directions of the family.
     pub fn rank(&self) -> usize {
         2 * (self.grid.count() - 3) - self.family.len()
     }
 
-    /// Distances from what is expected, of dx and of dy of each knot.
+    /// The differences dx and dy of the knots from the expected ones.
     fn off(&self, camera: &Camera) -> [Vec<f64>; 2] {
         let Lens::Spline(spline) = &camera.lens else { return [Vec::new(), Vec::new()] };
         let off = || spline.knots().iter().zip(&self.expected).map(|(knot, at)| *knot - *at);
         [off().map(|off| off.x).collect(), off().map(|off| off.y).collect()]
     }
 
-    /// Adds the expectation to normal equations whose unit of cost is a deviation of `sigma`; returns what it costs.
-    /// `parameters` are the camera's that are unknown with their columns.
+    /// Adds the prior to normal equations whose unit of cost is a residual of `sigma`; returns its
+    /// cost. `parameters` lists the index of each unknown parameter of the camera and its column.
     pub fn add(
         &self,
         camera: &Camera,
@@ -137,7 +145,8 @@ impl Roughness {
         cost
     }
 
-    /// The same with the size that fits the knots; `covariance` is that of all columns for residuals of variance 1.
+    /// The prior with the standard deviation s that fits the knots; `covariance` is that of all
+    /// columns for residuals of variance 1, `sigma` and `parameters` are as in [`Self::add`].
     pub fn fitted(
         &self,
         camera: &Camera,
@@ -177,12 +186,12 @@ impl Roughness {
         Self { size: size.max(LEAST_PART * self.grid.distance()), ..self.clone() }
     }
 
-    /// By what part another size differs.
+    /// Relative change of s from this prior to another.
     pub fn change(&self, other: &Self) -> f64 {
         (other.size / self.size - 1.0).abs()
     }
 
-    /// The columns of a direction with its parts.
+    /// The columns of the unknown knots in a direction, with their components.
     fn open(&self, direction: &[Vec<f64>; 2], columns: &[Option<usize>]) -> Vec<(usize, f64)> {
         let knots = (0..self.grid.count()).flat_map(|knot| [(knot, 0), (knot, 1)]);
         let parts = knots
@@ -190,7 +199,7 @@ impl Roughness {
         parts.collect()
     }
 
-    /// The column of each parameter of the lens, if it is unknown.
+    /// For each parameter of the lens its column; `None` where it is known.
     fn columns(&self, parameters: &[(usize, usize)]) -> Vec<Option<usize>> {
         let mut columns = vec![None; 2 * self.grid.count()];
         for &(parameter, column) in parameters {
@@ -206,7 +215,7 @@ fn dot(a: &[Vec<f64>; 2], b: &[Vec<f64>; 2]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
 }
 
-/// R times one coordinate of the knots.
+/// R times one coordinate of all knots.
 fn curved(grid: &SplineGrid, knots: &[f64]) -> Vec<f64> {
     let mut curved = vec![0.0; knots.len()];
     for difference in differences(grid) {
@@ -216,7 +225,7 @@ fn curved(grid: &SplineGrid, knots: &[f64]) -> Vec<f64> {
     curved
 }
 
-/// The second differences of a grid.
+/// All second differences of a grid of knots.
 pub(super) fn differences(grid: &SplineGrid) -> impl Iterator<Item = Difference> {
     let (columns, rows) = (grid.columns, grid.rows);
     let at = move |row: usize, column: usize| row * columns + column;

@@ -1,15 +1,18 @@
-//! Views that speak for another camera than all others do: another zoom, focus or crop.
+//! Consistency of views: which views contradict the camera of all others because zoom, focus or
+//! crop changed.
 //!
-//! At the minimum the pulls of all views on the camera add up to nothing. With S = Σ Sᵥ the reduced normal
-//! equations, each view's pull s by chance has the covariance Sᵥ − Sᵥ S⁻¹ Sᵥ, so that in units of it
+//! At the minimum the gradients of all views with respect to the camera sum to zero. With S = Σ Sᵥ
+//! the reduced normal equations (Schur complement), the gradient s of a view has by chance the
+//! covariance Sᵥ − Sᵥ S⁻¹ Sᵥ, so that the statistic
 //!
 //! ```text
 //!     T = sᵀ (Sᵥ − Sᵥ S⁻¹ Sᵥ)⁺ s
 //! ```
 //!
-//! is χ² of as many degrees of freedom as the view tells of the camera: whether the camera of this view
-//! and that of all others are the same (Chow 1960). A stranger makes it larger in all views until it has gone; what a
-//! model leaves does so in any case, and then no view is to blame.
+//! is χ² distributed with as many degrees of freedom as the view determines of the camera. This is
+//! the Chow test (Chow 1960) of whether the camera of this view is that of all others. A stranger
+//! increases the statistic of all views until it is removed; lack of fit of the model increases it
+//! in any case, and then no single view is to blame.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -22,38 +25,42 @@ use super::problem::Problem;
 use super::reweighting::Settled;
 use crate::statistics::median;
 
-/// Fewest views of which one can stand out: three are left then.
+/// Least number of views for the test: three remain without the tested one.
 const LEAST_VIEWS: usize = 4;
 
-/// A direction of the camera in which all views together tell less than this part of what they tell in the
-/// best one is open, and of which a view tells less than this part is left to the others.
+/// A direction of the camera parameters is undetermined when all views together tell less than the
+/// fraction `OPEN` of what they tell in the best one, and is not tested when the view, or all
+/// others, contribute less than `LEAST_PART` of it.
 const OPEN: f64 = 1e-9;
 const LEAST_PART: f64 = 1e-3;
 
-/// Views that mostly agree have a median of T, by its degrees of freedom, below this: 0.9 is usual.
+/// Views mostly agree when the median of T, divided by its degrees of freedom, is below this: 0.9
+/// is usual.
 const AGREEING: f64 = 1.5;
 
-/// A view is a stranger from so many deviations on, as scattered as the views are: of a million hardly one by chance.
+/// Significance from which a view is a stranger, in standard deviations relative to the scatter of
+/// all views: chance exceeds it hardly once in a million views.
 const SIGNIFICANT: f64 = 5.0;
 
-/// And where the camera is so many of its deviations elsewhere without the view.
+/// A stranger also has to shift the camera by this many of its standard deviations.
 const HARMFUL: f64 = 1.0;
 
-/// A median of squares is as good as the mean of this part of them.
+/// Efficiency of the median relative to the mean, for squares.
 const EFFICIENCY: f64 = 0.64;
 
-/// What a view says of the camera against all others.
+/// The test of one view against all others.
 #[derive(Clone, Copy, Debug)]
 struct Pull {
-    /// T by its degrees of freedom, of variance 1.
+    /// T divided by its degrees of freedom, in units of the variance of residuals.
     strange: f64,
     freedom: f64,
-    /// By how many deviations the camera moves without the view.
+    /// Shift of the camera without the view, in its standard deviations.
     moves: f64,
 }
 
 impl Pull {
-    /// Of the parts of directions that the view tells, and its pull along them.
+    /// From pairs of the fraction of a direction that the view contributes, and the component of
+    /// its gradient along it.
     fn of(directions: impl Iterator<Item = (f64, f64)>, variance: f64) -> Self {
         let mut found = Self { strange: 0.0, freedom: 0.0, moves: 0.0 };
         for (part, along) in directions {
@@ -71,17 +78,17 @@ impl Pull {
     }
 }
 
-/// What frames say of the cameras.
+/// Result of the test over all frames.
 pub(super) struct Opinions {
-    /// Whether most say the same.
+    /// Whether most frames agree on the cameras.
     pub agree: bool,
-    /// The frame that speaks most for other cameras than all others, if one does; and by how many deviations it
-    /// moves them.
+    /// The frame that contradicts the cameras of all others most significantly, if any, and the
+    /// shift of the cameras that it causes, in standard deviations.
     pub stranger: Option<(usize, f64)>,
 }
 
 impl Opinions {
-    /// `None` where cameras are known, or frames are few.
+    /// Tests all frames at a minimum; `None` where cameras are known or frames are too few.
     pub fn of(settled: &Settled, loss: Loss) -> Option<Self> {
         let pulls = pulls(settled, loss)?;
         let told = pulls.iter().flatten().filter(|pull| pull.freedom > 0.0);
@@ -105,7 +112,7 @@ impl Opinions {
     }
 }
 
-/// What each frame says; `None` where one says nothing by itself.
+/// The test of each frame; `None` for a frame that determines nothing by itself.
 fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     let problem = &settled.minimum.problem;
     if problem.cameras.iter().any(|camera| camera.roughness.is_some()) {
@@ -124,7 +131,7 @@ fn pulls(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
 }
 
-/// The same where a frame tells only of some of the unknowns.
+/// The same for cameras with a spline, of whose knots a frame determines only some.
 fn pulls_of_some(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     let problem = &settled.minimum.problem;
     let all = settled.minimum.normal.covariance_of_kept()?;
@@ -138,7 +145,8 @@ fn pulls_of_some(settled: &Settled, loss: Loss) -> Option<Vec<Option<Pull>>> {
     Some((0..problem.frames.len()).into_par_iter().map(of_frame).collect())
 }
 
-/// The reduced equations of a frame by itself.
+/// The reduced normal equations (Schur complement) of a frame by itself, without priors: matrix and
+/// right side.
 fn reduced_of(
     problem: &Problem,
     settled: &Settled,
@@ -153,7 +161,8 @@ fn reduced_of(
     found.filter(|(matrix, right)| matrix.iter().chain(right).all(|v| v.is_finite()))
 }
 
-/// W of a matrix S: W S Wᵀ = 1, without the directions that S leaves open; `None` where that is all.
+/// The whitening matrix W of S, with W S Wᵀ = 1 over the directions that S determines; `None` where
+/// there are none.
 fn whitener(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     if n == 0 || !matrix.iter().all(|v| v.is_finite()) {

@@ -1,4 +1,4 @@
-//! How much of the surroundings of a corner shows nothing but that corner.
+//! The clear area around a corner: the pixels that show only this corner.
 //!
 //! ```text
 //!        2 ╱╲ 1        the tiles around a corner end at their far sides; in tiles with a tag the
@@ -21,18 +21,18 @@ use crate::family::Family;
 use crate::lattice::{GridKind, Tile, Vertex};
 use crate::targets::{Panel, TagsIn, Target};
 
-/// Blur of the next edges reaches this many standard deviations into the clear: beyond, an edge
-/// changes what is seen by less than 2.5 % of its contrast.
+/// Distance to be kept from other edges, in standard deviations of the blur: beyond it, an edge
+/// changes grey values by less than 2.5 % of its contrast.
 const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 
-/// Corners lie beside the chords of their neighbours by less than this part of the way to them: lenses
-/// turn an edge by less than 0.3 rad from one corner to the next.
+/// Greatest distance of a corner from the chord of its neighbours, relative to the distance to
+/// them: lenses bend an edge by less than 0.3 rad from one corner to the next.
 const MOST_SAG: f64 = 0.15;
 
 /// Tiles by the id of their panel.
 type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
 
-/// Where the tags of a target lie.
+/// The tiles of a target with tags, and the area of the tag in its tile.
 #[derive(Clone, Debug, Default)]
 pub struct TagAreas {
     /// Distance from the edges of a tile to what it shows of a tag, in edges along the other
@@ -43,7 +43,7 @@ pub struct TagAreas {
 }
 
 impl TagAreas {
-    /// The tags of `target`, of this family.
+    /// The tag areas of `target` with the tags of this family.
     pub fn of(target: &Target, family: &Family) -> Self {
         let tagged = || target.panels.iter().filter(|panel| !panel.tags.is_empty());
         let inset = |panel: &Panel| {
@@ -60,7 +60,7 @@ impl TagAreas {
         }
     }
 
-    /// Those of several targets, by their names.
+    /// The tag areas of several targets, by their names.
     pub fn of_scene(targets: impl IntoIterator<Item = (String, Self)>) -> Self {
         let mut all = Self { inset: f64::INFINITY, targets: Vec::new() };
         for (name, of_target) in targets {
@@ -90,13 +90,13 @@ impl TagAreas {
     }
 }
 
-/// A span without any place.
+/// An empty span.
 pub const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 /// Signed distance from a line, px: a·u + b·v + c.
 type Line = [f64; 3];
 
-/// What lies around a corner, in px from it.
+/// The surroundings of a corner, px from it.
 #[derive(Clone, Debug, Default)]
 pub struct Surroundings {
     /// Far sides of the tiles, positive towards the corner.
@@ -116,13 +116,14 @@ pub struct Edge {
     pub angle_rad: f64,
     /// Curvature to the left of that direction (to greater v of u), 1/px.
     pub bend: f64,
-    /// How far from it something lies that is an edge of a tile away on the print, px.
+    /// Distance in the picture, perpendicular to the edge, of something one edge length away on the
+    /// print, px.
     pub across_px: f64,
 }
 
 impl Surroundings {
-    /// First and last place of a row, px from the corner, before which and behind which the far sides are seen under a
-    /// blur of this deviation.
+    /// Ends of the clear part of a row at distance `v` from the corner, px, between the far sides
+    /// of the tiles under a blur of this standard deviation, px.
     pub fn span(&self, v: f64, blur_px: f64) -> [f64; 2] {
         if self.sides.is_empty() {
             return NOTHING;
@@ -142,14 +143,16 @@ impl Surroundings {
         [first, last]
     }
 
-    /// Tells whether no tag is seen at a place, px from the corner, under a blur of this deviation.
+    /// A predicate for places, px from the corner, at which no tag is visible under a blur of this
+    /// standard deviation, px.
     pub fn off_tags(&self, blur_px: f64) -> impl Fn(DVec2) -> bool {
         let margin = BLUR_MARGIN_SIGMAS * blur_px;
         let circle2 = (self.distance_of_tags(DVec2::ZERO) - margin).max(0.0).powi(2);
         move |place| place.length_squared() < circle2 || self.distance_of_tags(place) >= margin
     }
 
-    /// Half the side of the largest clear square around the corner, px.
+    /// Half the side of the largest clear square around the corner, px, under a blur of this
+    /// standard deviation, px.
     pub fn clear_square_px(&self, blur_px: f64) -> f64 {
         let clear = self.distance(DVec2::ZERO) - BLUR_MARGIN_SIGMAS * blur_px;
         clear.max(0.0) * std::f64::consts::FRAC_1_SQRT_2
@@ -170,13 +173,14 @@ impl Surroundings {
     }
 }
 
-/// What lies around every corner of a grid, in their order, in pixels `scale` times as large as the
-/// grid's. Of a corner whose neighbours lie in one line nothing is known, and nothing is clear.
+/// The surroundings of every corner of a grid, in their order, in pixels of `scale` times the size
+/// of those of the grid. For a corner whose neighbours are collinear nothing is known, and nothing
+/// counts as clear.
 pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
     surroundings_of(grid, tags, scale, 0..grid.corners.len())
 }
 
-/// The same of some of the corners, by their index.
+/// The surroundings of some of the corners, by their index.
 pub fn surroundings_of(
     grid: &Grid,
     tags: &TagAreas,
@@ -190,7 +194,8 @@ pub fn surroundings_of(
         let here = places.get(vertex)?;
         let seen = |step: Vertex| places.get(vertex + step).map(|place| place - here);
         let near = affine(grid.kind.steps().iter().filter_map(|&s| Some((s, seen(s)?))));
-        // Of a corner by itself those beyond its neighbours tell where these would be.
+        // For a single corner the corners beyond its neighbours predict where missing neighbours
+        // would be.
         let map = match &near {
             Some(_) => None,
             None => Some(places.map_about(grid.kind, vertex, *bend)?),
@@ -221,8 +226,9 @@ pub fn surroundings_of(
     corners.map(|i| around(&grid.corners[i]).unwrap_or_default()).collect()
 }
 
-/// Where a corner should be that lies beside the lines of its neighbours: where they cross, px. `None`
-/// where it lies as near to them as any lens lets it, and of fewer than two lines.
+/// The crossing of the lines through the neighbours of a corner, px, if the corner is displaced
+/// from them. `None` where it lies as near to them as lens distortion permits, and with fewer than
+/// two lines.
 pub fn crossing(grid: &Grid, corner: &GridCorner) -> Option<DVec2> {
     let places = Places::of(grid, 1.0);
     let vertex = Vertex::new(corner.row, corner.col);

@@ -1,4 +1,4 @@
-//! From linked corners to grids: initial quads, then breadth-first growth, then the gaps.
+//! Grids from linked corners: initial quads, breadth-first growth, and filling of gaps.
 //!
 //! Every corner of a grid has a lattice vertex and a *turn*: ray k of the corner points along step
 //! `k + turn` of the lattice ([`step`]). Even rays begin dark sectors. On a deltille grid turns are
@@ -23,11 +23,11 @@ use super::tiling::{kind, neighbours, step, tiles_at};
 use crate::lattice::{GridKind, Vertex};
 use crate::raster::Pyramid;
 
-/// Largest distance of a corner from where its neighbours predict it, over the edge length.
+/// Greatest distance of a corner from the position that its neighbours predict, in edge lengths.
 const MAX_SURPRISE: f64 = 0.2;
 
-/// Corners nearer to each other than this part of an edge are the same: under blur and motion one may be
-/// found twice.
+/// Corners nearer to each other than this fraction of an edge are the same: under blur and motion
+/// one may be detected twice.
 const SAME_PART: f64 = 0.2;
 
 /// A corner that is missing is looked for in several views.
@@ -40,7 +40,7 @@ struct Place {
     turn: usize,
 }
 
-/// What the later stages know of a corner of either tiling.
+/// A corner of either tiling, as later stages need it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedSaddle {
     /// Position, px.
@@ -71,8 +71,8 @@ impl<const N: usize> GrownSaddle<N> {
 /// A grid while it grows.
 pub type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
 
-/// All grids among the saddles, largest first; none where there are more saddles than any board has. A grid that
-/// shows the `whole` board has no gaps.
+/// All grids among the saddle points, largest first, by lattice vertex; none where there are more
+/// saddle points than on any board. A grid that shows the `whole` board has no gaps to be filled.
 pub fn grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -134,14 +134,14 @@ fn plain<const N: usize>(grown: &GrownSaddle<N>) -> PlacedSaddle {
     PlacedSaddle { position: grown.saddle.position, amplitude: grown.saddle.sectors.amplitude }
 }
 
-/// The known saddle that is the same as another one.
+/// Index of the known saddle point that is the same as another one.
 fn same<const N: usize>(places: &Buckets, saddle: &Saddle<N>) -> Option<usize> {
     let near = places.within(saddle.position, merge_px(saddle.level));
     near.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(i, _)| i)
 }
 
-/// Leaves out of grids the corners that are in a larger one, or under another vertex of the same; no
-/// `places` are known at first.
+/// Removes corners from grids that are in a larger grid, or under another vertex of the same;
+/// `places` are known from before, and empty at first.
 fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
     for grid in grids.iter_mut() {
         let whole = grid.clone();
@@ -162,8 +162,8 @@ fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
     grids.retain(|grid| !grid.is_empty());
 }
 
-/// Drops grids that lie within one tile of a larger grid: the cells of a tag are a tiling too. The largest
-/// grid comes first.
+/// Drops grids that lie within one tile of a larger grid: the cells of a tag form a tiling, too.
+/// The largest grid comes first.
 fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGrid> {
     if grids.len() < 2 {
         return grids;
@@ -404,8 +404,9 @@ fn fill_gaps<const N: usize>(
     }
 }
 
-/// Where the straight (or evenly bent) rows through `vertex` continue to, and the length of an
-/// edge there; `None` unless two rows predict it, or two neighbours and those around them.
+/// Prediction of a missing corner: the position at which the straight (or evenly bent) rows through
+/// `vertex` continue, px, and the length of an edge there, px; `None` unless two rows predict it,
+/// or two neighbours and those around them.
 fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<(DVec2, f64)> {
     let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
     let mut sum = DVec2::ZERO;
@@ -433,8 +434,8 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<(DVec2, 
     Some((map.place, beside.iter().map(px).sum::<f64>() / beside.len() as f64))
 }
 
-/// The corner at `vertex`, if one is found near `position`, as the image shows it or in the frame of
-/// its neighbours.
+/// The corner at `vertex`, if one is found near `position`, in the picture as it is or rectified to
+/// the frame of its neighbours.
 fn corner_near<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -447,7 +448,7 @@ fn corner_near<const N: usize>(
     }
     let reach = (MAX_SURPRISE * edge_px).max(1.0);
     let neighbours = neighbours::<N>(vertex);
-    // What is blurred around it is best looked for where its neighbours were found.
+    // A blurred corner is found best in the view in which its neighbours were found.
     let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
     let level = levels.max().unwrap_or(0);
     let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);

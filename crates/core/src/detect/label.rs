@@ -1,33 +1,38 @@
-//! From readings of tags to panels, rows and columns, by the evidence of the whole board.
+//! Labelling of grids: from readings of tags to panels, rows and columns, by the evidence of the
+//! whole board.
 //!
-//! A *placement* says how a grid lies on a panel: a motion of the lattice, as seen on the print or in a mirror. It
-//! predicts a code in every tile with a tag. With l half the logarithm of the odds that a cell is white, and s = ±1 the
-//! cells of the code predicted, a tile speaks for the placement by
+//! A *placement* is a hypothesis of how a grid lies on a panel: a motion of the lattice, seen
+//! directly or in a mirror. It predicts a code in every tile with a tag. With l half the log-odds
+//! that a cell is white, and s = ±1 the cells of the predicted code, the log-likelihood ratio of a
+//! tile is
 //!
 //! ```text
 //!     Λ = Σ ( l s − ln( p e^l + (1 − p) e^−l ) )
 //! ```
 //!
-//! where p is how often the cell is white in the codes of the target and its family. Over codes drawn so, e^Λ has the
-//! mean 1 whatever the tile shows, and so has the product over tiles; hence by Markov's inequality a placement has
-//! more evidence than E by chance less often than e^−E (the value is an *e-value*). Nothing needs to be known of the
-//! picture for that, and cells of which little is known still add up.
+//! where p is the frequency of white in this cell over the codes of the target and its family. Over
+//! codes drawn with these frequencies, e^Λ has the mean 1 whatever the tile shows, and so has the
+//! product over tiles; hence by Markov's inequality a placement exceeds the evidence E by chance
+//! with a probability below e^−E (the value is an *e-value*). This needs no model of the picture,
+//! and cells with little information still contribute.
 //!
-//! Tiles without tags are predicted too: they are plain. A tile may be hidden, and then shows cells as drawn, so that
-//! e^Λ gives way to h + (1 − h) e^Λ; what is clearly a code, or plain, is not hidden. A placement must
-//! explain the tiles better than each of two boards that are not the target:
+//! Tiles without tags are predicted to be plain. A tile may be hidden, and then shows cells as
+//! drawn, so that e^Λ is replaced by h + (1 − h) e^Λ; a tile that clearly is a code, or plain, is
+//! not hidden. A placement must explain the tiles better than each of two boards that are not the
+//! target:
 //!
 //! - one with tags in the same tiles, but other codes, of the target or not;
 //! - one whose tiles are plain, or show any code, as they like, whatever part of them is plain.
 //!
-//! The first asks the codes alone, so that no pattern of plain tiles labels a board whose tags are not read; the second
-//! counts tags where none are predicted, plain tiles where tags are, and tiles beyond the end of the panel. Being held
-//! against the better of the two, and that with its best codes, the evidence only becomes less.
+//! The first tests the codes alone, so that no pattern of plain tiles labels a board whose tags are
+//! not read; the second counts tags where none are predicted, plain tiles where tags are, and tiles
+//! beyond the end of the panel. Comparison with the better of the two, with its best codes, only
+//! reduces the evidence.
 //!
-//! Limits: codes are taken as drawn from their family; placements of parts of the same board by
-//! other lattices are not thought of. Faces of a solid may lie in one grid, so there nothing counts beyond a panel; but
-//! all that is placed in a grid must explain its codes better together than a board does that has the same codes
-//! elsewhere.
+//! Limits: codes are assumed to be drawn from their family; other lattices on the same board are
+//! not considered. The faces of a solid may lie in one grid, so that tiles beyond a panel do not
+//! count there; but all placements in a grid together must explain its codes better than a board
+//! does that has the same codes elsewhere.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -41,46 +46,49 @@ use crate::lattice::{LatticeMap, Orientation, Tile, Vertex};
 use crate::raster::ImageView;
 use crate::targets::{Panel, TagsIn, Target};
 
-/// The chance that a tag is hidden or spoiled, so that its tile tells nothing of it.
+/// Probability that a tag is hidden or spoiled, so that its tile has no information.
 const SPOILT: f64 = 1.0 / 16.0;
 
-/// Chances that a tile without a tag is dirty, or misread, so that its cells tell nothing: what goes wrong in one goes
-/// wrong in all, as where the blur is none, and the picture decides which of these it is.
+/// Probabilities that a tile without a tag is dirty or misread, so that its cells have no
+/// information: a cause such as a picture without blur affects all tiles alike, and the picture
+/// decides which of these applies.
 const DIRTY: [f64; 3] = [SPOILT, 1.0 / 2.0, 1.0 - SPOILT];
 
-/// Evidence that must remain when the number of placements is taken into account, nats: 6 bits, and a
-/// picture without the target is labelled less than once in 64 times. Markov's inequality leaves a
-/// factor of about ten on top of that, a board of other tags, all of which must be taken for hidden, much more.
+/// Least evidence after correction for the number of placements, nats: 6 bits, so that a picture
+/// without the target is labelled less than once in 64 times. Markov's inequality leaves a factor
+/// of about ten on top of that; a board of other tags, all of which would have to be hidden, much
+/// more.
 const MIN_EVIDENCE: f64 = 6.0 * std::f64::consts::LN_2;
 
-/// How much more evidence a placement has than any other that puts the same corners elsewhere, nats.
+/// Least lead over any other placement that puts the same corners elsewhere, nats.
 const MIN_LEAD: f64 = 6.0 * std::f64::consts::LN_2;
 
-/// With so much evidence, nats, nobody asks what a mirror would show.
+/// Evidence from which mirrored placements are not tested any more, nats.
 const BEYOND_DOUBT: f64 = 40.0;
 
-/// A code that the target does not have is named where it has so much evidence, nats.
+/// Evidence from which a code that the target does not have is reported, nats.
 const CLEARLY_OTHER: f64 = 7.0;
 
-/// Parts of a board's tiles that may be plain: from tags in nearly all tiles to one in a corner of the board.
+/// Fractions of the tiles of a board that may be plain: from tags in nearly all tiles to one in a
+/// corner of the board.
 const PLAIN_PARTS: [f64; 5] = [1.0 / 16.0, 1.0 / 4.0, 1.0 / 2.0, 3.0 / 4.0, 15.0 / 16.0];
 
-/// Evidence of a tile for a placement to be proposed by it, nats.
+/// Least evidence of a single tile that proposes a placement, nats.
 const PROPOSING: f64 = 1.0;
 
-/// Placements that are judged, best proposals first.
+/// Most placements that are evaluated, best proposals first.
 const MOST_PROPOSALS: usize = 64;
 
-/// Tiles read in a grid: more would tell no more.
+/// Most tiles that are read in a grid; more would add no information.
 const MOST_TILES: usize = 2000;
 
-/// What one picture may cost: a tile's reading, in tiles compared with a code.
+/// Cost of reading a tile, in comparisons of a tile with a code.
 const READING_COST: usize = 1000;
 
-/// A budget that takes some hundredths of a second.
+/// Budget of a picture, in comparisons: some hundredths of a second.
 const BUDGET: usize = 4_000_000;
 
-/// What is left to spend on a picture.
+/// The remaining computing budget of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget(usize);
 
@@ -103,28 +111,30 @@ pub struct Labelled {
     pub tags: Vec<DecodedTag>,
 }
 
-/// What the tags of a grid told.
+/// The result of labelling a grid by its tags.
 #[derive(Clone, Debug, Default)]
 pub struct TagEvidence {
-    /// The panels found.
+    /// The panels that were identified.
     pub found: Vec<Labelled>,
     /// Tiles that may carry a tag.
     pub tiles: usize,
     /// The median length of a bit, px.
     pub bit_px: f64,
-    /// Deviation of the blur, px.
+    /// Standard deviation of the blur, px.
     pub blur_px: f64,
-    /// Ids of the family that were read and are none of the target's.
+    /// Ids of the family that were read and do not belong to the target.
     pub foreign_ids: BTreeSet<u32>,
-    /// Tiles whose cells are read without doubt and are no code of the family.
+    /// Number of tiles whose cells are read with certainty and are no code of the family.
     pub no_codes: usize,
-    /// Tiles whose cells tell less than which code of the family they are, where nothing was found.
+    /// Number of tiles whose cells do not determine a code of the family, where no panel was
+    /// identified.
     pub unread: usize,
-    /// Whether a placement has evidence enough, but another one nearly as much.
+    /// Whether a placement has sufficient evidence, but another one nearly as much.
     pub is_ambiguous: bool,
-    /// Tiles that agree and that disagree with a placement which would have evidence enough but for the latter.
+    /// Numbers of tiles that agree and that disagree with a placement whose evidence would suffice
+    /// without the latter.
     pub contradicted: Option<[usize; 2]>,
-    /// Whether the budget ended before the grid was read.
+    /// Whether the budget was exhausted before the grid was read.
     pub is_cut_short: bool,
 }
 
@@ -159,7 +169,7 @@ struct LabelPanel {
     tiles: BTreeSet<Tile>,
 }
 
-/// What the tiles of a grid say, all read alike and seen from the same side.
+/// The readings of the tiles of a grid, all read alike and seen from the same side.
 struct Sight {
     reader: usize,
     inverted: bool,
@@ -171,10 +181,10 @@ struct Sight {
     shown: Vec<Shown>,
 }
 
-/// What a tile shows, whatever a placement predicts: logarithms of likelihoods, over that of drawn cells.
+/// The contents of a tile regardless of placements: log-likelihood ratios over drawn cells.
 #[derive(Clone, Copy, Debug)]
 struct Shown {
-    /// If it should be plain, by how many such tiles are dirty.
+    /// If it is predicted to be plain, for each of [`DIRTY`].
     if_plain: [f64; DIRTY.len()],
     /// The word of the target that fits best.
     word: usize,
@@ -184,18 +194,18 @@ struct Shown {
     of_board: [[f64; PLAIN_PARTS.len()]; 2],
 }
 
-/// A tile under a placement: logarithms of likelihoods, over that of drawn cells.
+/// A tile under a placement: log-likelihood ratios over drawn cells.
 #[derive(Clone, Copy, Debug)]
 struct Judged {
-    /// As the placement predicts it, by how many plain tiles are dirty.
+    /// As the placement predicts it, for each of [`DIRTY`].
     predicted: [f64; DIRTY.len()],
-    /// The same on a board with another code in this tile.
+    /// On a board with another code in this tile.
     other_code: [f64; DIRTY.len()],
     /// On a board that shows what it likes, as far as the tile is of the panel.
     of_board: Option<[f64; PLAIN_PARTS.len()]>,
 }
 
-/// How a grid lies on a panel: `map` takes the grid, in a mirror if `sight` is mirrored, to the panel.
+/// A placement of a grid on a panel: `map` takes the grid, mirrored if `sight` is, to the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Placement {
     sight: usize,
@@ -213,8 +223,9 @@ struct Placed {
 }
 
 impl TagLabeller {
-    /// A labeller for the tags of `target`; `None` when it has no tags. Tags with more than `max_errors` misread
-    /// cells do not count, where that is given.
+    /// A labeller for the tags of `target`, whose codes are those of `family`; `None` when the
+    /// target has no tags. Tags with more than `max_errors` misread cells do not count, where that
+    /// is given.
     pub fn new(target: &Target, family: &Family, max_errors: Option<u32>) -> Option<Self> {
         let ids: BTreeSet<u32> =
             target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
@@ -258,7 +269,8 @@ impl TagLabeller {
         })
     }
 
-    /// The panels in a grid, by the tags read in `image`.
+    /// Identifies the panels in a grid by the tags that are read in `image`; `budget` is reduced by
+    /// the cost.
     pub fn label(&self, image: ImageView, grid: &SaddleGrid, budget: &mut Budget) -> TagEvidence {
         let mut evidence = TagEvidence::default();
         let mut sights = Vec::new();
@@ -280,7 +292,7 @@ impl TagLabeller {
         self.decide(sights, grid, evidence)
     }
 
-    /// What the sights of a grid, and the same in a mirror, are evidence for.
+    /// The placements for which the sights of a grid, direct and mirrored, are evidence.
     fn decide(
         &self,
         mut sights: Vec<Sight>,
@@ -355,7 +367,8 @@ impl TagLabeller {
         Sight { reader, inverted, mirrored, index, readings, evidence, shown }
     }
 
-    /// What a tile shows, by its evidence for all words; `plain` is what it shows without a tag.
+    /// The contents of a tile by its evidence for all words; `plain` is the word that it has
+    /// without a tag.
     fn shown(
         &self,
         (reading, plain): (&Reading, u64),
@@ -495,7 +508,7 @@ impl TagLabeller {
         mean(predicted) - greatest(of_board).max(mean(other_codes))
     }
 
-    /// How many tiles agree with a placement, and how many do not.
+    /// Numbers of tiles that agree and that disagree with a placement.
     fn agreement(&self, sight: &Sight, placement: &Placement) -> [usize; 2] {
         let against = |tile: &Judged| {
             greatest(tile.predicted) < tile.of_board.map_or(0.0, greatest) - PROPOSING
@@ -520,9 +533,9 @@ impl TagLabeller {
         tiles.filter_map(move |index| self.judge(sight, placement, index))
     }
 
-    /// What all tiles of a grid that show codes say of all that is placed in it together, each panel but once: how much
-    /// better it explains them than a board that has the same codes wherever it likes, nats, and how many agree and
-    /// disagree.
+    /// The joint evidence of all tiles of a grid that show codes, for all its placements together,
+    /// each panel only once: how much better they explain the codes than a board that has the same
+    /// codes anywhere, nats; and the numbers of tiles that agree and disagree.
     fn together(&self, sights: &[Sight], placements: &[Placement]) -> (f64, [usize; 2]) {
         let mut panels = BTreeSet::new();
         let once: Vec<&Placement> = placements.iter().filter(|p| panels.insert(p.panel)).collect();
@@ -624,8 +637,8 @@ impl TagLabeller {
     }
 }
 
-/// Logarithm of the likelihood of a tile, over that of drawn cells, that shows what is predicted or, by a chance, such
-/// cells.
+/// Log-likelihood ratio, over drawn cells, of a tile that shows what is predicted or, with
+/// probability `chance`, drawn cells.
 fn or_spoilt(evidence: f64, chance: f64) -> f64 {
     (chance + (1.0 - chance) * evidence.exp()).ln()
 }
@@ -638,19 +651,20 @@ fn greatest<const N: usize>(logs: [f64; N]) -> f64 {
     logs.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Logarithm of the mean of likelihoods, from their logarithms.
+/// Logarithm of the mean of likelihoods, given their logarithms.
 fn mean<const N: usize>(logs: [f64; N]) -> f64 {
     let most = greatest(logs);
     most + (logs.iter().map(|log| (log - most).exp()).sum::<f64>() / N as f64).ln()
 }
 
-/// How often a tag is turned counter-clockwise, by 120° or 90°, in a grid tile that this map puts on a panel.
+/// Number of counter-clockwise turns, by 120° or 90°, of a tag in a grid tile that this map puts on
+/// a panel.
 fn turns_of(panel_from_grid: LatticeMap, on_grid: Tile) -> usize {
     let a = panel_from_grid.inverse().apply(panel_from_grid.apply_tile(on_grid).frame()[0]);
     on_grid.vertices().position(|v| v == a).unwrap_or(0)
 }
 
-/// Whether the cells of a tile are told without doubt, and are not all the same.
+/// Whether the cells of a tile are read with certainty and are not all the same.
 fn is_word(reading: &Reading) -> bool {
     /// Half odds of a cell that is read right 19 times of 20.
     const SURE: f32 = 1.5;
@@ -659,7 +673,7 @@ fn is_word(reading: &Reading) -> bool {
     10 * (sure(1.0) + sure(-1.0)) >= 9 * n && sure(1.0).min(sure(-1.0)) * 6 >= n
 }
 
-/// The vertices of a panel's corners.
+/// The lattice vertices of the corners of a panel.
 pub fn panel_vertices(panel: &Panel) -> BTreeSet<Vertex> {
     panel.corners.iter().map(|corner| Vertex::new(corner.row, corner.col)).collect()
 }
@@ -841,8 +855,8 @@ mod tests {
         }
     }
 
-    /// A part of the board with one tag, as a photograph of nothing else shows it, is labelled; not so if just one other
-    /// tile says clearly that it belongs to another board.
+    /// A part of the board with one tag, as a photograph of nothing else shows it, is labelled; but
+    /// not if just one other tile clearly belongs to another board.
     #[test]
     fn one_tag_labels_where_nothing_contradicts_it() {
         let family = Family::shipped("delTag25h7").unwrap();

@@ -1,11 +1,12 @@
-//! What all corners of a picture have in common: tone curve, halo, astigmatism, and the ink of the print.
+//! Joint estimation of the parameters that all corners of a picture share: tone curve, halo and
+//! astigmatism of the point spread function, and the ink spread of the print.
 //!
-//! Corners from all over the picture are fitted together, each with its own place, edges, blur and light, and
-//! with the common parameters: the normal equations have a block for each corner, which is eliminated
-//! (Schur's complement). Then the common parameters are held, so that they cost single corners
-//! nothing. Groups of them that differ from nothing by no more than chance explains are left out; what
-//! chance explains is told by the scatter of the corners' gradients, so that pixels which depend on each
-//! other, or a model that holds only nearly, make no evidence.
+//! Corners from all over the picture are fitted together by damped least squares, each with its own
+//! position, edges, blur and light, and with the common parameters: the normal equations have a
+//! block for each corner, which is eliminated (Schur complement). Afterwards the common parameters
+//! are fixed, so that they add no unknowns to single corners. Groups of parameters that are not
+//! significant are omitted; significance is judged by the scatter of the gradients of the corners,
+//! so that correlated pixels, or a model that holds only approximately, are not taken for evidence.
 
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -19,97 +20,103 @@ use super::small_systems::solved;
 use crate::raster::ImageView;
 use crate::statistics::median;
 
-/// Corners that are fitted together; more tell the curve better than single corners can use it.
+/// Number of corners that are fitted together; more would determine the curve better than single
+/// corners can use it.
 pub const SAMPLES: usize = 16;
 
-/// Windows of these corners end here, px, or after so many deviations of the blur: what is common shows
-/// at the edges, and near the corner.
+/// Radius of the windows of these corners, px, and its limit in standard deviations of the blur:
+/// the common parameters show at the edges, and near the corner.
 pub const REACH_PX: f64 = 7.0;
 pub const REACH_SIGMAS: f64 = 5.0;
 
 /// Width of a halo over that of the blur: masks of 1 to 2 px on pictures of 0.7 to 1 px of blur.
 const HALO_WIDTH: f64 = 2.5;
 
-/// The least strength of a halo: where blur has a wide foot. What is weaker yet is but a wider blur again.
+/// The least strength of a halo: blur with wide tails. Beyond it the tails are no more than a wider
+/// blur.
 const LEAST_HALO: f64 = -0.45;
 
-/// A pattern is at least this part as blurred as its edges are steep, whatever the halo.
+/// Least blur of the pattern without its halo, relative to a blur whose edges are as steep.
 const LEAST_CORE: f64 = 0.3;
 
-/// Prior deviations of the parameters: gamma 2.6 has (1.6, 0, 0), smooth steps have −0.5 at both ends,
-/// halos of 0.5 are strong, a blur twice as wide in one direction has an astigmatism of 0.6, and ink that spreads by
-/// 2 % of an edge takes a fifth of the bits of a tag.
+/// Prior standard deviations of the parameters: gamma 2.6 has (1.6, 0, 0), smooth steps have −0.5
+/// at both ends, halos of 0.5 are strong, a blur twice as wide in one direction has an astigmatism
+/// of 0.6, and ink that spreads by 2 % of an edge covers a fifth of the bits of a tag.
 const PRIOR: [f64; PARAMS] = [2.0, 1.0, 1.0, 0.3, 0.3, 0.5, 2.0];
 
-/// The parameters: the curve's, the astigmatism's, the halo's, and the ink.
+/// The parameters: three of the tone curve, two of the astigmatism, the halo, and the ink.
 const PARAMS: usize = COMMON;
 const GROUPS: [&[usize]; 4] = [&[0, 1, 2], &[3, 4], &[HALO], &[INK]];
 const HALO: usize = PARAMS - 2;
 const INK: usize = PARAMS - 1;
 
-/// A group is used when chance has it with less than 1 : 1000: χ² of three, two and one degrees of freedom. But every
-/// picture is blurred a little more in one direction, and from a grazing angle that is nearly what a curve does:
-/// 1 : 10.
+/// A group is used when its probability by chance is below 1 : 1000: χ² of three, two and one
+/// degrees of freedom. Astigmatism is used from 1 : 10 on, because every picture is blurred a
+/// little more in one direction, and from a grazing angle that resembles a tone curve.
 const CHI2: [f64; 4] = [16.3, 4.6, 10.8, 10.8];
 
-/// The same of one degree of freedom.
+/// The threshold of one degree of freedom, 1 : 1000.
 const CHI2_OF_ONE: f64 = 10.8;
 
-/// A curve that displaces nothing is used where it explains this part of the noise.
+/// A curve that displaces no corner is used where it explains this fraction of the noise.
 const NOTICED: f64 = 0.05;
 
 /// The unit of the ink, in edges.
 pub const INK_UNIT: f64 = 0.01;
 
-/// A group is looked for where the first step, from a straight curve, promises this part of it.
+/// A group is estimated where the first step, from a straight curve, promises this fraction of its
+/// threshold.
 const WORTH_A_LOOK: f64 = 0.5;
 
-/// Steps of difference quotients, and of the parameters at most.
+/// Step of difference quotients, and largest step of the parameters.
 pub const STEP: f64 = 0.01;
 const MAX_STEP: f64 = 2.0;
 
 /// Most iterations; four are usual.
 const MAX_ITERATIONS: usize = 10;
 
-/// Steps below this part of the parameters' deviations end the iteration; those that are only to tell which groups
-/// there are end it earlier.
+/// The iteration ends with steps below this fraction of the standard deviations of the parameters;
+/// earlier where it only decides which groups are significant.
 const CONVERGED: f64 = 0.5;
 const ROUGHLY_CONVERGED: f64 = 1.0;
 
-/// Weights of corners end where their residuals are this many times the median: they show something else.
+/// Corners whose residuals exceed this many times the median have no weight: they show something
+/// else.
 const MAX_RESIDUAL_RATIO: f64 = 3.0;
 
-/// Most of the blur's square that may lie in one direction, over the mean of both.
+/// Greatest astigmatism: the part of the squared blur that may lie in one direction, over the mean
+/// of both.
 const MAX_ASTIGMATISM: f64 = 0.98;
 
-/// What is common to the corners of a picture.
+/// The parameters that the corners of a picture share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Optics {
-    /// Whether the curve is not known.
+    /// Whether the tone curve is unknown.
     is_open: bool,
-    /// Whether the ink is not known.
+    /// Whether the ink spread is unknown.
     is_ink_open: bool,
     curve: Option<Curve>,
     params: [f64; TONE_PARAMS],
-    /// Grey values that an estimated curve is made for.
+    /// Range of grey values, from the blackest to the whitest corner, for which a tone curve is
+    /// estimated.
     range: [f64; 2],
-    /// e₁, e₂ of M = (1 + e₁, e₂; e₂, 1 − e₁).
+    /// Astigmatism: e₁, e₂ of the shape M = (1 + e₁, e₂; e₂, 1 − e₁) of the squared blur.
     pub astigmatism: [f64; 2],
-    /// Whether that is a motion along a line rather than a Gaussian.
+    /// Whether the astigmatism is motion blur along a line instead of a Gaussian.
     pub is_motion: bool,
-    /// Strength of the halo, and its width over that of the blur.
+    /// Strength of the halo, and its width relative to the blur.
     pub halo: [f64; 2],
-    /// Growth of what is dark on the print, in units of [`INK_UNIT`].
+    /// Ink spread: growth of dark areas on the print, in units of [`INK_UNIT`].
     pub ink: f64,
-    /// Factor of the covariances.
+    /// Factor of the covariances of corners, for noise that is not white.
     pub inflation: f64,
-    /// What is not known of the optics moves corners by so much: covariance xx, xy, yy, px².
+    /// Covariance xx, xy, yy of the displacement of corners by the uncertainty of the optics, px².
     pub shift: [f64; 3],
-    /// What single corners leave without them, of half the contrast: the median.
+    /// Median residual of single corners without these parameters, in units of half the contrast.
     pub plain_residual: f64,
-    /// What was found of the curve.
+    /// The estimated tone curve, for the report.
     pub tone: Option<ToneEstimate>,
-    /// What was found of the ink.
+    /// The estimated ink spread, for the report.
     pub ink_found: Option<InkEstimate>,
 }
 
@@ -134,25 +141,28 @@ impl Default for Optics {
     }
 }
 
-/// Blur that is stretched less than this has its kurtosis changed by a motion by less than a fifth.
+/// Least stretch of the blur that can be motion: below it, motion changes the kurtosis by less than
+/// a fifth.
 const LEAST_MOTION: f64 = 0.25;
 
-/// In which directions the blur lies: M, of trace 2, or what a motion along a line leaves of it.
+/// Distribution of the blur over directions: M, of trace 2, or what remains of it without motion
+/// along a line.
 #[derive(Clone, Copy, Debug)]
 pub struct Spread {
     astigmatism: [f64; 2],
-    /// What the way takes of the astigmatism, and the astigmatism's length.
+    /// The part of the astigmatism that the motion takes, and the length of the astigmatism.
     part: f64,
     length: f64,
-    /// Whether there is a way.
+    /// Whether there is motion blur.
     pub is_swept: bool,
-    /// Half of the way, in units of the blur, and its derivatives by both parameters of astigmatism.
+    /// Half of the motion vector, in units of the blur, and its derivatives by both parameters of
+    /// astigmatism.
     pub way: [f64; 2],
     pub way_by_astigmatism: [[f64; 2]; 2],
 }
 
 impl Spread {
-    /// aᵀ M b.
+    /// The bilinear form aᵀ M b.
     pub fn product(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
         let [along, across] = parts(a, b);
         let [e1, e2] = self.astigmatism;
@@ -160,7 +170,7 @@ impl Spread {
             + (1.0 - self.part) * (e1 * along + e2 * across)
     }
 
-    /// Its derivatives by both parameters of astigmatism.
+    /// Derivatives of [`Self::product`] by both parameters of astigmatism.
     pub fn by_astigmatism(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
         let parts = parts(a, b);
         let round = self.part * (a[0] * b[0] + a[1] * b[1]);
@@ -171,41 +181,41 @@ impl Spread {
     }
 }
 
-/// What both parameters of astigmatism count for in aᵀ M b.
+/// The coefficients of both parameters of astigmatism in aᵀ M b.
 fn parts(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
 }
 
-/// A corner that is fitted together with others, in picture coordinates.
+/// A corner that takes part in the joint fit, in picture coordinates.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// Pixels that show nothing else.
+    /// The pixels that show only this corner.
     pub window: Window,
     /// The pixel in its middle.
     pub centre: DVec2,
-    /// What was found of it.
+    /// Its estimate by itself.
     pub corner: Corner<3>,
-    /// What it leaves, over half the contrast.
+    /// Its residual, over half the contrast.
     pub residual: f64,
 }
 
 impl Optics {
-    /// What is known of a camera with this tone curve.
+    /// Optics with a given tone curve, and nothing else known.
     pub fn of(tone: Tone) -> Self {
         Self { is_open: tone == Tone::Auto, curve: Curve::of(tone), ..Self::default() }
     }
 
-    /// The same of a print whose ink has spread so far, in edges; `None` where it is not known.
+    /// The same optics for a print with this ink spread, in edges; `None` where it is not known.
     pub fn with_ink(self, ink: Option<f64>) -> Self {
         Self { is_ink_open: ink.is_none(), ink: ink.unwrap_or(0.0) / INK_UNIT, ..self }
     }
 
-    /// The same, the ink not looked for: what is not known of it is not there.
+    /// The same optics with the ink spread taken for known: an unknown one counts as none.
     pub fn with_ink_as_known(self) -> Self {
         Self { is_ink_open: false, ..self }
     }
 
-    /// The directions of the blur, for corners of so many edges.
+    /// The distribution of the blur over directions, for corners with this number of edges.
     pub fn spread(&self, edges: usize) -> Spread {
         let ([e1, e2], length) = (self.astigmatism, self.stretch());
         let is_swept = self.is_motion && length > 0.0;
@@ -231,25 +241,26 @@ impl Optics {
         Spread { part, way, way_by_astigmatism, ..still }
     }
 
-    /// How much further the square of the blur goes one way than the other, over the sum of both.
+    /// Difference of the squared blur along both principal axes, over their sum.
     fn stretch(&self) -> f64 {
         let [e1, e2] = self.astigmatism;
         e1.hypot(e2)
     }
 
-    /// Blur in the direction in which there is the least of it, over that of the whole.
+    /// Least blur over all directions, relative to the mean blur.
     pub fn narrowest(&self) -> f64 {
         (1.0 - self.stretch()).sqrt()
     }
 
-    /// Blur of the pattern that a halo is made from, over the blur of a pattern without one whose edges are as steep:
-    /// (1 + α)/s − α/(w·s) is the same for all α. So a corner's blur is nearly the same with and without a halo.
+    /// Blur of the pattern without halo, relative to the blur of a pattern whose edges are as steep
+    /// without one: (1 + α)/s − α/(w·s) is the same for all α. So the blur of a corner is nearly
+    /// the same with and without a halo.
     pub fn core(&self) -> f64 {
         let [strength, width] = self.halo;
         (1.0 + strength * (1.0 - 1.0 / width)).max(LEAST_CORE)
     }
 
-    /// The derivative of its logarithm by the strength of the halo.
+    /// Derivative of the logarithm of [`Self::core`] by the strength of the halo.
     pub fn ln_core_by_halo(&self) -> f64 {
         (1.0 - 1.0 / self.halo[1]) / self.core()
     }
@@ -307,7 +318,7 @@ impl Optics {
         }
     }
 
-    /// The optics that a picture's corners show; a tone curve that is known is kept.
+    /// Estimates the optics from the corners of a picture; a tone curve that is known is kept.
     pub fn estimate<const K: usize>(
         fitter: &mut CornerFitter,
         image: ImageView,
@@ -327,7 +338,7 @@ impl Optics {
         let residuals = samples.iter().map(|sample| sample.residual).collect();
         let plain_residual = median(residuals).unwrap_or(0.0);
         let known = Self { range, plain_residual, ..known.clone() };
-        // Corners of two edges stay where they are under ink.
+        // Ink spread does not displace corners of two edges.
         let has_ink = known.is_ink_open && K == 3;
         let is_active = |p: usize| match p {
             0..TONE_PARAMS => known.is_open,
@@ -378,8 +389,8 @@ impl Optics {
         Self { tone: found.tone, ink_found: found.ink, inflation, ..optics }
     }
 
-    /// The curve between black and white, the active parameters known to this covariance; `None` where it was not
-    /// looked for.
+    /// The tone curve between black and white, given the covariance of the active parameters;
+    /// `None` where it was not estimated.
     fn tone_between(
         &self,
         greys: [f64; 2],
@@ -413,7 +424,7 @@ impl Optics {
     }
 }
 
-/// What a user is told of the optics.
+/// What is reported to the user about the optics.
 #[derive(Default)]
 struct Reported {
     tone: Option<ToneEstimate>,
@@ -438,7 +449,7 @@ struct Estimate {
     information: DMatrix<f64>,
     /// Derivatives of κ₀ by the parameters of the curve.
     kappa_slopes: [f64; TONE_PARAMS],
-    /// How many they come from.
+    /// Number of corners from which they come.
     pixels: usize,
 }
 
@@ -447,8 +458,8 @@ impl Estimate {
         DVector::from_iterator(self.active.len(), self.active.iter().map(|&p| self.vector[p]))
     }
 
-    /// Without the groups that differ from nothing by less than this part of what counts: the least of
-    /// them first, since what one explains another may explain too.
+    /// The estimate without the groups whose evidence is below this fraction of the threshold,
+    /// removed one by one from the weakest on, since one group may explain another.
     fn supported(mut self, part: f64) -> Self {
         loop {
             let present =
@@ -461,10 +472,10 @@ impl Estimate {
         }
     }
 
-    /// How much a group differs from nothing, in squared deviations.
+    /// Evidence against a group being zero, in squared standard deviations.
     ///
-    /// What a curve is beside κ₀ displaces no corner, and is in every picture whose blur is not quite that of the
-    /// model. It counts where it is more than a twentieth of the noise.
+    /// The part of a curve besides κ₀ displaces no corner, and occurs in every picture whose blur
+    /// differs a little from the model. It counts where it is more than a twentieth of the noise.
     fn evidence(&self, group: &[usize]) -> f64 {
         let places = |inside: bool| -> Vec<usize> {
             let all = 0..self.active.len();
@@ -490,7 +501,7 @@ impl Estimate {
         CHI2[0] * (of_kappa / CHI2_OF_ONE).max(of_noise)
     }
 
-    /// The most likely values where a group is nothing.
+    /// The most likely values of the other parameters if a group is zero.
     fn without(&self, group: &[usize]) -> Self {
         let kept: Vec<usize> =
             (0..self.active.len()).filter(|&i| !group.contains(&self.active[i])).collect();
@@ -543,8 +554,8 @@ struct Reduced {
 }
 
 impl Reduced {
-    /// What the common parameters, known to this covariance, move corners by: the mean of the covariances of their
-    /// positions, over corners that count.
+    /// The covariance of corner positions, xx, xy, yy, px², that follows from this covariance of
+    /// the common parameters: the mean over corners with weight.
     fn shift(&self, cov: &DMatrix<f64>, weights: &[f64]) -> [f64; 3] {
         let counting = self.own.iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
         let mut sum = DMatrix::zeros(2, 2);
@@ -559,7 +570,8 @@ impl Reduced {
 }
 
 impl<const K: usize> Problem<'_, K> {
-    /// Where a first step leads, under the noise alone, and the covariance by the scatter too.
+    /// The estimate after a first step, with the covariance of the noise alone, and the covariance
+    /// with the scatter of gradients.
     fn first_step(&self, optics: &Optics, equations: &[Option<Joint>]) -> (Estimate, DMatrix<f64>) {
         let count = self.active.len();
         let unknown = DMatrix::identity(count, count);
@@ -574,7 +586,8 @@ impl<const K: usize> Problem<'_, K> {
         (estimate, covariance(&reduced).unwrap_or(unknown))
     }
 
-    /// What these values of the parameters say, near these optics, if the active ones have this covariance.
+    /// The estimate with these values of the parameters, near these optics, given the covariance of
+    /// the active ones.
     fn estimate(&self, optics: &Optics, vector: [f64; PARAMS], cov: &DMatrix<f64>) -> Estimate {
         let active = self.active.clone();
         let inverse = cov.clone().cholesky().map(|factor| factor.inverse());
@@ -584,7 +597,7 @@ impl<const K: usize> Problem<'_, K> {
         Estimate { vector, active, information, kappa_slopes, pixels }
     }
 
-    /// What was found of the ink; `None` where it was not looked for.
+    /// The estimated ink spread; `None` where it was not estimated.
     fn ink(&self, optics: &Optics, cov: &DMatrix<f64>, used: bool) -> Option<InkEstimate> {
         let at = self.active.iter().position(|&p| p == INK)?;
         Some(InkEstimate {
@@ -752,7 +765,7 @@ impl<const K: usize> Problem<'_, K> {
             .collect()
     }
 
-    /// What the equations of all parameters say of the active ones.
+    /// The equations of the active parameters, from those of all.
     fn equations_of(&self, all: &[usize], equations: Vec<Option<Joint>>) -> Vec<Option<Joint>> {
         let places = self.active.iter().filter_map(|p| all.iter().position(|a| a == p));
         let places: Vec<usize> = places.collect();
@@ -815,7 +828,7 @@ impl<const K: usize> Problem<'_, K> {
     }
 }
 
-/// Weights of corners: the inverse of their noise, but of none more than of the middle one's.
+/// Weights of corners: the inverse of their noise, but not above that of the median corner.
 fn weights_of(equations: &[Option<Joint>]) -> Vec<f64> {
     let noises = equations.iter().flatten().map(|joint| joint.noise).collect();
     let middle = median(noises).unwrap_or(1.0);
@@ -839,7 +852,7 @@ fn cost(equations: &[Option<Joint>], weights: &[f64], optics: &Optics) -> f64 {
     prior + costs.map(of).sum::<f64>()
 }
 
-/// The larger of what the noise and what the scatter of the corners say.
+/// The larger of the covariances by the noise and by the scatter of the gradients.
 fn covariance(reduced: &Reduced) -> Option<DMatrix<f64>> {
     let inverse = reduced.matrix.clone().cholesky()?.inverse();
     let members = reduced.own.iter().flatten().count();

@@ -1,11 +1,10 @@
-//! Parts of a board that something covers the links between, joined by where the map of one says that the
-//! corners of the other are.
+//! Joining of the parts of a partly covered board, through the local map of one part.
 //!
-//! A finger over a board leaves grids that no link joins, and single corners at which no tile is
-//! seen whole. The map of a grid ([`LocalMap`]) tells where its lattice goes on behind the finger. A
-//! corner there is one of the board's when it lies at a vertex and all its edges leave it as the map
-//! says, each with its dark side on the right hand; a grid belongs to the same board when all its corners
-//! near enough do.
+//! A finger over a board leaves grids that no link joins, and single corners without a completely
+//! visible tile. The local map of a grid ([`LocalMap`]) predicts where its lattice continues behind
+//! the finger. A corner there belongs to the board when it lies at a vertex and all its edges have
+//! the predicted directions, each with its dark side on the right hand; a grid belongs to the same
+//! board when all its corners that are near enough do.
 
 use std::collections::BTreeMap;
 
@@ -23,35 +22,37 @@ use super::tiling::{kind, neighbours, step};
 use crate::lattice::{GridKind, LatticeMap, Vertex};
 use crate::raster::Pyramid;
 
-/// Vertices farther than this from all corners of a grid are not looked for, in edges of the map at the
-/// nearest: the map says next to nothing there.
+/// Greatest distance of a vertex from the corners of a grid, in edges of the map: farther away the
+/// map predicts next to nothing.
 const MAX_REACH: f64 = 4.0;
 
-/// Beyond a grid, where it comes nearer, edges are on the average at most so many times as long as its longest.
+/// Beyond a grid that approaches the camera, edges are on average at most this many times as long
+/// as its longest.
 const NEARER: f64 = 2.0;
 
-/// Largest deviations of a predicted place, in edges, in the order of trial: what is surer makes the rest
-/// surer. Within three of the largest a place is nearer to its vertex than anything else that a tile
-/// shows.
+/// Largest standard deviations of a predicted position, in edges, in the order of trial: certain
+/// corners make the rest more certain. Within three of the largest a position is nearer to its
+/// vertex than anything else in a tile.
 const SIGMAS: [f64; 3] = [0.02, 0.04, 0.08];
 
-/// A corner lies within so many deviations of its predicted place.
+/// Greatest distance of a corner from its predicted position, in standard deviations.
 const MAX_SIGMAS: f64 = 3.0;
 
-/// One of so many edges to neighbours, at least, is not covered.
+/// At least one in so many edges to neighbours must be visible.
 const MOST_COVERED: usize = 3;
 
-/// A grid of fewer corners predicts nothing: four are where it began.
+/// Least number of corners of a grid that predicts others: an initial quad has four.
 const LEAST: usize = 5;
 
-/// So many corners are compared in the time of a look.
+/// Number of corners that are compared in the time of one look into the picture, for the budget.
 const CORNERS_IN_A_LOOK: usize = 100;
 
 /// Where a saddle is in a set of grids.
 type Owners = BTreeMap<usize, (usize, Vertex)>;
 
-/// Joins grids that are parts of one board, and lets them adopt single corners. `places` are those of
-/// all saddles, `members` the indices of those in the grids. Tells which grids have grown.
+/// Joins grids that are parts of one board, and lets them adopt single corners. `places` are those
+/// of all saddle points, `members` the indices of those in the grids. Returns which grids have
+/// grown.
 pub fn join<const N: usize>(
     pyramid: &Pyramid,
     (saddles, places): (&[Saddle<N>], &Buckets),
@@ -87,8 +88,8 @@ pub fn join<const N: usize>(
     grids.into_iter().zip(has_grown).filter(|(grid, _)| !grid.is_empty()).collect()
 }
 
-/// Adds to a grid those candidates of which its map says that they belong to it, where it says so with a
-/// deviation of at most `sigma`; whether anything did.
+/// Adds to a grid the candidates that its map confirms, with a standard deviation of the prediction
+/// of at most `sigma` edges; returns whether there were any.
 fn adopt<const N: usize>(
     (pyramid, saddles): (&Pyramid, &[Saddle<N>]),
     grids: &mut [Growing<N>],
@@ -148,7 +149,7 @@ fn bend<const N: usize>(grid: &Growing<N>) -> Bend {
     Bend::of::<N>(grid.keys().copied(), at(grid), level)
 }
 
-/// Saddles that lie near a vertex without a corner, with that vertex, the nearest to the grid first.
+/// Saddle points near a vertex without a corner, with that vertex, the nearest to the grid first.
 fn candidates<const N: usize>(
     (saddles, places): (&[Saddle<N>], &Buckets),
     grid: &Growing<N>,
@@ -189,7 +190,7 @@ fn candidates<const N: usize>(
     found.into_iter().map(|(_, index, vertex)| (index, vertex)).collect()
 }
 
-/// A circle around all places that a grid says anything of.
+/// A circle (centre and radius, px) around all places that a grid predicts.
 fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<(DVec2, f64)> {
     let places: Vec<DVec2> = grid.values().map(|grown| grown.saddle.position).collect();
     let edges_px = grid.iter().flat_map(|(&v, grown)| {
@@ -203,7 +204,7 @@ fn surroundings<const N: usize>(grid: &Growing<N>) -> Option<(DVec2, f64)> {
     Some((lower.midpoint(upper), reach_px))
 }
 
-/// The saddle as a corner of a grid, if it lies at a vertex and looks as the map of the grid says.
+/// The saddle point as a corner of a grid, if it lies at a vertex and has the predicted edges.
 fn belongs<const N: usize>(
     grid: &Growing<N>,
     vertex: Vertex,
@@ -234,8 +235,8 @@ fn belongs<const N: usize>(
     (off(turn) <= MAX_CHORD_RAD).then_some(GrownSaddle { saddle: *saddle, turn })
 }
 
-/// Whether nothing but covers lies between a corner and its neighbours in a grid: some of the edges are clean,
-/// if there are neighbours. Between dots that do not meet none is.
+/// Whether a corner is connected to its neighbours in a grid: some of the edges between them are
+/// visible, if there are neighbours. Between separate dots none is.
 fn is_joined<const N: usize>(
     pyramid: &Pyramid,
     grid: &Growing<N>,
@@ -265,8 +266,8 @@ fn contrast_near<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<f6
     Some(nearest.1.saddle.sectors.amplitude)
 }
 
-/// Whether a part, moved by a lattice map, goes on where a grid ends: no vertex is in both, and each of its
-/// corners is where the grid says, as far as that says anything.
+/// Whether a part, moved by a lattice map, continues a grid: no vertex is in both, and each of its
+/// corners is where the grid predicts it, as far as it does.
 fn is_part<const N: usize>(
     grid: &Growing<N>,
     part: &Growing<N>,

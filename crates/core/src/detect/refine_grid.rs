@@ -1,10 +1,12 @@
-//! All corners of a grid refined, each by all pixels that show nothing but it.
+//! Subpixel refinement of all corners of a grid, each from all pixels that show only this corner.
 //!
-//! How far the next edges reach into a window is known once the blur is: a few corners tell it, on
-//! coarser levels of the pyramid where the finest shows too little of it. How a lens bends the edges
-//! is known once the corners are: then they are fitted again. What covers a part of the board may still lie beside a corner; then the model leaves more than
-//! elsewhere in the grid, and smaller windows are tried. A corner at the end of what is seen of the
-//! board that no window shows cleanly is dropped, since what hides the board has drawn it aside.
+//! The blur determines how far neighbouring edges reach into a window; it is estimated from a few
+//! corners, on coarser levels of the pyramid where the finest shows too little of it. The curvature
+//! of edges by lens distortion follows from the corners, which are then fitted again. Something
+//! that covers a part of the board may still lie beside a corner; then the residual of the model is
+//! larger than elsewhere in the grid, and smaller windows are tried. A corner at the end of the
+//! visible part of the board is dropped when no window shows it cleanly, since its position is
+//! biased by the cover.
 
 use std::collections::BTreeMap;
 
@@ -20,43 +22,46 @@ use crate::lattice::Vertex;
 use crate::raster::{Gray, ImageView, Pyramid};
 use crate::statistics::median;
 
-/// Corners that tell the blur: those with the most room of a few times as many, from all over the grid.
+/// Number of corners from which the blur is estimated, those with the most room of [`LOOKED_AT`]
+/// times as many, from all over the grid.
 const BLUR_CORNERS: usize = 15;
 const LOOKED_AT: usize = 4;
 
-/// Blur that is assumed before it is known, px: that of a good photograph.
+/// Blur that is assumed before it is estimated, px: that of a good photograph.
 const USUAL_BLUR_PX: f64 = 1.0;
 
-/// Larger blurs than this part of the radius of the largest window are looked for again on a coarser
-/// level: the window shows little but the middle of the edges.
+/// Largest blur as a fraction of the radius of the largest window; a larger one is estimated again
+/// on a coarser level, because the window shows little but the middle of the edges.
 const MAX_BLUR: f64 = 0.5;
 
-/// Residuals of the model above this many times the median of the grid show something else than the
-/// corner; noise of a 7×7 window varies by a tenth.
+/// Residuals above this many times the median of the grid show something else than the corner; the
+/// noise of a 7×7 window varies by a tenth.
 const MAX_RESIDUAL_RATIO: f64 = 3.0;
 
-/// Residuals below this part of the amplitude are no reason to doubt a corner: of a clean image the
-/// median says nothing.
+/// Residuals below this fraction of the amplitude are no reason to doubt a corner: in a clean image
+/// the median is close to zero.
 const MIN_RESIDUAL: f64 = 0.05;
 
 /// Residuals above this many times the median show something beside noise, whose scatter in a window is a tenth.
 const UNUSUAL: f64 = 1.3;
 
-/// Correlations of neighbours above this are one shape all over the window.
+/// Greatest correlation of neighbouring residuals that is distinguished: from there on they are one
+/// shape all over the window.
 const MOST_CORRELATED: f64 = 0.9;
 
 /// Blur of which a picture loses nothing when it is sampled once a pixel, px: its spectrum falls to a
 /// ten-thousandth at the highest frequency.
 const SHARP_PX: f64 = 1.4;
 
-/// Corners that are worth a thread.
+/// Least number of corners for a task on a thread of its own.
 const PART: usize = 128;
 
-/// What is more blurred than its neighbours by more than this is not a corner but the rim of what covers it: at
-/// the rims of fisheye pictures blur doubles from one corner to the next.
+/// A corner whose blur exceeds that of its neighbours by more than this factor is the rim of a
+/// cover: at the rims of fisheye pictures blur doubles from one corner to the next.
 const MAX_BLUR_RATIO: f64 = 3.0;
 
-/// A position less certain than this, px, with what the shape of the residuals adds, is none: the grid tells as much.
+/// Positions with a larger standard deviation than this, px, including the shape of the residuals,
+/// are dropped: the grid predicts as well.
 const WORST_SIGMA_PX: f64 = 3.0;
 
 /// A window is followed by one that is smaller by this factor.
@@ -74,7 +79,8 @@ impl Refiner {
         grids.iter().map(|grid| self.blur_of_grid(fitter, images, grid, tags)).collect()
     }
 
-    /// What the grids of a picture, with these blurs, have in common, as a level of its pyramid shows them.
+    /// The optics that the grids of a picture share, given their blurs, as one level of the pyramid
+    /// shows them.
     pub(super) fn optics(
         &self,
         fitter: &mut CornerFitter,
@@ -126,7 +132,8 @@ impl Refiner {
         self.joint_optics(fitter, image, samples, &known)
     }
 
-    /// Refines the corners of a grid in place, under its blur in px, and drops those that are spoilt.
+    /// Refines the corners of a grid in place, given its blur in px, and drops corners that are
+    /// spoilt.
     pub(super) fn refine_grid(
         &self,
         fitter: &mut CornerFitter,
@@ -175,8 +182,8 @@ impl Refiner {
         self.follow_bends(image, grid, &fits, limit, (tags, known_px, optics));
     }
 
-    /// Fits the corners again, now that their places tell how the edges are bent; what leaves more
-    /// than `limit` does not count.
+    /// Fits the corners again with the curvature of the edges, which follows from their positions;
+    /// fits with a residual above `limit` do not count.
     fn follow_bends(
         &self,
         image: ImageView,
@@ -215,12 +222,12 @@ impl Refiner {
         grid.corners = grid.corners.iter().zip(&fits).filter_map(settled).collect();
     }
 
-    /// Whether the model can be fitted to what is clear around a corner.
+    /// Whether the clear area around a corner suffices for the model.
     fn has_room(&self, image: ImageView, corner: &GridCorner, room: Room) -> bool {
         self.window(image, corner.position(), room).count() >= MIN_PIXELS
     }
 
-    /// All corners of a grid, each by itself.
+    /// Refines all corners of a grid, each by itself.
     fn refine_each(
         &self,
         image: ImageView,
@@ -234,9 +241,9 @@ impl Refiner {
         })
     }
 
-    /// Moves corners that the model does not find, as it finds most others, to where their neighbours'
-    /// lines cross, if that is farther than the model looks: a cell of a tag was taken for them.
-    /// Tells which were moved.
+    /// Moves corners at which the model fails, although it fits most others, to the crossing of the
+    /// lines of their neighbours, if that is outside the range of the model: a cell of a tag was
+    /// taken for them. Returns which corners were moved.
     fn put_back(&self, grid: &mut Grid, refined: &[(Refined, Option<ModelFit>)]) -> Vec<bool> {
         let judged = is_judge(refined);
         let place = |(corner, (_, fit)): (&GridCorner, &(_, Option<ModelFit>))| {
@@ -251,12 +258,12 @@ impl Refiner {
         places.iter().map(Option::is_some).collect()
     }
 
-    /// All that is clear around a corner, in the largest window.
+    /// All of the clear area around a corner, in the largest window.
     fn whole<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
         Room { around, blur_px, reach_px: self.largest_radius(), optics }
     }
 
-    /// What is near a corner, where the edges are told from: enough to begin with.
+    /// The immediate surroundings of a corner, from which the edges are initialised.
     fn near<'a>(&self, around: &'a Surroundings, blur_px: f64, optics: &'a Optics) -> Room<'a> {
         let reach_px = REACH_PX.max(REACH_SIGMAS * blur_px).round().min(self.largest_radius());
         Room { reach_px, ..self.whole(around, blur_px, optics) }
@@ -270,7 +277,7 @@ impl Refiner {
         grid: &Grid,
         tags: &TagAreas,
     ) -> Option<f64> {
-        // Of a grid without tags nothing says that its tiles are not plain.
+        // In a grid without tags nothing indicates that its tiles are not plain.
         let plain = TagAreas::default();
         let shown = if grid.tags.is_empty() { &plain } else { tags };
         let most_px = MAX_BLUR * self.largest_radius();
@@ -335,15 +342,16 @@ impl Refiner {
     }
 }
 
-/// What `work` makes of each of so many corners, in their order, in the threads of the pool at hand.
+/// The results of `work` for corners 0 to `count` − 1, in order, on the threads of the current
+/// pool.
 fn each<F: Send>(count: usize, work: impl Fn(&mut CornerFitter, usize) -> F + Sync) -> Vec<F> {
     let parts = (0..count).into_par_iter().with_min_len(PART);
     parts.map_init(CornerFitter::default, |fitter, i| work(fitter, i)).collect()
 }
 
-/// The level of the pyramid, of so many, on which a picture is refined: the coarsest on which its sharpest
-/// grid is no sharper than [`SHARP_PX`]. An enlarged picture shows on the finest level little but the
-/// middle of the edges, and the grain of all pixels around is the same.
+/// The level of the pyramid, of `levels`, on which a picture is refined: the coarsest on which its
+/// sharpest grid is no sharper than [`SHARP_PX`]. On the finest level an enlarged picture shows
+/// little but the middle of the edges, and noise is correlated over all pixels of the window.
 pub(super) fn sharp_level(blurs: &[Option<f64>], levels: usize) -> usize {
     let is_sampled_on = |&level: &usize| is_sampled(blurs, 1.0 / f64::from(1u32 << level));
     (1..levels).rfind(is_sampled_on).unwrap_or(0)
@@ -355,10 +363,10 @@ pub(super) fn is_sampled(blurs: &[Option<f64>], part: f64) -> bool {
     sharpest.is_some_and(|blur_px| part * blur_px >= SHARP_PX)
 }
 
-/// How much more a corner's covariance is than that of noise like elsewhere in the grid: what is left beyond that is
-/// something that the picture shows, as glare or the rim of a cover, and pixels beside each other say the same of it.
-/// Residuals whose neighbours have the correlation r, in rows and in columns, count as ((1 + r)/(1 − r))²
-/// times their variance.
+/// Factor of the covariance of a corner for systematic residuals: those beyond the usual noise of
+/// the grid show something in the picture, such as glare or the rim of a cover, and neighbouring
+/// pixels then are not independent. Residuals with the correlation r between neighbours, in rows
+/// and in columns, count as ((1 + r)/(1 − r))² times their variance.
 fn shape_of_residuals(fit: &ModelFit, usual_noise: f64) -> f64 {
     let share = 1.0 - (UNUSUAL * usual_noise / fit.noise()).powi(2);
     let correlation = (1.0 - fit.whiteness).clamp(0.0, MOST_CORRELATED);
@@ -366,8 +374,8 @@ fn shape_of_residuals(fit: &ModelFit, usual_noise: f64) -> f64 {
     1.0 + share.max(0.0) * (together - 1.0)
 }
 
-/// Whether the model finds most corners of a grid. Of edges as sharp as pixels it makes nothing; then it
-/// is no judge of corners.
+/// Whether the model fits most corners of a grid. It cannot fit edges as sharp as pixels, and must
+/// not judge corners then.
 fn is_judge(refined: &[(Refined, Option<ModelFit>)]) -> bool {
     let fitted = refined.iter().filter(|(_, fit)| fit.is_some()).count();
     2 * fitted > refined.len()

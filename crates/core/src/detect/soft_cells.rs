@@ -1,20 +1,23 @@
-//! What the pixels of a tile say about the cells of a tag in it, all cells from all samples at once.
+//! Soft decisions on the cells of a tag from the pixels of its tile: the log-odds of all cells from
+//! all samples at once, by linear Bayesian estimation under a known point spread function.
 //!
-//! On a scale of border 0 and white 1 a sample p sees the cells c by the share W of each in its blurred
-//! surroundings, and of the white beyond the border. With s = ±1 for cells of white and black,
+//! With the border at 0 and white at 1, a sample at p is the sum of the cells c weighted by their
+//! share W in its blurred neighbourhood, and of the white beyond the border. With s = ±1 for white
+//! and black cells,
 //!
 //! ```text
 //!     x(p) = ½ Σ W(p,c) (1 + s(c)) + white(p) + error of the levels + noise
 //!     m    = K (x − ½ Σ W − white),     K = (WᵀW/σ² + 1)⁻¹ Wᵀ/σ²
 //! ```
 //!
-//! is the expectation of s, v its variance, and m/v half the logarithm of the odds that the cell is white. Errors
-//! of the levels, a plane, are unknown like the cells and solved for with them.
+//! is the posterior mean of s, v its variance, and m/v half the log-odds that the cell is white.
+//! Errors of the grey levels, linear over the tile, are further unknowns that are solved for
+//! together with the cells.
 //!
-//! The shares depend on the blur in the tile's own coordinates alone, so neighbouring tiles have them in common:
-//! K is made once, and a tile costs a multiplication.
+//! The shares depend only on the blur in tile coordinates, which neighbouring tiles have in common:
+//! K is computed once, and each tile then costs one multiplication.
 //!
-//! Limits: cells are taken as independent, though their errors are not where the blur is wide.
+//! Limits: cells are treated as independent, although their errors are not where the blur is wide.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -28,34 +31,37 @@ use crate::lattice::{GridKind, TagCells};
 /// A triangle is divided into 3² parts, of which a square has two.
 const DIVISIONS: usize = 3;
 
-/// Deviation of the blur that is added, bit-widths: about that of a part of a cell, which stands for the part.
+/// Standard deviation of the blur that is added, in bit-widths: about the size of a part of a cell,
+/// which is represented by its middle.
 const PART_BLUR_BITS: f64 = 0.14;
 
-/// Steps in which blurs are told apart: by a seventh of their deviation, and by a fifth of their correlation.
+/// Steps by which blurs are distinguished: a seventh of their standard deviation, and a fifth in
+/// correlation.
 const LOG_VARIANCE_STEP: f64 = 0.3;
 const CORRELATION_STEP: f64 = 0.2;
 
-/// Deviation of a sample by what the model leaves out, over the contrast: places, the shape of the blur, dirt.
+/// Standard deviation of a sample by model errors, over the contrast: positions, the shape of the
+/// blur, dirt.
 const MODEL_ERROR: f64 = 0.05;
 
-/// Pixels whose noise a sample between them is the mean of: 1 / (2/3)².
+/// Number of pixels over which a sample between them averages the noise: 1 / (2/3)².
 const SAMPLE_PX2: f64 = 2.25;
 
-/// How much more the variance of noise counts than that of a sample alone: black, white and the width of the blur are
-/// measured through the same noise.
+/// Factor of the noise variance of a sample: black, white and the width of the blur are measured
+/// with the same noise.
 const NOISE_WEIGHT: f64 = 1.5;
 
-/// Deviation of the levels, over the contrast, and of their slopes over a tile.
+/// Standard deviation of the grey levels, over the contrast, and of their slopes over a tile.
 const LEVEL_ERROR: f64 = 0.15;
 const SLOPE_ERROR: f64 = 0.2;
 
-/// Half the logarithm of the odds at which a cell is as sure as print is: one in two hundred is dirty.
+/// Greatest half log-odds of a cell: one in two hundred is dirty on the print.
 const MOST_HALF_ODDS: f64 = 2.6;
 
-/// Rounds in which samples that tell nothing, or only that they are white, take what the others say.
+/// Rounds in which saturated or missing samples are replaced by the expectation from the others.
 const ROUNDS: usize = 6;
 
-/// Where the cells are sampled, and how the blur mixes them.
+/// The positions at which cells are sampled, and the geometry by which blur mixes them.
 #[derive(Clone, Debug)]
 pub struct CellModel {
     kind: GridKind,
@@ -64,24 +70,24 @@ pub struct CellModel {
     width: f64,
     /// Distance from the tile's edges to the border of the tag.
     margin_bits: f64,
-    /// Samples, in tile coordinates.
+    /// Positions of samples, in tile coordinates.
     points: Vec<DVec2>,
     /// Parts of the cells: the bit, and their middle in tile coordinates.
     parts: Vec<(usize, DVec2)>,
 }
 
-/// The blur in a tile's coordinates, and the noise.
+/// The blur in tile coordinates, and the noise.
 #[derive(Clone, Copy, Debug)]
 pub struct TileBlur {
     /// Covariance uu, uv, vv, bit-widths².
     pub covariance: [f64; 3],
     /// Area of a bit-width squared of tile coordinates, px².
     pub area_px2: f64,
-    /// Deviation of a sample, over the contrast.
+    /// Standard deviation of a sample, over the contrast.
     pub noise: f64,
 }
 
-/// K and what belongs to it.
+/// The estimator K with the terms that belong to it.
 #[derive(Debug)]
 pub struct Mixing {
     bits: usize,
@@ -97,23 +103,23 @@ pub struct Mixing {
     spread: Vec<f32>,
 }
 
-/// Mixings that were made already.
+/// Cache of mixings, by quantised blur.
 pub type Mixings = BTreeMap<[i32; 3], Rc<Mixing>>;
 
 /// A sample of a tile on the scale of black 0 and white 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sample {
-    /// It is so.
+    /// The measured value.
     Share(f32),
-    /// At least so.
+    /// A lower bound: the sample is saturated.
     AtLeast(f32),
-    /// Nothing is known.
+    /// No information.
     Erased,
 }
 
 impl CellModel {
-    /// Of tags whose cells begin `inset_bits` from the edges of their tiles, and whose border begins `margin_bits`
-    /// from them.
+    /// A model for tags whose cells begin `inset_bits`, and whose border begins `margin_bits`, from
+    /// the edges of their tiles, in bit-widths.
     pub fn new(cells: &TagCells, inset_bits: f64, margin_bits: f64) -> Self {
         let bits = cells.dimension().bits();
         let points = (0..bits).flat_map(|bit| {
@@ -136,7 +142,7 @@ impl CellModel {
         }
     }
 
-    /// Where a tile is sampled, in its coordinates.
+    /// The positions at which a tile is sampled, in tile coordinates.
     pub fn points(&self) -> &[DVec2] {
         &self.points
     }
@@ -146,7 +152,8 @@ impl CellModel {
         self.width
     }
 
-    /// The mixing under a blur, or one as good as the same.
+    /// The mixing for a blur, from the cache `known` where one for nearly the same blur exists;
+    /// `None` where the equations cannot be solved.
     pub fn mixing(&self, blur: TileBlur, known: &mut Mixings) -> Option<Rc<Mixing>> {
         let [uu, uv, vv] = blur.covariance;
         // Isotropic on the print.
@@ -232,7 +239,7 @@ impl CellModel {
         }
     }
 
-    /// How much of the white around the border a point sees.
+    /// The share of the white around the border in a sample.
     fn white_beyond(&self, point: DVec2, [uu, uv, vv]: [f64; 3]) -> f64 {
         let beyond = |inside_bits: f64, variance: f64| {
             0.5 - 0.5 * f64::from(erf_sqrt_half((inside_bits / variance.sqrt()) as f32))
@@ -248,7 +255,8 @@ impl CellModel {
 }
 
 impl Mixing {
-    /// Half the logarithm of the odds that each cell is white.
+    /// Half the log-odds that each cell is white, by bit; `samples` are at the positions of
+    /// [`CellModel::points`].
     pub fn half_odds(&self, samples: &[Sample]) -> Vec<f32> {
         let whole = samples.iter().all(|sample| matches!(sample, Sample::Share(_)));
         let mut off_middle: Vec<f32> = samples
@@ -300,7 +308,7 @@ impl Mixing {
     }
 }
 
-/// Mean of what is normally distributed with this mean and deviation, where it is at least `least`.
+/// Mean of a normal distribution with this mean and standard deviation, truncated below at `least`.
 fn mean_above(least: f32, mean: f32, deviation: f32) -> f32 {
     let deviation = deviation.max(1e-3);
     let at = (least - mean) / deviation;
@@ -333,7 +341,8 @@ fn parts_of(cell: &[DVec2]) -> Vec<DVec2> {
     middles.collect()
 }
 
-/// A covariance in px² as that of a tile's coordinates, whose steps along u and v are these vectors, px.
+/// Converts a covariance xx, xy, yy, px², to tile coordinates whose unit steps along u and v are
+/// the vectors `a` and `b`, px; also returns the area of a unit square, px².
 pub fn in_tile([xx, xy, yy]: [f64; 3], [a, b]: [DVec2; 2]) -> Option<([f64; 3], f64)> {
     let jacobian = Matrix2::new(a.x, b.x, a.y, b.y);
     let determinant = jacobian.determinant().abs();
@@ -380,7 +389,8 @@ mod tests {
         bit.map_or(0.0, |bit| f32::from(u8::from(word >> bit & 1 == 1)))
     }
 
-    /// The samples of a tag under a blur that is the same in all directions on the print, drawn at random, and the blur.
+    /// Random samples of a tag under a blur that is the same in all directions on the print, and
+    /// that blur.
     fn seen(
         model: &CellModel,
         cells: &TagCells,
@@ -414,8 +424,8 @@ mod tests {
         TileBlur { covariance, area_px2: 16.0, noise: 0.05 }
     }
 
-    /// What is drawn and blurred without this model is read by it: all cells under a weak blur, and under a strong one no
-    /// more are wrong than the odds say.
+    /// The model reads tags that are drawn and blurred without it: all cells under a weak blur, and
+    /// under a strong one no more are wrong than the odds say.
     #[test]
     fn cells_are_as_often_wrong_as_their_odds_say() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);

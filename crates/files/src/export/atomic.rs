@@ -1,40 +1,40 @@
-//! Files that appear whole or not at all.
+//! Atomic writing: files appear completely or not at all.
 //!
-//! A file is written under another name, brought to the disk, and renamed. What is being written is
-//! locked by its writer, so that what a killed one leaves can be told from it and goes when the next
-//! one comes, see [`settle`](super::staging::settle).
+//! A file is written under a temporary name in the same folder, flushed to the disk, and renamed.
+//! Its writer holds a lock on it, so that what a killed process leaves behind can be recognised and
+//! is removed by the next one; see [`settle`](super::staging::settle).
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What the names of files that are being written begin with, and how many characters follow.
+/// Prefix of temporary names, and the number of random characters that follow.
 const PREFIX: &str = ".deltille-writing-";
 const RANDOM: usize = 6;
 
-/// What this process is writing at the moment.
+/// Temporary files and folders of this process.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Held while a set of files is moved to its places.
+/// Held while a set of files is moved to its final place.
 static MOVING: Mutex<()> = Mutex::new(());
 
-/// A file that could not be written.
+/// Why a file could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}", path = path.display())]
 pub struct WriteError {
     /// The file asked for.
     pub path: PathBuf,
-    /// What the system says.
+    /// The error of the system.
     pub source: io::Error,
 }
 
-/// Writes a file through `fill`: to a temporary name in the same folder, renamed to `path` once
-/// everything is on the disk. On an error nothing is left behind, and an earlier file stays as it was.
-/// Where `path` is a symbolic link, what it points to is written; a device or a pipe is refused.
+/// Writes a file through `fill`: to a temporary name in the same folder, renamed to `path` once all
+/// content is on the disk. After an error nothing is left behind, and an earlier file is unchanged.
+/// A symbolic link is followed; a device or a pipe is refused.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// When `fill` fails, or the file cannot be written.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -83,12 +83,12 @@ fn fill_and_rename(
     Ok(())
 }
 
-/// Something that is being written, and goes when the process is left.
+/// A temporary file or folder, registered while it is written so that [`abandon`] can remove it.
 pub(super) struct Unfinished(PathBuf);
 
 impl Unfinished {
-    /// Makes something that is there while it is written. Another process that tidies up may take it
-    /// for left over in the moment before it is locked; then it is made again.
+    /// Creates and registers a temporary file or folder. Another process that cleans up may remove
+    /// it before it is locked; then it is created again.
     pub(super) fn begin<T>(
         mut make: impl FnMut() -> io::Result<(T, PathBuf)>,
     ) -> io::Result<(T, Self)> {
@@ -109,7 +109,7 @@ impl Drop for Unfinished {
     }
 }
 
-/// What is being written; while this is held, nothing is begun.
+/// The registered temporary files and folders; while this is held, none is created.
 fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -119,8 +119,9 @@ pub(super) fn moving() -> MutexGuard<'static, ()> {
     MOVING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes what this process is writing, and lets nothing else be begun while the result lives: for
-/// a program that is about to end. A set of files that is just being moved to its places gets there.
+/// Removes the temporary files and folders of this process, and prevents new ones while the result
+/// lives: for a program that is about to end. A set of files that is being moved to its final place
+/// is completed first.
 #[must_use]
 pub fn abandon() -> impl Sized {
     let (moving, unfinished) = (moving(), unfinished());
@@ -130,7 +131,7 @@ pub fn abandon() -> impl Sized {
     (moving, unfinished)
 }
 
-/// Removes a file or folder. Where that fails, the next run does it.
+/// Removes a file or folder; where that fails, the next run will.
 pub(super) fn remove(path: &Path) {
     let _ = match path.is_dir() {
         true => std::fs::remove_dir_all(path),
@@ -138,39 +139,40 @@ pub(super) fn remove(path: &Path) {
     };
 }
 
-/// A temporary folder with a name of its own, locked.
+/// Creates a locked temporary folder.
 pub(super) fn temporary_folder(folder: &Path) -> io::Result<(tempfile::TempDir, Option<File>)> {
     let made = tempfile::Builder::new().prefix(PREFIX).rand_bytes(RANDOM).tempdir_in(folder)?;
     let lock = lock(made.path());
     Ok((made, lock))
 }
 
-/// Whether a name is one of those that files have while they are written.
+/// Whether a name is that of a temporary file or folder.
 pub(super) fn is_temporary(name: &str) -> bool {
     let random = name.strip_prefix(PREFIX);
     random.is_some_and(|r| r.len() == RANDOM && r.bytes().all(|b| b.is_ascii_alphanumeric()))
 }
 
-/// Waits for the lock of a file or folder, held until the result is dropped; `None` where the system
-/// has none for it.
+/// Waits for the lock of a file or folder, held until the result is dropped; `None` where the
+/// system does not support it.
 pub(super) fn lock(path: &Path) -> Option<File> {
     File::open(path).ok().filter(|file| file.lock().is_ok())
 }
 
-/// The lock of a file or folder that no living process holds.
+/// Takes the lock of a file or folder unless a living process holds it.
 pub(super) fn lock_of_left(path: &Path) -> Option<File> {
     File::open(path).ok().filter(|file| file.try_lock().is_ok())
 }
 
-/// Brings the names in a folder to the disk; where a system cannot, it does so in its own time.
+/// Flushes the directory entries of a folder to the disk, where the system supports it.
 pub(super) fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
-/// The file that a path stands for, which a renamed one may take the place of.
+/// The path of the file that a write to `path` replaces: the destination of symbolic links, else
+/// `path`.
 ///
 /// # Errors
-/// Where a link leads nowhere, or the path cannot be looked at.
+/// When a symbolic link has no destination, or the path is a device or a pipe.
 pub fn place(path: &Path) -> io::Result<PathBuf> {
     match path.symlink_metadata() {
         Err(_) => Ok(path.to_owned()),

@@ -1,5 +1,5 @@
-//! Calibrations as JSON, schema `deltille/calibration/1`: the camera with standard deviations and
-//! correlations, and every view with its pose, and where that was asked for its residuals.
+//! Calibrations of a single camera as JSON, schema `deltille/calibration/1`: the camera with
+//! standard deviations and correlations, every view with its pose and, on request, its residuals.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -21,37 +21,37 @@ use deltille_core::quantity;
 pub struct Sheet {
     /// Print scale, measured over stated length, across and up the sheet; `None` where it was not measured.
     pub print_scale: Option<[f64; 2]>,
-    /// How the sheet differs from its plan after that scale; `None` where no shape was estimated.
+    /// Deviation of the sheet from its plan after that scale; `None` where no shape was estimated.
     pub shape: Option<Shape>,
 }
 
-/// What is known of the print that was photographed, beside its plan.
+/// What is known of the print that was photographed, besides its plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Print {
     /// Print scale, measured over stated length, across and up the sheet; `None` where it was not measured.
     pub scale: Option<[f64; 2]>,
-    /// The spread of ink, from the detections; `None` where it was not estimated.
+    /// Ink spread estimated from the detections; `None` where it was not estimated.
     pub ink: Option<InkEstimate>,
 }
 
-/// Whether a file lists every corner with its residual, which makes nearly all of its length.
+/// Whether a file lists the residual of every corner, which makes up nearly all of its length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Residuals {
-    /// Views have how many corners there were, and the root mean square of their errors.
+    /// Views state their number of corners and the RMS residual only.
     #[default]
     LeftOut,
-    /// Views have all corners.
+    /// Views list all corners.
     Listed,
 }
 
-/// Why a file tells of no sheet.
+/// Why no sheet can be read from a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SheetError {
-    /// Not the file of a calibration.
+    /// The file is not a calibration.
     #[error("not what `calibration::write` or `rig::write` made")]
     Foreign,
-    /// A field is missing, or holds what it must not.
+    /// A field is missing, or has an invalid value.
     #[error(
         "field `{field}`: {problem}; make it anew by a calibration with `Calibration::board_shape`"
     )]
@@ -61,7 +61,7 @@ pub enum SheetError {
         /// What is wrong.
         problem: String,
     },
-    /// A calibration without shape.
+    /// The calibration did not estimate a shape.
     #[error("no `board_shape` in it: make it by a calibration with `Calibration::board_shape`")]
     Flat,
 }
@@ -73,7 +73,7 @@ struct SheetOfFile {
     board_shape: Option<StoredShape>,
 }
 
-/// A shape as files of both kinds have it.
+/// A shape as calibration and rig files store it.
 #[derive(Deserialize)]
 pub(super) struct StoredShape {
     #[serde(deserialize_with = "quantity::place_mm::de")]
@@ -91,10 +91,10 @@ impl StoredShape {
     }
 }
 
-/// Reads the sheet of a calibration that found its shape.
+/// Reads the sheet from a calibration or rig file that has a shape.
 ///
 /// # Errors
-/// Where it is no calibration, a field is wrong, or it found no shape.
+/// When the file is not a calibration, a field is not valid, or no shape was estimated.
 pub fn read_sheet(text: &str) -> Result<Sheet, SheetError> {
     let schema = json::schema(text.as_bytes()).ok().flatten();
     if !schema.is_some_and(|schema| [SCHEMA, super::rig::SCHEMA].contains(&schema.as_str())) {
@@ -157,7 +157,8 @@ struct HeldOut<'a> {
     excluded: &'a [Excluded],
 }
 
-/// The text of the file of a single camera; `None` where there is none.
+/// The JSON text of the calibration of a single camera, with the diagnoses that were made; `None`
+/// for an estimate without cameras.
 pub fn write(
     found: &Estimate,
     said: &[Diagnosis],

@@ -1,7 +1,9 @@
-//! Cameras in the files of other programs.
+//! Cameras in the file formats of other programs: OpenCV, ROS, Kalibr, mrcal, COLMAP and
+//! nerfstudio.
 //!
-//! Pixel centres at integers become what the program has: COLMAP and nerfstudio put the centre of the
-//! first pixel at (½, ½).
+//! Image coordinates are converted to the convention of each program: COLMAP and nerfstudio put the
+//! centre of the first pixel at (½, ½), not at (0, 0). A lens model that the format lacks is
+//! refused, not approximated.
 
 use std::fmt::Write as _;
 
@@ -12,25 +14,25 @@ use super::GENERATOR;
 use deltille_core::camera::{Camera, Lens, Pose, SplineGrid};
 use deltille_core::name;
 
-/// A format that cannot say what a camera is.
+/// A format that has no model for a lens.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{format} cannot carry {lens}; its models: {models}")]
 pub struct FormatError {
     /// The format.
     format: &'static str,
-    /// What the camera has.
+    /// The lens of the camera.
     lens: String,
-    /// What the format has.
+    /// The models of the format.
     models: &'static str,
 }
 
-/// The lenses that other programs share, with their coefficients.
+/// The lens models that other programs share, with their coefficients.
 enum Shared<'a> {
-    /// k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, of which so many are needed.
+    /// Coefficients k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, and how many of them are needed.
     Perspective(&'a [f64], usize),
-    /// k1 k2 k3 k4.
+    /// Coefficients k1 k2 k3 k4 (Kannala–Brandt).
     Equidistant(&'a [f64]),
-    /// Another.
+    /// Any other model.
     Other,
 }
 
@@ -45,7 +47,7 @@ impl<'a> Shared<'a> {
     }
 }
 
-/// Says what a camera has that a format has not.
+/// The error that names the lens of the camera and the models of the format.
 fn refuse<T>(
     camera: &Camera,
     format: &'static str,
@@ -67,7 +69,7 @@ fn refuse<T>(
     Err(FormatError { format, lens: format!("{lens} with {}", names[..used].join(" ")), models })
 }
 
-/// OpenCV's FileStorage YAML.
+/// The camera as YAML for OpenCV `FileStorage`; focal lengths and principal point in px.
 ///
 /// ```
 /// use deltille_core::camera::Camera;
@@ -80,7 +82,7 @@ fn refuse<T>(
 /// ```
 ///
 /// # Errors
-/// Where OpenCV has no such model.
+/// When OpenCV has no such lens model.
 pub fn opencv(camera: &Camera) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
     let (model, coefficients) = match Shared::of(camera, &parameters) {
@@ -115,10 +117,10 @@ fn opencv_matrix(rows: usize, cols: usize, data: &[f64]) -> String {
     )
 }
 
-/// The camera file of ROS.
+/// The camera file of ROS (`camera_info` as YAML), with the camera name.
 ///
 /// # Errors
-/// Where ROS has no such model.
+/// When ROS has no such lens model.
 pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
     let (model, coefficients) = match Shared::of(camera, &parameters) {
@@ -146,11 +148,12 @@ pub fn ros(camera: &Camera, name: &str) -> Result<String, FormatError> {
     ))
 }
 
-/// Kalibr's camera chain: cameras, each with its camera_from_rig; `overlaps` has for each those that see what it sees, and
-/// may end before. Topics are `/cam0/image_raw` and so on.
+/// The camera chain of Kalibr: cameras, each with its camera_from_rig (mm, written in metres).
+/// `overlaps` lists for each camera the indices of those whose view overlaps its own, and may be
+/// shorter. Topics are `/cam0/image_raw` and so on.
 ///
 /// # Errors
-/// Where Kalibr has no such model.
+/// When Kalibr has no such lens model.
 pub fn kalibr(cameras: &[(&Camera, Pose)], overlaps: &[Vec<usize>]) -> Result<String, FormatError> {
     let mut text = format!("# {GENERATOR}\n");
     for (n, (camera, camera_from_rig)) in cameras.iter().enumerate() {
@@ -197,10 +200,11 @@ fn kalibr_camera(camera: &Camera) -> Result<String, FormatError> {
     ))
 }
 
-/// mrcal's camera model, in the place of the reference; the only format here that carries splines.
+/// The camera model of mrcal, at the origin of the reference frame; the only format here that
+/// stores spline lenses.
 ///
 /// # Errors
-/// Where mrcal has no such model.
+/// When mrcal has no such lens model.
 pub fn mrcal(camera: &Camera) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
     let (model, coefficients) = match (&camera.lens, Shared::of(camera, &parameters)) {
@@ -226,10 +230,10 @@ pub fn mrcal(camera: &Camera) -> Result<String, FormatError> {
     ))
 }
 
-/// COLMAP's cameras.txt, of cameras numbered from 1.
+/// The `cameras.txt` of COLMAP, with cameras numbered from 1.
 ///
 /// # Errors
-/// Where COLMAP has no such model.
+/// When COLMAP has no such lens model.
 pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
     let mut text = format!("# {GENERATOR}\n# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n");
     for (n, camera) in (1..).zip(cameras) {
@@ -243,11 +247,11 @@ pub fn colmap(cameras: &[&Camera]) -> Result<String, FormatError> {
     Ok(text)
 }
 
-/// COLMAP's rig_config.json: cameras by name, each with its camera_from_rig; pictures lie in a folder
-/// of the camera's name. The first camera is the rig.
+/// The `rig_config.json` of COLMAP: cameras by name, each with its camera_from_rig; images lie in a
+/// folder of the name of their camera. The first camera is the reference sensor of the rig.
 ///
 /// # Errors
-/// Where COLMAP has no such model.
+/// When COLMAP has no such lens model.
 pub fn colmap_rig(cameras: &[(&str, &Camera, Pose)]) -> Result<String, FormatError> {
     let mut entries = Vec::with_capacity(cameras.len());
     for (n, (name, camera, camera_from_rig)) in cameras.iter().enumerate() {
@@ -282,11 +286,12 @@ fn colmap_camera(camera: &Camera) -> Result<(&'static str, Vec<f64>), FormatErro
     Ok((model, [&focal, &centre, coefficients].concat()))
 }
 
-/// nerfstudio's transforms.json: the camera, and for each image its camera_from_target, with lengths
-/// in mm and axes as OpenGL has them. An image whose name leads out of its folder is called by the end of it.
+/// The `transforms.json` of nerfstudio: the camera, and for each image the inverse of its
+/// camera_from_target, with lengths in mm and camera axes as in OpenGL (y up, z backwards). An
+/// image path that leads out of its folder is shortened to its end.
 ///
 /// # Errors
-/// Where nerfstudio has no such model.
+/// When nerfstudio has no such lens model.
 pub fn nerfstudio(camera: &Camera, views: &[(&str, Pose)]) -> Result<String, FormatError> {
     let parameters = camera.lens.parameters();
     let (model, names, coefficients) = match Shared::of(camera, &parameters) {

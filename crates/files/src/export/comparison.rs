@@ -31,7 +31,8 @@ struct CameraRecord<'a> {
     chance: Option<f64>,
     significant: Option<bool>,
     second_from_first: Motion,
-    /// x, y of a pixel of the first camera, dx, dy of the second there, and the deviation of a coordinate.
+    /// For each pixel (x, y) of the first camera the difference (dx, dy) of the second camera
+    /// there, and the standard deviation of a coordinate.
     places: Vec<PlaceRecord>,
 }
 
@@ -57,7 +58,8 @@ struct MotionRecord<'a> {
     significant: Option<bool>,
 }
 
-/// The text of the file; `names` are those of the cameras, empty of one that has none.
+/// The JSON text of a comparison; `names` are those of the cameras, empty for a camera without
+/// name, in the order of `found`. Lengths in mm, angles in rad, image distances in px.
 pub fn write(names: &[&str], found: &[Comparison], motions: &[CameraMotion]) -> String {
     let cameras = names.iter().zip(found).map(|(name, found)| CameraRecord {
         name,

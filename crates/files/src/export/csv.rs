@@ -1,9 +1,9 @@
-//! Detections as comma-separated values, one corner a line, for spreadsheets and data frames; and
-//! lists of points, which are read.
+//! Detections as comma-separated values, one corner in each line, for spreadsheets and data frames;
+//! and reading of lists of points.
 //!
-//! Columns: `grid` (counted from 0 in the image), `kind`, `panel` (`target:panel` of several targets), `row`, `col`, `id`, `x`, `y`
-//! (px, pixel centres at integers, y down), `cov_xx`, `cov_xy`, `cov_yy` (px²). A cell is empty
-//! where nothing is known.
+//! Columns: `grid` (counted from 0 in the image), `kind`, `panel` (`target:panel` when there are
+//! several targets), `row`, `col`, `id`, `x`, `y` (px, pixel centres at integers, y down),
+//! `cov_xx`, `cov_xy`, `cov_yy` (px²). A cell is empty where the value is not known.
 
 use std::fmt::Write;
 
@@ -48,11 +48,10 @@ pub fn write(detection: &Detection) -> String {
     text
 }
 
-/// Reads points, `x,y` a line, in px; a header line and empty lines are skipped. The error names the
-/// line.
+/// Reads points, px, one `x,y` in each line; a header line `x,y` and empty lines are skipped.
 ///
 /// # Errors
-/// The line that is no point.
+/// The number of the first line that is not a point.
 pub fn read_points(text: &str) -> Result<Vec<DVec2>, String> {
     let mut points = Vec::new();
     for (i, line) in text.lines().enumerate() {

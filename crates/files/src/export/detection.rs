@@ -13,26 +13,26 @@ use deltille_core::reading::in_words;
 /// Schema and version that this crate writes and reads.
 pub const SCHEMA: &str = "deltille/detection/1";
 
-/// What is wrong with a detection file.
+/// Why a detection file cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DetectionFileError {
-    /// Not JSON, or cut off.
+    /// The file is not JSON, or truncated.
     #[error("not a detection file: {}; make it anew with `detection::write`", in_words(.0))]
     Json(serde_json::Error),
-    /// Another schema, or another version of it.
+    /// The file has another version of the schema.
     #[error("field `schema` is `{found}`, this version reads `{SCHEMA}`: make the file anew")]
     Schema {
         /// The schema that the file names.
         found: String,
     },
-    /// A file of something else.
+    /// The file is not a detection.
     #[error("this is a {found} file, not a detection: give what `detection::write` made")]
     Kind {
         /// The schema that the file names.
         found: String,
     },
-    /// A field is missing, unknown, or holds what it must not.
+    /// A field is missing, unknown, or has an invalid value.
     #[error("field `{field}`: {problem}; make the file anew with `detection::write`")]
     Field {
         /// The field, such as `grids[0].corners[3].x`.
@@ -40,7 +40,7 @@ pub enum DetectionFileError {
         /// What is wrong.
         problem: String,
     },
-    /// A grid that is there already.
+    /// A grid repeats the corners of another one.
     #[error("grids[{grid}] is grids[{first}] again")]
     Again {
         /// Index of the second.
@@ -48,7 +48,7 @@ pub enum DetectionFileError {
         /// Index of the first.
         first: usize,
     },
-    /// A corner that cannot be one.
+    /// A corner is not valid: its covariance is none, or its label is not unique.
     #[error("grids[{grid}].corners[{corner}]: {problem}")]
     Corner {
         /// Index of the grid.
@@ -95,7 +95,7 @@ struct DetectionFile {
     timing_ms: BTreeMap<String, f64>,
 }
 
-/// The text of the JSON file of one image, a corner a line.
+/// The JSON text of the detection in one image, with one corner in each line; positions in px.
 ///
 /// ```
 /// use deltille_core::detect::Detection;
@@ -109,7 +109,7 @@ pub fn write(detection: &Detection) -> String {
     deltille_core::json::to_text(&DetectionFile::of(detection), 4)
 }
 
-/// The same as a single line, which it ends, for streams of detections.
+/// The same JSON as a single line with its line end, for streams of detections.
 pub fn write_line(detection: &Detection) -> String {
     deltille_core::json::to_text(&DetectionFile::of(detection), 0)
 }
@@ -133,7 +133,7 @@ impl DetectionFile {
     }
 }
 
-/// Whether a text is JSON, but of something else than a detection.
+/// Whether a text is JSON of another schema than a detection.
 pub fn is_foreign(text: &str) -> bool {
     json::schema(text.as_bytes())
         .is_ok_and(|schema| schema.as_deref().map(json::kind) != Some(json::kind(SCHEMA)))
@@ -142,7 +142,7 @@ pub fn is_foreign(text: &str) -> bool {
 /// Reads the text of a detection file.
 ///
 /// # Errors
-/// Where it is no detection, of another version, or a field is wrong.
+/// When the text is not a detection, has another version, or a field, corner or grid is not valid.
 pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     #[derive(Deserialize)]
     struct Head {
@@ -157,7 +157,7 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     }
     let DetectionFile { image, width, height, file, grids, tone, ink, reasons, timing_ms, .. } =
         json::read(text)?;
-    // Corners that are there twice would count twice. A panel may be seen in pieces.
+    // A repeated corner would count twice. A panel may be seen in several grids.
     let (mut places, mut firsts) = (BTreeSet::new(), BTreeMap::new());
     for (grid, of_grid) in grids.iter().enumerate() {
         let corners = serde_json::to_string(&of_grid.corners).map_err(DetectionFileError::Json)?;
@@ -165,7 +165,7 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
         if first != grid && !of_grid.corners.is_empty() {
             return Err(DetectionFileError::Again { grid, first });
         }
-        // Labels without a panel are those of their grid alone.
+        // Without a panel labels are unique within their grid only.
         let labels =
             of_grid.panel.map_or((None, grid), |panel| (Some((&of_grid.target, panel)), 0));
         for (corner, found) in of_grid.corners.iter().enumerate() {
@@ -191,7 +191,7 @@ fn check_covariance([xx, xy, yy]: [f64; 3]) -> Result<(), String> {
         let in_range = quantity::variance_px2::RANGE.check(variance);
         in_range.map_err(|what| format!("`cov`: a variance, {what}"))?;
     }
-    // So that what is no number is refused too.
+    // Written so that NaN is refused, too.
     let usable = xx * yy > xy * xy;
     usable.then_some(()).ok_or_else(|| "`cov` is no covariance xx, xy, yy".to_owned())
 }

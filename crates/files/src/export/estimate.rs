@@ -1,4 +1,4 @@
-//! What files tell of an estimate, of a single camera and of a rig alike.
+//! Records that the files of single cameras and of rigs share.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use deltille_core::calibrate::{
 };
 use deltille_core::camera::{Lens, SplineGrid};
 
-/// The grid of a camera whose lens is a spline.
+/// The knot grid of a camera with a spline lens.
 pub(super) fn spline(camera: &CameraEstimate) -> Option<SplineGrid> {
     match &camera.camera.lens {
         Lens::Spline(spline) => Some(spline.grid()),
@@ -31,21 +31,22 @@ pub(super) struct ParameterRecord<'a> {
     observed_sd: Option<f64>,
 }
 
-/// How the projections of a camera are known.
+/// Uncertainty of the projections of a camera.
 #[derive(Serialize)]
 pub(super) struct ProjectionRecord {
-    /// For a turn (rad) and a move (mm) along each axis its change by each parameter that was found.
+    /// For a rotation (rad) and a translation (mm) along each axis, its derivative by each
+    /// estimated parameter.
     alignment: Vec<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_correlations: Option<Vec<Vec<f64>>>,
-    /// From so many squares a variance of that is known.
+    /// Degrees of freedom of the observed covariance.
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_freedom: Option<f64>,
     distances_mm: Vec<f64>,
     maps: Vec<UncertaintyRecord>,
 }
 
-/// How sure a camera is over its image, row by row.
+/// Standard deviation of projections over the image, row by row.
 #[derive(Serialize)]
 struct UncertaintyRecord {
     distance_mm: Option<f64>,
@@ -58,7 +59,7 @@ struct UncertaintyRecord {
 #[derive(Serialize)]
 pub(super) struct ViewRecord<'a> {
     name: &'a str,
-    /// The frame that it shows, where that is called otherwise.
+    /// The frame of the view, where its name differs.
     #[serde(skip_serializing_if = "Option::is_none")]
     frame: Option<&'a str>,
     image: &'a str,
@@ -71,7 +72,7 @@ pub(super) struct ViewRecord<'a> {
     corners: Option<Vec<CornerRecord<'a>>>,
 }
 
-/// How many corners a camera saw in each part of its image, row by row.
+/// Number of corners in each cell of the image, row by row.
 #[derive(Serialize)]
 pub(super) struct CoverageRecord {
     columns: usize,
@@ -81,7 +82,7 @@ pub(super) struct CoverageRecord {
 
 #[derive(Serialize)]
 struct CornerRecord<'a> {
-    /// Where there are several.
+    /// Name of the target, where there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     target: Option<&'a str>,
     panel: PanelRef,
@@ -108,7 +109,7 @@ pub(super) struct ShapeRecord {
     significant: bool,
 }
 
-/// What is said of an estimate beside its findings, with the figures behind the words.
+/// A diagnosis of an estimate that is not a finding, with the figures behind its text.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct DiagnosisRecord<'a> {
     kind: &'static str,
@@ -120,7 +121,7 @@ pub(super) struct DiagnosisRecord<'a> {
     rms_px: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_mm: Option<f64>,
-    /// By how many a camera is late.
+    /// Delay of a camera, in frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     frames: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -130,17 +131,17 @@ pub(super) struct DiagnosisRecord<'a> {
     /// Parameters of another camera that explains the views.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     other: BTreeMap<String, f64>,
-    /// Radius up to which a lens is good.
+    /// Radius up to which the lens model is usable, px.
     #[serde(skip_serializing_if = "Option::is_none")]
     steady_px: Option<f64>,
-    /// What was found instead of taken for given, and what is left then.
+    /// The quantity that was estimated instead of taken for given, and the RMS residual then.
     #[serde(skip_serializing_if = "Option::is_none")]
     instead: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_px_then: Option<f64>,
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     parameters: &'a [String],
-    /// A model of fewer parameters that holds the lens as well.
+    /// A smaller lens model that fits as well.
     #[serde(skip_serializing_if = "Option::is_none")]
     sufficient: Option<String>,
     text: String,
@@ -170,7 +171,7 @@ pub(super) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
         },
         columns: map.columns,
         rows: map.rows,
-        // Nobody needs more digits of a deviation.
+        // Standard deviations need few digits.
         sd_px: map.sd_px.iter().map(|sd| sd.map(|sd| (sd * 1e5).round() / 1e5)).collect(),
     });
     Some(ProjectionRecord {
@@ -185,7 +186,8 @@ pub(super) fn projection(camera: &CameraEstimate) -> Option<ProjectionRecord> {
     })
 }
 
-/// Of many parameters only the lower triangle, to nine digits: the file of a fisheye would have 30 MB.
+/// With many parameters only the lower triangle is written, to nine digits: the file of a fisheye
+/// would have 30 MB otherwise.
 fn correlations_of(covariance: &DMatrix<f64>, are_many: bool) -> Vec<Vec<f64>> {
     let c = covariance;
     let of = |i: usize, j: usize| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
@@ -206,7 +208,7 @@ pub(super) fn coverage(camera: &CameraEstimate) -> CoverageRecord {
     CoverageRecord { columns, rows, corners: of.counts().to_vec() }
 }
 
-/// The views of a camera; poses have deviations where the camera is the rig.
+/// The views of a camera; poses have standard deviations for a single camera.
 pub(super) fn views<'a>(
     estimate: &'a Estimate,
     camera: &'a CameraEstimate,
@@ -255,7 +257,7 @@ pub(super) fn shape(found: BoardShape) -> ShapeRecord {
     }
 }
 
-/// The map of a target's corners.
+/// The measured offsets of the corners of a target.
 #[derive(Serialize)]
 pub(super) struct MapRecord<'a> {
     expected_mm: [f64; 2],
@@ -277,7 +279,7 @@ struct OffsetRecord<'a> {
     views: usize,
 }
 
-/// The map of what was photographed.
+/// The record of the measured corners of a target.
 pub(super) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -> MapRecord<'a> {
     let corners = found.corners().iter().map(|corner| OffsetRecord {
         target: estimate.target_name(corner.panel),
@@ -297,7 +299,7 @@ pub(super) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -> MapRecord
     }
 }
 
-/// The diagnoses but those that are findings, which files tell by themselves.
+/// The diagnoses that are not findings, which files list separately.
 pub(super) fn diagnoses<'a>(
     estimate: &'a Estimate,
     diagnoses: &'a [Diagnosis],

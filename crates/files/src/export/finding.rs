@@ -1,8 +1,10 @@
+//! Findings of a calibration (what outliers have in common) as JSON records.
+
 use serde::Serialize;
 
 use deltille_core::calibrate::{Estimate, Finding, PanelRef, Shared};
 
-/// What outliers share, as files have it; `panel` is an id, `camera` a name.
+/// A finding as files store it; `panel` is an id, `camera` a name.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct FindingRecord {
     kind: &'static str,

@@ -1,4 +1,5 @@
-//! glTF 2.0 binary: one mesh with its texture inside, in metres, in the axes of the target frame.
+//! Binary glTF 2.0 (`.glb`): one mesh with its texture embedded, in metres, in the axes of the
+//! target frame.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -8,34 +9,35 @@ use serde_json::json;
 use super::atomic;
 use super::mesh::TexturedMesh;
 
-/// Components are `f32`. A number of the glTF 2.0 specification, as those below.
+/// Component type `f32`. Like the constants below, a number of the glTF 2.0 specification.
 pub const FLOAT: u32 = 5126;
-/// Components are `u16`.
+/// Component type `u16`.
 pub const UNSIGNED_SHORT: u32 = 5123;
 /// A buffer of vertices.
 pub const ARRAY_BUFFER: u32 = 34962;
 /// A buffer of indices.
 pub const ELEMENT_ARRAY_BUFFER: u32 = 34963;
-/// A filter: linear.
+/// Texture filter: linear.
 pub const LINEAR: u32 = 9729;
-/// A filter: linear, between mipmaps too.
+/// Texture filter: linear, also between mipmaps.
 pub const LINEAR_MIPMAP_LINEAR: u32 = 9987;
-/// A texture goes on as it ends.
+/// Texture wrapping: the outermost texels are repeated.
 pub const CLAMP_TO_EDGE: u32 = 33071;
 
-/// Name of the one material.
+/// Name of the only material.
 pub const MATERIAL: &str = "print";
 
-/// Writes the mesh as `.glb`.
+/// Writes the mesh as a `.glb` file.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// When the file cannot be written.
 pub fn write(mesh: &TexturedMesh, path: &Path) -> Result<(), atomic::WriteError> {
     let bytes = to_bytes(mesh);
     atomic::write(path, |file| file.write_all(&bytes))
 }
 
-/// The mesh as `.glb`. Faces keep their own vertices, so that normals are exact.
+/// The bytes of the mesh as a `.glb` file. Faces do not share vertices, so that normals are exact.
+/// Indices have 16 bits, which suffice for the 10 000 faces that a solid may have.
 pub fn to_bytes(mesh: &TexturedMesh) -> Vec<u8> {
     let corners = || mesh.faces.iter().flat_map(|face| (0..3).map(move |i| (face, i)));
     let positions: Vec<[f32; 3]> =

@@ -1,10 +1,10 @@
-//! What a file is, by its content: so that none takes the place of one of another kind, or of one
-//! that something else wrote.
+//! Recognises the kind of a file by its content, so that no file replaces one of another kind or of
+//! another writer.
 //!
-//! Files with a place for it name what wrote them: the schema of a JSON, the creator of a PDF, the
-//! software of a PNG, the generator of a glTF, the words before the triangles of an STL, and a comment
-//! in the first lines of a text. The others are known by what they begin with, such as the header of a
-//! CSV, or the keys of a JSON.
+//! Formats with a place for it name their writer: the schema of a JSON, the creator of a PDF, the
+//! software of a PNG, the generator of a glTF, the header of an STL, and a comment in the first
+//! lines of a text. Other files are recognised by what they begin with, such as the header of a
+//! CSV, or by the keys of a JSON.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -14,20 +14,20 @@ use std::fmt;
 use super::dsc;
 use deltille_core::json;
 
-/// Lines of a text within which its comment is looked for.
+/// Number of first lines of a text in which its comment is looked for.
 const HEAD_LINES: usize = 3;
 
-/// Bytes of a text within which its first lines are looked for.
+/// Bytes of a text in which its first lines are looked for.
 const HEAD: usize = 4096;
 
-/// How a PDF written here names its creator.
+/// How a PDF of this program names its creator.
 const PDF_CREATOR: &[u8] = b"/Creator(deltille ";
 
-/// What a list of corners for another detector is called here; it has no place for its writer.
+/// Words for a list of corners for other detectors; the format has no place for its writer.
 const DSC: &str = "a .dsc";
 
-/// The kind of a file. Two files of one kind have the same format and, where that can be told, the
-/// same writer.
+/// The kind of a file. Two files of one kind have the same format and, where it is stated, the same
+/// writer.
 #[derive(Clone, Debug)]
 pub struct Kind(Is);
 
@@ -35,12 +35,12 @@ pub struct Kind(Is);
 enum Is {
     /// A JSON with this schema.
     Schema(String),
-    /// What these words say.
+    /// A kind described by these words.
     Words(String),
 }
 
 impl PartialEq for Kind {
-    /// Versions of a schema are of one kind.
+    /// Versions of one schema are the same kind.
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
             (Is::Schema(one), Is::Schema(other)) => json::kind(one) == json::kind(other),
@@ -51,7 +51,7 @@ impl PartialEq for Kind {
 }
 
 impl Kind {
-    /// That of a file with this content.
+    /// The kind of a file with this content.
     pub fn of(content: &[u8]) -> Self {
         let signed = |format: &str, is_own: bool| {
             Self::words(if is_own {
@@ -77,7 +77,7 @@ impl Kind {
         }
     }
 
-    /// That of a JSON with this schema, of whatever version.
+    /// The kind of a JSON file with this schema, whatever its version.
     pub fn of_schema(schema: &str) -> Self {
         Self(Is::Schema(schema.to_owned()))
     }
@@ -86,33 +86,33 @@ impl Kind {
         Self(Is::Words(words.into()))
     }
 
-    /// That of the PDF files written here.
+    /// The kind of the PDF files that this program writes.
     pub fn own_pdf() -> Self {
         Self::of(&[b"%PDF-", PDF_CREATOR].concat())
     }
 
-    /// That of the pages written here.
+    /// The kind of the HTML pages that this program writes.
     pub fn own_page() -> Self {
         Self::of(b"<!DOCTYPE html>\n<!-- deltille 0 -->")
     }
 
-    /// That of the PNG files written here to be looked at: overlays, renderings, plots.
+    /// The kind of the PNG files that this program writes for viewing: overlays, renderings, plots.
     pub fn own_png() -> Self {
         Self::words("a PNG of deltille")
     }
 
-    /// That of the PNG files written here to be printed.
+    /// The kind of the PNG files that this program writes for printing.
     pub fn own_printed_png() -> Self {
         Self::words("a PNG to scale of deltille")
     }
 
-    /// Whether it is known to have been written here.
+    /// Whether the file is known to be written by this program.
     pub fn is_own(&self) -> bool {
         let (Is::Schema(words) | Is::Words(words)) = &self.0;
         words.contains("deltille") || words.contains("DelTag") || words == DSC
     }
 
-    /// The first value is looked at: of JSON by lines there are more.
+    /// Only the first value counts: a file of JSON lines has more.
     fn of_json(content: &[u8]) -> Option<Self> {
         #[derive(Deserialize)]
         struct Head {
@@ -130,10 +130,10 @@ impl Kind {
         }))
     }
 
-    /// By the first line without its values, and the one that names the writer.
+    /// A text by its first line without values, and by the line that names its writer.
     fn of_text(content: &[u8]) -> Self {
         let head = &content[..content.len().min(HEAD)];
-        // The end of the head may be within a character.
+        // The first bytes may end within a character.
         let whole = match std::str::from_utf8(head) {
             Err(error) if error.error_len().is_none() => &head[..error.valid_up_to()],
             _ => head,
@@ -164,7 +164,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// What a line says of the writer.
+/// The part of a line that names the writer.
 fn marked(line: &str) -> Option<String> {
     // The name and numbers of a family follow.
     let family = line.find("DelTag family").map(|at| line[..at].to_owned() + "DelTag family");
@@ -178,18 +178,18 @@ fn plain(line: &str) -> String {
     words.collect::<String>().trim().to_owned()
 }
 
-/// What every PNG begins with.
+/// The first bytes of every PNG.
 const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// The keyword under which a PNG names what wrote it.
 pub const SOFTWARE: &str = "Software";
 
-/// What the chunks before the pixels of a PNG say.
+/// What the chunks before the pixels of a PNG state.
 #[derive(Default)]
 struct Png<'a> {
-    /// What wrote it.
+    /// The program that wrote it.
     software: Option<&'a [u8]>,
-    /// Whether they state a resolution.
+    /// Whether a resolution is stated.
     is_to_scale: bool,
 }
 
@@ -216,7 +216,7 @@ fn next_chunk(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
     Some((name, data, after.get(4..)?))
 }
 
-/// A PNG with the name of its writer, which goes before all but the head.
+/// Adds the name of this program to a PNG, after its header chunk.
 pub fn signed_png(mut png: Vec<u8>) -> Vec<u8> {
     const HEAD_END: usize = 33;
     let mut chunk = b"tEXt".to_vec();
@@ -233,7 +233,7 @@ pub fn signed_png(mut png: Vec<u8>) -> Vec<u8> {
     png
 }
 
-/// The JSON of a binary glTF: after header, length and type, 20 bytes in all.
+/// The JSON chunk of a binary glTF, after 20 bytes of headers.
 fn glb_json(content: &[u8]) -> &[u8] {
     let length = content.get(12..16).and_then(|bytes| bytes.first_chunk::<4>());
     let length = length.map_or(0, |bytes| u32::from_le_bytes(*bytes) as usize);

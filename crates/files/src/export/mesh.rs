@@ -1,4 +1,4 @@
-//! The textured mesh of a solid: what glTF, OBJ and STL have in common.
+//! The textured mesh of a solid, from which glTF, OBJ and STL are written.
 
 use std::io;
 
@@ -9,17 +9,17 @@ use deltille_core::artwork::{ArtworkError, Atlas};
 use deltille_core::family::Family;
 use deltille_core::targets::{Target, TargetError, TargetSpec};
 
-/// Least texels along the edge of a tag's cell: sharp also where a viewer comes close.
+/// Least texels along the edge of a cell of a tag, so that a viewer sees it sharp at close range.
 pub const TEXELS_PER_BIT: f64 = 20.0;
 
-/// Longest side of a texture, px: what graphics hardware of the last ten years takes.
+/// Longest side of a texture, px, that graphics hardware of the last ten years accepts.
 pub const MAX_TEXTURE_PX: u32 = 16_384;
 
 /// Why a target has no mesh.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// A flat target, or one known by its corners only.
+    /// The target is flat, or known by its corners only.
     #[error("{0} was not made as a solid: it has no mesh")]
     NotSolid(String),
     /// The texture would be too large.
@@ -34,7 +34,7 @@ pub enum MeshError {
         /// What to do.
         instead: String,
     },
-    /// The resolution asked for leaves the tags unsharp.
+    /// The requested resolution leaves the tags unsharp.
     #[error(
         "{dpi} dpi are {texels:.1} texels per tag bit, at least {TEXELS_PER_BIT} are \
          needed: give {least} or more"
@@ -44,7 +44,7 @@ pub enum MeshError {
         dpi: f64,
         /// Texels per bit.
         texels: f64,
-        /// Least resolution that does, dots per inch.
+        /// Least sufficient resolution, dots per inch.
         least: u32,
     },
     /// The faces cannot be made.
@@ -58,7 +58,7 @@ pub enum MeshError {
     Encode(#[from] io::Error),
 }
 
-/// Spec and family of a target, for readers of its mesh.
+/// Specification and family of a target as JSON, for the metadata of its mesh.
 pub fn extras(target: &Target) -> serde_json::Value {
     serde_json::json!({
         "generator": GENERATOR,
@@ -68,39 +68,41 @@ pub fn extras(target: &Target) -> serde_json::Value {
     })
 }
 
-/// Triangles with a texture, in the target frame.
+/// Triangles with a texture, in the target frame, mm.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct TexturedMesh {
     /// Name of the target.
     pub name: String,
-    /// One face after the other, in the order of the panels.
+    /// The faces, in the order of the panels.
     pub faces: Vec<MeshFace>,
     /// The texture as a grey 8-bit PNG file.
     pub texture_png: Vec<u8>,
     /// Width and height of the texture, px.
     pub texture_px: [u32; 2],
-    /// Spec and family of the target, for readers of the file.
+    /// Specification and family of the target, for the metadata of the file.
     pub extras: serde_json::Value,
 }
 
-/// A plane face.
+/// A triangular face of the solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MeshFace {
-    /// Vertices, mm, counter-clockwise from outside.
+    /// Vertices in the target frame, mm, counter-clockwise seen from outside.
     pub vertices_mm: [DVec3; 3],
-    /// Unit normal, outwards.
+    /// Unit normal, pointing outwards.
     pub normal: DVec3,
     /// Texture coordinates: (0,0) is the upper left corner of the picture, (1,1) the lower right.
     pub uv: [DVec2; 3],
 }
 
 impl TexturedMesh {
-    /// The mesh of a solid. Without a resolution the texture has [`TEXELS_PER_BIT`].
+    /// Makes the mesh of a solid. `dpi` is the resolution of the texture in dots per inch on the
+    /// solid; by default it is that of [`TEXELS_PER_BIT`].
     ///
     /// # Errors
-    /// Where the target is no solid, the family is missing, or the texture would be too large.
+    /// When the target is not a solid, its family is missing, or the texture would be too large or
+    /// too coarse for the tags.
     pub fn new(
         target: &Target,
         family: Option<&Family>,

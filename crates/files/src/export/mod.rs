@@ -1,8 +1,9 @@
-//! Artwork, targets and detections to files and back, one module per format.
+//! Artwork, targets and results to files and back, one module for each format.
 //!
-//! Writers of artwork take shapes in millimetres and only change units and syntax; those of
-//! targets and detections make text. Files appear whole or not at all, see [`atomic`],
-//! and several as one, see [`staging`]; what a file is that is there already tells [`kind`].
+//! Writers of artwork take shapes in millimetres and only convert units and syntax; writers of
+//! targets and results return text. Files appear completely or not at all (see [`atomic`]), and
+//! sets of files together (see [`staging`]); [`kind`] recognises what an existing file is before it
+//! is replaced.
 
 pub mod atomic;
 pub mod calibration;
@@ -47,14 +48,14 @@ use std::path::PathBuf;
 #[cfg(feature = "print")]
 pub use supersample::{Block, SUBPIXELS, render as supersample};
 
-/// Why an artifact was not written.
+/// Why a file was not written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
     /// The file could not be written.
     #[error(transparent)]
     Write(#[from] atomic::WriteError),
-    /// A page larger than the format allows.
+    /// A page is larger than the format allows.
     #[error("{path}: a page of {width_mm} x {height_mm} mm is too large, {limit}")]
     TooLarge {
         /// The file asked for.
@@ -68,7 +69,7 @@ pub enum ExportError {
     },
 }
 
-/// What made a file, as it stands in all files that have a place for it.
+/// Name and version of this program, as all file formats with a place for it state them.
 pub const GENERATOR: &str = concat!("deltille ", env!("CARGO_PKG_VERSION"));
 
 /// The file name of sheet `index` (from 0) of `count`: `name.svg`, or `name-2.svg` when there are

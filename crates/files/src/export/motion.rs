@@ -1,15 +1,18 @@
+//! Poses as all JSON files of this crate store them.
+
 use glam::{DMat3, DVec3};
 use serde::Serialize;
 
 use deltille_core::camera::Pose;
 
-/// A pose as it stands in files.
+/// A pose with its standard deviations, as files store it.
 #[derive(Serialize)]
 pub(super) struct Motion {
     /// Row-major.
     rotation: [f64; 9],
     translation_mm: DVec3,
-    /// Standard deviations of a turn and a move along the axes of the frame that it leads to.
+    /// Standard deviations of the rotation and the translation along the axes of the destination
+    /// frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     rotation_sd_rad: Option<[f64; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,9 +1,10 @@
-//! Arrays for NumPy: the `.npy` format, version 1.0.
+//! Arrays for NumPy in the `.npy` format, version 1.0.
 
-/// What a file begins with.
+/// The first bytes of a file.
 pub const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// The bytes of a two-dimensional array of float32, row by row.
+/// The bytes of an array of float32 with shape (rows, columns), little-endian, row by row; `values`
+/// has to yield rows · columns numbers.
 pub fn float32(rows: usize, columns: usize, values: impl Iterator<Item = f32>) -> Vec<u8> {
     /// Data begin at a multiple of this.
     const ALIGNED: usize = 64;

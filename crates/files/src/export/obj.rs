@@ -1,4 +1,5 @@
-//! Wavefront OBJ with its material and texture, in millimetres; closed meshes from OBJ.
+//! Wavefront OBJ: textured meshes are written with material and texture, in millimetres, and closed
+//! meshes are read as solids.
 
 use std::fmt::Write;
 
@@ -9,34 +10,36 @@ use super::mesh::TexturedMesh;
 use crate::limits;
 use deltille_core::targets::{ClosedMesh, ClosedMeshError, is_coordinate};
 
-/// Why an OBJ is not taken for a solid.
+/// Why an OBJ cannot be used as a solid.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObjError {
-    /// Not an OBJ.
+    /// The file is not a valid OBJ.
     #[error("not a readable OBJ: {0}")]
     Grammar(#[from] tobj::LoadError),
-    /// Its reader fails within.
+    /// The reader panicked.
     #[error(transparent)]
     Broken(#[from] limits::Broken),
-    /// A face of more than three corners.
+    /// A face is not a triangle.
     #[error("face {face} has {corners} corners: triangles are needed")]
     NotTriangle {
         /// The face, counted from 1.
         face: usize,
-        /// Its corners.
+        /// Number of its corners.
         corners: u32,
     },
-    /// Not a closed solid.
+    /// The triangles are not one closed surface.
     #[error(transparent)]
     Mesh(#[from] ClosedMeshError),
 }
 
-/// Reads the triangles of all objects and groups of an OBJ as one solid; lines, points, materials
-/// and texture coordinates do not matter. The second value says whether it was inside out.
+/// Reads the triangles of all objects and groups of an OBJ as one solid, in the unit of the file;
+/// lines, points, materials and texture coordinates are ignored. The second value tells whether the
+/// surface was inside out.
 ///
 /// # Errors
-/// Where it is no OBJ, or its triangles are not one closed surface.
+/// When the file is not a valid OBJ, has a face that is not a triangle, or its triangles are not
+/// one closed surface.
 pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
     let options =
         tobj::LoadOptions { ignore_lines: true, ignore_points: true, ..Default::default() };
@@ -64,7 +67,7 @@ pub fn read(text: &[u8]) -> Result<(ClosedMesh, bool), ObjError> {
     })
 }
 
-/// Number of the first `v` line with a number that is no coordinate.
+/// Number of the first `v` line with a value that is not a valid coordinate.
 fn first_not_finite(text: &[u8]) -> Option<usize> {
     let text = String::from_utf8_lossy(text);
     let finite = |word: &str| word.parse().is_ok_and(is_coordinate);
@@ -72,7 +75,7 @@ fn first_not_finite(text: &[u8]) -> Option<usize> {
     lines.position(|line| !line.split_whitespace().all(finite)).map(|index| index + 1)
 }
 
-/// The text of `<name>.obj`; it names `<name>.mtl`.
+/// The text of `<name>.obj`, which refers to `<name>.mtl`; lengths in mm.
 pub fn text(mesh: &TexturedMesh) -> String {
     let name = &mesh.name;
     let generator = mesh.extras["generator"].as_str().unwrap_or("deltille");
@@ -97,7 +100,7 @@ pub fn text(mesh: &TexturedMesh) -> String {
     text
 }
 
-/// The text of `<name>.mtl`; it names the texture `<name>-texture.png`.
+/// The text of `<name>.mtl`, which refers to the texture `<name>-texture.png`.
 pub fn material(mesh: &TexturedMesh) -> String {
     let texture = texture_name(&mesh.name);
     format!(
@@ -105,7 +108,7 @@ pub fn material(mesh: &TexturedMesh) -> String {
     )
 }
 
-/// File name of the texture.
+/// File name of the texture of a target of this name.
 pub fn texture_name(name: &str) -> String {
     format!("{name}-texture.png")
 }

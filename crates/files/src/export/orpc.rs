@@ -11,8 +11,8 @@
 //! ```
 //!
 //! `board` is the position of the board among those of the target by ascending id, `point` the
-//! corner's place in its matrix ([`super::dsc::point_id`]). A grid that is not labelled has board
-//! −1, ordered 0, and points counted in the smallest matrix that holds it.
+//! index of the corner in its matrix ([`super::dsc::point_id`]). A grid that is not labelled has
+//! board −1, ordered 0, and points counted in the smallest matrix that holds the grid.
 
 use std::fmt::Write;
 
@@ -21,10 +21,11 @@ use deltille_core::detect::{Detection, Grid};
 use deltille_core::lattice::Vertex;
 use deltille_core::targets::Target;
 
-/// What a file begins with.
+/// The first word of a file.
 pub const HEAD: &str = "filename:";
 
-/// The text of the `.orpc` of one image; `target` is what was looked for, if it was known.
+/// The text of the `.orpc` file of one image; `target` is the target that was looked for, if known.
+/// Positions are in px.
 pub fn write(detection: &Detection, target: Option<&Target>) -> String {
     let lines: Vec<String> =
         detection.grids.iter().flat_map(|grid| corner_lines(grid, target)).collect();
@@ -44,7 +45,7 @@ fn corner_lines(grid: &Grid, target: Option<&Target>) -> Vec<String> {
         let board = target.panels.iter().position(|panel| panel.id == id)?;
         Some((board, &target.panels[board], Dialect::of(target)))
     });
-    // The product of numbers that a file has takes more than 32 bits.
+    // The product of two numbers from a file may exceed 32 bits.
     let low = |of: fn(&deltille_core::detect::GridCorner) -> i32| {
         grid.corners.iter().map(of).min().map_or(0, i64::from)
     };

@@ -1,9 +1,9 @@
-//! A picture of what was detected, drawn over the photograph.
+//! Overlay: the photograph with its detection drawn in.
 //!
-//! Grid edges as lines, corners as rings around the unmarked point, corner ids (or, on a grid that
-//! is not labelled, row and column) beside them, tag ids in their tiles. Every grid has its colour.
-//! Line widths and text follow the size of the tiles, and a small photograph is enlarged, so that
-//! all of it can be read.
+//! Edges of grids are lines, corners are rings around the unmarked point, with corner ids beside
+//! them (or row and column in an unlabelled grid) and tag ids in their tiles. Every grid has its
+//! own colour. Line widths and text scale with the size of the tiles, and a small photograph is
+//! enlarged, so that all text is legible.
 
 use glam::DVec2;
 use tiny_skia::{
@@ -21,10 +21,10 @@ use deltille_core::raster::{AnyGray, Gray, Intensity};
 const COLOURS: [[u8; 3]; 6] =
     [[255, 80, 60], [60, 170, 255], [80, 220, 80], [255, 180, 0], [230, 90, 255], [0, 220, 210]];
 
-/// A tile edge is at least this long in the picture, px, where enlarging allows: so that ids of
-/// three digits stay legible beside their corners.
+/// Least length of a tile edge in the picture, px, as far as enlarging allows: ids of three digits
+/// then stay legible beside their corners.
 const READABLE_EDGE_PX: f64 = 52.0;
-/// Photographs are enlarged at most so many times, and only to this many pixels a side.
+/// Greatest enlargement of a photograph, and the longest side that it may reach, px.
 const MOST_ENLARGED: u32 = 8;
 const LARGEST_SIDE_PX: u32 = 4096;
 /// Text height, line width and ring radius in tile edges.
@@ -33,11 +33,11 @@ const TAG_TEXT_EDGES: f64 = 0.3;
 const LINE_EDGES: f64 = 0.03;
 const RING_EDGES: f64 = 0.09;
 
-/// A picture that cannot be made.
+/// Why an overlay cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OverlayError {
-    /// More pixels than there is memory.
+    /// The picture is too large for memory.
     #[error("an image of {0} × {1} pixels is too large to draw on")]
     TooLarge(u32, u32),
     /// The PNG encoder failed.
@@ -45,10 +45,11 @@ pub enum OverlayError {
     Encode(String),
 }
 
-/// The PNG file of a photograph with its detection drawn over it.
+/// The PNG file of a photograph with its detection drawn in. `detection` has positions in px of
+/// `image`.
 ///
 /// # Errors
-/// Where the picture would be too large.
+/// When the picture is too large to draw on, or cannot be encoded.
 pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayError> {
     let scale = enlargement(image.width() as u32, image.height() as u32, detection);
     let mut canvas = match image {
@@ -63,7 +64,7 @@ pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayErr
     Ok(signed_png(png))
 }
 
-/// How many times the photograph is enlarged.
+/// The factor by which the photograph is enlarged.
 fn enlargement(width: u32, height: u32, detection: &Detection) -> u32 {
     let edges = detection.grids.iter().filter_map(Grid::edge_px);
     let shortest = edges.fold(READABLE_EDGE_PX, f64::min);
@@ -169,8 +170,8 @@ fn stroke(canvas: &mut Pixmap, path: Option<Path>, colour: Color, width: f64) {
     canvas.stroke_path(&path, &solid(colour), &stroke, Transform::identity(), None);
 }
 
-/// Writes text with a dark rim, so that it can be read on black, white and grey alike: from the
-/// lower left, or centred.
+/// Writes text with a dark outline, so that it is legible on black, white and grey; from its lower
+/// left corner, or centred.
 fn write(canvas: &mut Pixmap, words: &str, at: DVec2, size: f64, centred: bool, colour: Color) {
     let size = size.clamp(7.0, 160.0);
     // Digits, commas and minus signs, which the font has.

@@ -1,8 +1,8 @@
-//! PDF: all sheets in one file, a page each.
+//! PDF: all sheets in one file, one page each.
 //!
-//! Black is pure K. The page boxes are the page's size in points, and viewers are asked to print
-//! without scaling. The same artwork gives the same bytes: no dates, and the file's identifier is
-//! a digest of its content.
+//! Black is pure K (CMYK). The page boxes are the size of the page in points, and viewers are asked
+//! to print without scaling. The same artwork gives the same bytes: there are no dates, and the
+//! identifier of the file is a digest of its content.
 
 use std::path::Path;
 
@@ -15,19 +15,19 @@ use sha2::{Digest, Sha256};
 use super::{ExportError, GENERATOR, atomic};
 use deltille_core::artwork::{Artwork, Paint, Sheet};
 
-/// Version of the format.
+/// Version of the PDF format.
 pub const VERSION: &str = "1.6";
 
 /// Points per millimetre.
 const PT_PER_MM: f64 = 72.0 / 25.4;
 
-/// Longest side of a page that readers must accept, mm: 14400 points.
+/// Longest side of a page that readers have to accept, mm: 14400 points.
 const MAX_PAGE_MM: f64 = 5080.0;
 
-/// Writes all sheets as one PDF.
+/// Writes all sheets as one PDF file.
 ///
 /// # Errors
-/// Where a page is larger than PDF allows, or the file cannot be written.
+/// When a page is larger than PDF allows, or the file cannot be written.
 pub fn write(artwork: &Artwork, path: &Path) -> Result<(), ExportError> {
     let long = |sheet: &&Sheet| sheet.width_mm.max(sheet.height_mm) > MAX_PAGE_MM;
     if let Some(sheet) = artwork.sheets.iter().find(long) {
@@ -42,7 +42,7 @@ pub fn write(artwork: &Artwork, path: &Path) -> Result<(), ExportError> {
     Ok(atomic::write(path, |file| file.write_all(&bytes))?)
 }
 
-/// All sheets as one PDF, the same bytes for the same artwork.
+/// The bytes of one PDF file with all sheets; they are the same for the same artwork.
 ///
 /// ```
 /// use deltille_core::targets::{BoardSpec, Target};
@@ -60,7 +60,7 @@ pub fn to_bytes(artwork: &Artwork) -> Vec<u8> {
     saved(&mut document)
 }
 
-/// The document without its identifier: objects in the order in which they are numbered.
+/// The document without its identifier; objects in the order of their numbers.
 fn document(artwork: &Artwork) -> Document {
     let mut document = Document::with_version(VERSION);
     document.reference_table.cross_reference_type = XrefType::CrossReferenceTable;
@@ -99,7 +99,8 @@ fn document(artwork: &Artwork) -> Document {
     document
 }
 
-/// A digest of the content in place of a random identifier, so that the same artwork is the same file.
+/// The identifier: a digest of the content instead of a random number, so that the same artwork
+/// gives the same file.
 fn identifier(document: &mut Document) -> Vec<Object> {
     let digest = Sha256::digest(saved(document))[..16].to_vec();
     vec![Object::String(digest, StringFormat::Hexadecimal); 2]
@@ -111,7 +112,7 @@ fn saved(document: &mut Document) -> Vec<u8> {
     bytes
 }
 
-/// What draws a sheet, all in black.
+/// The operators that draw a sheet, all in black.
 fn operations(sheet: &Sheet) -> Vec<Operation> {
     let black: Vec<Object> = [0f32, 0.0, 0.0, 1.0].map(Object::from).to_vec();
     let mut operations = vec![Operation::new("k", black.clone()), Operation::new("K", black)];
@@ -141,7 +142,7 @@ struct Contour {
     is_closed: bool,
 }
 
-/// The contours of a path; PDF knows cubic curves only.
+/// The contours of a path. PDF has cubic curves only, so quadratic ones are raised.
 fn contours(path: &BezPath) -> Vec<Contour> {
     let mut contours = Vec::<Contour>::new();
     let mut at = Point::ZERO;

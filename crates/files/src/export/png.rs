@@ -9,20 +9,20 @@ use tiny_skia::{FillRule, Mask, PathBuilder, Transform};
 use super::{Block, ExportError, GENERATOR, SUBPIXELS, atomic, kind, supersample};
 use deltille_core::artwork::{Paint, Shape, Sheet};
 
-/// Most pixels of an image: 2 gigapixels, an A0 sheet at 1200 dpi.
+/// Most pixels of an image: 2 gigapixels, as of an A0 sheet at 1200 dpi.
 const MAX_PIXELS: f64 = 2.0e9;
 
-/// How far the outline of a stroke may lie from its true curve, mm.
+/// Greatest deviation of the outline of a stroke from its exact curve, mm.
 const STROKE_TOLERANCE_MM: f64 = 1e-4;
 
-/// Writes a sheet as PNG.
+/// Writes a sheet as a grey 8-bit PNG; `dpi` is the resolution in dots per inch.
 ///
-/// PNG states its resolution in whole pixels per metre; the drawing is scaled by exactly the
-/// stated value nearest to `dpi`. The image starts at the upper-left corner of the page; its size
-/// is the page's, rounded to whole pixels.
+/// PNG states its resolution in whole pixels per metre; the drawing is scaled by exactly the value
+/// nearest to `dpi`. The image starts at the upper-left corner of the page and has the size of the
+/// page, rounded to whole pixels.
 ///
 /// # Errors
-/// Where the picture would be too large, or the file cannot be written.
+/// When the picture would have more than 2 gigapixels, or the file cannot be written.
 pub fn write(sheet: &Sheet, title: &str, path: &Path, dpi: f64) -> Result<(), ExportError> {
     let raster = Raster::new(sheet, dpi);
     if raster.width as f64 * raster.height as f64 > MAX_PIXELS {
@@ -36,17 +36,17 @@ pub fn write(sheet: &Sheet, title: &str, path: &Path, dpi: f64) -> Result<(), Ex
     Ok(atomic::write(path, |file| raster.encode(title, file))?)
 }
 
-/// The PNG file in memory; for pages of moderate size.
+/// The same PNG file in memory, for pages of moderate size.
 ///
 /// # Errors
-/// Where the picture is larger than PNG allows.
+/// When the picture is larger than PNG allows.
 pub fn to_bytes(sheet: &Sheet, title: &str, dpi: f64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     Raster::new(sheet, dpi).encode(title, &mut bytes)?;
     Ok(bytes)
 }
 
-/// A sheet about to be drawn.
+/// A sheet that is prepared for drawing.
 struct Raster {
     pixels_per_metre: u32,
     width: usize,
@@ -99,7 +99,7 @@ impl Raster {
         Ok(writer.finish()?)
     }
 
-    /// Ink on the samples of a block.
+    /// Coverage of the samples of a block, 255 where fully inked.
     fn coverage(&self, block: Block) -> Vec<u8> {
         let (x, y) = (block.x as f64, block.y as f64);
         let bounds = Rect::new(x, y, x + block.width as f64, y + block.height as f64);

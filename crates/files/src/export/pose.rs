@@ -1,4 +1,4 @@
-//! Poses of a target in single images, schema `deltille/pose/1`, a line each.
+//! Poses of a target in single images as JSON lines, schema `deltille/pose/1`; translations in mm.
 
 use serde::Serialize;
 
@@ -29,13 +29,14 @@ struct NoPoseLine<'a> {
     reason: &'a str,
 }
 
-/// The line of a picture in which there is no pose, and why, without its end.
+/// The line of a picture without a pose, with the reason; without line end.
 pub fn write_none(image: &str, target: &str, reason: &str) -> String {
     let line = NoPoseLine { schema: SCHEMA, image, target, camera_from_target: None, reason };
     serde_json::to_string(&line).expect("plain data has a JSON form")
 }
 
-/// The line of a view of a single camera, without its end.
+/// The line of a view of a single camera, with the standard deviations of its pose; without line
+/// end.
 pub fn write_line(estimate: &Estimate, view: &ViewEstimate, target: &str) -> String {
     let line = PoseLine {
         schema: SCHEMA,

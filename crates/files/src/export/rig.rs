@@ -1,5 +1,5 @@
-//! Rigs as JSON, schema `deltille/rig/1`: every camera with its place, every frame with that of the
-//! target.
+//! Rig calibrations as JSON, schema `deltille/rig/1`: every camera with its pose on the rig, every
+//! frame with that of the target.
 
 use serde::Serialize;
 
@@ -50,7 +50,7 @@ struct RigFile<'a> {
 #[derive(Serialize)]
 struct TargetRecord<'a> {
     name: &'a str,
-    /// How many it has.
+    /// Number of its panels.
     panels: usize,
     scene_from_target: Motion,
 }
@@ -75,10 +75,11 @@ struct Camera<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     projection: Option<ProjectionRecord>,
     camera_from_rig: Motion,
-    /// By how many frames its pictures are late.
+    /// Delay of its pictures, in frames.
     #[serde(skip_serializing_if = "is_none")]
     delay_frames: i32,
-    /// As the frames agree with each other: of a turn (rad) and a move (mm).
+    /// Empirical standard deviation from the scatter of frames: rotation (rad) and translation
+    /// (mm).
     #[serde(skip_serializing_if = "Option::is_none")]
     observed_pose_sd: Option<[f64; 6]>,
     views: Vec<ViewRecord<'a>>,
@@ -99,7 +100,7 @@ struct HeldOut<'a> {
     excluded: &'a [Excluded],
 }
 
-/// What a camera saw in frames that were held out.
+/// The views of a camera in frames that were held out.
 #[derive(Serialize)]
 struct Seen<'a> {
     name: &'a str,
@@ -107,7 +108,8 @@ struct Seen<'a> {
     views: Vec<ViewRecord<'a>>,
 }
 
-/// The text of a rig's file; `model` is that of its cameras, if nothing else was said of them.
+/// The JSON text of the calibration of a rig; `model` is the lens model of its cameras where none
+/// was stated for a camera.
 pub fn write(
     found: &Estimate,
     said: &[Diagnosis],

@@ -1,8 +1,8 @@
-//! Calibrations and rigs, read back from their JSON.
+//! Calibrations of cameras and rigs, read back from their JSON.
 //!
-//! What a file does not hold stays empty: corners where residuals were not asked for, findings and patterns of the residuals, which are told there in
-//! words, and where refined panels are, which stands in the refined target. Reasons why views took no
-//! part are the words of the file.
+//! Quantities that a file does not hold stay empty: corners where residuals were not requested,
+//! findings and lack of fit, which files describe in words, and refined panel poses, which are in
+//! the refined target. The reasons for excluded views are the words of the file.
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::DMatrix;
@@ -19,14 +19,14 @@ use deltille_core::camera::{Camera, Lens, Pose, Spline, SplineGrid};
 use deltille_core::json::{self, ReadError};
 use deltille_core::quantity;
 
-/// Why a file is no calibration that can be read.
+/// Why a calibration cannot be read from a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SavedError {
-    /// Neither that of a camera nor that of a rig.
+    /// The file is neither the calibration of a camera nor of a rig.
     #[error("not what `calibration::write` or `rig::write` made")]
     Foreign,
-    /// A field is missing, or holds what it must not.
+    /// A field is missing, or has an invalid value.
     #[error("field `{field}`: {problem}")]
     Field {
         /// The field, such as `cameras[1].views[3].rms_px`.
@@ -34,15 +34,16 @@ pub enum SavedError {
         /// What is wrong.
         problem: String,
     },
-    /// A corner on a panel that the target does not have.
+    /// A corner lies on a panel that the target does not have.
     #[error("panel {0} is not on the target")]
     Panel(u32),
 }
 
-/// Reads the estimate of a camera or a rig; `reference` is what was photographed.
+/// Reads the estimate of a camera or a rig; `reference` is the target that was photographed.
 ///
 /// # Errors
-/// Where it is no such file, a field is wrong, or the target has other panels.
+/// When the file is not a calibration, a field is not valid, or the target does not have a panel of
+/// the file.
 pub fn read(text: &str, reference: &Reference) -> Result<Estimate, SavedError> {
     estimate(text, Some(reference))
 }
@@ -59,16 +60,16 @@ fn estimate(text: &str, reference: Panels) -> Result<Estimate, SavedError> {
     }
 }
 
-/// Reads the cameras of a calibration or a rig by themselves, whatever was photographed; panels of corners are
-/// only told apart.
+/// Reads the cameras of a calibration or a rig without knowing the target; the panels of corners
+/// are then identified by id only.
 ///
 /// # Errors
-/// Where it is no such file, or a field is wrong.
+/// When the file is not a calibration, or a field is not valid.
 pub fn read_cameras(text: &str) -> Result<Vec<CameraEstimate>, SavedError> {
     Ok(estimate(text, None)?.cameras)
 }
 
-/// What was photographed, if that is known.
+/// The target that was photographed, if known.
 type Panels<'a> = Option<&'a Reference<'a>>;
 
 fn panel(panels: Panels, target: Option<&str>, id: u32) -> Result<PanelRef, SavedError> {
@@ -132,7 +133,7 @@ struct SavedSeen {
     views: Vec<SavedView>,
 }
 
-/// What files of both kinds tell of the fit as a whole.
+/// The fields about the whole fit that both kinds of files have.
 #[derive(Deserialize)]
 struct Fit {
     #[serde(deserialize_with = "quantity::deviation::de")]
@@ -164,7 +165,7 @@ struct SavedCamera {
     delay_frames: i32,
     #[serde(default, deserialize_with = "quantity::deviation::de")]
     observed_pose_sd: Option<[f64; 6]>,
-    /// In files of later than 2026-11-24.
+    /// Only in files written after 2026-11-24.
     coverage: Option<SavedCoverage>,
     views: Vec<SavedView>,
 }
@@ -215,7 +216,7 @@ struct SavedView {
     #[serde(deserialize_with = "quantity::deviation::de")]
     rms_px: f64,
     camera_from_target: SavedPose,
-    /// Left out unless residuals were asked for.
+    /// Absent unless residuals were requested.
     #[serde(default)]
     corners: Vec<SavedCorner>,
 }
@@ -380,7 +381,7 @@ impl Fit {
     }
 }
 
-/// The frames of a single camera, which are its views.
+/// The frames of a single camera: one for each view.
 fn frames_of(views: &[SavedView]) -> Vec<FrameEstimate> {
     let frames = views.iter().map(|view| FrameEstimate {
         name: view.name.clone(),
@@ -391,7 +392,7 @@ fn frames_of(views: &[SavedView]) -> Vec<FrameEstimate> {
     frames.collect()
 }
 
-/// A camera that was found, with other views.
+/// A calibrated camera with other views.
 fn known(
     found: &CameraEstimate,
     rms_px: f64,
@@ -482,10 +483,11 @@ impl SavedCamera {
     }
 }
 
-/// What correlations and deviations make; `None` where there is not a correlation for each pair.
+/// The covariance matrix from correlations and standard deviations; `None` where there is not one
+/// correlation for each pair.
 fn covariance(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
     let n = sds.len();
-    // Of a spline the lower triangle is there.
+    // For a spline only the lower triangle is stored.
     let has_all = |(i, row): (usize, &Vec<f64>)| row.len() == n || row.len() == i + 1;
     let is_whole = rows.len() == n && rows.iter().enumerate().all(has_all);
     let of = |i: usize, j: usize| rows[i].get(j).copied().unwrap_or_else(|| rows[j][i]);
@@ -493,7 +495,7 @@ fn covariance(rows: &[Vec<f64>], sds: &[f64]) -> Option<DMatrix<f64>> {
 }
 
 impl SavedProjection {
-    /// Of so many parameters that were found, with the deviations that were observed.
+    /// `found` is the number of estimated parameters, `sds` are their observed standard deviations.
     fn read(self, found: usize, sds: &[f64]) -> Result<ProjectionUncertainty, &'static str> {
         let Self { alignment, observed_correlations, observed_freedom, distances_mm } = self;
         if alignment.len() != 6 || alignment.iter().any(|row| row.len() != found) {
@@ -510,7 +512,7 @@ impl SavedProjection {
     }
 }
 
-/// The lens whose camera has parameters of these names.
+/// The lens model whose camera has parameters of these names.
 fn lens_of(names: &[&str], spline: Option<SplineGrid>) -> Option<Lens> {
     let terms = names.len().saturating_sub(4);
     let models = [

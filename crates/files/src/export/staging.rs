@@ -1,15 +1,17 @@
-//! Several files that appear as one.
+//! Staging: a set of files that appears as one.
 //!
-//! All are written to a folder beside their places first, `.deltille-writing-…`, and brought to the
-//! disk. Then the empty file `complete` is put to them: from there on they count as written. Then each
-//! is moved to its place, and the folder goes.
+//! All files are first written to a temporary folder beside their final places,
+//! `.deltille-writing-…`, and flushed to the disk. Then the empty file `complete` is added: from
+//! there on the set counts as written. Then each file is moved to its place, and the folder is
+//! removed.
 //!
-//! Whoever is killed before `complete` leaves the earlier files, and after it all of the new ones,
-//! some of them perhaps still in the folder. [`settle`] finishes the one and removes the other; all
-//! that write to a folder do so first, and so do those that read a target or a camera. The lock of the
-//! folder keeps apart those who move files in it; the lock of the temporary folder tells one that is
-//! written to from one that was left. Systems without locks for folders (Windows, some network
-//! drives) have neither: there what is left stays, and two runs into one folder are not kept apart.
+//! A process that is killed before `complete` leaves the earlier files; after it all of the new
+//! ones, some of them perhaps still in the temporary folder. [`settle`] finishes the latter and
+//! removes the former; everything that writes to a folder calls it first, and so do readers of
+//! targets and cameras. A lock on the folder serialises those who move files in it; a lock on the
+//! temporary folder distinguishes one in use from one left behind. Systems without locks on folders
+//! (Windows, some network drives) have neither: leftovers stay there, and two runs into one folder
+//! are not serialised.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -20,16 +22,18 @@ use tempfile::TempDir;
 
 use super::atomic::{self, Unfinished};
 
-/// Name of the file that says that all others are there.
+/// Name of the file that marks the set as complete.
 const COMPLETE: &str = "complete";
 
-/// Name of the folder within the temporary one that the files are in.
+/// Name of the folder with the files, inside the temporary one.
 const FILES: &str = "files";
 
-/// Files on their way to a folder. Dropped before [`commit`](Self::commit), nothing is left of them.
+/// A set of files that is being written. Dropped before [`commit`](Self::commit), it leaves nothing
+/// behind.
 pub struct Staging {
     folder: PathBuf,
-    /// Folders that were made for it, the innermost first; they go where they stay empty.
+    /// Folders that were created for it, the innermost first; they are removed again if they stay
+    /// empty.
     made: Vec<PathBuf>,
     temporary: Option<TempDir>,
     unfinished: Option<Unfinished>,
@@ -37,10 +41,10 @@ pub struct Staging {
 }
 
 impl Staging {
-    /// Begins to write files to a folder, which is made where there is none.
+    /// Begins a set of files in a folder, which is created if necessary.
     ///
     /// # Errors
-    /// Where the folder cannot be made or written to.
+    /// When the folder cannot be created or written to, or an earlier set in it cannot be finished.
     pub fn new(folder: &Path) -> io::Result<Self> {
         let missing = folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists());
         let made: Vec<PathBuf> = missing.map(Path::to_owned).collect();
@@ -62,16 +66,17 @@ impl Staging {
         })
     }
 
-    /// Where the files are written, each under its own name, with [`atomic::write`], which brings them to
-    /// the disk.
+    /// The folder in which the files are to be written, each under its final name, with
+    /// [`atomic::write`], which flushes them to the disk.
     pub fn files(&self) -> PathBuf {
         self.temporary.as_ref().map(|temporary| temporary.path().join(FILES)).unwrap_or_default()
     }
 
-    /// Moves all files to their places; a file whose content is there already is left as it is.
+    /// Moves all files to their final places; an existing file with the same content is left as it
+    /// is.
     ///
     /// # Errors
-    /// Where a file cannot be moved.
+    /// When a file cannot be moved.
     pub fn commit(mut self) -> io::Result<()> {
         let Some(temporary) = self.temporary.take() else { return Ok(()) };
         let files = temporary.path().join(FILES);
@@ -99,17 +104,17 @@ impl Drop for Staging {
     fn drop(&mut self) {
         self.temporary.take();
         for folder in &self.made {
-            // Only a folder that is still empty goes.
+            // This removes only empty folders.
             let _ = fs::remove_dir(folder);
         }
     }
 }
 
-/// Brings a folder to where killed runs would have brought it: what was complete is moved to its
-/// places, what was not is removed. What living ones are writing stays.
+/// Finishes or removes what killed processes left in a folder: complete sets are moved to their
+/// places, incomplete ones are removed. Sets that living processes are writing are not touched.
 ///
 /// # Errors
-/// Where the folder cannot be read, or a file cannot be moved.
+/// When the folder cannot be read, or a file cannot be moved.
 pub fn settle(folder: &Path) -> io::Result<()> {
     if temporaries(folder).is_empty() {
         return Ok(());
@@ -137,8 +142,8 @@ fn settle_alone(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Moves complete files to their places. Whoever was killed may have done so, and have removed part of
-/// the temporary folder.
+/// Moves the files of a complete set to their places. A killed process may have moved some, and
+/// have removed part of the temporary folder.
 fn finish(temporary: &Path, folder: &Path) -> io::Result<()> {
     let files = temporary.join(FILES);
     let names: Vec<OsString> = match fs::read_dir(&files) {
@@ -147,8 +152,8 @@ fn finish(temporary: &Path, folder: &Path) -> io::Result<()> {
     };
     let place = |name: &OsString| atomic::place(&folder.join(name));
     let places = names.iter().map(place).collect::<io::Result<Vec<_>>>()?;
-    // Freeing what is replaced takes a file system a hundred times as long as a rename: it waits until
-    // these are closed, after the last rename.
+    // Freeing a replaced file takes a file system a hundred times as long as a rename; holding it
+    // open defers that until after the last rename.
     let open = |place: &PathBuf| File::open(place).ok().filter(|_| cfg!(unix));
     let _replaced: Vec<File> = places.iter().filter_map(open).collect();
     for (name, place) in names.iter().zip(&places) {
@@ -166,7 +171,7 @@ fn finish(temporary: &Path, folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// What is being written to a folder, or was left there.
+/// The temporary files and folders in a folder.
 fn temporaries(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let named = entries.filter(|entry| atomic::is_temporary(&entry.file_name().to_string_lossy()));

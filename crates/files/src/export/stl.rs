@@ -1,8 +1,8 @@
-//! Binary STL, in millimetres: the bare solid, or its skeleton.
+//! Binary STL in millimetres, of a solid without print or of its skeleton.
 
 use glam::DVec3;
 
-/// The content of an `.stl` file; triangles counter-clockwise from outside.
+/// The content of an `.stl` file; `triangles_mm` in mm, counter-clockwise seen from outside.
 pub fn to_bytes(name: &str, triangles_mm: &[[DVec3; 3]]) -> Vec<u8> {
     let mut bytes = header(name).to_vec();
     bytes.extend((triangles_mm.len() as u32).to_le_bytes());
@@ -16,7 +16,7 @@ pub fn to_bytes(name: &str, triangles_mm: &[[DVec3; 3]]) -> Vec<u8> {
     bytes
 }
 
-/// The words before the triangles, which readers pass over.
+/// The header before the triangles, whose text readers ignore.
 pub fn header(name: &str) -> [u8; 80] {
     let mut header = [b' '; 80];
     let words = format!("deltille {name}, millimetres");

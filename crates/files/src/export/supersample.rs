@@ -1,9 +1,12 @@
+//! Anti-aliased rendering of black marks by supersampling, in blocks and bands to bound memory.
+
 use rayon::prelude::*;
 
-/// Samples per pixel and axis. With the renderer's own four levels an edge is placed to 1/32 px.
+/// Samples for each pixel along each axis. With the four levels of the renderer an edge is placed
+/// to 1/32 px.
 pub const SUBPIXELS: usize = 4;
 
-/// Largest block, px: its samples stay within the size that tiny-skia draws in one piece.
+/// Longest side of a block, px: its samples stay within the size that tiny-skia draws in one piece.
 const BLOCK: usize = 1024;
 
 /// A rectangle of an image, px.

@@ -1,4 +1,4 @@
-//! SVG: one file per sheet, user units are millimetres.
+//! SVG: one file for each sheet; user units are millimetres.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,26 +10,30 @@ use kurbo::{Affine, BezPath, PathEl, Point};
 use super::{ExportError, atomic};
 use deltille_core::artwork::{Artwork, Paint, Part, Shape};
 
-/// Decimals of a coordinate: a tenth of a micrometre.
+/// Decimals of a coordinate: to a tenth of a micrometre.
 const DECIMALS: usize = 4;
 
-/// What a file begins with.
+/// The first lines of a file.
 pub const HEAD: &str = concat!(
     "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- deltille ",
     env!("CARGO_PKG_VERSION"),
     " -->\n"
 );
 
-/// Writes one sheet (counted from 0) as SVG.
+/// Writes sheet `sheet` (counted from 0) as an SVG file.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// When the file cannot be written.
 pub fn write(artwork: &Artwork, sheet: usize, path: &Path) -> Result<(), ExportError> {
     let text = to_string(artwork, sheet);
     Ok(atomic::write(path, |file| file.write_all(text.as_bytes()))?)
 }
 
-/// One sheet as SVG: a path per shape, named after what it is.
+/// The text of sheet `sheet` (counted from 0) as SVG: one path for each shape, named after its
+/// part.
+///
+/// # Panics
+/// When the artwork has no such sheet.
 ///
 /// ```
 /// use deltille_core::targets::{BoardSpec, Target};

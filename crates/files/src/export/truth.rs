@@ -1,4 +1,4 @@
-//! What a synthetic photograph shows, as JSON, schema `deltille/truth/1`.
+//! Ground truth of a synthetic photograph as JSON, schema `deltille/truth/1`.
 
 use glam::DVec2;
 use serde::Serialize;
@@ -23,7 +23,8 @@ struct TruthFile<'a> {
     corners: &'a [TruthCorner],
 }
 
-/// The truth about a picture with the file name `image` of the target of that name.
+/// The text of the ground truth of the picture with the file name `image`, of the target named
+/// `target`: pose (mm), light and corner positions (px).
 pub fn write(
     image: &str,
     target: &str,

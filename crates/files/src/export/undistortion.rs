@@ -1,5 +1,5 @@
-//! Views of what cameras see, as JSON: schemas `deltille/undistortion/1` and `deltille/rectification/1`; of a rectified
-//! pair also what OpenCV calls it.
+//! Undistorted views and rectified pairs as JSON, schemas `deltille/undistortion/1` and
+//! `deltille/rectification/1`, and as OpenCV stores them.
 
 use std::fmt::Write as _;
 
@@ -11,10 +11,10 @@ use super::npy;
 use deltille_core::camera::{PixelMap, Rectification, Undistortion};
 use deltille_core::json;
 
-/// Schema and version of a view that this crate writes.
+/// Schema and version of an undistorted view that this crate writes.
 pub const SCHEMA: &str = "deltille/undistortion/1";
 
-/// The same of a pair.
+/// Schema and version of a rectified pair that this crate writes.
 pub const PAIR_SCHEMA: &str = "deltille/rectification/1";
 
 #[derive(Serialize)]
@@ -34,9 +34,9 @@ struct View {
     vertical_field_deg: f64,
     /// Row-major.
     view_from_camera: [f64; 9],
-    /// The part of its pixels that show something.
+    /// Fraction of its pixels that the camera sees.
     covered: f64,
-    /// x, y, width, height of the largest rectangle in which all do.
+    /// x, y, width, height of the largest rectangle that the camera sees completely.
     whole_px: [usize; 4],
 }
 
@@ -75,17 +75,18 @@ impl View {
     }
 }
 
-/// The rotation of a view, row by row.
+/// The rotation of a view, row-major.
 fn rows(made: &Undistortion) -> [f64; 9] {
     DMat3::from_quat(made.view_from_camera()).transpose().to_cols_array()
 }
 
-/// The text that describes a view.
+/// The JSON text of an undistorted view; `map` has the place in the photograph for each of its
+/// pixels.
 pub fn write(made: &Undistortion, map: &PixelMap) -> String {
     json::to_text(&ViewFile { schema: SCHEMA, view: View::of(made, map) }, 1)
 }
 
-/// The text that describes a pair, with the names of its cameras.
+/// The JSON text of a rectified pair, with the names of its cameras and the map of each view.
 pub fn write_pair(made: &Rectification, names: [&str; 2], maps: &[PixelMap; 2]) -> String {
     let views = names.into_iter().zip(&made.views).zip(maps);
     let views = views.map(|((camera, view), map)| Named { camera, view: View::of(view, map) });
@@ -98,7 +99,8 @@ pub fn write_pair(made: &Rectification, names: [&str; 2], maps: &[PixelMap; 2]) 
     json::to_text(&file, 2)
 }
 
-/// R1, R2, P1, P2 and Q of a pair as OpenCV's `stereoRectify` has them, for its `FileStorage`; lengths in mm.
+/// R1, R2, P1, P2 and Q of a rectified pair as OpenCV `stereoRectify` returns them, as text for
+/// `FileStorage`; lengths in mm, focal length and principal point in px.
 pub fn opencv_pair(made: &Rectification) -> String {
     let view = made.views[0].view();
     let (focal, centre) = (view.focal_px.x, view.centre_px);
@@ -127,7 +129,8 @@ pub fn opencv_pair(made: &Rectification) -> String {
     text
 }
 
-/// The maps of x and y for OpenCV's `remap`, as arrays for NumPy; −1 where a pixel shows nothing.
+/// The x and y maps for OpenCV `remap`, px, as `.npy` files of float32 (height × width); −1 where
+/// the camera sees nothing.
 pub fn maps(map: &PixelMap) -> [Vec<u8>; 2] {
     let of = |index: usize| {
         let values = map.places().iter().map(move |place| match place[index].is_nan() {

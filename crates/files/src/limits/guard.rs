@@ -1,21 +1,23 @@
+//! Third-party code under guard: panics become errors, and endless work is abandoned after a time.
+
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::{Once, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Stack of a thread that runs code of others, bytes: their readers call themselves for each level
-/// of a file. Only what is used of it is memory.
+/// Stack of a thread that runs third-party code, bytes: their readers recurse for each level of a
+/// file. Only the part that is used takes memory.
 const STACK_BYTES: usize = 256 << 20;
 
-/// Why there is no result.
+/// Why guarded code gave no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Broken {
-    /// The code panicked.
+    /// The code panicked, or no thread could be started for it.
     #[error("its reader failed within; the file is damaged, or made to do that")]
     Panic,
-    /// The time is over.
+    /// The code did not finish in time.
     #[error("the time is over")]
     Time,
 }
@@ -24,10 +26,11 @@ thread_local! {
     static IS_QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs code of others; a panic within is an error, and nothing is printed of it.
+/// Runs third-party code on the calling thread. A panic becomes an error, and its message is not
+/// printed.
 ///
 /// # Errors
-/// [`Broken::Panic`].
+/// [`Broken::Panic`] when the code panics.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Broken> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -39,14 +42,14 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Broken> {
         }));
     });
     let before = IS_QUIET.replace(true);
-    // What the code was at work on is not looked at after a panic.
+    // State that the code may have left inconsistent is not used after a panic.
     let result = panic::catch_unwind(AssertUnwindSafe(work));
     IS_QUIET.set(before);
     result.map_err(|_| Broken::Panic)
 }
 
-/// Runs code of others as [`caught`] does, on a thread with a deep stack, for so long. After that
-/// it goes on unheard, until it or the program ends.
+/// Runs third-party code as [`caught`] does, on a thread with a deep stack, for at most `time`.
+/// After that the thread goes on, unheard, until it or the process ends.
 ///
 /// # Errors
 /// [`Broken::Panic`], or [`Broken::Time`].
@@ -57,26 +60,26 @@ pub fn bounded<T: Send + 'static>(
     let (sender, receiver) = mpsc::sync_channel(1);
     let thread = thread::Builder::new().stack_size(STACK_BYTES);
     let run = move || {
-        // Nobody listens any more where the time was over.
+        // The receiver is gone when the time is over.
         let _ = sender.send(caught(work));
     };
     thread.spawn(run).map_err(|_| Broken::Panic)?;
     receiver.recv_timeout(time).map_err(|_| Broken::Time)?
 }
 
-/// Where code of others runs, which may panic or never end.
+/// How third-party code is run, which may panic or never end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Guard {
-    /// On the thread of the caller, without a clock, as [`caught`] does: where there are no threads,
-    /// as in a browser. Endless work is not noticed, nor is there a deeper stack.
+    /// On the calling thread and without a time limit, as [`caught`] does: for platforms without
+    /// threads, such as a browser. Endless work is not noticed, and the stack is no deeper.
     #[default]
     Here,
-    /// On a thread of its own, and only for so long, as [`bounded`] does.
+    /// On a thread of its own with a time limit, as [`bounded`] does.
     Timed,
 }
 
 impl Guard {
-    /// Runs code of others, for at most `time` where there is a clock.
+    /// Runs third-party code, for at most `time` with [`Guard::Timed`].
     ///
     /// # Errors
     /// [`Broken::Panic`], or [`Broken::Time`].
@@ -91,7 +94,7 @@ impl Guard {
         }
     }
 
-    /// When a time that begins now is over; never where there is no clock.
+    /// The instant at which a time that begins now is over; `None` without a time limit.
     pub fn end(self, time: Duration) -> Option<Instant> {
         match self {
             Self::Here => None,

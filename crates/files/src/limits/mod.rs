@@ -1,5 +1,4 @@
-//! How much is read before a file is refused, so that no file, whoever made it, takes all memory or
-//! never ends.
+//! Limits on what is read, so that no file, whoever made it, exhausts memory or time.
 //!
 //! ```
 //! use deltille_files::limits::Limits;
@@ -13,8 +12,8 @@
 //! );
 //! ```
 //!
-//! The defaults take whatever this crate writes and any camera takes up to 150 megapixels, and end
-//! within a gigabyte of memory.
+//! The defaults accept everything that this crate writes and photographs of up to 150 megapixels,
+//! and stay within a gigabyte of memory.
 
 mod guard;
 
@@ -26,37 +25,39 @@ use std::time::Duration;
 
 pub use guard::{Broken, Guard, bounded, caught};
 
-/// Most bytes of a file of settings: a camera, a template, rules. A hundredth of it is more than
-/// most have, and readers of YAML take time with the square of it.
+/// Most bytes of a settings file: a camera, a template, rules. Most have a hundredth of it, and
+/// readers of YAML take time quadratic in it.
 pub const MAX_SETTINGS_BYTES: usize = 50_000;
 
-/// Most bytes of a family file or of a checkpoint of its search: twice what the three million codes
-/// of the largest family take.
+/// Most bytes of a family file or of a checkpoint of its search: twice as many as the three million
+/// codes of the largest family take.
 pub const MAX_FAMILY_BYTES: usize = 150_000_000;
 
-/// Pixels of a picture that may be in a file of any size.
+/// Pixels that a picture may have whatever the size of its file.
 const FREE_PIXELS: u64 = 10_000_000;
 
-/// Bytes that a pixel may take while a picture is decoded: 8 bits of four colours.
+/// Bytes of memory for each pixel while a picture is decoded: four channels of 8 bits.
 const BYTES_PER_PIXEL: u64 = 4;
 
-/// What a reader takes before it gives up.
+/// Limits within which a reader accepts a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Limits {
-    /// Bytes of a file, and of what is unpacked from it; pictures go by their pixels.
+    /// Bytes of a file, and of what is decompressed from it; pictures are limited by their pixels
+    /// instead.
     pub max_bytes: u64,
     /// Pixels of a picture: of a photograph, of a page or texture as PNG, and of all photographs
     /// that are in memory at a time.
     pub max_pixels: u64,
-    /// Pixels of a photograph of more than 10 megapixels for each byte of its file. The noise of sensors takes bytes: a
-    /// compressed photograph has some 5, and what has so many more was made to keep its reader busy.
+    /// Pixels for each byte of its file, of a photograph of more than 10 megapixels. The noise of a
+    /// sensor cannot be compressed away: a compressed photograph has some 5, and a file with far
+    /// more was made to exhaust its reader.
     pub max_pixels_per_byte: u64,
     /// Parts of a file: elements of an SVG, operators of a PDF page, nodes and triangles of a mesh.
     pub max_nodes: u64,
-    /// How deep parts lie within each other.
+    /// Depth to which parts may be nested.
     pub max_depth: usize,
-    /// Seconds for each step that other crates do: reading a file, drawing a page.
+    /// Seconds for each step of third-party code: reading a file, drawing a page.
     pub max_seconds: f64,
 }
 
@@ -91,10 +92,10 @@ pub enum Kind {
     Seconds,
 }
 
-/// A limit that a file passes.
+/// A limit that a file exceeds.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub struct Exceeded {
-    /// Which limit.
+    /// The limit that is exceeded.
     pub kind: Kind,
     /// The value of the limit, in its unit: bytes, pixels, parts, levels or seconds.
     pub limit: f64,
@@ -137,7 +138,7 @@ impl fmt::Display for Exceeded {
     }
 }
 
-/// A file that is not read.
+/// Why a file is not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
@@ -149,15 +150,15 @@ pub enum ReadError {
         /// Why.
         source: io::Error,
     },
-    /// A folder, a device or a pipe, which may never end.
+    /// The path is a folder, a device or a pipe, which may never end.
     #[error("{}: {what}, where a file is needed", path.display())]
     NotFile {
-        /// Where it is.
+        /// The path.
         path: PathBuf,
-        /// What it is.
+        /// The kind of thing found there.
         what: &'static str,
     },
-    /// The file has more bytes than are read.
+    /// The file has more bytes than the limits allow.
     #[error("{}: {exceeded}", path.display())]
     Exceeded {
         /// The file.
@@ -165,15 +166,15 @@ pub enum ReadError {
         /// The limit.
         exceeded: Exceeded,
     },
-    /// The file has more bytes than any of its kind.
+    /// The file has more bytes than a file of its kind may have.
     #[error("{}: more than {most} bytes, which no such file has", path.display())]
     TooLong {
         /// The file.
         path: PathBuf,
-        /// How many a file of this kind may have.
+        /// The most bytes of a file of this kind.
         most: usize,
     },
-    /// The file is no text.
+    /// The file is not UTF-8 text.
     #[error("{}: not a text file", path.display())]
     NotText {
         /// The file.
@@ -182,7 +183,7 @@ pub enum ReadError {
 }
 
 impl Limits {
-    /// No limits, for files whose maker is trusted.
+    /// No limits, for files from a trusted source.
     pub const NONE: Self = Self {
         max_bytes: u64::MAX,
         max_pixels: u64::MAX,
@@ -192,25 +193,27 @@ impl Limits {
         max_seconds: f64::INFINITY,
     };
 
-    /// The bytes of a regular file.
+    /// Reads the bytes of a regular file.
     ///
     /// # Errors
-    /// Where it cannot be read, is no regular file, or is larger than the limit.
+    /// When the file cannot be read, is not a regular file, or is larger than
+    /// [`max_bytes`](Self::max_bytes).
     pub fn read(&self, path: &Path) -> Result<Vec<u8>, ReadError> {
         let exceeded = self.exceeded(Kind::Bytes);
         read_up_to(path, self.max_bytes)?
             .ok_or_else(|| ReadError::Exceeded { path: path.to_owned(), exceeded })
     }
 
-    /// The text of a regular file.
+    /// Reads a regular file as UTF-8 text.
     ///
     /// # Errors
-    /// Where it cannot be read, is no regular file, is larger than the limit, or is no text.
+    /// When the file cannot be read, is not a regular file, is larger than
+    /// [`max_bytes`](Self::max_bytes), or is not UTF-8.
     pub fn read_text(&self, path: &Path) -> Result<String, ReadError> {
         text(path, self.read(path)?)
     }
 
-    /// A limit that is passed.
+    /// The error that says that this limit is exceeded.
     pub fn exceeded(&self, kind: Kind) -> Exceeded {
         let limit = match kind {
             Kind::Bytes => self.max_bytes as f64,
@@ -223,7 +226,7 @@ impl Limits {
         Exceeded { kind, limit }
     }
 
-    /// Refuses a picture of too many pixels.
+    /// Refuses a picture of more than [`max_pixels`](Self::max_pixels).
     ///
     /// # Errors
     /// The limit that it passes.
@@ -231,7 +234,7 @@ impl Limits {
         self.check(Kind::Pixels, u64::from(width) * u64::from(height), self.max_pixels)
     }
 
-    /// Refuses a photograph of too many pixels, or of too many for a file of so many bytes.
+    /// Refuses a photograph of too many pixels, or of too many for a file of `bytes` bytes.
     ///
     /// # Errors
     /// The limit that it passes.
@@ -242,7 +245,7 @@ impl Limits {
         self.check(Kind::PixelsPerByte, pixels, most)
     }
 
-    /// Refuses so many parts.
+    /// Refuses a file of more than [`max_nodes`](Self::max_nodes) parts.
     ///
     /// # Errors
     /// The limit that they pass.
@@ -250,7 +253,7 @@ impl Limits {
         self.check(Kind::Nodes, nodes as u64, self.max_nodes)
     }
 
-    /// Refuses parts that lie so deep.
+    /// Refuses parts that are nested deeper than [`max_depth`](Self::max_depth).
     ///
     /// # Errors
     /// The limit that they pass.
@@ -258,12 +261,13 @@ impl Limits {
         self.check(Kind::Depth, depth as u64, self.max_depth as u64)
     }
 
-    /// Most bytes of a decoded picture, and of its file, which is never much larger.
+    /// Most bytes of a decoded picture, and of its file, which is hardly larger.
     pub fn picture_bytes(&self) -> u64 {
         self.max_pixels.saturating_mul(BYTES_PER_PIXEL)
     }
 
-    /// [`max_seconds`](Self::max_seconds); what no clock holds is for ever.
+    /// [`max_seconds`](Self::max_seconds) as a duration, the longest one where it cannot be
+    /// represented.
     pub fn time(&self) -> Duration {
         Duration::try_from_secs_f64(self.max_seconds).unwrap_or(Duration::MAX)
     }
@@ -273,19 +277,19 @@ impl Limits {
     }
 }
 
-/// The text of a regular file of a kind that has at most so many bytes.
+/// Reads a regular file of at most `most` bytes as UTF-8 text.
 ///
 /// # Errors
-/// Where it cannot be read, is no regular file, is too long, or is no text.
+/// When the file cannot be read, is not a regular file, is longer than `most`, or is not UTF-8.
 pub fn read_short_text(path: &Path, most: usize) -> Result<String, ReadError> {
     let bytes = read_up_to(path, most as u64)?;
     text(path, bytes.ok_or_else(|| ReadError::TooLong { path: path.to_owned(), most })?)
 }
 
-/// Refuses what is no regular file. A pipe is not even opened, as that may wait for ever.
+/// Refuses a path that is not a regular file. A pipe is not opened, as that may wait for ever.
 ///
 /// # Errors
-/// Where it cannot be looked at, or is no regular file.
+/// When the metadata cannot be read, or the path is not a regular file.
 pub fn check_file(path: &Path) -> Result<(), ReadError> {
     let io = |source| ReadError::Io { path: path.to_owned(), source };
     let metadata = path.metadata().map_err(io)?;
@@ -296,7 +300,7 @@ pub fn check_file(path: &Path) -> Result<(), ReadError> {
     Err(ReadError::NotFile { path: path.to_owned(), what })
 }
 
-/// The bytes of a regular file, unless there are more than so many.
+/// The bytes of a regular file; `None` when there are more than `most`.
 fn read_up_to(path: &Path, most: u64) -> Result<Option<Vec<u8>>, ReadError> {
     check_file(path)?;
     let io = |source| ReadError::Io { path: path.to_owned(), source };

@@ -1,4 +1,5 @@
-//! Plain words on what a calibration lacks. Every rule has its reason; none depends on a camera.
+//! Advice on what would improve a calibration. Every rule has its reason; none depends on the kind
+//! of camera.
 
 use super::{Report, Survey};
 use deltille_core::calibrate::{CameraEstimate, Diagnosis, Excluded, Parameter};
@@ -6,15 +7,15 @@ use deltille_core::camera::Lens;
 use deltille_core::statistics::median;
 use deltille_core::words::counted;
 
-/// How much a piece of advice matters.
+/// Importance of a piece of advice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Weight {
-    /// Something is as it should be.
+    /// A check that passed.
     Good,
-    /// Better results are to be had.
+    /// Better results are possible.
     Hint,
-    /// Figures are not to be relied on before this is mended.
+    /// The figures are not reliable before this is corrected.
     Warning,
 }
 
@@ -22,45 +23,48 @@ pub enum Weight {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Advice {
-    /// How much it matters.
+    /// Its importance.
     pub weight: Weight,
-    /// What is the case, and what to do about it.
+    /// The observation, and what to do about it.
     pub text: String,
 }
 
-/// A view tilted by more than this tells focal length from distance: the near side of the board is
-/// then seen larger than the far side by a tenth and more at usual distances.
+/// Least tilt that separates focal length from distance, rad: at usual distances the near side of
+/// the board is then seen larger than the far side by a tenth and more.
 const TILTED_RAD: f64 = 0.35;
-/// Tilted views to have: two axes, both ways.
+/// Least number of tilted views: about two axes, both ways.
 const TILTED_VIEWS: usize = 4;
 
-/// Views to have: below, a wrong one can hardly be told from the others.
+/// Least number of views: with fewer, a wrong one can hardly be identified.
 const VIEWS: usize = 10;
 
-/// Of the image's cells so many should hold corners: distortion between them is interpolated.
+/// Fraction of the cells of the image that should hold corners: distortion between them is
+/// interpolated.
 const COVERED: f64 = 0.75;
-/// Beyond the outermost corner distortion is extrapolated; polynomials run away there.
+/// Least distance of the outermost corner from the middle, as a fraction of the half diagonal:
+/// beyond it distortion is extrapolated, where polynomials diverge.
 const REACH: f64 = 0.85;
 
-/// A distortion parameter below so many standard deviations may as well be zero.
+/// A distortion parameter smaller than this many standard deviations may be zero.
 const SIGNIFICANT: f64 = 2.0;
 
-/// Parameters correlated more than this cannot be told apart in practice.
+/// Parameters with a greater correlation cannot be separated in practice.
 const CORRELATED: f64 = 0.99;
 
-/// A pattern of residuals so many times as large as chance makes is the model's.
+/// A pattern of mean residuals this many times as large as by chance is lack of fit of the model.
 const PATTERN: f64 = 3.0;
-/// Against it stands the noise of a single corner: a pattern smaller than this part of it does not
-/// matter, however sure it is.
+/// Least size of such a pattern relative to the noise of a corner: a smaller one does not matter,
+/// however significant it is.
 const PATTERN_PART: f64 = 0.2;
 
-/// A view so many times worse than the median is to be looked at.
+/// A view whose RMS residual is this many times the median should be inspected.
 const BAD_VIEW: f64 = 2.5;
 
-/// Held-out views worse by more than this part show that the model fits noise, or views that differ.
+/// Held-out views whose RMS residual is this many times larger show overfitting, or views that
+/// differ.
 const HOLDOUT: f64 = 1.25;
 
-/// What would make a calibration better, what matters most first; `surveys` are those of its cameras.
+/// Advice on a calibration, the most important first; `surveys` are those of its cameras, in order.
 pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let mut found = Vec::new();
     let mut add = |weight, text: String| found.push(Advice { weight, text });
@@ -140,7 +144,7 @@ pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
 
 /// A text about a camera, which is named where there are several.
 fn of_camera(report: &Report, camera: &CameraEstimate, text: String) -> String {
-    // What is told of a diagnosis names its camera.
+    // The text of a diagnosis names its camera.
     let named = format!("Camera {}", camera.name);
     match report.is_rig() && !text.starts_with(&named) {
         true => format!("{named}: {text}"),
@@ -148,7 +152,7 @@ fn of_camera(report: &Report, camera: &CameraEstimate, text: String) -> String {
     }
 }
 
-/// What is said of the diagnoses of a kind.
+/// The texts of the diagnoses of a kind.
 fn told(
     report: &Report,
     add: &mut impl FnMut(Weight, String),
@@ -159,7 +163,7 @@ fn told(
     }
 }
 
-/// Whether it says why residuals are not noise.
+/// Whether a diagnosis explains why residuals are not noise.
 fn is_cause(diagnosis: &Diagnosis) -> bool {
     matches!(
         diagnosis,
@@ -215,7 +219,7 @@ fn views(
     }
 }
 
-/// Names what took no part.
+/// Names the excluded views and panels.
 fn left_out(
     report: &Report,
     add: &mut impl FnMut(Weight, String),
@@ -266,7 +270,7 @@ fn coverage(camera: &CameraEstimate, survey: &Survey, add: &mut impl FnMut(Weigh
     }
 }
 
-/// With a capital and a full stop.
+/// The text as a sentence, with a capital letter and a full stop.
 fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|letter| letter.to_ascii_uppercase());
@@ -297,7 +301,7 @@ fn superfluous(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
 }
 
 fn correlated(camera: &CameraEstimate, add: &mut impl FnMut(Weight, String)) {
-    // Of neighbouring knots nobody asks.
+    // Correlations of neighbouring knots are of no interest.
     if matches!(camera.camera.lens, Lens::Spline(_)) {
         return;
     }

@@ -1,5 +1,5 @@
-//! A pair of axes in an SVG, in user units. All plots of a page are equally wide, and drawn into equally large frames
-//! where they stand beside a picture of the same camera.
+//! Axes of a plot as SVG, in user units. All plots of a page have equally wide frames, and equally
+//! large ones beside a picture of the same camera.
 //!
 //! ```text
 //!     ┌──────────────────┐  ABOVE
@@ -74,7 +74,8 @@ impl Axes {
         Self { is_framed: false, ..Self::new(frame(image_px), [0.0, 1.0], [0.0, 1.0]) }
     }
 
-    /// The upper left corner and the size of what may be drawn into: of one without a frame also where others have numbers.
+    /// Upper left corner and size of the area that may be drawn into; without a frame it includes
+    /// the room that other plots use for numbers.
     pub(super) fn bounds(&self) -> [DVec2; 2] {
         match self.is_framed {
             true => [self.corner(), self.size],

@@ -1,14 +1,16 @@
-//! What residuals say of each corner of the target: where it would have to be on its panel, and how well it fits.
+//! Residuals by corner of the target: the offset on its panel that would explain them, and their
+//! RMS.
 //!
-//! A residual r of a corner is what a move d of the corner in the plane of its panel does there, J d, with J the change of
-//! its pixel by that move. Of all views of the corner together the move is
+//! An offset d of a corner in the plane of its panel causes the residual r = J d, with J the
+//! derivative of the pixel by the offset. The least-squares offset over all views of the corner is
 //!
 //! ```text
 //!     d = (Σ JᵀJ)⁻¹ Σ Jᵀ r      covariance σ² (Σ JᵀJ)⁻¹
 //! ```
 //!
-//! Poses take up what all corners of a panel have in common. Heights and the covariances of offsets are found by
-//! `Calibration::measure_target`; this is a look at what is left, at no cost.
+//! Poses absorb what all corners of a panel have in common. `Calibration::measure_target` estimates
+//! heights and covariances of offsets as well; this is a quick approximation from the residuals
+//! that are left.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -26,7 +28,8 @@ use deltille_core::statistics::quantile;
 /// Corners that are taken into account, of views evenly over all: more say no more.
 const MOST_CORNERS: usize = 200_000;
 
-/// A move in the plane is sure beyond this (chi squared of two coordinates, one in a thousand by chance).
+/// Threshold of a significant offset (χ² of two coordinates, exceeded by chance once in a thousand
+/// times).
 const SURE: f64 = 13.8;
 
 /// Fewest views of a corner.
@@ -40,17 +43,17 @@ const NEARLY_ALL: f64 = 0.95;
 const FOOT: f64 = 58.0;
 const STEPS: usize = 22;
 
-/// What is known of a corner of the target.
+/// Statistics of a corner of the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct OfCorner {
     pub panel: PanelRef,
     pub row: i32,
     pub col: i32,
-    /// Where it is on its panel, mm.
+    /// Its position on the panel, mm.
     pub at_mm: DVec2,
-    /// Where its residuals would have it, from there, mm.
+    /// The least-squares offset d from that position, mm.
     pub move_mm: DVec2,
-    /// Whether that is more than chance makes.
+    /// Whether the offset is significant.
     pub is_sure: bool,
     /// Root mean square of its residuals, of a coordinate, px.
     pub rms_px: f64,
@@ -67,8 +70,8 @@ struct Sums {
     views: usize,
 }
 
-/// The corners that a camera saw, by panel, row and column. Outliers are left out; but where a corner is one in most of its
-/// views it is no accident, and all of them count.
+/// The corners that a camera saw, by panel, row and column. Outliers are excluded; but where a
+/// corner is an outlier in most of its views, this is no accident, and all of them count.
 pub(super) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<OfCorner> {
     let step = camera.corner_count().div_ceil(MOST_CORNERS).max(1);
     // Of those that are no outliers, and of all.
@@ -113,7 +116,7 @@ pub(super) fn of_corners(estimate: &Estimate, camera: &CameraEstimate) -> Vec<Of
     seen.filter_map(of_corner).collect()
 }
 
-/// Where a panel was in a view.
+/// The pose of a panel in a view.
 pub(super) fn camera_from_panel(
     estimate: &Estimate,
     view: &ViewEstimate,
@@ -125,7 +128,8 @@ pub(super) fn camera_from_panel(
     Some(view.pose.after(&scene_from_target).after(&place))
 }
 
-/// Where on a panel a pixel looks, mm, and how a pixel there changes by a move in its plane, px/mm.
+/// The point of a panel that a pixel sees, mm, and the derivative of the pixel by an offset in the
+/// plane, px/mm.
 fn at_corner(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<(DVec2, DMat2)> {
     let at_mm = on_plane(camera, camera_from_panel, pixel)?;
     let point = camera_from_panel.apply(at_mm.extend(0.0));
@@ -136,7 +140,7 @@ fn at_corner(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<
     Some((at_mm, DMat2::from_cols(column(across), column(up))))
 }
 
-/// Where on the plane of a panel a pixel looks, mm.
+/// The point of the plane of a panel that a pixel sees, mm.
 pub(super) fn on_plane(camera: &Camera, camera_from_panel: &Pose, pixel: DVec2) -> Option<DVec2> {
     let ray = camera.unproject(pixel)?;
     let panel_from_camera = camera_from_panel.inverse();

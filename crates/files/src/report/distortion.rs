@@ -1,12 +1,14 @@
-//! How a lens bends what it sees: its radius over the angle from the axis, and a grid over the image, both beside those of
-//! a lens that is ideal.
+//! Distortion of a lens: its radial displacement over the angle from the axis, and a grid over the
+//! image, both compared with an ideal lens.
 //!
 //! ```text
 //!     displacement(θ) = mean over φ of |p(θ, φ) − c| − |i(θ, φ) − c|       px
 //! ```
 //!
-//! p is where the camera has a direction θ from its axis, in the direction φ around it, i where an ideal lens of the same
-//! focal length near the axis has it: a pinhole, f tan θ, or where the image shows more than that does well, f θ.
+//! p is the pixel of the camera for the direction at the angle θ from its axis and the azimuth φ, i
+//! that of an ideal lens with the same focal length near the axis: a pinhole, f tan θ, or for
+//! images that show more than a pinhole represents well, equidistant, f θ; c is the principal
+//! point.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -18,10 +20,11 @@ use super::survey::Survey;
 use deltille_core::calibrate::CameraEstimate;
 use deltille_core::camera::Camera;
 
-/// A pinhole is what a lens is held against up to this angle, rad: there its radius is 2.7 times the focal length.
+/// Widest field for which a lens is compared with a pinhole, rad from the axis: there its radius is
+/// 2.7 times the focal length.
 const PINHOLE_RAD: f64 = 70.0 / 180.0 * PI;
 
-/// Nobody builds a lens that sees more, rad.
+/// Widest field that is considered, rad from the axis: no lens sees more.
 const MOST_RAD: f64 = 130.0 / 180.0 * PI;
 
 /// How far away what is seen at infinity is, mm; how near the axis the focal length is taken, rad.
@@ -35,8 +38,8 @@ const ANGLES: usize = 96;
 /// Bins in which corners are counted by their angle.
 const BINS: usize = 40;
 
-/// Where points at the distance of the corners are seen elsewhere by so much, px, than those at infinity, they have a curve
-/// of their own.
+/// Least difference, px, between the projections of points at the distance of the corners and at
+/// infinity for which both have a curve.
 const APART_PX: f64 = 0.05;
 
 /// Lines of the grid over the longer side, and points of each.
@@ -49,7 +52,7 @@ const SEEN_PART: f64 = 0.03;
 /// Room for what lines mean, user units.
 const FOOT: f64 = 24.0;
 
-/// What a lens is held against.
+/// The ideal lens with which a lens is compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ideal {
     focal_px: DVec2,
@@ -84,7 +87,7 @@ impl Ideal {
         Self { focal_px, centre_px, is_pinhole: widest_rad < PINHOLE_RAD }
     }
 
-    /// Where it has a direction; `None` behind a pinhole.
+    /// The pixel of a direction; `None` behind a pinhole.
     fn pixel(&self, direction: DVec3) -> Option<DVec2> {
         let angle = direction.angle_between(DVec3::Z);
         let around = direction.truncate().try_normalize().unwrap_or(DVec2::ZERO);
@@ -96,7 +99,7 @@ impl Ideal {
         Some(self.centre_px + self.focal_px * radius * around)
     }
 
-    /// The direction that it has at a pixel; `None` where there is none.
+    /// The direction of a pixel; `None` where there is none.
     fn direction(&self, pixel: DVec2) -> Option<DVec3> {
         let flat = (pixel - self.centre_px) / self.focal_px;
         let angle = if self.is_pinhole { flat.length().atan() } else { flat.length() };
@@ -114,7 +117,8 @@ impl Ideal {
     }
 }
 
-/// How far from the axis the image shows something, rad: at its sides or its image circle, and in its corners.
+/// The angle from the axis that the image shows, rad: at its sides or its image circle, and in its
+/// corners.
 pub(super) fn shown_rad(camera: &Camera, survey: &Survey) -> [f64; 2] {
     let angle = |pixel: DVec2| {
         let ray = camera.unproject(pixel)?;
@@ -149,7 +153,7 @@ pub(super) fn curve(
             let around = DVec2::from_angle(TAU * i as f64 / AROUND as f64);
             let direction = (around * angle_rad.sin()).extend(angle_rad.cos());
             let pixel = camera.project(distance_mm * direction)?;
-            // Beyond where it turns back it is no lens.
+            // Beyond the point where the radius decreases it is no lens.
             let radius = ((pixel - camera.centre_px) / camera.focal_px).length();
             let centre_px = ideal.centre_px;
             let ideal = ideal.pixel(direction)?.distance(centre_px);

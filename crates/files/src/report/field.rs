@@ -1,5 +1,5 @@
-//! Values over an image as a picture: colours for how large they are, an outline around where corners were, and
-//! arrows.
+//! Maps over an image as SVG: colours for the size of a value, an outline around the region with
+//! corners, and arrows.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ const SCALES: f64 = 58.0;
 /// Widest part of the scale for a colour, user units.
 const WIDEST: f64 = 46.0;
 
-/// Where colours change, px, from the finest on.
+/// Limits between colours, px, from the finest on.
 const LEVELS: [f64; 10] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
 
 /// The colours between them, light where little is: told apart by those who see no red or no green.
@@ -55,12 +55,14 @@ struct Field {
     arrows: Vec<(DVec2, DVec2)>,
 }
 
-/// How sure a camera is over its image, as a file of its own.
+/// The uncertainty map of a camera as an SVG file of its own: standard deviation of projections
+/// over the image, px.
 pub fn uncertainty_svg(camera: &CameraEstimate, map: &UncertaintyMap) -> String {
     of_uncertainty(camera, map).by_itself(UNCERTAIN)
 }
 
-/// How two cameras differ over their image, as a file of its own.
+/// The comparison of two cameras as an SVG file of its own: differences of projections over an
+/// image of `size_px`, px.
 pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
     let places = found.places.iter();
     let values = places.map(|place| Some(place.as_ref()?.by.length()));
@@ -86,7 +88,7 @@ pub fn comparison_svg(size_px: [u32; 2], found: &Comparison) -> String {
 
 const UNCERTAIN: &str = "How sure the camera is over its image";
 
-/// How sure a camera is over its image, for a page.
+/// The uncertainty map of a camera for a page.
 pub(super) fn uncertainty(camera: &CameraEstimate, map: &UncertaintyMap) -> String {
     of_uncertainty(camera, map).axes().svg(NAMES, UNCERTAIN)
 }

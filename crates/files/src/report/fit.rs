@@ -1,10 +1,11 @@
-//! How well a camera fits, and how sure it is: plots over the image, the target and the views.
+//! Plots of residuals and of the uncertainty of projections, over the image, the target and the
+//! views.
 
 use super::page;
 use super::{Survey, board_residuals, field, plots};
 use deltille_core::calibrate::{CameraEstimate, Estimate, Source};
 
-/// Residuals over the image, the target, the radius and the views, and what the views cover.
+/// Residuals over the image, the target, the radius and the views, and the coverage of the image.
 pub(super) fn residuals(estimate: &Estimate, camera: &CameraEstimate, survey: &Survey) -> String {
     let (arrows, caption) = plots::residual_map(survey);
     let mut figures = vec![(arrows, caption)];
@@ -39,7 +40,7 @@ pub(super) fn residuals(estimate: &Estimate, camera: &CameraEstimate, survey: &S
     page::section("Residuals and coverage", &page::figures(figures))
 }
 
-/// How sure the camera is over its image.
+/// Uncertainty of projections over the image.
 pub(super) fn uncertainty(camera: &CameraEstimate) -> String {
     let maps = camera.uncertainty_maps();
     if maps.is_empty() {

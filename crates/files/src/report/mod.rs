@@ -1,14 +1,14 @@
-//! What a calibration is worth, as one page to look at: a self-contained HTML file with plots,
-//! tables and words on what would make it better.
+//! The report of a calibration: a self-contained HTML page with plots, tables and advice.
 //!
 //! ```text
-//!   estimate ─── survey ─→ what the views of a camera cover and show ─┬─ fit, distortion, board_residuals, scene ─→ SVG
-//!   diagnoses ───────────→ why it does not fit ───────────────────────├─ advice ───────────────────→ words
-//!   photographs ─────────→ thumbnails and a sample ───────────────────├─ models, parameters, views ─→ tables
-//!   models that were tried ───────────────────────────────────────────┴─ page ─────────────────────→ HTML
+//!  estimate ─── survey ─→ coverage and mean residuals of a camera ───┬─ fit, distortion, board_residuals, scene ─→ SVG
+//!  diagnoses ───────────→ reasons for lack of fit ───────────────────├─ advice ───────────────────→ words
+//!  photographs ─────────→ thumbnails and a sample ───────────────────├─ models, parameters, views ─→ tables
+//!  models that were tried ───────────────────────────────────────────┴─ page ─────────────────────→ HTML
 //! ```
 //!
-//! Limits: tilts are those of planar targets; a solid shows its faces at all of them.
+//! Limits: the tilt of a view is shown for planar targets only, as a solid shows faces at all
+//! tilts.
 
 mod advice;
 mod axes;
@@ -42,39 +42,41 @@ pub use target_map::target_map_svg;
 pub use thumbnail::thumbnail;
 pub use views::shown_views;
 
-/// What the page about a calibration shows.
+/// The contents of the page about a calibration.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Report<'a> {
-    /// Its headline, such as the name of the camera.
+    /// Headline, such as the name of the camera.
     pub title: &'a str,
     /// The calibration.
     pub estimate: &'a Estimate,
-    /// What is to be said about it.
+    /// Diagnoses of the calibration.
     pub diagnoses: &'a [Diagnosis],
-    /// Where the target's file has its panels.
+    /// Poses of the panels as the target file states them.
     pub stated: &'a [PanelPlace],
     /// What is known of the print.
     pub print: Print,
-    /// Small pictures of the views, by camera and name, as PNG; see [`thumbnail`].
+    /// Thumbnails of the views as PNG, by index of the camera and name of the view; see
+    /// [`thumbnail`].
     pub thumbnails: BTreeMap<(usize, String), Vec<u8>>,
-    /// A photograph of each camera, with and without distortion, by camera; see [`Sample::of`].
+    /// A photograph of each camera with and without distortion, by index of the camera; see
+    /// [`Sample::of`].
     pub samples: BTreeMap<usize, Sample>,
-    /// Models that were tried, by camera; see [`Calibration::compare_models`].
+    /// Lens models that were tried, for each camera; see [`Calibration::compare_models`].
     ///
     /// [`Calibration::compare_models`]: deltille_core::calibrate::Calibration::compare_models
     pub models: &'a [Vec<Candidate>],
 }
 
 impl<'a> Report<'a> {
-    /// A page of an estimate of which nothing else is known.
+    /// A page of an estimate without any of the optional contents.
     pub fn new(title: &'a str, estimate: &'a Estimate) -> Self {
         let (diagnoses, stated, print) = (&[], &[], Print::default());
         let (thumbnails, samples, models) = (BTreeMap::new(), BTreeMap::new(), &[]);
         Self { title, estimate, diagnoses, stated, print, thumbnails, samples, models }
     }
 
-    /// The page as HTML in one file, with its pictures within.
+    /// The page as one HTML file, with its pictures embedded.
     pub fn html(&self) -> String {
         page::html(self)
     }
@@ -88,7 +90,7 @@ impl<'a> Report<'a> {
         Words::new(self.estimate, self.print.scale)
     }
 
-    /// A camera on views that were held out.
+    /// A camera on the held-out views.
     fn held_out(&self, camera: usize) -> Option<&CameraEstimate> {
         self.estimate.held_out.as_ref()?.cameras.get(camera)
     }

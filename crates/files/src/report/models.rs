@@ -1,4 +1,4 @@
-//! Models that were tried beside the one that was taken, on views that took no part.
+//! Comparison of lens models on held-out views.
 
 use super::page::{escaped, meter};
 use deltille_core::calibrate::{CameraEstimate, Candidate, Comparison, Region};

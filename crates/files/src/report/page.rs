@@ -1,4 +1,4 @@
-//! The page itself.
+//! Assembly of the HTML page.
 
 use std::fmt::Write as _;
 
@@ -79,13 +79,13 @@ pub(super) fn html(report: &Report) -> String {
     page
 }
 
-/// What cameras have in common: the target as it was measured, and where all are in space.
+/// Sections about all cameras: the measured target, and the scene in space.
 fn shared(report: &Report) -> String {
     let map = report.estimate.map.as_ref().map_or(String::new(), target);
     map + &rig::panels(report) + &in_space(report)
 }
 
-/// How the lens bends what it sees.
+/// Plots of the distortion of a lens.
 fn distortion(camera: &CameraEstimate, survey: &Survey) -> String {
     let grid = distortion::grid_plot(camera, survey);
     let curve = distortion::curve_plot(camera, survey);
@@ -130,7 +130,7 @@ fn verdict(report: &Report, advice: &[Advice]) -> String {
     )
 }
 
-/// How sure the projections of a single camera are.
+/// Summary of the uncertainty of projections of a single camera.
 fn sureness(report: &Report) -> String {
     let [camera] = report.estimate.cameras.as_slice() else { return String::new() };
     let distance = camera.projection.as_ref().and_then(|known| known.distances_mm.first().copied());
@@ -146,7 +146,7 @@ fn sureness(report: &Report) -> String {
 /// A figure and what it is.
 type Figure = (String, &'static str);
 
-/// The figures of a camera that are looked for first.
+/// The key figures of a camera.
 fn of_camera(report: &Report, index: usize, found: &CameraEstimate) -> Vec<Figure> {
     let camera = &found.camera;
     let model = found.model.map_or("fixed".to_owned(), |model| model.to_string());
@@ -168,7 +168,7 @@ fn of_camera(report: &Report, index: usize, found: &CameraEstimate) -> Vec<Figur
     cells
 }
 
-/// The same of all cameras together.
+/// The key figures of all cameras together.
 fn of_rig(report: &Report) -> Vec<Figure> {
     let found = report.estimate;
     let mut cells = vec![
@@ -222,7 +222,7 @@ pub(super) fn data_url(png: &[u8]) -> String {
     format!("data:image/png;base64,{data}")
 }
 
-/// What took no part, over so many columns beside its name.
+/// A table row of an excluded view, over `columns` columns beside its name.
 pub(super) fn out_row(out: &Excluded, columns: usize) -> String {
     format!(
         "<td class=\"name\">{}</td><td colspan=\"{columns}\" class=\"out\">left out: {}</td></tr>",

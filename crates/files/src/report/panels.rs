@@ -1,4 +1,5 @@
-//! The corners of a target with something to say of each: a coloured dot at its place on its panel, and an arrow.
+//! Plot of values at the corners of a target: a coloured dot at the place of each corner on its
+//! panel, and an arrow.
 
 use std::fmt::Write as _;
 
@@ -23,7 +24,7 @@ pub(super) struct Mark {
     pub panel: PanelRef,
     pub row: i32,
     pub col: i32,
-    /// Where it is on its panel, mm.
+    /// Its position on the panel, mm.
     pub at_mm: DVec2,
     /// Its arrow before that is enlarged, mm.
     pub by_mm: DVec2,

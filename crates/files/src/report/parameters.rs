@@ -1,4 +1,4 @@
-//! The parameters of a camera, with their deviations and correlations.
+//! Table of the parameters of a camera, with standard deviations and correlations.
 
 use std::fmt::Write as _;
 

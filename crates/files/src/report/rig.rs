@@ -1,4 +1,4 @@
-//! What a rig has that a single camera has not: places of cameras and panels, and frames.
+//! Tables of a rig: relative camera poses, panels, targets and frames.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::views::MOST_VIEWS;
 use deltille_core::calibrate::{FrameEstimate, PanelPlace};
 use deltille_core::camera::Pose;
 
-/// Where the cameras are to each other.
+/// Relative camera poses.
 pub(super) fn places(report: &Report) -> String {
     let first = report.estimate.cameras.first().map_or("", |camera| camera.name.as_str());
     let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
@@ -43,7 +43,7 @@ pub(super) fn places(report: &Report) -> String {
     )
 }
 
-/// Where targets are to each other, where there are several.
+/// Relative poses of targets, where there are several.
 pub(super) fn targets(report: &Report) -> String {
     let targets = &report.estimate.targets;
     if targets.len() < 2 {
@@ -73,7 +73,7 @@ pub(super) fn targets(report: &Report) -> String {
     )
 }
 
-/// How far the panels of the target are from where its file has them, where that was found.
+/// Refined panel poses against those of the target file.
 pub(super) fn panels(report: &Report) -> String {
     let seen = report.estimate.corners().map(|corner| (corner.panel.index(), corner.panel.id()));
     let ids: BTreeMap<usize, u32> = seen.collect();
@@ -101,13 +101,13 @@ pub(super) fn panels(report: &Report) -> String {
     )
 }
 
-/// How far a panel was turned, rad, and moved, mm.
+/// Rotation, rad, and translation, mm, of a panel against its stated pose.
 fn off(found: &PanelPlace, stated: &PanelPlace) -> [DVec3; 2] {
     found.target_from_panel.off(&stated.target_from_panel)
 }
 
-/// Standard deviation of the length of a vector of which a block of the covariance tells; the largest
-/// of any direction where it has none.
+/// Standard deviation of the length of a vector with a block of the covariance; for a zero vector
+/// the largest of any direction.
 fn deviation(of: DVec3, covariance: &[[f64; 6]; 6], block: usize) -> f64 {
     let entry = |i: usize, j: usize| covariance[block + i][block + j];
     let variance = match of.try_normalize() {

@@ -1,4 +1,5 @@
-//! A photograph, and what it would be without distortion: lines through the corners of a row are straight there.
+//! A photograph beside its undistorted version, in which lines through the corners of a row are
+//! straight.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -16,23 +17,23 @@ use deltille_core::raster::Gray;
 /// Longest side of the pictures, px.
 const SIDE: usize = 520;
 
-/// The widest view that is shown, rad: beyond, its border takes all the room.
+/// Widest field of view that is shown, rad: beyond it the border takes up all of the picture.
 const WIDEST_RAD: f64 = 110.0 / 180.0 * std::f64::consts::PI;
 
-/// What is nearer to the axis is within that view, rad.
+/// Angle from the axis within which corners are inside that field, rad.
 const AHEAD_RAD: f64 = 45.0 / 180.0 * std::f64::consts::PI;
 
-/// A line is drawn through so many corners and more.
+/// Least number of corners of a line.
 const LEAST_IN_LINE: usize = 3;
 
-/// A photograph of a camera and what it would be without distortion.
+/// A photograph of a camera and its undistorted version.
 #[derive(Clone, Debug)]
 pub struct Sample {
     view: String,
     size_px: DVec2,
     photograph: Vec<u8>,
     undistorted: Vec<u8>,
-    /// Of the undistorted picture.
+    /// Size of the undistorted picture, px.
     undistorted_px: DVec2,
     field_rad: f64,
     /// Chords from the first to the last corner of rows and columns, and the corners, in both pictures.
@@ -41,7 +42,8 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// The view of a camera, of those that are meant, whose corners fill most of the picture, as far as a pinhole shows them.
+    /// The view of a camera, among those that satisfy `is_meant`, whose corners fill most of the
+    /// picture within the field of a pinhole.
     pub fn best(
         camera: &CameraEstimate,
         is_meant: impl Fn(&&ViewEstimate) -> bool,
@@ -62,7 +64,8 @@ impl Sample {
         views.into_iter().find(is_meant)
     }
 
-    /// A view and its photograph; `None` where the camera sees nothing along its axis, or no picture comes of it.
+    /// Undistorts the photograph of a view; `None` where the camera has no ray along its axis, or
+    /// the picture cannot be made.
     pub fn of(camera: &CameraEstimate, view: &ViewEstimate, photograph: Gray<u8>) -> Option<Self> {
         let lens = &camera.camera;
         let distance_mm = view.pose.translation.length();

@@ -1,4 +1,5 @@
-//! Cameras and targets in space: pictures in parallel projection, one with the cameras at rest, one with the target.
+//! Drawings of cameras and targets in space, in parallel projection: one with the cameras fixed,
+//! one with the target fixed.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -184,7 +185,7 @@ fn around_target(estimate: &Estimate, long: f64) -> Vec<Shape> {
     widest.into_values().map(|(_, shape)| shape).chain(cameras).collect()
 }
 
-/// Where the corners of the picture are on a plane ahead.
+/// The corners of the picture projected onto a plane ahead.
 fn corners_ahead(camera: &Camera) -> [DVec2; 4] {
     let [a, b, c, d] = camera.corners_px();
     [a, b, d, c].map(|corner| {

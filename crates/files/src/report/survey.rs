@@ -6,7 +6,7 @@ use deltille_core::camera::Camera;
 /// Cells of the maps along the longer side of the image.
 const CELLS: usize = 16;
 
-/// What the views of a camera cover and show.
+/// Statistics of the views of a camera: coverage of the image, mean residuals, tilts and distances.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Survey {
@@ -23,11 +23,11 @@ pub struct Survey {
     pub views: Vec<SurveyedView>,
     /// Whether the target is a plane.
     pub planar: bool,
-    /// What the lens shows, where that is not all of the image.
+    /// Image circle of the lens, where it does not fill the image.
     pub circle: Option<ImageCircle>,
 }
 
-/// The mean residual of a cell, outliers left out.
+/// The mean residual of a cell, without outliers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CellMean {
@@ -37,18 +37,18 @@ pub struct CellMean {
     pub sd_px: f64,
 }
 
-/// How a view stands.
+/// Tilt and distance of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SurveyedView {
     /// Angle between the board's normal and the line of sight to the middle of its corners, rad;
     /// `None` for solids.
     pub tilt_rad: Option<f64>,
-    /// Distance of the target's origin, mm.
+    /// Distance of the origin of the target from the camera, mm.
     pub distance_mm: f64,
 }
 
-/// Fewest corners whose mean says something.
+/// Least number of corners for a mean.
 const LEAST_IN_CELL: usize = 4;
 
 impl Survey {
@@ -79,7 +79,7 @@ impl Survey {
         Self { size_px, cells, counts, means_px, views, planar, circle }
     }
 
-    /// Part of the cells of the image, or of its circle, in which there are corners.
+    /// Fraction of the cells of the image, or of its image circle, that hold corners.
     pub fn covered(&self) -> f64 {
         let [columns, rows] = self.cells;
         let is_shown = |index: usize| {
@@ -93,8 +93,8 @@ impl Survey {
         covered as f64 / shown.len().max(1) as f64
     }
 
-    /// Distance of the outermost corner from the middle of the image, as a part of half its
-    /// diagonal; or from the middle of its circle, as a part of its radius.
+    /// Distance of the outermost corner from the middle of the image, as a fraction of half its
+    /// diagonal; or from the middle of the image circle, as a fraction of its radius.
     pub fn reach(&self, camera: &CameraEstimate) -> f64 {
         let size = self.size_px;
         let whole =
@@ -104,8 +104,8 @@ impl Survey {
         radii.fold(0.0, f64::max) / circle.radius_px
     }
 
-    /// Root mean square of the cells' mean residuals in their standard deviations: 1 where
-    /// residuals are by chance, more where the model leaves a pattern.
+    /// RMS of the mean residuals of cells in units of their standard deviations: 1 where residuals
+    /// are random, more where the model has lack of fit. `None` without cells that have a mean.
     pub fn pattern(&self) -> Option<f64> {
         let seen: Vec<f64> = self
             .means_px

@@ -1,5 +1,5 @@
-//! A map of a target's corners as a picture: arrows for what is off in the plane, colours for what is above
-//! or below it.
+//! Map of the measured corner offsets of a target: arrows for offsets in the plane, colours for
+//! those above or below it.
 
 use std::fmt::Write as _;
 
@@ -31,7 +31,7 @@ const STYLE: &str = "\
 .target-map .place{stroke:#667;stroke-width:.6}\
 @media(prefers-color-scheme:dark){.target-map text{fill:#a9b2bd}.target-map .offset{stroke:#ff7b72}}";
 
-/// The picture as a file of its own.
+/// The map as an SVG file of its own.
 pub fn target_map_svg(map: &TargetMap) -> String {
     drawing(map, " xmlns=\"http://www.w3.org/2000/svg\"")
 }

@@ -1,18 +1,19 @@
-//! Photographs made small.
+//! Thumbnails of photographs.
 
 use image::GrayImage;
 
 use deltille_core::raster::Gray;
 
-/// Longest side of a small picture, px.
+/// Longest side of a thumbnail, px.
 const SIDE: usize = 240;
 
-/// A small picture of an image as PNG: each pixel the mean of those that it stands for.
+/// The thumbnail of an image as PNG, at most 240 px on its longer side, each pixel the mean of
+/// those that it covers; `None` where it cannot be encoded.
 pub fn thumbnail(image: &Gray<u8>) -> Option<Vec<u8>> {
     png(&reduced(image, SIDE))
 }
 
-/// An image whose longer side is at most so many pixels.
+/// The image reduced to at most `side` pixels on its longer side.
 pub(super) fn reduced(image: &Gray<u8>, side: usize) -> GrayImage {
     let (width, height) = (image.width(), image.height());
     let scale = (width.max(height) as f64 / side as f64).max(1.0);

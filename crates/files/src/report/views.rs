@@ -1,4 +1,4 @@
-//! The views of a camera: the worst in pictures, all of them in a table.
+//! The views of a camera: the worst as pictures, all of them in a table.
 
 use std::fmt::Write as _;
 
@@ -19,7 +19,7 @@ const IN_PICTURES: usize = 8;
 const ARROW_PART: f64 = 0.05;
 const NEARLY_ALL: f64 = 0.95;
 
-/// The views of a camera that a page shows, the worst first.
+/// The views of a camera that a page shows, those with the largest RMS residual first.
 pub fn shown_views(camera: &CameraEstimate) -> Vec<&ViewEstimate> {
     order(camera).into_iter().map(|index| &camera.views[index]).collect()
 }
@@ -168,8 +168,8 @@ fn id(camera: usize, of_view: usize) -> String {
     format!("picture-{camera}-{of_view}")
 }
 
-/// The small picture of a view with its corners, and with their residuals so many times enlarged; these alone where there is
-/// no picture.
+/// The thumbnail of a view with its corners, and their residuals enlarged by a factor; these alone
+/// where there is no thumbnail.
 fn picture(report: &Report, index: usize, view: &ViewEstimate, shown: Shown) -> String {
     let camera = &report.estimate.cameras[index].camera;
     let (width, height) = (camera.width, camera.height);

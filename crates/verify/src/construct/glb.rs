@@ -18,11 +18,11 @@ use deltille_files::limits::{Exceeded, Limits};
 
 const TRIANGLES: u32 = 4;
 
-/// How far a node's motion may be from a turn and one scale for all axes, relative: single
-/// precision.
+/// Tolerance, relative, of the transformation of a node from a rotation with one scale for all
+/// axes: single precision.
 const SLACK: f64 = 1e-5;
 
-/// Goes through a `.glb`.
+/// Inspects a `.glb` for constructs that are not permitted.
 pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Findings, String> {
     let mut found = Findings::default();
     let Some(Chunks { json, binary }) = Chunks::read(bytes, &mut found)? else { return Ok(found) };
@@ -47,7 +47,7 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
         found.add("the JSON", "a list for an object or within a list");
         return Ok(found);
     }
-    // Of what is spelled in two ways, or there twice, readers take one or the other.
+    // Of a key that is spelled in two ways, or repeated, readers take one or the other.
     let anew = value.to_string();
     let filled = anew.len().next_multiple_of(4) == json.len();
     if !filled || json.trim_ascii_end() != anew.as_bytes() {
@@ -56,7 +56,7 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
     }
     let mut walk = Walk { root: &root, binary, words, found };
     walk.counts();
-    // What refers to something that is not there is not followed.
+    // References to missing objects are not followed.
     if walk.found.0.is_empty() {
         walk.sizes(limits).map_err(|exceeded| exceeded.to_string())?;
         walk.nodes(limits).map_err(|exceeded| exceeded.to_string())?;

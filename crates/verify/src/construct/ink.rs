@@ -1,5 +1,5 @@
-//! How much there is to draw on a page. Lines that cross it a thousand times, or a thousand areas
-//! on top of each other, keep a renderer busy for hours, and no target has them.
+//! Bounds on the amount of drawing on a page. Lines that cross it a thousand times, or a thousand
+//! areas on top of each other, keep a renderer busy for hours, and no target has them.
 
 use std::collections::HashSet;
 
@@ -17,17 +17,19 @@ const MOST_PAGES: f64 = 40.0;
 /// and strokes of letters have more.
 const LEAST_WIDTH_MM: f64 = 0.01;
 
-/// Of a mark that is thinner.
+/// Problem of a mark that is thinner.
 const THIN: &str = "a mark so thin that not all viewers draw it alike";
 
-/// Of a mark on top of its like: where both cover a part of a pixel, some viewers draw it darker.
+/// Problem of a mark on top of an equal one: where both cover a part of a pixel, some viewers draw
+/// it darker.
 const TWICE: &str = "a mark that is drawn twice";
 
-/// What tells marks apart, in parts of [`LEAST_WIDTH_MM`]: where one ends on each side, the side of a square of its
-/// area, along which diagonal its points lie, and the width of its pen.
+/// The key by which equal marks are recognised, in units of [`LEAST_WIDTH_MM`]: its ends on each
+/// side, the side of a square of its area, the diagonal along which its points lie, and the width
+/// of its pen.
 type Outline = [i64; 7];
 
-/// What is on a page so far, in its own units.
+/// The marks on a page so far, in units of the page.
 pub(super) struct Ink {
     /// Area of the page.
     page: f64,
@@ -44,7 +46,8 @@ impl Ink {
         Self { page: size.element_product(), mm, length: 0.0, area: 0.0, marks: HashSet::new() }
     }
 
-    /// Adds a filled path, or one that is drawn by a pen of some width, and says why not all viewers draw it alike.
+    /// Adds a filled path, or one that is stroked with a pen of some width; returns the reason if
+    /// not all viewers draw it alike.
     pub fn add(&mut self, path: &BezPath, pen: Option<f64>) -> Option<&'static str> {
         let (length, count) = length(path);
         let around = path.control_box();
@@ -105,8 +108,8 @@ impl Ink {
     }
 }
 
-/// The length of a path, and how many segments it has. Of a curve it is that of its control points, which is no less and
-/// takes no time.
+/// The length of a path, and its number of segments. For a curve it is the length of its control
+/// polygon, which is an upper bound and quick to compute.
 fn length(path: &BezPath) -> (f64, f64) {
     let lengths = path.segments().map(|segment| {
         let points = segment.to_cubic();

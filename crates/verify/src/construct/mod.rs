@@ -1,9 +1,9 @@
-//! What a file is built of, held against a list of what every viewer shows alike.
+//! Inspection of the constructs of a file against a list of those that every viewer shows alike.
 //!
-//! A picture of a file proves what one program shows. Scripts, animations, rules for print, layers,
-//! blend modes, vertex colours or a second scene make another program show something else. So each
-//! format has a list of what its writer here uses and the reader interprets exactly; anything else
-//! is named and refused, known as harmful or not. What is refused is not drawn.
+//! Rendering a file proves what one program shows. Scripts, animations, rules for print, layers,
+//! blend modes, vertex colours or a second scene make other programs show something else. So each
+//! format has a list of the constructs that its writer here uses and the reader interprets exactly;
+//! anything else is named and refused, known as harmful or not. A refused file is not rendered.
 
 mod glb;
 mod glb_json;
@@ -28,40 +28,41 @@ use deltille_core::artwork::subject;
 use deltille_core::targets::Target;
 use deltille_files::export::mesh::extras;
 
-/// Of marks that a viewer which shows more than the page shows too.
+/// Problem of marks outside the page, which viewers that show more than the page show, too.
 const OFF_PAGE: &str = "a mark that reaches over the edge of the page";
 
 /// Most characters of a number.
 const MOST_DIGITS: usize = 40;
 
-/// More than this of a file is not listed.
+/// Most findings that are listed for a file.
 const MOST_LISTED: usize = 64;
 
-/// What is wrong with what a file is built of.
+/// A construct that is not permitted, or hidden content.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ConstructFinding {
-    /// The file has something that not every viewer shows alike, so that what is seen here need
-    /// not be what is seen elsewhere.
+    /// The file has a construct that not every viewer shows alike, so that other programs may show
+    /// something else than is seen here.
     #[error("{place}: {construct}: not every viewer shows that alike")]
     Construct {
-        /// Where it is, in the words of the format.
+        /// Its place, in the terms of the format.
         place: String,
-        /// What it is.
+        /// The construct or problem.
         construct: String,
     },
-    /// What no picture of the page shows: words that are not those of the target, or marks beside the page.
+    /// Content that no picture of the page shows: texts that are not those of the target, or marks
+    /// beside the page.
     #[error("{place}: {problem}")]
     Unseen {
-        /// Where it is, in the words of the format.
+        /// Its place, in the terms of the format.
         place: String,
-        /// What it is.
+        /// The construct or problem.
         problem: String,
     },
 }
 
-/// What is not on the list, as it is met on the way through a file.
+/// Constructs that are not permitted, collected while a file is inspected.
 #[derive(Default)]
 struct Findings(Vec<Finding>);
 
@@ -74,14 +75,14 @@ impl Findings {
         }
     }
 
-    /// Adds a construct unless something holds.
+    /// Adds a construct unless `holds`.
     fn unless(&mut self, holds: bool, place: impl Into<String>, construct: impl Into<String>) {
         if !holds {
             self.add(place, construct);
         }
     }
 
-    /// Adds, unless something holds, what no picture shows; what is drawn is compared all the same.
+    /// Adds hidden content unless `holds`; the file is rendered and compared all the same.
     fn unseen_unless(&mut self, holds: bool, place: impl Into<String>, problem: impl Into<String>) {
         if !holds && !self.is_full() {
             let (place, problem) = (place.into(), problem.into());
@@ -99,7 +100,7 @@ impl Findings {
         self.0.len() >= MOST_LISTED
     }
 
-    /// Adds what a file that belongs to this one has, with its name.
+    /// Adds the findings of a file that belongs to this one, with its name.
     fn add_of(&mut self, file: &str, other: Findings) {
         for finding in other.0 {
             match finding {
@@ -126,13 +127,13 @@ pub(super) fn refuse(findings: &[Finding]) -> bool {
     })
 }
 
-/// What files say of their target in words, for people and programs that do not look at the picture.
+/// Texts about the target in files, for people and programs that do not look at the picture.
 struct Words {
     /// Its name.
     title: String,
     /// One line on what it is.
     subject: String,
-    /// The same for programs.
+    /// The same facts as JSON, for programs.
     extras: Value,
 }
 
@@ -156,8 +157,8 @@ fn is_creator(words: &str) -> bool {
     !version.is_empty() && version.chars().all(|c| c.is_ascii_digit() || c == '.')
 }
 
-/// What of a drawn page, a mesh or a body is not on the list of its format, or says in words
-/// what the target is not; and the files that belong to it, as an OBJ names them. An error means that
+/// Inspects a printed page, a mesh or a body: constructs that are not permitted, texts that are not
+/// those of the target, and the files that belong to it, as an OBJ names them. An error means that
 /// a file cannot be read at all.
 pub(super) fn check(
     reader: &Reader,
@@ -202,8 +203,8 @@ fn decimal(word: &str) -> Option<f64> {
     plain.then(|| word.parse().ok()).flatten()
 }
 
-/// Unpacks what is packed by zlib, block by block, and tells its length: `None` unless it ends with the
-/// last of these bytes, its check sum is right, and it is no longer than `most`.
+/// Decompresses zlib data block by block and returns its length: `None` unless the stream ends with
+/// the last byte, its checksum is right, and it is no longer than `most`.
 fn unpack(packed: &[u8], most: u64, mut each: impl FnMut(&[u8])) -> Option<u64> {
     let mut stream = Decompress::new(true);
     let mut block = vec![0; 1 << 16];
@@ -221,7 +222,7 @@ fn unpack(packed: &[u8], most: u64, mut each: impl FnMut(&[u8])) -> Option<u64> 
                 return Some(stream.total_out());
             }
             Status::StreamEnd => return None,
-            // Nothing goes on: the end is missing.
+            // No progress: the end is missing.
             _ if length == 0 && stream.total_in() == read => return None,
             _ => {}
         }

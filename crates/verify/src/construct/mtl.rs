@@ -3,8 +3,8 @@
 
 use super::{Findings, is_creator, is_plain_file_name, start};
 
-/// What is stated of the material, word for word: no light of its own, white, no gloss. What is left out
-/// is something else in each viewer.
+/// The statements about the material, word for word: no ambient light, white, no gloss. Viewers
+/// differ in what they assume for an omitted statement.
 const STATED: [&str; 4] = ["Ka 0 0 0", "Kd 1 1 1", "Ks 0 0 0", "illum 1"];
 
 /// The material of a library.
@@ -16,7 +16,8 @@ pub(super) struct Material {
     pub texture: Option<String>,
 }
 
-/// Goes through a material library: what wrote it, and each statement once, the name first.
+/// Inspects a material library: the comment about its writer, and each statement once, the name
+/// first.
 pub(super) fn check(text: &str) -> (Material, Findings) {
     let (mut material, mut found) = (Material::default(), Findings::default());
     let mut stated: Vec<&str> = Vec::new();

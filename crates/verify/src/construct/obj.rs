@@ -10,8 +10,8 @@ use super::{Findings, Words, decimal, is_creator, is_plain_file_name, mtl, png, 
 use crate::reader::Reader;
 use crate::{Artifact, DocumentError};
 
-/// Goes through an OBJ, its material library and its texture, and returns these two where they
-/// were come to.
+/// Inspects an OBJ, its material library and its texture, and returns these two if they were
+/// reached.
 pub(super) fn check(
     reader: &Reader,
     path: &Path,
@@ -45,7 +45,7 @@ pub(super) fn check(
     Ok((found, parts))
 }
 
-/// Goes through the lines of an OBJ.
+/// Inspects the lines of an OBJ.
 fn lines(text: &str, words: &Words) -> Lines {
     let mut lines = Lines::default();
     for (index, line) in text.split_terminator('\n').enumerate() {
@@ -65,7 +65,7 @@ fn lines(text: &str, words: &Words) -> Lines {
     lines
 }
 
-/// What was read so far.
+/// The state of the inspection.
 #[derive(Default)]
 struct Lines {
     found: Findings,
@@ -147,7 +147,7 @@ fn index(word: &str) -> Option<usize> {
     word.parse().ok().filter(|index: &usize| index.to_string() == word)
 }
 
-/// Beyond the texture viewers repeat it or not.
+/// Whether a coordinate is on the texture; beyond it some viewers repeat the texture.
 fn on_texture(word: &str) -> bool {
     decimal(word).is_some_and(|value| (0.0..=1.0).contains(&value))
 }

@@ -20,14 +20,14 @@ const PAGE: [&str; 8] =
     ["Type", "Parent", "MediaBox", "TrimBox", "CropBox", "Resources", "Contents", "Annots"];
 /// Kinds of resources that may be listed, as long as there are none.
 const RESOURCES: [&str; 4] = ["Font", "XObject", "ExtGState", "Shading"];
-/// Where the content of a stream begins.
+/// The bytes before the content of a stream.
 const STREAM_BEGINS: &[u8] = b">>stream";
 const STREAM: [&str; 2] = ["Length", "Filter"];
 
 /// Bytes that are no text, for programs that tell files by them.
 const BINARY_MARK: &[u8] = b"\n%\xbb\xad\xc0\xde\n";
 
-/// Goes through a PDF.
+/// Inspects a PDF for constructs that are not permitted.
 pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Findings, String> {
     if positions(bytes, b"%PDF-").is_empty() {
         return Err("not a readable PDF (its head)".to_owned());
@@ -116,13 +116,13 @@ fn trailer(bytes: &[u8], found: &mut Findings) {
     found.unless(tables < 2, "the end", "a second revision");
 }
 
-/// Where a word stands in a file.
+/// The offsets of a word in a file.
 fn positions(bytes: &[u8], word: &[u8]) -> Vec<usize> {
     let windows = bytes.windows(word.len()).enumerate();
     windows.filter(|(_, window)| *window == word).map(|(at, _)| at).collect()
 }
 
-/// How many slashes, which begin names, an object is written with.
+/// Number of slashes, which begin names, in the written form of an object.
 fn slashes(object: &Object) -> usize {
     let of_dictionary = |dictionary: &Dictionary| -> usize {
         dictionary.iter().map(|(_, value)| 1 + slashes(value)).sum()
@@ -139,8 +139,8 @@ fn slashes(object: &Object) -> usize {
     }
 }
 
-/// What stands between the streams of a file, and what is in them, without the ends of lines
-/// around it.
+/// The parts of a file between its streams, and the contents of the streams without the line ends
+/// around them.
 fn split_streams(bytes: &[u8]) -> (Vec<&[u8]>, Vec<&[u8]>) {
     let (begins, ends) = (positions(bytes, STREAM_BEGINS), positions(bytes, b"endstream"));
     let (mut between, mut streams) = (Vec::new(), Vec::new());
@@ -174,22 +174,22 @@ fn references(document: &Document, object: &Object, used: &mut BTreeSet<ObjectId
 /// The way through a document.
 struct Walk<'a> {
     document: &'a Document,
-    /// What stands between streams in the file.
+    /// The parts of the file between streams.
     between: Vec<&'a [u8]>,
-    /// What is in streams in the file.
+    /// The contents of streams in the file.
     streams: Vec<&'a [u8]>,
     limits: &'a Limits,
     found: Findings,
 }
 
 impl<'a> Walk<'a> {
-    /// What an object is, references followed.
+    /// The object with references resolved.
     fn resolve(&self, object: &'a Object) -> Option<&'a Object> {
         self.document.dereference(object).ok().map(|(_, object)| object)
     }
 
-    /// As many names are read as stand in the file: of a key or an object that is there twice one
-    /// reader takes the first, another the last.
+    /// Checks that as many names are parsed as the file has: of a repeated key or object one reader
+    /// takes the first, another the last.
     fn names(&mut self) {
         let objects = self.document.objects.values().map(slashes);
         let trailer: usize =
@@ -331,7 +331,7 @@ impl<'a> Walk<'a> {
         self.content(page, size_pt, place)
     }
 
-    /// All boxes are the page, from its origin; its width and height in points.
+    /// Checks that all boxes are the page, from its origin; returns width and height in points.
     fn boxes(&mut self, page: &'a Dictionary, place: &str) -> DVec2 {
         let ends = |key: &str| -> Option<Vec<f32>> {
             let list = self.value(page, key)?.as_array().ok()?;
@@ -348,7 +348,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Nothing of a page needs a resource.
+    /// Checks that a page has no resources.
     fn resources(&mut self, page: &'a Dictionary, place: &str) {
         let resources = self.value(page, "Resources").and_then(|object| object.as_dict().ok());
         let Some(resources) = resources else { return };

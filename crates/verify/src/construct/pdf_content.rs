@@ -13,14 +13,14 @@ const MM_PER_PT: f64 = 25.4 / 72.0;
 /// Words that an operator with its operands has on the average.
 const WORDS: usize = 3;
 
-/// What an operator does to the path that is being built.
+/// The effect of an operator on the current path.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Role {
     /// Sets what paths are painted with, between paths.
     State,
     /// Begins a contour.
     Begin,
-    /// Goes on with a contour.
+    /// Continues a contour.
     GoOn,
     /// Paints the path, which is then gone.
     Paint,
@@ -45,11 +45,11 @@ const BLACK: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 /// Coordinates beyond this are not held exactly by all viewers, points.
 const FARTHEST_PT: f64 = 1e5;
 
-/// How far a path may reach over the edge of the page, points: what written digits leave.
+/// Distance by which a path may reach over the edge of the page, points, by the number of digits.
 const EDGE_SLACK_PT: f64 = 0.01;
 
-/// Goes through the content of a page of that width and height in points: numbers and operators, and
-/// nothing else. What is painted is on the page, and with what is said before.
+/// Inspects the content of a page of that width and height in points: numbers and permitted
+/// operators only, and all painted marks on the page, with the stated paint.
 pub(super) fn check(
     content: &[u8],
     size_pt: DVec2,
@@ -96,7 +96,7 @@ pub(super) fn check(
     Ok(())
 }
 
-/// What was said so far on a page.
+/// The graphics state of a page.
 struct Painter {
     size_pt: DVec2,
     /// Operators that tell what paths are painted with.

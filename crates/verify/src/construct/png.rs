@@ -10,13 +10,13 @@ const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 /// Pixels, their size on paper, what wrote them, and a title.
 const CHUNKS: [&[u8]; 6] = [b"IHDR", b"pHYs", b"tEXt", b"iTXt", b"IDAT", b"IEND"];
 
-/// What stands before the title: a word, and that it is neither packed nor in a language.
+/// The bytes before the title: a keyword, and flags for neither compression nor a language.
 const TITLE: &[u8] = b"Title\0\0\0\0\0";
 
 /// Depth, colour type, compression, filter and interlace of 8-bit grey.
 const GREY: [u8; 5] = [8, 0, 0, 0, 0];
 
-/// Goes through the chunks of a PNG with that title.
+/// Inspects the chunks of a PNG with that title.
 pub(super) fn check(bytes: &[u8], title: &str, limits: &Limits) -> Result<Findings, String> {
     let mut rest = bytes.strip_prefix(&SIGNATURE).ok_or("not a readable PNG (its signature)")?;
     let mut found = Findings::default();
@@ -67,7 +67,7 @@ pub(super) fn check(bytes: &[u8], title: &str, limits: &Limits) -> Result<Findin
     found.unseen_unless(seen.contains(&b"tEXt".as_slice()), "the file", "no name of what wrote it");
     let place = format!("byte {}", bytes.len() - rest.len());
     found.unless(rest.is_empty(), place, "data after the end");
-    // What is not grey of 8 bits is told already.
+    // Other pixel formats are reported already.
     let is_whole = found.refuse() || is_whole(&packed, first);
     found.unless(
         is_whole,
@@ -116,7 +116,7 @@ struct Chunk<'a> {
     data: &'a [u8],
     /// Whether the check sum is that of name and content.
     is_intact: bool,
-    /// What follows the chunk.
+    /// The bytes after the chunk.
     after: &'a [u8],
 }
 

@@ -1,5 +1,5 @@
-//! What every reader of binary STL takes alike: the head that is written, and triangles without
-//! attributes, which some readers take for colours.
+//! Inspection of binary STL for what every reader takes alike: the header that is written here, and
+//! triangles without attributes, which some readers take for colours.
 
 use super::Findings;
 use deltille_files::export::stl::header;
@@ -10,7 +10,7 @@ const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 const GEOMETRY: usize = 48;
 
-/// Goes through an STL of a target of that name. What is too short is left to the reader.
+/// Inspects an STL of a target of that name. A truncated file is left to the reader.
 pub(super) fn check(bytes: &[u8], name: &str, limits: &Limits) -> Result<Findings, String> {
     let count = bytes.len().saturating_sub(HEAD) / TRIANGLE;
     limits.check_nodes(count).map_err(|exceeded| exceeded.to_string())?;

@@ -10,7 +10,7 @@ use deltille_files::limits::{Kind, Limits};
 
 const NAMESPACE: &str = "http://www.w3.org/2000/svg";
 
-/// What is written before the drawing.
+/// The declaration before the drawing.
 const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>";
 
 /// Elements with their parents and attributes. An `id` is on the list since nothing that is could
@@ -27,14 +27,14 @@ const ELEMENTS: [(&str, &str, &[&str]); 6] = [
 /// Coordinates beyond this are drawn differently by arithmetic of different precision.
 const FARTHEST: f64 = 1e5;
 
-/// How far a path may reach over the edge of the page, and width and height of the drawing be of another
-/// shape than those of the page: what written digits leave, mm.
+/// Distance by which a path may reach over the edge of the page, and by which the shape of the
+/// drawing may differ from that of the page, mm, by the number of digits.
 const EDGE_SLACK_MM: f64 = 1e-3;
 
 /// Attributes of an element are compared with each other by readers, so that many take for ever.
 const MOST_ATTRIBUTES: usize = 1000;
 
-/// Goes through an SVG.
+/// Inspects an SVG for constructs that are not permitted.
 pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Findings, String> {
     let text = text(bytes)?;
     if text.split('<').any(|tag| tag.matches('=').count() > MOST_ATTRIBUTES) {
@@ -115,7 +115,7 @@ fn is_writer(comment: &Node) -> bool {
     first && words.is_some_and(is_creator)
 }
 
-/// Adds what a path draws, and says why it is not drawn alike everywhere.
+/// Adds the mark of a path; returns the reason if not all viewers draw it alike.
 fn add(node: &Node, ink: &mut Ink) -> Option<&'static str> {
     let path = BezPath::from_svg(node.attribute("d").unwrap_or_default()).ok()?;
     let pen = node.attribute("stroke").map(|_| {
@@ -146,7 +146,7 @@ struct View {
 }
 
 impl View {
-    /// Whose drawing is as wide and high as the page, in some unit.
+    /// The view of a drawing with the proportions of the page, in some unit.
     fn of(svg: &Node) -> Option<Self> {
         let [width, height] = ["width", "height"].map(|key| length(svg.attribute(key)?));
         let ends = svg.attribute("viewBox")?.split(' ').map(decimal).collect::<Option<Vec<_>>>()?;
@@ -186,7 +186,7 @@ fn paper(document: &Document, found: &mut Findings) {
     found.unless(!drawn.any(|name| name == "rect"), "the page", "paper above the marks");
 }
 
-/// What of an element is not on the list.
+/// The parts of an element that are not permitted.
 fn element(node: &Node) -> Vec<String> {
     let name = node.tag_name().name();
     let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());

@@ -1,5 +1,5 @@
-//! Artifacts read back as pictures, by other code than wrote them: hayro for PDF, resvg
-//! for SVG, the image crates for PNG.
+//! Artifacts read back as pictures, by other code than wrote them: hayro for PDF, resvg for SVG,
+//! the image crates for PNG.
 
 mod pdf;
 mod png;
@@ -18,14 +18,14 @@ use deltille_files::limits::{Guard, Limits, ReadError};
 /// Largest picture that is drawn for a check, px.
 pub(super) const MAX_PIXELS: f64 = 60.0e6;
 
-/// How far the ink of an area may be from 0 or 1 on a page that is drawn or read: what rounding leaves of 255 grey
-/// values.
+/// Tolerance of the ink of an area from 0 or 1 on a page that is rendered or read: the effect of
+/// rounding to 255 grey values.
 pub(super) const MAX_INK_ERROR: f64 = 0.01;
 
-/// The same so near to an edge that its smear reaches there.
+/// The tolerance near an edge, within reach of its smear.
 pub(super) const SMEARED_INK_ERROR: f64 = 0.3;
 
-/// Which kind of file.
+/// The format of an artifact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
@@ -49,7 +49,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// All kinds with the extensions of their files.
+    /// All formats with the extensions of their files.
     pub const ALL: [(Self, &str); 8] = [
         (Self::Pdf, "pdf"),
         (Self::Svg, "svg"),
@@ -61,13 +61,13 @@ impl Format {
         (Self::Dxf, "dxf"),
     ];
 
-    /// The kind that a file name tells.
+    /// The format by the extension of a file name; `None` for other extensions.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_string_lossy().to_lowercase();
         Self::ALL.iter().find(|(_, known)| *known == extension).map(|(format, _)| *format)
     }
 
-    /// Whether files of this kind are printed pages.
+    /// Whether files of this format are printed pages.
     pub fn is_document(self) -> bool {
         matches!(self, Self::Pdf | Self::Svg | Self::Png)
     }
@@ -86,25 +86,25 @@ pub enum DocumentError {
         /// The file.
         path: PathBuf,
     },
-    /// The file is not what its name says, has no size in units of length, or takes more than the
+    /// The file is not of the format of its extension, states no physical size, or exceeds the
     /// [`Limits`].
     #[error("{}: {problem}", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
 }
 
 impl DocumentError {
-    /// What is wrong with a file that was read.
+    /// An error about the content of a file.
     pub(super) fn unreadable(path: &Path, problem: impl Into<String>) -> Self {
         Self::Unreadable { path: path.to_owned(), problem: problem.into() }
     }
 }
 
-/// An opened artifact.
+/// An opened document of printed pages.
 pub struct Document {
     path: PathBuf,
     content: Arc<Content>,
@@ -130,23 +130,23 @@ pub struct Page {
     pub px_per_mm: f64,
     /// The picture.
     pub image: Gray<u8>,
-    /// How much further edges reach than over the pixel that they cross, px: on a page that is put together from
-    /// pixels of others.
+    /// Extra width of edges beyond the pixel that they cross, px, on a page that is resampled from
+    /// others.
     pub smear_px: f64,
 }
 
 impl Page {
-    /// How far ink may be from 0 or 1 beside an edge.
+    /// Tolerance of ink from 0 or 1 beside an edge.
     pub fn max_ink_error_at_edges(&self) -> f64 {
         if self.smear_px > 0.0 { SMEARED_INK_ERROR } else { MAX_INK_ERROR }
     }
 }
 
 impl Document {
-    /// Reads a `.pdf`, `.svg` or `.png` file that is in memory.
+    /// Reads a `.pdf`, `.svg` or `.png` file that is in memory, within limits.
     ///
     /// # Errors
-    /// Where it is not of this format, is damaged, or passes a limit.
+    /// When it is not of the format of its extension, is damaged, or exceeds a limit.
     pub fn read(artifact: &Artifact, limits: &Limits) -> Result<Self, DocumentError> {
         let files = std::slice::from_ref(artifact);
         let reader = Reader { files: &files, limits: *limits, guard: Guard::Here };
@@ -170,7 +170,7 @@ impl Document {
         Ok(Self { path: path.to_owned(), content: Arc::new(content), format, limits, guard })
     }
 
-    /// Kind of the file.
+    /// Format of the file.
     pub fn format(&self) -> Format {
         self.format
     }
@@ -192,7 +192,7 @@ impl Document {
         }
     }
 
-    /// What is said of a page that is far larger than it should be.
+    /// The error about a page that is far larger than stated.
     pub(super) fn too_large(&self, found_mm: DVec2, stated_mm: DVec2) -> DocumentError {
         let problem = format!(
             "a page of {} x {} mm instead of {} x {} mm is not looked at",
@@ -201,7 +201,7 @@ impl Document {
         DocumentError::unreadable(&self.path, problem)
     }
 
-    /// How far the stated size may be from the true one by the nature of the format, mm.
+    /// Greatest difference of the stated size from the true one that the format allows, mm.
     pub fn size_tolerance_mm(&self) -> f64 {
         match &*self.content {
             // Points in single precision, and decimals written.
@@ -211,11 +211,11 @@ impl Document {
         }
     }
 
-    /// A page as a picture, on white. `px_per_mm` is a wish: a PNG has its own resolution, and
-    /// large pages are drawn coarser to bound the memory.
+    /// Renders a page (counted from 0) on white. `px_per_mm` is a wish: a PNG has its own
+    /// resolution, and large pages are rendered coarser to bound the memory.
     ///
     /// # Errors
-    /// Where the page cannot be drawn, or passes a limit.
+    /// When the page cannot be rendered, or exceeds a limit.
     pub fn render(&self, page: usize, px_per_mm: f64) -> Result<Page, DocumentError> {
         let DVec2 { x: width_mm, y: height_mm } = self.size_mm(page);
         let most = (MAX_PIXELS / (width_mm * height_mm)).sqrt();
@@ -257,11 +257,11 @@ impl Page {
         DVec2::new(from_top.x, self.height_mm - from_top.y)
     }
 
-    /// The page as a lens shows it: each pixel with its neighbours, weighted 1 2 1 along both axes,
-    /// which is a blur of 0.71 px, on the scale of 16 bits.
+    /// The page blurred as by a lens: each pixel with its neighbours, weighted 1 2 1 along both
+    /// axes, which is a blur with a standard deviation of 0.71 px, in 16 bits.
     ///
-    /// Corners are located by a blurred model; of a sharp edge along the pixels a single grey value
-    /// tells the place, and the model misreads it by up to a quarter of a pixel.
+    /// Corners are located by a model of blurred edges; of a sharp edge along the pixels a single
+    /// grey value determines the place, and the model is then off by up to a quarter of a pixel.
     pub fn blurred(&self) -> Gray<u16> {
         let (width, height) = (self.image.width(), self.image.height());
         let near = |i: usize, size: usize| [i.saturating_sub(1), i, i, (i + 1).min(size - 1)];
@@ -278,7 +278,7 @@ impl Page {
         blurred
     }
 
-    /// The page as in a mirror, left and right exchanged.
+    /// The mirror image of the page, left and right exchanged.
     pub fn mirrored(&self) -> Self {
         let mut page = self.clone();
         let width = page.image.width();

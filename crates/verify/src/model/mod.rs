@@ -1,4 +1,4 @@
-//! Meshes read back as their users read them, through the gltf and tobj crates.
+//! Meshes read back through the gltf and tobj crates, as other programs read them.
 
 mod load;
 mod stl;

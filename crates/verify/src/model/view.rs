@@ -74,7 +74,7 @@ impl View {
         })
     }
 
-    /// Where the ray of a pixel meets the mesh first, in the target frame, mm.
+    /// The first point of the mesh on the ray of a pixel, in the target frame, mm.
     pub fn meet(&self, model: &Model, pixel: DVec2) -> Option<DVec3> {
         let target_from_camera = self.camera_from_target.inverse();
         let eye = target_from_camera.translation;

@@ -1,9 +1,10 @@
-//! Which cycle of a code goes where on the tag.
+//! The assignment of the cycles of a code to the cycles of the tag, by simulated annealing.
 //!
-//! Assigning cycles, turning them on their places and adding a rotation-fixed word change neither
-//! distances nor invariance ([`Arrangement`]), but they decide how many words are complex enough
-//! to be tags. Simulated annealing over these choices; all words are judged at once, 64 to a
-//! machine word, by counting differing neighbours in bit slices.
+//! Permuting cycles, rotating them in their places and adding a word that is fixed by the turn
+//! change neither distances nor invariance ([`Arrangement`]), but they decide how many words are
+//! complex enough to be tags. Annealing maximises that number over these choices; it finds a good
+//! arrangement, not provably the best. All words are judged at once, 64 to a machine word, by
+//! counting differing neighbours in bit slices.
 
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
@@ -16,7 +17,7 @@ use crate::lattice::{Dimension, TagCells};
 /// 512 words of the code, one bit each.
 type Slice = [u64; 8];
 
-/// Judges arrangements of one code.
+/// Scores the arrangements of one code, and searches for a good one.
 #[derive(Clone, Debug)]
 pub struct Arranger {
     dimension: Dimension,
@@ -29,13 +30,15 @@ pub struct Arranger {
     black_distance: u32,
     white_distance: u32,
     free_centre: bool,
-    /// Pairs that a word may lack and still be worth something, and what it is worth.
+    /// Number of differing pairs that a word may lack and still count, and the fraction as which it
+    /// counts.
     nearly: Option<(u32, f64)>,
 }
 
 impl Arranger {
-    /// For the words of a code, one of each orbit. With `free_centre` the central bit of each word
-    /// may be chosen after the fact, and a word counts when either choice is fine.
+    /// Prepares the words of a code, in cycle coordinates, one of each orbit. With `free_centre`
+    /// the central bit of each word may be chosen afterwards, and a word counts when either choice
+    /// satisfies the rules.
     pub fn new(
         dimension: Dimension,
         distance: u32,
@@ -71,8 +74,9 @@ impl Arranger {
         }
     }
 
-    /// Counts a word that lacks up to `pairs` differing pairs as the fraction `worth` of one: where
-    /// the code's distance leaves room, one changed cell may repair it.
+    /// Lets a word that lacks up to `pairs` differing pairs count as the fraction `worth` of one,
+    /// for the annealing only: where the code has distance to spare, changing one cell may repair
+    /// the word.
     pub fn with_nearly(mut self, pairs: u32, worth: f64) -> Self {
         self.nearly = Some((pairs.min(self.min_pairs), worth));
         self
@@ -84,7 +88,7 @@ impl Arranger {
         self.count(arrangement, &weights, self.min_pairs)
     }
 
-    /// What annealing maximises.
+    /// The objective of the annealing.
     fn worth(&self, arrangement: &Arrangement, weights: &[Slice]) -> f64 {
         let good = f64::from(self.count(arrangement, weights, self.min_pairs));
         self.nearly.map_or(good, |(pairs, worth)| {
@@ -93,14 +97,15 @@ impl Arranger {
         })
     }
 
-    /// Which words are far enough from all black and all white; where cycles go does not matter.
+    /// Which words are far enough from all black and all white, as bit slices; the places of cycles
+    /// do not matter for this.
     fn weights(&self, inverted: u32) -> Vec<Slice> {
         let translation =
             Arrangement { inverted, ..Arrangement::plain(self.space) }.translation(self.space);
         let bits = self.space.bits();
         let centre = u64::from(self.free_centre) << (bits - 1);
         let fine = |word: u64| {
-            // With a free centre the choice that helps is taken.
+            // With a free centre the favourable choice is taken.
             let white = (word | centre).count_ones();
             let black = bits - (word & !centre).count_ones();
             white >= self.black_distance && black >= self.white_distance
@@ -122,7 +127,8 @@ impl Arranger {
         let mut code_bit = [0u8; 64];
         (0..).zip(&to_tag).for_each(|(i, &to)| code_bit[usize::from(to)] = i);
         let inverted = arrangement.translation(self.space);
-        // Per edge of the tag: the two bits of the code, and whether just one is inverted.
+        // For each edge between cells of the tag: the two bits of the code, and whether exactly one
+        // of them is inverted.
         let edges: Vec<(u8, u8, u64)> = self
             .edges
             .iter()
@@ -147,8 +153,10 @@ impl Arranger {
             .sum()
     }
 
-    /// Anneals from a random arrangement; the same for the same seed and number of steps, unless
-    /// `halt` ends it early. Returns what the best arrangement is worth, and it.
+    /// Anneals from a random arrangement, and returns the best objective and arrangement found. The
+    /// objective is the number of words that satisfy the rules, and what [`Arranger::with_nearly`]
+    /// adds. The result depends on `seed` and `steps` only, unless `halt` returns true and ends the
+    /// search early.
     pub fn anneal(&self, seed: u64, steps: u32, halt: impl Fn() -> bool) -> (f64, Arrangement) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let n = self.space.cycles as usize;
@@ -160,7 +168,8 @@ impl Arranger {
         let mut weights = self.weights(now.inverted);
         let mut score = self.worth(&now, &weights);
         let mut best = (score, now.clone());
-        // From a spread of scores as large as chance makes it down to single words.
+        // The temperature falls geometrically from the standard deviation that chance gives a score
+        // to that of single words.
         let hot = (self.words.len() as f64).sqrt().max(2.0) * 0.5;
         for step in 0..steps {
             if halt() {
@@ -191,10 +200,11 @@ impl Arranger {
     }
 }
 
-/// Words of a slice whose differing neighbours number at least `min_pairs`.
+/// The words of a slice that have at least `min_pairs` pairs of differing neighbours, as a bit
+/// slice.
 ///
-/// Counts in bit slices: 64 − `min_pairs` plus one for each differing pair overflows into bit 6
-/// exactly when there are enough. Eight pairs at a time go through seven full adders.
+/// Counting starts at 64 − `min_pairs` and adds one for each differing pair, so that it overflows
+/// into bit 6 exactly when there are enough. Eight pairs at a time go through seven full adders.
 fn enough(
     edges: &[(u8, u8, u64)],
     slices: &[Slice],
@@ -228,7 +238,7 @@ fn enough(
     count[6]
 }
 
-/// Adds two slices to a digit and returns the carries.
+/// Adds two slices to a binary digit (a full adder) and returns the carries.
 #[inline(always)]
 fn add(digit: &mut Slice, a: &Slice, b: &Slice) -> Slice {
     let mut carry = [0; 8];

@@ -1,10 +1,13 @@
 //! Unions of cosets of an invariant linear code K, by clique search.
 //!
 //! Two cosets of K are at distance h or more exactly when the sum of their syndromes is not the
-//! syndrome of a word lighter than h. So mark these syndromes once; a code K ∪ (K+a) ∪ … with
-//! distance h is a set of syndromes, containing 0, all of whose pairwise sums are unmarked: a
-//! clique in a Cayley graph. Its vertices here are whole orbits of syndromes under the turn, so
-//! that the union is invariant.
+//! syndrome of a word lighter than h. All syndromes of such words are marked once. A code K ∪ (K+a)
+//! ∪ … with distance h is then a set of syndromes that contains 0 and all of whose pairwise sums
+//! are unmarked: a clique in a Cayley graph (an independent set in its complement). Its vertices
+//! here are whole orbits of syndromes under the turn, so that the union is invariant.
+//!
+//! The search is a randomised greedy one: the union that it finds need not be the largest. The
+//! table of marks has one bit for each syndrome, which limits codes to [`MAX_SYNDROME_BITS`].
 
 use rand::SeedableRng;
 use rand::seq::IndexedRandom;
@@ -12,22 +15,24 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{CycleSpace, LinearMap, Span};
 
-/// Codes with more than this many bits of syndrome need too large a table.
+/// The most bits that a syndrome may have; the table of marked syndromes then takes 16 MiB.
 pub const MAX_SYNDROME_BITS: u32 = 27;
 
-/// A union of cosets of a linear code, invariant under the turn.
+/// A union of cosets of a linear code. It is invariant under the turn when [`CosetGraph::grow`]
+/// made it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CosetUnion {
-    /// Where the words live.
+    /// The space of the words.
     pub space: CycleSpace,
-    /// The linear code.
+    /// The linear code whose cosets are united.
     pub code: Span,
-    /// One word of each coset.
+    /// One word of each coset, in cycle coordinates; zero stands for the code itself.
     pub cosets: Vec<u64>,
 }
 
 impl CosetUnion {
-    /// One word of each orbit of three words; words that turning leaves as they are do not count.
+    /// One word of each orbit of three words, in cycle coordinates: the smallest. Words that are
+    /// fixed by the turn are left out, since they do not tell the orientation of a tag.
     pub fn orbits(&self) -> Vec<u64> {
         let space = self.space;
         let words = self.cosets.iter().flat_map(|&c| self.code.words().map(move |w| w ^ c));
@@ -35,7 +40,8 @@ impl CosetUnion {
     }
 }
 
-/// The graph of the cosets of one code.
+/// The compatibility graph of the cosets of one code: vertices are orbits of cosets that keep the
+/// distance, edges join those that keep it from each other.
 #[derive(Clone, Debug)]
 pub struct CosetGraph {
     space: CycleSpace,
@@ -47,17 +53,18 @@ pub struct CosetGraph {
     vertices: Vec<Vertex>,
 }
 
-/// An orbit of syndromes: one that the turn leaves as it is, or three.
+/// An orbit of syndromes under the turn: one syndrome that the turn fixes, or three.
 #[derive(Clone, Copy, Debug)]
 struct Vertex {
     syndrome: u32,
-    /// Orbits of words in its cosets.
+    /// Number of orbits of three words in its cosets.
     weight: u32,
 }
 
 impl CosetGraph {
-    /// The graph of `code` for `distance`; `None` when the code itself is not that good, or its
-    /// syndromes have more than [`MAX_SYNDROME_BITS`] bits, or `halt` ends the work early.
+    /// The graph of an invariant `code` for minimum distance `distance` (1 or more). `None` when
+    /// the code itself has a smaller distance, when its syndromes have more than
+    /// [`MAX_SYNDROME_BITS`] bits, or when `halt` returned true before the table was complete.
     pub fn new(
         space: CycleSpace,
         code: Span,
@@ -83,7 +90,7 @@ impl CosetGraph {
         Some(graph)
     }
 
-    /// Number of orbits of cosets that can join the code itself.
+    /// Number of orbits of cosets that can be united with the code itself.
     pub fn vertices(&self) -> usize {
         self.vertices.len()
     }
@@ -120,11 +127,12 @@ impl CosetGraph {
         !self.is_marked(a ^ b) && !self.is_marked(a ^ once) && !self.is_marked(a ^ self.turn(once))
     }
 
-    /// A large union found from one random start: vertices are added one by one, each the one, of
-    /// a few looked at, that leaves most of the others possible. It grows until nothing fits any
-    /// more, or `halt` ends it.
+    /// A large union, grown greedily from one random start: vertices are added one by one, each
+    /// time the one of a few random candidates that leaves the most words possible. It grows until
+    /// no vertex fits any more or `halt` returns true. The result depends on `seed` only, unless
+    /// `halt` ended the search.
     pub fn grow(&self, seed: u64, halt: impl Fn() -> bool) -> CosetUnion {
-        /// Vertices looked at before each choice.
+        /// Candidates that are compared before each choice.
         const LOOK_AT: usize = 12;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut chosen: Vec<Vertex> = Vec::new();
@@ -167,7 +175,7 @@ impl CosetGraph {
         CosetUnion { space: self.space, code: self.code.clone(), cosets }
     }
 
-    /// A word with the syndrome.
+    /// The word of this syndrome that has only free bits set.
     fn word(&self, syndrome: u32) -> u64 {
         (0..)
             .zip(&self.free_bits)
@@ -176,8 +184,9 @@ impl CosetGraph {
     }
 }
 
-/// Marks the sums of up to `weight` columns; false when one of one or more is zero, or when `halt`
-/// came first.
+/// Marks the syndromes of all words of up to `weight` set bits, as sums of columns added to `sum`.
+/// Returns false when one or more columns sum to zero, so that the code has a word that light, or
+/// when `halt` came first.
 fn mark(
     columns: &[u32],
     sum: u32,
@@ -185,7 +194,7 @@ fn mark(
     marked: &mut [u64],
     halt: &dyn Fn() -> bool,
 ) -> bool {
-    /// Some ten thousand sums between two looks at the clock.
+    /// Remaining weight at which `halt` is asked: some ten thousand sums lie between two calls.
     const LOOK_AT: u32 = 4;
     marked[sum as usize / 64] |= 1 << (sum % 64);
     if weight == 0 {

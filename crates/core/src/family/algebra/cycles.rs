@@ -1,23 +1,26 @@
+//! Cycle coordinates of words, and the arrangements that put the cycles of a code on a tag.
+
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::{Dimension, TagCells};
 
-/// Words of m three-cycles, and perhaps a fixed central bit, in cycle coordinates.
+/// The space of words in cycle coordinates: m three-cycles, and perhaps a central bit that every
+/// turn leaves in place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CycleSpace {
-    /// Number of three-cycles, m.
+    /// Number of three-cycles, m; at most 21, so that words fit 64 bits.
     pub cycles: u32,
     /// Whether there is a central bit, number 3m.
     pub centre: bool,
 }
 
 impl CycleSpace {
-    /// The space of the tags of a dimension.
+    /// The space of the tags of one dimension.
     pub fn of(dimension: Dimension) -> Self {
         Self { cycles: dimension.bits() / 3, centre: dimension.bits() % 3 == 1 }
     }
 
-    /// Number of bits.
+    /// Number of bits, 3m or 3m + 1.
     pub fn bits(self) -> u32 {
         3 * self.cycles + u32::from(self.centre)
     }
@@ -27,7 +30,7 @@ impl CycleSpace {
         0x9249_2492_4924_9249 & ((1 << (3 * self.cycles)) - 1)
     }
 
-    /// The word after one turn.
+    /// The word after one turn of the tag by 120°.
     #[inline]
     pub fn turn(self, word: u64) -> u64 {
         let (first, cycles) = (self.firsts(), (1 << (3 * self.cycles)) - 1);
@@ -42,35 +45,36 @@ impl CycleSpace {
         word.min(once).min(self.turn(once))
     }
 
-    /// The words that turning leaves as they are, as a basis: a whole cycle each, and the centre.
+    /// A basis of the words that are fixed by the turn: each whole cycle, and the central bit.
     pub fn fixed_basis(self) -> Vec<u64> {
         let cycles = (0..self.cycles).map(|c| 0b111 << (3 * c));
         cycles.chain(self.centre.then_some(1 << (3 * self.cycles))).collect()
     }
 }
 
-/// Where the cycles of a code go on the tag: everything that changes neither distances nor
-/// invariance.
+/// How the cycles of a code are placed on the tag: all choices that change neither distances nor
+/// invariance under the turn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Arrangement {
-    /// Cycle of the tag for each cycle of the code.
+    /// For each cycle of the code the index of the cycle of the tag where it goes.
     pub places: Vec<u8>,
-    /// Number of steps, 0 to 2, by which each cycle of the code is turned on its place.
+    /// For each cycle of the code the number of steps, 0 to 2, by which it is rotated in its place.
     pub starts: Vec<u8>,
-    /// Cycles of the code that are inverted (a rotation-fixed word is added), as a bit set; the
-    /// central bit comes after the last cycle.
+    /// Cycles of the code that are inverted, as a bit set; the central bit comes after the last
+    /// cycle. Inverting adds a word that is fixed by the turn.
     pub inverted: u32,
 }
 
 impl Arrangement {
-    /// Every cycle of the code on the tag's cycle of the same number.
+    /// The identity: every cycle of the code on the cycle of the tag of the same number, nothing
+    /// inverted.
     pub fn plain(space: CycleSpace) -> Self {
         let n = space.cycles as usize;
         Self { places: (0..n as u8).collect(), starts: vec![0; n], inverted: 0 }
     }
 
-    /// Whether it is an arrangement of the cycles of `space`.
+    /// Whether this is a valid arrangement of the cycles of `space`.
     pub fn fits(&self, space: CycleSpace) -> bool {
         let n = space.cycles as usize;
         let mut seen = self.places.clone();
@@ -81,7 +85,7 @@ impl Arrangement {
             && self.inverted >> (space.cycles + u32::from(space.centre)) == 0
     }
 
-    /// Tag bit of each code bit.
+    /// The permutation of bits: for each bit in cycle coordinates the bit of the tag.
     pub fn bit_map(&self, dimension: Dimension) -> Vec<u8> {
         let (cycles, centre) = tag_cycles(dimension);
         let mut map = Vec::with_capacity(dimension.bits() as usize);
@@ -93,13 +97,14 @@ impl Arrangement {
         map
     }
 
-    /// The rotation-fixed word that is added, in cycle coordinates.
+    /// The word that is added to every code word for the inverted cycles, in cycle coordinates; the
+    /// turn leaves it fixed.
     pub fn translation(&self, space: CycleSpace) -> u64 {
         let basis = space.fixed_basis();
         (0..).zip(basis).filter(|&(i, _)| self.inverted >> i & 1 == 1).fold(0, |t, (_, w)| t ^ w)
     }
 
-    /// The words as they are on the tag.
+    /// Maps words from cycle coordinates to words of the tag.
     pub fn apply(&self, dimension: Dimension, words: &[u64]) -> Vec<u64> {
         let map = self.bit_map(dimension);
         let translation = self.translation(CycleSpace::of(dimension));
@@ -113,8 +118,8 @@ impl Arrangement {
     }
 }
 
-/// The three-cycles of a tag's bits, each in the order in which a turn moves their content, and
-/// the bit that stays.
+/// The three-cycles of the bits of a tag, each in the order in which a turn moves the content, and
+/// the central bit that stays.
 fn tag_cycles(dimension: Dimension) -> (Vec<[u8; 3]>, Option<u8>) {
     let cells = TagCells::new(dimension);
     let source = cells.rotation();

@@ -1,15 +1,18 @@
-//! Codes that a turn of the tag leaves invariant, found by algebra instead of trial.
+//! Codes that are invariant under a turn of the tag by 120°, constructed by algebra instead of
+//! trial.
 //!
-//! A turn permutes the cells of a tag in m cycles of three, and one central cell stays when
-//! b mod 3 = 1. In *cycle coordinates* the cycle c holds bits 3c, 3c+1, 3c+2 of a word, the turn
-//! moves bit 3c+j to 3c+(j+1 mod 3), and the central cell is bit 3m. A code that this permutation
-//! leaves invariant yields a family: one tag for each orbit of three words (`docs/families.md`).
+//! A turn permutes the cells of a tag in m cycles of three; one central cell stays where it is when
+//! b mod 3 = 1, b being the number of bits. In *cycle coordinates* cycle c holds bits 3c, 3c+1,
+//! 3c+2 of a word, the turn moves bit 3c+j to 3c+(j+1 mod 3), and the central cell is bit 3m. Words
+//! are `u64` with one bit for each cell. A code that this permutation leaves invariant yields a
+//! family: one tag for each orbit of three words (`docs/families.md`).
 //!
-//! - [`residue`]: extended quadratic-residue codes, which have a symmetry of order three.
-//! - [`quasicyclic`]: random invariant linear codes with further symmetries.
-//! - [`cosets`]: unions of cosets of an invariant linear code, by clique search.
-//! - [`ranked`]: the tags of a linear code by number, without listing them.
-//! - [`arrange`]: which cycle of the code goes where on the tag decides how many words look good.
+//! - [`residue`]: extended quadratic-residue codes (extended cyclic codes), which have a symmetry of order three.
+//! - [`quasicyclic`]: random invariant linear codes with a further quasi-cyclic symmetry.
+//! - [`cosets`]: unions of cosets of an invariant linear code, found by clique search over syndromes.
+//! - [`ranked`]: the tags of a linear code by number, computed without listing the code.
+//! - [`arrange`]: the assignment of code cycles to tag cycles, by simulated annealing; it decides
+//!   how many words satisfy the rules on complexity.
 
 pub mod arrange;
 pub mod cosets;

@@ -1,4 +1,5 @@
-//! The record of an algebraic family: enough to write its codes down again, and to prove them.
+//! The record of an algebraic family: what suffices to list its codes again, and to prove their
+//! distance.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -10,37 +11,39 @@ use crate::family::file::parse_word;
 use crate::family::{FamilyError, Screen};
 use crate::lattice::Dimension;
 
-/// All that is needed to write down an algebraic family again.
+/// The construction of an algebraic family, as its file holds it.
 ///
-/// The codes are one word of each orbit of the union of cosets, arranged on the tag, as far as the
-/// rules admit them and no exchanged word excludes them; and the exchanged words. Where no word of
-/// the union uses the central cell, it is white if the rules need it, else black. In order of the
-/// smallest of the three turned words.
+/// The codes are one word of each orbit of the union of cosets, arranged on the tag, where the
+/// rules admit it and no exchanged word is too near; and the exchanged words. Where no word of the
+/// union uses the central cell, it is black, or white if only that satisfies the rules. Codes are
+/// sorted by the smallest of the three turned words.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AlgebraicConstruction {
-    /// Where the linear code comes from, in words.
+    /// Where the linear code comes from, for readers.
     pub source: String,
     /// Basis of the linear code, in cycle coordinates, hexadecimal.
     pub basis: Vec<String>,
     /// One word of each coset, in cycle coordinates, hexadecimal.
     pub cosets: Vec<String>,
-    /// Where its cycles go on the tag.
+    /// How the cycles of the code are placed on the tag.
     pub arrangement: Arrangement,
-    /// Words of the tag that local search put in, hexadecimal.
+    /// Words of the tag that local search added in exchange for others, hexadecimal.
     pub exchanged: Vec<String>,
-    /// Only so many codes are listed, the first in order; absent for all of them.
+    /// Number of codes that are listed, the first in order; absent for all of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit: Option<u64>,
-    /// Seed of the search that found all this.
+    /// Seed of the search that found the construction.
     pub seed: u64,
 }
 
 impl AlgebraicConstruction {
-    /// Writes down the codes, in the order of the family.
+    /// Lists the codes as words of the tag, in the order of the family. `screen` holds dimension,
+    /// distance and rules.
     ///
     /// # Errors
-    /// Where the record is not consistent, or its code words break the rules.
+    /// When a word does not parse or is too long for the dimension, the arrangement does not fit
+    /// it, or the basis has more than 26 dimensions.
     pub fn codes(&self, screen: &Screen) -> Result<Vec<u64>, FamilyError> {
         let dimension = screen.words().dimension();
         let space = CycleSpace::of(dimension);
@@ -71,9 +74,10 @@ impl AlgebraicConstruction {
         Ok(codes)
     }
 
-    /// The tag number `rank` of the whole linear code, whether or not it satisfies the rules; and
-    /// how many there are. `None` when the construction is more than a linear code. The central
-    /// cell, where the code does not use it, is black.
+    /// Tag number `rank` of the whole linear code, as a word of the tag whether or not it satisfies
+    /// the rules, and the number of tags; the tag is `None` beyond them. `None` altogether when the
+    /// construction is more than a linear code, or its record is not consistent. A central cell
+    /// that the code does not use is black, unless the arrangement inverts it.
     pub fn by_rank(&self, dimension: Dimension, rank: u64) -> Option<(Option<u64>, u64)> {
         let space = CycleSpace::of(dimension);
         let words = |field, list| self.words(field, list, dimension).ok();
@@ -87,8 +91,9 @@ impl AlgebraicConstruction {
         Some((word, ranked.len()))
     }
 
-    /// The linear code and a word of each of its cosets as they are on the tag, and the central cell
-    /// where no word uses it, else 0. `None` when the family is not of these alone.
+    /// The linear code and one word of each of its cosets as words of the tag, and a mask of the
+    /// central cell where no word uses it, else 0. `None` when the family has exchanged words, or
+    /// the record is not consistent.
     pub(in crate::family) fn on_the_tag(
         &self,
         dimension: Dimension,
@@ -109,16 +114,17 @@ impl AlgebraicConstruction {
         Some((code, cosets, ignored))
     }
 
-    /// A proof, from the structure of the code, that words of the family and their turns are
-    /// `distance` apart; or the reason why it is none. Takes time in proportion to the number of
-    /// codes, not to its square.
+    /// Proves from the structure of the code that the words of the family and their turns are
+    /// `screen.distance()` apart. Takes time in proportion to the number of codes, not to its
+    /// square.
     ///
-    /// The basis has to span a code that the turn leaves invariant and whose lightest word weighs
-    /// `distance` or more (all are looked at), and each code, arranged back, has to lie in it. Then
-    /// any two words are as far apart as some word of the linear code is heavy.
+    /// The basis has to span a code that is invariant under the turn and whose lightest non-zero
+    /// word weighs the distance or more (all words are checked), and each of `codes`, mapped back
+    /// to cycle coordinates, has to lie in it. Then the sum of any two words is a word of the
+    /// linear code, and their distance is its weight.
     ///
     /// # Errors
-    /// The reason why it is no proof.
+    /// The reason why this is no proof; the distance may hold all the same.
     pub fn prove(&self, screen: &Screen, codes: &[u64]) -> Result<(), String> {
         let dimension = screen.words().dimension();
         let space = CycleSpace::of(dimension);
@@ -139,7 +145,7 @@ impl AlgebraicConstruction {
             return Err("the linear code has too light a word".to_owned());
         }
         let union = CosetUnion { space, code, cosets };
-        // The free centre is no part of the linear code: it only adds distance.
+        // A free centre is no part of the linear code: it can only add distance.
         let ignored = if has_free_centre(&union) { 1u64 << (space.bits() - 1) } else { 0 };
         let translation = self.arrangement.translation(space);
         let map = self.arrangement.bit_map(dimension);
@@ -170,10 +176,10 @@ impl AlgebraicConstruction {
     }
 }
 
-/// Beyond this the list of words would not fit in memory.
+/// The most dimensions; the list of words would not fit in memory beyond.
 const MOST_DIMENSIONS: u32 = 26;
 
-/// The words of a union on the tag, one of each orbit, as far as the screen admits them.
+/// The words of a union on the tag that the screen admits, one of each orbit.
 fn arranged(screen: &Screen, union: &CosetUnion, arrangement: &Arrangement) -> Vec<u64> {
     let dimension = screen.words().dimension();
     let words = arrangement.apply(dimension, &union.orbits());

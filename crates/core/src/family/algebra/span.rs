@@ -1,6 +1,8 @@
+//! Binary linear codes: bases, cosets and syndromes.
+
 use super::LinearMap;
 
-/// A binary linear code of length up to 64, by a reduced basis.
+/// A binary linear code of length up to 64, kept as a reduced basis.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Span {
     /// Rows with distinct leading bits, each leading bit set in its own row only; descending.
@@ -8,7 +10,7 @@ pub struct Span {
 }
 
 impl Span {
-    /// The span of some words.
+    /// The linear span of some words.
     pub fn of(words: impl IntoIterator<Item = u64>) -> Self {
         let mut span = Self::default();
         for word in words {
@@ -17,17 +19,18 @@ impl Span {
         span
     }
 
-    /// Number of dimensions.
+    /// Dimension of the code.
     pub fn dimension(&self) -> u32 {
         self.rows.len() as u32
     }
 
-    /// The reduced basis.
+    /// The reduced basis (reduced row echelon form), by descending leading bit.
     pub fn rows(&self) -> &[u64] {
         &self.rows
     }
 
-    /// The representative of the word's coset: zero at every leading bit.
+    /// The representative of the coset of a word: the one that is zero at the leading bit of every
+    /// row.
     pub fn reduce(&self, word: u64) -> u64 {
         self.rows.iter().fold(
             word,
@@ -42,7 +45,7 @@ impl Span {
         self.reduce(word) == 0
     }
 
-    /// Adds a word to the span; false when it was in it.
+    /// Adds a word to the span; returns false when the span contained it already.
     pub fn insert(&mut self, word: u64) -> bool {
         let word = self.reduce(word);
         if word == 0 {
@@ -59,7 +62,7 @@ impl Span {
         true
     }
 
-    /// All words, each once, zero first (in Gray code order).
+    /// All code words, each once, zero first, in Gray code order.
     pub fn words(&self) -> impl Iterator<Item = u64> + '_ {
         let mut word = 0;
         (0u64..1 << self.rows.len()).map(move |i| {
@@ -70,7 +73,7 @@ impl Span {
         })
     }
 
-    /// The words that vanish wherever `mask` is set.
+    /// The subcode of words that are zero at every bit set in `mask`.
     pub fn vanishing_on(&self, mask: u64) -> Self {
         // Reduce with the masked bits leading: what is left of rows that have none of them.
         let mut rows = self.rows.clone();
@@ -90,14 +93,16 @@ impl Span {
         Self::of(kept)
     }
 
-    /// Bits of a word of `length` bits that are leading in no row; they name cosets.
+    /// The bits of a word of `length` bits that lead no row, ascending; their values identify a
+    /// coset.
     pub fn free_bits(&self, length: u32) -> Vec<u32> {
         let leading = self.rows.iter().fold(0u64, |bits, row| bits | 1 << row.ilog2());
         (0..length).filter(|i| leading >> i & 1 == 0).collect()
     }
 
-    /// Syndromes of words of `length` bits: what a coset has at the free bits, side by side.
-    /// `None` when these are more than 32.
+    /// The map from words of `length` bits to syndromes: the free bits of the representative of the
+    /// coset, side by side in the order of [`Span::free_bits`]. `None` when there are more than 32
+    /// of them.
     pub fn syndromes(&self, length: u32) -> Option<LinearMap> {
         let free_bits = self.free_bits(length);
         let syndrome = |word: u64| {

@@ -14,7 +14,7 @@
 //! | | original | fork |
 //! |---|---|---|
 //! | squares | A × B squares, corners (A−1) × (B−1), all listed | A × B corners |
-//! | triangles | B = 0: a triangular outline of A tiles a side, n(n+1)/2 corners, n = A−2 | a matrix of A columns, B rows; any outline |
+//! | triangles | B = 0: triangle of A tiles a side, n(n+1)/2 corners, n = A−2 | A columns, B rows; any outline |
 //! | triangular when | B = 0 | the family is a `delTag` |
 //! | families | `t25h7`, … | `delTag25h7`, `aprilTag25h7`, … |
 //!
@@ -28,14 +28,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The reader takes either dialect, spaces around commas, CRLF, a missing final newline, and
+//! The reader accepts either dialect, spaces around commas, CRLF, a missing final newline, and
 //! coordinates in the unit of the edge, in cm with the edge in mm, or in m with the edge in cm or
-//! mm; the distance of neighbouring corners tells which.
+//! mm; it infers the unit from the distance of neighbouring corners.
 //!
-//! Limits: the original dialect has no word for outlines other than the triangle, and neither for
-//! untagged or inverted boards, or tags in white squares. Of square tags this crate has aprilTag16h5,
-//! 25h9 and 36h11; another family has no fingerprint here. The original program reads triangular tags with square code tables, so it
-//! indexes such boards by its own codes only.
+//! Limits: the original dialect cannot describe outlines other than the triangle, and neither
+//! dialect untagged or inverted boards, or tags in white squares. Of square tags this crate has
+//! aprilTag16h5, 25h9 and 36h11; other families have no fingerprint here. The original program
+//! reads triangular tags with code tables of square ones, so that it indexes such boards by its own
+//! codes only.
 
 mod read;
 mod write;
@@ -49,7 +50,7 @@ pub use write::write;
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::targets::{ListFormat, ListedSpec, Panel, Target, TargetSpec};
 
-/// Who reads the file.
+/// The dialect of a file, by the program that reads it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Dialect {
@@ -61,7 +62,7 @@ pub enum Dialect {
 }
 
 impl Dialect {
-    /// The dialect that a target was read in; that of the fork for all others.
+    /// The dialect from which a target was read; that of the fork for all other targets.
     pub fn of(target: &Target) -> Self {
         let original = ListedSpec { format: ListFormat::DscOriginal };
         if target.spec == TargetSpec::Listed(original) { Dialect::Original } else { Dialect::Fork }
@@ -93,7 +94,7 @@ impl FromStr for Dialect {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DscError {
-    /// A line is not what it should be.
+    /// A line is not valid.
     #[error("line {line}: {problem}")]
     Line {
         /// Counted from 1.
@@ -101,10 +102,10 @@ pub enum DscError {
         /// What is wrong.
         problem: String,
     },
-    /// The boards together make no target.
+    /// The boards do not make a valid target.
     #[error("{0}")]
     Target(String),
-    /// The dialect cannot say this.
+    /// The dialect cannot describe the target.
     #[error("the {dialect} .dsc dialect cannot describe `{name}`: {reason}")]
     Refused {
         /// The dialect.
@@ -116,12 +117,12 @@ pub enum DscError {
     },
 }
 
-/// Family names after the prefix; all programs know these and no others.
+/// Names of families without their prefix; all programs know these and no others.
 const FAMILIES: [&str; 5] = ["16h5", "25h7", "25h9", "36h9", "36h11"];
 
-/// The number under which a corner goes in `.orpc` files: its place in the matrix of the panel.
+/// The index of a corner in `.orpc` files: its place in the matrix of the panel, row by row.
 ///
-/// Rectangular boards are counted from the top in the original dialect.
+/// Rows of rectangular boards are counted from the top in the original dialect.
 pub fn point_id(panel: &Panel, dialect: Dialect, corner: Vertex) -> i64 {
     let [cols, rows] = panel.matrix.map(i64::from);
     let (row, col) = (i64::from(corner.row), i64::from(corner.col));

@@ -1,3 +1,5 @@
+//! Reader of `.dsc` target descriptions.
+
 use std::collections::BTreeMap;
 
 use glam::DVec3;
@@ -13,32 +15,33 @@ use deltille_core::targets::{
 };
 use deltille_core::words::{counted, quoted};
 
-/// Most boards in a file, and most columns or rows of one: beyond this a number is a typing error.
+/// Most boards in a file, and most columns or rows of one: a larger number is a typing error.
 const MOST: u32 = 10_000;
 
-/// How far the unit that the corner distances suggest may be off, relative.
+/// Relative tolerance of the unit that the distances of corners suggest.
 const UNIT_SLACK: f64 = 0.02;
 
-/// Units of a file: how many units of the coordinates the edge's unit makes, and the mm of either.
+/// Units of a file: units of the coordinates in one unit of the edge, and both units in mm.
 type Units = (f64, [f64; 2]);
 
 /// Edge and coordinates: mm and mm, mm and cm, cm and m, mm and m.
 const KNOWN: [Units; 4] =
     [(1.0, [1.0, 1.0]), (10.0, [1.0, 10.0]), (100.0, [10.0, 1e3]), (1e3, [1.0, 1e3])];
 
-/// Reads the text of a `.dsc` in either dialect; corner ids count through the file by board, row
-/// and column.
+/// Reads the text of a `.dsc` file in either dialect as a target with the given name. Corner ids
+/// are counted through the file by board, row and column; lengths are converted to mm.
 ///
 /// # Errors
-/// Where it is no list of boards, or does not say what it is.
+/// When a line is not valid, the boards do not make a valid target, or units cannot be inferred.
 pub fn read(text: &str, name: &str) -> Result<Target, DscError> {
     read_in(text, name, &KNOWN)
 }
 
-/// Reads the text of a `.dsc` whose lengths must all be in millimetres, as they are written here.
+/// Reads the text of a `.dsc` file whose lengths must all be in millimetres, as
+/// [`write`](super::write) writes them.
 ///
 /// # Errors
-/// Where it is no such list, or its lengths are in another unit.
+/// When a line is not valid, the boards do not make a valid target, or lengths are in another unit.
 pub fn read_in_mm(text: &str, name: &str) -> Result<Target, DscError> {
     read_in(text, name, &KNOWN[..1])
 }
@@ -89,7 +92,7 @@ fn read_in(text: &str, name: &str, units: &[Units]) -> Result<Target, DscError> 
     Ok(target)
 }
 
-/// The family by the name that this crate has for it, with its fingerprint where it has the codes.
+/// The family by its name in this crate, with its fingerprint where the crate has its codes.
 fn family_ref(name: &str, blocks: &[Block]) -> Result<FamilyRef, DscError> {
     let Ok(family) = Family::shipped(name) else {
         return Ok(FamilyRef { name: name.to_owned(), fingerprint: String::new() });
@@ -135,7 +138,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// One board as it is listed.
+/// One board as the file lists it.
 struct Block<'a> {
     head: Line<'a>,
     id: u32,

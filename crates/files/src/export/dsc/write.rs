@@ -1,3 +1,5 @@
+//! Writer of `.dsc` target descriptions.
+
 use std::fmt::Write;
 
 use glam::DVec3;
@@ -6,10 +8,10 @@ use super::{Dialect, DscError, FAMILIES};
 use deltille_core::lattice::{GridKind, Vertex};
 use deltille_core::targets::{Panel, TagsIn, Target};
 
-/// The text of the `.dsc` of a target; positions are those in the target frame, mm.
+/// The text of the `.dsc` file of a target; positions are in the target frame, mm.
 ///
 /// # Errors
-/// Where the dialect cannot carry the target.
+/// When the dialect cannot describe the target.
 pub fn write(target: &Target, dialect: Dialect) -> Result<String, DscError> {
     let refused = |reason: &str| DscError::Refused {
         dialect,

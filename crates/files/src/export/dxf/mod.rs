@@ -1,9 +1,9 @@
 //! DXF of AutoCAD release 12, as text, in millimetres: the dialect that every cutter reads.
 //!
-//! Closed paths are closed `POLYLINE`s, others are `LINE`s; layers `CUT`, `FOLD`, `VALLEY`
-//! and `ENGRAVE` have colours of their own, by which cutters tell what to do.
+//! Closed paths are closed `POLYLINE`s, others are `LINE`s. The layers `CUT`, `FOLD`, `VALLEY` and
+//! `ENGRAVE` have a colour each, by which cutters choose the operation.
 //!
-//! The reader takes what the writer writes, and names anything else: what it does not know could
+//! The reader accepts only what the writer writes, and names anything else: unknown elements could
 //! move, hide or scale what is cut.
 
 mod read;
@@ -22,7 +22,7 @@ const LAYERS: [(CutLayer, &str, u8); 4] = [
     (CutLayer::Engrave, "ENGRAVE", 5),
 ];
 
-/// The name of a layer in the file.
+/// The name of a layer in a file.
 pub fn layer_name(layer: CutLayer) -> &'static str {
     LAYERS.iter().find(|(l, ..)| *l == layer).map_or("0", |(_, name, _)| name)
 }

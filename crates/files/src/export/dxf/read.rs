@@ -1,40 +1,42 @@
+//! Strict reader of DXF, for checking drawings before they are cut.
+
 use glam::DVec2;
 
 use super::LAYERS;
 use deltille_core::artwork::{CutDrawing, CutLayer, CutPath};
 
-/// The one line style.
+/// The only line style.
 const CONTINUOUS: [(u32, &str); 6] =
     [(2, "CONTINUOUS"), (70, "0"), (3, "Solid line"), (72, "65"), (73, "0"), (40, "0.0")];
 
-/// Variables of the head that say the release and the unit: millimetres.
+/// Header variables that state the release and the unit, millimetres.
 const HEAD: [(u32, &str); 5] =
     [(2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (9, "$INSUNITS"), (70, "4")];
 
-/// How far the stated extent may be from that of the paths, mm: what written digits leave.
+/// Greatest difference of the stated extent from that of the paths, mm, by the number of digits.
 const EXTENT_SLACK_MM: f64 = 2e-6;
 
-/// Why a `.dxf` is not taken.
+/// Why a `.dxf` file is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DxfError {
-    /// Not a DXF as text.
+    /// The file is not a DXF as text.
     #[error("not a DXF of release 12 as text")]
     NotDxf,
-    /// Something that the writer does not write.
+    /// The file has an element that the writer does not write.
     #[error("line {line}: {construct}")]
     Construct {
         /// Counted from 1.
         line: usize,
-        /// What it is, such as "entity CIRCLE".
+        /// The element, such as "entity CIRCLE".
         construct: String,
     },
 }
 
-/// Reads the text of a `.dxf`; lines come as open paths of two points.
+/// Reads the text of a `.dxf` file, mm; each `LINE` becomes an open path of two points.
 ///
 /// # Errors
-/// Where it is no such drawing.
+/// When the file is not a DXF, or not one that [`text`](super::text) writes.
 pub fn read(text: &str) -> Result<CutDrawing, DxfError> {
     let records = records(text)?;
     let mut reader = Reader { records: &records, at: 0 };
@@ -53,8 +55,8 @@ pub fn read(text: &str) -> Result<CutDrawing, DxfError> {
     Ok(drawing)
 }
 
-/// Refuses what is not written as what is read of it is; the words on the first lines may be of any
-/// version of the writer.
+/// Refuses a text that differs from what the writer makes of its content; the first comment may
+/// name any version of the writer.
 fn written_otherwise(found: &str, drawing: &CutDrawing) -> Result<(), DxfError> {
     let anew = super::text(drawing);
     let of_writer = |line: &str| line.starts_with("deltille ") && line.ends_with(", millimetres");
@@ -70,7 +72,7 @@ fn written_otherwise(found: &str, drawing: &CutDrawing) -> Result<(), DxfError> 
     }
 }
 
-/// A group of code 0, which begins something, and the groups that follow it.
+/// A record: a group of code 0 and the groups that follow it.
 struct Record<'a> {
     line: usize,
     name: &'a str,
@@ -103,7 +105,7 @@ impl Record<'_> {
         DxfError::Construct { line: self.line, construct: construct.into() }
     }
 
-    /// Refuses groups other than those given.
+    /// Refuses groups other than the `stated` ones.
     fn check(&self, stated: &[(u32, &str)]) -> Result<(), DxfError> {
         let wrong = self.fields.iter().zip(stated).find(|(found, stated)| found != stated);
         if let Some(((code, value), _)) = wrong {
@@ -123,7 +125,8 @@ impl Record<'_> {
         }
     }
 
-    /// The points whose x has the codes given, after the fields given, at z = 0.
+    /// The points at z = 0 whose x coordinates have the group codes given; the first `before`
+    /// fields are skipped.
     fn points<const N: usize>(
         &self,
         before: usize,
@@ -177,7 +180,7 @@ impl<'a, 't> Reader<'a, 't> {
         Ok(record)
     }
 
-    /// The next record, which must have a name.
+    /// The next record, which must have this name.
     fn named(&mut self, name: &str) -> Result<&'a Record<'t>, DxfError> {
         let record = self.next()?;
         match record.name == name {
@@ -186,7 +189,7 @@ impl<'a, 't> Reader<'a, 't> {
         }
     }
 
-    /// The next record, which must be just so.
+    /// The next record, which must have this name and exactly these fields.
     fn expect(&mut self, name: &str, fields: &[(u32, &str)]) -> Result<(), DxfError> {
         self.named(name)?.check(fields)
     }

@@ -1,3 +1,5 @@
+//! Writer of DXF.
+
 use std::fmt::Write;
 
 use glam::DVec2;
@@ -6,7 +8,7 @@ use super::{LAYERS, layer_name};
 use crate::export::GENERATOR;
 use deltille_core::artwork::{CutDrawing, CutPath};
 
-/// The text of a `.dxf` file.
+/// The text of the `.dxf` file of a drawing, mm.
 pub fn text(drawing: &CutDrawing) -> String {
     let [left, lower, right, upper] = drawing.bounds_mm().unwrap_or_default();
     let mut file = File::default();
