@@ -180,10 +180,13 @@ pub(super) fn curve_plot(found: &CameraEstimate, survey: &Survey) -> Option<(Str
         .filter_map(|at| Some(camera.unproject(at.pixel)?.direction.angle_between(DVec3::Z)))
         .collect();
     let farthest = of_corners.iter().copied().fold(0.0, f64::max);
-    let far = curve(camera, &ideal, INFINITY_MM, corner.max(farthest));
+    // At the same angles at every distance.
+    let most = corner.max(farthest);
+    let far = curve(camera, &ideal, INFINITY_MM, most);
     let widest = far.last().filter(|last| last.angle_rad > 0.0)?.angle_rad;
     let distance_mm = found.projection.as_ref().and_then(|p| p.distances_mm.first().copied());
-    let near = distance_mm.map(|mm| (mm, curve(camera, &ideal, mm, widest)));
+    let near = distance_mm.map(|mm| (mm, curve(camera, &ideal, mm, most)));
+    let near = near.map(|(mm, near)| (mm, near.into_iter().take(far.len()).collect::<Vec<_>>()));
     let near = near.filter(|(_, near)| {
         near.iter().zip(&far).any(|(a, b)| (a.mean_px - b.mean_px).abs() > APART_PX)
     });
@@ -202,10 +205,10 @@ pub(super) fn curve_plot(found: &CameraEstimate, survey: &Survey) -> Option<(Str
     for angle in of_corners {
         counts[((angle / widest * BINS as f64) as usize).min(BINS - 1)] += 1;
     }
-    let most = counts.into_iter().max().unwrap_or(0).max(1) as f64;
+    let fullest = counts.into_iter().max().unwrap_or(0).max(1) as f64;
     for (bin, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
         let at = |bin: usize| (bin as f64 / BINS as f64 * widest).to_degrees();
-        let top = y[0] + 0.12 * (y[1] - y[0]) * count as f64 / most;
+        let top = y[0] + 0.12 * (y[1] - y[0]) * count as f64 / fullest;
         axes.bar(DVec2::new(at(bin), y[0]), DVec2::new(at(bin + 1), top), "count-bar", "");
     }
     axes.line(&[DVec2::ZERO, DVec2::new(widest.to_degrees(), 0.0)], "guide");
