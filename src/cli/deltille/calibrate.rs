@@ -12,7 +12,7 @@ use super::calibrating::{
     without_outliers,
 };
 use super::camera_file;
-use super::files::{File, check_places, sample_of, text_file, write_all};
+use super::files::{File, check_places, same_file, sample_of, text_file, write_all};
 use super::page::check_images;
 use super::sightings::{Sightings, SightingsArgs};
 use crate::calibrate::{Calibration, CameraEstimate, Estimate, Intrinsics, Source};
@@ -83,6 +83,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let stem = if args.fixed_intrinsics.is_some() { "poses" } else { "camera" };
     let path = output::file(args.output.as_deref().unwrap_or(Path::new(".")), stem, "yaml")?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    if let Some(known) = &args.fixed_intrinsics {
+        ensure!(
+            !same_file(&path, known),
+            "-o: {} is the camera of --fixed-intrinsics, whose uncertainties would be lost: give another name",
+            path.display()
+        );
+    }
     let intrinsics = args.intrinsics()?;
     let folder = output::folder_of(&path);
     let sample = sample(&intrinsics);

@@ -35,6 +35,9 @@ pub struct Args {
     /// LEFT,TOP,RIGHT,BOTTOM
     #[arg(long, value_name = "PART", default_value = "seen", value_parser = region)]
     region: Region,
+    /// Differences up to this, px rms a coordinate, are no reason to end with exit code 1, however significant
+    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = tolerance)]
+    tolerance: f64,
     /// Write the comparison, and a picture of the same name of each camera
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
@@ -54,7 +57,13 @@ fn region(text: &str) -> Result<Region, String> {
     }
 }
 
-/// Compares two calibrations; exit code 1 where they differ by more than their uncertainties explain.
+fn tolerance(text: &str) -> Result<f64, String> {
+    let px = text.strip_suffix("px").unwrap_or(text).trim().parse::<f64>().ok();
+    px.filter(|px| (0.0..=1e6).contains(px)).ok_or("give px, such as 0.05".to_owned())
+}
+
+/// Compares two calibrations; exit code 1 where they differ by more than their uncertainties explain, and by more than
+/// is tolerated.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = args.output.as_deref().map(|path| output::file(path, "comparison", "json"));
     let path = path.transpose()?;
@@ -75,7 +84,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let motions = CameraMotion::of_rig(&pairs);
     let mut text = String::new();
     for ((one, _), found) in pairs.iter().zip(&found) {
-        text += &told(one, found);
+        text += &told(one, found, args.tolerance);
     }
     for motion in &motions {
         // Writing to a String cannot fail.
@@ -98,7 +107,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
     }
     output::print(&text)?;
-    let has_changed = found.iter().any(|found| found.is_significant() == Some(true))
+    let is_beyond =
+        |found: &Comparison| found.is_significant() == Some(true) && found.rms_px > args.tolerance;
+    let has_changed = found.iter().any(is_beyond)
         || motions.iter().any(|motion| motion.is_significant() == Some(true));
     Ok(if has_changed { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
 }
@@ -163,7 +174,7 @@ fn files(
 }
 
 /// How two cameras differ, in words.
-fn told(camera: &CameraEstimate, found: &Comparison) -> String {
+fn told(camera: &CameraEstimate, found: &Comparison, tolerance: f64) -> String {
     let name = match camera.name.as_str() {
         "" => String::new(),
         name => format!("{}: ", shown(name)),
@@ -174,10 +185,16 @@ fn told(camera: &CameraEstimate, found: &Comparison) -> String {
         Some(_) => format!(" and moved by {:.3} mm", moved.length()),
         None => String::new(),
     };
+    let meaning = match found.rms_px <= tolerance {
+        true => format!("within the tolerance of {tolerance} px"),
+        false => {
+            "the camera has changed, or its model or the board does not hold in both".to_owned()
+        }
+    };
     let expected = found.expected_px.map_or(String::new(), |px| {
         format!(
             "{name}from the uncertainties of both {px:.4} px are expected: {}\n",
-            verdict(found.chance, found.is_significant(), "the camera has changed")
+            verdict(found.chance, found.is_significant(), &meaning)
         )
     });
     format!(

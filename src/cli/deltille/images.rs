@@ -115,7 +115,7 @@ impl Stems {
         let stem = stem(image)?;
         if let Some(other) = self.taken.insert(stem.clone(), image.to_owned()) {
             bail!(
-                "{} and {} would both write {stem}.json: detect them into different folders with -o",
+                "{} and {} would both be written under the name {stem}: give them different folders with -o",
                 other.display(),
                 image.display()
             );

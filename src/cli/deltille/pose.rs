@@ -9,7 +9,9 @@ use super::images::Images;
 use super::limits::ImageLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
-use crate::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
+use crate::calibrate::{
+    Calibration, CalibrationError, Diagnosis, Estimate, Reference, Words, views,
+};
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::FAILED;
@@ -175,7 +177,10 @@ impl Finder {
         sightings::put_on(&self.sheet, Some(target), &mut views)?;
         let panels = sightings::panels(&reference, &self.sheet)?;
         let calibration = Calibration::new(panels).camera("", views, self.camera.clone());
-        let found = calibration.solve().with_context(|| image.display().to_string())?;
+        let found = match calibration.solve() {
+            Err(error @ CalibrationError::OtherSize { .. }) => return Ok(Err(error.to_string())),
+            found => found.with_context(|| image.display().to_string())?,
+        };
         let words = Words::new(&found, None);
         let said = found.inspect();
         let foreign = said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));

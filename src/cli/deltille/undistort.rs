@@ -323,10 +323,10 @@ pub fn run_pair(args: PairArgs) -> anyhow::Result<ExitCode> {
     }
     let baseline = made.baseline_mm;
     let (mm, what) = match baseline.y == 0.0 {
-        true => (baseline.x, "rows"),
-        false => (baseline.y, "columns"),
+        true => (baseline.x, "row"),
+        false => (baseline.y, "column"),
     };
-    say!("baseline {mm:.3} mm; a point is in the same of the {what} of both");
+    say!("baseline {mm:.3} mm; a point is in the same {what} of both pictures");
     let written = write_all(&args.view.output, &files, args.view.overwrite)?;
     for path in &written {
         say!("wrote {}", path.display());

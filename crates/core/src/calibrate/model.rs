@@ -57,11 +57,7 @@ pub enum Model {
 
 /// A text that is no model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "`{0}` is no model: radtan, radtan5, rational, thin-prism, kannala-brandt (with 4 terms; \
-     kannala-brandt-5 and so on up to 12), eucm, double-sphere, pupil, or spline (of degree 3; spline-2; \
-     with as many knots as you say: spline-3-16x12)"
-)]
+#[error("{0}")]
 pub struct ModelError(String);
 
 impl Model {
@@ -208,13 +204,20 @@ impl FromStr for Model {
         if let Some(&(_, model)) = Self::NAMED.iter().find(|(name, _)| *name == text) {
             return Ok(model);
         }
-        if let Some(spline) = text.strip_prefix("spline-").and_then(spline) {
-            return Ok(spline);
+        if let Some((degree, knots)) = text.strip_prefix("spline-").and_then(spline) {
+            // Any field of view: it is found later.
+            SplineGrid::new(degree, knots.unwrap_or(SPLINE_KNOTS), 90)
+                .map_err(|error| ModelError(format!("`{text}` is no model: {error}")))?;
+            return Ok(Self::Spline { degree, knots });
         }
         let terms = text.strip_prefix("kannala-brandt-").and_then(|terms| terms.parse().ok());
         match terms.filter(|terms| (TERMS..=MAX_LENS_PARAMETERS).contains(terms)) {
             Some(terms) => Ok(Self::KannalaBrandt(terms)),
-            None => Err(ModelError(text.to_owned())),
+            None => Err(ModelError(format!(
+                "`{text}` is no model: radtan, radtan5, rational, thin-prism, kannala-brandt (with 4 terms; \
+                 kannala-brandt-5 and so on up to 12), eucm, double-sphere, pupil, or spline (of degree 3; spline-2; \
+                 with as many knots as you say: spline-3-16x12)"
+            ))),
         }
     }
 }
@@ -233,8 +236,8 @@ impl fmt::Display for Model {
     }
 }
 
-/// The model of what follows `spline-`.
-fn spline(text: &str) -> Option<Model> {
+/// Degree and knots of what follows `spline-`.
+fn spline(text: &str) -> Option<(usize, Option<[usize; 2]>)> {
     let (degree, knots) = match text.split_once('-') {
         Some((degree, knots)) => (degree, Some(knots.split_once('x')?)),
         None => (text, None),
@@ -244,9 +247,7 @@ fn spline(text: &str) -> Option<Model> {
         Some((columns, rows)) => Some([columns.parse().ok()?, rows.parse().ok()?]),
         None => None,
     };
-    // Any field of view: it is found later.
-    SplineGrid::new(degree, knots.unwrap_or(SPLINE_KNOTS), 90).ok()?;
-    Some(Model::Spline { degree, knots })
+    Some((degree, knots))
 }
 
 /// Which parameters of a camera are found of those that are to be, without those that others make up for.
