@@ -44,7 +44,7 @@ places = {(c["row"], c["col"]): c["target_mm"] for c in board["panels"][0]["corn
 for model in ("spline-3-10x8", "spline-2-9x9"):
     path = f"{folder}/{model}"
     command = [deltille, "calibrate", f"{folder}/corners", "--target", f"{folder}/board.json"]
-    command += ["--model", model, "--format", "own,mrcal", "--force", "-o", f"{path}.yaml"]
+    command += ["--model", model, "--format", "own,mrcal", "--residuals", "--force", "-o", f"{path}.yaml"]
     subprocess.run(command, check=True, capture_output=True)
     camera, found = yaml.safe_load(open(f"{path}.yaml")), json.load(open(f"{path}.json"))
     points, predicted = [], []
