@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::detect::Grid;
 use crate::lattice::GridKind;
-use crate::targets::{BoardSpec, Target, TargetError, TargetSpec, zigzag_vertices};
+use crate::targets::{BoardSpec, Target, TargetError, TargetSpec, board_vertices};
 
 /// An untagged board that no file describes. Its labels may differ between views by a motion of the
 /// lattice, which the pose of the view takes up.
@@ -60,12 +60,6 @@ impl UntaggedGrid {
     }
 
     fn labels(&self, rows: u32, cols: u32) -> BTreeSet<(i32, i32)> {
-        match self.kind {
-            GridKind::Deltille => zigzag_vertices(rows, cols).map(|v| (v.row, v.col)).collect(),
-            GridKind::Checker => {
-                let all = 0..rows as i32;
-                all.flat_map(|row| (0..cols as i32).map(move |col| (row, col))).collect()
-            }
-        }
+        board_vertices(self.kind, rows, cols).into_iter().map(|v| (v.row, v.col)).collect()
     }
 }
