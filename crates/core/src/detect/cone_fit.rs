@@ -8,13 +8,13 @@ use glam::DVec2;
 use multiversion::multiversion;
 use nalgebra::DMatrix;
 
+use super::lanes::{self, LANES};
 use crate::raster::{ImageView, Intensity, View, of_any};
 
 /// Powers (i, j) of a monomial uⁱvʲ.
 pub type Powers = (i32, i32);
 
-/// Numbers that the widest processors work on at once; rows of kernels are padded to so many.
-const LANES: usize = 16;
+/// Rows of kernels are padded to whole vectors, of which so much is worked on at a time.
 const HALF: usize = LANES / 2;
 
 /// Kernels of the first N coefficients of a polynomial.
@@ -100,7 +100,7 @@ fn products<const N: usize, T: Intensity>(
             sums[k][first..first + HALF].copy_from_slice(&part[k]);
         }
     }
-    sums.map(|sums| sums.iter().sum())
+    sums.each_ref().map(lanes::sum)
 }
 
 /// The sums of half of the lanes, from one on: so many stay in registers.

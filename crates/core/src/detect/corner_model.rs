@@ -37,15 +37,13 @@ use super::blurred_corner::{
 };
 use super::correlation::Influence;
 use super::curve::{Piece, TONE_PARAMS};
+use super::lanes::LANES;
 use super::optics::{INK_UNIT, Optics, STEP, Spread};
 use super::small_systems::solved;
 use crate::raster::ImageView;
 
 /// Largest radius of a window, px.
 pub const MAX_RADIUS: usize = 15;
-
-/// Numbers that the widest processors work on at once.
-const LANES: usize = 16;
 
 /// Pixels of the largest window, rounded up to whole vectors.
 const MAX_PIXELS: usize = ((2 * MAX_RADIUS + 1) * (2 * MAX_RADIUS + 1)).next_multiple_of(LANES);
@@ -1152,7 +1150,12 @@ fn with_prior<const K: usize>(
 fn products<const N: usize>(columns: &mut Columns, count: usize) -> [[f64; N]; N] {
     let padded = count.next_multiple_of(LANES).min(MAX_PIXELS);
     for column in columns.iter_mut().take(N) {
-        column[count..padded].fill(0.0);
+        // All of the last vector, which is one comparison.
+        if let Some(last) = column[..padded].last_chunk_mut::<LANES>() {
+            for (k, value) in last.iter_mut().enumerate() {
+                *value = if padded - LANES + k < count { *value } else { 0.0 };
+            }
+        }
     }
     let mut products = [[0.0; N]; N];
     for i in (0..N).step_by(2) {

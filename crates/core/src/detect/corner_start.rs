@@ -11,6 +11,7 @@ use glam::DVec2;
 use multiversion::multiversion;
 
 use super::corner_model::{Corner, Window};
+use super::lanes::{self, LANES};
 use crate::raster::ImageView;
 
 /// Directions on the half-circle: 7.5° apart, so that the 17° between edges at 75° hold two.
@@ -84,7 +85,6 @@ fn sums<const K: usize>(
     [x, y]: [f32; 2],
     directions: &[[f32; 2]],
 ) -> [[f32; 2]; 2] {
-    const LANES: usize = 16;
     let (mut sums, mut counts, mut all) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
     let n = us.len().min(vs.len()).min(pixels.len());
     for first in (0..n).step_by(LANES) {
@@ -100,9 +100,8 @@ fn sums<const K: usize>(
             all[k] += pixels[first + k];
         }
     }
-    let total = |lanes: [f32; LANES]| lanes.iter().sum::<f32>();
-    let (sum, count) = (total(sums), total(counts));
-    [[sum, count], [total(all) - sum, n as f32 - count]]
+    let (sum, count) = (lanes::sum(&sums), lanes::sum(&counts));
+    [[sum, count], [lanes::sum(&all) - sum, n as f32 - count]]
 }
 
 /// The start around `position`, from circles; `None` when the circles leave the image or show no contrast.

@@ -17,6 +17,8 @@
 
 use multiversion::multiversion;
 
+use super::lanes::{self, LANES};
+
 /// Residuals of a corner, and how its parameters answer to its pixels.
 #[derive(Clone, Debug)]
 pub struct Influence {
@@ -34,9 +36,6 @@ pub struct Influence {
     pub noise: f64,
 }
 
-/// Numbers that the widest processors work on at once.
-const LANES: usize = 16;
-
 /// Largest lags, px: of sensors and JPEG, and of enlarged pictures, whose grain is wider.
 const LAGS_PX: [i32; 2] = [2, 6];
 
@@ -49,6 +48,10 @@ const FACTORS: [f64; 2] = [0.02, 40.0];
 
 /// Corners from which correlations are told; the sums of ten vary by some per cent.
 pub const CORNERS: usize = 10;
+
+/// Of so many one tells what fits take out of residuals, which depends on the windows alone and is nearly
+/// the same for all.
+const HAT_EVERY: usize = 4;
 
 impl Influence {
     /// What is the same at opposite pixels, or of opposite sign, of those that have both.
@@ -152,22 +155,28 @@ fn lagged(corners: &[Influence], reach: i32) -> (f64, f64) {
     let mut products = vec![0.0; lags.len()];
     let mut influences = vec![0.0; lags.len()];
     let (mut square, mut count, mut white) = (0.0, 0.0, 0.0);
-    for corner in corners {
+    let hats = corners.len() as f64 / corners.len().div_ceil(HAT_EVERY) as f64;
+    for (i, corner) in corners.iter().enumerate() {
         let field = Field::of(corner, reach);
         let mask = field.spread([vec![1.0; corner.residuals.len()].as_slice()]);
         let residual = field.spread([corner.residuals.as_slice()]);
         let on_position = field.spread(corner.on_position.iter().map(Vec::as_slice));
-        let hat = field.spread(corner.hat.iter().map(Vec::as_slice));
         let variance = corner.noise.powi(2);
-        square += field.product(&residual, 0) / variance + field.product(&hat, 0);
+        square += field.product(&residual, 0) / variance;
         count += field.product(&mask, 0);
         white += field.product(&on_position, 0);
         for (k, lag) in lags.iter().enumerate() {
             let offset = field.offset(*lag);
             pairs[k] += field.product(&mask, offset);
-            products[k] +=
-                field.product(&residual, offset) / variance + field.product(&hat, offset);
+            products[k] += field.product(&residual, offset) / variance;
             influences[k] += field.product(&on_position, offset);
+        }
+        if i % HAT_EVERY == 0 {
+            let hat = field.spread(corner.hat.iter().map(Vec::as_slice));
+            square += hats * field.product(&hat, 0);
+            for (k, lag) in lags.iter().enumerate() {
+                products[k] += hats * field.product(&hat, field.offset(*lag));
+            }
         }
     }
     let scale = square / count;
@@ -246,5 +255,5 @@ fn lagged_product(fields: &[f32], [pixels, room]: [usize; 2], offset: usize) -> 
         }
         first += room;
     }
-    f64::from(sums.iter().sum::<f32>())
+    f64::from(lanes::sum(&sums))
 }

@@ -41,6 +41,7 @@ mod grow;
 mod ink;
 mod label;
 mod labels;
+mod lanes;
 mod links;
 mod local_map;
 mod optics;

@@ -75,10 +75,11 @@ const MAX_STEP: f64 = 2.0;
 /// Most iterations; four are usual.
 const MAX_ITERATIONS: usize = 10;
 
-/// The iteration ends with steps below this fraction of the standard deviations of the parameters;
-/// earlier where it only decides which groups are significant.
-const CONVERGED: f64 = 0.5;
-const ROUGHLY_CONVERGED: f64 = 1.0;
+/// The iteration ends where it lacks less than this fraction of the standard deviations of the parameters,
+/// as a series of steps that go on to shrink as the last one did would; earlier where it only decides which
+/// groups are significant. A first step may be twice as long, as no step is half as long as the one before.
+const CONVERGED: f64 = 0.25;
+const ROUGHLY_CONVERGED: f64 = 0.5;
 
 /// Corners whose residuals exceed this many times the median have no weight: they show something
 /// else.
@@ -302,10 +303,11 @@ impl Optics {
 
     fn with(&self, &[p1, p2, p3, e1, e2, halo, ink]: &[f64; PARAMS]) -> Self {
         let params = [p1, p2, p3];
-        let curve = if params == self.params {
-            self.curve.clone()
-        } else {
-            Some(Curve::estimated(params, self.range))
+        let curve = match params {
+            same if same == self.params => self.curve.clone(),
+            // The camera is linear again, and corners need no pieces of a curve.
+            [0.0, 0.0, 0.0] => None,
+            _ => Some(Curve::estimated(params, self.range)),
         };
         let long = (e1.hypot(e2) / MAX_ASTIGMATISM).max(1.0);
         Self {
@@ -345,45 +347,43 @@ impl Optics {
             INK => has_ink,
             _ => true,
         };
-        let active = (0..PARAMS).filter(|&p| is_active(p)).collect();
         let members = samples.into_iter().map(Member::from).collect();
         let greys = [blacks, whites].map(|greys| median(greys).unwrap_or(0.0));
-        let mut problem = Problem::<K> { fitter, image, members, greys, active };
+        let all: Vec<usize> = (0..PARAMS).filter(|&p| is_active(p)).collect();
+        let active = all.clone();
+        let mut problem = Problem::<K> { fitter, image, members, greys, all, active };
         let reported = |problem: &Problem<K>, optics: &Self, cov: &DMatrix<f64>, used| Reported {
             tone: optics.tone_between(greys, (cov, &problem.active), used),
             ink: problem.ink(optics, cov, used),
         };
-        let all = problem.active.clone();
         let mut optics = known.clone();
+        let mut at = problem.linearised(known);
         let (mut used, mut found) = (Vec::new(), Reported::default());
         // A first step tells what is worth looking for. What the model lacks there scatters the gradients: that is
         // no reason to look away, but the deviation that is reported. From a straight curve it tells little of what
         // is weak beside the curve, and from a Gaussian little of what a motion leaves: all is asked once more.
         for is_first in [true, false] {
-            problem.active.clone_from(&all);
-            let equations = problem.equations(&optics);
-            let (step, scattered) = problem.first_step(&optics, &equations);
-            let unused = reported(&problem, &optics.with(&step.vector), &scattered, false);
+            problem.active.clone_from(&problem.all);
+            let reduced = problem.reduced(&at, &weights_of(&at.equations));
+            let (step, scattered) = problem.first_step(&at.optics, &reduced);
+            let unused = reported(&problem, &at.optics.with(&step.vector), &scattered, false);
             let worth = match is_first {
                 true => step.supported(WORTH_A_LOOK),
-                false => problem.estimate(&optics, step.vector, &scattered).supported(1.0),
+                false => problem.estimate(&at.optics, step.vector, &scattered).supported(1.0),
             };
             if worth.active == used {
                 found = found.or(unused);
                 break;
             }
-            problem.active.clone_from(&worth.active);
-            let (start, equations) = if is_first {
-                (known.clone(), problem.equations_of(&all, equations))
-            } else {
-                let start = optics.with(&worth.vector);
-                let equations = problem.equations(&start);
-                (start, equations)
-            };
-            let cov;
-            (optics, cov) = problem.settled(&start, equations);
+            if !is_first {
+                let start = problem.stepped(&at, &reduced, &worth.vector);
+                at = problem.linearised(start);
+            }
+            problem.active = worth.active;
+            let settled = problem.settled(at);
             used.clone_from(&problem.active);
-            found = reported(&problem, &optics, &cov, true).or(unused);
+            found = reported(&problem, &settled.optics, &settled.cov, true).or(unused);
+            (optics, at) = (settled.optics, settled.at);
         }
         let inflation = problem.inflation(&optics);
         Self { tone: found.tone, ink_found: found.ink, inflation, ..optics }
@@ -501,6 +501,16 @@ impl Estimate {
         CHI2[0] * (of_kappa / CHI2_OF_ONE).max(of_noise)
     }
 
+    /// The most likely values of these parameters if those of all other groups are zero.
+    fn only(self, active: &[usize]) -> Self {
+        let others = GROUPS.iter().filter(|group| !active.contains(&group[0]));
+        let present = |all: &Self, group: &[usize]| all.active.contains(&group[0]);
+        others.fold(
+            self,
+            |rest, group| if present(&rest, group) { rest.without(group) } else { rest },
+        )
+    }
+
     /// The most likely values of the other parameters if a group is zero.
     fn without(&self, group: &[usize]) -> Self {
         let kept: Vec<usize> =
@@ -540,7 +550,26 @@ struct Problem<'a, const K: usize> {
     members: Vec<Member<K>>,
     /// Median black and white of the corners.
     greys: [f64; 2],
+    /// The parameters that may be estimated, and those of them that are.
+    all: Vec<usize>,
     active: Vec<usize>,
+}
+
+/// The equations of all parameters at these optics and corners.
+struct Linearised<const K: usize> {
+    optics: Optics,
+    corners: Vec<Corner<K>>,
+    equations: Vec<Option<Joint>>,
+}
+
+/// Optics that fit the corners, the covariance of the active parameters, and the equations before the last step.
+struct Adjusted<const K: usize> {
+    optics: Optics,
+    cov: DMatrix<f64>,
+    /// What the last step lacks, in standard deviations, as the steps before it say.
+    lack: f64,
+    at: Linearised<K>,
+    reduced: Reduced,
 }
 
 /// The equations of the common parameters, the corners' eliminated.
@@ -572,10 +601,9 @@ impl Reduced {
 impl<const K: usize> Problem<'_, K> {
     /// The estimate after a first step, with the covariance of the noise alone, and the covariance
     /// with the scatter of gradients.
-    fn first_step(&self, optics: &Optics, equations: &[Option<Joint>]) -> (Estimate, DMatrix<f64>) {
+    fn first_step(&self, optics: &Optics, reduced: &Reduced) -> (Estimate, DMatrix<f64>) {
         let count = self.active.len();
         let unknown = DMatrix::identity(count, count);
-        let reduced = self.reduced(equations, &weights_of(equations), optics);
         let mut vector = optics.vector();
         let Some(factor) = reduced.matrix.clone().cholesky() else {
             return (self.estimate(optics, vector, &unknown), unknown);
@@ -583,7 +611,7 @@ impl<const K: usize> Problem<'_, K> {
         let step = factor.solve(&reduced.gradient);
         self.active.iter().zip(step.iter()).for_each(|(&p, s)| vector[p] += s);
         let estimate = self.estimate(optics, vector, &factor.inverse());
-        (estimate, covariance(&reduced).unwrap_or(unknown))
+        (estimate, covariance(reduced).unwrap_or(unknown))
     }
 
     /// The estimate with these values of the parameters, near these optics, given the covariance of
@@ -610,97 +638,103 @@ impl<const K: usize> Problem<'_, K> {
         })
     }
 
-    /// The optics that fit the corners best up to a part of their deviations, from those of which these are the
-    /// equations, and the covariance of the active parameters.
-    fn adjusted(
-        &mut self,
-        first: &Optics,
-        mut equations: Vec<Option<Joint>>,
-        converged: f64,
-    ) -> (Optics, DMatrix<f64>) {
-        let mut optics = first.clone();
-        let mut damping = 0.0;
+    /// The optics that fit the corners best up to a part of their deviations.
+    fn adjusted(&mut self, mut at: Linearised<K>, converged: f64) -> Adjusted<K> {
+        let mut optics = at.optics.clone();
+        let (mut damping, mut before, mut lack) = (0.0, None, f64::INFINITY);
         // By the noise that is left so far: of a curve that is not yet known it is many times what it will be.
-        let mut weights = weights_of(&equations);
-        let mut reduced = self.reduced(&equations, &weights, &optics);
+        let mut weights = weights_of(&at.equations);
+        let mut reduced = self.reduced(&at, &weights);
         for _ in 0..MAX_ITERATIONS {
-            let Some(step) = self.step(&reduced, &optics, damping) else {
+            let Some(step) = self.step(&reduced, &at.optics, damping) else {
                 break;
             };
-            let mut vector = optics.vector();
+            let mut vector = at.optics.vector();
             self.active.iter().zip(step.iter()).for_each(|(&p, s)| vector[p] += s);
-            let there = optics.with(&vector);
-            let before = self.corners();
-            let mut common = SVector::<f64, PARAMS>::zeros();
-            common.iter_mut().zip(step.iter()).for_each(|(to, from)| *to = *from);
-            for (member, own) in self.members.iter_mut().zip(&reduced.own) {
-                let Some((constant, slope)) = own else {
-                    continue;
-                };
-                let own = constant - slope * common;
-                member.corner = member.corner.stepped(&own).unwrap_or(member.corner);
-            }
+            let there = self.stepped(&at, &reduced, &vector);
             let length = step.dot(&(&reduced.matrix * &step)).max(0.0).sqrt();
-            if length < converged {
+            lack = match before {
+                Some(before) if length < before => length * length / (before - length),
+                _ => length / 2.0,
+            };
+            if lack < converged || length < 2.0 * converged {
                 optics = there;
                 break;
             }
-            let next = self.equations(&there);
-            let improved = cost(&next, &weights, &there) <= cost(&equations, &weights, &optics);
-            if improved {
-                (optics, equations) = (there, next);
-                weights = weights_of(&equations);
-                reduced = self.reduced(&equations, &weights, &optics);
+            let next = self.linearised(there);
+            if cost(&next, &weights) <= cost(&at, &weights) {
+                (at, before) = (next, Some(length));
+                optics.clone_from(&at.optics);
+                weights = weights_of(&at.equations);
+                reduced = self.reduced(&at, &weights);
                 damping *= 0.1;
             } else {
-                self.put_back(&before);
-                if length < ROUGHLY_CONVERGED {
+                self.put_back(&at.corners);
+                if length < 2.0 * ROUGHLY_CONVERGED {
                     // What it would gain is no more than sums of single precision tell.
                     break;
                 }
+                before = None;
                 damping = (damping * 10.0).max(0.01);
             }
         }
         let count = self.active.len();
         let cov = covariance(&reduced).unwrap_or_else(|| DMatrix::identity(count, count));
-        (Optics { shift: reduced.shift(&cov, &weights), ..optics }, cov)
+        let optics = Optics { shift: reduced.shift(&cov, &weights), ..optics };
+        Adjusted { optics, cov, lack, at, reduced }
     }
 
-    /// The optics that fit the corners best, from those of which these are the equations, without the groups that
-    /// then differ from nothing by no more than chance, and the covariance of the active parameters.
-    fn settled(&mut self, start: &Optics, equations: Vec<Option<Joint>>) -> (Optics, DMatrix<f64>) {
-        let (mut optics, cov) = self.adjusted(start, equations, ROUGHLY_CONVERGED);
-        let supported = self.estimate(&optics, optics.vector(), &cov).supported(1.0);
-        if supported.active.len() < self.active.len() {
-            optics = start.with(&supported.vector);
-            self.active = supported.active;
+    /// The optics that fit the corners best, without the groups that then differ from nothing by no more than
+    /// chance.
+    fn settled(&mut self, start: Linearised<K>) -> Adjusted<K> {
+        let mut found = self.adjusted(start, ROUGHLY_CONVERGED);
+        let vector = found.optics.vector();
+        let supported = self.estimate(&found.optics, vector, &found.cov).supported(1.0);
+        let is_less = supported.active.len() < self.active.len();
+        if is_less {
+            // Where the others then fit best, which the scatter, by which they are judged, does not tell.
+            let (step, _) = self.first_step(&found.at.optics, &found.reduced);
+            let rest = step.only(&supported.active);
+            found.optics = self.stepped(&found.at, &found.reduced, &rest.vector);
+            self.active = rest.active;
         }
-        let equations = self.equations(&optics);
-        let (mut optics, mut cov) = self.adjusted(&optics, equations, CONVERGED);
-        if optics.stretch() > LEAST_MOTION
-            && !optics.is_motion
-            && let Some(moved) = self.moved(&optics)
-        {
-            (optics, cov) = moved;
+        if is_less || found.lack >= CONVERGED {
+            let at = self.linearised(found.optics);
+            found = self.adjusted(at, CONVERGED);
         }
-        (optics, cov)
+        if found.optics.stretch() > LEAST_MOTION && !found.optics.is_motion {
+            found = self.moved(&found.optics).unwrap_or(found);
+        }
+        found
     }
 
-    /// The optics and the covariance of their active parameters if the picture moved along a line, where that
-    /// fits the corners better than a Gaussian does.
-    fn moved(&mut self, still: &Optics) -> Option<(Optics, DMatrix<f64>)> {
-        let before = self.corners();
-        let equations = self.equations(still);
-        let weights = weights_of(&equations);
-        let cost_before = cost(&equations, &weights, still);
-        let moved = Optics { is_motion: true, ..still.clone() };
-        let equations = self.equations(&moved);
-        let (moved, cov) = self.adjusted(&moved, equations, CONVERGED);
-        if cost(&self.equations(&moved), &weights, &moved) < cost_before {
-            return Some((moved, cov));
+    /// The optics if the picture moved along a line, where that fits the corners better than a Gaussian does.
+    fn moved(&mut self, still: &Optics) -> Option<Adjusted<K>> {
+        let before = self.linearised(still.clone());
+        let weights = weights_of(&before.equations);
+        let moved = self.linearised(Optics { is_motion: true, ..still.clone() });
+        let found = self.adjusted(moved, CONVERGED);
+        if cost(&self.linearised(found.optics.clone()), &weights) < cost(&before, &weights) {
+            return Some(found);
         }
-        self.put_back(&before);
+        self.put_back(&before.corners);
         None
+    }
+
+    /// The optics with these values of the active parameters, with the corners moved along as their equations say.
+    fn stepped(&mut self, at: &Linearised<K>, reduced: &Reduced, vector: &[f64; PARAMS]) -> Optics {
+        let there = at.optics.with(vector);
+        let (from, to) = (at.optics.vector(), there.vector());
+        let mut step = SVector::<f64, PARAMS>::zeros();
+        self.active.iter().enumerate().for_each(|(i, &p)| step[i] = to[p] - from[p]);
+        let corners = at.corners.iter().zip(&reduced.own);
+        for (member, (corner, own)) in self.members.iter_mut().zip(corners) {
+            let moved = own
+                .as_ref()
+                .and_then(|(constant, slope)| corner.stepped(&(constant - slope * step)));
+            member.corner = moved.unwrap_or(*corner);
+        }
+        there
     }
 
     /// The members' corners.
@@ -753,59 +787,53 @@ impl<const K: usize> Problem<'_, K> {
         correlation::inflation(&found)
     }
 
-    fn equations(&mut self, optics: &Optics) -> Vec<Option<Joint>> {
-        let Self { fitter, image, members, active, .. } = self;
-        let common: Vec<Common> = active.iter().map(|&p| optics.common(p)).collect();
-        members
+    /// The equations of all parameters at the members' corners.
+    fn linearised(&mut self, optics: Optics) -> Linearised<K> {
+        let corners = self.corners();
+        let Self { fitter, image, members, all, .. } = self;
+        let common: Vec<Common> = all.iter().map(|&p| optics.common(p)).collect();
+        let equations = members
             .iter()
             .map(|member| {
                 let window = (&member.window, member.centre);
-                fitter.joint(*image, window, &member.corner, optics, &common)
+                fitter.joint(*image, window, &member.corner, &optics, &common)
             })
-            .collect()
+            .collect();
+        Linearised { optics, corners, equations }
     }
 
-    /// The equations of the active parameters, from those of all.
-    fn equations_of(&self, all: &[usize], equations: Vec<Option<Joint>>) -> Vec<Option<Joint>> {
-        let places = self.active.iter().filter_map(|p| all.iter().position(|a| a == p));
-        let places: Vec<usize> = places.collect();
-        let of = |joint: Joint| {
-            let (mut matrix, mut gradient) = (SMatrix::identity(), SVector::zeros());
-            let from = |i: usize| if i < OWN { i } else { OWN + places[i - OWN] };
-            for i in 0..OWN + places.len() {
-                gradient[i] = joint.gradient[from(i)];
-                for j in 0..OWN + places.len() {
-                    matrix[(i, j)] = joint.matrix[(from(i), from(j))];
-                }
-            }
-            Joint { matrix, gradient, ..joint }
-        };
-        equations.into_iter().map(|joint| joint.map(of)).collect()
-    }
-
-    fn reduced(&self, equations: &[Option<Joint>], weights: &[f64], optics: &Optics) -> Reduced {
-        let count = self.active.len();
-        let vector = optics.vector();
+    /// The equations of the active parameters.
+    fn reduced(&self, at: &Linearised<K>, weights: &[f64]) -> Reduced {
+        let places = self.active.iter().filter_map(|p| self.all.iter().position(|a| a == p));
+        let places: Vec<usize> = places.map(|place| OWN + place).collect();
+        let count = places.len();
         let mut matrix = SMatrix::<f64, PARAMS, PARAMS>::zeros();
         let mut scatter = SMatrix::<f64, PARAMS, PARAMS>::zeros();
         let mut gradient = SVector::<f64, PARAMS>::zeros();
-        let mut own = Vec::with_capacity(equations.len());
-        for (joint, weight) in equations.iter().zip(weights) {
+        let mut own = Vec::with_capacity(at.equations.len());
+        for (joint, weight) in at.equations.iter().zip(weights) {
             own.push(joint.as_ref().and_then(|joint| {
                 const ALL: usize = OWN + PARAMS;
+                let mut shared = SMatrix::<f64, OWN, PARAMS>::zeros();
+                let mut block = SMatrix::<f64, PARAMS, PARAMS>::zeros();
+                let mut pull = SVector::<f64, PARAMS>::zeros();
+                for (j, &from) in places.iter().enumerate() {
+                    (0..OWN).for_each(|i| shared[(i, j)] = joint.matrix[(i, from)]);
+                    (0..count).for_each(|i| block[(i, j)] = joint.matrix[(places[i], from)]);
+                    pull[j] = joint.gradient[from];
+                }
                 let rows = std::array::from_fn::<[f64; ALL + 1], OWN, _>(|i| {
                     std::array::from_fn(|j| match j {
-                        ALL => joint.gradient[i],
-                        _ => joint.matrix[(i, j)],
+                        0..OWN => joint.matrix[(i, j)],
+                        OWN..ALL => shared[(i, j - OWN)],
+                        _ => joint.gradient[i],
                     })
                 });
                 let solution = solved(rows)?;
-                let shared = joint.matrix.fixed_view::<OWN, PARAMS>(0, OWN).into_owned();
                 let constant = SVector::from_fn(|i, _| solution[i][ALL]);
                 let slope = SMatrix::from_fn(|i, j| solution[i][OWN + j]);
-                let pull = joint.gradient.fixed_rows::<PARAMS>(OWN) - shared.tr_mul(&constant);
-                matrix += *weight
-                    * (joint.matrix.fixed_view::<PARAMS, PARAMS>(OWN, OWN) - shared.tr_mul(&slope));
+                pull -= shared.tr_mul(&constant);
+                matrix += *weight * (block - shared.tr_mul(&slope));
                 scatter += *weight * weight * pull * pull.transpose();
                 gradient += *weight * pull;
                 Some((constant, slope))
@@ -819,6 +847,7 @@ impl<const K: usize> Problem<'_, K> {
             scatter: cut(&scatter),
             own,
         };
+        let vector = at.optics.vector();
         for (i, &p) in self.active.iter().enumerate() {
             let weight = 1.0 / (PRIOR[p] * PRIOR[p]);
             reduced.matrix[(i, i)] += weight;
@@ -841,9 +870,9 @@ fn weights_of(equations: &[Option<Joint>]) -> Vec<f64> {
     equations.iter().map(weight).collect()
 }
 
-fn cost(equations: &[Option<Joint>], weights: &[f64], optics: &Optics) -> f64 {
-    let prior = optics.vector().iter().zip(PRIOR).map(|(p, d)| (p / d).powi(2)).sum::<f64>();
-    let costs = equations.iter().zip(weights);
+fn cost<const K: usize>(at: &Linearised<K>, weights: &[f64]) -> f64 {
+    let prior = at.optics.vector().iter().zip(PRIOR).map(|(p, d)| (p / d).powi(2)).sum::<f64>();
+    let costs = at.equations.iter().zip(weights);
     let of = |(joint, weight): (&Option<Joint>, &f64)| match joint {
         Some(joint) => weight * joint.cost,
         None if *weight > 0.0 => f64::INFINITY,
