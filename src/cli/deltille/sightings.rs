@@ -364,7 +364,9 @@ fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<I
 
 /// Whether two detections are of one picture, whatever it is called: noise makes no corners twice.
 pub fn is_same(one: &Detection, other: &Detection) -> bool {
-    !one.grids.is_empty() && one.grids == other.grids
+    let corners =
+        |found: &'_ Detection| found.grids.iter().map(|grid| &grid.corners).collect::<Vec<_>>();
+    !one.grids.is_empty() && one.grids.len() == other.grids.len() && corners(one) == corners(other)
 }
 
 /// Adds a detection, unless it is of a picture that is there.
@@ -391,7 +393,8 @@ fn of_tables(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<(String, 
         pictures.into_iter().filter_map(|picture| picture.found.ok()).collect();
     if found.len() < all {
         let unread = counted(all - found.len(), "picture");
-        tell!("left out: {unread} of {} could not be read when looked at", files[0].display());
+        let folder = files[0].parent().unwrap_or(&files[0]);
+        tell!("left out: {unread} of the tables in {} that could not be read", folder.display());
     }
     let stem = |image: &str| {
         let stem = Path::new(image).file_stem();

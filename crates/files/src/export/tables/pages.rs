@@ -158,3 +158,45 @@ fn number(bytes: &mut &[u8]) -> Option<i64> {
     let value = varint(bytes)?;
     Some((value >> 1) as i64 ^ -((value & 1) as i64))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A page of data whose header has these sizes.
+    fn page(unpacked: u32, packed: u32, field: u8, values: u32, encoding: u8) -> Vec<u8> {
+        let varint = |value: u32| {
+            let mut value = u64::from(value) << 1;
+            let mut bytes = Vec::new();
+            while value > 0x7f {
+                bytes.push(value as u8 | 0x80);
+                value >>= 7;
+            }
+            bytes.push(value as u8);
+            bytes
+        };
+        let mut bytes = vec![0x15, 0];
+        for size in [unpacked, packed] {
+            bytes.push(0x15);
+            bytes.extend(varint(size));
+        }
+        bytes.push((field - 3) << 4 | STRUCT);
+        bytes.push(0x15);
+        bytes.extend(varint(values));
+        bytes.extend([0x15, encoding << 1, 0, 0]);
+        bytes.extend(vec![0; packed as usize]);
+        bytes
+    }
+
+    #[test]
+    fn sizes_are_known_before_anything_is_unpacked() {
+        let two = [page(100, 7, 5, 9, 0), page(2_000_000_000, 20, 5, 9, 0)].concat();
+        assert_eq!(unpacked_bytes(&two, 10), Ok(2_000_000_100));
+        assert!(unpacked_bytes(&two[..30], 10).unwrap_err().contains("too soon"));
+        assert!(unpacked_bytes(&page(100, 7, 7, 101, 0), 1000).unwrap_err().contains("dictionary"));
+        assert!(unpacked_bytes(&page(100, 7, 7, 11, 0), 10).unwrap_err().contains("dictionary"));
+        assert!(unpacked_bytes(&page(100, 7, 5, 9, 5), 10).unwrap_err().contains("differences"));
+        assert!(unpacked_bytes(&[0xff; 40], 10).unwrap_err().contains("header"));
+        assert!(unpacked_bytes(&[0x1c; 40], 10).unwrap_err().contains("header"));
+    }
+}
