@@ -146,7 +146,7 @@ def detect(
         ``found``, a list of corners.
     concurrency : int or (int, int), optional
         How many processes look at pictures, or the least and the most; one for each processor of the cluster if left
-        out. Each takes one processor.
+        out, and one less for a dataset, which takes processors itself. Each takes one processor.
     batch_size : int, optional
         Pictures that a process is given at a time. It holds the bytes and pixels of one only.
     filesystem : pyarrow.fs.FileSystem or fsspec filesystem, optional
@@ -214,7 +214,8 @@ def detect_to(
     if dataset is None:
         return Summary(0, 0, 0, skipped)
     sink = _Tables(to, root, pictures_per_file)
-    dataset.write_datasink(sink)
+    # The processors are taken by those that look at pictures, who would wait for ever for those that write.
+    dataset.write_datasink(sink, ray_remote_args={"num_cpus": 0}, concurrency=2)
     return Summary(*sink.counts, skipped)
 
 
@@ -289,12 +290,15 @@ def _detect(
         dataset = ray.data.from_arrow([pa.table({"path": pa.array(block, pa.string())}) for block in blocks])
         there = frozenset()
     if concurrency is None:
-        concurrency = max(1, int(ray.cluster_resources().get("CPU", 1)))
+        processors = max(1, int(ray.cluster_resources().get("CPU", 1)))
+        # Whatever makes a dataset needs processors, too, and would wait for them for ever.
+        concurrency = processors if pictures is not dataset else (1, max(1, processors - 1))
+    least, most = concurrency if isinstance(concurrency, tuple) else (concurrency, concurrency)
     found = dataset.map_batches(
         _Looking,
         batch_size=batch_size,
         batch_format="pyarrow",
-        concurrency=concurrency,
+        compute=ray.data.ActorPoolStrategy(min_size=least, max_size=most),
         num_cpus=1,
         fn_constructor_kwargs={
             "target": target,
