@@ -114,7 +114,7 @@ fn a_camera_is_the_same_to_the_last_bit_from_tables_and_from_json() {
     save(&all[..3], ["many/corners/3.parquet", "left.parquet"]);
 
     let camera = |from: &str| {
-        let out = format!("of-{}", from.replace('/', "-"));
+        let out = format!("of-{}", from.replace(['/', '.'], "-"));
         let args =
             format!("calibrate {from} --target board.json --model radtan -o {out} --residuals");
         deltille(folder.path(), &args).success();
