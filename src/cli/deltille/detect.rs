@@ -80,7 +80,7 @@ enum Format {
 
 /// What came of an image.
 enum Outcome {
-    Seen(Found),
+    Seen(Box<Found>),
     Skipped,
 }
 
@@ -177,7 +177,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             let found = one_image(&args, &targets, &detector, &image, &stem)?;
             let looked_at = Seen { index, image, stem, ink: found.ink };
             seen.lock().expect("no thread panics here").push(looked_at);
-            Ok(Outcome::Seen(found))
+            Ok(Outcome::Seen(Box::new(found)))
         });
         if let Some(tables) = &tables {
             let row = row_of(name, &mut result);
@@ -243,7 +243,13 @@ fn see_again(
             let again = one_image(args, targets, &detector, image, stem);
             again.as_ref().err().iter().for_each(|error| bar.suspend(|| run::report(error)));
             if let Some(tables) = &tables {
-                tables.add(*index, row_of(Some(name_of(image)), &mut again.map(Outcome::Seen)));
+                tables.add(
+                    *index,
+                    row_of(
+                        Some(name_of(image)),
+                        &mut again.map(|found| Outcome::Seen(Box::new(found))),
+                    ),
+                );
             }
             bar.inc(1);
         });
@@ -312,10 +318,10 @@ impl Report {
             state.next += 1;
             match result {
                 Ok(Outcome::Skipped) => state.skipped += 1,
-                Ok(Outcome::Seen(Found { line, is_there, .. })) => {
-                    state.found += usize::from(is_there);
+                Ok(Outcome::Seen(found)) => {
+                    state.found += usize::from(found.is_there);
                     // What cannot be printed is lost, as it would be with `println`.
-                    if let Err(error) = output::print(&line) {
+                    if let Err(error) = output::print(&found.line) {
                         state.error.get_or_insert(error);
                     }
                 }
