@@ -110,17 +110,25 @@ impl Overwrite {
         if self.force || !path.is_file() {
             return Ok(());
         }
-        let content = match Limits::default().read(path) {
-            Err(ReadError::Exceeded { .. }) => bail!(
-                "{} is too large to be looked at, and would be lost: choose another place to write \
-                 to; --force replaces it",
-                path.display()
-            ),
-            content => content.with_context(|| cannot_read(path))?,
+        let (there, is_empty) = match Limits::default().read(path) {
+            Err(ReadError::Exceeded { .. }) => {
+                let there = Kind::of_large(path).with_context(|| cannot_read(path))?;
+                let there = there.with_context(|| {
+                    format!(
+                        "{} is too large to be looked at, and would be lost: choose another place to write to; \
+                         --force replaces it",
+                        path.display()
+                    )
+                })?;
+                (there, false)
+            }
+            content => {
+                let content = content.with_context(|| cannot_read(path))?;
+                (Kind::of(&content), content.is_empty())
+            }
         };
-        let there = Kind::of(&content);
         ensure!(
-            content.is_empty() || there == *kind,
+            is_empty || there == *kind,
             "{} holds {there}, which would be lost: choose another place to write to; --force \
              replaces it",
             path.display()

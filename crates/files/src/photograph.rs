@@ -163,7 +163,24 @@ pub fn read_with_notes(
     limits: &Limits,
     accept_damaged: bool,
 ) -> Result<Photograph, ImageError> {
-    let (image, notes) = decoded(path, limits, accept_damaged)?;
+    let open = || ImageFile::open(path, limits);
+    let (image, notes) = decoded(path, open, limits, accept_damaged)?;
+    Ok(Photograph { image: from_dynamic(image), notes })
+}
+
+/// Reads a photograph from the bytes of its file, as [`read_with_notes`] does; errors call it `name`.
+///
+/// # Errors
+/// When the bytes are no picture, exceed the limits, or are damaged and that is not accepted.
+pub fn decode_with_notes(
+    bytes: Vec<u8>,
+    name: &str,
+    limits: &Limits,
+    accept_damaged: bool,
+) -> Result<Photograph, ImageError> {
+    let path = Path::new(name);
+    let open = || ImageFile::of(path, bytes, limits);
+    let (image, notes) = decoded(path, open, limits, accept_damaged)?;
     Ok(Photograph { image: from_dynamic(image), notes })
 }
 
@@ -172,18 +189,19 @@ pub fn read_with_notes(
 /// # Errors
 /// When the file cannot be read, is not a picture, is damaged, or exceeds the limits.
 pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageError> {
-    Ok(decoded(path, limits, false)?.0)
+    Ok(decoded(path, || ImageFile::open(path, limits), limits, false)?.0)
 }
 
-fn decoded(
+fn decoded<'a>(
     path: &Path,
+    open: impl FnOnce() -> Result<ImageFile<'a>, ImageError>,
     limits: &Limits,
     accept_damaged: bool,
 ) -> Result<(DynamicImage, FileNotes), ImageError> {
     let broken = |source| ImageError::Broken { path: path.to_owned(), source };
     limits::caught(|| {
         let decode = |source| ImageError::Decode { path: path.to_owned(), source };
-        let file = ImageFile::open(path, limits)?;
+        let file = open()?;
         file.check_pages()?;
         let mut decoder = file.decoder(limits)?;
         let orientation = decoder.orientation().map_or(1, Orientation::to_exif);
@@ -209,6 +227,20 @@ pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
         || Some(ImageFile::open(path, limits).ok()?.decoder(limits).ok()?.dimensions());
     let (width, height) = limits::caught(dimensions).ok()??;
     Some(u64::from(width) * u64::from(height))
+}
+
+/// Refuses a WebP that has fewer bytes than it says; of other formats decoders notice.
+fn check_length(
+    path: &Path,
+    format: Option<ImageFormat>,
+    head: &[u8],
+    length: u64,
+) -> Result<(), ImageError> {
+    if format == Some(ImageFormat::WebP) && riff_bytes(head).is_none_or(|whole| length < whole) {
+        let source = DecodingError::new(ImageFormat::WebP.into(), "it is cut off");
+        return Err(ImageError::Decode { path: path.to_owned(), source: Decoding(source) });
+    }
+    Ok(())
 }
 
 /// A source from which decoders read.
@@ -249,13 +281,19 @@ impl<'a> ImageFile<'a> {
             }
         }
         let length = if metadata.is_file() { metadata.len() } else { bytes.len() as u64 };
-        if format == Some(ImageFormat::WebP)
-            && riff_bytes(&bytes).is_none_or(|whole| length < whole)
-        {
-            let source = DecodingError::new(ImageFormat::WebP.into(), "it is cut off");
-            return Err(ImageError::Decode { path: path.to_owned(), source: Decoding(source) });
-        }
+        check_length(path, format, &bytes, length)?;
         Ok(Self { path, bytes: is_whole.then_some(bytes), length, format })
+    }
+
+    /// A file whose bytes are in memory.
+    fn of(path: &'a Path, bytes: Vec<u8>, limits: &Limits) -> Result<Self, ImageError> {
+        let (most, length) = (limits.picture_bytes(), bytes.len() as u64);
+        if length > most {
+            return Err(ImageError::Memory { path: path.to_owned(), bytes: most });
+        }
+        let format = image::guess_format(&bytes).ok();
+        check_length(path, format, &bytes, length)?;
+        Ok(Self { path, bytes: Some(bytes), length, format })
     }
 
     fn source(&self) -> Result<Box<dyn Source + '_>, ImageError> {

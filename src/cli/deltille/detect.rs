@@ -1,6 +1,6 @@
 //! `deltille detect`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -12,13 +12,16 @@ use clap::ValueEnum;
 use super::finder::FinderArgs;
 use super::images::{self, Images, Stems};
 use super::in_flight;
+use super::tables::{self, Tables};
 use crate::cli::output::{self, Overwrite, tell};
 use crate::cli::run::{self, BAD_INPUT, FAILED, Interrupted};
 use crate::cli::values::whole;
+use crate::cli::wording::in_options;
 use crate::cli::{interrupt, progress};
 use crate::clock;
 use crate::detect::{Detection, Detector, InkEstimate};
 use crate::export::kind::Kind;
+use crate::export::tables::{EXTENSION, Picture};
 use crate::export::{atomic, csv, detection, orpc, overlay};
 use crate::photograph::{self, Photograph};
 use crate::targets::Target;
@@ -70,11 +73,14 @@ enum Format {
     Orpc,
     /// One corner a line, with a header
     Csv,
+    /// corners.parquet and pictures.parquet, a row for each corner and for each image of the run; `calibrate` and
+    /// `rig` read them
+    Parquet,
 }
 
 /// What came of an image.
 enum Outcome {
-    Seen(Found),
+    Seen(Box<Found>),
     Skipped,
 }
 
@@ -86,6 +92,8 @@ struct Found {
     ink: Option<InkEstimate>,
     /// Whether what was asked for is there: labels of the target, or some grid.
     is_there: bool,
+    /// Its row, where tables are written.
+    row: Option<Picture>,
 }
 
 /// An image that was looked at.
@@ -117,6 +125,25 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             .with_context(|| format!("-o: cannot write to {}", folder.display()))?;
         output::settle(folder).context("-o")?;
     }
+    let limits = args.finder.limits();
+    let folder = args.tables();
+    let earlier = match folder {
+        Some(folder) => {
+            tables::check(folder, args.overwrite)?;
+            if args.skip_existing { tables::earlier(folder, &limits)? } else { Vec::new() }
+        }
+        None => Vec::new(),
+    };
+    let done: BTreeSet<&str> = earlier
+        .iter()
+        .filter(|picture| picture.found.is_ok())
+        .map(|picture| picture.image.as_str())
+        .collect();
+    let tables = folder.map(|folder| Tables::begin(folder, &targets)).transpose()?;
+    if tables.is_some() {
+        // Rows that are there are kept.
+        interrupt::keeps_results();
+    }
 
     let bar = progress::bar(images.count().unwrap_or(0) as u64, "images");
     let threads = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0).into());
@@ -130,23 +157,35 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let go_on = if args.stream { "" } else { "; --skip-existing goes on from here" };
     let report = Report::new(images.count() == Some(1), go_on);
     let seen: Mutex<Vec<Seen>> = Mutex::default();
+    // Rows of images that are not seen, if they have one.
+    let unseen: Mutex<Vec<(usize, Option<Picture>)>> = Mutex::default();
     let threads = threads.build()?;
-    let limits = args.finder.limits();
     in_flight::for_each(&threads, &limits, claimed, |index, image| {
         if interrupt::is_raised() {
             return;
         }
-        let result = image.and_then(|image| {
+        let name = image.as_ref().ok().map(|image| name_of(image));
+        let mut result = image.and_then(|image| {
             let stem = images::stem(&image)?;
             args.check_results(&stem)?;
-            if args.skip_existing && args.results(&stem).iter().all(|(path, _)| path.exists()) {
+            if args.skip_existing
+                && args.results(&stem).iter().all(|(path, _)| path.exists())
+                && (folder.is_none() || done.contains(name_of(&image).as_str()))
+            {
                 return Ok(Outcome::Skipped);
             }
             let found = one_image(&args, &targets, &detector, &image, &stem)?;
             let looked_at = Seen { index, image, stem, ink: found.ink };
             seen.lock().expect("no thread panics here").push(looked_at);
-            Ok(Outcome::Seen(found))
+            Ok(Outcome::Seen(Box::new(found)))
         });
+        if let Some(tables) = &tables {
+            let row = row_of(name, &mut result);
+            if !matches!(result, Ok(Outcome::Seen(_))) {
+                unseen.lock().expect("no thread panics here").push((index, row.clone()));
+            }
+            tables.add(index, row);
+        }
         bar.inc(1);
         bar.suspend(|| report.add(index, result));
     });
@@ -154,8 +193,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut seen = seen.into_inner().expect("no thread panics here");
     // In the order of the images, whichever was done first.
     seen.sort_unstable_by_key(|seen| seen.index);
+    let mut again = None;
     if !args.stream && args.finder.ink_is_open() && !interrupt::is_raised() {
-        see_again(&args, &targets, detector, &seen, &threads);
+        let unseen = unseen.into_inner().expect("no thread panics here");
+        again = see_again(&args, &targets, detector, &seen, unseen, &threads)?;
+    }
+    if let Some(tables) = tables {
+        let is_left = interrupt::is_raised();
+        // An interrupted run does not take the place of one that was not, unless it goes on with it.
+        let stays = is_left && !args.skip_existing && folder.is_some_and(tables::are_in);
+        match again.filter(|_| !is_left) {
+            _ if stays => {}
+            Some(again) => again.finish(&earlier)?,
+            None => tables.finish(&earlier)?,
+        }
     }
     if interrupt::is_raised() {
         return Err(Interrupted(report.standing()).into());
@@ -164,32 +215,62 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Looks once more at all images, with what they say together of the ink: pictures that say little of it are seen
-/// with what all say.
+/// with what all say. Tables are then written anew, with the rows of images that were not seen.
 fn see_again(
     args: &Args,
     targets: &[Target],
     detector: Detector,
     seen: &[Seen],
+    unseen: Vec<(usize, Option<Picture>)>,
     threads: &rayon::ThreadPool,
-) {
+) -> anyhow::Result<Option<Tables>> {
     let found: Vec<InkEstimate> = seen.iter().filter_map(|seen| seen.ink).collect();
-    let Some(ink) = InkEstimate::of_all(&found).filter(|ink| ink.used) else { return };
+    let Some(ink) = InkEstimate::of_all(&found).filter(|ink| ink.used) else { return Ok(None) };
+    let mut tables = None;
     if seen.len() > 1 {
         let detector = detector.with_ink(ink);
         let bar = progress::bar(seen.len() as u64, "images, with the ink of all");
         let images = seen.iter().map(|seen| Ok(seen.image.clone()));
+        tables = args.tables().map(|folder| Tables::begin(folder, targets)).transpose()?;
+        if let Some(table) = &tables {
+            unseen.iter().for_each(|(index, row)| table.add(*index, row.clone()));
+        }
         in_flight::for_each(threads, &args.finder.limits(), images, |index, _| {
             if interrupt::is_raised() {
                 return;
             }
-            let Seen { image, stem, .. } = &seen[index];
+            let Seen { index, image, stem, .. } = &seen[index];
             let again = one_image(args, targets, &detector, image, stem);
-            again.err().iter().for_each(|error| bar.suspend(|| run::report(error)));
+            again.as_ref().err().iter().for_each(|error| bar.suspend(|| run::report(error)));
+            if let Some(tables) = &tables {
+                tables.add(
+                    *index,
+                    row_of(
+                        Some(name_of(image)),
+                        &mut again.map(|found| Outcome::Seen(Box::new(found))),
+                    ),
+                );
+            }
             bar.inc(1);
         });
         bar.finish_and_clear();
     }
     tell!("ink: {ink} ({})", counted(ink.pictures as usize, "picture"));
+    Ok(tables)
+}
+
+/// The name of an image in its results.
+fn name_of(image: &Path) -> String {
+    image.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The row of an image in tables, if it has one.
+fn row_of(name: Option<String>, result: &mut anyhow::Result<Outcome>) -> Option<Picture> {
+    match result {
+        Ok(Outcome::Seen(found)) => found.row.take(),
+        Ok(Outcome::Skipped) => None,
+        Err(error) => Some(Picture::unread(name?, in_options(&run::message(error)))),
+    }
 }
 
 /// Prints what came of the images, in their order, as soon as it is known.
@@ -237,10 +318,10 @@ impl Report {
             state.next += 1;
             match result {
                 Ok(Outcome::Skipped) => state.skipped += 1,
-                Ok(Outcome::Seen(Found { line, is_there, .. })) => {
-                    state.found += usize::from(is_there);
+                Ok(Outcome::Seen(found)) => {
+                    state.found += usize::from(found.is_there);
                     // What cannot be printed is lost, as it would be with `println`.
-                    if let Err(error) = output::print(&line) {
+                    if let Err(error) = output::print(&found.line) {
                         state.error.get_or_insert(error);
                     }
                 }
@@ -289,10 +370,20 @@ impl Args {
         }
     }
 
+    /// The folder of tables, where they are asked for.
+    fn tables(&self) -> Option<&Path> {
+        self.folder().filter(|_| self.format.contains(&Format::Parquet))
+    }
+
+    /// Formats with a file for each image that are asked for.
+    fn each(&self) -> impl Iterator<Item = Format> + '_ {
+        self.format.iter().copied().filter(|format| *format != Format::Parquet)
+    }
+
     /// The files of an image's results.
     fn results(&self, stem: &str) -> Vec<(PathBuf, Kind)> {
         let Some(folder) = self.folder() else { return Vec::new() };
-        let formats = self.format.iter().map(|format| (format.extension(), format.kind()));
+        let formats = self.each().map(|format| (format.extension(), format.kind()));
         let overlay = self.overlay.then(|| ("overlay.png", Kind::own_png()));
         let all = formats.chain(overlay);
         all.map(|(end, kind)| (folder.join(format!("{stem}.{end}")), kind)).collect()
@@ -312,6 +403,7 @@ impl Format {
             Self::Json => "json",
             Self::Orpc => "orpc",
             Self::Csv => "csv",
+            Self::Parquet => EXTENSION,
         }
     }
 
@@ -320,14 +412,17 @@ impl Format {
             Self::Json => Kind::of_schema(detection::SCHEMA),
             Self::Orpc => Kind::of(orpc::HEAD.as_bytes()),
             Self::Csv => Kind::of(csv::HEADER.as_bytes()),
+            Self::Parquet => Kind::own_parquet(),
         }
     }
 
+    /// The text of an image's file; tables have none.
     fn text(self, found: &Detection, target: Option<&Target>) -> String {
         match self {
             Self::Json => detection::write(found),
             Self::Orpc => orpc::write(found, target),
             Self::Csv => csv::write(found),
+            Self::Parquet => String::new(),
         }
     }
 }
@@ -343,15 +438,14 @@ fn one_image(
     let limits = args.finder.limits();
     let Photograph { image, notes } =
         photograph::read_with_notes(path, &limits, args.accept_damaged)?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let mut found = detector.detect(&image, &name);
+    let mut found = detector.detect(&image, &name_of(path));
     found.file = notes;
     if let Some(folder) = args.folder() {
         let save = |extension: &str, content: &[u8]| {
             let path = folder.join(format!("{stem}.{extension}"));
             atomic::write(&path, |out| out.write_all(content))
         };
-        for format in &args.format {
+        for format in args.each() {
             save(format.extension(), format.text(&found, targets.first()).as_bytes())?;
         }
         if args.overlay {
@@ -363,7 +457,8 @@ fn one_image(
         false => found.grids.iter().any(|grid| grid.panel.is_some()),
         true => !found.grids.is_empty(),
     };
-    Ok(Found { line, ink: found.ink, is_there })
+    let row = args.tables().map(|_| Picture::of(&found));
+    Ok(Found { line, ink: found.ink, is_there, row })
 }
 
 /// What was found in an image, in a line, and why there is no more.

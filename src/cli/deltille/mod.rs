@@ -22,6 +22,7 @@ mod rig;
 pub mod settings;
 mod sightings;
 mod solid;
+mod tables;
 mod target_file;
 mod undistort;
 mod verify;

@@ -1,12 +1,13 @@
 //! What was photographed, and the detections of it: the options of commands that calibrate.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 
 use super::limits::FileLimits;
-use super::target_file;
+use super::{tables, target_file};
 use crate::calibrate::{Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views};
 use crate::cli::output::tell;
 use crate::cli::values::whole;
@@ -22,7 +23,7 @@ use crate::words::counted;
 /// Detections and what they show.
 #[derive(clap::Args)]
 pub struct SightingsArgs {
-    /// Detections, the .json files of `deltille detect`, or folders of them
+    /// Detections, what `deltille detect` wrote as .json or .parquet, or folders of it
     #[arg(required = true, value_name = "DETECTIONS")]
     detections: Vec<PathBuf>,
     /// Description of the target: the .json of `deltille board`, or a .dsc
@@ -288,7 +289,8 @@ pub struct Read {
 /// told on standard error, too.
 pub fn read(paths: &[PathBuf], reference: &Reference, limits: &Limits) -> anyhow::Result<Read> {
     let (mut files, mut detections, mut foreign) = (Vec::new(), Vec::new(), Vec::new());
-    for Place { path, is_named } in places(paths)? {
+    let Places { texts, tables } = places(paths)?;
+    for Place { path, is_named } in texts {
         let show = || path.display().to_string();
         let text = match limits.read_text(&path) {
             Err(ReadError::NotText { .. }) => bail!(
@@ -302,14 +304,21 @@ pub fn read(paths: &[PathBuf], reference: &Reference, limits: &Limits) -> anyhow
             continue;
         }
         let found: Detection = detection::read(&text).with_context(show)?;
-        if let Some(first) = detections.iter().position(|(_, other)| is_same(&found, other)) {
-            let first: &PathBuf = &files[first];
-            tell!("warning: {}: the same corners as in {}, counted once", show(), first.display());
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        add(&mut detections, &mut files, (name, found), path);
+    }
+    for Tables { files: of_table, folder } in tables {
+        // Beside the detections one by one they would count twice.
+        if let Some(one) =
+            folder.and_then(|folder| files.iter().find(|file| file.parent() == Some(&folder)))
+        {
+            tell!("left out: {}: {} says the same", of_table[0].display(), one.display());
             continue;
         }
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        detections.push((name, found));
-        files.push(path);
+        for (name, found) in of_tables(&of_table, limits)? {
+            let path = of_table[0].with_file_name(&found.image);
+            add(&mut detections, &mut files, (name, found), path);
+        }
     }
     if let Some(first) = foreign.first() {
         let count = counted(foreign.len(), "file");
@@ -355,27 +364,113 @@ fn ink_of(detections: &[(String, Detection)], reference: &Reference) -> Option<I
 
 /// Whether two detections are of one picture, whatever it is called: noise makes no corners twice.
 pub fn is_same(one: &Detection, other: &Detection) -> bool {
-    !one.grids.is_empty() && one.grids == other.grids
+    // Tables have no tags.
+    let corners = one.grids.iter().map(|grid| &grid.corners);
+    !one.grids.is_empty() && corners.eq(other.grids.iter().map(|grid| &grid.corners))
 }
 
-/// Where a detection may be.
+/// Adds a detection, unless it is of a picture that is there.
+fn add(
+    detections: &mut Vec<(String, Detection)>,
+    files: &mut Vec<PathBuf>,
+    found: (String, Detection),
+    path: PathBuf,
+) {
+    if let Some(first) = detections.iter().position(|(_, other)| is_same(&found.1, other)) {
+        let (path, first) = (path.display(), files[first].display());
+        tell!("warning: {path}: the same corners as in {first}, counted once");
+        return;
+    }
+    detections.push(found);
+    files.push(path);
+}
+
+/// The detections of tables, in the order in which their files would be as JSON.
+fn of_tables(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<(String, Detection)>> {
+    let pictures = tables::read(files, limits)?.pictures;
+    let all = pictures.len();
+    let found: Vec<Detection> =
+        pictures.into_iter().filter_map(|picture| picture.found.ok()).collect();
+    if found.len() < all {
+        let unread = counted(all - found.len(), "picture");
+        let folder = files[0].parent().unwrap_or(&files[0]);
+        tell!("left out: {unread} of the tables in {} that could not be read", folder.display());
+    }
+    let stem = |image: &str| {
+        let stem = Path::new(image).file_stem();
+        stem.map_or_else(|| image.to_owned(), |stem| stem.to_string_lossy().into_owned())
+    };
+    let stems: BTreeSet<String> = found.iter().map(|found| stem(&found.image)).collect();
+    let are_told_apart = stems.len() == found.len();
+    // Pictures of several folders may have one name; then the folders are part of theirs.
+    let name = |found: &Detection| {
+        let image = &found.image;
+        let stem = stem(image);
+        if are_told_apart {
+            stem
+        } else {
+            Path::new(image).with_file_name(stem).display().to_string()
+        }
+    };
+    let mut named: Vec<(String, Detection)> =
+        found.into_iter().map(|found| (name(&found), found)).collect();
+    named.sort_by_cached_key(|(name, found)| {
+        (PathBuf::from(format!("{name}.json")), found.image.clone())
+    });
+    Ok(named)
+}
+
+/// Where detections may be.
+struct Places {
+    texts: Vec<Place>,
+    tables: Vec<Tables>,
+}
+
+/// A file of a detection.
 struct Place {
     path: PathBuf,
     /// Given by name, not only in a folder that was.
     is_named: bool,
 }
 
-fn places(paths: &[PathBuf]) -> anyhow::Result<Vec<Place>> {
-    let mut places = Vec::new();
+/// Files of tables that belong together.
+struct Tables {
+    files: Vec<PathBuf>,
+    /// The folder that was named, if they were not.
+    folder: Option<PathBuf>,
+}
+
+fn places(paths: &[PathBuf]) -> anyhow::Result<Places> {
+    let (mut texts, mut tables) = (Vec::new(), Vec::new());
+    let mut named: Vec<PathBuf> = Vec::new();
     for path in paths {
         if path.is_dir() {
-            let inside = in_folder(path)?.into_iter();
-            places.extend(inside.map(|path| Place { path, is_named: false }));
+            let files = tables::in_folder(path)?;
+            let inside = in_folder(path)?;
+            let show = path.display();
+            ensure!(
+                !(files.is_empty() && inside.is_empty()),
+                "{show}: no .json or .parquet file in this folder"
+            );
+            texts.extend(inside.into_iter().map(|path| Place { path, is_named: false }));
+            if !files.is_empty() {
+                tables.push(Tables { files, folder: Some(path.clone()) });
+            }
+        } else if tables::is_named(path) {
+            let both = [Some(path.clone()), tables::beside(path)];
+            for file in both.into_iter().flatten() {
+                if !named.contains(&file) {
+                    named.push(file);
+                }
+            }
         } else {
-            places.push(Place { path: path.clone(), is_named: true });
+            texts.push(Place { path: path.clone(), is_named: true });
         }
     }
-    Ok(places)
+    if !named.is_empty() {
+        tables.push(Tables { files: named, folder: None });
+    }
+    Ok(Places { texts, tables })
 }
 
 /// The JSON files of a folder, in the order of their names.
@@ -388,7 +483,6 @@ fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
             files.push(path);
         }
     }
-    ensure!(!files.is_empty(), "{}: no .json file in this folder", folder.display());
     files.sort();
     Ok(files)
 }

@@ -11,3 +11,4 @@ mod reasons;
 mod refine;
 mod solid_views;
 mod synthetic;
+mod tables;

@@ -32,7 +32,7 @@ static GOOD: LazyLock<TempDir> = LazyLock::new(|| {
     make(
         "tetrahedron --edge 60mm --tiles 7 --face-margin 4mm --name s --gltf --obj --stl --dxf --no-verify",
     );
-    make("detect --target b.json b.png -o d");
+    make("detect --target b.json b.png -o d --format json,parquet");
     fs::write(folder.path().join("c.yaml"), CAMERA).unwrap();
     folder
 });
@@ -108,10 +108,15 @@ fn fault(end: &End, codes: &[i32]) -> Option<String> {
 }
 
 /// Every reader of files but pictures: the extension, the command, and a good file.
-const READERS: [(&str, &str, &str); 19] = [
+const READERS: [(&str, &str, &str); 20] = [
     ("json", "deltille verify @", "b.json"),
     ("dsc", "deltille detect --target @ +/b.png -o out", "b.dsc"),
     ("json", "deltille calibrate --target +/b.json --model radtan -o out @", "d/b.json"),
+    (
+        "parquet",
+        "deltille calibrate --target +/b.json --model radtan -o out @",
+        "d/corners.parquet",
+    ),
     ("json", "deltille pose --target @ --camera +/c.yaml +/b.png", "b.json"),
     ("yaml", "deltille pose --target +/b.json --camera @ +/b.png", "c.yaml"),
     ("yaml", "deltille render +/b.json --eye 0,0,500 -o out --camera @", "c.yaml"),

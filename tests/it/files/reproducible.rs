@@ -145,7 +145,7 @@ fn detections_and_calibrations() {
         }
         commands.push(format!(
             "deltille detect --target @board/board.json @{camera}/0.png @{camera}/1.png @{camera}/2.png \
-             @{camera}/3.png @{camera}/4.png @{camera}/5.png --format json,csv,orpc --overlay -j $ -o @{camera}-seen"
+             @{camera}/3.png @{camera}/4.png @{camera}/5.png --format json,csv,orpc,parquet --overlay -j $ -o @{camera}-seen"
         ));
     }
     commands.push(

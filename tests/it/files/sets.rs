@@ -53,7 +53,7 @@ fn only_files_of_the_same_kind_are_replaced() {
             "tetrahedron --tiles 6 --edge 60mm --family delTag16h5 --gltf --obj \
              --stl --skeleton --dxf --svg --dsc --no-verify -o out",
         ),
-        (DELTILLE, "detect t.png --target t.json --format json,orpc,csv --overlay -o out"),
+        (DELTILLE, "detect t.png --target t.json --format json,orpc,csv,parquet --overlay -o out"),
         (DELTILLE, "render t.json --camera camera.yaml --eye 10,10,300 -o out/view.png"),
         (DELTILLE, "refine --kind deltille --seeds seeds.csv t.png -o out/corners.csv"),
         (DELTILLE, "verify t.json t.svg --report out/verdict.json"),

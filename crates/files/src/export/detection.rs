@@ -157,6 +157,16 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
     }
     let DetectionFile { image, width, height, file, grids, tone, ink, reasons, timing_ms, .. } =
         json::read(text)?;
+    check_corners(&grids)?;
+    let mut detection = Detection::new(image, [width, height], grids);
+    detection.file = file;
+    (detection.tone, detection.ink) = (tone, ink);
+    (detection.reasons, detection.timing_ms) = (reasons, timing_ms);
+    Ok(detection)
+}
+
+/// Refuses corners that stand twice or whose covariance is none.
+pub(super) fn check_corners(grids: &[Grid]) -> Result<(), DetectionFileError> {
     // A repeated corner would count twice. A panel may be seen in several grids.
     let (mut places, mut firsts) = (BTreeSet::new(), BTreeMap::new());
     for (grid, of_grid) in grids.iter().enumerate() {
@@ -178,11 +188,7 @@ pub fn read(text: &str) -> Result<Detection, DetectionFileError> {
             }
         }
     }
-    let mut detection = Detection::new(image, [width, height], grids);
-    detection.file = file;
-    (detection.tone, detection.ink) = (tone, ink);
-    (detection.reasons, detection.timing_ms) = (reasons, timing_ms);
-    Ok(detection)
+    Ok(())
 }
 
 /// Checks the covariance of a corner.

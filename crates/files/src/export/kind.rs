@@ -10,6 +10,9 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
 
 use super::dsc;
 use deltille_core::json;
@@ -22,6 +25,9 @@ const HEAD: usize = 4096;
 
 /// How a PDF of this program names its creator.
 const PDF_CREATOR: &[u8] = b"/Creator(deltille ";
+
+/// The first bytes of a Parquet.
+const PARQUET: &[u8] = b"PAR1";
 
 /// Words for a list of corners for other detectors; the format has no place for its writer.
 const DSC: &str = "a .dsc";
@@ -68,6 +74,10 @@ impl Kind {
             signed(if is_to_scale && is_own { "PNG to scale" } else { "PNG" }, is_own)
         } else if content.starts_with(super::npy::MAGIC) {
             Self::words("an array of NumPy")
+        } else if content.starts_with(PARQUET) {
+            // The file ends with what describes it, which ends with the name of its writer.
+            let end = &content[content.len().saturating_sub(HEAD)..];
+            signed("Parquet", contains(end, b"deltille "))
         } else if content.starts_with(b"glTF") {
             signed("glTF", contains(glb_json(content), b"\"generator\":\"deltille "))
         } else if content.starts_with(b"deltille ") && content.get(80..84).is_some() {
@@ -84,6 +94,27 @@ impl Kind {
 
     fn words(words: impl Into<String>) -> Self {
         Self(Is::Words(words.into()))
+    }
+
+    /// The kind of a file that is too large to be read whole, where its first and last bytes tell it.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn of_large(path: &Path) -> io::Result<Option<Self>> {
+        let mut file = File::open(path)?;
+        let mut content = vec![0; PARQUET.len()];
+        file.read_exact(&mut content)?;
+        if content != PARQUET {
+            return Ok(None);
+        }
+        file.seek(SeekFrom::End(-(HEAD as i64)))?;
+        file.read_to_end(&mut content)?;
+        Ok(Some(Self::of(&content)))
+    }
+
+    /// The kind of the Parquet files that this program writes.
+    pub fn own_parquet() -> Self {
+        Self::words("a Parquet of deltille")
     }
 
     /// The kind of the PDF files that this program writes.

@@ -40,6 +40,8 @@ pub mod stl;
 mod supersample;
 #[cfg(feature = "print")]
 pub mod svg;
+#[cfg(feature = "parquet")]
+pub mod tables;
 pub mod truth;
 pub mod undistortion;
 

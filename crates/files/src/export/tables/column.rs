@@ -1,0 +1,111 @@
+//! The columns of both tables.
+
+use parquet::data_type::ByteArray;
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// UTF-8.
+    Text,
+    /// A whole number of 32 bits, with a sign.
+    Signed,
+    /// The same without.
+    Unsigned,
+    /// A number of double precision.
+    Real,
+    /// True or false.
+    Flag,
+}
+
+/// A column.
+#[derive(Clone, Copy, Debug)]
+pub struct Column {
+    pub name: &'static str,
+    pub kind: Kind,
+    /// Whether every row has a value.
+    pub full: bool,
+    /// Whether values repeat, so that a dictionary of them is shorter.
+    pub repeats: bool,
+    /// Whether the table is not read without it.
+    pub needed: bool,
+}
+
+/// A value of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    None,
+    Text(ByteArray),
+    Whole(i64),
+    Real(f64),
+    Flag(bool),
+}
+
+const fn column(name: &'static str, kind: Kind) -> Column {
+    Column { name, kind, full: true, repeats: true, needed: true }
+}
+
+impl Column {
+    /// With rows that have no value.
+    const fn gaps(self) -> Self {
+        Self { full: false, ..self }
+    }
+
+    /// With values that do not repeat.
+    const fn varied(self) -> Self {
+        Self { repeats: false, ..self }
+    }
+
+    /// For those who look at the table; it is read without, too.
+    const fn extra(self) -> Self {
+        Self { needed: false, ..self }
+    }
+}
+
+/// A row for each corner.
+pub const CORNERS: [Column; 17] = [
+    column("image", Kind::Text),
+    column("grid", Kind::Signed),
+    column("kind", Kind::Text),
+    column("target", Kind::Text).gaps().extra(),
+    column("panel", Kind::Unsigned).gaps(),
+    column("mirrored", Kind::Flag).extra(),
+    column("row", Kind::Signed),
+    column("col", Kind::Signed),
+    column("id", Kind::Unsigned).gaps(),
+    column("x", Kind::Real).varied(),
+    column("y", Kind::Real).varied(),
+    column("cov_xx", Kind::Real).gaps().varied(),
+    column("cov_xy", Kind::Real).gaps().varied(),
+    column("cov_yy", Kind::Real).gaps().varied(),
+    column("target_x_mm", Kind::Real).gaps().extra(),
+    column("target_y_mm", Kind::Real).gaps().extra(),
+    column("target_z_mm", Kind::Real).gaps().extra(),
+];
+
+/// A row for each picture.
+pub const PICTURES: [Column; 24] = [
+    column("image", Kind::Text),
+    column("width", Kind::Signed).gaps(),
+    column("height", Kind::Signed).gaps(),
+    column("grids", Kind::Signed).gaps().extra(),
+    column("corners", Kind::Signed).gaps().extra(),
+    column("tags", Kind::Signed).gaps().extra(),
+    column("why", Kind::Text).gaps().extra(),
+    column("why_text", Kind::Text).gaps().extra(),
+    column("reasons", Kind::Text).gaps().extra(),
+    column("tone_black", Kind::Real).gaps().extra(),
+    column("tone_white", Kind::Real).gaps().extra(),
+    column("tone_kappa", Kind::Real).gaps().extra(),
+    column("tone_kappa_deviation", Kind::Real).gaps().extra(),
+    column("tone_kappa_odd", Kind::Real).gaps().extra(),
+    column("tone_used", Kind::Flag).gaps().extra(),
+    column("ink_edges", Kind::Real).gaps(),
+    column("ink_edges_deviation", Kind::Real).gaps(),
+    column("ink_um", Kind::Real).gaps(),
+    column("ink_um_deviation", Kind::Real).gaps(),
+    column("ink_used", Kind::Flag).gaps(),
+    column("ink_pictures", Kind::Signed).gaps(),
+    column("exif_orientation", Kind::Signed).gaps().extra(),
+    column("damage", Kind::Text).gaps().extra(),
+    column("error", Kind::Text).gaps().extra(),
+];

@@ -1,0 +1,202 @@
+//! Headers of pages, looked at before anything is unpacked: what they promise is what a reader sets aside.
+//!
+//! A page begins with a struct in Thrift's compact protocol: its kind, its sizes unpacked and packed, and of its
+//! kind how many values it holds and how they are encoded.
+
+/// Depth to which structs of a header may be nested; a good one has three.
+const MOST_DEPTH: u32 = 8;
+
+/// Encodings that are read: their decoders set aside no more than a page holds. Those that begin with a count of
+/// differences do.
+const PLAIN: i64 = 0;
+const PLAIN_DICTIONARY: i64 = 2;
+const RLE: i64 = 3;
+const RLE_DICTIONARY: i64 = 8;
+const BYTE_STREAM_SPLIT: i64 = 9;
+
+/// What the header of a page says.
+#[derive(Default)]
+struct Header {
+    unpacked: i64,
+    packed: i64,
+    values: i64,
+    encoding: i64,
+    is_dictionary: bool,
+}
+
+/// Bytes of all pages of a column's part of a file once they are unpacked; `Err` says what is wrong with a page.
+/// No dictionary may have more than `most_entries`.
+pub fn unpacked_bytes(mut chunk: &[u8], most_entries: u64) -> Result<u64, String> {
+    let mut all = 0;
+    while !chunk.is_empty() {
+        let header = header(&mut chunk).ok_or("the header of a page is damaged")?;
+        let size =
+            |bytes: i64| u64::try_from(bytes).map_err(|_| "a page of negative size".to_owned());
+        let (unpacked, packed) = (size(header.unpacked)?, size(header.packed)?);
+        if !matches!(
+            header.encoding,
+            PLAIN | PLAIN_DICTIONARY | RLE | RLE_DICTIONARY | BYTE_STREAM_SPLIT
+        ) {
+            return Err("values are encoded as differences; write them plain or with a dictionary"
+                .to_owned());
+        }
+        // Every value of a dictionary takes a byte at least.
+        if header.is_dictionary && size(header.values)? > unpacked.min(most_entries) {
+            return Err("a dictionary promises more values than it has".to_owned());
+        }
+        all += unpacked;
+        let rest = usize::try_from(packed).ok().and_then(|packed| chunk.get(packed..));
+        chunk = rest.ok_or("a page ends too soon")?;
+    }
+    Ok(all)
+}
+
+fn header(bytes: &mut &[u8]) -> Option<Header> {
+    let mut header = Header::default();
+    let mut field = 0;
+    loop {
+        let Some(kind) = next_field(bytes, &mut field)? else { return Some(header) };
+        match (field, kind) {
+            (2, I32) => header.unpacked = number(bytes)?,
+            (3, I32) => header.packed = number(bytes)?,
+            // Pages of data, a dictionary, and pages of data in their second version.
+            (5 | 7 | 8, STRUCT) => {
+                header.is_dictionary = field == 7;
+                let encoding_at = if field == 8 { 4 } else { 2 };
+                let mut inner = 0;
+                while let Some(kind) = next_field(bytes, &mut inner)? {
+                    match (inner, kind) {
+                        (1, I32) => header.values = number(bytes)?,
+                        (_, I32) if inner == encoding_at => header.encoding = number(bytes)?,
+                        _ => skip(bytes, kind, 1)?,
+                    }
+                }
+            }
+            _ => skip(bytes, kind, 0)?,
+        }
+    }
+}
+
+const TRUE: u8 = 1;
+const FALSE: u8 = 2;
+const BYTE: u8 = 3;
+const I16: u8 = 4;
+const I32: u8 = 5;
+const I64: u8 = 6;
+const DOUBLE: u8 = 7;
+const BINARY: u8 = 8;
+const LIST: u8 = 9;
+const SET: u8 = 10;
+const STRUCT: u8 = 12;
+
+/// The kind of the next field of a struct, whose number is told too; `Some(None)` at its end.
+fn next_field(bytes: &mut &[u8], field: &mut i64) -> Option<Option<u8>> {
+    let head = byte(bytes)?;
+    if head == 0 {
+        return Some(None);
+    }
+    *field = match head >> 4 {
+        0 => number(bytes)?,
+        step => field.checked_add(i64::from(step))?,
+    };
+    Some(Some(head & 15))
+}
+
+fn skip(bytes: &mut &[u8], kind: u8, depth: u32) -> Option<()> {
+    if depth > MOST_DEPTH {
+        return None;
+    }
+    match kind {
+        TRUE | FALSE => {}
+        BYTE => drop(byte(bytes)?),
+        I16 | I32 | I64 => drop(varint(bytes)?),
+        DOUBLE => *bytes = bytes.get(8..)?,
+        BINARY => {
+            let length = usize::try_from(varint(bytes)?).ok()?;
+            *bytes = bytes.get(length..)?;
+        }
+        LIST | SET => {
+            let head = byte(bytes)?;
+            let count = if head >> 4 == 15 { varint(bytes)? } else { u64::from(head >> 4) };
+            for _ in 0..count {
+                // Flags in a list have a byte each.
+                let kind = if head & 15 <= FALSE { BYTE } else { head & 15 };
+                skip(bytes, kind, depth + 1)?;
+            }
+        }
+        STRUCT => {
+            let mut field = 0;
+            while let Some(kind) = next_field(bytes, &mut field)? {
+                skip(bytes, kind, depth + 1)?;
+            }
+        }
+        _ => return None,
+    }
+    Some(())
+}
+
+fn byte(bytes: &mut &[u8]) -> Option<u8> {
+    let (&first, rest) = bytes.split_first()?;
+    *bytes = rest;
+    Some(first)
+}
+
+fn varint(bytes: &mut &[u8]) -> Option<u64> {
+    let mut value = 0;
+    for shift in (0..64).step_by(7) {
+        let part = byte(bytes)?;
+        value |= u64::from(part & 0x7f) << shift;
+        if part & 0x80 == 0 {
+            return Some(value);
+        }
+    }
+    None
+}
+
+/// A whole number with its sign in the last bit.
+fn number(bytes: &mut &[u8]) -> Option<i64> {
+    let value = varint(bytes)?;
+    Some((value >> 1) as i64 ^ -((value & 1) as i64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A page of data whose header has these sizes.
+    fn page(unpacked: u32, packed: u32, field: u8, values: u32, encoding: u8) -> Vec<u8> {
+        let varint = |value: u32| {
+            let mut value = u64::from(value) << 1;
+            let mut bytes = Vec::new();
+            while value > 0x7f {
+                bytes.push(value as u8 | 0x80);
+                value >>= 7;
+            }
+            bytes.push(value as u8);
+            bytes
+        };
+        let mut bytes = vec![0x15, 0];
+        for size in [unpacked, packed] {
+            bytes.push(0x15);
+            bytes.extend(varint(size));
+        }
+        bytes.push((field - 3) << 4 | STRUCT);
+        bytes.push(0x15);
+        bytes.extend(varint(values));
+        bytes.extend([0x15, encoding << 1, 0, 0]);
+        bytes.extend(vec![0; packed as usize]);
+        bytes
+    }
+
+    #[test]
+    fn sizes_are_known_before_anything_is_unpacked() {
+        let two = [page(100, 7, 5, 9, 0), page(2_000_000_000, 20, 5, 9, 0)].concat();
+        assert_eq!(unpacked_bytes(&two, 10), Ok(2_000_000_100));
+        assert!(unpacked_bytes(&two[..40], 10).unwrap_err().contains("too soon"));
+        assert!(unpacked_bytes(&page(100, 7, 7, 101, 0), 1000).unwrap_err().contains("dictionary"));
+        assert!(unpacked_bytes(&page(100, 7, 7, 11, 0), 10).unwrap_err().contains("dictionary"));
+        assert!(unpacked_bytes(&page(100, 7, 5, 9, 5), 10).unwrap_err().contains("differences"));
+        assert!(unpacked_bytes(&[0xff; 40], 10).unwrap_err().contains("header"));
+        assert!(unpacked_bytes(&[0x1c; 40], 10).unwrap_err().contains("header"));
+    }
+}

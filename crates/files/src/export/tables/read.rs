@@ -1,0 +1,591 @@
+//! Reading of tables, by this program or by others written, some rows at a time.
+
+use std::collections::{BTreeMap, HashMap};
+use std::str;
+
+use bytes::Bytes;
+use parquet::basic::{Compression, ConvertedType, LogicalType};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::DataType;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+use parquet::file::reader::FileReader;
+use parquet::file::serialized_reader::SerializedFileReader;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+use super::column::{self, Cell, Column, Kind};
+use super::write::kind_name;
+use super::{CORNERS_SCHEMA, PICTURES_SCHEMA, Picture, SCHEMA, TableError};
+use crate::export::detection;
+use crate::limits::{self, Broken, Kind as Limit, Limits};
+use deltille_core::detect::{Detection, Grid, GridCorner, InkEstimate, Reason, ToneEstimate};
+use deltille_core::lattice::GridKind;
+use deltille_core::quantity::{self, Range};
+use deltille_core::raster::FileNotes;
+
+/// Rows that are decoded at a time.
+const BATCH: usize = 4096;
+
+/// What a row takes in memory, about, bytes. A file may have it in less, where values repeat.
+const BYTES_PER_CORNER: u64 = 32;
+const BYTES_PER_PICTURE: u64 = 200;
+
+/// Most bytes of a text, such as the path of a picture.
+const MOST_TEXT: usize = 10_000;
+
+/// Which table a file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contents {
+    /// A row for each corner.
+    Corners,
+    /// A row for each picture.
+    Pictures,
+}
+
+/// Reads tables, each of which may be in several files, in any order.
+pub struct Reader {
+    limits: Limits,
+    index: HashMap<String, usize>,
+    seen: Vec<Seen>,
+}
+
+/// What tables hold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Read {
+    /// The pictures, in the order in which they came first.
+    pub pictures: Vec<Picture>,
+    /// How many pictures have fewer corners than their table says.
+    pub short: usize,
+}
+
+/// What was read of a picture.
+struct Seen {
+    image: String,
+    picture: Option<Picture>,
+    /// Its corners as the table of pictures counts them.
+    corners: Option<u32>,
+    grids: BTreeMap<u32, Grid>,
+}
+
+impl Reader {
+    /// A reader without tables. No file may have more than [`Limits::max_bytes`], as it is and unpacked.
+    pub fn new(limits: Limits) -> Self {
+        Self { limits, index: HashMap::new(), seen: Vec::new() }
+    }
+
+    /// Reads a file of a table, and says which table it is.
+    ///
+    /// # Errors
+    /// When it is no such table, is damaged, or needs more memory than the limits allow.
+    pub fn add(&mut self, content: Vec<u8>) -> Result<Contents, TableError> {
+        // The reader of Parquet checks much and not all.
+        limits::caught(|| self.add_file(Bytes::from(content)))
+            .unwrap_or_else(|broken: Broken| Err(TableError::File(broken.to_string())))
+    }
+
+    fn add_file(&mut self, content: Bytes) -> Result<Contents, TableError> {
+        let file = SerializedFileReader::new(content.clone()).map_err(damaged)?;
+        let metadata = file.metadata();
+        let contents = contents(metadata)?;
+        let (columns, per_row) = match contents {
+            Contents::Corners => (&column::CORNERS[..], BYTES_PER_CORNER),
+            Contents::Pictures => (&column::PICTURES[..], BYTES_PER_PICTURE),
+        };
+        let places = places(metadata, columns)?;
+        let mut budget = Budget { left: self.limits.max_bytes, limits: self.limits };
+        check_groups(metadata, &content, &places, per_row, &mut budget)?;
+        let mut first_row = 1;
+        for group in 0..metadata.num_row_groups() {
+            let reader = file.get_row_group(group).map_err(damaged)?;
+            let rows = reader.metadata().num_rows() as usize;
+            let open = |(column, place): (&Column, &Option<usize>)| {
+                let Some(place) = *place else { return Ok(None) };
+                let description = reader.metadata().column(place).column_descr_ptr();
+                let stream = Stream {
+                    column: *column,
+                    reader: reader.get_column_reader(place).map_err(damaged)?,
+                    unsigned: is_unsigned(
+                        description.logical_type_ref(),
+                        description.converted_type(),
+                    ),
+                    has_gaps: description.max_def_level() > 0,
+                };
+                Ok(Some(stream))
+            };
+            let streams: Result<Vec<Option<Stream>>, TableError> =
+                columns.iter().zip(&places).map(open).collect();
+            let mut streams = streams?;
+            for begin in (0..rows).step_by(BATCH) {
+                let count = BATCH.min(rows - begin);
+                let batch = streams.iter_mut().map(|stream| match stream {
+                    Some(stream) => stream.next(count),
+                    None => Ok(Vec::new()),
+                });
+                let batch = batch.collect::<Result<Vec<_>, TableError>>()?;
+                for row in 0..count {
+                    let number = first_row + (begin + row) as u64;
+                    let row = Row { number, columns, cells: &batch, row };
+                    match contents {
+                        Contents::Corners => self.add_corner(&row, &mut budget)?,
+                        Contents::Pictures => self.add_picture(&row, &mut budget)?,
+                    }
+                }
+            }
+            first_row += rows as u64;
+        }
+        Ok(contents)
+    }
+
+    /// The picture of a name.
+    fn seen(&mut self, image: &str, budget: &mut Budget) -> Result<&mut Seen, TableError> {
+        // Rows of a picture come one after the other.
+        let last = self.seen.len().checked_sub(1).filter(|&last| self.seen[last].image == image);
+        let place = match last.or_else(|| self.index.get(image).copied()) {
+            Some(place) => place,
+            None => {
+                budget.spend(BYTES_PER_PICTURE + 2 * image.len() as u64)?;
+                self.index.insert(image.to_owned(), self.seen.len());
+                let image = image.to_owned();
+                self.seen.push(Seen {
+                    image,
+                    picture: None,
+                    corners: None,
+                    grids: BTreeMap::new(),
+                });
+                self.seen.len() - 1
+            }
+        };
+        Ok(&mut self.seen[place])
+    }
+
+    fn add_corner(&mut self, row: &Row, budget: &mut Budget) -> Result<(), TableError> {
+        let kind = match row.text(2)? {
+            Some(name) if name == kind_name(GridKind::Deltille) => GridKind::Deltille,
+            Some(name) if name == kind_name(GridKind::Checker) => GridKind::Checker,
+            Some(_) => return Err(row.wrong(2, "neither `deltille` nor `checker`")),
+            None => return Err(row.missing(2)),
+        };
+        let target = row.text(3)?;
+        let panel = row.unsigned(4)?;
+        let mirrored = row.flag(5)?.unwrap_or(false);
+        let place = |at| {
+            let value = row.whole(at)?.ok_or_else(|| row.missing(at))?;
+            let in_range = quantity::place_in_lattice::RANGE.check(value as f64);
+            in_range.map_err(|what| row.wrong(at, what))?;
+            Ok::<i32, TableError>(value as i32)
+        };
+        let needed = |at, range| row.real(at, range)?.ok_or_else(|| row.missing(at));
+        let covariance = |at| row.real(at, quantity::figure::RANGE);
+        let cov = match [covariance(11)?, covariance(12)?, covariance(13)?] {
+            [Some(xx), Some(xy), Some(yy)] => Some([xx, xy, yy]),
+            [None, None, None] => None,
+            _ => return Err(row.wrong(11, "a covariance has all of xx, xy and yy, or none")),
+        };
+        let corner = GridCorner {
+            row: place(6)?,
+            col: place(7)?,
+            id: row.unsigned(8)?,
+            x: needed(9, quantity::place_px::RANGE)?,
+            y: needed(10, quantity::place_px::RANGE)?,
+            cov,
+        };
+        let index = row.unsigned(1)?.ok_or_else(|| row.missing(1))?;
+        let image = row.text(0)?.ok_or_else(|| row.missing(0))?;
+        let seen = self.seen(image, budget)?;
+        if !seen.grids.contains_key(&index) {
+            budget.spend(BYTES_PER_PICTURE + target.map_or(0, |target| target.len() as u64))?;
+        }
+        let grid = seen.grids.entry(index).or_insert_with(|| Grid {
+            kind,
+            target: target.map(str::to_owned),
+            panel,
+            mirrored,
+            corners: Vec::new(),
+            tags: Vec::new(),
+        });
+        if (grid.kind, grid.target.as_deref(), grid.panel, grid.mirrored)
+            != (kind, target, panel, mirrored)
+        {
+            let problem = "another kind, target, panel or side than other corners of this grid";
+            return Err(row.wrong(1, problem));
+        }
+        grid.corners.push(corner);
+        Ok(())
+    }
+
+    fn add_picture(&mut self, row: &Row, budget: &mut Budget) -> Result<(), TableError> {
+        let image = row.text(0)?.ok_or_else(|| row.missing(0))?;
+        let mut spent = 0;
+        let mut owned = |text: Option<&str>| {
+            spent += text.map_or(0, |text| text.len() as u64);
+            text.map(str::to_owned)
+        };
+        let found = match owned(row.text(23)?) {
+            Some(why) => Err(why),
+            None => {
+                let side = |at| {
+                    let value = row.whole(at)?.ok_or_else(|| row.missing(at))?;
+                    let in_range = quantity::side_px::RANGE.check(value as f64);
+                    in_range.map_err(|what| row.wrong(at, what))?;
+                    Ok::<u32, TableError>(value as u32)
+                };
+                let mut found = Detection::new(image, [side(1)?, side(2)?], Vec::new());
+                found.tone = row.tone()?;
+                found.ink = row.ink()?;
+                let exif_orientation = row.unsigned(21)?.map(u8::try_from).transpose();
+                let exif_orientation =
+                    exif_orientation.map_err(|_| row.wrong(21, "not from 2 to 8"))?;
+                found.file = FileNotes { exif_orientation, damage: owned(row.text(22)?) };
+                if let Some(json) = owned(row.text(8)?) {
+                    let reasons: Result<Vec<Reason>, _> = serde_json::from_str(&json);
+                    found.reasons = reasons.map_err(|error| row.wrong(8, error))?;
+                }
+                Ok(found)
+            }
+        };
+        let (tags, corners) = (row.unsigned(5)?.unwrap_or(0), row.unsigned(4)?);
+        // Reasons take more than their text.
+        budget.spend(image.len() as u64 + 8 * spent)?;
+        let seen = self.seen(image, budget)?;
+        let picture = Picture { image: image.to_owned(), tags, found };
+        if seen.picture.replace(picture).is_some() {
+            let problem = "it stands twice in the table of pictures".to_owned();
+            return Err(TableError::Picture { image: image.to_owned(), problem });
+        }
+        seen.corners = corners;
+        Ok(())
+    }
+
+    /// The pictures with their corners, each grid's by row and column.
+    ///
+    /// # Errors
+    /// When corners are of a picture that is not in the table of pictures or could not be read, or the corners of a
+    /// picture contradict each other.
+    pub fn finish(self) -> Result<Read, TableError> {
+        let (mut pictures, mut short) = (Vec::with_capacity(self.seen.len()), 0);
+        for Seen { image, picture, corners, grids } in self.seen {
+            let wrong = |problem: String| TableError::Picture { image: image.clone(), problem };
+            let Some(mut picture) = picture else {
+                return Err(wrong(
+                    "corners of it, but it is not in the table of pictures".to_owned(),
+                ));
+            };
+            let count: usize = grids.values().map(|grid| grid.corners.len()).sum();
+            short +=
+                usize::from(corners.is_some_and(|corners| (count as u64) < u64::from(corners)));
+            match &mut picture.found {
+                Ok(found) => {
+                    found.grids = grids.into_values().collect();
+                    // Whatever moved the rows, their order is the one in which they were found.
+                    let order = |grid: &mut Grid| {
+                        grid.corners.sort_by_key(|corner| (corner.row, corner.col))
+                    };
+                    found.grids.iter_mut().for_each(order);
+                    let checked = detection::check_corners(&found.grids);
+                    checked.map_err(|error| wrong(error.to_string()))?;
+                }
+                Err(_) if count > 0 => {
+                    return Err(wrong("corners of it, but it could not be read".to_owned()));
+                }
+                Err(_) => {}
+            }
+            pictures.push(picture);
+        }
+        Ok(Read { pictures, short })
+    }
+}
+
+fn damaged(error: ParquetError) -> TableError {
+    // Such as "Parquet error: …", of which the first words say nothing.
+    let words = error.to_string();
+    TableError::File(words.trim_start_matches("Parquet error: ").to_owned())
+}
+
+/// Which table it is, by its columns.
+fn contents(metadata: &ParquetMetaData) -> Result<Contents, TableError> {
+    let schema = metadata.file_metadata().schema_descr();
+    let has = |name: &str| schema.columns().iter().any(|column| column.path().string() == name);
+    let (contents, reads) = match (has("width"), has("x")) {
+        (true, _) => (Contents::Pictures, PICTURES_SCHEMA),
+        (_, true) => (Contents::Corners, CORNERS_SCHEMA),
+        _ => return Err(TableError::Other("x` or `width")),
+    };
+    let stated = metadata.file_metadata().key_value_metadata().into_iter().flatten();
+    let stated = stated.filter(|pair| pair.key == SCHEMA).find_map(|pair| pair.value.as_deref());
+    match stated {
+        Some(found) if found != reads => {
+            let found: String = found.chars().take(100).collect();
+            Err(TableError::Schema { found, reads })
+        }
+        _ => Ok(contents),
+    }
+}
+
+/// Where the columns are in a file.
+fn places(
+    metadata: &ParquetMetaData,
+    columns: &'static [Column],
+) -> Result<Vec<Option<usize>>, TableError> {
+    let schema = metadata.file_metadata().schema_descr();
+    let place = |column: &'static Column| {
+        let wrong =
+            |problem: &str| TableError::Column { column: column.name, problem: problem.to_owned() };
+        let all = schema.columns().iter();
+        match all.clone().position(|found| found.path().string() == column.name) {
+            Some(place) => {
+                let found = schema.column(place);
+                let is_flat = found.max_rep_level() == 0 && found.max_def_level() <= 1;
+                is_flat.then_some(Some(place)).ok_or_else(|| wrong("a value in each row is needed"))
+            }
+            None if column.needed => Err(wrong("it is missing")),
+            None => Ok(None),
+        }
+    };
+    columns.iter().map(place).collect()
+}
+
+/// What may still be set aside, bytes.
+struct Budget {
+    left: u64,
+    limits: Limits,
+}
+
+impl Budget {
+    fn spend(&mut self, bytes: u64) -> Result<(), TableError> {
+        let left = self.left.checked_sub(bytes);
+        self.left = left.ok_or_else(|| self.limits.exceeded(Limit::Bytes))?;
+        Ok(())
+    }
+}
+
+/// Looks at the sizes of all pages before any is unpacked.
+fn check_groups(
+    metadata: &ParquetMetaData,
+    content: &Bytes,
+    places: &[Option<usize>],
+    per_row: u64,
+    budget: &mut Budget,
+) -> Result<(), TableError> {
+    let file = |problem: &str| TableError::File(problem.to_owned());
+    for group in metadata.row_groups() {
+        let rows =
+            u64::try_from(group.num_rows()).map_err(|_| file("a negative number of rows"))?;
+        budget.spend(rows.saturating_mul(per_row))?;
+        for &place in places.iter().flatten() {
+            let part = group.columns().get(place).ok_or_else(|| file("a column is missing"))?;
+            let problem = |problem: String| {
+                TableError::File(format!("column {}: {problem}", part.column_path().string()))
+            };
+            if !matches!(part.compression(), Compression::UNCOMPRESSED | Compression::SNAPPY) {
+                let words = part.compression().to_string();
+                let name = words.split('(').next().unwrap_or_default().to_owned();
+                return Err(problem(format!(
+                    "compressed as {name}; write it with SNAPPY, or without"
+                )));
+            }
+            let pages = pages_of(part, content)
+                .ok_or_else(|| problem("it lies outside of the file".to_owned()))?;
+            let entries = budget.limits.max_nodes;
+            budget.spend(super::pages::unpacked_bytes(pages, entries).map_err(problem)?)?;
+        }
+    }
+    Ok(())
+}
+
+/// The bytes of a column's part.
+fn pages_of<'a>(part: &ColumnChunkMetaData, content: &'a Bytes) -> Option<&'a [u8]> {
+    let begin = part.dictionary_page_offset().unwrap_or(part.data_page_offset());
+    let begin = usize::try_from(begin).ok()?;
+    let length = usize::try_from(part.compressed_size()).ok()?;
+    content.get(begin..begin.checked_add(length)?)
+}
+
+fn is_unsigned(logical: Option<&LogicalType>, converted: ConvertedType) -> bool {
+    let by_logical = matches!(logical, Some(LogicalType::Integer(whole)) if !whole.is_signed);
+    by_logical
+        || matches!(
+            converted,
+            ConvertedType::UINT_8 | ConvertedType::UINT_16 | ConvertedType::UINT_32
+        )
+}
+
+/// A column that is being read.
+struct Stream {
+    column: Column,
+    reader: ColumnReader,
+    unsigned: bool,
+    has_gaps: bool,
+}
+
+impl Stream {
+    /// The next rows.
+    fn next(&mut self, count: usize) -> Result<Vec<Cell>, TableError> {
+        let (unsigned, has_gaps) = (self.unsigned, self.has_gaps);
+        let whole = |value: i32| {
+            Cell::Whole(if unsigned { i64::from(value as u32) } else { i64::from(value) })
+        };
+        // What NumPy has for a value that is missing.
+        let real = |value: f64| if value.is_nan() { Cell::None } else { Cell::Real(value) };
+        let cells = match &mut self.reader {
+            ColumnReader::BoolColumnReader(from) => cells(from, count, has_gaps, Cell::Flag),
+            ColumnReader::Int32ColumnReader(from) => cells(from, count, has_gaps, whole),
+            ColumnReader::Int64ColumnReader(from) => cells(from, count, has_gaps, Cell::Whole),
+            ColumnReader::FloatColumnReader(from) => {
+                cells(from, count, has_gaps, |value| real(value.into()))
+            }
+            ColumnReader::DoubleColumnReader(from) => cells(from, count, has_gaps, real),
+            ColumnReader::ByteArrayColumnReader(from) => cells(from, count, has_gaps, Cell::Text),
+            _ => {
+                let problem = format!("no {}", name_of(self.column.kind));
+                return Err(TableError::Column { column: self.column.name, problem });
+            }
+        };
+        cells.map_err(|error| match error {
+            Some(error) => damaged(error),
+            None => TableError::File(format!("column {} ends too soon", self.column.name)),
+        })
+    }
+}
+
+/// The next rows of a column; `None` as an error where it ends before.
+fn cells<T: DataType>(
+    from: &mut ColumnReaderImpl<T>,
+    count: usize,
+    has_gaps: bool,
+    cell: impl Fn(T::T) -> Cell,
+) -> Result<Vec<Cell>, Option<ParquetError>> {
+    let mut cells = Vec::with_capacity(count);
+    while cells.len() < count {
+        let (mut levels, mut values) = (Vec::new(), Vec::new());
+        let gaps = has_gaps.then_some(&mut levels);
+        let (rows, ..) = from.read_records(count - cells.len(), gaps, None, &mut values)?;
+        if rows == 0 {
+            return Err(None);
+        }
+        let mut values = values.into_iter();
+        if has_gaps {
+            for level in levels {
+                let value = if level > 0 { Some(values.next().ok_or(None)?) } else { None };
+                cells.push(value.map_or(Cell::None, &cell));
+            }
+        } else {
+            cells.extend(values.map(&cell));
+        }
+    }
+    Ok(cells)
+}
+
+fn name_of(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Text => "text",
+        Kind::Signed | Kind::Unsigned => "whole number",
+        Kind::Real => "number",
+        Kind::Flag => "true or false",
+    }
+}
+
+/// A row of a table.
+struct Row<'a> {
+    number: u64,
+    columns: &'static [Column],
+    cells: &'a [Vec<Cell>],
+    row: usize,
+}
+
+impl<'a> Row<'a> {
+    fn cell(&self, at: usize) -> &'a Cell {
+        self.cells[at].get(self.row).unwrap_or(&Cell::None)
+    }
+
+    fn wrong(&self, at: usize, problem: impl ToString) -> TableError {
+        let (row, column) = (self.number, self.columns[at].name);
+        TableError::Cell { row, column, problem: problem.to_string() }
+    }
+
+    fn missing(&self, at: usize) -> TableError {
+        self.wrong(at, format!("no {}", name_of(self.columns[at].kind)))
+    }
+
+    fn text(&self, at: usize) -> Result<Option<&'a str>, TableError> {
+        match self.cell(at) {
+            Cell::None => Ok(None),
+            Cell::Text(bytes) if bytes.len() > MOST_TEXT => {
+                Err(self.wrong(at, format!("a text of more than {MOST_TEXT} bytes")))
+            }
+            Cell::Text(bytes) => {
+                let text = str::from_utf8(bytes.data());
+                text.map(Some).map_err(|_| self.wrong(at, "no text in UTF-8"))
+            }
+            _ => Err(self.missing(at)),
+        }
+    }
+
+    /// A whole number, which a table of floating-point numbers may have, too: where some are missing, others know no
+    /// other.
+    fn whole(&self, at: usize) -> Result<Option<i64>, TableError> {
+        match *self.cell(at) {
+            Cell::None => Ok(None),
+            Cell::Whole(value) => Ok(Some(value)),
+            Cell::Real(value) if value.fract() == 0.0 && value.abs() < 1e15 => {
+                Ok(Some(value as i64))
+            }
+            _ => Err(self.missing(at)),
+        }
+    }
+
+    fn unsigned(&self, at: usize) -> Result<Option<u32>, TableError> {
+        let value = self.whole(at)?.map(u32::try_from).transpose();
+        value.map_err(|_| self.wrong(at, "not a whole number from 0 to 4294967295"))
+    }
+
+    fn real(&self, at: usize, range: Range) -> Result<Option<f64>, TableError> {
+        let value = match *self.cell(at) {
+            Cell::None => return Ok(None),
+            Cell::Real(value) => value,
+            Cell::Whole(value) => value as f64,
+            _ => return Err(self.missing(at)),
+        };
+        range.check(value).map(Some).map_err(|what| self.wrong(at, what))
+    }
+
+    fn flag(&self, at: usize) -> Result<Option<bool>, TableError> {
+        match *self.cell(at) {
+            Cell::None => Ok(None),
+            Cell::Flag(value) => Ok(Some(value)),
+            _ => Err(self.missing(at)),
+        }
+    }
+
+    fn tone(&self) -> Result<Option<ToneEstimate>, TableError> {
+        self.estimate(9, &["black", "white", "kappa", "kappa_deviation", "kappa_odd", "used"])
+    }
+
+    fn ink(&self) -> Result<Option<InkEstimate>, TableError> {
+        let fields = ["edges", "edges_deviation", "um", "um_deviation", "used", "pictures"];
+        self.estimate(15, &fields)
+    }
+
+    /// An estimate whose fields are in as many columns from `at` on, if the first has a value. It is read as from
+    /// JSON, which knows the ranges.
+    fn estimate<T: DeserializeOwned>(
+        &self,
+        at: usize,
+        fields: &[&str],
+    ) -> Result<Option<T>, TableError> {
+        if *self.cell(at) == Cell::None {
+            return Ok(None);
+        }
+        let mut object = Map::new();
+        for (column, field) in (at..).zip(fields) {
+            let value = match self.columns[column].kind {
+                Kind::Flag => self.flag(column)?.map(Value::from),
+                Kind::Real => self.real(column, quantity::figure::RANGE)?.map(Value::from),
+                _ => self.unsigned(column)?.map(Value::from),
+            };
+            object.extend(value.map(|value| ((*field).to_owned(), value)));
+        }
+        let read = serde_json::from_value(Value::Object(object));
+        read.map(Some).map_err(|error| self.wrong(at, error))
+    }
+}

@@ -1,0 +1,203 @@
+"""Detection of many pictures on a cluster of this machine's processors, with a worker killed in the middle.
+
+    python python/benches/cluster.py FOLDER                   # 20,000 pictures, some ten minutes, 1 GB in FOLDER
+    python python/benches/cluster.py FOLDER --pictures 2000
+
+Needs ``deltille[ray]``, pillow and psutil. Pictures are made once: some hundred views of a board, each with many noises,
+1 % of the files damaged. They are looked at by one process without Ray, by one worker, by two, and by two of which one
+is killed; the last must account for every picture with the very same corners as the first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+os.environ["RAYON_NUM_THREADS"] = "1"
+
+import numpy
+import psutil
+import pyarrow as pa
+import pyarrow.parquet as pq
+import ray
+from PIL import Image
+
+import deltille
+import deltille.ray
+from deltille.ray import CORNERS, PICTURES, _Rows
+
+SIZE = (480, 360)
+VIEWS = 300
+DAMAGED = 0.01
+
+
+def make(folder: Path, count: int) -> deltille.Target:
+    """The pictures, where they are not there yet."""
+    folder.mkdir(parents=True, exist_ok=True)
+    board = deltille.Board(8, 9, edge_mm=20)
+    camera = deltille.Camera(*SIZE, 450.0)
+    random = numpy.random.default_rng(7)
+    middle = board.corners.mean(axis=0)
+    eyes = [middle + [*random.uniform(-160, 160, 2), random.uniform(300, 450)] for _ in range(VIEWS)]
+    shots = folder / "pictures"
+    shots.mkdir(exist_ok=True)
+    if len(os.listdir(shots)) == count:
+        return board
+    views = [deltille.render(board, camera, eye=eye, noise=0.0, dtype="float32")[0] for eye in eyes]
+    for index in range(count):
+        view = views[index % VIEWS]
+        noise = numpy.random.default_rng(index)
+        grey = view + noise.normal(0.0, noise.uniform(0.002, 0.02), view.shape)
+        path = shots / f"{index:06}.jpg"
+        Image.fromarray((grey.clip(0, 1) * 255).round().astype("uint8")).save(path, quality=90)
+        if noise.random() < DAMAGED:
+            content = path.read_bytes()
+            path.write_bytes(content[: int(len(content) * noise.uniform(0.0, 0.9))])
+    return board
+
+
+def by_one_process(shots: Path, board: deltille.Target) -> tuple[pa.Table, pa.Table]:
+    """Both tables, without Ray."""
+    detector = deltille.Detector(board)
+    rows = _Rows()
+    for path in sorted(shots.iterdir()):
+        try:
+            found = detector.detect_bytes(path.read_bytes(), name=f"{path}")
+        except deltille.Error as error:
+            rows.failed(f"{path}", f"{error}")
+        else:
+            rows.add(f"{path}", found)
+    return rows.table("corner"), rows.table("picture")
+
+
+def in_order(table: pa.Table) -> pa.Table:
+    keys = [name for name in ("image", "grid", "row", "col") if name in table.column_names]
+    return table.sort_by([(key, "ascending") for key in keys]).combine_chunks()
+
+
+def written(folder: Path) -> tuple[pa.Table, pa.Table]:
+    return pq.read_table(folder / "corners", schema=CORNERS), pq.read_table(folder / "pictures", schema=PICTURES)
+
+
+class Watch(threading.Thread):
+    """Looks at the memory of the workers once a second, and may kill one of them."""
+
+    def __init__(self, kill_when: float | None, folder: Path, count: int) -> None:
+        super().__init__(daemon=True)
+        self.kill_when, self.folder, self.count = kill_when, folder, count
+        self.killed: int | None = None
+        self.memory: dict[int, list[float]] = {}
+        self.is_over = threading.Event()
+
+    def run(self) -> None:
+        while not self.is_over.wait(1.0):
+            for worker in workers():
+                try:
+                    self.memory.setdefault(worker.pid, []).append(worker.memory_info().rss / 1e6)
+                except psutil.NoSuchProcess:
+                    continue
+            if self.kill_when is not None and self.killed is None:
+                written = [pq.read_metadata(path).num_rows for path in (self.folder / "pictures").glob("*.parquet")]
+                if sum(written) >= self.kill_when * self.count:
+                    victim = workers()[0]
+                    self.killed = victim.pid
+                    victim.kill()
+
+    def words(self) -> str:
+        """Memory of each worker after a quarter of its time, and the most of the rest."""
+        parts = []
+        for pid, seen in self.memory.items():
+            quarter = seen[len(seen) // 4 :]
+            dead = ", killed" if pid == self.killed else ""
+            parts.append(f"{quarter[0]:.0f} to {max(quarter):.0f} MB in {len(seen)} s{dead}")
+        return "; ".join(parts)
+
+
+def workers() -> list[psutil.Process]:
+    """Processes of this run that look at pictures."""
+    found = []
+    for process in psutil.Process().children(recursive=True):
+        try:
+            if "_Looking" in " ".join(process.cmdline()):
+                found.append(process)
+        except psutil.NoSuchProcess:
+            continue
+    return found
+
+
+def by_ray(folder: Path, shots: Path, board: deltille.Target, count: int, processes: int, kill: bool) -> float:
+    """Seconds for each picture."""
+    shutil.rmtree(folder, ignore_errors=True)
+    # Some time passes until the workers are there.
+    watch = Watch(0.4 if kill else None, folder, count)
+    watch.start()
+    begin = time.perf_counter()
+    summary = deltille.ray.detect_to(folder, shots, board, concurrency=processes)
+    seconds = time.perf_counter() - begin
+    watch.is_over.set()
+    watch.join()
+    if kill and watch.killed is None:
+        sys.exit("no worker was killed: take more pictures")
+    what = f"{processes} worker{'s' * (processes > 1)}{', one killed' * kill}"
+    print(f"{what}: {seconds:.1f} s, {count / seconds:.0f} pictures/s, {summary}; {watch.words()}", flush=True)
+    return seconds
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--pictures", type=int, default=20_000)
+    parser.add_argument("--program", help="the program deltille, to calibrate from what was written")
+    arguments = parser.parse_args()
+    folder, count = arguments.folder.resolve(), arguments.pictures
+    board = make(folder, count)
+    shots = folder / "pictures"
+    size = sum(path.stat().st_size for path in shots.iterdir())
+    print(f"{count} pictures of {SIZE[0]} × {SIZE[1]}, {size / 1e6:.0f} MB", flush=True)
+
+    begin = time.perf_counter()
+    alone = by_one_process(shots, board)
+    seconds = time.perf_counter() - begin
+    print(f"without Ray: {seconds:.1f} s, {count / seconds:.0f} pictures/s; load {os.getloadavg()[0]:.1f}", flush=True)
+
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="warning")
+    context = ray.data.DataContext.get_current()
+    context.enable_progress_bars = False
+    one = by_ray(folder / "one", shots, board, count, 1, False)
+    two = by_ray(folder / "two", shots, board, count, 2, False)
+    by_ray(folder / "killed", shots, board, count, 2, True)
+    print(f"two workers over one: {one / two:.2f}; load {os.getloadavg()[0]:.1f}", flush=True)
+
+    failed = []
+    for name in ("one", "two", "killed"):
+        for what, expected, found in zip(("corners", "pictures"), alone, written(folder / name)):
+            same = in_order(expected).equals(in_order(found))
+            failed += [] if same else [f"{name}: {what}"]
+            print(f"{name}: {what}: {len(found)} rows, {'the same' if same else 'NOT the same'} as of one process")
+    errors = len(alone[1]) - alone[1]["error"].null_count
+    print(f"{errors} pictures could not be read, each a row with its error")
+    again = deltille.ray.detect_to(folder / "killed", shots, board)
+    print(f"once more: {again}")
+    failed += [] if (again.pictures, again.skipped) == (0, count) else ["once more"]
+    if arguments.program:
+        (folder / "board.json").write_text(board.to_json())
+        few = folder / "few"
+        shutil.rmtree(few, ignore_errors=True)
+        deltille.ray.detect_to(few, [shots / f"{index:06}.jpg" for index in range(40)], board)
+        command = [arguments.program, "calibrate", few, "--target", folder / "board.json", "--model", "radtan"]
+        done = subprocess.run([*map(str, command), "-o", str(few / "camera")], capture_output=True, text=True)
+        focal = json.loads((few / "camera/camera.json").read_text())["parameters"][0] if done.returncode == 0 else None
+        print(f"calibrated from 40 of them: {focal or done.stderr}")
+    if failed:
+        sys.exit(f"failed: {', '.join(failed)}")
+
+
+if __name__ == "__main__":
+    main()

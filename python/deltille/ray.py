@@ -1,0 +1,545 @@
+"""Detections of more pictures than one machine should look at, by Ray (``pip install 'deltille[ray]'``).
+
+:func:`detect` makes a dataset, a row for each corner or for each picture; :func:`detect_to` writes both as Parquet
+into a folder or bucket, leaves out what stands there already, and ``deltille calibrate`` reads the folder.
+
+Only paths, or encoded files, travel to the workers, and small tables come back: decoded pictures stay in the process
+that looks at them, which is one thread. What Ray does when a process or a machine is lost is its own.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import uuid
+from typing import TYPE_CHECKING, Any, Optional, Union
+
+import pyarrow as pa
+import pyarrow.fs as pafs
+import pyarrow.parquet as pq
+import ray
+import ray.data
+from ray.data import Datasink
+
+import deltille
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from typing_extensions import TypeAlias
+
+    Paths: TypeAlias = Union[str, "os.PathLike[str]", Sequence[Union[str, "os.PathLike[str]"]]]
+    Targets: TypeAlias = Union["deltille.Target", Sequence["deltille.Target"]]
+
+__all__ = ["CORNERS", "PICTURES", "Summary", "detect", "detect_to", "done"]
+
+#: Columns of the table of corners.
+CORNERS = pa.schema(
+    [
+        ("image", pa.string()),
+        ("grid", pa.int32()),
+        ("kind", pa.string()),
+        ("target", pa.string()),
+        ("panel", pa.uint32()),
+        ("mirrored", pa.bool_()),
+        ("row", pa.int32()),
+        ("col", pa.int32()),
+        ("id", pa.uint32()),
+        ("x", pa.float64()),
+        ("y", pa.float64()),
+        ("cov_xx", pa.float64()),
+        ("cov_xy", pa.float64()),
+        ("cov_yy", pa.float64()),
+        ("target_x_mm", pa.float64()),
+        ("target_y_mm", pa.float64()),
+        ("target_z_mm", pa.float64()),
+    ],
+    metadata={"deltille.schema": "deltille/corners/1"},
+)
+
+#: Columns of the table of pictures.
+PICTURES = pa.schema(
+    [
+        ("image", pa.string()),
+        ("width", pa.int32()),
+        ("height", pa.int32()),
+        ("grids", pa.int32()),
+        ("corners", pa.int32()),
+        ("tags", pa.int32()),
+        ("why", pa.string()),
+        ("why_text", pa.string()),
+        ("reasons", pa.string()),
+        ("tone_black", pa.float64()),
+        ("tone_white", pa.float64()),
+        ("tone_kappa", pa.float64()),
+        ("tone_kappa_deviation", pa.float64()),
+        ("tone_kappa_odd", pa.float64()),
+        ("tone_used", pa.bool_()),
+        ("ink_edges", pa.float64()),
+        ("ink_edges_deviation", pa.float64()),
+        ("ink_um", pa.float64()),
+        ("ink_um_deviation", pa.float64()),
+        ("ink_used", pa.bool_()),
+        ("ink_pictures", pa.int32()),
+        ("exif_orientation", pa.int32()),
+        ("damage", pa.string()),
+        ("error", pa.string()),
+    ],
+    metadata={"deltille.schema": "deltille/pictures/1"},
+)
+
+# Of a corner in a row that holds its picture: all but the picture's name.
+_CORNER = pa.struct(list(CORNERS)[1:])
+_BOTH = pa.schema([*PICTURES, pa.field("found", pa.list_(_CORNER))])
+
+_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm", ".pbm", ".webp")
+
+
+class Summary:
+    """What :func:`detect_to` did.
+
+    Attributes
+    ----------
+    pictures, corners, errors : int
+        Pictures that were looked at, corners found in them, and how many of the pictures could not be read.
+    skipped : int
+        Pictures that stood in the folder already. Those of a dataset, whose length is not known, count as nothing.
+    """
+
+    def __init__(self, pictures: int, corners: int, errors: int, skipped: int) -> None:
+        self.pictures = pictures
+        self.corners = corners
+        self.errors = errors
+        self.skipped = skipped
+
+    def __repr__(self) -> str:
+        return (
+            f"<Summary: {self.pictures} pictures, {self.corners} corners, {self.errors} errors, "
+            f"{self.skipped} skipped>"
+        )
+
+
+def detect(
+    pictures: Union["ray.data.Dataset", Paths],
+    target: Optional[Targets] = None,
+    *,
+    per: str = "corner",
+    concurrency: Union[int, tuple[int, int], None] = None,
+    batch_size: int = 64,
+    filesystem: Any = None,
+    accept_damaged: bool = False,
+    **options: Any,
+) -> "ray.data.Dataset":
+    """Find a target in pictures, on all machines of a cluster.
+
+    Parameters
+    ----------
+    pictures : str, path-like, sequence of these, or ray.data.Dataset
+        Photographs and folders of them, on any filesystem that Ray reads (``"s3://bucket/day"``); every worker has to
+        reach it. Or a dataset with a column ``path``, or with ``bytes`` (encoded files, as of
+        :func:`ray.data.read_binary_files` with ``include_paths=True``) beside it.
+    target : Target or sequence of Target, optional
+        What is looked for.
+    per : str, optional
+        ``"corner"``: a row for each corner, with the columns :data:`CORNERS`. ``"picture"``: a row for each picture,
+        :data:`PICTURES`; one that could not be read has a text in ``error``. ``"both"``: the latter with a column
+        ``found``, a list of corners.
+    concurrency : int or (int, int), optional
+        How many processes look at pictures, or the least and the most; one for each processor of the cluster if left
+        out, and one less for a dataset, which takes processors itself. Each takes one processor.
+    batch_size : int, optional
+        Pictures that a process is given at a time. It holds the bytes and pixels of one only.
+    filesystem : pyarrow.fs.FileSystem or fsspec filesystem, optional
+        Where the paths are; found from them if left out.
+    accept_damaged : bool, optional
+        Whether JPEG files of which a part is missing are read too.
+    **options
+        For :class:`deltille.Detector`, such as ``grid``, ``rows``, ``cols`` or ``ink``. Each picture is seen by
+        itself: what pictures say together of the ink is not found here, but may be given as ``ink``, in µm.
+
+    Returns
+    -------
+    ray.data.Dataset
+        Made when it is consumed, in no order.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where a path is not there.
+    deltille.Error
+        Where there is nothing to look for.
+    """
+    if per not in ("corner", "picture", "both"):
+        raise ValueError('per: give "corner", "picture" or "both"')
+    return _detect(pictures, frozenset(), target, per, concurrency, batch_size, filesystem, accept_damaged, options)[0]
+
+
+def detect_to(
+    folder: Union[str, "os.PathLike[str]"],
+    pictures: Union["ray.data.Dataset", Paths],
+    target: Optional[Targets] = None,
+    *,
+    concurrency: Union[int, tuple[int, int], None] = None,
+    batch_size: int = 64,
+    filesystem: Any = None,
+    accept_damaged: bool = False,
+    pictures_per_file: int = 1000,
+    **options: Any,
+) -> Summary:
+    """Find a target in pictures and write what comes of it, as it comes, to ``folder/corners`` and ``folder/pictures``.
+
+    A picture that stands in the folder already is not read again, with or without corners or an error: after a run
+    that was stopped, the same call does the rest. ``deltille calibrate FOLDER --target …`` reads the folder.
+
+    Parameters
+    ----------
+    folder : str or path-like
+        A folder or bucket that every worker reaches; made where it is not there.
+    pictures, target, concurrency, batch_size, filesystem, accept_damaged, **options
+        As of :func:`detect`; `filesystem` is that of the pictures.
+    pictures_per_file : int, optional
+        How many pictures a file of either table has at least. What is in no file yet is done again after a run that
+        was stopped.
+
+    Returns
+    -------
+    Summary
+    """
+    to, root = _place(folder)
+    _remove_halves(to, root)
+    there = done(folder)
+    dataset, skipped = _detect(
+        pictures, there, target, "both", concurrency, batch_size, filesystem, accept_damaged, options
+    )
+    if dataset is None:
+        return Summary(0, 0, 0, skipped)
+    sink = _Tables(to, root, pictures_per_file)
+    # The processors are taken by those that look at pictures, who would wait for ever for those that write.
+    dataset.write_datasink(sink, ray_remote_args={"num_cpus": 0}, concurrency=2)
+    return Summary(*sink.counts, skipped)
+
+
+def done(folder: Union[str, "os.PathLike[str]"]) -> frozenset[str]:
+    """The pictures that stand in a folder of :func:`detect_to`."""
+    to, root = _place(folder)
+    names: set[str] = set()
+    for path in _files(to, f"{root}/pictures"):
+        with to.open_input_file(path) as file:
+            names.update(pq.read_table(file, columns=["image"])["image"].to_pylist())
+    return frozenset(names)
+
+
+def _place(path: Union[str, "os.PathLike[str]"]) -> tuple[pafs.FileSystem, str]:
+    """The filesystem of a path, and the path in it."""
+    text = os.fspath(path)
+    if "://" in text:
+        filesystem, inside = pafs.FileSystem.from_uri(text)
+        return filesystem, inside.rstrip("/")
+    # Workers have another working directory.
+    return pafs.LocalFileSystem(), os.path.abspath(text)
+
+
+def _files(filesystem: pafs.FileSystem, folder: str) -> list[str]:
+    """The tables in a folder."""
+    selector = pafs.FileSelector(folder, allow_not_found=True)
+    found = filesystem.get_file_info(selector)
+    names = [info for info in found if info.is_file and not info.base_name.startswith(".")]
+    return sorted(info.path for info in names if info.base_name.endswith(".parquet"))
+
+
+def _remove_halves(filesystem: pafs.FileSystem, root: str) -> None:
+    """Removes files of corners whose pictures were not written."""
+    name = os.path.basename
+    whole = {name(path) for path in _files(filesystem, f"{root}/pictures")}
+    for path in _files(filesystem, f"{root}/corners"):
+        if name(path) not in whole:
+            filesystem.delete_file(path)
+
+
+def _detect(
+    pictures: Any,
+    there: frozenset[str],
+    target: Optional[Targets],
+    per: str,
+    concurrency: Any,
+    batch_size: int,
+    filesystem: Any,
+    accept_damaged: bool,
+    options: dict[str, Any],
+) -> tuple[Any, int]:
+    """The dataset, ``None`` where nothing is left to do, and how many pictures are not in it."""
+    if batch_size < 1:
+        raise ValueError("batch_size: give 1 or more")
+    # What is wrong with the options is said here and not by every worker.
+    deltille.Detector(target, **options)
+    skipped = 0
+    if filesystem is not None and not isinstance(filesystem, pafs.FileSystem):
+        filesystem = pafs.PyFileSystem(pafs.FSSpecHandler(filesystem))
+    if isinstance(pictures, ray.data.Dataset):
+        names = set(pictures.schema().names)
+        if "path" not in names:
+            raise ValueError("pictures: the dataset has no column path, the name of each picture")
+        dataset = pictures
+    else:
+        paths = _listed(pictures, filesystem)
+        left = [path for path in paths if path not in there]
+        skipped = len(paths) - len(left)
+        if not left and per == "both":
+            return None, skipped
+        blocks = [left[at : at + batch_size] for at in range(0, len(left), batch_size)] or [[]]
+        dataset = ray.data.from_arrow([pa.table({"path": pa.array(block, pa.string())}) for block in blocks])
+        there = frozenset()
+    if concurrency is None:
+        processors = max(1, int(ray.cluster_resources().get("CPU", 1)))
+        # Whatever makes a dataset needs processors, too, and would wait for them for ever.
+        concurrency = processors if pictures is not dataset else (1, max(1, processors - 1))
+    least, most = concurrency if isinstance(concurrency, tuple) else (concurrency, concurrency)
+    found = dataset.map_batches(
+        _Looking,
+        batch_size=batch_size,
+        batch_format="pyarrow",
+        compute=ray.data.ActorPoolStrategy(min_size=least, max_size=most),
+        num_cpus=1,
+        fn_constructor_kwargs={
+            "target": target,
+            "options": options,
+            "per": per,
+            "filesystem": filesystem,
+            "accept_damaged": accept_damaged,
+            "there": there,
+        },
+    )
+    return found, skipped
+
+
+def _listed(paths: Paths, filesystem: Any) -> list[str]:
+    """The pictures among paths and in folders, by name, each as it was given."""
+    listed: list[str] = []
+    for path in [paths] if isinstance(paths, (str, os.PathLike)) else paths:
+        text = os.fspath(path)
+        on, inside = (filesystem, text) if filesystem is not None else _place(text)
+        info = on.get_file_info(inside)
+        if info.type == pafs.FileType.NotFound:
+            raise FileNotFoundError(f"{text}: no such file or folder")
+        if info.type != pafs.FileType.Directory:
+            listed.append(text)
+            continue
+        found = on.get_file_info(pafs.FileSelector(inside, recursive=True))
+        inner = sorted(
+            file.path[len(inside) :].lstrip("/")
+            for file in found
+            if file.is_file and file.path.lower().endswith(_ENDINGS) and not file.path.endswith(".overlay.png")
+        )
+        listed.extend(f"{text.rstrip('/')}/{name}" for name in inner)
+    return list(dict.fromkeys(listed))
+
+
+class _Looking:
+    """A process that looks at pictures."""
+
+    def __init__(
+        self,
+        target: Optional[Targets],
+        options: dict[str, Any],
+        per: str,
+        filesystem: Any,
+        accept_damaged: bool,
+        there: frozenset[str],
+    ) -> None:
+        # Ray runs as many processes as there are processors.
+        os.environ["RAYON_NUM_THREADS"] = "1"
+        self.detector = deltille.Detector(target, **options)
+        self.per = per
+        self.filesystem = filesystem
+        self.accept_damaged = accept_damaged
+        self.there = there
+
+    def __call__(self, batch: pa.Table) -> Iterator[pa.Table]:
+        rows = _Rows()
+        names = batch.column_names
+        content = batch["bytes"] if "bytes" in names else [None] * len(batch)
+        for path, encoded in zip(batch["path"], content):
+            # One picture at a time: a batch of files may be large.
+            name = path.as_py()
+            if name in self.there:
+                continue
+            try:
+                data = self._read(name) if encoded is None else encoded.as_buffer()
+                found = self.detector.detect_bytes(data, name=name, accept_damaged=self.accept_damaged)
+            except (deltille.Error, OSError, ValueError) as error:
+                rows.failed(name, f"{error}")
+            else:
+                rows.add(name, found)
+        yield rows.table(self.per)
+
+    def _read(self, path: str) -> Any:
+        on, inside = (self.filesystem, path) if self.filesystem is not None else _place(path)
+        with on.open_input_stream(inside) as file:
+            return file.read()
+
+
+class _Rows:
+    """Rows of both tables, column by column."""
+
+    def __init__(self) -> None:
+        self.pictures: list[dict[str, Any]] = []
+        self.counts: list[int] = []
+        self.corners: list[pa.Table] = []
+
+    def failed(self, image: str, error: str) -> None:
+        self.pictures.append({"image": image, "error": error})
+        self.counts.append(0)
+
+    def add(self, image: str, found: "deltille.Detection") -> None:
+        reasons = [
+            {"kind": reason.kind}
+            | ({} if reason.grid is None else {"grid": reason.grid})
+            | ({"figures": reason.figures} if reason.figures else {})
+            for reason in found.reasons
+        ]
+        picture: dict[str, Any] = {
+            "image": image,
+            "width": found.width,
+            "height": found.height,
+            "grids": len(found.grids),
+            "corners": len(found),
+            "tags": len(found.tags),
+            "exif_orientation": found.exif_orientation,
+            "damage": found.damage,
+        }
+        if reasons:
+            picture["why"] = reasons[0]["kind"]
+            picture["why_text"] = "; ".join(str(reason) for reason in found.reasons)
+            picture["reasons"] = json.dumps(reasons)
+        for name, estimate in (("tone", found.tone), ("ink", found.ink)):
+            if estimate is not None:
+                fields = (field for field in PICTURES.names if field.startswith(f"{name}_"))
+                picture |= {field: _field(estimate, field.removeprefix(f"{name}_")) for field in fields}
+        self.pictures.append(picture)
+        self.counts.append(len(found))
+        if len(found):
+            self.corners.append(_corners(image, found))
+
+    def table(self, per: str) -> pa.Table:
+        corners = pa.concat_tables([CORNERS.empty_table(), *self.corners])
+        if per == "corner":
+            return corners
+        pictures = pa.Table.from_pylist(self.pictures, PICTURES)
+        if per == "picture":
+            return pictures
+        parts = corners.drop_columns(["image"]).combine_chunks()
+        arrays = [parts[name].combine_chunks() for name in parts.column_names]
+        values = pa.StructArray.from_arrays(arrays, fields=list(_CORNER))
+        ends = [0]
+        for count in self.counts:
+            ends.append(ends[-1] + count)
+        found = pa.ListArray.from_arrays(pa.array(ends, pa.int32()), values)
+        return pa.table([*pictures.columns, found], schema=_BOTH)
+
+
+def _field(record: Any, name: str) -> Any:
+    return record.get(name) if isinstance(record, dict) else getattr(record, name, None)
+
+
+def _corners(image: str, found: "deltille.Detection") -> pa.Table:
+    """The corners of a picture."""
+    grids = found.grid_indices
+    each = found.grids
+    cov, pixels, places = found.covariances, found.pixels, found.object_points
+
+    def of_grid(what: Any) -> list[Any]:
+        values = [what(grid) for grid in each]
+        return [values[grid] for grid in grids]
+
+    def known(ids: Any) -> pa.Array:
+        return pa.array(ids, mask=ids < 0).cast(pa.uint32())
+
+    def number(values: Any) -> pa.Array:
+        # NaN is a number that is not known.
+        return pa.array(values, pa.float64(), from_pandas=True)
+
+    columns = {
+        "image": [image] * len(grids),
+        "grid": grids,
+        "kind": of_grid(lambda grid: grid.kind),
+        "target": of_grid(lambda grid: grid.target),
+        "panel": known(found.panels),
+        "mirrored": of_grid(lambda grid: grid.mirrored),
+        "row": found.rows,
+        "col": found.cols,
+        "id": known(found.ids),
+        "x": number(pixels[:, 0]),
+        "y": number(pixels[:, 1]),
+        "cov_xx": number(cov[:, 0, 0]),
+        "cov_xy": number(cov[:, 0, 1]),
+        "cov_yy": number(cov[:, 1, 1]),
+        "target_x_mm": number(places[:, 0]),
+        "target_y_mm": number(places[:, 1]),
+        "target_z_mm": number(places[:, 2]),
+    }
+    arrays = [
+        values.cast(field.type) if isinstance(values, pa.Array) else pa.array(values, field.type)
+        for field, values in zip(CORNERS, columns.values())
+    ]
+    return pa.table(arrays, schema=CORNERS)
+
+
+class _Tables(Datasink):
+    """Writes the rows of a block of pictures as a file of corners and then one of pictures, of the same name.
+
+    A picture counts as done once it is among the pictures. A file of corners without its pictures is ignored by
+    whoever reads the folder, and removed by the next run.
+    """
+
+    def __init__(self, filesystem: pafs.FileSystem, root: str, pictures_per_file: int) -> None:
+        self.filesystem = filesystem
+        self.root = root
+        self.pictures_per_file = pictures_per_file
+        self.run = uuid.uuid4().hex[:12]
+        self.counts = (0, 0, 0)
+
+    def on_write_start(self, schema: Optional[pa.Schema] = None) -> None:
+        for table in ("corners", "pictures"):
+            self.filesystem.create_dir(f"{self.root}/{table}", recursive=True)
+
+    def write(self, blocks: Iterable[Any], ctx: Any) -> tuple[int, int, int]:
+        tables = [ray.data.block.BlockAccessor.for_block(block).to_arrow() for block in blocks]
+        tables = [table for table in tables if len(table)]
+        if not tables:
+            return (0, 0, 0)
+        both = pa.concat_tables(tables, promote_options="permissive").combine_chunks()
+        pictures = both.select(PICTURES.names).cast(PICTURES)
+        lists = both["found"].combine_chunks()
+        values = lists.flatten()
+        image = pictures["image"].combine_chunks().take(pa.compute.list_parent_indices(lists))
+        columns = [image, *(values.field(field.name) for field in list(CORNERS)[1:])]
+        corners = pa.table(columns, schema=CORNERS)
+        # A task that is run again writes the same files again.
+        name = f"{self.run}-{ctx.task_idx:06}.parquet"
+        self._put(corners, f"{self.root}/corners", name)
+        self._put(pictures, f"{self.root}/pictures", name)
+        errors = len(pictures) - pictures["error"].null_count
+        return len(pictures), len(corners), errors
+
+    def _put(self, table: pa.Table, folder: str, name: str) -> None:
+        """A file that is there as a whole or not at all."""
+        if not isinstance(self.filesystem, pafs.LocalFileSystem):
+            # Of a bucket an object is there once its stream is closed.
+            with self.filesystem.open_output_stream(f"{folder}/{name}") as file:
+                pq.write_table(table, file, compression="snappy")
+            return
+        temporary = f"{folder}/.{name}-{uuid.uuid4().hex}"
+        with self.filesystem.open_output_stream(temporary) as file:
+            pq.write_table(table, file, compression="snappy")
+        os.replace(temporary, f"{folder}/{name}")
+
+    def on_write_complete(self, write_result: Any) -> None:
+        returns = [counts for counts in write_result.write_returns if counts]
+        self.counts = tuple(map(sum, zip(*returns))) if returns else (0, 0, 0)  # type: ignore[assignment]
+
+    def get_name(self) -> str:
+        return "Tables"
+
+    @property
+    def min_rows_per_write(self) -> Optional[int]:
+        return self.pictures_per_file

@@ -1,0 +1,158 @@
+"""Detection on a cluster: the same corners as of one process, nothing lost and nothing done twice."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy
+import pytest
+
+pytest.importorskip("pyarrow")
+ray = pytest.importorskip("ray")
+pytest.importorskip("ray.data")
+Image = pytest.importorskip("PIL.Image")
+
+import pyarrow as pa
+import pyarrow.fs as pafs
+import pyarrow.parquet as pq
+
+import deltille
+import deltille.ray
+from deltille.ray import CORNERS, PICTURES
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cluster():
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="error")
+    yield
+    ray.shutdown()
+
+
+@pytest.fixture(scope="module")
+def target():
+    return deltille.Board(6, 7, edge_mm=20)
+
+
+@pytest.fixture(scope="module")
+def shots(tmp_path_factory, target) -> Path:
+    """Nine photographs in two folders, and a file that is none."""
+    folder = tmp_path_factory.mktemp("shots")
+    camera = deltille.Camera(480, 360, 450.0)
+    middle = target.corners.mean(axis=0)
+    for index in range(9):
+        place = folder / ("a" if index < 5 else "b")
+        place.mkdir(exist_ok=True)
+        eye = middle + [40.0 * (index % 3) - 30.0, 50.0 * (index % 4) - 60.0, 280.0]
+        picture, _ = deltille.render(target, camera, eye=eye, seed=index)
+        Image.fromarray(picture).save(place / f"{index}.png")
+    (folder / "b/broken.png").write_bytes((folder / "b/7.png").read_bytes()[:900])
+    (folder / "notes.txt").write_text("no picture")
+    return folder
+
+
+def places(corners) -> dict:
+    return {(row["image"], row["id"]): (row["x"], row["y"], row["cov_xx"]) for row in corners}
+
+
+def expected(shots: Path, target) -> dict:
+    detector = deltille.Detector(target)
+    found = {}
+    for path in sorted(shots.rglob("?.png")):
+        seen = detector.detect_file(path)
+        for number, pixel, cov in zip(seen.ids, seen.pixels, seen.covariances):
+            found[f"{path}", int(number)] = (pixel[0], pixel[1], cov[0, 0])
+    return found
+
+
+def test_a_row_for_each_corner_and_for_each_picture(shots, target):
+    corners = deltille.ray.detect(shots, target, batch_size=3)
+    rows = corners.take_all()
+    assert list(corners.schema().names) == CORNERS.names
+    assert places(rows) == expected(shots, target)
+    of_board = {int(number): place for number, place in zip(target.corner_ids, target.corners)}
+    for row in rows:
+        place = [row["target_x_mm"], row["target_y_mm"], row["target_z_mm"]]
+        assert numpy.array_equal(place, of_board[row["id"]])
+
+    pictures = deltille.ray.detect([shots / "b", shots / "a/0.png"], target, per="picture").take_all()
+    assert len(pictures) == 6 and list(pictures[0]) == PICTURES.names
+    errors = {row["image"]: row["error"] for row in pictures if row["error"]}
+    assert list(errors) == [f"{shots}/b/broken.png"] and "broken.png" in errors[f"{shots}/b/broken.png"]
+
+
+def test_encoded_files_and_paths_of_a_dataset(shots, target):
+    encoded = ray.data.read_binary_files(f"{shots}/a", include_paths=True)
+    paths = ray.data.from_items([{"path": f"{path}"} for path in sorted((shots / "a").iterdir())])
+    due = {key: place for key, place in expected(shots, target).items() if "/a/" in key[0]}
+    for dataset in (encoded, paths):
+        assert places(deltille.ray.detect(dataset, target).take_all()) == due
+    with pytest.raises(ValueError, match="no column path"):
+        deltille.ray.detect(ray.data.range(3), target)
+
+
+def test_what_is_written_is_not_done_again_and_makes_a_camera(shots, target, tmp_path):
+    out = tmp_path / "found"
+    first = deltille.ray.detect_to(out, shots / "a", target, pictures_per_file=2, batch_size=2)
+    assert (first.pictures, first.errors, first.skipped) == (5, 0, 0)
+    # What a task leaves that is lost between its two files.
+    orphan = out / "corners/lost-000000.parquet"
+    shutil.copy(next((out / "corners").iterdir()), orphan)
+    second = deltille.ray.detect_to(out, shots, target)
+    assert (second.pictures, second.errors, second.skipped) == (5, 1, 5)
+    assert not orphan.exists()
+    again = deltille.ray.detect_to(out, shots, target)
+    assert (again.pictures, again.skipped) == (0, 10)
+    assert len(deltille.ray.done(out)) == 10
+    assert places(pq.read_table(out / "corners").to_pylist()) == expected(shots, target)
+    of_dataset = ray.data.read_binary_files(f"{shots}/a", include_paths=True)
+    assert deltille.ray.detect_to(out, of_dataset, target).pictures == 0
+    assert not [name for _, _, files in os.walk(out) for name in files if name.startswith(".")]
+
+    program = shutil.which("deltille", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    if program is None:
+        pytest.skip("the program deltille is not there")
+    target.save(tmp_path, formats=[])
+    description = next(tmp_path.glob("*.json"))
+    single = tmp_path / "single"
+    single.mkdir()
+    detector = deltille.Detector(target)
+    for image in sorted(shots.rglob("?.png")):
+        (single / f"{image.stem}.json").write_text(detector.detect_file(image).to_json())
+    cameras = []
+    for of in (out, single):
+        command = [program, "calibrate", of, "--target", description, "--model", "radtan", "-o", tmp_path / of.name]
+        done = subprocess.run([f"{part}" for part in command], capture_output=True, text=True)
+        assert done.returncode in (0, 1), done.stderr
+        cameras.append((tmp_path / of.name / "camera.yaml").read_text())
+    assert cameras[0] == cameras[1]
+
+
+def test_filesystems(shots, target):
+    inside = pafs.SubTreeFileSystem(f"{shots}", pafs.LocalFileSystem())
+    pictures = deltille.ray.detect("a", target, per="picture", filesystem=inside).take_all()
+    assert sorted(row["image"] for row in pictures) == [f"a/{index}.png" for index in range(5)]
+    uri = deltille.ray.detect(f"file://{shots}/a", target, per="picture").take_all()
+    assert {row["corners"] for row in uri} == {row["corners"] for row in pictures}
+
+
+def test_what_is_wrong_is_said_before_anything_is_done(shots, target, tmp_path):
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        deltille.ray.detect(shots / "nowhere", target)
+    with pytest.raises(ValueError, match="per"):
+        deltille.ray.detect(shots, target, per="row")
+    with pytest.raises(deltille.Error):
+        deltille.ray.detect(shots)
+    # A folder without a picture is no error, as one that was emptied by a run before.
+    (tmp_path / "empty").mkdir()
+    assert deltille.ray.detect(tmp_path / "empty", target).count() == 0
+    assert deltille.ray.detect_to(tmp_path / "out", tmp_path / "empty", target).pictures == 0
+
+
+def test_both_tables_are_one_dataset(shots, target):
+    both = deltille.ray.detect(shots / "a", target, per="both").to_arrow_refs()
+    table = pa.concat_tables(ray.get(both), promote_options="permissive")
+    assert table["corners"].to_pylist() == [len(row) for row in table["found"].to_pylist()]
