@@ -132,6 +132,14 @@ pub enum ImageError {
     },
 }
 
+/// Grey values of `rgb`, as photographs of colour have them; `None` where there are not three bytes for each pixel.
+pub fn grey_of_colours(width: u32, height: u32, rgb: Vec<u8>) -> Option<Gray<u8>> {
+    match from_dynamic(DynamicImage::ImageRgb8(RgbImage::from_raw(width, height, rgb)?)) {
+        AnyGray::U8(grey) => Some(grey),
+        AnyGray::U16(_) => None,
+    }
+}
+
 /// Reads a PNG, JPEG, TIFF, BMP, PGM/PPM or WebP file as a grey image in sensor orientation. Colour
 /// becomes luma (Rec. 709 weights), transparency is ignored, and a depth beyond 8 bits is kept as
 /// 16 bits.

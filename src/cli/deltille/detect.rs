@@ -172,10 +172,10 @@ fn see_again(
     seen: &[Seen],
     threads: &rayon::ThreadPool,
 ) {
-    let found: Vec<InkEstimate> = seen.iter().filter_map(|seen| seen.ink).collect();
-    let Some(ink) = InkEstimate::of_all(&found).filter(|ink| ink.used) else { return };
-    if seen.len() > 1 {
-        let detector = detector.with_ink(ink);
+    let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
+    let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
+    let Some(ink) = InkEstimate::of_all(&known).filter(|ink| ink.used) else { return };
+    if let Some(detector) = detector.with_ink_of(&found) {
         let bar = progress::bar(seen.len() as u64, "images, with the ink of all");
         let images = seen.iter().map(|seen| Ok(seen.image.clone()));
         in_flight::for_each(threads, &args.finder.limits(), images, |index, _| {
