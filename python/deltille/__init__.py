@@ -64,9 +64,9 @@ from .errors import (
 )
 
 # What needs other packages, or nothing of the compiled part, is written in Python.
-Detection.to_opencv = _opencv_points
-Detection.plot = _plot
-Detection._repr_html_ = _repr_html
+Detection.to_opencv = _opencv_points  # type: ignore[method-assign]
+Detection.plot = _plot  # type: ignore[method-assign]
+Detection._repr_html_ = _repr_html  # type: ignore[method-assign]
 
 __all__ = [
     "Board",

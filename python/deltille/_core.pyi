@@ -1,54 +1,71 @@
 from collections.abc import Callable, Mapping, Sequence
-from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, TypedDict, final
+from typing import Any, Literal, final
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
 
-__version__: str
+from .typing import (
+    AnyPath,
+    BoardShape,
+    Bools,
+    CameraFormat,
+    Candidate,
+    Floats,
+    Ints,
+    Loss,
+    Orientation,
+    Source,
+    TargetFormat,
+    Tiling,
+    Weights,
+    Words,
+)
 
-Floats: TypeAlias = NDArray[numpy.float64]
-Ints: TypeAlias = NDArray[numpy.int64]
-Words: TypeAlias = NDArray[numpy.uint64]
-Bools: TypeAlias = NDArray[numpy.bool_]
-AnyPath: TypeAlias = str | PathLike[str]
-Orientation: TypeAlias = Literal["auto", "portrait", "landscape"]
-Tiling: TypeAlias = Literal["deltille", "checker"]
-Source: TypeAlias = Literal["noise", "observed"]
-Loss: TypeAlias = Literal["huber", "cauchy", "none"]
-Weights: TypeAlias = Literal["covariance", "equal"]
-TargetFormat: TypeAlias = Literal[
-    "json",
-    "pdf",
-    "svg",
-    "png",
-    "dsc",
-    "dsc-fork",
-    "dsc-original",
-    "gltf",
-    "glb",
-    "obj",
-    "stl",
-    "skeleton",
-    "panels",
-    "net",
+__all__ = [
+    "Board",
+    "CalibratedCamera",
+    "Calibration",
+    "Camera",
+    "Checkerboard",
+    "Comparison",
+    "DecodedTag",
+    "Detection",
+    "Detector",
+    "Diagnosis",
+    "Excluded",
+    "Family",
+    "Grid",
+    "Icosahedron",
+    "Located",
+    "Motion",
+    "Octahedron",
+    "Pose",
+    "Reason",
+    "Rig",
+    "Solid",
+    "Tag",
+    "Target",
+    "Tetrahedron",
+    "Truth",
+    "Verdict",
+    "View",
+    "__version__",
+    "_calibration",
+    "_detection",
+    "_keywords",
+    "_run",
+    "_target",
+    "calibrate",
+    "compare",
+    "compare_rigs",
+    "pose",
+    "render",
+    "rig",
+    "search_family",
 ]
-CameraFormat: TypeAlias = Literal["own", "opencv", "ros", "kalibr", "colmap", "nerfstudio", "mrcal"]
 
-class Candidate(TypedDict):
-    model: str
-    parameters: int
-    held_out_px: float | None
-    is_stable: bool
-    holds: bool
-    chosen: bool
-
-class BoardShape(TypedDict):
-    bent_mm: float
-    stretched_mm: float
-    f_ratio: float
-    is_significant: bool
+__version__: str
 
 class Target:
     @staticmethod
@@ -835,7 +852,7 @@ def render(
     seed: int = 0,
     dtype: Literal["uint8", "uint16", "float32"] = "uint8",
 ) -> tuple[NDArray[Any], Truth]: ...
-def _run(name: str, arguments: Sequence[str]) -> int: ...
+def _run(name: str, arguments: Sequence[str]) -> None: ...
 def _keywords() -> list[tuple[str, str]]: ...
 def _target(json: str, family: str | None) -> Target: ...
 def _detection(json: str, targets: Sequence[Target]) -> Detection: ...

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["opencv_points", "plot", "repr_html", "stereo_to_opencv", "to_opencv"]
 
 
-def opencv_points(detection: Detection) -> tuple[Points, Points]:
+def opencv_points(self: Detection) -> tuple[Points, Points]:
     """Corners with labels as OpenCV takes them.
 
     Returns
@@ -30,15 +30,13 @@ def opencv_points(detection: Detection) -> tuple[Points, Points]:
 
     Examples
     --------
-    ``cv2.solvePnP(*detection.to_opencv(), camera.matrix, camera.distortion)``
+    ``cv2.solvePnP(*self.to_opencv(), camera.matrix, camera.distortion)``
     """
     import numpy
 
-    objects = detection.object_points
+    objects = self.object_points
     is_known = ~numpy.isnan(objects).any(axis=1)
-    objects = numpy.ascontiguousarray(objects[is_known], numpy.float32)
-    pixels = numpy.ascontiguousarray(detection.pixels[is_known], numpy.float32)
-    return objects, pixels
+    return objects[is_known].astype(numpy.float32), self.pixels[is_known].astype(numpy.float32)
 
 
 def to_opencv(
@@ -106,7 +104,7 @@ def stereo_to_opencv(
 
 
 def plot(
-    detection: Detection,
+    self: Detection,
     image: Optional[NDArray[Any]] = None,
     ax: Any = None,
     *,
@@ -133,7 +131,7 @@ def plot(
         ax = pyplot.gca()
     if image is not None:
         ax.imshow(image, cmap="gray")
-    for grid in detection.grids:
+    for grid in self.grids:
         pixels = grid.pixels
         label = "no labels" if grid.panel is None else f"panel {grid.panel}"
         ax.plot(pixels[:, 0], pixels[:, 1], "+", label=label)
@@ -141,31 +139,31 @@ def plot(
             for (x, y), number in zip(pixels, grid.ids):
                 if number >= 0:
                     ax.annotate(str(number), (x, y), xytext=(2, 2), textcoords="offset points", fontsize=6)
-    ax.set_xlim(-0.5, detection.width - 0.5)
-    ax.set_ylim(detection.height - 0.5, -0.5)
+    ax.set_xlim(-0.5, self.width - 0.5)
+    ax.set_ylim(self.height - 0.5, -0.5)
     ax.set_aspect("equal")
-    ax.set_title(detection.image)
-    if detection.grids:
+    ax.set_title(self.image)
+    if self.grids:
         ax.legend(loc="lower right", fontsize="small")
-    elif detection.why is not None:
-        ax.text(0.5, 0.5, detection.why.sentence, transform=ax.transAxes, ha="center", wrap=True)
+    elif self.why is not None:
+        ax.text(0.5, 0.5, self.why.sentence, transform=ax.transAxes, ha="center", wrap=True)
     return ax
 
 
 _COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f")
 
 
-def repr_html(detection: Detection) -> str:
+def repr_html(self: Detection) -> str:
     """A small picture of the corners for notebooks."""
-    width, height = max(detection.width, 1), max(detection.height, 1)
+    width, height = max(self.width, 1), max(self.height, 1)
     radius = max(width, height) / 320
     dots: list[str] = []
-    for index, grid in enumerate(detection.grids):
+    for index, grid in enumerate(self.grids):
         colour = _COLOURS[index % len(_COLOURS)]
         dots += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{colour}"/>' for x, y in grid.pixels]
-    why = "".join(f"<br>{html.escape(reason.sentence)}" for reason in detection.reasons)
+    why = "".join(f"<br>{html.escape(reason.sentence)}" for reason in self.reasons)
     return (
-        f"<div><code>{html.escape(repr(detection))}</code>{why}<br>"
+        f"<div><code>{html.escape(repr(self))}</code>{why}<br>"
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="320" '
         f'style="background:#f4f4f4;border:1px solid #ccc">{"".join(dots)}</svg></div>'
     )

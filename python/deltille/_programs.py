@@ -1,6 +1,5 @@
 """The programs ``deltille`` and ``deltag``: entry points that hand over to the compiled part."""
 
-import os
 import sys
 
 from ._core import _run
@@ -19,6 +18,4 @@ def deltag() -> None:
 
 
 def _leave(name: str) -> None:
-    code = _run(name, [name, *sys.argv[1:]])
-    # Nothing of Python is left to be tidied up, and what was printed is flushed.
-    os._exit(code)
+    _run(name, [name, *sys.argv[1:]])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
+from collections.abc import Sized
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Optional, Union
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
-    from typing_extensions import TypeAlias
+    from typing import TypeAlias
 
     Picture: TypeAlias = Union[str, "os.PathLike[str]", NDArray[Any]]
     Result: TypeAlias = Union[Detection, "Failure"]
@@ -85,7 +86,7 @@ def detect_many(
     count = workers if workers is not None else (os.cpu_count() or 1)
     if count < 1:
         raise ValueError("workers: give 1 or more")
-    total = len(pictures) if hasattr(pictures, "__len__") else None
+    total = len(pictures) if isinstance(pictures, Sized) else None
     seen: list[Picture] = []
 
     def taken() -> Iterator[Picture]:
@@ -140,11 +141,10 @@ def _in_order(
 
 
 def _one(detector: Detector, index: int, picture: Picture, accept_damaged: bool) -> Result:
-    is_path = isinstance(picture, (str, os.PathLike))
-    name = Path(os.fspath(picture)).name if is_path else f"{index:04}"  # type: ignore[arg-type]
+    name = Path(picture).name if isinstance(picture, (str, os.PathLike)) else f"{index:04}"
     try:
-        if is_path:
-            return detector.detect_file(picture, accept_damaged=accept_damaged)  # type: ignore[arg-type]
+        if isinstance(picture, (str, os.PathLike)):
+            return detector.detect_file(picture, accept_damaged=accept_damaged)
         return detector.detect(picture, name=name)
     except Error as error:
         return Failure(name, error)
