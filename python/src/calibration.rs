@@ -651,9 +651,7 @@ impl Calibration {
         slf.as_super().__repr__().replace("CalibratedCamera ", "Calibration ")
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<String>))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Vec<String>)> {
         let solved = slf.as_super().get().solved.clone();
         let restore = slf.py().import("deltille._core")?.getattr("_calibration")?;
         let targets = solved.targets.iter().map(targets::Target::to_json).collect();

@@ -270,7 +270,7 @@ impl Camera {
         )
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String,)> {
         Ok((slf.get_type().getattr("from_yaml")?, (slf.get().to_yaml(),)))
     }
 }

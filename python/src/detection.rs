@@ -416,9 +416,7 @@ impl Detection {
         self.found == other.found
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<Target>))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Vec<Target>)> {
         let restore = slf.py().import("deltille._core")?.getattr("_detection")?;
         let own = slf.get();
         Ok((restore, (own.to_json(), own.targets.clone())))

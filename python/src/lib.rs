@@ -32,6 +32,9 @@ mod verdict;
 
 use pyo3::prelude::*;
 
+/// What pickle restores a value by: a function and its arguments.
+type Reduced<'py, A> = PyResult<(Bound<'py, PyAny>, A)>;
+
 /// The compiled part of the package.
 #[pymodule]
 mod _core {

@@ -158,9 +158,7 @@ impl Pose {
         self.told()
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, ([f64; 3], [f64; 3]))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, ([f64; 3], [f64; 3])> {
         let [turn, _] = slf.get().0.off(&camera::Pose::IDENTITY);
         Ok((slf.get_type().into_any(), (turn.to_array(), slf.get().0.translation.to_array())))
     }

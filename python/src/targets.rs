@@ -362,9 +362,7 @@ impl Target {
         self.target == other.target
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Option<String>))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Option<String>)> {
         let restore = slf.py().import("deltille._core")?.getattr("_target")?;
         let own = slf.get();
         let family = own.family.as_ref().map(|family| family.to_json());

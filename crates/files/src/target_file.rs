@@ -92,7 +92,7 @@ pub enum TargetFamilyError {
         /// The family's name.
         name: String,
         /// Why.
-        error: FamilyFileError,
+        error: Box<FamilyFileError>,
     },
     /// A family with other codes.
     #[error("{target} was made with fingerprint {wanted} of {name}, this one is {found}")]
@@ -127,7 +127,7 @@ pub fn family(target: &Target, given: Option<&str>) -> Result<Option<Family>, Ta
             .map_err(|error| TargetFamilyError::Named {
                 target: target.name.to_string(),
                 name: wanted.name.clone(),
-                error,
+                error: Box::new(error),
             })?,
     };
     if !wanted.fingerprint.is_empty() && family.fingerprint() != wanted.fingerprint {
