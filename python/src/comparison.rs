@@ -11,7 +11,8 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 use crate::arrays;
-use crate::calibration::{CalibratedCamera, Rig};
+use crate::calibrated_camera::CalibratedCamera;
+use crate::calibration::Rig;
 use crate::camera::Camera;
 use crate::detection::{Detection, Targets};
 use crate::errors::{self, Raise, raised, unlocked};

@@ -4,16 +4,20 @@
 //! |---|---|
 //! | `errors`, `interrupt` | exceptions in the words of Python; long work that Ctrl-C ends |
 //! | `image`, `arrays` | arrays to pictures and points, and back |
-//! | `targets`, `boards`, `verdict` | targets, their making and their files |
+//! | `targets`, `boards`, `solids`, `verdict` | targets, their making and their files |
 //! | `families` | codes of tags |
 //! | `detector`, `detection` | pictures to corners |
 //! | `camera`, `pose` | cameras and rigid motions |
-//! | `solving`, `calibration`, `comparison` | corners to cameras and rigs |
+//! | `calibrate`, `solving` | corners to cameras and rigs: keywords, and the work |
+//! | `calibration`, `calibrated_camera`, `views` | what came of it |
+//! | `comparison` | whether two calibrations differ; where a target is |
 //! | `rendering` | synthetic pictures |
 //! | `programs` | the programs `deltille` and `deltag` |
 
 mod arrays;
 mod boards;
+mod calibrate;
+mod calibrated_camera;
 mod calibration;
 mod camera;
 mod comparison;
@@ -26,9 +30,11 @@ mod interrupt;
 mod pose;
 mod programs;
 mod rendering;
+mod solids;
 mod solving;
 mod targets;
 mod verdict;
+mod views;
 
 use pyo3::prelude::*;
 
@@ -41,11 +47,13 @@ mod _core {
     use super::*;
 
     #[pymodule_export]
-    use super::boards::{Board, Checkerboard, Icosahedron, Octahedron, Solid, Tetrahedron};
+    use super::boards::{Board, Checkerboard};
     #[pymodule_export]
-    use super::calibration::{
-        _calibration, CalibratedCamera, Calibration, Diagnosis, Excluded, Rig, View, calibrate, rig,
-    };
+    use super::calibrate::{calibrate, rig};
+    #[pymodule_export]
+    use super::calibrated_camera::CalibratedCamera;
+    #[pymodule_export]
+    use super::calibration::{_calibration, Calibration, Rig};
     #[pymodule_export]
     use super::camera::Camera;
     #[pymodule_export]
@@ -65,9 +73,13 @@ mod _core {
     #[pymodule_export]
     use super::rendering::{Truth, render};
     #[pymodule_export]
+    use super::solids::{Icosahedron, Octahedron, Solid, Tetrahedron};
+    #[pymodule_export]
     use super::targets::{_target, Tag, Target};
     #[pymodule_export]
     use super::verdict::Verdict;
+    #[pymodule_export]
+    use super::views::{Diagnosis, Excluded, View};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
