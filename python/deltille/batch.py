@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from typing import TypeAlias
 
-    Picture: TypeAlias = Union[str, "os.PathLike[str]", NDArray[Any]]
+    Picture: TypeAlias = Union[str, "os.PathLike[str]", bytes, NDArray[Any]]
     Result: TypeAlias = Union[Detection, "Failure"]
 
 __all__ = ["Failure", "detect_many"]
@@ -62,8 +62,8 @@ def detect_many(
 
     Parameters
     ----------
-    pictures : iterable of path-like or ndarray
-        Photographs, or pictures as of :meth:`Detector.detect`.
+    pictures : iterable of path-like, bytes or ndarray
+        Photographs, contents of their files, or pictures as of :meth:`Detector.detect`.
     target : Target, sequence of Target, or Detector
         What is looked for.
     workers : int, optional
@@ -145,6 +145,8 @@ def _one(detector: Detector, index: int, picture: Picture, accept_damaged: bool)
     try:
         if isinstance(picture, (str, os.PathLike)):
             return detector.detect_file(picture, accept_damaged=accept_damaged)
+        if isinstance(picture, bytes):
+            return detector.detect_bytes(picture, name=name, accept_damaged=accept_damaged)
         return detector.detect(picture, name=name)
     except Error as error:
         return Failure(name, error)

@@ -1,6 +1,6 @@
 //! Finding targets in pictures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use deltille::detect::{self, DetectorConfig, Ink, Refinement, Tone};
@@ -9,6 +9,7 @@ use deltille::limits::Limits;
 use deltille::photograph;
 use deltille::targets::SIDES;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::detection::{Detection, Targets};
 use crate::errors::{self, Raise, raised, unlocked};
@@ -57,6 +58,21 @@ pub struct Detector {
     targets: Vec<Target>,
     limits: Limits,
     is_ink_open: bool,
+    asked: Arc<Asked>,
+}
+
+/// The keywords by which a detector was made, to make it again elsewhere.
+#[derive(Clone, Default)]
+struct Asked {
+    grid: Option<String>,
+    rows: Option<u32>,
+    cols: Option<u32>,
+    tone: Option<String>,
+    ink: Option<String>,
+    allow_mirrored: bool,
+    max_errors: Option<u32>,
+    refine: String,
+    max_pixels: u64,
 }
 
 /// A name or a number.
@@ -116,8 +132,19 @@ impl Detector {
         max_pixels: u64,
     ) -> PyResult<Self> {
         let wrong = |what: String| raised::DetectionError::new_err(what);
-        let tone = tone.map_or(Ok(Tone::Auto), |tone| tone.text().parse());
-        let ink = ink.map_or(Ok(Ink::Auto), |ink| ink.text().parse());
+        let asked = Asked {
+            grid: grid.map(str::to_owned),
+            rows,
+            cols,
+            tone: tone.map(NameOrNumber::text),
+            ink: ink.map(NameOrNumber::text),
+            allow_mirrored,
+            max_errors,
+            refine: refine.to_owned(),
+            max_pixels,
+        };
+        let tone = asked.tone.as_ref().map_or(Ok(Tone::Auto), |tone| tone.parse());
+        let ink = asked.ink.as_ref().map_or(Ok(Ink::Auto), |ink| ink.parse());
         let ink = ink.map_err(|error| wrong(format!("ink: {error}")))?;
         let config = DetectorConfig::default()
             .max_bit_errors(max_errors)
@@ -168,7 +195,8 @@ impl Detector {
                 detect::Detector::for_targets(&each, config).raise(errors::detection)?
             }
         };
-        Ok(Self { detector: Arc::new(detector), targets, limits, is_ink_open })
+        let asked = Arc::new(asked);
+        Ok(Self { detector: Arc::new(detector), targets, limits, is_ink_open, asked })
     }
 
     /// Finds what is looked for in a picture.
@@ -238,6 +266,44 @@ impl Detector {
         Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
     }
 
+    /// Finds what is looked for in a photograph whose file somebody else has read, decoded as :meth:`detect_file` does.
+    ///
+    /// Parameters
+    /// ----------
+    /// data : bytes
+    ///     Content of a PNG, JPEG, TIFF, BMP, PGM or WebP file.
+    /// name : str, optional
+    ///     Name of the picture, which is noted in the result.
+    /// accept_damaged : bool, optional
+    ///     Whether JPEG files of which a part is missing are read too.
+    ///
+    /// Returns
+    /// -------
+    /// Detection
+    ///
+    /// Raises
+    /// ------
+    /// ImageError
+    ///     Where this is no picture.
+    #[pyo3(signature = (data, *, name = "", accept_damaged = false))]
+    fn detect_bytes(
+        &self,
+        py: Python<'_>,
+        data: Vec<u8>,
+        name: &str,
+        accept_damaged: bool,
+    ) -> PyResult<Detection> {
+        let found = unlocked(py, || {
+            let called = Path::new(if name.is_empty() { "data" } else { name });
+            let read = photograph::read_bytes(called, data, &self.limits, accept_damaged);
+            let photograph = read.raise(errors::image)?;
+            let mut found = self.detector.detect(&photograph.image, name);
+            found.file = photograph.notes;
+            Ok::<_, PyErr>(found)
+        })??;
+        Ok(Detection { found: Arc::new(found), targets: self.targets.clone() })
+    }
+
     /// The same detector for a second look at pictures of one print, with what they say together of the ink.
     ///
     /// Parameters
@@ -260,6 +326,28 @@ impl Detector {
         self.targets.clone()
     }
 
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> crate::Reduced<'py, (Vec<Target>, Bound<'py, PyDict>, Option<String>)> {
+        let (py, own) = (slf.py(), slf.get());
+        let restore = py.import("deltille._core")?.getattr("_detector")?;
+        let asked = PyDict::new(py);
+        let Asked { grid, rows, cols, tone, ink, allow_mirrored, max_errors, refine, max_pixels } =
+            &*own.asked;
+        asked.set_item("grid", grid)?;
+        asked.set_item("rows", rows)?;
+        asked.set_item("cols", cols)?;
+        asked.set_item("tone", tone)?;
+        asked.set_item("ink", ink)?;
+        asked.set_item("allow_mirrored", allow_mirrored)?;
+        asked.set_item("max_errors", max_errors)?;
+        asked.set_item("refine", refine)?;
+        asked.set_item("max_pixels", max_pixels)?;
+        let known = own.detector.known_ink();
+        let known = known.map(|ink| serde_json::to_string(&ink).unwrap_or_default());
+        Ok((restore, (own.targets.clone(), asked, known)))
+    }
+
     fn __repr__(&self) -> String {
         let names: Vec<&str> = self.targets.iter().map(|of| &*of.target.name).collect();
         format!(
@@ -267,4 +355,23 @@ impl Detector {
             if names.is_empty() { "of untagged boards".into() } else { names.join(", ") }
         )
     }
+}
+
+/// A detector that was pickled.
+#[pyfunction]
+pub fn _detector<'py>(
+    py: Python<'py>,
+    targets: Vec<Bound<'py, Target>>,
+    asked: &Bound<'py, PyDict>,
+    ink: Option<&str>,
+) -> PyResult<Detector> {
+    let class = py.get_type::<Detector>();
+    let made = match targets.is_empty() {
+        true => class.call((), Some(asked))?,
+        false => class.call((targets,), Some(asked))?,
+    };
+    let made = made.cast::<Detector>()?.get().clone();
+    let Some(ink) = ink else { return Ok(made) };
+    let ink = serde_json::from_str(ink).raise(errors::detection)?;
+    Ok(Detector { detector: Arc::new((*made.detector).clone().with_ink(ink)), ..made })
 }

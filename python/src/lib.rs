@@ -61,7 +61,7 @@ mod _core {
     #[pymodule_export]
     use super::detection::{_detection, DecodedTag, Detection, Grid, Reason};
     #[pymodule_export]
-    use super::detector::Detector;
+    use super::detector::{_detector, Detector};
     #[pymodule_export]
     use super::errors::_keywords;
     #[pymodule_export]

@@ -27,6 +27,9 @@ def test_corners_are_those_of_the_program_bit_by_bit(program, root, tmp_path, na
     assert len(found) == rows * cols and found.error is None
     assert found.to_json() == text
     assert deltille.Detection.load(tmp_path / f"{photograph.stem}.json") == found
+    assert detector.detect_bytes(photograph.read_bytes(), name=name) == found
+    with pytest.raises(deltille.ImageError, match="cut.png"):
+        detector.detect_bytes(photograph.read_bytes()[:5000], name="cut.png")
     # The same from an array that another program decoded.
     cv2 = pytest.importorskip("cv2")
     array = cv2.imread(str(photograph), cv2.IMREAD_UNCHANGED)

@@ -22,6 +22,23 @@ def test_a_detector_serves_several_threads(board, pictures, detections):
         assert (one.pixels == other.pixels).all()
 
 
+def test_a_detector_goes_to_other_processes(board, pictures, detections):
+    import pickle
+
+    for detector in (deltille.Detector(board, tone="linear"), deltille.Detector(grid="checker", rows=4, cols=5)):
+        again = pickle.loads(pickle.dumps(detector))
+        for picture in pictures[:2]:
+            assert again.detect(picture) == detector.detect(picture)
+    detector = deltille.Detector(board)
+    inked = detector.with_ink_of([deltille.Detection.from_json(WITH_INK), deltille.Detection.from_json(WITH_INK)])
+    assert inked is not None
+    assert pickle.loads(pickle.dumps(inked)).detect(pictures[0]) == inked.detect(pictures[0])
+
+
+WITH_INK = """{"schema": "deltille/detection/1", "image": "a", "width": 9, "height": 9, "grids": [], "tone": null,
+    "ink": {"edges": 0.01, "edges_deviation": 0.0001, "um": 200, "um_deviation": 2, "used": true, "pictures": 1}}"""
+
+
 def test_others_run_meanwhile(board):
     picture = numpy.random.default_rng(1).integers(0, 255, (3000, 4000), numpy.uint8)
     detector, ticks, ended = deltille.Detector(board), [], threading.Event()

@@ -171,7 +171,21 @@ pub fn read_with_notes(
     limits: &Limits,
     accept_damaged: bool,
 ) -> Result<Photograph, ImageError> {
-    let (image, notes) = decoded(path, limits, accept_damaged)?;
+    let (image, notes) = decoded(path, None, limits, accept_damaged)?;
+    Ok(Photograph { image: from_dynamic(image), notes })
+}
+
+/// The same of the bytes of a file, as somebody else has read them; `name` is what errors call it.
+///
+/// # Errors
+/// When the bytes are not a picture, exceed the limits, or are damaged and that is not accepted.
+pub fn read_bytes(
+    name: &Path,
+    bytes: Vec<u8>,
+    limits: &Limits,
+    accept_damaged: bool,
+) -> Result<Photograph, ImageError> {
+    let (image, notes) = decoded(name, Some(bytes), limits, accept_damaged)?;
     Ok(Photograph { image: from_dynamic(image), notes })
 }
 
@@ -180,18 +194,23 @@ pub fn read_with_notes(
 /// # Errors
 /// When the file cannot be read, is not a picture, is damaged, or exceeds the limits.
 pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageError> {
-    Ok(decoded(path, limits, false)?.0)
+    Ok(decoded(path, None, limits, false)?.0)
 }
 
+/// Decodes a file, or the bytes of one that were read already.
 fn decoded(
     path: &Path,
+    bytes: Option<Vec<u8>>,
     limits: &Limits,
     accept_damaged: bool,
 ) -> Result<(DynamicImage, FileNotes), ImageError> {
     let broken = |source| ImageError::Broken { path: path.to_owned(), source };
     limits::caught(|| {
         let decode = |source| ImageError::Decode { path: path.to_owned(), source };
-        let file = ImageFile::open(path, limits)?;
+        let file = match bytes {
+            Some(bytes) => ImageFile::of_bytes(path, bytes, limits)?,
+            None => ImageFile::open(path, limits)?,
+        };
         file.check_pages()?;
         let mut decoder = file.decoder(limits)?;
         let orientation = decoder.orientation().map_or(1, Orientation::to_exif);
@@ -257,13 +276,19 @@ impl<'a> ImageFile<'a> {
             }
         }
         let length = if metadata.is_file() { metadata.len() } else { bytes.len() as u64 };
-        if format == Some(ImageFormat::WebP)
-            && riff_bytes(&bytes).is_none_or(|whole| length < whole)
-        {
-            let source = DecodingError::new(ImageFormat::WebP.into(), "it is cut off");
-            return Err(ImageError::Decode { path: path.to_owned(), source: Decoding(source) });
-        }
+        check_webp(path, format, &bytes, length)?;
         Ok(Self { path, bytes: is_whole.then_some(bytes), length, format })
+    }
+
+    /// A file that was read already.
+    fn of_bytes(path: &'a Path, bytes: Vec<u8>, limits: &Limits) -> Result<Self, ImageError> {
+        let (most, length) = (limits.picture_bytes(), bytes.len() as u64);
+        if length > most {
+            return Err(ImageError::Memory { path: path.to_owned(), bytes: most });
+        }
+        let format = image::guess_format(&bytes).ok();
+        check_webp(path, format, &bytes, length)?;
+        Ok(Self { path, bytes: Some(bytes), length, format })
     }
 
     fn source(&self) -> Result<Box<dyn Source + '_>, ImageError> {
@@ -334,6 +359,20 @@ impl<'a> ImageFile<'a> {
         let image = RgbImage::from_raw(width as u32, height as u32, pixels);
         Ok(image.filter(|_| as_seen).map(DynamicImage::ImageRgb8))
     }
+}
+
+/// Refuses a WebP that is shorter than its head says.
+fn check_webp(
+    path: &Path,
+    format: Option<ImageFormat>,
+    head: &[u8],
+    length: u64,
+) -> Result<(), ImageError> {
+    if format == Some(ImageFormat::WebP) && riff_bytes(head).is_none_or(|whole| length < whole) {
+        let source = DecodingError::new(ImageFormat::WebP.into(), "it is cut off");
+        return Err(ImageError::Decode { path: path.to_owned(), source: Decoding(source) });
+    }
+    Ok(())
 }
 
 fn jpeg_decoder(bytes: &[u8], strict: bool) -> JpegDecoder<ZCursor<&[u8]>> {

@@ -313,6 +313,11 @@ impl Detector {
         Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), other, ..self }
     }
 
+    /// What is known of the ink from other pictures, see [`Self::with_ink`].
+    pub fn known_ink(&self) -> Option<InkEstimate> {
+        self.ink
+    }
+
     /// The same detector for a second look at pictures of one print, with what they say together of the ink: pictures
     /// that say little of it are seen with what all say. `None` where a second look would find nothing else.
     pub fn with_ink_of(&self, found: &[Option<InkEstimate>]) -> Option<Self> {
