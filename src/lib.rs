@@ -36,7 +36,7 @@ pub use deltille_core::{
 #[cfg(feature = "report")]
 pub use deltille_files::report;
 #[cfg(feature = "files")]
-pub use deltille_files::{clock, export, limits};
+pub use deltille_files::{SheetUseError, camera_file, clock, export, limits, target_file};
 #[cfg(feature = "photographs")]
 pub use deltille_files::{photograph, remap};
 #[cfg(feature = "verify")]

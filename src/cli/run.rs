@@ -1,5 +1,6 @@
 //! From a command's result to an exit code and one line on standard error.
 
+use std::ffi::OsString;
 use std::io;
 use std::process::ExitCode;
 
@@ -25,15 +26,28 @@ pub struct Interrupted(pub String);
 
 /// Parses the arguments and runs a program; errors become one line on standard error.
 pub fn run<A: Parser>(program: impl FnOnce(A) -> anyhow::Result<ExitCode>) -> ExitCode {
+    run_with(std::env::args_os().collect(), program)
+}
+
+/// The number of an exit code, for whoever ends the process in another way than by returning from `main`.
+pub fn number(code: ExitCode) -> u8 {
+    (0..=u8::MAX).find(|&number| ExitCode::from(number) == code).unwrap_or(BAD_INPUT)
+}
+
+/// The same with given arguments, of which the first is the name of the program.
+pub fn run_with<A: Parser>(
+    arguments: Vec<OsString>,
+    program: impl FnOnce(A) -> anyhow::Result<ExitCode>,
+) -> ExitCode {
     interrupt::listen();
     let mut command = A::command();
-    let arguments = command.try_get_matches_from_mut(std::env::args_os()).and_then(|matches| {
+    let parsed = command.try_get_matches_from_mut(&arguments).and_then(|matches| {
         wording::runs(&command, &matches);
         A::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
     });
-    let result = match arguments {
-        Ok(arguments) => program(arguments),
-        Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error))),
+    let result = match parsed {
+        Ok(parsed) => program(parsed),
+        Err(error) if error.use_stderr() => Err(anyhow::anyhow!(one_line(&error, &arguments))),
         Err(help_or_version) => {
             // Nothing is left to say when the reader of the help text has gone away.
             match help_or_version.print() {
@@ -86,9 +100,9 @@ fn shortened(line: &str) -> String {
 }
 
 /// The first paragraph of a message of clap, and its tip, on one line.
-fn one_line(error: &clap::Error) -> String {
+fn one_line(error: &clap::Error, arguments: &[OsString]) -> String {
     if error.kind() == ErrorKind::InvalidUtf8 {
-        let arguments = (1..).zip(std::env::args_os().skip(1));
+        let arguments = (1..).zip(arguments.iter().skip(1));
         let wrong: Vec<String> = arguments
             .filter(|(_, argument)| argument.to_str().is_none())
             .map(|(i, argument)| format!("{i} (`{}`)", argument.to_string_lossy()))

@@ -6,10 +6,13 @@
 //! | [`clock`] | the monotonic clock of the machine |
 //! | [`limits`] | bounds on the size of files that are read; panics and endless work of third-party readers |
 //! | [`family_file`] | families by name or from their files |
+//! | [`target_file`] | targets from their files, with the families that they name |
+//! | [`camera_file`] | cameras from their files |
 //! | [`photograph`] | photographs in common formats as grey images |
 //! | [`export`] | artwork, targets and results to files and back, one module for each format |
 //! | [`report`] | a calibration as an HTML page |
 
+pub mod camera_file;
 pub mod clock;
 pub mod export;
 pub mod family_file;
@@ -20,3 +23,7 @@ pub mod photograph;
 pub mod remap;
 #[cfg(feature = "report")]
 pub mod report;
+mod sheet;
+pub mod target_file;
+
+pub use sheet::SheetUseError;

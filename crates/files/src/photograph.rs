@@ -132,6 +132,14 @@ pub enum ImageError {
     },
 }
 
+/// Grey values of `rgb`, as photographs of colour have them; `None` where there are not three bytes for each pixel.
+pub fn grey_of_colours(width: u32, height: u32, rgb: Vec<u8>) -> Option<Gray<u8>> {
+    match from_dynamic(DynamicImage::ImageRgb8(RgbImage::from_raw(width, height, rgb)?)) {
+        AnyGray::U8(grey) => Some(grey),
+        AnyGray::U16(_) => None,
+    }
+}
+
 /// Reads a PNG, JPEG, TIFF, BMP, PGM/PPM or WebP file as a grey image in sensor orientation. Colour
 /// becomes luma (Rec. 709 weights), transparency is ignored, and a depth beyond 8 bits is kept as
 /// 16 bits.
@@ -163,24 +171,21 @@ pub fn read_with_notes(
     limits: &Limits,
     accept_damaged: bool,
 ) -> Result<Photograph, ImageError> {
-    let open = || ImageFile::open(path, limits);
-    let (image, notes) = decoded(path, open, limits, accept_damaged)?;
+    let (image, notes) = decoded(path, None, limits, accept_damaged)?;
     Ok(Photograph { image: from_dynamic(image), notes })
 }
 
-/// Reads a photograph from the bytes of its file, as [`read_with_notes`] does; errors call it `name`.
+/// The same of the bytes of a file, as somebody else has read them; `name` is what errors call it.
 ///
 /// # Errors
-/// When the bytes are no picture, exceed the limits, or are damaged and that is not accepted.
-pub fn decode_with_notes(
+/// When the bytes are not a picture, exceed the limits, or are damaged and that is not accepted.
+pub fn read_bytes(
+    name: &Path,
     bytes: Vec<u8>,
-    name: &str,
     limits: &Limits,
     accept_damaged: bool,
 ) -> Result<Photograph, ImageError> {
-    let path = Path::new(name);
-    let open = || ImageFile::of(path, bytes, limits);
-    let (image, notes) = decoded(path, open, limits, accept_damaged)?;
+    let (image, notes) = decoded(name, Some(bytes), limits, accept_damaged)?;
     Ok(Photograph { image: from_dynamic(image), notes })
 }
 
@@ -189,19 +194,23 @@ pub fn decode_with_notes(
 /// # Errors
 /// When the file cannot be read, is not a picture, is damaged, or exceeds the limits.
 pub fn read_colours(path: &Path, limits: &Limits) -> Result<DynamicImage, ImageError> {
-    Ok(decoded(path, || ImageFile::open(path, limits), limits, false)?.0)
+    Ok(decoded(path, None, limits, false)?.0)
 }
 
-fn decoded<'a>(
+/// Decodes a file, or the bytes of one that were read already.
+fn decoded(
     path: &Path,
-    open: impl FnOnce() -> Result<ImageFile<'a>, ImageError>,
+    bytes: Option<Vec<u8>>,
     limits: &Limits,
     accept_damaged: bool,
 ) -> Result<(DynamicImage, FileNotes), ImageError> {
     let broken = |source| ImageError::Broken { path: path.to_owned(), source };
     limits::caught(|| {
         let decode = |source| ImageError::Decode { path: path.to_owned(), source };
-        let file = open()?;
+        let file = match bytes {
+            Some(bytes) => ImageFile::of_bytes(path, bytes, limits)?,
+            None => ImageFile::open(path, limits)?,
+        };
         file.check_pages()?;
         let mut decoder = file.decoder(limits)?;
         let orientation = decoder.orientation().map_or(1, Orientation::to_exif);
@@ -227,20 +236,6 @@ pub fn pixels(path: &Path, limits: &Limits) -> Option<u64> {
         || Some(ImageFile::open(path, limits).ok()?.decoder(limits).ok()?.dimensions());
     let (width, height) = limits::caught(dimensions).ok()??;
     Some(u64::from(width) * u64::from(height))
-}
-
-/// Refuses a WebP that has fewer bytes than it says; of other formats decoders notice.
-fn check_length(
-    path: &Path,
-    format: Option<ImageFormat>,
-    head: &[u8],
-    length: u64,
-) -> Result<(), ImageError> {
-    if format == Some(ImageFormat::WebP) && riff_bytes(head).is_none_or(|whole| length < whole) {
-        let source = DecodingError::new(ImageFormat::WebP.into(), "it is cut off");
-        return Err(ImageError::Decode { path: path.to_owned(), source: Decoding(source) });
-    }
-    Ok(())
 }
 
 /// A source from which decoders read.
@@ -281,18 +276,18 @@ impl<'a> ImageFile<'a> {
             }
         }
         let length = if metadata.is_file() { metadata.len() } else { bytes.len() as u64 };
-        check_length(path, format, &bytes, length)?;
+        check_webp(path, format, &bytes, length)?;
         Ok(Self { path, bytes: is_whole.then_some(bytes), length, format })
     }
 
-    /// A file whose bytes are in memory.
-    fn of(path: &'a Path, bytes: Vec<u8>, limits: &Limits) -> Result<Self, ImageError> {
+    /// A file that was read already.
+    fn of_bytes(path: &'a Path, bytes: Vec<u8>, limits: &Limits) -> Result<Self, ImageError> {
         let (most, length) = (limits.picture_bytes(), bytes.len() as u64);
         if length > most {
             return Err(ImageError::Memory { path: path.to_owned(), bytes: most });
         }
         let format = image::guess_format(&bytes).ok();
-        check_length(path, format, &bytes, length)?;
+        check_webp(path, format, &bytes, length)?;
         Ok(Self { path, bytes: Some(bytes), length, format })
     }
 
@@ -364,6 +359,20 @@ impl<'a> ImageFile<'a> {
         let image = RgbImage::from_raw(width as u32, height as u32, pixels);
         Ok(image.filter(|_| as_seen).map(DynamicImage::ImageRgb8))
     }
+}
+
+/// Refuses a WebP that is shorter than its head says.
+fn check_webp(
+    path: &Path,
+    format: Option<ImageFormat>,
+    head: &[u8],
+    length: u64,
+) -> Result<(), ImageError> {
+    if format == Some(ImageFormat::WebP) && riff_bytes(head).is_none_or(|whole| length < whole) {
+        let source = DecodingError::new(ImageFormat::WebP.into(), "it is cut off");
+        return Err(ImageError::Decode { path: path.to_owned(), source: Decoding(source) });
+    }
+    Ok(())
 }
 
 fn jpeg_decoder(bytes: &[u8], strict: bool) -> JpegDecoder<ZCursor<&[u8]>> {

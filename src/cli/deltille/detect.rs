@@ -224,11 +224,11 @@ fn see_again(
     unseen: Vec<(usize, Option<Picture>)>,
     threads: &rayon::ThreadPool,
 ) -> anyhow::Result<Option<Tables>> {
-    let found: Vec<InkEstimate> = seen.iter().filter_map(|seen| seen.ink).collect();
-    let Some(ink) = InkEstimate::of_all(&found).filter(|ink| ink.used) else { return Ok(None) };
+    let found: Vec<Option<InkEstimate>> = seen.iter().map(|seen| seen.ink).collect();
+    let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
+    let Some(ink) = InkEstimate::of_all(&known).filter(|ink| ink.used) else { return Ok(None) };
     let mut tables = None;
-    if seen.len() > 1 {
-        let detector = detector.with_ink(ink);
+    if let Some(detector) = detector.with_ink_of(&found) {
         let bar = progress::bar(seen.len() as u64, "images, with the ink of all");
         let images = seen.iter().map(|seen| Ok(seen.image.clone()));
         tables = args.tables().map(|folder| Tables::begin(folder, targets)).transpose()?;

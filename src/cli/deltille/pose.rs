@@ -9,9 +9,7 @@ use super::images::Images;
 use super::limits::ImageLimits;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
-use crate::calibrate::{
-    Calibration, CalibrationError, Diagnosis, Estimate, Reference, Words, views,
-};
+use crate::calibrate::{Calibration, Diagnosis, Estimate, Reference, Words, views};
 use crate::camera::Camera;
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::FAILED;
@@ -177,23 +175,9 @@ impl Finder {
         sightings::put_on(&self.sheet, Some(target), &mut views)?;
         let panels = sightings::panels(&reference, &self.sheet)?;
         let calibration = Calibration::new(panels).camera("", views, self.camera.clone());
-        let found = match calibration.solve() {
-            Err(error @ CalibrationError::OtherSize { .. }) => return Ok(Err(error.to_string())),
-            found => found.with_context(|| image.display().to_string())?,
-        };
-        let words = Words::new(&found, None);
-        let said = found.inspect();
-        let foreign = said.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
-        if let Some(foreign) = foreign {
-            return Ok(Err(words.sentence(foreign)));
-        }
-        if found.frames.is_empty() {
-            let excluded = found.excluded.first().map(|out| out.reason.to_string());
-            let reason = || seen[0].1.reasons.first().map(|reason| reason.to_string());
-            return Ok(Err(excluded
-                .or_else(reason)
-                .unwrap_or_else(|| "no target in it".to_owned())));
-        }
+        let found = calibration.located(&seen[0].1).with_context(|| image.display().to_string())?;
+        let Ok(found) = found else { return Ok(found) };
+        let (words, said) = (Words::new(&found, None), found.inspect());
         // Where the lens ends is the camera's, and the same for every picture.
         for diagnosis in said.iter().filter(|said| !matches!(said, Diagnosis::LensEnds { .. })) {
             let of_target = self.of_target(target);

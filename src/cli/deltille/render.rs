@@ -153,13 +153,8 @@ impl Args {
             bail!("give --pose, or --eye for where the camera stands");
         };
         let centre = self.look_at.map(DVec3::from).unwrap_or(middle);
-        let sight = (centre - eye).normalize_or_zero();
-        let upright = if sight.cross(DVec3::Z).length() < 1e-6 { DVec3::Y } else { DVec3::Z };
-        let up = self.up.map(DVec3::from).unwrap_or(upright);
-        if sight.cross(up).length() < 1e-9 {
-            bail!("--up: it must not be parallel to the line of sight, nor --eye be --look-at");
-        }
-        Ok(Pose::looking_at(eye, centre, up))
+        let pose = Pose::viewing(eye, centre, self.up.map(DVec3::from));
+        pose.context("--up: it must not be parallel to the line of sight, nor --eye be --look-at")
     }
 }
 

@@ -1,6 +1,5 @@
 //! `deltille rig`.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -17,7 +16,7 @@ use super::page::check_images;
 use super::sightings::SheetArgs;
 use super::{camera_file, sightings, target_file};
 use crate::calibrate::{
-    Calibration, CameraViews, Estimate, Excluded, Intrinsics, PanelPlace, Reference, TargetMap,
+    Calibration, CameraViews, Estimate, Excluded, Intrinsics, Reference, TargetMap,
 };
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{Overwrite, check_folder, fixed, say, tell};
@@ -112,7 +111,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let cameras = cameras.collect::<anyhow::Result<Vec<Intrinsics>>>()?;
     args.check_files(&cameras, &targets)?;
     let page = args.solve.page("rig", args.overwrite)?;
-    let mut calibration = scene(&targets, panels).refine_panels(args.refine_target);
+    let mut calibration = Calibration::of(&reference, panels).refine_panels(args.refine_target);
     let (mut left_out, mut ink, mut seen) = (Vec::new(), Vec::new(), Vec::new());
     for ((name, folder), intrinsics) in args.camera.iter().zip(cameras) {
         let read = sightings::read(std::slice::from_ref(folder), &reference, &limits);
@@ -243,29 +242,6 @@ impl Args {
     }
 }
 
-/// Which other cameras saw the target in the same frames, of each camera.
-fn overlaps(found: &Estimate) -> Vec<Vec<usize>> {
-    let frames = found.cameras.iter().map(|camera| camera.views.iter().map(|view| view.frame));
-    let frames: Vec<BTreeSet<usize>> = frames.map(Iterator::collect).collect();
-    let others = |of: usize| {
-        let others = (0..frames.len()).filter(move |&other| other != of);
-        others.filter(|&other| !frames[of].is_disjoint(&frames[other])).collect()
-    };
-    (0..frames.len()).map(others).collect()
-}
-
-/// A calibration of one target, or of several, with their panels one target after the other.
-fn scene(targets: &[Target], panels: Vec<PanelPlace>) -> Calibration {
-    if targets.len() == 1 {
-        return Calibration::new(panels);
-    }
-    let mut panels = panels.into_iter();
-    let of_target = |target: &Target| {
-        (target.name.to_string(), panels.by_ref().take(target.panels.len()).collect())
-    };
-    Calibration::of_targets(targets.iter().map(of_target).collect::<Vec<_>>())
-}
-
 /// Refuses names of cameras that cannot be names of files, or not of different ones.
 fn check_names(names: &[&str]) -> anyhow::Result<()> {
     for (index, name) in names.iter().enumerate() {
@@ -345,7 +321,7 @@ impl Format {
         let placed: Vec<(&Camera, Pose)> = cameras.iter().map(|(_, c, pose)| (*c, *pose)).collect();
         Ok(match self {
             Self::Kalibr => {
-                vec![text_file("camchain.yaml".to_owned(), kalibr(&placed, &overlaps(found))?)]
+                vec![text_file("camchain.yaml".to_owned(), kalibr(&placed, &found.overlaps())?)]
             }
             Self::Colmap => vec![
                 text_file("cameras.txt".to_owned(), colmap(&alone)?),

@@ -17,12 +17,8 @@ use crate::limits;
 use crate::reading::in_words;
 use crate::targets::{
     BORDER_BITS, BoardSpec, DEFAULT_MARGIN_MM, MOST_ROWS, PaperSpec, SIDES, TagSpec, TagsIn,
-    largest_edge_mm, parse_length_mm,
+    parse_length_mm, usual_edge_mm,
 };
-
-/// Edge where neither an edge nor a paper is given, mm: that of the published board, which fits
-/// A4 with 10 × 11 corners.
-const DEFAULT_EDGE_MM: f64 = 20.0;
 
 /// Resolution of PNG files, dots per inch.
 pub const DEFAULT_DPI: u32 = 300;
@@ -270,7 +266,7 @@ impl Settings {
             grid,
             rows,
             cols,
-            edge_mm: DEFAULT_EDGE_MM,
+            edge_mm: 0.0,
             boards: self.boards.unwrap_or(1),
             board_id: self.board_id.unwrap_or(0),
             tags,
@@ -278,11 +274,7 @@ impl Settings {
         };
         spec.edge_mm = match length("edge", &self.edge)? {
             Some(mm) => mm,
-            None if paper.size.is_some() => {
-                // Where nothing fits, making the board says so.
-                largest_edge_mm(&spec, &paper).unwrap_or(DEFAULT_EDGE_MM)
-            }
-            None => DEFAULT_EDGE_MM,
+            None => usual_edge_mm(&spec, &paper),
         };
         if self.dsc_dialect.is_some() && !self.dsc {
             bail!("--dsc-dialect: there is no .dsc to write: add --dsc");

@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
 
 use super::limits::FileLimits;
 use super::{tables, target_file};
+use crate::SheetUseError;
 use crate::calibrate::{Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views};
 use crate::cli::output::tell;
 use crate::cli::values::whole;
@@ -17,7 +18,7 @@ use crate::export::detection;
 use crate::lattice::GridKind;
 use crate::limits::{Limits, ReadError};
 use crate::quantity::{edge_mm, print_scale};
-use crate::targets::{SIDES, Target, TargetSpec, parse_length_mm};
+use crate::targets::{SIDES, Target, parse_length_mm};
 use crate::words::counted;
 
 /// Detections and what they show.
@@ -186,90 +187,31 @@ pub fn take_sure(views: &mut Vec<View>, reference: &Reference) -> anyhow::Result
 const NOT_WHOLE: &str =
     "a board without tags is measured where it is seen whole: its corners have no ids";
 
-/// Where the panels of what was photographed are, on a solid as large as its net was printed.
+/// Where the panels of what was photographed are, see [`Sheet::panels`].
 pub fn panels(reference: &Reference, sheet: &Sheet) -> anyhow::Result<Vec<PanelPlace>> {
-    let scale = match reference {
-        Reference::Target(target) => solid_scale(sheet, target)?,
-        Reference::Scene(_) => {
-            ensure!(sheet.print_scale.is_none(), "--print-scale: it is that of one target");
-            ensure!(sheet.shape.is_none(), "--shape: it is that of one board");
-            ensure!(
-                !reference.is_loose(),
-                "--target: boards of one file that lie about have no place in a scene: make a file for each"
-            );
-            1.0
-        }
-        Reference::Grid(_) => 1.0,
-    };
-    let mut panels = reference.panels();
-    panels.iter_mut().for_each(|panel| panel.target_from_panel.translation *= scale);
-    Ok(panels)
+    sheet.panels(reference).map_err(told)
 }
 
-/// How much larger than planned a solid is whose net was printed like this; 1 for a board.
-fn solid_scale(sheet: &Sheet, target: &Target) -> anyhow::Result<f64> {
-    let Some([across, up]) = sheet.print_scale.filter(|_| is_solid(target)) else {
-        return Ok(1.0);
-    };
-    if across != up {
-        bail!(
-            "--print-scale: faces that are stretched in one direction do not close to the solid that \
-             was planned: give one number for both, or find their places by `rig --refine-target`"
-        );
-    }
-    let with_skeleton = matches!(&target.spec, TargetSpec::Solid(spec) if spec.skeleton.is_some());
-    let mut sheets = target.sheets.iter();
-    if with_skeleton || (target.sheets.len() > 1 && sheets.all(|s| s.placements.len() == 1)) {
-        bail!(
-            "--print-scale: faces that are printed one by one keep their places on the solid: those \
-             are found by `rig --refine-target`"
-        );
-    }
-    Ok(across)
-}
-
-/// Whether panels are fixed to each other in space.
-fn is_solid(target: &Target) -> bool {
-    match target.spec {
-        TargetSpec::Solid(_) => true,
-        TargetSpec::Listed(_) => target.panels.len() > 1,
-        TargetSpec::Board(_) | TargetSpec::Tags(_) => false,
-    }
-}
-
-/// Moves the corners of all views to where their sheet has them.
+/// Moves the corners of all views to where their sheet has them, see [`Sheet::put_on`].
 pub fn put_on(sheet: &Sheet, target: Option<&Target>, views: &mut [View]) -> anyhow::Result<()> {
-    if let Some(target) = target {
-        solid_scale(sheet, target)?;
-        let given = sheet.print_scale.map(|_| "--print-scale").or(sheet.shape.map(|_| "--shape"));
-        if let Some(option) = given.filter(|_| target.is_measured()) {
-            bail!(
-                "{option}: {} says where its corners were measured, as they were printed",
-                target.name
-            );
-        }
-    }
-    if sheet.shape.is_some() && target.is_some_and(|target| target.panels.len() > 1) {
-        bail!("--shape: it is that of one board, and the target has several panels");
-    }
-    for sighting in views.iter_mut().flat_map(|view| &mut view.sightings) {
-        if let Some(scale) = sheet.print_scale {
-            let angle_rad =
-                target.map_or(0.0, |target| angle_on_sheet(target, sighting.panel.id()));
-            sighting.stretch(scale, angle_rad);
-        }
-        // The shape was found on corners that the scale had moved.
-        if let Some(shape) = &sheet.shape {
-            sighting.bend(shape);
-        }
-    }
-    Ok(())
+    sheet.put_on(target, views).map_err(told)
 }
 
-/// How the panel of an id is turned on its sheet, rad; 0 where no sheet is described.
-fn angle_on_sheet(target: &Target, id: u32) -> f64 {
-    let mut placements = target.sheets.iter().flat_map(|sheet| &sheet.placements);
-    placements.find(|placement| placement.panel == id).map_or(0.0, |placement| placement.angle_rad)
+/// What is wrong with a sheet, in words of the command line.
+fn told(error: SheetUseError) -> anyhow::Error {
+    let text = match error {
+        SheetUseError::Loose => {
+            "--target: boards of one file that lie about have no place in a scene: make a file for each"
+                .to_owned()
+        }
+        _ => error.to_string(),
+    };
+    let named = [
+        ("`Print::scale`", "--print-scale"),
+        ("`Sighting::bend`", "--shape"),
+        ("`Calibration::refine_panels`", "`rig --refine-target`"),
+    ];
+    anyhow!(named.into_iter().fold(text, |text, (setting, option)| text.replace(setting, option)))
 }
 
 /// What detections show.

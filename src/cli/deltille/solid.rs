@@ -11,9 +11,10 @@ use super::settings::DEFAULT_DPI;
 use crate::artwork;
 use crate::cli::output::say;
 use crate::cli::values::{number, whole};
+use crate::export::artifacts::{self, Making, What};
 use crate::export::dsc::{self, Dialect};
 use crate::export::mesh::TexturedMesh;
-use crate::export::{dxf, gltf, obj, stl};
+use crate::export::{gltf, obj};
 use crate::family::{self, Family};
 use crate::quantity::unit_mm;
 use crate::targets::{
@@ -289,23 +290,15 @@ impl Args {
             files.push(text_file(format!("{name}.dsc"), text));
         }
         let (printed, with_gltf) = (self.printed(), self.with_gltf());
-        if self.stl {
-            let bytes = stl::to_bytes(name, &spec.polyhedron().triangles_mm());
-            files.push(bytes_file(format!("{name}.stl"), bytes));
-        }
-        if let Some(skeleton) = &spec.skeleton {
-            let skeleton = Skeleton::new(&spec.polyhedron(), skeleton)?;
-            spec.panel_inset_mm()?;
-            let bytes = stl::to_bytes(name, &skeleton.triangles_mm);
-            files.push(bytes_file(stl::skeleton_name(name), bytes));
-        }
-        if self.dxf {
-            let text = dxf::text(&artwork::panels_to_cut(target)?);
-            files.push(text_file(format!("{name}-panels.dxf"), text));
-        }
-        if net {
-            let text = dxf::text(&artwork::net_to_cut(target)?);
-            files.push(text_file(format!("{name}-net.dxf"), text));
+        let asked = [
+            (self.stl, What::Stl),
+            (spec.skeleton.is_some(), What::Skeleton),
+            (self.dxf, What::Panels),
+            (net, What::Net),
+        ];
+        for (_, what) in asked.into_iter().filter(|(is_asked, _)| *is_asked) {
+            let made = artifacts::make(target, Some(family), what, Making::default())?;
+            files.extend(made.into_iter().map(|(name, bytes)| bytes_file(name, bytes)));
         }
         if with_gltf || self.obj {
             let mesh = TexturedMesh::new(target, Some(family), self.texture_dpi);

@@ -4,27 +4,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
-use crate::cli::output;
 use crate::detect::check_distinct;
-use crate::export::dsc;
 use crate::family::{self, Family};
 use crate::limits::Limits;
-use crate::targets::{Target, TargetSpec};
+use crate::target_file::{self, TargetFamilyError};
+use crate::targets::Target;
 
 /// Reads a target: `.dsc` by its extension, JSON otherwise.
 pub fn read(path: &Path, limits: &Limits) -> anyhow::Result<Target> {
-    let show = || path.display().to_string();
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    if ["pdf", "svg", "png", "glb", "obj", "stl", "dxf", "mtl"].contains(&extension.as_str()) {
-        bail!("{}: a .{extension} describes no target: give the .json written with it", show());
-    }
-    output::settle(output::folder_of(path))?;
-    let text = limits.read_text(path)?;
-    if extension == "dsc" {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        return dsc::read(&text, &stem).with_context(show);
-    }
-    Target::from_json(&text).with_context(show)
+    Ok(target_file::read(path, limits)?)
 }
 
 /// The targets of several files, which can be told apart.
@@ -54,36 +42,12 @@ pub fn families(targets: &[Target], given: Option<&str>) -> anyhow::Result<Vec<O
     targets.iter().map(own).collect()
 }
 
-/// The family of a target: the file given, else by the name in the target, else by the path in its
-/// spec. Its codes must be those that the target was made with.
+/// The family of a target, see [`target_file::family`].
 pub fn family(target: &Target, given: Option<&str>) -> anyhow::Result<Option<Family>> {
-    let Some(wanted) = &target.family else {
-        if given.is_some() {
-            bail!("--family: {} has no tags", target.name);
+    target_file::family(target, given).map_err(|error| match error {
+        TargetFamilyError::Named { .. } => {
+            anyhow!(error).context("give the family's file with --family")
         }
-        return Ok(None);
-    };
-    let in_spec = match &target.spec {
-        TargetSpec::Board(board) => board.tags.as_ref().map(|tags| tags.family.as_str()),
-        TargetSpec::Solid(solid) => Some(solid.tags.family.as_str()),
-        TargetSpec::Tags(tags) => Some(tags.family.as_str()),
-        TargetSpec::Listed(_) => None,
-    };
-    let family = match given {
-        Some(given) => family::resolve(given).context("--family")?,
-        None => family::resolve(&wanted.name)
-            .or_else(|error| in_spec.map_or(Err(error), family::resolve))
-            .with_context(|| format!("{} carries tags of {}", target.name, wanted.name))
-            .context("give the family's file with --family")?,
-    };
-    if !wanted.fingerprint.is_empty() && family.fingerprint() != wanted.fingerprint {
-        return Err(anyhow!(
-            "--family: {} was made with fingerprint {} of {}, this one is {}",
-            target.name,
-            wanted.fingerprint,
-            wanted.name,
-            family.fingerprint()
-        ));
-    }
-    Ok(Some(family))
+        _ => anyhow!(error).context("--family"),
+    })
 }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::error::CalibrationError;
 use super::estimate::Estimate;
@@ -9,10 +11,11 @@ use super::loss::Loss;
 use super::model::Model;
 use super::panel::PanelRef;
 use super::start::in_order;
-use super::view::{Sighting, View};
+use super::stop::Stop;
+use super::view::{Reference, Sighting, View};
 use super::weights::Weights;
 use crate::camera::{Camera, Pose};
-use crate::targets::PanelPose;
+use crate::targets::{PanelPose, Target};
 
 /// Cameras that are fixed to each other, their views of one rigid target or of several that are fixed to each
 /// other, and what of these is known.
@@ -51,6 +54,8 @@ pub struct Calibration {
     pub(super) order: Vec<String>,
     /// By how many frames each camera is late, where that is known.
     pub(super) delays: Option<Vec<i32>>,
+    /// Whether the work is to end.
+    pub(super) stop: Stop,
 }
 
 /// A target of the scene: panels that move together.
@@ -190,7 +195,21 @@ impl Calibration {
             start: None,
             order: Vec::new(),
             delays: None,
+            stop: Stop::default(),
         }
+    }
+
+    /// A calibration of what was photographed, with panels at these places: one target, or several with their panels one
+    /// target after the other.
+    pub fn of(reference: &Reference, panels: Vec<PanelPlace>) -> Self {
+        let ([_, _, ..], targets) = (reference.targets(), reference.targets()) else {
+            return Self::new(panels);
+        };
+        let mut panels = panels.into_iter();
+        let of_target = |target: &Target| {
+            (target.name.to_string(), panels.by_ref().take(target.panels.len()).collect())
+        };
+        Self::of_targets(targets.iter().map(of_target).collect::<Vec<_>>())
     }
 
     /// Adds a camera: of an unknown lens of a [`Model`], or a known [`Camera`] that is kept.
@@ -257,6 +276,13 @@ impl Calibration {
         Self { distances_mm, ..self }
     }
 
+    /// With a flag that ends the work soon after it is raised: [`Self::solve`] returns
+    /// [`CalibrationError::Stopped`] then.
+    #[must_use]
+    pub fn stopped_by(self, flag: Arc<AtomicBool>) -> Self {
+        Self { stop: Stop::by(flag), ..self }
+    }
+
     /// The cameras and their views.
     pub fn cameras(&self) -> &[CameraViews] {
         &self.cameras
@@ -286,8 +312,8 @@ impl Calibration {
     pub(super) fn of_cameras(&self, cameras: Vec<CameraViews>) -> Self {
         let (panels, targets) = (self.panels.clone(), self.targets.clone());
         let (distances_mm, order) = (self.distances_mm.clone(), self.order.clone());
-        let delays = self.delays.clone();
-        Self { panels, targets, cameras, distances_mm, order, delays, ..*self }
+        let (delays, stop) = (self.delays.clone(), self.stop.clone());
+        Self { panels, targets, cameras, distances_mm, order, delays, stop, ..*self }
     }
 
     /// One of its cameras by itself, with panels at these places. What it saw of each target is a view of its own.
@@ -308,6 +334,7 @@ impl Calibration {
             distances_mm: Vec::new(),
             order: Vec::new(),
             delays: None,
+            stop: self.stop.clone(),
             ..*self
         }
     }
@@ -402,6 +429,7 @@ impl Calibration {
             panels,
             targets: targets.collect(),
             cameras: cameras.collect(),
+            stop: self.stop.clone(),
             refine_panels: false,
             board_shape: false,
             measure_target: false,

@@ -206,6 +206,9 @@ pub enum CalibrationError {
          the one that was photographed"
     )]
     NoStart,
+    /// Somebody has ended it, see [`Calibration::stopped_by`](super::Calibration::stopped_by).
+    #[error("interrupted before it was solved")]
+    Stopped,
     /// The views leave parameters open.
     #[error(
         "the views do not determine {parameters}: tilt the board more, fill the corners of the \

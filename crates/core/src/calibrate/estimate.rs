@@ -233,6 +233,18 @@ impl Estimate {
         Self { panels, map, targets, ..Self::default() }
     }
 
+    /// Which other cameras saw the target in the same frames, of each camera.
+    pub fn overlaps(&self) -> Vec<Vec<usize>> {
+        let frames = self.cameras.iter();
+        let frames = frames.map(|camera| camera.views.iter().map(|view| view.frame).collect());
+        let frames: Vec<BTreeSet<usize>> = frames.collect();
+        let others = |of: usize| {
+            let others = (0..frames.len()).filter(move |&other| other != of);
+            others.filter(|&other| !frames[of].is_disjoint(&frames[other])).collect()
+        };
+        (0..frames.len()).map(others).collect()
+    }
+
     /// Whether panels were to be found.
     pub fn has_refined_panels(&self) -> bool {
         self.panels.iter().any(|panel| panel.covariance.is_some())

@@ -44,7 +44,7 @@ pub(super) struct Minimum {
 }
 
 /// Walks from the problem's values to the next minimum of the cost (Levenberg–Marquardt); `None`
-/// where a corner is out of its camera's reach at the start.
+/// where a corner is out of its camera's reach at the start, or the work is to end.
 pub(super) fn minimise(
     problem: Problem,
     whitening: &Whitening,
@@ -57,6 +57,9 @@ pub(super) fn minimise(
     let mut damping = DAMPING;
     let coordinates = 2.0 * best.problem.count() as f64;
     while best.steps < MOST_STEPS && damping < MOST_DAMPING {
+        if best.problem.stop.is_raised() {
+            return None;
+        }
         let Some(step) = best.normal.step(&best.layout, damping) else {
             damping *= STIFFEN;
             continue;

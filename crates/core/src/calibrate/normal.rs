@@ -926,9 +926,8 @@ mod tests {
             frames: frames.collect(),
             targets,
             panels: panels.collect(),
-            blocks: Vec::new(),
             shape,
-            map: None,
+            ..Problem::default()
         };
         for frame in 0..moments {
             for (camera, panel) in (0..count).flat_map(|c| (0..count).map(move |p| (c, p))) {

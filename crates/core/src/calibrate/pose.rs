@@ -165,8 +165,7 @@ fn refine(
         targets: vec![TargetUnknowns::SCENE],
         panels: fixed(panels),
         blocks: blocks(sightings, 0).collect(),
-        shape: None,
-        map: None,
+        ..Problem::default()
     };
     let first: Option<Vec<_>> =
         problem.blocks.iter().map(|block| problem.residuals(block)).collect();

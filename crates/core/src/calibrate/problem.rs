@@ -6,6 +6,7 @@ use super::model::without_gauge;
 use super::panel::PanelRef;
 use super::roughness::Roughness;
 use super::shape::Shape;
+use super::stop::Stop;
 use super::view::LEAST_CORNERS;
 use crate::camera::{Camera, Pose};
 
@@ -119,6 +120,8 @@ pub(super) struct Problem {
     pub shape: Option<Shape>,
     /// How the corners differ from their plan, each by itself, where that is unknown.
     pub map: Option<CornerMap>,
+    /// Whether the work is to end.
+    pub stop: Stop,
 }
 
 impl CameraUnknowns {
@@ -263,8 +266,9 @@ impl Problem {
     fn unknowns(&self) -> Problem {
         let Problem { cameras, frames, targets, panels, shape, map, .. } = self;
         let (cameras, frames, panels) = (cameras.clone(), frames.clone(), panels.clone());
-        let (targets, map) = (targets.clone(), map.clone());
-        Problem { cameras, frames, targets, panels, blocks: Vec::new(), shape: *shape, map }
+        let (targets, map, stop) = (targets.clone(), map.clone(), self.stop.clone());
+        let (blocks, shape) = (Vec::new(), *shape);
+        Problem { cameras, frames, targets, panels, blocks, shape, map, stop }
     }
 }
 

@@ -50,6 +50,11 @@ impl Calibration {
     /// # Errors
     /// Where views are too few, too much alike, of different sizes, or do not belong together.
     pub fn solve(&self) -> Result<Estimate, CalibrationError> {
+        let found = self.solved();
+        if self.stop.is_raised() { Err(CalibrationError::Stopped) } else { found }
+    }
+
+    fn solved(&self) -> Result<Estimate, CalibrationError> {
         let (own, test) = self.split()?;
         let estimate = own.adjusted().map_err(|error| match own.foreign_cameras().as_slice() {
             [] => error,
@@ -71,6 +76,9 @@ impl Calibration {
         if self.board_shape && self.panels.len() > 1 {
             return Err(CalibrationError::ShapeOfMany { panels: self.panels.len() });
         }
+        if self.stop.is_raised() {
+            return Err(CalibrationError::Stopped);
+        }
         let mut findings = Vec::new();
         let cameras = self.cameras.iter().enumerate().map(|(index, camera)| {
             let (views, beyond) = within_pictures(&camera.views, index);
@@ -78,7 +86,8 @@ impl Calibration {
             CameraViews { views, ..camera.clone() }
         });
         let own = self.of_cameras(cameras.collect());
-        let Start { problem, frames, mut excluded, delays } = Start::of(&own)?;
+        let Start { mut problem, frames, mut excluded, delays } = Start::of(&own)?;
+        problem.stop = self.stop.clone();
         let gross = Gross::of(problem).ok_or(CalibrationError::NoStart)?;
         own.check_frames(&gross)?;
         let prepare = |kept: &mut Kept| panels::hold(kept, &own);

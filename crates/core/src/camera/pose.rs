@@ -53,6 +53,16 @@ impl Pose {
         [turn.to_scaled_axis(), self.translation - other.translation]
     }
 
+    /// [`Self::looking_at`] with what is usually up: z, or y where the camera looks along z. `None` where `up` is
+    /// parallel to the line of sight, or there is none.
+    pub fn viewing(eye: DVec3, centre: DVec3, up: Option<DVec3>) -> Option<Self> {
+        let sight = (centre - eye).normalize_or_zero();
+        let upright = if sight.cross(DVec3::Z).length() < 1e-6 { DVec3::Y } else { DVec3::Z };
+        let up = up.unwrap_or(upright);
+        let is_clear = sight.cross(up).length() >= 1e-9;
+        is_clear.then(|| Self::looking_at(eye, centre, up))
+    }
+
     /// The camera_from_target pose of a camera that stands at `eye`, looks at `centre`, and has
     /// `up` upwards in its image; `up` must not be parallel to the line of sight.
     pub fn looking_at(eye: DVec3, centre: DVec3, up: DVec3) -> Self {

@@ -313,6 +313,19 @@ impl Detector {
         Self { refiner: self.refiner.with_ink(Some(ink.edges)), ink: Some(ink), other, ..self }
     }
 
+    /// What is known of the ink from other pictures, see [`Self::with_ink`].
+    pub fn known_ink(&self) -> Option<InkEstimate> {
+        self.ink
+    }
+
+    /// The same detector for a second look at pictures of one print, with what they say together of the ink: pictures
+    /// that say little of it are seen with what all say. `None` where a second look would find nothing else.
+    pub fn with_ink_of(&self, found: &[Option<InkEstimate>]) -> Option<Self> {
+        let known: Vec<InkEstimate> = found.iter().copied().flatten().collect();
+        let ink = InkEstimate::of_all(&known).filter(|ink| ink.used && found.len() > 1)?;
+        Some(self.clone().with_ink(ink))
+    }
+
     /// Finds the grids in one image and labels their corners; `name` is only noted in the result.
     ///
     /// An image without a grid is no error: [`Detection::reasons`] says why there is none.

@@ -135,6 +135,14 @@ fn range(ids: &[u32]) -> Option<[u32; 2]> {
     Some([*ids.iter().min()?, *ids.iter().max()?])
 }
 
+/// The edge of a board's tiles where none is asked for, mm: that of the published board, which fits A4 with 10 × 11 corners;
+/// on a certain paper the largest in whole millimetres that fits. Where nothing fits, making the board says so.
+pub fn usual_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> f64 {
+    const USUAL_MM: f64 = 20.0;
+    let fitting = paper.size.as_ref().and_then(|_| largest_edge_mm(spec, paper));
+    fitting.unwrap_or(USUAL_MM)
+}
+
 /// The largest edge in whole millimetres with which a board fits on paper, if one of 5 mm does.
 pub fn largest_edge_mm(spec: &BoardSpec, paper: &PaperSpec) -> Option<f64> {
     // A metre fits next to nothing, and the refusal proposes an edge that does.

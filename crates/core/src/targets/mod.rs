@@ -34,7 +34,7 @@ pub use crate::Name;
 use crate::lattice::GridKind;
 use crate::quantity;
 pub use board::{board_vertices, zigzag_vertices};
-pub use build::largest_edge_mm;
+pub use build::{largest_edge_mm, usual_edge_mm};
 pub use closed_mesh::is_coordinate;
 pub use closed_mesh::{ClosedMesh, ClosedMeshError, NEAR_EQUILATERAL};
 pub use error::TargetError;

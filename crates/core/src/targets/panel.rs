@@ -41,6 +41,19 @@ impl Panel {
         self.kind.position(vertex.row.into(), vertex.col.into()) * self.edge_mm
     }
 
+    /// Where a corner is in the target frame, mm: where it was measured, else as planned.
+    pub fn place_mm(&self, corner: &Corner) -> DVec3 {
+        corner.target_mm + self.pose.matrix() * corner.offset_mm()
+    }
+
+    /// The middle of a tag in the target frame, mm.
+    pub fn tag_centre_mm(&self, tag: &TagPlacement) -> DVec3 {
+        let vertices = self.tag_tile(tag).vertices();
+        let count = vertices.clone().count() as f64;
+        let sum: DVec2 = vertices.map(|vertex| self.lattice_mm(vertex)).sum();
+        self.pose.target_from_panel(sum / count)
+    }
+
     /// The tile of a tag.
     pub fn tag_tile(&self, tag: &TagPlacement) -> Tile {
         self.kind.tag_tile(Vertex::new(tag.row, tag.col))

@@ -84,30 +84,43 @@ fn refuse<T>(
 /// # Errors
 /// When OpenCV has no such lens model.
 pub fn opencv(camera: &Camera) -> Result<String, FormatError> {
-    let parameters = camera.lens.parameters();
-    let (model, coefficients) = match Shared::of(camera, &parameters) {
-        Shared::Perspective(k, needed) => {
-            let count = [4, 5, 8, 12].into_iter().find(|&count| count >= needed).unwrap_or(12);
-            ("pinhole", &k[..count])
-        }
-        Shared::Equidistant(k) => ("fisheye", k),
-        Shared::Other => {
-            return refuse(
-                camera,
-                "opencv",
-                "radtan, radtan5, rational, thin-prism, kannala-brandt",
-            );
-        }
-    };
-    let model = if model == "fisheye" { "distortion_model: fisheye\n" } else { "" };
+    let Coefficients { is_fisheye, values } = opencv_coefficients(camera)?;
+    let model = if is_fisheye { "distortion_model: fisheye\n" } else { "" };
     Ok(format!(
         "%YAML:1.0\n---\n# {GENERATOR}\nimage_width: {}\nimage_height: {}\ncamera_matrix: {}{model}\
          distortion_coefficients: {}",
         camera.width,
         camera.height,
         opencv_matrix(3, 3, &matrix(camera)),
-        opencv_matrix(1, coefficients.len(), coefficients),
+        opencv_matrix(1, values.len(), &values),
     ))
+}
+
+/// The coefficients of distortion by which OpenCV knows a lens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coefficients {
+    /// Whether they are those of the module `fisheye`: k1 k2 k3 k4.
+    pub is_fisheye: bool,
+    /// 4, 5, 8 or 12 of k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, as many as are needed, or those of a fisheye.
+    pub values: Vec<f64>,
+}
+
+/// The coefficients of a camera for OpenCV.
+///
+/// # Errors
+/// When OpenCV has no such lens model.
+pub fn opencv_coefficients(camera: &Camera) -> Result<Coefficients, FormatError> {
+    let parameters = camera.lens.parameters();
+    match Shared::of(camera, &parameters) {
+        Shared::Perspective(k, needed) => {
+            let count = [4, 5, 8, 12].into_iter().find(|&count| count >= needed).unwrap_or(12);
+            Ok(Coefficients { is_fisheye: false, values: k[..count].to_vec() })
+        }
+        Shared::Equidistant(k) => Ok(Coefficients { is_fisheye: true, values: k.to_vec() }),
+        Shared::Other => {
+            refuse(camera, "opencv", "radtan, radtan5, rational, thin-prism, kannala-brandt")
+        }
+    }
 }
 
 fn opencv_matrix(rows: usize, cols: usize, data: &[f64]) -> String {

@@ -5,6 +5,8 @@
 //! sets of files together (see [`staging`]); [`kind`] recognises what an existing file is before it
 //! is replaced.
 
+#[cfg(all(feature = "meshes", feature = "print"))]
+pub mod artifacts;
 pub mod atomic;
 pub mod calibration;
 pub mod camera;

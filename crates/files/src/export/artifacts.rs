@@ -1,0 +1,286 @@
+//! All that is made of a target, in memory, and sets of files written all or none.
+//!
+//! ```
+//! use deltille_core::targets::{BoardSpec, Target};
+//! use deltille_files::export::artifacts::{Making, What, make};
+//!
+//! let board = Target::new("desk", BoardSpec::deltille(4, 5, 20.0))?;
+//! let files = make(&board, board.family()?.as_ref(), What::Svg, Making::default())?;
+//! assert_eq!(files[0].0, "desk.svg");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use super::dsc::{self, Dialect, DscError};
+use super::kind::Kind;
+use super::mesh::{MeshError, TexturedMesh};
+use super::staging::Staging;
+use super::{atomic, dxf, gltf, obj, pdf, png, sheet_file_name, stl, svg};
+use crate::limits::{Limits, ReadError};
+use deltille_core::artwork::{self, ArtworkError, CuttingError};
+use deltille_core::family::Family;
+use deltille_core::targets::{Skeleton, SolidSpec, Target, TargetError, TargetSpec};
+
+/// Resolution of PNG pages, dots per inch, where none is asked for.
+pub const DEFAULT_DPI: f64 = 300.0;
+
+/// What can be made of a target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum What {
+    /// `<name>.json`, the description.
+    Json,
+    /// `<name>.pdf`.
+    Pdf,
+    /// `<name>.svg`, one for each page.
+    Svg,
+    /// `<name>.png`, one for each page.
+    Png,
+    /// `<name>.dsc`, the list of the reference detector or its fork.
+    Dsc(Dialect),
+    /// `<name>.glb` of a solid.
+    Gltf,
+    /// `<name>.obj` of a solid, with its material and texture.
+    Obj,
+    /// `<name>.stl`, the bare solid.
+    Stl,
+    /// `<name>-skeleton.stl` of a solid that has one.
+    Skeleton,
+    /// `<name>-panels.dxf`, outlines of a solid's panels to cut.
+    Panels,
+    /// `<name>-net.dxf`, the net of a solid to cut and fold.
+    Net,
+}
+
+/// A text that is nothing that can be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, stl, skeleton, panels or net"
+)]
+pub struct WhatError(String);
+
+impl FromStr for What {
+    type Err = WhatError;
+
+    fn from_str(text: &str) -> Result<Self, WhatError> {
+        Ok(match text {
+            "json" => Self::Json,
+            "pdf" => Self::Pdf,
+            "svg" => Self::Svg,
+            "png" => Self::Png,
+            "dsc" | "dsc-fork" => Self::Dsc(Dialect::Fork),
+            "dsc-original" => Self::Dsc(Dialect::Original),
+            "gltf" | "glb" => Self::Gltf,
+            "obj" => Self::Obj,
+            "stl" => Self::Stl,
+            "skeleton" => Self::Skeleton,
+            "panels" => Self::Panels,
+            "net" => Self::Net,
+            _ => return Err(WhatError(text.to_owned())),
+        })
+    }
+}
+
+/// How it is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Making {
+    /// Resolution of PNG pages, dots per inch.
+    pub dpi: f64,
+    /// Resolution of the texture of a mesh, dots per inch; where none is said that which tags need.
+    pub texture_dpi: Option<f64>,
+}
+
+impl Default for Making {
+    fn default() -> Self {
+        Self { dpi: DEFAULT_DPI, texture_dpi: None }
+    }
+}
+
+/// Why something cannot be made of a target.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MakeError {
+    /// It cannot be drawn.
+    #[error(transparent)]
+    Draw(#[from] ArtworkError),
+    /// It was not laid out on paper.
+    #[error("{0} was not laid out on paper: there is no page to draw")]
+    NoSheets(String),
+    /// A page is too large for the format.
+    #[error("a page cannot be drawn: {0}")]
+    Page(io::Error),
+    /// No list can be made of it.
+    #[error(transparent)]
+    Dsc(#[from] DscError),
+    /// No mesh can be made of it.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// It is no solid.
+    #[error("{0} is no solid: only solids are meshes")]
+    NotSolid(String),
+    /// It has no skeleton.
+    #[error("{0} has no skeleton: set `SolidSpec::skeleton`")]
+    NoSkeleton(String),
+    /// Its specification makes none.
+    #[error(transparent)]
+    Target(#[from] TargetError),
+    /// There is nothing to cut.
+    #[error(transparent)]
+    Cutting(#[from] CuttingError),
+}
+
+/// Files in memory, with their names.
+pub type Files = Vec<(String, Vec<u8>)>;
+
+/// The files of one kind that are made of a target.
+///
+/// # Errors
+/// Where the target has none of that kind, or its family is missing.
+pub fn make(
+    target: &Target,
+    family: Option<&Family>,
+    what: What,
+    making: Making,
+) -> Result<Files, MakeError> {
+    let name = &target.name;
+    let named = |end: &str, bytes: Vec<u8>| vec![(format!("{name}{end}"), bytes)];
+    Ok(match what {
+        What::Json => named(".json", target.to_json().into_bytes()),
+        What::Pdf | What::Svg | What::Png => drawn(target, family, what, making)?,
+        What::Dsc(dialect) => named(".dsc", dsc::write(target, dialect)?.into_bytes()),
+        What::Gltf => {
+            let mesh = TexturedMesh::new(target, family, making.texture_dpi)?;
+            named(".glb", gltf::to_bytes(&mesh))
+        }
+        What::Obj => {
+            let mesh = TexturedMesh::new(target, family, making.texture_dpi)?;
+            vec![
+                (format!("{name}.obj"), obj::text(&mesh).into_bytes()),
+                (format!("{name}.mtl"), obj::material(&mesh).into_bytes()),
+                (obj::texture_name(name), mesh.texture_png),
+            ]
+        }
+        What::Stl => {
+            named(".stl", stl::to_bytes(name, &solid(target)?.polyhedron().triangles_mm()))
+        }
+        What::Skeleton => {
+            let spec = solid(target)?;
+            let skeleton = spec.skeleton.as_ref();
+            let skeleton = skeleton.ok_or_else(|| MakeError::NoSkeleton(name.to_string()))?;
+            let skeleton = Skeleton::new(&spec.polyhedron(), skeleton)?;
+            spec.panel_inset_mm()?;
+            vec![(stl::skeleton_name(name), stl::to_bytes(name, &skeleton.triangles_mm))]
+        }
+        What::Panels => {
+            named("-panels.dxf", dxf::text(&artwork::panels_to_cut(target)?).into_bytes())
+        }
+        What::Net => named("-net.dxf", dxf::text(&artwork::net_to_cut(target)?).into_bytes()),
+    })
+}
+
+fn solid(target: &Target) -> Result<&SolidSpec, MakeError> {
+    match &target.spec {
+        TargetSpec::Solid(spec) => Ok(spec),
+        _ => Err(MakeError::NotSolid(target.name.to_string())),
+    }
+}
+
+/// The pages of a target.
+fn drawn(
+    target: &Target,
+    family: Option<&Family>,
+    what: What,
+    making: Making,
+) -> Result<Files, MakeError> {
+    if target.sheets.is_empty() {
+        return Err(MakeError::NoSheets(target.name.to_string()));
+    }
+    let artwork = artwork::draw(target, family)?;
+    let (name, count) = (&target.name, artwork.sheets.len());
+    let pages = 0..count;
+    Ok(match what {
+        What::Svg => pages
+            .map(|page| {
+                let text = svg::to_string(&artwork, page);
+                (sheet_file_name(name, page, count, "svg"), text.into_bytes())
+            })
+            .collect(),
+        What::Png => {
+            let page = |page: usize| {
+                let drawn = png::to_bytes(&artwork.sheets[page], &artwork.title, making.dpi);
+                let drawn = drawn.map_err(MakeError::Page)?;
+                Ok((sheet_file_name(name, page, count, "png"), drawn))
+            };
+            pages.map(page).collect::<Result<_, MakeError>>()?
+        }
+        _ => vec![(format!("{name}.pdf"), pdf::to_bytes(&artwork))],
+    })
+}
+
+/// Why a set of files was not written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SetError {
+    /// The folder cannot be written to.
+    #[error("cannot write to {}: {source}", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] atomic::WriteError),
+    /// What would be replaced cannot be looked at.
+    #[error("cannot read {}, which would be replaced: {source}", path.display())]
+    Unread {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: ReadError,
+    },
+    /// Something else is there.
+    #[error("{} holds {found}, which would be lost: choose another place to write to, or `force` it", path.display())]
+    Taken {
+        /// The file.
+        path: PathBuf,
+        /// What is there.
+        found: String,
+    },
+}
+
+/// Writes files into a folder, all or none, see [`super::staging`], and returns where they are. A file that is there
+/// already is replaced where it is of the same kind, or with `force`.
+///
+/// # Errors
+/// Where something else is there, or nothing can be written.
+pub fn write_set(
+    folder: &Path,
+    files: &[(String, Vec<u8>)],
+    force: bool,
+) -> Result<Vec<PathBuf>, SetError> {
+    let at = |source: io::Error| SetError::Folder { folder: folder.to_owned(), source };
+    for (name, bytes) in files {
+        let path = folder.join(name);
+        if force || !path.is_file() {
+            continue;
+        }
+        let there = Limits::default().read(&path);
+        let there = there.map_err(|source| SetError::Unread { path: path.clone(), source })?;
+        let found = Kind::of(&there);
+        if !there.is_empty() && found != Kind::of(bytes) {
+            return Err(SetError::Taken { path, found: found.to_string() });
+        }
+    }
+    let staging = Staging::new(folder).map_err(at)?;
+    for (name, bytes) in files {
+        atomic::write(&staging.files().join(name), |out| out.write_all(bytes))?;
+    }
+    staging.commit().map_err(at)?;
+    Ok(files.iter().map(|(name, _)| folder.join(name)).collect())
+}

@@ -1,0 +1,142 @@
+//! Targets from files, and the families that they name.
+
+use std::path::{Path, PathBuf};
+
+use deltille_core::family::Family;
+use deltille_core::targets::{Target, TargetFileError};
+
+use crate::export::dsc::{self, DscError};
+use crate::export::staging;
+use crate::family_file::{self, FamilyFileError};
+use crate::limits::{Limits, ReadError};
+
+/// Endings of files that are made of a target and do not describe it.
+const MADE: [&str; 8] = ["pdf", "svg", "png", "glb", "obj", "stl", "dxf", "mtl"];
+
+/// Why a target cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TargetReadError {
+    /// A file that was made of a target.
+    #[error("{}: a .{extension} describes no target: give the .json written with it", path.display())]
+    Made {
+        /// The file.
+        path: PathBuf,
+        /// Its ending.
+        extension: String,
+    },
+    /// What an interrupted run has left cannot be put in order.
+    #[error(transparent)]
+    Settle(std::io::Error),
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file is no `.dsc`.
+    #[error("{}: {error}", path.display())]
+    Dsc {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: DscError,
+    },
+    /// The file is no target.
+    #[error("{}: {error}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: TargetFileError,
+    },
+}
+
+/// Reads a target: `.dsc` by its extension, JSON otherwise. What killed runs have left in its folder is put in order
+/// before.
+///
+/// # Errors
+/// Where the file cannot be read, or describes no target.
+pub fn read(path: &Path, limits: &Limits) -> Result<Target, TargetReadError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let path_of = || path.to_owned();
+    if MADE.contains(&extension.as_str()) {
+        return Err(TargetReadError::Made { path: path_of(), extension });
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    staging::settle(folder.unwrap_or(Path::new("."))).map_err(TargetReadError::Settle)?;
+    let text = limits.read_text(path)?;
+    if extension == "dsc" {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let target = dsc::read(&text, &stem);
+        return target.map_err(|error| TargetReadError::Dsc { path: path_of(), error });
+    }
+    Target::from_json(&text).map_err(|error| TargetReadError::Json { path: path_of(), error })
+}
+
+/// Why the family of a target cannot be had.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TargetFamilyError {
+    /// A family for a target without tags.
+    #[error("{target} has no tags")]
+    NoTags {
+        /// The target's name.
+        target: String,
+    },
+    /// The family that was given cannot be read.
+    #[error(transparent)]
+    Given(FamilyFileError),
+    /// The family that the target names cannot be read.
+    #[error("{target} carries tags of {name}: {error}")]
+    Named {
+        /// The target's name.
+        target: String,
+        /// The family's name.
+        name: String,
+        /// Why.
+        error: Box<FamilyFileError>,
+    },
+    /// A family with other codes.
+    #[error("{target} was made with fingerprint {wanted} of {name}, this one is {found}")]
+    Other {
+        /// The target's name.
+        target: String,
+        /// The family's name.
+        name: String,
+        /// Fingerprint of the family that the target was made with.
+        wanted: String,
+        /// That of the family which is there.
+        found: String,
+    },
+}
+
+/// The family of a target: the one given, else by the name in the target, else by the path in its spec. Its codes must be
+/// those that the target was made with. `None` of a target without tags.
+///
+/// # Errors
+/// Where it cannot be read, or has other codes.
+pub fn family(target: &Target, given: Option<&str>) -> Result<Option<Family>, TargetFamilyError> {
+    let Some(wanted) = &target.family else {
+        return match given {
+            Some(_) => Err(TargetFamilyError::NoTags { target: target.name.to_string() }),
+            None => Ok(None),
+        };
+    };
+    let family = match given {
+        Some(given) => family_file::resolve(given).map_err(TargetFamilyError::Given)?,
+        None => family_file::resolve(&wanted.name)
+            .or_else(|error| target.spec.family().map_or(Err(error), family_file::resolve))
+            .map_err(|error| TargetFamilyError::Named {
+                target: target.name.to_string(),
+                name: wanted.name.clone(),
+                error: Box::new(error),
+            })?,
+    };
+    if !wanted.fingerprint.is_empty() && family.fingerprint() != wanted.fingerprint {
+        return Err(TargetFamilyError::Other {
+            target: target.name.to_string(),
+            name: wanted.name.clone(),
+            wanted: wanted.fingerprint.clone(),
+            found: family.fingerprint().to_owned(),
+        });
+    }
+    Ok(Some(family))
+}

@@ -1,0 +1,125 @@
+"""What a call from Python costs beside the library itself, what threads gain, and what a hundred thousand calls keep.
+
+    python python/benches/overhead.py            # a minute
+    python python/benches/overhead.py --calls 100000
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy
+
+import deltille
+
+
+def resident() -> int:
+    """Memory of the process, bytes; 0 where the system does not tell."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return 0
+
+
+def milliseconds(work, repeats: int) -> float:
+    """The median time of a call."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        times.append(1e3 * (time.perf_counter() - start))
+    return statistics.median(times)
+
+
+def rate(detector, board, camera, workers: int) -> float:
+    """Pictures per second with so many threads; the best of some rounds, as others use the machine too."""
+    pictures = [deltille.render(board, camera, eye=(100, -60 + i, 420), seed=i)[0] for i in range(16)]
+    best = 0.0
+    with ThreadPoolExecutor(workers) as pool:
+        for _ in range(12):
+            start = time.perf_counter()
+            list(pool.map(detector.detect, pictures))
+            best = max(best, len(pictures) / (time.perf_counter() - start))
+    return best
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--calls", type=int, default=2000, help="calls after which memory is compared")
+    parser.add_argument("--repeats", type=int, default=50)
+    parser.add_argument("--workers", type=int, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+
+    board = deltille.Board(10, 11, edge_mm=20)
+    camera = deltille.Camera(1600, 1200, 1500)
+    detector = deltille.Detector(board)
+
+    if arguments.workers:
+        print(rate(detector, board, camera, arguments.workers))
+        return
+
+    # A picture in which nothing is to be found takes the library the least: what else a call takes shows best.
+    blank = numpy.zeros((1200, 1600), numpy.uint8)
+    small = numpy.zeros((1, 1), numpy.uint8)
+    print(f"call with a picture of one pixel: {milliseconds(lambda: detector.detect(small), 2000):.4f} ms")
+    print(f"call with a black picture of 1600 × 1200: {milliseconds(lambda: detector.detect(blank), arguments.repeats):.3f} ms")
+
+    picture, _ = deltille.render(board, camera, eye=(100, -60, 420))
+    of_call = milliseconds(lambda: detector.detect(picture), arguments.repeats)
+    print(f"call with a board in 1600 × 1200: {of_call:.2f} ms")
+    found = detector.detect(picture)
+    arrays = milliseconds(lambda: (found.pixels, found.ids, found.object_points, found.covariances), 200)
+    print(f"its arrays: {arrays:.4f} ms")
+    wide = numpy.zeros((1200, 3200), numpy.uint8)
+    wide[:, :1600] = picture
+    print(f"of a view: {milliseconds(lambda: detector.detect(wide[:, :1600]), arguments.repeats):.2f} ms")
+    turned = numpy.ascontiguousarray(picture.T).T
+    print(f"transposed, copied: {milliseconds(lambda: detector.detect(turned), arguments.repeats):.2f} ms")
+
+    # The library by itself, as its own program measures it.
+    program = shutil.which("deltille", path=sysconfig.get_path("scripts"))
+    with tempfile.TemporaryDirectory() as folder:
+        board.save(folder)
+        path = Path(folder) / "picture.pgm"
+        path.write_bytes(b"P5 1600 1200 255\n" + picture.tobytes())
+        command = [program, "bench", "detect", str(path), "--target", str(Path(folder) / "board.json")]
+        done = subprocess.run(command, capture_output=True, text=True)
+        print("the library by itself:")
+        print(re.sub(r"^", "    ", done.stdout or done.stderr, flags=re.M).rstrip())
+
+    # The library shares out parts of a picture too, on as many threads as are said before it begins; so each number
+    # of threads is a process of its own.
+    rates = {}
+    for workers in (1, 2):
+        command = [sys.executable, __file__, "--workers", str(workers)]
+        environment = {**os.environ, "RAYON_NUM_THREADS": str(workers)}
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+        rates[workers] = float(done.stdout)
+    print(f"1 thread {rates[1]:.1f}, 2 threads {rates[2]:.1f} pictures/s: {rates[2] / rates[1]:.2f} times")
+
+    tiny, _ = deltille.render(board, deltille.Camera(320, 240, 280), eye=(100, -60, 420))
+    for _ in range(200):
+        detector.detect(tiny).pixels  # noqa: B018
+    gc.collect()
+    before = resident()
+    for _ in range(arguments.calls):
+        found = detector.detect(tiny)
+        found.pixels, found.ids, found.object_points, found.covariances, found.tags  # noqa: B018
+    gc.collect()
+    print(f"{arguments.calls} calls: {(resident() - before) / 1e6:+.2f} MB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+"""Deltille calibration targets: made, proved, found, and cameras calibrated with them.
+
+Lengths are millimetres and angles radians; pixel centres are at integer coordinates, y down. The frame of a board is
+right-handed with x right, y up on the print, z towards the viewer; that of a camera has x right, y down, z forward.
+
+>>> import deltille
+>>> board = deltille.Board(10, 11, edge_mm=20)
+>>> board.corners.shape
+(110, 3)
+"""
+
+from ._core import (
+    Board,
+    CalibratedCamera,
+    Calibration,
+    Camera,
+    Checkerboard,
+    Comparison,
+    DecodedTag,
+    Detection,
+    Detector,
+    Diagnosis,
+    Excluded,
+    Family,
+    Grid,
+    Icosahedron,
+    Located,
+    Motion,
+    Octahedron,
+    Pose,
+    Reason,
+    Rig,
+    Solid,
+    Tag,
+    Target,
+    Tetrahedron,
+    Truth,
+    Verdict,
+    View,
+    __version__,
+    calibrate,
+    compare,
+    compare_rigs,
+    pose,
+    render,
+    rig,
+    search_family,
+)
+from ._detections import opencv_points as _opencv_points
+from ._detections import plot as _plot
+from ._detections import repr_html as _repr_html
+from ._detections import stereo_to_opencv, to_opencv
+from .batch import Failure, detect_many
+from .errors import (
+    CalibrationError,
+    CameraError,
+    DetectionError,
+    Error,
+    FamilyError,
+    FileError,
+    ImageError,
+    TargetError,
+    VerifyError,
+)
+
+# What needs other packages, or nothing of the compiled part, is written in Python.
+Detection.to_opencv = _opencv_points  # type: ignore[method-assign]
+Detection.plot = _plot  # type: ignore[method-assign]
+Detection._repr_html_ = _repr_html  # type: ignore[method-assign]
+
+__all__ = [
+    "Board",
+    "CalibratedCamera",
+    "Calibration",
+    "CalibrationError",
+    "Camera",
+    "CameraError",
+    "Checkerboard",
+    "Comparison",
+    "DecodedTag",
+    "Detection",
+    "DetectionError",
+    "Detector",
+    "Diagnosis",
+    "Error",
+    "Excluded",
+    "Failure",
+    "Family",
+    "FamilyError",
+    "FileError",
+    "Grid",
+    "Icosahedron",
+    "ImageError",
+    "Located",
+    "Motion",
+    "Octahedron",
+    "Pose",
+    "Reason",
+    "Rig",
+    "Solid",
+    "Tag",
+    "Target",
+    "TargetError",
+    "Tetrahedron",
+    "Truth",
+    "Verdict",
+    "VerifyError",
+    "View",
+    "__version__",
+    "calibrate",
+    "compare",
+    "compare_rigs",
+    "detect_many",
+    "pose",
+    "render",
+    "rig",
+    "search_family",
+    "stereo_to_opencv",
+    "to_opencv",
+]

@@ -1,0 +1,152 @@
+"""Many pictures at a time, on the threads of one machine."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Sized
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Callable, Optional, Union
+
+from ._core import Detection, Detector, Target
+from .errors import Error
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+    from typing import TypeAlias
+
+    Picture: TypeAlias = Union[str, "os.PathLike[str]", bytes, NDArray[Any]]
+    Result: TypeAlias = Union[Detection, "Failure"]
+
+__all__ = ["Failure", "detect_many"]
+
+
+class Failure:
+    """A picture that could not be read, in the place of its detection.
+
+    Attributes
+    ----------
+    image : str
+        Name of the picture.
+    error : Error
+        Why.
+    """
+
+    def __init__(self, image: str, error: Error) -> None:
+        self.image = image
+        self.error = error
+
+    def __bool__(self) -> bool:
+        return False
+
+    def __len__(self) -> int:
+        return 0
+
+    def __repr__(self) -> str:
+        return f"<Failure {self.image}: {self.error}>"
+
+
+def detect_many(
+    pictures: Iterable[Picture],
+    target: Union[Target, Sequence[Target], Detector],
+    *,
+    workers: Optional[int] = None,
+    progress: Optional[Callable[..., Any]] = None,
+    ink_of_all: bool = True,
+    accept_damaged: bool = False,
+) -> list[Result]:
+    """Find a target in many pictures, several at a time.
+
+    Parameters
+    ----------
+    pictures : iterable of path-like, bytes or ndarray
+        Photographs, contents of their files, or pictures as of :meth:`Detector.detect`.
+    target : Target, sequence of Target, or Detector
+        What is looked for.
+    workers : int, optional
+        Pictures at a time; one for each processor if left out.
+    progress : callable, optional
+        Such as ``tqdm.tqdm``: called with an iterable, and with ``total`` where that is known.
+    ink_of_all : bool, optional
+        Whether all pictures are looked at once more, with what they say together of the ink, as ``deltille detect``
+        does. Arrays are kept for that.
+    accept_damaged : bool, optional
+        Whether JPEG files of which a part is missing are read too.
+
+    Returns
+    -------
+    list of Detection or Failure
+        In the order of the pictures. A picture that cannot be read is a :class:`Failure`, which is false, has no
+        corners, and an attribute ``error``; of a :class:`Detection` the attribute is ``None``.
+    """
+    detector = target if isinstance(target, Detector) else Detector(target)
+    count = workers if workers is not None else (os.cpu_count() or 1)
+    if count < 1:
+        raise ValueError("workers: give 1 or more")
+    total = len(pictures) if isinstance(pictures, Sized) else None
+    seen: list[Picture] = []
+
+    def taken() -> Iterator[Picture]:
+        for picture in pictures:
+            if ink_of_all:
+                seen.append(picture)
+            yield picture
+
+    found = _all(detector, taken(), count, progress, total, accept_damaged)
+    if not ink_of_all:
+        return found
+    good = [index for index, result in enumerate(found) if isinstance(result, Detection)]
+    again = detector.with_ink_of([result for result in found if isinstance(result, Detection)])
+    if again is not None:
+        second = _all(again, (seen[index] for index in good), count, progress, len(good), accept_damaged)
+        for index, result in zip(good, second):
+            if isinstance(result, Detection):
+                found[index] = result
+    return found
+
+
+def _all(
+    detector: Detector,
+    pictures: Iterator[Picture],
+    workers: int,
+    progress: Optional[Callable[..., Any]],
+    total: Optional[int],
+    accept_damaged: bool,
+) -> list[Result]:
+    results = _in_order(detector, pictures, workers, accept_damaged)
+    if progress is None:
+        return list(results)
+    return list(progress(results, total=total) if total is not None else progress(results))
+
+
+def _in_order(
+    detector: Detector, pictures: Iterator[Picture], workers: int, accept_damaged: bool
+) -> Iterator[Result]:
+    """Results in the order of the pictures; few more pictures than workers are in memory."""
+    pool = ThreadPoolExecutor(workers, thread_name_prefix="deltille")
+    waiting: deque[Future[Result]] = deque()
+    try:
+        for index, picture in enumerate(pictures):
+            waiting.append(pool.submit(_one, detector, index, picture, accept_damaged))
+            if len(waiting) >= 2 * workers:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        # What has begun ends; nothing else begins, as after Ctrl-C.
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _one(detector: Detector, index: int, picture: Picture, accept_damaged: bool) -> Result:
+    name = Path(picture).name if isinstance(picture, (str, os.PathLike)) else f"{index:04}"
+    try:
+        if isinstance(picture, (str, os.PathLike)):
+            return detector.detect_file(picture, accept_damaged=accept_damaged)
+        if isinstance(picture, bytes):
+            return detector.detect_bytes(picture, name=name, accept_damaged=accept_damaged)
+        return detector.detect(picture, name=name)
+    except Error as error:
+        return Failure(name, error)

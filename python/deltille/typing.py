@@ -1,0 +1,55 @@
+"""Types in the signatures of this package, for annotations of one's own.
+
+Nothing of it is needed to use the package, which does not import this module.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import Literal, Optional, TypeAlias, TypedDict, Union
+
+import numpy
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[numpy.float64]
+Ints: TypeAlias = NDArray[numpy.int64]
+Words: TypeAlias = NDArray[numpy.uint64]
+Bools: TypeAlias = NDArray[numpy.bool_]
+AnyPath: TypeAlias = Union[str, PathLike[str]]
+Orientation: TypeAlias = Literal["auto", "portrait", "landscape"]
+Tiling: TypeAlias = Literal["deltille", "checker"]
+Source: TypeAlias = Literal["noise", "observed"]
+Loss: TypeAlias = Literal["huber", "cauchy", "none"]
+Weights: TypeAlias = Literal["covariance", "equal"]
+TargetFormat: TypeAlias = Literal[
+    "json",
+    "pdf",
+    "svg",
+    "png",
+    "dsc",
+    "dsc-fork",
+    "dsc-original",
+    "gltf",
+    "glb",
+    "obj",
+    "stl",
+    "skeleton",
+    "panels",
+    "net",
+]
+CameraFormat: TypeAlias = Literal["own", "opencv", "ros", "kalibr", "colmap", "nerfstudio", "mrcal"]
+
+class Candidate(TypedDict):
+    model: str
+    parameters: int
+    held_out_px: Optional[float]
+    is_stable: bool
+    holds: bool
+    chosen: bool
+
+class BoardShape(TypedDict):
+    bent_mm: float
+    stretched_mm: float
+    f_ratio: float
+    is_significant: bool
+

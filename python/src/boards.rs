@@ -1,0 +1,258 @@
+//! Boards from what is asked for.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use deltille::family;
+use deltille::lattice::GridKind;
+use deltille::targets::{
+    self, BoardSpec, DEFAULT_MARGIN_MM, PaperSpec, SolidSheets, TagSpec, TagsIn, TargetSpec,
+    usual_edge_mm,
+};
+use pyo3::prelude::*;
+
+use crate::errors::{self, Raise, raised};
+use crate::families::FamilyChoice;
+use crate::targets::Target;
+
+/// What a target is printed on.
+pub fn paper(
+    size: Option<&str>,
+    orientation: &str,
+    margin_mm: Option<f64>,
+    solids: SolidSheets,
+) -> PyResult<PaperSpec> {
+    Ok(PaperSpec {
+        size: size.map(str::parse).transpose().raise(errors::target)?,
+        orientation: orientation.parse().raise(errors::target)?,
+        margin_mm: margin_mm.unwrap_or(DEFAULT_MARGIN_MM),
+        solids,
+    })
+}
+
+/// A board of a kind.
+struct Wanted {
+    grid: GridKind,
+    size: [u32; 2],
+    edge_mm: Option<f64>,
+    tags: Option<Tags>,
+    boards: u32,
+    board_id: u32,
+    inverted: bool,
+    name: String,
+    paper: PaperSpec,
+}
+
+/// Tags as they are asked for.
+pub struct Tags {
+    pub family: Option<FamilyChoice>,
+    pub tags_in: TagsIn,
+    pub spacing: Option<u32>,
+    pub border_bits: Option<f64>,
+    pub first_id: u32,
+}
+
+impl Tags {
+    /// What a specification says, and the family.
+    pub fn spec(self, usual: TagSpec) -> PyResult<(TagSpec, Arc<family::Family>)> {
+        let usual_family = FamilyChoice::Name(PathBuf::from(&usual.family));
+        let (name, family) = self.family.unwrap_or(usual_family).resolve()?;
+        let spec = TagSpec {
+            family: name,
+            first_id: self.first_id,
+            spacing: self.spacing.unwrap_or(usual.spacing),
+            border_bits: self.border_bits.unwrap_or(usual.border_bits),
+            tags_in: self.tags_in,
+        };
+        Ok((spec, family))
+    }
+}
+
+impl Wanted {
+    fn make(self) -> PyResult<Target> {
+        let usual = |tags: &Tags| match self.grid {
+            GridKind::Deltille => TagSpec::default(),
+            GridKind::Checker => TagSpec::for_squares(tags.tags_in),
+        };
+        let tags = self.tags.map(|tags| {
+            let usual = usual(&tags);
+            tags.spec(usual)
+        });
+        let (tags, family) = tags.transpose()?.unzip();
+        let [rows, cols] = self.size;
+        let mut spec = BoardSpec {
+            boards: self.boards,
+            board_id: self.board_id,
+            tags,
+            inverted: self.inverted,
+            ..BoardSpec::new(self.grid, rows, cols, 1.0)
+        };
+        spec.edge_mm = self.edge_mm.unwrap_or_else(|| usual_edge_mm(&spec, &self.paper));
+        let spec = TargetSpec::Board(spec);
+        let target =
+            targets::Target::build(&self.name, &spec, family.as_deref(), Some(&self.paper));
+        Ok(Target { target: Arc::new(target.raise(errors::target)?), family })
+    }
+}
+
+/// A flat deltille board with tags.
+///
+/// Parameters
+/// ----------
+/// rows, cols : int
+///     Rows of corners, and corners in each row, 2 to 500.
+/// edge_mm : float, optional
+///     Edge of a tile, mm; 20, or with ``paper`` the largest in whole mm that fits it.
+/// family : Family, str or path-like, optional
+///     Family of the tags, see :meth:`Family.shipped`; delTag25h7 if left out.
+/// tags : bool, optional
+///     ``False`` for a board without tags.
+/// tag_spacing : int, optional
+///     A tag in every n-th row and column.
+/// tag_border : float, optional
+///     Black border of a tag, in widths of a bit.
+/// first_id : int, optional
+///     Id of the first tag; the others follow.
+/// boards : int, optional
+///     Number of boards, alike but for their ids, each on a sheet of its own.
+/// board_id : int, optional
+///     Id of the first board.
+/// inverted : bool, optional
+///     Whether black and white are exchanged.
+/// paper : str, optional
+///     ``"A4"``, ``"letter"``, ``"297x420mm"``, …; the smallest of A4 to A0 that takes the board if left out.
+/// orientation : str, optional
+///     ``"auto"``, ``"portrait"`` or ``"landscape"``.
+/// margin_mm : float, optional
+///     Blank along the edges of the paper, mm.
+/// name : str, optional
+///     Stem of the names of its files, printed on the sheet.
+///
+/// Raises
+/// ------
+/// TargetError
+///     Where no such board can be made.
+///
+/// Examples
+/// --------
+/// >>> import deltille
+/// >>> board = deltille.Board(10, 11, edge_mm=20)
+/// >>> board.corners.shape
+/// (110, 3)
+#[pyclass(frozen, extends = Target, module = "deltille")]
+pub struct Board;
+
+#[pymethods]
+impl Board {
+    #[new]
+    #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags = true, tag_spacing = None,
+        tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
+        orientation = "auto", margin_mm = None, name = "board"))]
+    #[expect(clippy::too_many_arguments, reason = "keywords")]
+    fn new(
+        rows: u32,
+        cols: u32,
+        edge_mm: Option<f64>,
+        family: Option<FamilyChoice>,
+        tags: bool,
+        tag_spacing: Option<u32>,
+        tag_border: Option<f64>,
+        first_id: u32,
+        boards: u32,
+        board_id: u32,
+        inverted: bool,
+        paper: Option<&str>,
+        orientation: &str,
+        margin_mm: Option<f64>,
+        name: &str,
+    ) -> PyResult<PyClassInitializer<Self>> {
+        let paper = self::paper(paper, orientation, margin_mm, SolidSheets::default())?;
+        let of_tags = || Tags {
+            family,
+            tags_in: TagsIn::Black,
+            spacing: tag_spacing,
+            border_bits: tag_border,
+            first_id,
+        };
+        let wanted = Wanted {
+            grid: GridKind::Deltille,
+            size: [rows, cols],
+            edge_mm,
+            tags: tags.then(of_tags),
+            boards,
+            board_id,
+            inverted,
+            name: name.to_owned(),
+            paper,
+        };
+        Ok(PyClassInitializer::from(wanted.make()?).add_subclass(Self))
+    }
+}
+
+/// A flat checkerboard, plain or with square tags.
+///
+/// Parameters
+/// ----------
+/// rows, cols : int
+///     Rows of inner corners, and corners in each row, 2 to 500.
+/// edge_mm : float, optional
+///     Edge of a square, mm; 20, or with ``paper`` the largest in whole mm that fits it.
+/// family : Family, str or path-like, optional
+///     ``"aprilTag36h11"``, ``"aprilTag25h9"`` or ``"aprilTag16h5"``; no tags if left out.
+/// tags_in : str, optional
+///     Squares that carry the tags, ``"black"`` or ``"white"``.
+/// tag_spacing, tag_border, first_id, boards, board_id, inverted, paper, orientation, margin_mm, name
+///     As of :class:`Board`.
+#[pyclass(frozen, extends = Target, module = "deltille")]
+pub struct Checkerboard;
+
+#[pymethods]
+impl Checkerboard {
+    #[new]
+    #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags_in = "black", tag_spacing = None,
+        tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
+        orientation = "auto", margin_mm = None, name = "checkerboard"))]
+    #[expect(clippy::too_many_arguments, reason = "keywords")]
+    fn new(
+        rows: u32,
+        cols: u32,
+        edge_mm: Option<f64>,
+        family: Option<FamilyChoice>,
+        tags_in: &str,
+        tag_spacing: Option<u32>,
+        tag_border: Option<f64>,
+        first_id: u32,
+        boards: u32,
+        board_id: u32,
+        inverted: bool,
+        paper: Option<&str>,
+        orientation: &str,
+        margin_mm: Option<f64>,
+        name: &str,
+    ) -> PyResult<PyClassInitializer<Self>> {
+        let tags_in = match tags_in {
+            "black" => TagsIn::Black,
+            "white" => TagsIn::White,
+            _ => return Err(raised::TargetError::new_err("tags_in: give black or white")),
+        };
+        let of_tags = |family| Tags {
+            family: Some(family),
+            tags_in,
+            spacing: tag_spacing,
+            border_bits: tag_border,
+            first_id,
+        };
+        let wanted = Wanted {
+            grid: GridKind::Checker,
+            size: [rows, cols],
+            edge_mm,
+            tags: family.map(of_tags),
+            boards,
+            board_id,
+            inverted,
+            name: name.to_owned(),
+            paper: self::paper(paper, orientation, margin_mm, SolidSheets::default())?,
+        };
+        Ok(PyClassInitializer::from(wanted.make()?).add_subclass(Self))
+    }
+}

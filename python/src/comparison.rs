@@ -1,0 +1,432 @@
+//! Whether two calibrations differ, and where a target is.
+
+use std::sync::Arc;
+
+use deltille::calibrate::{self, CameraEstimate, CameraMotion, Diagnosis, Region, Words, views};
+use deltille::export::{comparison, pose};
+use deltille::glam::DVec2;
+use deltille::{export, targets};
+use export::calibration::Sheet;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use crate::arrays;
+use crate::calibrated_camera::CalibratedCamera;
+use crate::calibration::Rig;
+use crate::camera::Camera;
+use crate::detection::{Detection, Targets};
+use crate::errors::{self, Raise, raised, unlocked};
+use crate::pose::Pose;
+use crate::solving::{PrintScale, Seen};
+
+/// A camera as found, or as given.
+pub enum Compared {
+    Cameras(Vec<CameraEstimate>),
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Compared {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(rig) = given.cast::<Rig>() {
+            return Ok(Self::Cameras(rig.get().solved.estimate.cameras.clone()));
+        }
+        if let Ok(found) = given.cast::<CalibratedCamera>() {
+            return Ok(Self::Cameras(vec![found.get().estimate().clone()]));
+        }
+        let camera = given.cast::<Camera>()?;
+        Ok(Self::Cameras(vec![CameraEstimate::given("", camera.get().0.clone())]))
+    }
+}
+
+/// Where cameras are compared.
+#[derive(FromPyObject)]
+pub enum Part {
+    Name(String),
+    Within([f64; 4]),
+}
+
+impl Part {
+    fn region(self) -> PyResult<Region> {
+        match self {
+            Self::Within([left, top, right, bottom]) if left < right && top < bottom => {
+                Ok(Region::Within(DVec2::new(left, top), DVec2::new(right, bottom)))
+            }
+            Self::Name(name) if name == "seen" => Ok(Region::Seen),
+            Self::Name(name) if name == "image" => Ok(Region::Image),
+            _ => {
+                let what = "region: give seen, image, or four pixels (left, top, right, bottom)";
+                Err(raised::CalibrationError::new_err(what))
+            }
+        }
+    }
+}
+
+/// How two calibrations of a camera differ over its image.
+#[pyclass(frozen, module = "deltille")]
+pub struct Comparison {
+    name: String,
+    found: calibrate::Comparison,
+}
+
+#[pymethods]
+impl Comparison {
+    /// Name of the camera.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Root mean square difference of a coordinate, px.
+    #[getter]
+    fn rms_px(&self) -> f64 {
+        self.found.rms_px
+    }
+
+    /// The same as the uncertainties of both have it, px; ``None`` where they are not known.
+    #[getter]
+    fn expected_px(&self) -> Option<f64> {
+        self.found.expected_px
+    }
+
+    /// The largest difference, px.
+    #[getter]
+    fn largest_px(&self) -> f64 {
+        self.found.largest_px()
+    }
+
+    /// How often chance makes them differ as much where the camera is the same.
+    #[getter]
+    fn chance(&self) -> Option<f64> {
+        self.found.chance
+    }
+
+    /// Whether they differ by more than chance makes; ``None`` where uncertainties are not known.
+    #[getter]
+    fn is_significant(&self) -> Option<bool> {
+        self.found.is_significant()
+    }
+
+    /// What the second camera sees is this motion of what the first one sees.
+    #[getter]
+    fn second_from_first(&self) -> Pose {
+        Pose(self.found.second_from_first)
+    }
+
+    /// Places of the first image that were compared, N × 2, float64, px.
+    #[getter]
+    fn pixels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.found.compared().map(|place| place.pixel.to_array()))
+    }
+
+    /// By how much the second camera differs there, N × 2, float64, px.
+    #[getter]
+    fn differences<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.found.compared().map(|place| place.by.to_array()))
+    }
+
+    /// Standard deviations of a coordinate as the uncertainties of both have them, N, float64, px; NaN where they are
+    /// not known.
+    #[getter]
+    fn sd_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.found.compared().map(|place| place.sd_px.unwrap_or(f64::NAN)))
+    }
+
+    /// The text that ``deltille compare`` writes.
+    fn to_json(&self) -> String {
+        comparison::write(&[&self.name], std::slice::from_ref(&self.found), &[])
+    }
+
+    fn __repr__(&self) -> String {
+        let significant = match self.found.is_significant() {
+            Some(true) => ", more than chance makes",
+            Some(false) => ", no more than chance makes",
+            None => "",
+        };
+        format!("<Comparison: {:.4} px rms{significant}>", self.found.rms_px)
+    }
+}
+
+/// How a camera of a rig is elsewhere than before.
+#[pyclass(frozen, module = "deltille")]
+pub struct Motion(CameraMotion);
+
+#[pymethods]
+impl Motion {
+    /// The camera from which it is seen.
+    #[getter]
+    fn of_frame(&self) -> &str {
+        &self.0.from
+    }
+
+    /// The camera.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.to
+    }
+
+    /// By how much it is turned along its axes, 3, float64, rad.
+    #[getter]
+    fn turn_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.0.turn_rad.to_array())
+    }
+
+    /// By how much it is elsewhere along its axes, 3, float64, mm.
+    #[getter]
+    fn moved_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.0.moved_mm.to_array())
+    }
+
+    /// How often chance makes as large a motion; ``None`` where deviations are not known.
+    #[getter]
+    fn chance(&self) -> Option<f64> {
+        self.0.chance
+    }
+
+    /// Whether it moved by more than the deviations explain; ``None`` where these are not known.
+    #[getter]
+    fn is_significant(&self) -> Option<bool> {
+        self.0.is_significant()
+    }
+}
+
+fn compared(
+    py: Python<'_>,
+    pairs: &[(&CameraEstimate, &CameraEstimate)],
+    distance_mm: Option<f64>,
+    region: Region,
+) -> PyResult<Vec<Comparison>> {
+    let found = unlocked(py, || {
+        let one = |(one, other): &(&CameraEstimate, &CameraEstimate)| {
+            calibrate::Comparison::of(one, other, distance_mm, region)
+        };
+        pairs.iter().map(one).collect::<Result<Vec<_>, _>>()
+    })?;
+    let found = found.raise(errors::calibration)?;
+    let named = pairs.iter().zip(found);
+    Ok(named.map(|((one, _), found)| Comparison { name: one.name.clone(), found }).collect())
+}
+
+/// Says whether two calibrations of a camera differ by more than chance.
+///
+/// Parameters
+/// ----------
+/// first, second : Calibration, CalibratedCamera or Camera
+///     Of a :class:`Camera` no uncertainty is known.
+/// distance_mm : float, optional
+///     How far the points are by which they are compared, mm; infinity if left out.
+/// region : str or (float, float, float, float), optional
+///     ``"seen"``, where both saw corners, ``"image"``, or pixels left, top, right, bottom.
+///
+/// Returns
+/// -------
+/// Comparison
+#[pyfunction]
+#[pyo3(signature = (first, second, *, distance_mm = None, region = None))]
+pub fn compare(
+    py: Python<'_>,
+    first: Compared,
+    second: Compared,
+    distance_mm: Option<f64>,
+    region: Option<Part>,
+) -> PyResult<Comparison> {
+    let region = region.map_or(Ok(Region::Seen), Part::region)?;
+    let (Compared::Cameras(first), Compared::Cameras(second)) = (first, second);
+    let ([one], [other]) = (first.as_slice(), second.as_slice()) else {
+        let what = "rigs are compared by compare_rigs";
+        return Err(raised::CalibrationError::new_err(what));
+    };
+    Ok(compared(py, &[(one, other)], distance_mm, region)?.remove(0))
+}
+
+/// Says whether two calibrations of a rig differ by more than chance: cameras of the same name, and where they are.
+///
+/// Parameters
+/// ----------
+/// first, second : Rig
+/// distance_mm, region
+///     As of :func:`compare`.
+///
+/// Returns
+/// -------
+/// cameras : list of Comparison
+/// motions : list of Motion
+#[pyfunction]
+#[pyo3(signature = (first, second, *, distance_mm = None, region = None))]
+pub fn compare_rigs(
+    py: Python<'_>,
+    first: PyRef<'_, Rig>,
+    second: PyRef<'_, Rig>,
+    distance_mm: Option<f64>,
+    region: Option<Part>,
+) -> PyResult<(Vec<Comparison>, Vec<Motion>)> {
+    let region = region.map_or(Ok(Region::Seen), Part::region)?;
+    let (first, second) = (first.solved.clone(), second.solved.clone());
+    let others = &second.estimate.cameras;
+    let same = |one: &&CameraEstimate| others.iter().any(|other| other.name == one.name);
+    let own = first.estimate.cameras.iter().filter(same);
+    let pairs =
+        own.filter_map(|one| Some((one, others.iter().find(|other| other.name == one.name)?)));
+    let pairs: Vec<_> = pairs.collect();
+    if pairs.is_empty() {
+        let what = "no camera is in both: give two calibrations of the same rig";
+        return Err(raised::CalibrationError::new_err(what));
+    }
+    let found = compared(py, &pairs, distance_mm, region)?;
+    Ok((found, CameraMotion::of_rig(&pairs).into_iter().map(Motion).collect()))
+}
+
+/// Where a target is in a picture of a known camera.
+#[pyclass(frozen, module = "deltille")]
+pub struct Located {
+    estimate: Option<Arc<calibrate::Estimate>>,
+    why: Option<String>,
+    warnings: Vec<String>,
+    image: String,
+    target: String,
+}
+
+impl Located {
+    fn view(&self) -> Option<&calibrate::ViewEstimate> {
+        self.estimate.as_ref()?.cameras.first()?.views.first()
+    }
+}
+
+#[pymethods]
+impl Located {
+    /// Camera from target; ``None`` where it is not known.
+    #[getter]
+    fn pose(&self) -> Option<Pose> {
+        self.view().map(|view| Pose(view.pose))
+    }
+
+    /// Standard deviations of the pose, 6, float64: a rotation (rad) and a translation (mm) about the camera's axes.
+    #[getter]
+    fn pose_sd<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        let frame = self.estimate.as_ref()?.frames.first()?;
+        Some(arrays::column(py, frame.pose_sd))
+    }
+
+    /// Why there is no pose, as a sentence; ``None`` where there is one.
+    #[getter]
+    fn why(&self) -> Option<&str> {
+        self.why.as_deref()
+    }
+
+    /// What else is to be said, in sentences.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    /// Root mean square error of a coordinate, px; NaN without a pose.
+    #[getter]
+    fn rms_px(&self) -> f64 {
+        self.view().map_or(f64::NAN, |view| view.rms_px)
+    }
+
+    /// Residuals of the corners, N × 2, float64, px: detected less predicted position.
+    #[getter]
+    fn residuals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let corners = self.view().into_iter().flat_map(|view| &view.corners);
+        arrays::rows(py, corners.map(|corner| corner.residual.to_array()))
+    }
+
+    /// The line that ``deltille pose`` writes.
+    fn to_json(&self) -> String {
+        let found = self.estimate.as_ref().zip(self.view());
+        match found {
+            Some((estimate, view)) => pose::write_line(estimate, view, &self.target),
+            None => pose::write_none(&self.image, &self.target, self.why.as_deref().unwrap_or("")),
+        }
+    }
+
+    fn __bool__(&self) -> bool {
+        self.estimate.is_some()
+    }
+
+    fn __repr__(&self) -> String {
+        match (self.view(), &self.why) {
+            (Some(view), _) => {
+                format!("<Located {}, rms {:.4} px>", Pose(view.pose).told(), view.rms_px)
+            }
+            (None, why) => format!("<Located nowhere: {}>", why.as_deref().unwrap_or("")),
+        }
+    }
+}
+
+/// Says where a target is in a picture of a known camera.
+///
+/// Parameters
+/// ----------
+/// detection : Detection
+///     What was found in the picture.
+/// camera : Camera
+///     The camera that took it.
+/// target : Target, optional
+///     The target; that of the detection if left out.
+/// print_scale : float or (float, float), optional
+///     Measured over stated length of the check bars, across and up the sheet.
+///
+/// Returns
+/// -------
+/// Located
+///     Where there is no pose, :attr:`Located.why` says why.
+#[pyfunction]
+#[pyo3(name = "pose", signature = (detection, camera, target = None, *, print_scale = None))]
+pub fn pose_of(
+    py: Python<'_>,
+    detection: PyRef<'_, Detection>,
+    camera: PyRef<'_, Camera>,
+    target: Option<Targets>,
+    print_scale: Option<PrintScale>,
+) -> PyResult<Located> {
+    let target = target.or_else(|| Some(Targets(detection.targets.clone())));
+    let seen = Seen::of(target, None, [None, None], None)?;
+    let found = detection.found.clone();
+    let own = camera.0.clone();
+    let sheet = Sheet { print_scale: print_scale.map(PrintScale::both), shape: None };
+    let [target] = seen.targets() else {
+        let what = "several targets were looked for: say which one";
+        return Err(raised::CalibrationError::new_err(what));
+    };
+    let target: &targets::Target = target;
+    unlocked(py, || {
+        let reference = seen.reference();
+        let named = [(found.image.clone(), (*found).clone())];
+        let shown = views(&named, &reference);
+        let (image, name) = (found.image.clone(), target.name.to_string());
+        let nowhere = |why: String| Located {
+            estimate: None,
+            why: Some(why),
+            warnings: Vec::new(),
+            image: image.clone(),
+            target: name.clone(),
+        };
+        let mut views = match shown {
+            Ok(shown) => shown.views,
+            Err(error) => return Ok(nowhere(errors::told(&error))),
+        };
+        sheet.put_on(Some(target), &mut views).raise(errors::calibration)?;
+        let panels = sheet.panels(&reference).raise(errors::calibration)?;
+        let calibration = calibrate::Calibration::new(panels).camera("", views, own);
+        let located = calibration.located(&found).raise(errors::calibration)?;
+        Ok(match located {
+            Err(why) => nowhere(errors::told(&why)),
+            Ok(estimate) => {
+                let words = Words::new(&estimate, None);
+                let is_of_picture = |said: &&Diagnosis| !matches!(said, Diagnosis::LensEnds { .. });
+                let said = estimate.inspect();
+                let said = said.iter().filter(is_of_picture).map(|said| words.sentence(said));
+                let warnings = said.collect();
+                Located {
+                    estimate: Some(Arc::new(estimate)),
+                    why: None,
+                    warnings,
+                    image,
+                    target: name,
+                }
+            }
+        })
+    })?
+}

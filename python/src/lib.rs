@@ -1,0 +1,88 @@
+//! The Python package `deltille`, thin over the library: what arrays become, and what becomes of results.
+//!
+//! | module | its one job |
+//! |---|---|
+//! | `errors`, `interrupt` | exceptions in the words of Python; long work that Ctrl-C ends |
+//! | `image`, `arrays` | arrays to pictures and points, and back |
+//! | `targets`, `boards`, `solids`, `verdict` | targets, their making and their files |
+//! | `families` | codes of tags |
+//! | `detector`, `detection` | pictures to corners |
+//! | `camera`, `pose` | cameras and rigid motions |
+//! | `calibrate`, `solving` | corners to cameras and rigs: keywords, and the work |
+//! | `calibration`, `calibrated_camera`, `views` | what came of it |
+//! | `comparison` | whether two calibrations differ; where a target is |
+//! | `rendering` | synthetic pictures |
+//! | `programs` | the programs `deltille` and `deltag` |
+
+mod arrays;
+mod boards;
+mod calibrate;
+mod calibrated_camera;
+mod calibration;
+mod camera;
+mod comparison;
+mod detection;
+mod detector;
+mod errors;
+mod families;
+mod image;
+mod interrupt;
+mod pose;
+mod programs;
+mod rendering;
+mod solids;
+mod solving;
+mod targets;
+mod verdict;
+mod views;
+
+use pyo3::prelude::*;
+
+/// What pickle restores a value by: a function and its arguments.
+type Reduced<'py, A> = PyResult<(Bound<'py, PyAny>, A)>;
+
+/// The compiled part of the package.
+#[pymodule]
+mod _core {
+    use super::*;
+
+    #[pymodule_export]
+    use super::boards::{Board, Checkerboard};
+    #[pymodule_export]
+    use super::calibrate::{calibrate, rig};
+    #[pymodule_export]
+    use super::calibrated_camera::CalibratedCamera;
+    #[pymodule_export]
+    use super::calibration::{_calibration, Calibration, Rig};
+    #[pymodule_export]
+    use super::camera::Camera;
+    #[pymodule_export]
+    use super::comparison::{Comparison, Located, Motion, compare, compare_rigs, pose_of};
+    #[pymodule_export]
+    use super::detection::{_detection, DecodedTag, Detection, Grid, Reason};
+    #[pymodule_export]
+    use super::detector::{_detector, Detector};
+    #[pymodule_export]
+    use super::errors::_keywords;
+    #[pymodule_export]
+    use super::families::{Family, search_family};
+    #[pymodule_export]
+    use super::pose::Pose;
+    #[pymodule_export]
+    use super::programs::_run;
+    #[pymodule_export]
+    use super::rendering::{Truth, render};
+    #[pymodule_export]
+    use super::solids::{Icosahedron, Octahedron, Solid, Tetrahedron};
+    #[pymodule_export]
+    use super::targets::{_target, Tag, Target};
+    #[pymodule_export]
+    use super::verdict::Verdict;
+    #[pymodule_export]
+    use super::views::{Diagnosis, Excluded, View};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

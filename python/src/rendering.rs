@@ -1,0 +1,212 @@
+//! Synthetic pictures of targets, with the true places of their corners.
+
+use deltille::export::truth;
+use deltille::glam::DVec3;
+use deltille::limits::Limits;
+use deltille::synth::{Light, TruthCorner, scene_of_target};
+use deltille::targets::TargetSpec;
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use crate::arrays;
+use crate::camera::Camera;
+use crate::errors::{self, Raise, raised};
+use crate::interrupt::interruptible;
+use crate::pose::Pose;
+use crate::targets::Target;
+
+/// The true places of the N corners that a synthetic picture shows.
+#[pyclass(frozen, module = "deltille")]
+pub struct Truth {
+    corners: Vec<TruthCorner>,
+    pose: Pose,
+    light: Light,
+    target: String,
+}
+
+#[pymethods]
+impl Truth {
+    /// Positions, N × 2, float64, px.
+    #[getter]
+    fn pixels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.corners.iter().map(|corner| [corner.x, corner.y]))
+    }
+
+    /// Places on the target, N × 3, float64, mm.
+    #[getter]
+    fn object_points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.corners.iter().map(|corner| corner.target_mm.to_array()))
+    }
+
+    /// Ids of the corners, N, int64.
+    #[getter]
+    fn ids<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        arrays::column(py, self.corners.iter().map(|corner| i64::from(corner.id)))
+    }
+
+    /// Rows, N, int64.
+    #[getter]
+    fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        arrays::column(py, self.corners.iter().map(|corner| i64::from(corner.row)))
+    }
+
+    /// Columns, N, int64.
+    #[getter]
+    fn cols<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        arrays::column(py, self.corners.iter().map(|corner| i64::from(corner.col)))
+    }
+
+    /// Ids of the panels, N, int64.
+    #[getter]
+    fn panels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        arrays::column(py, self.corners.iter().map(|corner| i64::from(corner.panel)))
+    }
+
+    /// Camera from target.
+    #[getter]
+    fn pose(&self) -> Pose {
+        self.pose
+    }
+
+    /// The text that ``deltille render`` writes beside a picture.
+    ///
+    /// Parameters
+    /// ----------
+    /// image : str, optional
+    ///     Name of the picture's file.
+    #[pyo3(signature = (image = ""))]
+    fn to_json(&self, image: &str) -> String {
+        truth::write(image, &self.target, &self.pose.0, &self.light, &self.corners)
+    }
+
+    fn __len__(&self) -> usize {
+        self.corners.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Truth of {}: {} corners>", self.target, self.corners.len())
+    }
+}
+
+/// Takes a synthetic picture of a target.
+///
+/// Parameters
+/// ----------
+/// target : Target
+///     A board or a solid.
+/// camera : Camera
+/// pose : Pose, optional
+///     Camera from target.
+/// eye : sequence of 3 floats, optional
+///     Instead of ``pose``: where the camera stands in the target's frame, mm.
+/// look_at : sequence of 3 floats, optional
+///     What it looks at, mm; the middle of all corners if left out.
+/// up : sequence of 3 floats, optional
+///     What is up in the picture.
+/// blur_px : float, optional
+///     Standard deviation of the blur, px.
+/// noise : float, optional
+///     Standard deviation of the noise, of full scale 1.
+/// gradient : (float, float), optional
+///     Relative change of the light across and down the picture.
+/// white, black, background : float, optional
+///     Grey values of paper, print and what is around, of full scale 1.
+/// seed : int, optional
+///     Seed of the noise.
+/// dtype : str, optional
+///     ``"uint8"``, ``"uint16"`` or ``"float32"`` (0 to 1).
+///
+/// Returns
+/// -------
+/// image : ndarray of H × W
+/// truth : Truth
+///     The true places of all corners in view.
+#[pyfunction]
+#[pyo3(signature = (target, camera, pose = None, *, eye = None, look_at = None, up = None, blur_px = 0.8,
+    noise = 0.01, gradient = [0.0, 0.0], white = 0.9, black = 0.1, background = 0.5, seed = 0, dtype = "uint8"))]
+#[expect(clippy::too_many_arguments, reason = "keywords")]
+pub fn render<'py>(
+    py: Python<'py>,
+    target: PyRef<'_, Target>,
+    camera: PyRef<'_, Camera>,
+    pose: Option<PyRef<'_, Pose>>,
+    eye: Option<[f64; 3]>,
+    look_at: Option<[f64; 3]>,
+    up: Option<[f64; 3]>,
+    blur_px: f64,
+    noise: f64,
+    gradient: [f64; 2],
+    white: f64,
+    black: f64,
+    background: f64,
+    seed: u64,
+    dtype: &str,
+) -> PyResult<(Bound<'py, PyAny>, Truth)> {
+    let wrong = |what: String| raised::TargetError::new_err(what);
+    let own = target.clone();
+    let of = &own.target;
+    if !matches!(of.spec, TargetSpec::Solid(_)) && of.panels.len() > 1 {
+        let what =
+            format!("{} has several loose boards: render targets of one board, or solids", of.name);
+        return Err(wrong(what));
+    }
+    let camera = camera.0.clone();
+    Limits::default().check_pixels(camera.width, camera.height).raise(errors::camera)?;
+    let in_range = |name: &str, value: f64, most: f64| match (0.0..=most).contains(&value) {
+        true => Ok(value),
+        false => Err(wrong(format!("{name}: {value} is not between 0 and {most}"))),
+    };
+    if gradient.iter().any(|part| !(-2.0..=2.0).contains(part)) {
+        return Err(wrong("gradient: it must be between -2 and 2".to_owned()));
+    }
+    let light = Light::default()
+        .blur_px(in_range("blur_px", blur_px, 100.0)?)
+        .noise(in_range("noise", noise, 1.0)?)
+        .white(in_range("white", white, 1.0)?)
+        .black(in_range("black", black, 1.0)?)
+        .background(in_range("background", background, 1.0)?)
+        .gradient(gradient.into())
+        .seed(seed);
+    let pose = match (pose, eye) {
+        (Some(pose), None) => *pose,
+        (None, Some(eye)) => {
+            let places = own.all().map(|(_, corner)| corner.target_mm);
+            let middle = places.sum::<DVec3>() / own.all().count().max(1) as f64;
+            Pose::looking_at(eye, look_at.unwrap_or(middle.to_array()), up)?
+        }
+        _ => {
+            let what = "give pose, or eye for where the camera stands";
+            return Err(wrong(what.to_owned()));
+        }
+    };
+    let name = own.target.name.to_string();
+    let drawn = interruptible(py, move |_| {
+        let scene = scene_of_target(&own.target, own.family.as_deref())?;
+        let image = scene.render(&camera, &pose.0, &light);
+        Ok::<_, deltille::artwork::ArtworkError>((
+            image,
+            scene.truth(&camera, &pose.0, 0.0).corners,
+        ))
+    })?;
+    let (image, corners) = drawn.raise(errors::target)?;
+    let shape = (image.height(), image.width());
+    let pixels = image.pixels();
+    let full = "a picture has all its pixels";
+    let array = match dtype {
+        "uint8" => {
+            let grey = pixels.iter().map(|v| (v * 255.0 + 0.5) as u8).collect();
+            Array2::from_shape_vec(shape, grey).expect(full).into_pyarray(py).into_any()
+        }
+        "uint16" => {
+            let grey = pixels.iter().map(|v| (v * 65535.0 + 0.5) as u16).collect();
+            Array2::from_shape_vec(shape, grey).expect(full).into_pyarray(py).into_any()
+        }
+        "float32" => {
+            let grey = pixels.to_vec();
+            Array2::from_shape_vec(shape, grey).expect(full).into_pyarray(py).into_any()
+        }
+        _ => return Err(wrong("dtype: give uint8, uint16 or float32".to_owned())),
+    };
+    Ok((array, Truth { corners, pose, light, target: name }))
+}

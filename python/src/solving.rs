@@ -1,0 +1,366 @@
+//! From detections to calibrations: what is asked for, and the work.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+
+use deltille::calibrate::{
+    Calibration, CalibrationError, Candidate, Diagnosis, Estimate, Excluded, Intrinsics, Loss,
+    Model, PanelPlace, Reference, UntaggedGrid, View, Weights, Words, views,
+};
+use deltille::camera;
+use deltille::detect;
+use deltille::export::calibration::{Print, Residuals, Sheet};
+use deltille::export::{calibration, rig};
+use deltille::targets;
+use pyo3::exceptions::PyUserWarning;
+use pyo3::prelude::*;
+use serde_json::Value;
+
+use crate::detection::{Detection, Targets};
+use crate::detector::{size, tiling};
+use crate::errors::{self, Raise, raised};
+use crate::interrupt::interruptible;
+
+/// What was photographed.
+pub enum Seen {
+    /// Targets, of which there is at least one.
+    Targets(Vec<targets::Target>),
+    /// An untagged board.
+    Grid(UntaggedGrid),
+}
+
+impl Seen {
+    /// What is asked for: targets, or a grid with its edge.
+    pub fn of(
+        target: Option<Targets>,
+        grid: Option<&str>,
+        [rows, cols]: [Option<u32>; 2],
+        edge_mm: Option<f64>,
+    ) -> PyResult<Self> {
+        let wrong = |what: &str| Err(raised::CalibrationError::new_err(what.to_owned()));
+        match (target.map(|targets| targets.0).unwrap_or_default(), grid) {
+            (found, None) if found.is_empty() => wrong(
+                "give a target, or grid=\"deltille\" or \"checker\" with edge_mm for untagged boards",
+            ),
+            (found, None) => {
+                let own = |target: &crate::targets::Target| (*target.target).clone();
+                Ok(Self::Targets(found.iter().map(own).collect()))
+            }
+            (found, Some(grid)) if found.is_empty() => {
+                let Some(edge_mm) = edge_mm.filter(|mm| (1.0..=1000.0).contains(mm)) else {
+                    return wrong(
+                        "edge_mm: a board of a grid needs the edge of its tiles, 1 mm to 1 m",
+                    );
+                };
+                let size = size(rows, cols)?.map(|(rows, cols)| [rows, cols]);
+                Ok(Self::Grid(UntaggedGrid { kind: tiling(grid)?, edge_mm, size }))
+            }
+            _ => wrong("give a target or a grid, not both"),
+        }
+    }
+
+    /// What views refer to.
+    pub fn reference(&self) -> Reference<'_> {
+        match self {
+            Self::Targets(targets) => match targets.as_slice() {
+                [only] => Reference::Target(only),
+                several => Reference::Scene(several),
+            },
+            Self::Grid(grid) => Reference::Grid(*grid),
+        }
+    }
+
+    /// The targets, none of a grid.
+    pub fn targets(&self) -> &[targets::Target] {
+        match self {
+            Self::Targets(targets) => targets,
+            Self::Grid(_) => &[],
+        }
+    }
+}
+
+/// How a calibration is solved.
+#[derive(Clone)]
+pub struct How {
+    pub loss: Loss,
+    pub weights: Weights,
+    pub hold_out: Option<usize>,
+    pub board_shape: bool,
+    pub measure_target: bool,
+    pub refine_target: bool,
+    pub distances_mm: Vec<f64>,
+    pub sheet: Sheet,
+}
+
+impl How {
+    /// What the two functions have in common.
+    pub fn of(
+        loss: &str,
+        weights: &str,
+        hold_out: Option<usize>,
+        distances_mm: Vec<f64>,
+        print_scale: Option<PrintScale>,
+    ) -> PyResult<Self> {
+        let wrong = |what: &str| raised::CalibrationError::new_err(what.to_owned());
+        let loss = match loss {
+            "huber" => Loss::Huber,
+            "cauchy" => Loss::Cauchy,
+            "none" => Loss::Squared,
+            _ => return Err(wrong("loss: give huber, cauchy or none")),
+        };
+        let weights = match weights {
+            "covariance" => Weights::Covariance,
+            "equal" => Weights::Equal,
+            _ => return Err(wrong("weights: give covariance or equal")),
+        };
+        if hold_out.is_some_and(|every| every < 2) {
+            return Err(wrong("hold_out: every n-th view is kept out, n from 2"));
+        }
+        if !distances_mm.iter().all(|mm| (1.0..=1e6).contains(mm)) {
+            return Err(wrong("distances_mm: give distances from 1 mm to 1000 m"));
+        }
+        let print_scale = print_scale.map(PrintScale::both);
+        let is_scale = |scale: &f64| (0.5..=2.0).contains(scale);
+        if print_scale.is_some_and(|scales| !scales.iter().all(is_scale)) {
+            return Err(wrong("print_scale: give measured length over stated length, near 1"));
+        }
+        Ok(Self {
+            loss,
+            weights,
+            hold_out,
+            board_shape: false,
+            measure_target: false,
+            refine_target: false,
+            distances_mm,
+            sheet: Sheet { print_scale, shape: None },
+        })
+    }
+}
+
+/// How a print came out: one number, or two.
+#[derive(FromPyObject)]
+pub enum PrintScale {
+    One(f64),
+    Two([f64; 2]),
+}
+
+impl PrintScale {
+    pub fn both(self) -> [f64; 2] {
+        match self {
+            Self::One(both) => [both; 2],
+            Self::Two(each) => each,
+        }
+    }
+}
+
+/// A model, or the choice of one.
+#[derive(Clone, Copy)]
+pub struct ModelChoice(pub Option<Model>);
+
+impl ModelChoice {
+    pub fn of(text: &str) -> PyResult<Self> {
+        match text {
+            "auto" => Ok(Self(None)),
+            _ => Ok(Self(Some(text.parse().raise(errors::calibration)?))),
+        }
+    }
+
+    /// The model with the most parameters that may be chosen.
+    pub fn richest(self) -> Model {
+        self.0.unwrap_or(Model::ThinPrism)
+    }
+
+    pub fn name(self) -> String {
+        self.0.map_or("auto".to_owned(), |model| model.to_string())
+    }
+}
+
+/// Detections with the names of their views.
+pub type Named = Vec<(String, detect::Detection)>;
+
+/// Detections as views: named as they are asked to be, else after their pictures, else by their place. A picture that is
+/// there twice counts once.
+pub fn named(
+    py: Python<'_>,
+    detections: &[PyRef<'_, Detection>],
+    names: Option<Vec<String>>,
+) -> PyResult<Named> {
+    if names.as_ref().is_some_and(|names| names.len() != detections.len()) {
+        let what = "names: give as many as there are detections";
+        return Err(raised::CalibrationError::new_err(what));
+    }
+    let mut all: Named = Vec::new();
+    for (index, detection) in detections.iter().enumerate() {
+        let found = &detection.found;
+        let stem = Path::new(&found.image).file_stem().map(|stem| stem.to_string_lossy());
+        let name = names.as_ref().map(|names| names[index].clone());
+        let name = name.or(stem.map(|stem| stem.into_owned())).filter(|name| !name.is_empty());
+        let name = name.unwrap_or_else(|| format!("{index:04}"));
+        let is_same = |(_, other): &&(String, detect::Detection)| {
+            !found.grids.is_empty() && found.grids == other.grids
+        };
+        if let Some((first, _)) = all.iter().find(is_same) {
+            let what = format!("{name}: the same corners as in {first}, counted once\0");
+            let what = std::ffi::CStr::from_bytes_until_nul(what.as_bytes()).unwrap_or_default();
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), what, 2)?;
+            continue;
+        }
+        all.push((name, (**found).clone()));
+    }
+    Ok(all)
+}
+
+/// What came of it.
+pub struct Solved {
+    pub estimate: Estimate,
+    pub diagnoses: Vec<Diagnosis>,
+    pub print: Print,
+    /// Where the target's file has its panels.
+    pub stated: Vec<PanelPlace>,
+    /// Models that were tried, by camera.
+    pub models: Vec<Vec<Candidate>>,
+    pub targets: Vec<targets::Target>,
+    pub model: String,
+}
+
+impl Solved {
+    /// One that was read from a file.
+    pub fn read(estimate: Estimate, targets: Vec<targets::Target>, model: String) -> Self {
+        let (diagnoses, models) = (Vec::new(), Vec::new());
+        Self {
+            estimate,
+            diagnoses,
+            print: Print::default(),
+            stated: Vec::new(),
+            models,
+            targets,
+            model,
+        }
+    }
+
+    /// What the programs write of it.
+    pub fn json(&self, is_rig: bool, residuals: Residuals) -> String {
+        let Self { estimate, diagnoses, print, .. } = self;
+        match is_rig {
+            true => rig::write(estimate, diagnoses, &self.model, *print, residuals),
+            false => calibration::write(estimate, diagnoses, *print, residuals).unwrap_or_default(),
+        }
+    }
+
+    /// What is said of it, as plain data with a sentence each.
+    pub fn said(&self) -> Vec<(Value, bool)> {
+        let is_rig = self.estimate.cameras.len() != 1;
+        let file: Value =
+            serde_json::from_str(&self.json(is_rig, Residuals::LeftOut)).unwrap_or_default();
+        let records = file["diagnoses"].as_array().cloned().unwrap_or_default();
+        let words = Words::new(&self.estimate, self.print.scale);
+        let said = |diagnosis: &Diagnosis| {
+            let text = words.sentence(diagnosis);
+            let record = records.iter().find(|record| record["text"] == text.as_str());
+            let record = record.cloned().unwrap_or_else(|| serde_json::json!({ "text": text }));
+            (record, diagnosis.is_failure())
+        };
+        self.diagnoses.iter().map(said).collect()
+    }
+}
+
+/// A camera to be found, or known, with what it saw.
+pub struct OneCamera {
+    pub name: String,
+    pub detections: Named,
+    pub known: Option<camera::Camera>,
+}
+
+/// Calibrates cameras.
+pub fn solve(
+    py: Python<'_>,
+    seen: Seen,
+    cameras: Vec<OneCamera>,
+    model: ModelChoice,
+    how: How,
+) -> PyResult<Solved> {
+    let seen = Arc::new(seen);
+    let mut all = Vec::new();
+    let (mut left_out, mut ink, mut panels) = (Vec::new(), Vec::new(), Vec::new());
+    let is_rig = cameras.len() > 1;
+    {
+        let reference = seen.reference();
+        panels.extend(how.sheet.panels(&reference).raise(errors::calibration)?);
+        let mut taken: BTreeSet<(usize, String)> = BTreeSet::new();
+        for (index, camera) in cameras.into_iter().enumerate() {
+            if is_rig
+                && let Some((twice, _)) =
+                    camera.detections.iter().find(|(name, _)| !taken.insert((index, name.clone())))
+            {
+                let what = format!("{}: two pictures are named {twice}", camera.name);
+                return Err(raised::CalibrationError::new_err(what));
+            }
+            ink.extend(camera.detections.iter().filter_map(|(_, found)| {
+                let ink = found.ink?;
+                Some(if let Seen::Grid(grid) = &*seen { ink.on_print(grid.edge_mm) } else { ink })
+            }));
+            let shown = views(&camera.detections, &reference).raise(errors::calibration)?;
+            let mut of_camera: Vec<View> = shown.views;
+            let name = is_rig.then(|| camera.name.clone());
+            left_out.extend(
+                shown.left_out.into_iter().map(|(_, out)| Excluded { camera: name.clone(), ..out }),
+            );
+            let target = seen.targets().first();
+            how.sheet.put_on(target, &mut of_camera).raise(errors::calibration)?;
+            if of_camera.is_empty() {
+                let what = format!("{}: no picture shows the target", camera.name);
+                return Err(raised::CalibrationError::new_err(what));
+            }
+            let known = camera.known.map(Intrinsics::Known);
+            let intrinsics = known.unwrap_or(Intrinsics::Unknown(model.richest()));
+            all.push((camera.name, of_camera, intrinsics));
+        }
+    }
+    let print = Print { scale: how.sheet.print_scale, ink: detect::InkEstimate::of_all(&ink) };
+    let stated = panels.clone();
+    let of = seen.clone();
+    let solved = interruptible(py, move |stop| {
+        let mut calibration = Calibration::of(&of.reference(), panels)
+            .loss(how.loss)
+            .weights(how.weights)
+            .board_shape(how.board_shape)
+            .measure_target(how.measure_target)
+            .refine_panels(how.refine_target)
+            .distances_mm(how.distances_mm)
+            .hold_out(how.hold_out)
+            .stopped_by(stop.clone());
+        let count = all.len();
+        for (name, views, intrinsics) in all {
+            calibration = calibration.camera(&name, views, intrinsics);
+        }
+        let mut models = vec![Vec::new(); count];
+        for (index, tried) in models.iter_mut().enumerate() {
+            if model.0.is_none() && calibration.cameras()[index].intrinsics.model().is_some() {
+                let (chosen, candidates) = calibration.choose_model(index)?;
+                calibration.set_intrinsics(index, chosen);
+                *tried = candidates;
+            }
+        }
+        let estimate = calibration.solve()?;
+        let diagnoses = calibration.diagnose(&estimate);
+        Ok::<_, CalibrationError>((estimate, diagnoses, models))
+    })?;
+    let (mut estimate, diagnoses, models) = solved.raise(errors::calibration)?;
+    let foreign = diagnoses.iter().find(|said| matches!(said, Diagnosis::ForeignCamera { .. }));
+    if let Some(foreign) = foreign {
+        let text = Words::new(&estimate, print.scale).sentence(foreign);
+        return Err(raised::CalibrationError::new_err(text));
+    }
+    if estimate.frames.is_empty() {
+        let what = "no view shows the target as this camera sees it";
+        return Err(raised::CalibrationError::new_err(what));
+    }
+    estimate.excluded.splice(0..0, left_out);
+    let targets = match Arc::try_unwrap(seen) {
+        Ok(Seen::Targets(targets)) => targets,
+        Ok(Seen::Grid(grid)) => grid.target("board").and_then(Result::ok).into_iter().collect(),
+        Err(shared) => shared.targets().to_vec(),
+    };
+    Ok(Solved { estimate, diagnoses, print, stated, models, targets, model: model.name() })
+}

@@ -1,0 +1,412 @@
+//! Targets: what they are, and what is made of them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use deltille::export::artifacts::{Files, Making, What, make, write_set};
+use deltille::limits::Limits;
+use deltille::targets::{self, Corner, Panel};
+use deltille::{export, target_file};
+use export::dsc::Dialect;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::arrays;
+use crate::errors::{self, Raise, raised, unlocked};
+use crate::families::{Family, FamilyChoice};
+use crate::interrupt::interruptible;
+use crate::verdict::{Proof, Verdict};
+
+/// What is printed, photographed and found: panels with corners and tags, in millimetres.
+///
+/// Made by :class:`Board`, :class:`Checkerboard`, :class:`Icosahedron` and the others, or read by :meth:`load`. The
+/// frame of a board is right-handed: x right, y up on the print, z towards the viewer.
+#[pyclass(frozen, subclass, module = "deltille")]
+#[derive(Clone)]
+pub struct Target {
+    pub target: Arc<targets::Target>,
+    pub family: Option<Arc<deltille::family::Family>>,
+}
+
+impl Target {
+    /// All corners with their panels.
+    pub fn all(&self) -> impl Iterator<Item = (&Panel, &Corner)> {
+        of(&self.target)
+    }
+
+    /// A target with the family that was given, else the one that it names.
+    pub fn with_family(target: targets::Target, family: Option<FamilyChoice>) -> PyResult<Self> {
+        let family = match family {
+            Some(FamilyChoice::Family(family)) => Some(family),
+            Some(FamilyChoice::Name(name)) => {
+                let name = name.to_string_lossy();
+                target_file::family(&target, Some(&name)).raise(errors::family)?.map(Arc::new)
+            }
+            None => target_file::family(&target, None).raise(errors::family)?.map(Arc::new),
+        };
+        Ok(Self { target: Arc::new(target), family })
+    }
+
+    fn made(&self, what: &str, making: Making) -> PyResult<Files> {
+        let what = what.parse::<What>().raise(errors::target)?;
+        make(&self.target, self.family.as_deref(), what, making).raise(errors::target)
+    }
+}
+
+/// All corners of a target with their panels.
+pub fn of(target: &targets::Target) -> impl Iterator<Item = (&Panel, &Corner)> {
+    target.panels.iter().flat_map(|panel| panel.corners.iter().map(move |corner| (panel, corner)))
+}
+
+#[pymethods]
+impl Target {
+    /// Reads a target: the ``.json`` that was written with it, or a ``.dsc``.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    /// family : Family, str or path-like, optional
+    ///     The family of its tags, where that is not shipped.
+    ///
+    /// Returns
+    /// -------
+    /// Target
+    #[staticmethod]
+    #[pyo3(signature = (path, *, family = None))]
+    fn load(path: PathBuf, family: Option<FamilyChoice>) -> PyResult<Self> {
+        let target = target_file::read(&path, &Limits::default()).raise(errors::file)?;
+        Self::with_family(target, family)
+    }
+
+    /// The target of a text, as :meth:`load` reads it from files.
+    #[staticmethod]
+    #[pyo3(signature = (text, *, family = None))]
+    fn from_json(text: &str, family: Option<FamilyChoice>) -> PyResult<Self> {
+        Self::with_family(targets::Target::from_json(text).raise(errors::target)?, family)
+    }
+
+    /// The text of the target's description.
+    fn to_json(&self) -> String {
+        self.target.to_json()
+    }
+
+    /// Name of the target, which is the stem of the names of its files.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.target.name
+    }
+
+    /// Places of all corners in the target's frame, N × 3, float64, mm: where they were measured, else as planned.
+    #[getter]
+    fn corners<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.all().map(|(panel, corner)| panel.place_mm(corner).to_array()))
+    }
+
+    /// Ids of the corners, N, int64.
+    #[getter]
+    fn corner_ids<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        arrays::column(py, self.all().map(|(_, corner)| i64::from(corner.id)))
+    }
+
+    /// Rows of the corners in the lattice of their panel, N, int64.
+    #[getter]
+    fn corner_rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        arrays::column(py, self.all().map(|(_, corner)| i64::from(corner.row)))
+    }
+
+    /// Columns of the corners in the lattice of their panel, N, int64.
+    #[getter]
+    fn corner_cols<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        arrays::column(py, self.all().map(|(_, corner)| i64::from(corner.col)))
+    }
+
+    /// Ids of the panels on which the corners lie, N, int64.
+    #[getter]
+    fn corner_panels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        arrays::column(py, self.all().map(|(panel, _)| i64::from(panel.id)))
+    }
+
+    /// The tags: ids, panels and places of their centres.
+    #[getter]
+    fn tags(&self) -> Vec<Tag> {
+        let of_panel = |panel: &Panel| {
+            let tag = |tag: &targets::TagPlacement| Tag {
+                id: tag.id,
+                panel: panel.id,
+                row: tag.row,
+                col: tag.col,
+                centre: panel.tag_centre_mm(tag).to_array(),
+            };
+            panel.tags.iter().map(tag).collect::<Vec<_>>()
+        };
+        self.target.panels.iter().flat_map(of_panel).collect()
+    }
+
+    /// Ids of the tags, T, int64.
+    #[getter]
+    fn tag_ids<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        arrays::column(py, self.tags().into_iter().map(|tag| i64::from(tag.id)))
+    }
+
+    /// Centres of the tags in the target's frame, T × 3, float64, mm.
+    #[getter]
+    fn tag_centres<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::rows(py, self.tags().into_iter().map(|tag| tag.centre))
+    }
+
+    /// Ids of the panels.
+    #[getter]
+    fn panels(&self) -> Vec<u32> {
+        self.target.panels.iter().map(|panel| panel.id).collect()
+    }
+
+    /// The family of the tags; ``None`` of a target without.
+    #[getter]
+    fn family(&self) -> Option<Family> {
+        self.family.clone().map(Family::from)
+    }
+
+    /// Whether places of its corners were measured.
+    #[getter]
+    fn is_measured(&self) -> bool {
+        self.target.is_measured()
+    }
+
+    /// Number of pages that it is printed on.
+    #[getter]
+    fn page_count(&self) -> usize {
+        self.target.page_count()
+    }
+
+    /// What is printed, as PDF.
+    ///
+    /// Returns
+    /// -------
+    /// bytes
+    fn pdf(&self) -> PyResult<Vec<u8>> {
+        Ok(self.made("pdf", Making::default())?.remove(0).1)
+    }
+
+    /// A page as SVG.
+    ///
+    /// Parameters
+    /// ----------
+    /// page : int, optional
+    ///     Which one, from 0.
+    ///
+    /// Returns
+    /// -------
+    /// str
+    #[pyo3(signature = (page = 0))]
+    fn svg(&self, page: usize) -> PyResult<String> {
+        let pages = self.made("svg", Making::default())?;
+        let count = pages.len();
+        let found = pages.into_iter().nth(page);
+        let none =
+            || raised::TargetError::new_err(format!("page {page}: there are {count}, from 0"));
+        Ok(String::from_utf8_lossy(&found.ok_or_else(none)?.1).into_owned())
+    }
+
+    /// Everything of one format in memory.
+    ///
+    /// Parameters
+    /// ----------
+    /// format : str
+    ///     ``"json"``, ``"pdf"``, ``"svg"``, ``"png"``, ``"dsc"``, ``"dsc-original"``; of a solid also ``"gltf"``,
+    ///     ``"obj"``, ``"stl"``, ``"skeleton"``, ``"panels"`` (DXF) and ``"net"`` (DXF).
+    /// dpi : float, optional
+    ///     Resolution of PNG pages, dots per inch.
+    /// texture_dpi : float, optional
+    ///     Resolution of the texture of a mesh; what tags need if left out.
+    ///
+    /// Returns
+    /// -------
+    /// dict of str to bytes
+    ///     Contents by names of files.
+    #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None))]
+    fn files<'py>(
+        &self,
+        py: Python<'py>,
+        format: &str,
+        dpi: f64,
+        texture_dpi: Option<f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let making = making(dpi, texture_dpi)?;
+        let files = PyDict::new(py);
+        for (name, bytes) in unlocked(py, || self.made(format, making))?? {
+            files.set_item(name, PyBytes::new(py, &bytes))?;
+        }
+        Ok(files)
+    }
+
+    /// Writes the description and files to print, cut or render, all or none.
+    ///
+    /// Parameters
+    /// ----------
+    /// folder : path-like
+    ///     Where they go; it is made where there is none.
+    /// formats : sequence of str, optional
+    ///     Of those of :meth:`files`; the ``.json`` is always written.
+    /// dpi : float, optional
+    ///     Resolution of PNG pages, dots per inch.
+    /// texture_dpi : float, optional
+    ///     Resolution of the texture of a mesh; what tags need if left out.
+    /// force : bool, optional
+    ///     Whether files of another kind are replaced.
+    ///
+    /// Returns
+    /// -------
+    /// list of pathlib.Path
+    ///     The files, the description first.
+    #[pyo3(signature = (folder, formats = vec!["pdf".to_owned()], *, dpi = 300.0, texture_dpi = None, force = false))]
+    fn save(
+        &self,
+        py: Python<'_>,
+        folder: PathBuf,
+        formats: Vec<String>,
+        dpi: f64,
+        texture_dpi: Option<f64>,
+        force: bool,
+    ) -> PyResult<Vec<PathBuf>> {
+        let making = making(dpi, texture_dpi)?;
+        unlocked(py, || {
+            let mut files = self.made("json", making)?;
+            for format in formats.iter().filter(|format| *format != "json") {
+                files.extend(self.made(format, making)?);
+            }
+            write_set(&folder, &files, force).raise(errors::file)
+        })?
+    }
+
+    /// Reads a file back and compares it with this target: every corner, tile and cell.
+    ///
+    /// Parameters
+    /// ----------
+    /// artifact : path-like or bytes, optional
+    ///     The file, or its content. Without, what :meth:`save` would write is made in memory and proved.
+    /// name : str, optional
+    ///     Name of the file where its content is given, such as ``"desk.pdf"``; its ending tells the format.
+    ///
+    /// Returns
+    /// -------
+    /// Verdict
+    ///
+    /// Raises
+    /// ------
+    /// VerifyError
+    ///     Where nothing can be compared, such as where the file cannot be read.
+    #[pyo3(signature = (artifact = None, *, name = None))]
+    fn verify(
+        &self,
+        py: Python<'_>,
+        artifact: Option<Proof>,
+        name: Option<String>,
+    ) -> PyResult<Verdict> {
+        let proof = match artifact {
+            Some(Proof::Bytes(bytes)) => {
+                let name = name.unwrap_or_else(|| format!("{}.pdf", self.target.name));
+                (name.clone(), Some(vec![(name, bytes)]))
+            }
+            Some(Proof::Path(path)) => (path.to_string_lossy().into_owned(), None),
+            None => {
+                let usual = if self.target.sheets.is_empty() { "gltf" } else { "pdf" };
+                let files = self.made(usual, Making::default())?;
+                (files[0].0.clone(), Some(files))
+            }
+        };
+        let own = self.clone();
+        interruptible(py, move |stop| Verdict::of(&own, proof, stop))?
+    }
+
+    /// Makes the list of corners and tags that the reference detector reads.
+    #[pyo3(signature = (dialect = "fork"))]
+    fn dsc(&self, dialect: &str) -> PyResult<String> {
+        let dialect = dialect.parse::<Dialect>().raise(errors::target)?;
+        export::dsc::write(&self.target, dialect).raise(errors::target)
+    }
+
+    /// A small picture of the first page for notebooks.
+    fn _repr_html_(&self) -> String {
+        let Ok(pages) = self.made("svg", Making::default()) else { return self.__repr__() };
+        let page = String::from_utf8_lossy(&pages[0].1).into_owned();
+        // Its size is that of the paper: only the view box is kept.
+        let start = page.find("<svg").unwrap_or(0);
+        let (head, body) = page[start..].split_once('>').unwrap_or(("<svg", ""));
+        let view_box = head.split("viewBox=\"").nth(1).and_then(|rest| rest.split('"').next());
+        let view_box = view_box.unwrap_or("0 0 210 297");
+        format!(
+            "<div><code>{}</code><br><svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{view_box}\" \
+             width=\"320\" style=\"background:white;border:1px solid #ccc\">{body}</div>",
+            self.__repr__()
+        )
+    }
+
+    fn __len__(&self) -> usize {
+        self.all().count()
+    }
+
+    fn __repr__(&self) -> String {
+        let tags: usize = self.target.panels.iter().map(|panel| panel.tags.len()).sum();
+        let family = self.target.family.as_ref().map_or("", |family| &family.name);
+        format!(
+            "<Target {}: {} panels, {} corners, {tags} tags {family}>",
+            self.target.name,
+            self.target.panels.len(),
+            self.all().count(),
+        )
+        .replace(" >", ">")
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.target == other.target
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Option<String>)> {
+        let restore = slf.py().import("deltille._core")?.getattr("_target")?;
+        let own = slf.get();
+        let family = own.family.as_ref().map(|family| family.to_json());
+        Ok((restore, (own.target.to_json(), family)))
+    }
+}
+
+/// A target that was pickled.
+#[pyfunction]
+pub fn _target(json: &str, family: Option<&str>) -> PyResult<Target> {
+    let target = targets::Target::from_json(json).raise(errors::target)?;
+    let family =
+        family.map(deltille::family::Family::from_json).transpose().raise(errors::family)?;
+    Ok(Target { target: Arc::new(target), family: family.map(Arc::new) })
+}
+
+fn making(dpi: f64, texture_dpi: Option<f64>) -> PyResult<Making> {
+    if !(1.0..=1e5).contains(&dpi) || texture_dpi.is_some_and(|dpi| !(1.0..=1e5).contains(&dpi)) {
+        return Err(raised::TargetError::new_err("dpi: give dots per inch from 1 to 100000"));
+    }
+    let mut making = Making::default();
+    (making.dpi, making.texture_dpi) = (dpi, texture_dpi);
+    Ok(making)
+}
+
+/// A tag of a target.
+#[pyclass(frozen, get_all, module = "deltille")]
+#[derive(Clone)]
+pub struct Tag {
+    /// Id of the tag: the index of its code in the family.
+    id: u32,
+    /// Id of its panel.
+    panel: u32,
+    /// Row of the lower left vertex of its tile.
+    row: i32,
+    /// Column of that vertex.
+    col: i32,
+    /// Its centre in the target's frame, mm.
+    centre: [f64; 3],
+}
+
+#[pymethods]
+impl Tag {
+    fn __repr__(&self) -> String {
+        format!("Tag(id={}, panel={}, row={}, col={})", self.id, self.panel, self.row, self.col)
+    }
+}

@@ -1,0 +1,86 @@
+"""Tests of the installed package; they read photographs of the repository and run from any folder."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sysconfig
+from pathlib import Path
+
+import numpy
+import pytest
+
+import deltille
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def pytest_addoption(parser):
+    parser.addoption("--long", action="store_true", help="proofs that take minutes, too")
+
+
+def pytest_collection_modifyitems(config, items):
+    if config.getoption("--long"):
+        return
+    skipped = pytest.mark.skip(reason="takes minutes: give --long")
+    for item in items:
+        if "long" in item.keywords:
+            item.add_marker(skipped)
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Photographs beside the repository, where they are present."""
+    folder = Path(os.environ.get("DELTILLE_DATA", ROOT / "../shared/data"))
+    if not folder.is_dir():
+        pytest.skip("the photographs are not there")
+    return folder
+
+
+def script(name: str) -> str:
+    """A program that the package installed."""
+    found = shutil.which(name, path=sysconfig.get_path("scripts"))
+    assert found, f"{name} is not installed"
+    return found
+
+
+@pytest.fixture(scope="session")
+def program() -> str:
+    """The native program where it was built, else that of the package."""
+    native = os.environ.get("DELTILLE_PROGRAM")
+    return native or script("deltille")
+
+
+@pytest.fixture(scope="session")
+def board() -> deltille.Target:
+    return deltille.Board(7, 8, edge_mm=20, name="desk")
+
+
+@pytest.fixture(scope="session")
+def camera() -> deltille.Camera:
+    return deltille.Camera(1280, 960, 1100, distortion=[-0.1, 0.02, 0.001, -0.0005])
+
+
+EYES = [(0, -50, 420), (300, 60, 330), (-90, 200, 380), (250, 280, 350), (80, -160, 300), (380, 200, 300),
+        (100, 60, 330), (-40, 20, 300), (180, 300, 300), (330, -80, 380)]
+
+
+@pytest.fixture(scope="session")
+def pictures(board, camera) -> list[numpy.ndarray]:
+    return [deltille.render(board, camera, eye=eye, seed=i)[0] for i, eye in enumerate(EYES)]
+
+
+@pytest.fixture(scope="session")
+def detections(board, pictures) -> list[deltille.Detection]:
+    detector = deltille.Detector(board)
+    return [detector.detect(picture, name=f"{i}.png") for i, picture in enumerate(pictures)]
+
+
+@pytest.fixture(scope="session")
+def calibration(detections, board) -> deltille.Calibration:
+    return deltille.calibrate(detections, board)

@@ -1,0 +1,164 @@
+import json
+import subprocess
+
+import numpy
+import pytest
+
+import deltille
+
+
+def test_a_camera_is_found_with_its_uncertainties(calibration, camera, detections):
+    assert calibration.model == "radtan" and calibration.camera.model == "pinhole"
+    found = calibration.camera.parameters
+    names = calibration.camera.parameter_names
+    assert names[:4] == ["fx", "fy", "cx", "cy"] and len(names) == len(calibration.sd)
+    of_found = [names.index(name) for name in calibration.found]
+    off = (found - camera.parameters)[of_found] / calibration.sd[of_found]
+    assert numpy.abs(off).max() < 5
+    assert calibration.covariance.shape == (8, 8)
+    numpy.testing.assert_allclose(numpy.sqrt(numpy.diag(calibration.covariance)), calibration.sd[of_found])
+    assert calibration.rms_px < 0.02 and calibration.inlier_rms_px <= calibration.rms_px
+    assert calibration.corner_count == len(calibration.residuals) == sum(len(view) for view in calibration.views)
+    assert calibration.residuals.shape == calibration.pixels.shape
+    rms = numpy.sqrt((calibration.residuals**2).mean())
+    assert rms == pytest.approx(calibration.rms_px)
+    assert (numpy.bincount(calibration.view_indices) == [len(view) for view in calibration.views]).all()
+    view = calibration.views[0]
+    ids = {int(i): pixel for i, pixel in zip(detections[0].ids, detections[0].pixels)}
+    for number, pixel in zip(view.ids, view.pixels):
+        assert (ids[int(number)] == pixel).all()
+    assert calibration.outliers.dtype == bool and calibration.outlier_count == calibration.outliers.sum()
+    assert calibration.projection_sd() > 0 and calibration.projection_sd(400.0) > 0
+    assert calibration.uncertainty_map().shape == (18, 24)
+    assert calibration.projection_covariance([[640, 480]]).shape == (1, 2, 2)
+    assert calibration.excluded == [] and all(said.sentence for said in calibration.diagnoses)
+
+
+def test_residuals_are_those_of_the_projection(calibration, board):
+    view = calibration.views[3]
+    order = numpy.argsort(board.corner_ids)
+    points = view.pose.apply(board.corners[order][view.ids])
+    predicted = calibration.camera.project(points)
+    numpy.testing.assert_allclose(view.pixels - predicted, view.residuals, atol=1e-8)
+
+
+def test_the_camera_is_that_of_the_program(program, detections, board, calibration, tmp_path):
+    board.save(tmp_path)
+    (tmp_path / "corners").mkdir()
+    for i, detection in enumerate(detections):
+        detection.save(tmp_path / f"corners/{i}.json")
+    command = [program, "calibrate", str(tmp_path / "corners"), "--target", str(tmp_path / "desk.json")]
+    subprocess.run([*command, "--model", "radtan", "-o", str(tmp_path / "camera.yaml")], check=True, capture_output=True)
+    assert (tmp_path / "camera.json").read_text() == calibration.to_json()
+    assert (tmp_path / "camera.yaml").read_text() == calibration.camera.to_yaml()
+    again = deltille.Calibration.load(tmp_path / "camera.json", target=board)
+    assert again.camera == deltille.Camera.load(tmp_path / "camera.yaml") == calibration.camera
+
+
+def test_calibrations_are_written_and_read(calibration, board, tmp_path):
+    path = calibration.save(tmp_path / "a.json", residuals=True)
+    again = deltille.Calibration.load(path, target=board)
+    assert again.camera == calibration.camera
+    numpy.testing.assert_array_equal(again.residuals, calibration.residuals)
+    numpy.testing.assert_allclose(again.covariance, calibration.covariance)
+    assert (again.ids == calibration.ids).all()
+    for form, end in [("own", "yaml"), ("opencv", "yaml"), ("ros", "yaml"), ("kalibr", "yaml"), ("colmap", "txt"),
+                      ("nerfstudio", "json"), ("mrcal", "cameramodel")]:
+        assert calibration.save(tmp_path / f"{form}.{end}", form).stat().st_size > 50
+    assert len(json.loads((tmp_path / "nerfstudio.json").read_text())["frames"]) == 10
+    for form in ("own", "opencv", "ros"):
+        read = deltille.Camera.load(tmp_path / f"{form}.yaml")
+        numpy.testing.assert_allclose(read.matrix, calibration.camera.matrix)
+    page = calibration.report(tmp_path / "a.html", title="mine")
+    assert "<html" in page.read_text() and "mine" in page.read_text()
+
+
+@pytest.mark.parametrize("model", ["radtan5", "kannala-brandt", "eucm"])
+def test_other_models(detections, board, model):
+    found = deltille.calibrate(detections, board, model)
+    assert found.model == model and found.rms_px < 0.1
+    with pytest.raises(deltille.CalibrationError, match="no model"):
+        deltille.calibrate(detections, board, "none")
+
+
+def test_options(detections, board, calibration):
+    held_out = deltille.calibrate(detections, hold_out=5)
+    assert held_out.held_out_rms_px < 0.05 and len(held_out.views) == 8
+    bent = deltille.calibrate(detections, board, board_shape=True)
+    assert bent.board_shape["bent_mm"] < 0.1
+    plain = deltille.calibrate(detections, board, weights="equal", loss="none")
+    assert plain.common_px is None
+    larger = deltille.calibrate(detections, board, print_scale=1.01)
+    assert larger.views[0].pose.tvec[2] == pytest.approx(1.01 * calibration.views[0].pose.tvec[2], rel=1e-3)
+    known = deltille.calibrate(detections, board, camera=calibration.camera)
+    assert known.model is None and numpy.isnan(known.sd).all()
+    of_grid = deltille.calibrate(detections, grid="deltille", edge_mm=20)
+    numpy.testing.assert_allclose(of_grid.camera.matrix, calibration.camera.matrix, rtol=1e-6)
+
+
+def test_poses(detections, board, calibration, camera):
+    found = deltille.pose(detections[2], camera)
+    assert found and found.why is None and found.warnings == []
+    assert found.residuals.shape == (len(detections[2]), 2)
+    assert found.pose_sd.shape == (6,) and json.loads(found.to_json())["schema"] == "deltille/pose/1"
+    eye = found.pose.origin
+    numpy.testing.assert_allclose(eye, (-90, 200, 380), atol=0.3)
+    nothing = deltille.Detector(board).detect(numpy.zeros((960, 1280), numpy.uint8))
+    lost = deltille.pose(nothing, camera)
+    assert not lost and lost.pose is None and "dark" in lost.why
+    small = deltille.pose(detections[2], deltille.Camera(640, 480, 500))
+    assert not small and "640" in small.why
+
+
+def test_comparisons(detections, board, calibration, tmp_path):
+    halves = [deltille.calibrate(detections[i::2], board) for i in range(2)]
+    same = deltille.compare(*halves, distance_mm=400)
+    assert same.rms_px < 1 and same.chance is not None and same.pixels.shape == same.differences.shape
+    moved = calibration.camera
+    other = deltille.Camera(1280, 960, (1111, 1111), tuple(moved.parameters[2:4]), distortion=moved.parameters[4:].tolist())
+    changed = deltille.compare(calibration, other, region="image")
+    assert changed.rms_px > 1 and changed.is_significant is None and changed.largest_px >= changed.rms_px
+    with pytest.raises(deltille.CalibrationError, match="region"):
+        deltille.compare(calibration, other, region="nowhere")
+
+
+def test_rigs(board, camera, tmp_path):
+    detector = deltille.Detector(board)
+    left_from_right = deltille.Pose((0, 0.1, 0), (-80, 5, 0))
+    eyes = [(0, -50, 420), (300, 60, 330), (-90, 200, 380), (250, 280, 350), (80, -160, 300), (380, 200, 300)]
+    seen = {"left": [], "right": []}
+    for i, eye in enumerate(eyes):
+        pose = deltille.Pose.looking_at(eye, (70, 60, 0))
+        for name, place in (("left", pose), ("right", left_from_right @ pose)):
+            picture, _ = deltille.render(board, camera, place, seed=i)
+            seen[name].append(detector.detect(picture, name=f"{i}.png"))
+    found = deltille.rig(seen)
+    assert list(found.cameras) == ["left", "right"] and found.frames == [str(i) for i in range(6)]
+    numpy.testing.assert_allclose(found.cameras["right"].pose.tvec, left_from_right.tvec, atol=1)
+    assert found.cameras["left"].pose_sd is None and found.cameras["right"].pose_sd.shape == (6,)
+    assert len(found.poses) == 6 and found.pose_sd.shape == (6, 6) and found.rms_px < 0.02
+    path = found.save(tmp_path / "rig.json", residuals=True)
+    again = deltille.Rig.load(path, target=board)
+    assert again.cameras["left"].camera == found.cameras["left"].camera
+    cameras, motions = deltille.compare_rigs(found, again)
+    assert len(cameras) == 2 and cameras[0].rms_px < 1e-9 and motions[0].is_significant is False
+    for form in ("kalibr", "colmap", "colmap-rig"):
+        assert found.save(tmp_path / form, form).stat().st_size > 50
+    assert found.report(tmp_path / "rig.html").exists()
+    with pytest.raises(deltille.CalibrationError, match="at least two"):
+        deltille.rig({"left": seen["left"]})
+    with pytest.raises(deltille.CalibrationError, match="same corners"):
+        deltille.rig({"left": seen["left"], "right": seen["left"]})
+    with pytest.raises(deltille.FileError, match="Rig.load"):
+        deltille.Calibration.load(path)
+
+
+def test_what_cannot_be_calibrated_is_told(detections, board):
+    with pytest.raises(deltille.CalibrationError, match="usable views"):
+        deltille.calibrate(detections[:1], board)
+    with pytest.raises(deltille.CalibrationError):
+        deltille.calibrate([])
+    with pytest.raises(deltille.CalibrationError, match="loss"):
+        deltille.calibrate(detections, loss="l1")
+    with pytest.warns(UserWarning, match="counted once"):
+        deltille.calibrate([*detections, detections[0]])

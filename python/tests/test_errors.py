@@ -1,0 +1,78 @@
+import re
+
+import numpy
+import pytest
+
+import deltille
+from deltille import _core
+
+
+def test_every_setting_that_the_library_names_has_a_keyword(root):
+    """The words of the command line are held against the library by a test of its own."""
+    wording = (root / "src/cli/wording.rs").read_text()
+    named = set(re.findall(r'^    named\("([^"]+)"', wording, re.M))
+    assert named and named == {setting for setting, _ in _core._keywords()}
+
+
+def test_errors_are_of_python_with_the_words_of_the_library(tmp_path):
+    cases = [
+        (deltille.TargetError, ValueError, lambda: deltille.Board(1, 5), "rows: 1 is not between"),
+        (deltille.TargetError, ValueError, lambda: deltille.Board(40, 50, edge_mm=50, paper="A4"), "paper: "),
+        (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5, paper="B9"), ""),
+        (deltille.FamilyError, ValueError, lambda: deltille.Board(4, 5, family="none"), "none"),
+        (deltille.FileError, OSError, lambda: deltille.Target.load(tmp_path / "none.json"), "none.json"),
+        (deltille.TargetError, ValueError, lambda: deltille.Target.from_json("{}"), "schema"),
+        (deltille.DetectionError, ValueError, lambda: deltille.Detector(grid="squares"), "deltille or checker"),
+        (deltille.DetectionError, ValueError, lambda: deltille.Detector(grid="checker", rows=4), "rows and cols"),
+        (deltille.DetectionError, ValueError, lambda: deltille.Detector(grid="checker", tone="x"), "tone"),
+        (deltille.ImageError, ValueError, lambda: deltille.Detector(grid="checker").detect_file(tmp_path / "a.png"), "a.png"),
+        (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).files("doc"), "doc"),
+        (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).files("gltf"), "solid"),
+        (deltille.TargetError, ValueError, lambda: deltille.Board(4, 5).svg(3), "page 3"),
+    ]
+    for kind, base, wrong, words in cases:
+        with pytest.raises(kind) as raised:
+            wrong()
+        assert isinstance(raised.value, deltille.Error) and isinstance(raised.value, base)
+        text = str(raised.value)
+        assert words in text and "::" not in text and "\n" not in text, text
+        assert type(raised.value).__module__ == "deltille"
+
+
+def test_wrong_types_are_type_errors(board):
+    for wrong in [lambda: deltille.Board("a", 5), lambda: deltille.Detector(3), lambda: deltille.calibrate([1]),
+                  lambda: deltille.pose(None, None), lambda: deltille.Board(4, 5, nothing=3),
+                  lambda: deltille.Board(-1, 5), lambda: deltille.compare(1, 2)]:
+        with pytest.raises((TypeError, OverflowError)):
+            wrong()
+
+
+def test_a_mistake_within_is_an_exception_too(board, camera):
+    """No call with odd numbers ends in anything but an exception of this package, or a result."""
+    odd = [0.0, -1.0, 1e300, -1e300, float("nan"), float("inf"), 1e-300]
+    for number in odd:
+        for call in [lambda: deltille.Board(4, 5, edge_mm=number), lambda: deltille.Icosahedron(edge_mm=number),
+                     lambda: deltille.Board(4, 5, tag_border=number), lambda: deltille.Board(4, 5, margin_mm=number),
+                     lambda: deltille.Camera(640, 480, number), lambda: camera.project([[number] * 3]),
+                     lambda: camera.unproject([[number] * 2]), lambda: board.files("png", dpi=number),
+                     lambda: deltille.render(board, camera, eye=(number, 0, 300), blur_px=0.5),
+                     lambda: deltille.Pose((number, 0, 0)), lambda: deltille.Detector(board, ink=number, tone=number),
+                     lambda: deltille.search_family("d16h5", seconds=number if number < 1 else -1)]:
+            try:
+                call()
+            except deltille.Error:
+                pass
+
+
+def test_docstrings_are_there():
+    for name in deltille.__all__:
+        thing = getattr(deltille, name)
+        if name == "__version__":
+            continue
+        assert thing.__doc__, name
+        if isinstance(thing, type) and thing.__module__ == "deltille" and not issubclass(thing, Exception):
+            for part, member in vars(thing).items():
+                if not part.startswith("_"):
+                    assert member.__doc__, f"{name}.{part}"
+    assert re.fullmatch(r"\d+\.\d+\.\d+", deltille.__version__)
+    assert numpy.dtype("u1")

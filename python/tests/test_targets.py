@@ -1,0 +1,92 @@
+import io
+import pickle
+
+import numpy
+import pytest
+
+import deltille
+
+
+def test_a_board_has_corners_and_tags_in_mm():
+    board = deltille.Board(10, 11, edge_mm=20)
+    assert isinstance(board, deltille.Target) and len(board) == 110
+    assert board.corners.shape == (110, 3) and board.corners.dtype == numpy.float64
+    assert board.corner_ids.dtype == numpy.int64 and len(set(board.corner_ids)) == 110
+    x = (board.corner_cols + board.corner_rows / 2) * 20
+    y = board.corner_rows * 20 * 3**0.5 / 2
+    numpy.testing.assert_allclose(board.corners, numpy.stack([x, y, 0 * x], 1), atol=1e-9)
+    assert len(board.tags) == len(board.tag_ids) == 11
+    assert board.tag_centres.shape == (11, 3) and (board.tag_centres[:, 2] == 0).all()
+    assert (board.corner_panels == 0).all() and board.panels == [0]
+    assert board.family.name == "delTag25h7"
+
+
+def test_boards_take_what_the_program_takes(tmp_path):
+    assert deltille.Board(10, 11, paper="A3").corners[-1, 0] > 200
+    assert deltille.Board(10, 11, tags=False).tags == []
+    assert deltille.Board(5, 6, family="d36h9", first_id=100).tag_ids.min() == 100
+    assert deltille.Checkerboard(8, 11, edge_mm=20).tags == []
+    assert deltille.Checkerboard(8, 11, family="aprilTag36h11", tags_in="white").tags
+    assert deltille.Board(4, 5, boards=3).panels == [0, 1, 2]
+
+
+def test_a_target_is_read_back(tmp_path, board):
+    paths = board.save(tmp_path / "made", ["pdf", "svg", "png", "dsc"])
+    assert [path.name for path in paths] == ["desk.json", "desk.pdf", "desk.svg", "desk.png", "desk.dsc"]
+    again = deltille.Target.load(tmp_path / "made/desk.json")
+    assert again == board and again.to_json() == board.to_json()
+    assert deltille.Target.from_json(board.to_json()) == board
+    assert pickle.loads(pickle.dumps(board)) == board
+    for path in paths[1:]:
+        verdict = board.verify(path)
+        assert verdict and verdict.passed and not verdict.findings, str(verdict)
+    assert board.save(tmp_path / "made") == paths[:2], "files of one's own are replaced"
+    (tmp_path / "made/desk.pdf").write_bytes(b"something else")
+    with pytest.raises(deltille.FileError, match="would be lost"):
+        board.save(tmp_path / "made")
+    board.save(tmp_path / "made", force=True)
+
+
+def test_what_is_printed_is_proved_in_memory(board):
+    assert board.pdf().startswith(b"%PDF")
+    assert board.svg().lstrip().startswith("<")
+    assert board.verify()
+    assert board.verify(board.pdf())
+    wrong = deltille.Board(7, 8, edge_mm=20, first_id=50, name="desk")
+    verdict = wrong.verify(board.pdf())
+    assert not verdict and verdict.findings
+    with pytest.raises(deltille.VerifyError):
+        board.verify(b"nothing", name="desk.txt")
+
+
+def test_solids_are_meshes_too(tmp_path, root):
+    solid = deltille.Icosahedron(edge_mm=120)
+    assert len(solid.panels) == 20 and solid.corners.shape[1] == 3
+    assert numpy.ptp(solid.corners[:, 2]) > 100
+    files = solid.save(tmp_path, ["gltf", "stl"])
+    assert files[1].read_bytes().startswith(b"glTF")
+    assert solid.verify(files[1])
+    assert solid.files("obj").keys() == {"icosahedron.obj", "icosahedron.mtl", "icosahedron-texture.png"}
+    (tmp_path / "part.obj").write_bytes(deltille.Tetrahedron().files("obj")["tetrahedron.obj"])
+    part = deltille.Solid(tmp_path / "part.obj", name="part")
+    assert len(part.panels) == 4
+    assert deltille.Octahedron(skeleton=True).files("skeleton")
+    with pytest.raises(deltille.TargetError, match="without skeleton=True"):
+        deltille.Octahedron(wall_mm=3)
+
+
+def test_a_target_is_shown_in_notebooks(board):
+    html = board._repr_html_()
+    assert "<svg" in html and html.endswith("</div>")
+    xml = html[html.index("<svg") : html.rindex("</div>")]
+    import xml.etree.ElementTree as tree
+
+    tree.parse(io.StringIO(xml))
+
+
+def test_targets_by_cameras_that_saw_them_are_measured(detections, board, tmp_path):
+    found = deltille.calibrate(detections, board, measure_target=True)
+    measured = found.measured_target
+    assert measured.is_measured and not board.is_measured
+    off = numpy.abs(measured.corners - board.corners)
+    assert 0 < off.max() < 0.1
