@@ -94,6 +94,8 @@ class Watch(threading.Thread):
         self.kill_when, self.folder, self.count = kill_when, folder, count
         self.killed: int | None = None
         self.memory: dict[int, list[float]] = {}
+        # When it was seen first and last.
+        self.processor: dict[int, tuple[float, float]] = {}
         self.is_over = threading.Event()
 
     def run(self) -> None:
@@ -101,6 +103,9 @@ class Watch(threading.Thread):
             for worker in workers():
                 try:
                     self.memory.setdefault(worker.pid, []).append(worker.memory_info().rss / 1e6)
+                    used = worker.cpu_times()
+                    now = used.user + used.system
+                    self.processor[worker.pid] = (self.processor.get(worker.pid, (now, now))[0], now)
                 except psutil.NoSuchProcess:
                     continue
             if self.kill_when is not None and self.killed is None:
@@ -133,20 +138,26 @@ def workers() -> list[psutil.Process]:
 
 
 def by_ray(folder: Path, shots: Path, board: deltille.Target, count: int, processes: int, kill: bool) -> float:
-    """Seconds for each picture."""
+    """Seconds that it took."""
     shutil.rmtree(folder, ignore_errors=True)
     # Some time passes until the workers are there.
     watch = Watch(0.4 if kill else None, folder, count)
     watch.start()
+    before = psutil.cpu_times()
     begin = time.perf_counter()
     summary = deltille.ray.detect_to(folder, shots, board, concurrency=processes)
     seconds = time.perf_counter() - begin
+    after = psutil.cpu_times()
     watch.is_over.set()
     watch.join()
+    # On a machine that others use, too, this tells what is left of it.
+    busy = sum(getattr(after, kind) - getattr(before, kind) for kind in ("user", "nice", "system"))
+    own = sum(last - first for first, last in watch.processor.values())
     if kill and watch.killed is None:
         sys.exit("no worker was killed: take more pictures")
     what = f"{processes} worker{'s' * (processes > 1)}{', one killed' * kill}"
     print(f"{what}: {seconds:.1f} s, {count / seconds:.0f} pictures/s, {summary}; {watch.words()}", flush=True)
+    print(f"  {own:.0f} s of processors in workers, of {busy:.0f} s of all programs of the machine", flush=True)
     return seconds
 
 
