@@ -50,7 +50,7 @@ from ._detections import opencv_points as _opencv_points
 from ._detections import plot as _plot
 from ._detections import repr_html as _repr_html
 from ._detections import stereo_to_opencv, to_opencv
-from .batch import Failure, detect_many
+from .batch import Failure, detect_many, load_detections
 from .errors import (
     CalibrationError,
     CameraError,
@@ -111,6 +111,7 @@ __all__ = [
     "compare",
     "compare_rigs",
     "detect_many",
+    "load_detections",
     "pose",
     "render",
     "rig",

@@ -9,8 +9,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Optional, Union
 
-from ._core import Detection, Detector, Target
-from .errors import Error
+from ._core import Detection, Detector, Target, _tables
+from .errors import Error, FileError, ImageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Picture: TypeAlias = Union[str, "os.PathLike[str]", bytes, NDArray[Any]]
     Result: TypeAlias = Union[Detection, "Failure"]
 
-__all__ = ["Failure", "detect_many"]
+__all__ = ["Failure", "detect_many", "load_detections"]
 
 
 class Failure:
@@ -106,6 +106,43 @@ def detect_many(
             if isinstance(result, Detection):
                 found[index] = result
     return found
+
+
+def load_detections(
+    path: Union[str, os.PathLike[str]],
+    target: Union[Target, Sequence[Target], None] = None,
+) -> list[Result]:
+    """Detections of many pictures from files.
+
+    Parameters
+    ----------
+    path : path-like
+        A folder of the ``.json`` files that ``deltille detect`` writes, or of its tables in Parquet, as
+        :mod:`deltille.ray` writes them too; or one of the two tables, beside which the other lies.
+    target : Target or sequence of Target, optional
+        What was looked for, from which :attr:`Detection.object_points` come.
+
+    Returns
+    -------
+    list of Detection or Failure
+        In the order of the files' names, of tables in their order. A picture that could not be read when they were
+        made is a :class:`Failure`.
+
+    Raises
+    ------
+    FileError
+        When there are no such files, or one is damaged.
+    """
+    place = Path(path)
+    texts = sorted(place.glob("*.json")) if place.is_dir() else []
+    if texts:
+        return [Detection.load(text, target=target) for text in texts]
+    if place.suffix == ".json":
+        return [Detection.load(place, target=target)]
+    rows = _tables([place], target)
+    if not rows and place.is_dir():
+        raise FileError(f"{place}: no .json or .parquet file in this folder")
+    return [found if found is not None else Failure(image, ImageError(why)) for image, found, why in rows]
 
 
 def _all(

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use deltille::detect::{self, GridCorner};
+use deltille::export::tables::{Picture, folder};
 use deltille::export::{csv, detection, orpc};
 use deltille::limits::Limits;
 use deltille::targets;
@@ -449,4 +450,31 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Targets {
         let all = given.try_iter()?.map(|target| Ok(target?.cast::<Target>()?.get().clone()));
         all.collect::<PyResult<_>>().map(Self)
     }
+}
+
+/// What came of a picture: its name, and its detection or why it could not be read.
+type Row = (String, Option<Detection>, Option<String>);
+
+/// Detections from tables: Parquet files, or the folders that hold them.
+#[pyfunction]
+pub fn _tables(paths: Vec<PathBuf>, targets: Option<Targets>) -> PyResult<Vec<Row>> {
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            files.extend(folder::files(&path).raise(errors::file)?);
+        } else {
+            files.extend(folder::beside(&path).into_iter().filter(|other| !files.contains(other)));
+            files.push(path);
+        }
+    }
+    let targets = targets.map(|targets| targets.0).unwrap_or_default();
+    let row = |picture: Picture| match picture.found {
+        Ok(found) => {
+            let found = Detection { found: Arc::new(found), targets: targets.clone() };
+            (picture.image, Some(found), None)
+        }
+        Err(why) => (picture.image, None, Some(why)),
+    };
+    let read = folder::read(&files, &Limits::default()).raise(errors::file)?;
+    Ok(read.pictures.into_iter().map(row).collect())
 }

@@ -59,7 +59,7 @@ mod _core {
     #[pymodule_export]
     use super::comparison::{Comparison, Located, Motion, compare, compare_rigs, pose_of};
     #[pymodule_export]
-    use super::detection::{_detection, DecodedTag, Detection, Grid, Reason};
+    use super::detection::{_detection, _tables, DecodedTag, Detection, Grid, Reason};
     #[pymodule_export]
     use super::detector::{_detector, Detector};
     #[pymodule_export]

@@ -9,6 +9,7 @@ use clap::ValueEnum;
 use super::limits::FileLimits;
 use super::{tables, target_file};
 use crate::SheetUseError;
+use crate::export::tables::folder;
 use crate::calibrate::{Excluded, PanelPlace, Reason, Reference, Shown, UntaggedGrid, View, views};
 use crate::cli::output::tell;
 use crate::cli::values::whole;
@@ -329,7 +330,7 @@ fn add(
 
 /// The detections of tables, in the order in which their files would be as JSON.
 fn of_tables(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<(String, Detection)>> {
-    let pictures = tables::read(files, limits)?.pictures;
+    let pictures = tables::read(files, limits)?;
     let all = pictures.len();
     let found: Vec<Detection> =
         pictures.into_iter().filter_map(|picture| picture.found.ok()).collect();
@@ -387,7 +388,7 @@ fn places(paths: &[PathBuf]) -> anyhow::Result<Places> {
     let mut named: Vec<PathBuf> = Vec::new();
     for path in paths {
         if path.is_dir() {
-            let files = tables::in_folder(path)?;
+            let files = folder::files(path)?;
             let inside = in_folder(path)?;
             let show = path.display();
             ensure!(
@@ -398,8 +399,8 @@ fn places(paths: &[PathBuf]) -> anyhow::Result<Places> {
             if !files.is_empty() {
                 tables.push(Tables { files, folder: Some(path.clone()) });
             }
-        } else if tables::is_named(path) {
-            let both = [Some(path.clone()), tables::beside(path)];
+        } else if folder::is_named(path) {
+            let both = [Some(path.clone()), folder::beside(path)];
             for file in both.into_iter().flatten() {
                 if !named.contains(&file) {
                     named.push(file);

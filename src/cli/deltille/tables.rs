@@ -1,20 +1,17 @@
 //! Tables of detections in a folder: what is written of a run, and what is read of one.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsStr;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 
 use crate::cli::output::{Overwrite, tell};
 use crate::export::kind::Kind;
 use crate::export::staging::Staging;
-use crate::export::tables::{
-    self, CORNERS, Contents, EXTENSION, PICTURES, Picture, Reader, Writer,
-};
+use crate::export::tables::{CORNERS, EXTENSION, PICTURES, Picture, Writer, folder};
 use crate::limits::Limits;
 use crate::targets::Target;
 use crate::words::counted;
@@ -120,82 +117,14 @@ pub fn are_in(folder: &Path) -> bool {
 pub fn earlier(folder: &Path, limits: &Limits) -> anyhow::Result<Vec<Picture>> {
     let files = files(folder);
     match files.iter().any(|file| file.exists()) {
-        true => Ok(read(&files, limits)?.pictures),
+        true => read(&files, limits),
         false => Ok(Vec::new()),
     }
 }
 
-/// Whether a file is named like a table.
-pub fn is_named(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(EXTENSION))
-}
-
-/// The tables of a folder: files in it, and in folders of the tables' names. A file of corners there has a file of
-/// pictures of the same name, or was left by a run that did not come to write that.
-pub fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let mut files = files_of(folder)?;
-    let [corners, pictures] = [CORNERS, PICTURES].map(|table| folder.join(table));
-    if pictures.is_dir() {
-        let done = files_of(&pictures)?;
-        let names: BTreeSet<&OsStr> = done.iter().filter_map(|file| file.file_name()).collect();
-        if corners.is_dir() {
-            let is_done =
-                |file: &PathBuf| file.file_name().is_some_and(|name| names.contains(name));
-            files.extend(files_of(&corners)?.into_iter().filter(is_done));
-        }
-        files.extend(done);
-    }
-    Ok(files)
-}
-
-/// The files in a folder that are named like tables, in the order of their names.
-fn files_of(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let show = || format!("cannot read {}", folder.display());
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).with_context(show)? {
-        let path = entry.with_context(show)?.path();
-        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        if is_named(&path) && !hidden && path.is_file() {
-            files.push(path);
-        }
-    }
-    files.sort();
-    Ok(files)
-}
-
-/// The file of the other table beside one: `pictures` where it says `corners`, or the other way round.
-pub fn beside(path: &Path) -> Option<PathBuf> {
-    let name = path.file_name()?.to_str()?;
-    let swapped =
-        |from, to| name.contains(from).then(|| path.with_file_name(name.replace(from, to)));
-    let other = swapped(CORNERS, PICTURES).or_else(|| swapped(PICTURES, CORNERS));
-    other.filter(|other| other.is_file())
-}
-
-/// Reads tables from their files.
-pub fn read(files: &[PathBuf], limits: &Limits) -> anyhow::Result<tables::Read> {
-    let mut reader = Reader::new(*limits);
-    let mut contents = Vec::new();
-    for file in files {
-        let content = limits.read(file)?;
-        contents.push(reader.add(content).with_context(|| file.display().to_string())?);
-    }
-    if let Some(first) = files.first() {
-        let lacks = |wanted, name| {
-            let show = first.display();
-            ensure!(
-                contents.contains(&wanted),
-                "{show}: the table of {name} is not beside it: give both, or their folder"
-            );
-            Ok(())
-        };
-        lacks(Contents::Pictures, PICTURES)?;
-        lacks(Contents::Corners, CORNERS)?;
-    }
-    let read = reader.finish().with_context(|| match files {
-        [first, ..] => first.display().to_string(),
-        [] => String::new(),
-    })?;
+/// The pictures of tables, from their files.
+pub fn read(files: &[PathBuf], limits: &Limits) -> anyhow::Result<Vec<Picture>> {
+    let read = folder::read(files, limits)?;
     if read.short > 0 {
         let have = if read.short == 1 { "has" } else { "have" };
         tell!(
@@ -203,5 +132,5 @@ pub fn read(files: &[PathBuf], limits: &Limits) -> anyhow::Result<tables::Read> 
             counted(read.short, "picture")
         );
     }
-    Ok(read)
+    Ok(read.pictures)
 }

@@ -22,6 +22,7 @@
 //! ```
 
 mod column;
+pub mod folder;
 mod pages;
 mod read;
 mod write;
