@@ -137,3 +137,24 @@ def test_a_detection_is_drawn(detections, pictures, tmp_path):
     axes = detections[0].plot(pictures[0], ids=True)
     axes.figure.savefig(tmp_path / "a.png")
     matplotlib.pyplot.close(axes.figure)
+
+
+def test_detections_of_files_and_tables_are_the_same(program, root, tmp_path):
+    photographs = tmp_path / "photographs"
+    photographs.mkdir()
+    (photographs / "cut.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    for name in ["robot-hand-0108.png", "fisheye-0200.png"]:
+        (photographs / name).write_bytes((root / "tests/photographs" / name).read_bytes())
+    for format in ["json", "parquet"]:
+        command = [program, "detect", str(photographs), "--grid", "deltille", "-o", str(tmp_path / format)]
+        assert subprocess.run([*command, "--format", format], capture_output=True).returncode == 1
+    texts = deltille.load_detections(tmp_path / "json")
+    failure, *tables = deltille.load_detections(tmp_path / "parquet")
+    assert failure.image == "cut.png" and isinstance(failure.error, deltille.ImageError)
+    assert [found.image for found in tables] == [found.image for found in texts]
+    for table, text in zip(tables, texts):
+        assert (table.pixels == text.pixels).all() and (table.covariances == text.covariances).all()
+    beside = deltille.load_detections(tmp_path / "parquet" / "corners.parquet")
+    assert [found.image for found in beside] == ["cut.png", *(found.image for found in texts)]
+    with pytest.raises(deltille.FileError, match="no .json or .parquet file"):
+        deltille.load_detections(photographs)
