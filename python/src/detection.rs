@@ -463,7 +463,8 @@ pub fn _tables(paths: Vec<PathBuf>, targets: Option<Targets>) -> PyResult<Vec<Ro
         if path.is_dir() {
             files.extend(folder::files(&path).raise(errors::file)?);
         } else {
-            files.extend(folder::beside(&path).into_iter().filter(|other| !files.contains(other)));
+            let other = folder::beside(&path).filter(|other| !files.contains(other));
+            files.extend(other);
             files.push(path);
         }
     }
