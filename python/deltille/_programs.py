@@ -1,8 +1,12 @@
 """The programs ``deltille`` and ``deltag``: entry points that hand over to the compiled part."""
 
+import signal
 import sys
 
-from ._core import _run
+# Until the program has handlers of its own a signal ends it, and does not wait for Python code that never comes.
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+from ._core import _run  # noqa: E402
 
 __all__ = ["deltag", "deltille"]
 

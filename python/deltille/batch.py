@@ -125,7 +125,7 @@ def load_detections(
     Returns
     -------
     list of Detection or Failure
-        In the order of the files' names, of tables in their order. A picture that could not be read when they were
+        In the order of the files' names, from tables of the pictures'. A picture that could not be read when they were
         made is a :class:`Failure`.
 
     Raises
@@ -139,7 +139,7 @@ def load_detections(
         return [Detection.load(text, target=target) for text in texts]
     if place.suffix == ".json":
         return [Detection.load(place, target=target)]
-    rows = _tables([place], target)
+    rows = sorted(_tables([place], target), key=lambda row: row[0])
     if not rows and place.is_dir():
         raise FileError(f"{place}: no .json or .parquet file in this folder")
     return [found if found is not None else Failure(image, ImageError(why)) for image, found, why in rows]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import os
 import uuid
-from typing import TYPE_CHECKING, Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Callable, Optional, Union
 
 import pyarrow as pa
 import pyarrow.fs as pafs
@@ -171,7 +171,9 @@ def detect(
     """
     if per not in ("corner", "picture", "both"):
         raise ValueError('per: give "corner", "picture" or "both"')
-    return _detect(pictures, frozenset(), target, per, concurrency, batch_size, filesystem, accept_damaged, options)[0]
+    found: ray.data.Dataset
+    found, _ = _detect(pictures, frozenset(), target, per, concurrency, batch_size, filesystem, accept_damaged, options)
+    return found
 
 
 def detect_to(
@@ -290,7 +292,8 @@ def _detect(
         dataset = ray.data.from_arrow([pa.table({"path": pa.array(block, pa.string())}) for block in blocks])
         there = frozenset()
     if concurrency is None:
-        processors = max(1, int(ray.cluster_resources().get("CPU", 1)))
+        resources: Callable[[], dict[str, float]] = ray.cluster_resources
+        processors = max(1, int(resources().get("CPU", 1)))
         # Whatever makes a dataset needs processors, too, and would wait for them for ever.
         concurrency = processors if pictures is not dataset else (1, max(1, processors - 1))
     least, most = concurrency if isinstance(concurrency, tuple) else (concurrency, concurrency)
@@ -484,7 +487,7 @@ def _corners(image: str, found: "deltille.Detection") -> pa.Table:
     return pa.table(arrays, schema=CORNERS)
 
 
-class _Tables(Datasink):
+class _Tables(Datasink[Any]):
     """Writes the rows of a block of pictures as a file of corners and then one of pictures, of the same name.
 
     A picture counts as done once it is among the pictures. A file of corners without its pictures is ignored by

@@ -40,7 +40,7 @@ def test_signals_end_the_program_as_the_native_one(tmp_path):
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         command = [script("deltag"), "gen-family", "d36h9", "--time", "60", "--from-nothing", "-o", "a.json"]
         process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
-        time.sleep(1.0)
+        time.sleep(3.0)
         start = time.monotonic()
         process.send_signal(number)
         process.communicate(timeout=20)
@@ -48,7 +48,7 @@ def test_signals_end_the_program_as_the_native_one(tmp_path):
         (tmp_path / "a.json").unlink(missing_ok=True)
     command = [script("deltille"), "detect", "--grid", "deltille", "-"]
     process = subprocess.Popen(command, cwd=tmp_path, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
-    time.sleep(0.5)
+    time.sleep(2.0)
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=5) == 130
     process.stdin.close()

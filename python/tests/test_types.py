@@ -1,5 +1,6 @@
 """Stubs and module agree, and a user's script is clean."""
 
+import importlib.util
 import shutil
 import subprocess
 import sys
@@ -82,5 +83,9 @@ def test_stubs_and_module_agree(tmp_path):
 def test_the_package_is_clean_under_mypy(tmp_path):
     pytest.importorskip("mypy")
     command = [sys.executable, "-m", "mypy", "--strict", "-p", "deltille"]
+    # What the extras bring may have no types, or not be there.
+    command += ["--ignore-missing-imports"]
+    if importlib.util.find_spec("ray") is None:
+        command += ["--allow-subclassing-any"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
