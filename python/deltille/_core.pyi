@@ -1,10 +1,11 @@
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, final
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
 
+from .batch import Failure
 from .typing import (
     AnyPath,
     BoardShape,
@@ -109,7 +110,7 @@ class Target:
     def save(
         self,
         folder: AnyPath,
-        formats: Sequence[TargetFormat] = ...,
+        formats: TargetFormat | Sequence[TargetFormat] = ...,
         *,
         dpi: float = 300.0,
         texture_dpi: float | None = None,
@@ -709,7 +710,7 @@ class Rig:
     def report(self, path: AnyPath, *, title: str | None = None, force: bool = False) -> Path: ...
 
 def calibrate(
-    detections: Sequence[Detection],
+    detections: Iterable[Detection | Failure],
     target: Target | Sequence[Target] | None = None,
     model: str = "radtan",
     *,
@@ -729,7 +730,7 @@ def calibrate(
     names: Sequence[str] | None = None,
 ) -> Calibration: ...
 def rig(
-    cameras: Mapping[str, Sequence[Detection]],
+    cameras: Mapping[str, Sequence[Detection | Failure]],
     target: Target | Sequence[Target] | None = None,
     model: str = "radtan",
     *,

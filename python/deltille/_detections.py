@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ._core import Detection
+    from .batch import Failure
 
     Points = NDArray[numpy.float32]
 
@@ -40,13 +41,14 @@ def opencv_points(self: Detection) -> tuple[Points, Points]:
 
 
 def to_opencv(
-    detections: Sequence[Detection], *, least_corners: int = 6
+    detections: Sequence[Detection | Failure], *, least_corners: int = 6
 ) -> tuple[list[Points], list[Points]]:
     """Corners with labels of many pictures, as ``cv2.calibrateCamera`` takes them.
 
     Parameters
     ----------
     detections : sequence of Detection
+        What could not be read is passed over.
     least_corners : int, optional
         Pictures with fewer corners are left out.
 
@@ -57,7 +59,7 @@ def to_opencv(
     image_points : list of ndarray of N × 2, float32
         Positions, px.
     """
-    points = [opencv_points(detection) for detection in detections]
+    points = [opencv_points(detection) for detection in detections if detection.error is None]
     points = [(objects, pixels) for objects, pixels in points if len(objects) >= least_corners]
     return [objects for objects, _ in points], [pixels for _, pixels in points]
 

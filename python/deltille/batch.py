@@ -82,6 +82,8 @@ def detect_many(
         In the order of the pictures. A picture that cannot be read is a :class:`Failure`, which is false, has no
         corners, and an attribute ``error``; of a :class:`Detection` the attribute is ``None``.
     """
+    if isinstance(pictures, (str, bytes, os.PathLike)) or hasattr(pictures, "shape"):
+        raise TypeError("pictures: give a list of them, [picture]")
     detector = target if isinstance(target, Detector) else Detector(target)
     count = workers if workers is not None else (os.cpu_count() or 1)
     if count < 1:

@@ -9,6 +9,7 @@ that looks at them, which is one thread. What Ray does when a process or a machi
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import uuid
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
     Targets: TypeAlias = Union["deltille.Target", Sequence["deltille.Target"]]
 
 __all__ = ["CORNERS", "PICTURES", "Summary", "detect", "detect_to", "done"]
+
+#: What was asked of a table's pictures, in its metadata.
+ASKED = b"deltille.asked"
 
 #: Columns of the table of corners.
 CORNERS = pa.schema(
@@ -206,8 +210,20 @@ def detect_to(
     Returns
     -------
     Summary
+
+    Raises
+    ------
+    deltille.DetectionError
+        Where the folder has tables of another target or of other options.
     """
     to, root = _place(folder)
+    asked = _asked(target, {**options, "accept_damaged": accept_damaged})
+    for path in _files(to, f"{root}/pictures")[:1]:
+        with to.open_input_file(path) as file:
+            known = (pq.read_schema(file).metadata or {}).get(ASKED, asked)
+        if known != asked:
+            what = "what stands there was looked at for another target, or with other options: give another folder"
+            raise deltille.DetectionError(f"{folder}: {what}")
     _remove_halves(to, root)
     there = done(folder)
     dataset, skipped = _detect(
@@ -215,7 +231,7 @@ def detect_to(
     )
     if dataset is None:
         return Summary(0, 0, 0, skipped)
-    sink = _Tables(to, root, pictures_per_file)
+    sink = _Tables(to, root, pictures_per_file, asked)
     # The processors are taken by those that look at pictures, who would wait for ever for those that write.
     dataset.write_datasink(sink, ray_remote_args={"num_cpus": 0}, concurrency=2)
     return Summary(*sink.counts, skipped)
@@ -229,6 +245,13 @@ def done(folder: Union[str, "os.PathLike[str]"]) -> frozenset[str]:
         with to.open_input_file(path) as file:
             names.update(pq.read_table(file, columns=["image"])["image"].to_pylist())
     return frozenset(names)
+
+
+def _asked(target: Optional[Targets], options: dict[str, Any]) -> bytes:
+    """What tells pictures that were looked at for one target, with one set of options, from others."""
+    targets = [] if target is None else [target] if isinstance(target, deltille.Target) else list(target)
+    asked = [[one.to_json() for one in targets], sorted((name, str(value)) for name, value in options.items())]
+    return hashlib.sha256(json.dumps(asked).encode()).hexdigest().encode()
 
 
 def _place(path: Union[str, "os.PathLike[str]"]) -> tuple[pafs.FileSystem, str]:
@@ -494,10 +517,11 @@ class _Tables(Datasink[Any]):
     whoever reads the folder, and removed by the next run.
     """
 
-    def __init__(self, filesystem: pafs.FileSystem, root: str, pictures_per_file: int) -> None:
+    def __init__(self, filesystem: pafs.FileSystem, root: str, pictures_per_file: int, asked: bytes) -> None:
         self.filesystem = filesystem
         self.root = root
         self.pictures_per_file = pictures_per_file
+        self.asked = asked
         self.run = uuid.uuid4().hex[:12]
         self.counts = (0, 0, 0)
 
@@ -512,6 +536,7 @@ class _Tables(Datasink[Any]):
             return (0, 0, 0)
         both = pa.concat_tables(tables, promote_options="permissive").combine_chunks()
         pictures = both.select(PICTURES.names).cast(PICTURES)
+        pictures = pictures.replace_schema_metadata({**(PICTURES.metadata or {}), ASKED: self.asked})
         lists = both["found"].combine_chunks()
         values = lists.flatten()
         image = pictures["image"].combine_chunks().take(pa.compute.list_parent_indices(lists))

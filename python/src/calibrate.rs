@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::calibration::{Calibration, Rig, calibration};
 use crate::camera::Camera;
-use crate::detection::{Detection, Targets};
+use crate::detection::{Detection, Results, Targets};
 use crate::errors::{self, Raise, raised};
 use crate::solving::{How, ModelChoice, OneCamera, PrintScale, Seen, named, solve};
 
@@ -69,7 +69,7 @@ use crate::solving::{How, ModelChoice, OneCamera, PrintScale, Seen, named, solve
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn calibrate(
     py: Python<'_>,
-    detections: Vec<PyRef<'_, Detection>>,
+    detections: Results<'_>,
     target: Option<Targets>,
     model: &str,
     camera: Option<PyRef<'_, Camera>>,
@@ -97,10 +97,11 @@ pub fn calibrate(
         };
         how.sheet = sheet.map_err(wrong)?;
     }
-    let target = target.or_else(|| of_detections(&detections, grid.is_some()));
+    let target = target.or_else(|| of_detections(&detections.all, grid.is_some()));
     let seen = Seen::of(target, grid, [rows, cols], edge_mm)?;
     let model = ModelChoice::of(model)?;
-    let detections = named(py, &detections, names)?;
+    let names = detections.names(names);
+    let detections = named(py, &detections.all, names)?;
     let known = camera.map(|camera| camera.0.clone());
     let one = OneCamera { name: "camera".to_owned(), detections, known };
     let solved = solve(py, seen, vec![one], model, how)?;
@@ -175,10 +176,10 @@ pub fn rig(
         let name: String = name.extract()?;
         targets::Name::new(&name)
             .map_err(|error| raised::CalibrationError::new_err(errors::told(&error)))?;
-        let detections: Vec<PyRef<'_, Detection>> = detections.extract()?;
-        target = target.or_else(|| of_detections(&detections, false));
+        let detections: Results<'_> = detections.extract()?;
+        target = target.or_else(|| of_detections(&detections.all, false));
         let known = known.remove(&name).map(|camera| camera.0.clone());
-        let detections = named(py, &detections, None)?;
+        let detections = named(py, &detections.all, None)?;
         let is_same = |one: &deltille::detect::Detection, other: &deltille::detect::Detection| {
             !one.grids.is_empty() && one.grids == other.grids
         };

@@ -30,6 +30,11 @@ impl CalibratedCamera {
     pub fn estimate(&self) -> &CameraEstimate {
         &self.solved.estimate.cameras[self.index]
     }
+
+    /// A figure of the file that it was read from.
+    fn in_file(&self, figure: &str) -> Option<f64> {
+        self.solved.in_file(Some(self.index))?[figure].as_f64()
+    }
 }
 
 /// Where deviations come from, by name.
@@ -111,19 +116,25 @@ impl CalibratedCamera {
     /// The same of the corners that are no outliers, px.
     #[getter]
     fn inlier_rms_px(&self) -> f64 {
-        self.estimate().inlier_rms_px()
+        self.in_file("inlier_rms_px").unwrap_or_else(|| self.estimate().inlier_rms_px())
     }
 
     /// How many corners took part.
     #[getter]
     fn corner_count(&self) -> usize {
-        self.estimate().corner_count()
+        match self.in_file("corners") {
+            Some(count) => count as usize,
+            None => self.estimate().corner_count(),
+        }
     }
 
     /// How many corners are outliers.
     #[getter]
     fn outlier_count(&self) -> usize {
-        self.estimate().outlier_count()
+        match self.in_file("outliers") {
+            Some(count) => count as usize,
+            None => self.estimate().outlier_count(),
+        }
     }
 
     /// Where the camera is on the rig: camera from rig; of a single camera the identity.

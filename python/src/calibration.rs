@@ -58,24 +58,33 @@ macro_rules! whole {
                     corners: out.corners,
                     reason: errors::told(&out.reason),
                 };
+                if let Some(file) = $solved.in_file(None) {
+                    let all = file["excluded"].as_array().map_or(&[][..], Vec::as_slice);
+                    return all.iter().map(Excluded::read).collect();
+                }
                 $solved.estimate.excluded.iter().map(one).collect()
             }
 
             /// A-posteriori standard deviation of a coordinate, by whose square covariances are scaled.
             #[getter]
             fn sigma($self: $kind) -> f64 {
-                $solved.estimate.sigma
+                let file = $solved.in_file(None).and_then(|file| file["sigma"].as_f64());
+                file.unwrap_or($solved.estimate.sigma)
             }
 
             /// The deviation that was added to that of every corner, px; ``None`` with equal weights.
             #[getter]
             fn common_px($self: $kind) -> Option<f64> {
-                $solved.estimate.common_px
+                let file = $solved.in_file(None).and_then(|file| file["common_px"].as_f64());
+                file.or($solved.estimate.common_px)
             }
 
             /// Root mean square error of a coordinate in what was held out, px; ``None`` where nothing was.
             #[getter]
             fn held_out_rms_px($self: $kind) -> Option<f64> {
+                if let Some(file) = $solved.in_file(None) {
+                    return file["held_out"]["rms_px"].as_f64();
+                }
                 $solved.estimate.held_out.as_ref().map(|test| test.rms_px)
             }
 
@@ -130,6 +139,10 @@ macro_rules! whole {
                 force: bool,
             ) -> PyResult<PathBuf> {
                 let solved = $solved.clone();
+                if !solved.has_corners() {
+                    let what = "a page needs the corners: save with residuals=True, and load with the target";
+                    return Err(errors::calibration(what.to_owned()));
+                }
                 let usual = if $is_rig { "rig" } else { "camera" };
                 let title = title.unwrap_or(usual).to_owned();
                 let page = unlocked(py, move || {
@@ -196,6 +209,7 @@ impl Calibration {
         let text = match format {
             "json" => {
                 let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
+                check_listed(&own.solved, residuals)?;
                 own.solved.json(false, listed)
             }
             _ => {
@@ -288,7 +302,8 @@ impl Rig {
     /// Root mean square error of a coordinate over all corners, px.
     #[getter]
     fn rms_px(&self) -> f64 {
-        self.solved.estimate.rms_px
+        let file = self.solved.in_file(None).and_then(|file| file["rms_px"].as_f64());
+        file.unwrap_or(self.solved.estimate.rms_px)
     }
 
     /// The targets with their panels where they were found, where that was asked for.
@@ -359,6 +374,15 @@ impl Rig {
 }
 
 /// A calibration or rig of a text.
+/// Whether corners can be listed where they are asked for.
+fn check_listed(solved: &Solved, residuals: bool) -> PyResult<()> {
+    if residuals && !solved.has_corners() {
+        let what = "residuals: the file that this was loaded from has none: save them where it was calibrated";
+        return Err(errors::calibration(what.to_owned()));
+    }
+    Ok(())
+}
+
 fn of_text(text: &str, targets: Vec<targets::Target>) -> Result<Solved, saved::SavedError> {
     let estimate: Estimate = match targets.as_slice() {
         [] => {
@@ -372,7 +396,7 @@ fn of_text(text: &str, targets: Vec<targets::Target>) -> Result<Solved, saved::S
     };
     let model = estimate.cameras.first().and_then(|camera| camera.model);
     let model = model.map_or("fixed".to_owned(), |model| model.to_string());
-    Ok(Solved::read(estimate, targets, model))
+    Ok(Solved::read(estimate, targets, model, text))
 }
 
 fn read(path: &std::path::Path, target: Option<Targets>, is_rig: bool) -> PyResult<Solved> {
@@ -381,6 +405,12 @@ fn read(path: &std::path::Path, target: Option<Targets>, is_rig: bool) -> PyResu
     let targets = targets.iter().map(|target| (*target.target).clone()).collect();
     let wrong = |what: String| raised::FileError::new_err(format!("{}: {what}", path.display()));
     let solved = of_text(&text, targets).map_err(|error| wrong(errors::told(&error)))?;
+    let is_of_rig = solved.in_file(None).is_some_and(|file| file.get("cameras").is_some());
+    if is_rig && !is_of_rig {
+        return Err(wrong(
+            "this is a calibration of one camera: read it by Calibration.load".to_owned(),
+        ));
+    }
     if !is_rig && solved.estimate.cameras.len() != 1 {
         return Err(wrong("this is a rig: read it by Rig.load".to_owned()));
     }

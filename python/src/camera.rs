@@ -50,14 +50,14 @@ enum Focal {
 #[pymethods]
 impl Camera {
     #[new]
-    #[pyo3(signature = (width, height, focal_px, centre_px = None, *, model = "pinhole", distortion = Vec::new()))]
+    #[pyo3(signature = (width, height, focal_px, centre_px = None, *, model = "pinhole", distortion = Numbers(Vec::new())))]
     fn new(
         width: u32,
         height: u32,
         focal_px: Focal,
         centre_px: Option<[f64; 2]>,
         model: &str,
-        distortion: Vec<f64>,
+        distortion: Numbers,
     ) -> PyResult<Self> {
         let focal = match focal_px {
             Focal::One(both) => [both; 2],
@@ -66,7 +66,7 @@ impl Camera {
         let middle = [width, height].map(|side| (f64::from(side) - 1.0) / 2.0);
         let text = json!({
             "width": width, "height": height, "focal_px": focal,
-            "centre_px": centre_px.unwrap_or(middle), "model": model, "distortion": distortion,
+            "centre_px": centre_px.unwrap_or(middle), "model": model, "distortion": distortion.0,
         });
         camera::Camera::from_yaml(&text.to_string()).map(Self).raise(errors::camera)
     }
@@ -313,4 +313,19 @@ pub fn save_text(path: PathBuf, text: String, force: bool) -> PyResult<PathBuf> 
     let files = [(name.to_string_lossy().into_owned(), text.into_bytes())];
     write_set(&folder, &files, force).raise(errors::file)?;
     Ok(path)
+}
+
+/// Numbers in a row, also where an array has them in several dimensions, as OpenCV's coefficients.
+pub struct Numbers(pub Vec<f64>);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Numbers {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let flat = match given.hasattr("ravel")? {
+            true => given.call_method0("ravel")?,
+            false => given.to_owned(),
+        };
+        flat.extract().map(Self)
+    }
 }

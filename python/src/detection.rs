@@ -10,6 +10,7 @@ use deltille::export::{csv, detection, orpc};
 use deltille::limits::Limits;
 use deltille::targets;
 use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::arrays;
@@ -117,6 +118,28 @@ impl Detection {
             None => self.targets.first(),
         };
         found.map(|found| &*found.target)
+    }
+
+    /// The same, where its labels are those of its targets: of others they would be places that were never seen.
+    fn checked(self) -> PyResult<Self> {
+        for grid in &self.found.grids {
+            let Some(target) = self.target_of(grid) else { continue };
+            let panel = grid.panel.and_then(|id| target.panels.iter().find(|panel| panel.id == id));
+            let place = |id: u32| {
+                let corner = panel?.corners.iter().find(|corner| corner.id == id)?;
+                Some((corner.row, corner.col))
+            };
+            for corner in &grid.corners {
+                let Some(id) = corner.id else { continue };
+                if place(id) != Some((corner.row, corner.col)) {
+                    return Err(errors::detection(format!(
+                        "corner {id} in row {}, column {} is not on {}: give the target that was looked for",
+                        corner.row, corner.col, target.name
+                    )));
+                }
+            }
+        }
+        Ok(self)
     }
 
     /// Places of the corners of a grid on their target, mm.
@@ -277,7 +300,7 @@ impl Detection {
     #[pyo3(signature = (text, *, target = None))]
     fn from_json(text: &str, target: Option<Targets>) -> PyResult<Self> {
         let found = Arc::new(detection::read(text).raise(errors::detection)?);
-        Ok(Self { found, targets: target.map(|targets| targets.0).unwrap_or_default() })
+        Self { found, targets: target.map(|targets| targets.0).unwrap_or_default() }.checked()
     }
 
     /// The text that ``deltille detect`` writes.
@@ -472,10 +495,53 @@ pub fn _tables(paths: Vec<PathBuf>, targets: Option<Targets>) -> PyResult<Vec<Ro
     let row = |picture: Picture| match picture.found {
         Ok(found) => {
             let found = Detection { found: Arc::new(found), targets: targets.clone() };
-            (picture.image, Some(found), None)
+            Ok((picture.image, Some(found.checked()?), None))
         }
-        Err(why) => (picture.image, None, Some(why)),
+        Err(why) => Ok((picture.image, None, Some(why))),
     };
     let read = folder::read(&files, &Limits::default()).raise(errors::file)?;
-    Ok(read.pictures.into_iter().map(row).collect())
+    read.pictures.into_iter().map(row).collect()
+}
+
+/// What `detect_many` gives, without the pictures that could not be read.
+pub struct Results<'py> {
+    pub all: Vec<PyRef<'py, Detection>>,
+    is_read: Vec<bool>,
+}
+
+impl Results<'_> {
+    /// The names of those that were read, of names of all.
+    pub fn names(&self, names: Option<Vec<String>>) -> Option<Vec<String>> {
+        let names = names?;
+        if names.len() != self.is_read.len() {
+            return Some(names);
+        }
+        let read = names.into_iter().zip(&self.is_read).filter(|(_, is_read)| **is_read);
+        Some(read.map(|(name, _)| name).collect())
+    }
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Results<'py> {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let wrong = |what: String| PyTypeError::new_err(format!("detections: {what}"));
+        if given.cast::<Detection>().is_ok() {
+            return Err(wrong("give a list of them, [detection]".to_owned()));
+        }
+        let (mut all, mut is_read) = (Vec::new(), Vec::new());
+        for one in given.try_iter()? {
+            let one = one?;
+            if let Ok(found) = one.cast::<Detection>() {
+                all.push(found.clone().borrow());
+                is_read.push(true);
+            } else if one.getattr("error").is_ok_and(|error| !error.is_none()) {
+                is_read.push(false);
+            } else {
+                let kind = one.get_type().qualname()?;
+                return Err(wrong(format!("{kind} is no Detection")));
+            }
+        }
+        Ok(Self { all, is_read })
+    }
 }

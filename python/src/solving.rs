@@ -222,11 +222,19 @@ pub struct Solved {
     pub models: Vec<Vec<Candidate>>,
     pub targets: Vec<targets::Target>,
     pub model: String,
+    /// The file that it was read from, and what that says.
+    pub file: Option<(String, Value)>,
 }
 
 impl Solved {
     /// One that was read from a file.
-    pub fn read(estimate: Estimate, targets: Vec<targets::Target>, model: String) -> Self {
+    pub fn read(
+        estimate: Estimate,
+        targets: Vec<targets::Target>,
+        model: String,
+        text: &str,
+    ) -> Self {
+        let file = serde_json::from_str(text).ok().map(|value| (text.to_owned(), value));
         let (diagnoses, models) = (Vec::new(), Vec::new());
         Self {
             estimate,
@@ -236,11 +244,26 @@ impl Solved {
             models,
             targets,
             model,
+            file,
         }
+    }
+
+    /// What the file says that it was read from, of a camera where it has several.
+    pub fn in_file(&self, camera: Option<usize>) -> Option<&Value> {
+        let (_, whole) = self.file.as_ref()?;
+        Some(camera.and_then(|camera| whole["cameras"].get(camera)).unwrap_or(whole))
+    }
+
+    /// Whether the corners that it comes from are known.
+    pub fn has_corners(&self) -> bool {
+        self.estimate.cameras.iter().any(|camera| camera.corner_count() > 0)
     }
 
     /// What the programs write of it.
     pub fn json(&self, is_rig: bool, residuals: Residuals) -> String {
+        if let Some((text, _)) = &self.file {
+            return text.clone();
+        }
         let Self { estimate, diagnoses, print, .. } = self;
         match is_rig {
             true => rig::write(estimate, diagnoses, &self.model, *print, residuals),
@@ -250,6 +273,19 @@ impl Solved {
 
     /// What is said of it, as plain data with a sentence each.
     pub fn said(&self) -> Vec<(Value, bool)> {
+        if let Some(file) = self.in_file(None) {
+            let records = file["diagnoses"].as_array().cloned().unwrap_or_default();
+            let is_failure = |record: &Value| {
+                matches!(
+                    record["kind"].as_str(),
+                    Some("foreign_camera" | "absurd_fit" | "many_left_out")
+                )
+            };
+            return records
+                .into_iter()
+                .map(|record| (record.clone(), is_failure(&record)))
+                .collect();
+        }
         let is_rig = self.estimate.cameras.len() != 1;
         let file: Value =
             serde_json::from_str(&self.json(is_rig, Residuals::LeftOut)).unwrap_or_default();
@@ -362,5 +398,6 @@ pub fn solve(
         Ok(Seen::Grid(grid)) => grid.target("board").and_then(Result::ok).into_iter().collect(),
         Err(shared) => shared.targets().to_vec(),
     };
-    Ok(Solved { estimate, diagnoses, print, stated, models, targets, model: model.name() })
+    let model = model.name();
+    Ok(Solved { estimate, diagnoses, print, stated, models, targets, model, file: None })
 }

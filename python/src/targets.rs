@@ -259,12 +259,12 @@ impl Target {
     /// -------
     /// list of pathlib.Path
     ///     The files, the description first.
-    #[pyo3(signature = (folder, formats = vec!["pdf".to_owned()], *, dpi = 300.0, texture_dpi = None, force = false))]
+    #[pyo3(signature = (folder, formats = Formats::One("pdf".to_owned()), *, dpi = 300.0, texture_dpi = None, force = false))]
     fn save(
         &self,
         py: Python<'_>,
         folder: PathBuf,
-        formats: Vec<String>,
+        formats: Formats,
         dpi: f64,
         texture_dpi: Option<f64>,
         force: bool,
@@ -272,6 +272,7 @@ impl Target {
         let making = making(dpi, texture_dpi)?;
         unlocked(py, || {
             let mut files = self.made("json", making)?;
+            let formats = formats.into_vec();
             for format in formats.iter().filter(|format| *format != "json") {
                 files.extend(self.made(format, making)?);
             }
@@ -408,5 +409,21 @@ pub struct Tag {
 impl Tag {
     fn __repr__(&self) -> String {
         format!("Tag(id={}, panel={}, row={}, col={})", self.id, self.panel, self.row, self.col)
+    }
+}
+
+/// One format, or several.
+#[derive(FromPyObject)]
+pub enum Formats {
+    One(String),
+    Many(Vec<String>),
+}
+
+impl Formats {
+    fn into_vec(self) -> Vec<String> {
+        match self {
+            Self::One(format) => vec![format],
+            Self::Many(formats) => formats,
+        }
     }
 }

@@ -56,6 +56,22 @@ impl Diagnosis {
     }
 }
 
+impl Excluded {
+    /// As a file has it.
+    pub fn read(record: &serde_json::Value) -> Self {
+        let text = |field: &str| record[field].as_str().map(str::to_owned);
+        let number = |field: &str| record[field].as_u64();
+        Self {
+            view: text("view").unwrap_or_default(),
+            camera: text("camera"),
+            image: text("image").unwrap_or_default(),
+            panel: number("panel").map(|panel| panel as u32),
+            corners: number("corners").unwrap_or(0) as usize,
+            reason: errors::told(&text("reason").unwrap_or_default()),
+        }
+    }
+}
+
 /// A view, frame or panel that took no part, and why.
 #[pyclass(frozen, get_all, module = "deltille")]
 pub struct Excluded {

@@ -1,4 +1,5 @@
 import json
+import pickle
 import subprocess
 
 import numpy
@@ -162,3 +163,41 @@ def test_what_cannot_be_calibrated_is_told(detections, board):
         deltille.calibrate(detections, loss="l1")
     with pytest.warns(UserWarning, match="counted once"):
         deltille.calibrate([*detections, detections[0]])
+
+
+def test_what_is_loaded_says_what_was_saved(detections, board, tmp_path):
+    found = deltille.calibrate(detections, board, hold_out=5)
+    found.save(tmp_path / "plain.json")
+    found.save(tmp_path / "listed.json", residuals=True)
+    figures = ("corner_count", "outlier_count", "inlier_rms_px", "rms_px", "sigma", "common_px", "held_out_rms_px")
+    loaded = [deltille.Calibration.load(tmp_path / f"{name}.json", target=target)
+              for name in ("plain", "listed") for target in (None, board)]
+    for one in [*loaded, pickle.loads(pickle.dumps(found))]:
+        assert [getattr(one, figure) for figure in figures] == [getattr(found, figure) for figure in figures]
+        assert [str(said) for said in one.diagnoses] == [str(said) for said in found.diagnoses]
+    loaded[0].save(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_text() == (tmp_path / "plain.json").read_text()
+    loaded[3].report(tmp_path / "page.html")
+    with pytest.raises(deltille.CalibrationError, match="residuals=True"):
+        loaded[0].report(tmp_path / "empty.html")
+    with pytest.raises(deltille.FileError, match=r"Calibration\.load"):
+        deltille.Rig.load(tmp_path / "plain.json")
+
+
+def test_pictures_that_cannot_be_read_are_passed_over(pictures, board):
+    found = deltille.detect_many([*pictures, b"no picture"], board)
+    assert found[-1].error and not found[-1]
+    names = [f"view{i}" for i in range(len(found))]
+    calibration = deltille.calibrate(found, board, names=names)
+    assert calibration.views[-1].name == names[len(pictures) - 1]
+    assert len(deltille.to_opencv(found)[0]) == len(pictures)
+    with pytest.raises(TypeError, match="give a list"):
+        deltille.calibrate(found[0], board)
+    with pytest.raises(TypeError, match="give a list"):
+        deltille.detect_many("photograph.png", board)
+
+
+def test_labels_of_another_target_are_refused(detections):
+    other = deltille.Board(9, 8, edge_mm=20)
+    with pytest.raises(deltille.DetectionError, match="give the target that was looked for"):
+        deltille.Detection.from_json(detections[0].to_json(), target=other)

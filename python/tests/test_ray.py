@@ -156,3 +156,18 @@ def test_both_tables_are_one_dataset(shots, target):
     both = deltille.ray.detect(shots / "a", target, per="both").to_arrow_refs()
     table = pa.concat_tables(ray.get(both), promote_options="permissive")
     assert table["corners"].to_pylist() == [len(row) for row in table["found"].to_pylist()]
+
+
+def test_a_folder_of_another_target_is_refused(tmp_path):
+    board, other = deltille.Board(5, 6, edge_mm=20), deltille.Board(5, 7, edge_mm=20)
+    camera = deltille.Camera(320, 240, 300)
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    picture, _ = deltille.render(board, camera)
+    (pictures / "one.pgm").write_bytes(b"P5 320 240 255\n" + picture.tobytes())
+    found = tmp_path / "found"
+    assert deltille.ray.detect_to(found, pictures, board).pictures == 1
+    assert deltille.ray.detect_to(found, pictures, board).skipped == 1
+    for changed in ({"target": other}, {"target": board, "tone": "linear"}):
+        with pytest.raises(deltille.DetectionError, match="give another folder"):
+            deltille.ray.detect_to(found, pictures, **changed)
