@@ -163,7 +163,7 @@ def test_a_folder_of_another_target_is_refused(tmp_path):
     camera = deltille.Camera(320, 240, 300)
     pictures = tmp_path / "pictures"
     pictures.mkdir()
-    picture, _ = deltille.render(board, camera)
+    picture, _ = deltille.render(board, camera, eye=(50, 40, 250))
     (pictures / "one.pgm").write_bytes(b"P5 320 240 255\n" + picture.tobytes())
     found = tmp_path / "found"
     assert deltille.ray.detect_to(found, pictures, board).pictures == 1
