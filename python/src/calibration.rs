@@ -106,15 +106,14 @@ macro_rules! whole {
             /// Parameters
             /// ----------
             /// residuals : bool, optional
-            ///     Whether every corner is listed.
+            ///     Whether every corner is listed; what was loaded is written as it was.
             ///
             /// Returns
             /// -------
             /// str
             #[pyo3(signature = (*, residuals = false))]
-            fn to_json($self: $kind, residuals: bool) -> String {
-                let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
-                $solved.json($is_rig, listed)
+            fn to_json($self: $kind, residuals: bool) -> PyResult<String> {
+                text_of(&$solved, $is_rig, residuals)
             }
 
             /// Writes a page that shows what the calibration is worth, and what would make it better.
@@ -139,8 +138,9 @@ macro_rules! whole {
                 force: bool,
             ) -> PyResult<PathBuf> {
                 let solved = $solved.clone();
-                if !solved.has_corners() {
-                    let what = "a page needs the corners: save with residuals=True, and load with the target";
+                if !solved.is_whole() {
+                    let what = "a page needs the corners and all that is said of them: make it where the camera is \
+                                calibrated, or save with residuals=True and load with the target what has no diagnosis";
                     return Err(errors::calibration(what.to_owned()));
                 }
                 let usual = if $is_rig { "rig" } else { "camera" };
@@ -207,11 +207,7 @@ impl Calibration {
     ) -> PyResult<PathBuf> {
         let own = slf.as_super();
         let text = match format {
-            "json" => {
-                let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
-                check_listed(&own.solved, residuals)?;
-                own.solved.json(false, listed)
-            }
+            "json" => text_of(&own.solved, false, residuals)?,
             _ => {
                 let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                 let camera = own.estimate();
@@ -344,10 +340,7 @@ impl Rig {
         let estimate = &self.solved.estimate;
         let cameras = || estimate.cameras.iter();
         let text = match format {
-            "json" => {
-                let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
-                self.solved.json(true, listed)
-            }
+            "json" => text_of(&self.solved, true, residuals)?,
             "kalibr" => {
                 let placed = cameras().map(|found| (&found.camera, found.camera_from_rig));
                 kalibr(&placed.collect::<Vec<_>>(), &estimate.overlaps()).raise(errors::camera)?
@@ -374,13 +367,14 @@ impl Rig {
 }
 
 /// A calibration or rig of a text.
-/// Whether corners can be listed where they are asked for.
-fn check_listed(solved: &Solved, residuals: bool) -> PyResult<()> {
+/// The text of a file, with its corners where they are asked for.
+fn text_of(solved: &Solved, is_rig: bool, residuals: bool) -> PyResult<String> {
     if residuals && !solved.has_corners() {
         let what = "residuals: the file that this was loaded from has none: save them where it was calibrated";
         return Err(errors::calibration(what.to_owned()));
     }
-    Ok(())
+    let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
+    Ok(solved.json(is_rig, listed))
 }
 
 fn of_text(text: &str, targets: Vec<targets::Target>) -> Result<Solved, saved::SavedError> {

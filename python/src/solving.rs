@@ -254,6 +254,14 @@ impl Solved {
         Some(camera.and_then(|camera| whole["cameras"].get(camera)).unwrap_or(whole))
     }
 
+    /// Whether all is known that a page shows: of a file the sentences alone are, not what they come from.
+    pub fn is_whole(&self) -> bool {
+        let is_said =
+            |file: &Value| file["diagnoses"].as_array().is_some_and(|all| !all.is_empty());
+        let is_lost = |file| self.targets.is_empty() || is_said(file);
+        self.has_corners() && !self.in_file(None).is_some_and(is_lost)
+    }
+
     /// Whether the corners that it comes from are known.
     pub fn has_corners(&self) -> bool {
         self.estimate.cameras.iter().any(|camera| camera.corner_count() > 0)
