@@ -52,6 +52,7 @@ from ._detections import repr_html as _repr_html
 from ._detections import stereo_to_opencv, to_opencv
 from .batch import Failure, detect_many, load_detections
 from .errors import (
+    ArgumentError,
     CalibrationError,
     CameraError,
     DetectionError,
@@ -59,6 +60,7 @@ from .errors import (
     FamilyError,
     FileError,
     ImageError,
+    MissingFileError,
     TargetError,
     VerifyError,
 )
@@ -69,6 +71,7 @@ Detection.plot = _plot  # type: ignore[method-assign]
 Detection._repr_html_ = _repr_html  # type: ignore[method-assign]
 
 __all__ = [
+    "ArgumentError",
     "Board",
     "CalibratedCamera",
     "Calibration",
@@ -92,6 +95,7 @@ __all__ = [
     "Icosahedron",
     "ImageError",
     "Located",
+    "MissingFileError",
     "Motion",
     "Octahedron",
     "Pose",

@@ -127,6 +127,7 @@ def plot(
     -------
     matplotlib.axes.Axes
     """
+    import matplotlib.patheffects as patheffects
     import matplotlib.pyplot as pyplot
 
     if ax is None:
@@ -138,9 +139,11 @@ def plot(
         label = "no labels" if grid.panel is None else f"panel {grid.panel}"
         ax.plot(pixels[:, 0], pixels[:, 1], "+", label=label)
         if ids:
+            # Tiles are black and white: numbers stand out from both.
+            outline = [patheffects.withStroke(linewidth=1.5, foreground="white")]
             for (x, y), number in zip(pixels, grid.ids):
                 if number >= 0:
-                    ax.annotate(str(number), (x, y), xytext=(2, 2), textcoords="offset points", fontsize=6)
+                    ax.annotate(str(number), (x, y), xytext=(2, 2), textcoords="offset points", fontsize=6, path_effects=outline)
     ax.set_xlim(-0.5, self.width - 0.5)
     ax.set_ylim(self.height - 0.5, -0.5)
     ax.set_aspect("equal")
@@ -164,6 +167,8 @@ def repr_html(self: Detection) -> str:
         colour = _COLOURS[index % len(_COLOURS)]
         dots += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{colour}"/>' for x, y in grid.pixels]
     why = "".join(f"<br>{html.escape(reason.sentence)}" for reason in self.reasons)
+    if not dots:
+        return f"<div><code>{html.escape(repr(self))}</code>{why}</div>"
     return (
         f"<div><code>{html.escape(repr(self))}</code>{why}<br>"
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="320" '

@@ -4,6 +4,7 @@ Every exception is an :class:`Error`; most are a :class:`ValueError` too, files 
 """
 
 __all__ = [
+    "ArgumentError",
     "CalibrationError",
     "CameraError",
     "DetectionError",
@@ -11,6 +12,7 @@ __all__ = [
     "FamilyError",
     "FileError",
     "ImageError",
+    "MissingFileError",
     "TargetError",
     "VerifyError",
 ]
@@ -18,6 +20,10 @@ __all__ = [
 
 class Error(Exception):
     """Base of all exceptions of this package."""
+
+
+class ArgumentError(Error, ValueError):
+    """An array of another shape than is wanted, or a number out of its range."""
 
 
 class TargetError(Error, ValueError):
@@ -52,9 +58,14 @@ class FileError(Error, OSError):
     """A file that cannot be read or written."""
 
 
+class MissingFileError(FileError, FileNotFoundError):
+    """A file that is not there; ``filename`` is its name."""
+
+
 # Where they are imported from.
 for _class in (
     Error,
+    ArgumentError,
     TargetError,
     FamilyError,
     ImageError,
@@ -63,5 +74,6 @@ for _class in (
     CameraError,
     VerifyError,
     FileError,
+    MissingFileError,
 ):
     _class.__module__ = "deltille"

@@ -20,12 +20,11 @@ import pyarrow.fs as pafs
 import pyarrow.parquet as pq
 import ray
 import ray.data
-from ray.data import Datasink
 
 import deltille
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from typing_extensions import TypeAlias
 
@@ -216,6 +215,8 @@ def detect_to(
     deltille.DetectionError
         Where the folder has tables of another target or of other options.
     """
+    if pictures_per_file < 1:
+        raise ValueError("pictures_per_file: give 1 or more")
     to, root = _place(folder)
     asked = _asked(target, {**options, "accept_damaged": accept_damaged})
     for path in _files(to, f"{root}/pictures")[:1]:
@@ -231,10 +232,19 @@ def detect_to(
     )
     if dataset is None:
         return Summary(0, 0, 0, skipped)
-    sink = _Tables(to, root, pictures_per_file, asked)
-    # The processors are taken by those that look at pictures, who would wait for ever for those that write.
-    dataset.write_datasink(sink, ray_remote_args={"num_cpus": 0}, concurrency=2)
-    return Summary(*sink.counts, skipped)
+    # One process for all files, as each that Ray starts costs a second. It takes no processor: all of them look at
+    # pictures, and would never end if nothing were written.
+    written = dataset.map_batches(
+        _Writing,
+        batch_size=pictures_per_file,
+        batch_format="pyarrow",
+        compute=ray.data.ActorPoolStrategy(size=1),
+        num_cpus=0,
+        fn_constructor_kwargs={"filesystem": to, "root": root, "run": uuid.uuid4().hex[:12], "asked": asked},
+    )
+    counts = [[row["pictures"], row["corners"], row["errors"]] for row in written.iter_rows()]
+    pictures_seen, corners, errors = (sum(column) for column in zip(*counts)) if counts else (0, 0, 0)
+    return Summary(pictures_seen, corners, errors, skipped)
 
 
 def done(folder: Union[str, "os.PathLike[str]"]) -> frozenset[str]:
@@ -510,31 +520,23 @@ def _corners(image: str, found: "deltille.Detection") -> pa.Table:
     return pa.table(arrays, schema=CORNERS)
 
 
-class _Tables(Datasink[Any]):
-    """Writes the rows of a block of pictures as a file of corners and then one of pictures, of the same name.
+class _Writing:
+    """A process that writes rows of pictures as a file of corners and then one of pictures, of the same name.
 
     A picture counts as done once it is among the pictures. A file of corners without its pictures is ignored by
     whoever reads the folder, and removed by the next run.
     """
 
-    def __init__(self, filesystem: pafs.FileSystem, root: str, pictures_per_file: int, asked: bytes) -> None:
+    def __init__(self, filesystem: pafs.FileSystem, root: str, run: str, asked: bytes) -> None:
         self.filesystem = filesystem
         self.root = root
-        self.pictures_per_file = pictures_per_file
+        self.run = run
         self.asked = asked
-        self.run = uuid.uuid4().hex[:12]
-        self.counts = (0, 0, 0)
-
-    def on_write_start(self, schema: Optional[pa.Schema] = None) -> None:
         for table in ("corners", "pictures"):
-            self.filesystem.create_dir(f"{self.root}/{table}", recursive=True)
+            self.filesystem.create_dir(f"{root}/{table}", recursive=True)
 
-    def write(self, blocks: Iterable[Any], ctx: Any) -> tuple[int, int, int]:
-        tables = [ray.data.block.BlockAccessor.for_block(block).to_arrow() for block in blocks]
-        tables = [table for table in tables if len(table)]
-        if not tables:
-            return (0, 0, 0)
-        both = pa.concat_tables(tables, promote_options="permissive").combine_chunks()
+    def __call__(self, both: pa.Table) -> pa.Table:
+        both = both.combine_chunks()
         pictures = both.select(PICTURES.names).cast(PICTURES)
         pictures = pictures.replace_schema_metadata({**(PICTURES.metadata or {}), ASKED: self.asked})
         lists = both["found"].combine_chunks()
@@ -542,12 +544,13 @@ class _Tables(Datasink[Any]):
         image = pictures["image"].combine_chunks().take(pa.compute.list_parent_indices(lists))
         columns = [image, *(values.field(field.name) for field in list(CORNERS)[1:])]
         corners = pa.table(columns, schema=CORNERS)
-        # A task that is run again writes the same files again.
-        name = f"{self.run}-{ctx.task_idx:06}.parquet"
+        # What is done again, as a process was lost, writes the same files again.
+        of_these = hashlib.sha256("\n".join(pictures["image"].to_pylist()).encode()).hexdigest()
+        name = f"{self.run}-{of_these[:16]}.parquet"
         self._put(corners, f"{self.root}/corners", name)
         self._put(pictures, f"{self.root}/pictures", name)
         errors = len(pictures) - pictures["error"].null_count
-        return len(pictures), len(corners), errors
+        return pa.table({"pictures": [len(pictures)], "corners": [len(corners)], "errors": [errors]})
 
     def _put(self, table: pa.Table, folder: str, name: str) -> None:
         """A file that is there as a whole or not at all."""
@@ -560,14 +563,3 @@ class _Tables(Datasink[Any]):
         with self.filesystem.open_output_stream(temporary) as file:
             pq.write_table(table, file, compression="snappy")
         os.replace(temporary, f"{folder}/{name}")
-
-    def on_write_complete(self, write_result: Any) -> None:
-        returns = [counts for counts in write_result.write_returns if counts]
-        self.counts = tuple(map(sum, zip(*returns))) if returns else (0, 0, 0)  # type: ignore[assignment]
-
-    def get_name(self) -> str:
-        return "Tables"
-
-    @property
-    def min_rows_per_write(self) -> Optional[int]:
-        return self.pictures_per_file

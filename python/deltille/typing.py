@@ -39,6 +39,19 @@ TargetFormat: TypeAlias = Literal[
 ]
 CameraFormat: TypeAlias = Literal["own", "opencv", "ros", "kalibr", "colmap", "nerfstudio", "mrcal"]
 
+CameraModel: TypeAlias = Literal[
+    "pinhole",
+    "fisheye",
+    "eucm",
+    "double-sphere",
+    "pupil",
+    "radtan",
+    "radtan5",
+    "rational",
+    "thin-prism",
+    "kannala-brandt",
+]
+
 class Candidate(TypedDict):
     model: str
     parameters: int

@@ -1,11 +1,13 @@
-//! Arrays of many small things, and back.
+//! Arrays of many small things, and back; numbers that arguments give.
 
-use deltille::glam::{DMat3, DVec2, DVec3};
+use deltille::glam::DMat3;
 use deltille::nalgebra::DMatrix;
+use deltille::quantity::{OutOfRange, Range};
 use numpy::ndarray::{Array1, Array2, Array3};
-use numpy::{Element, PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyUntypedArrayMethods};
-use numpy::{IntoPyArray, PyArrayLike2};
+use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLikeDyn};
 use pyo3::prelude::*;
+
+use crate::errors;
 
 /// Rows of so many numbers as an array of N × so many.
 pub fn rows<'py, T: Element + Copy, const N: usize>(
@@ -51,25 +53,98 @@ pub fn matrix3<'py>(py: Python<'py>, matrix: &DMat3) -> Bound<'py, PyArray2<f64>
     rows(py, [0, 1, 2].map(|row| matrix.row(row).to_array()))
 }
 
-/// An array of N × 3, or anything that makes one.
-pub type Points<'py> = PyArrayLike2<'py, f64, numpy::AllowTypeChange>;
-
-/// Rows of an array, which are to have three numbers.
-pub fn points3(points: &Points) -> Option<Vec<DVec3>> {
-    let points = points.as_array();
-    let is_it = points.ncols() == 3;
-    is_it.then(|| points.rows().into_iter().map(|p| DVec3::new(p[0], p[1], p[2])).collect())
+/// Rows of so many numbers each, of an array of N × so many or anything that makes one.
+///
+/// # Errors
+/// Where it is something else, with the argument's name.
+pub fn rows_of<const N: usize>(
+    argument: &str,
+    given: &Bound<'_, PyAny>,
+) -> PyResult<Vec<[f64; N]>> {
+    let wrong =
+        |what: String| errors::argument(format!("{argument}: N × {N} are wanted, not {what}"));
+    let Ok(array) = given.extract::<PyArrayLikeDyn<'_, f64, numpy::AllowTypeChange>>() else {
+        return Err(wrong(given.get_type().qualname()?.to_string()));
+    };
+    let array = array.as_array();
+    match array.shape() {
+        [_, across] if *across == N => {
+            Ok(array.outer_iter().map(|row| std::array::from_fn(|i| row[[i]])).collect())
+        }
+        shape => Err(wrong(shape_in_words(shape))),
+    }
 }
 
-/// Rows of an array, which are to have two numbers.
-pub fn points2(points: &Points) -> Option<Vec<DVec2>> {
-    let points = points.as_array();
-    let is_it = points.ncols() == 2;
-    is_it.then(|| points.rows().into_iter().map(|p| DVec2::new(p[0], p[1])).collect())
+/// So many numbers of a range, also where an array has them in several dimensions, as OpenCV's vectors.
+///
+/// # Errors
+/// Where it is something else, with the argument's name, of a class.
+pub fn vector<const N: usize>(
+    argument: &str,
+    given: &Bound<'_, PyAny>,
+    range: Range,
+    class: fn(String) -> PyErr,
+) -> PyResult<[f64; N]> {
+    let all = numbers(argument, given, range, class)?;
+    let count = all.len();
+    let wrong = |_| class(format!("{argument}: {N} numbers are wanted, not {count}"));
+    all.try_into().map_err(wrong)
 }
 
-/// The shape of an array, as it is read.
-pub fn shape(points: &Points) -> String {
-    let points: &PyReadonlyArray2<f64> = points;
-    format!("{} × {}", points.shape()[0], points.shape()[1])
+/// Numbers of a range in a row, alike.
+///
+/// # Errors
+/// Where it is something else, with the argument's name.
+pub fn numbers(
+    argument: &str,
+    given: &Bound<'_, PyAny>,
+    range: Range,
+    class: fn(String) -> PyErr,
+) -> PyResult<Vec<f64>> {
+    let Ok(array) = given.extract::<PyArrayLikeDyn<'_, f64, numpy::AllowTypeChange>>() else {
+        let kind = given.get_type().qualname()?;
+        return Err(class(format!("{argument}: numbers are wanted, not {kind}")));
+    };
+    let array = array.as_array();
+    let checked = array.iter().map(|&number| range.check(number));
+    let checked: Result<Vec<f64>, OutOfRange> = checked.collect();
+    checked.map_err(|error| class(format!("{argument}: {error}")))
+}
+
+/// A number of a range.
+///
+/// # Errors
+/// Where it is another one, with the argument's name, of a class.
+pub fn number(
+    argument: &str,
+    given: f64,
+    range: Range,
+    class: fn(String) -> PyErr,
+) -> PyResult<f64> {
+    range.check(given).map_err(|error| class(format!("{argument}: {error}")))
+}
+
+/// A shape as it is read.
+pub fn shape_in_words(shape: &[usize]) -> String {
+    match shape {
+        [] => "a single number".to_owned(),
+        [count] => format!("{count} in a row"),
+        _ => shape.iter().map(usize::to_string).collect::<Vec<_>>().join(" × "),
+    }
+}
+
+/// A whole number that the library's own type holds.
+///
+/// # Errors
+/// Where it is negative or too large, with the argument's name, of a class.
+pub fn whole<T: TryFrom<i64>>(
+    argument: &str,
+    given: i64,
+    class: fn(String) -> PyErr,
+) -> PyResult<T> {
+    let wrong = |_| match given {
+        ..0 => class(format!("{argument}: give a whole number from 0, not {given}")),
+        _ => class(format!("{argument}: {given} is too large")),
+    };
+    given.try_into().map_err(wrong)
 }

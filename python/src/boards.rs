@@ -11,6 +11,7 @@ use deltille::targets::{
 };
 use pyo3::prelude::*;
 
+use crate::arrays::whole;
 use crate::errors::{self, Raise, raised};
 use crate::families::FamilyChoice;
 use crate::targets::Target;
@@ -95,6 +96,16 @@ impl Wanted {
     }
 }
 
+/// Rows and columns of corners.
+fn size_of(rows: i64, cols: i64) -> PyResult<[u32; 2]> {
+    Ok([whole("rows", rows, errors::target)?, whole("cols", cols, errors::target)?])
+}
+
+/// How far tags are from each other.
+pub fn spacing_of(tag_spacing: Option<i64>) -> PyResult<Option<u32>> {
+    tag_spacing.map(|rows| whole("tag_spacing", rows, errors::target)).transpose()
+}
+
 /// A flat deltille board with tags.
 ///
 /// Parameters
@@ -150,16 +161,16 @@ impl Board {
         orientation = "auto", margin_mm = None, name = "board"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
-        rows: u32,
-        cols: u32,
+        rows: i64,
+        cols: i64,
         edge_mm: Option<f64>,
         family: Option<FamilyChoice>,
         tags: bool,
-        tag_spacing: Option<u32>,
+        tag_spacing: Option<i64>,
         tag_border: Option<f64>,
-        first_id: u32,
-        boards: u32,
-        board_id: u32,
+        first_id: i64,
+        boards: i64,
+        board_id: i64,
         inverted: bool,
         paper: Option<&str>,
         orientation: &str,
@@ -167,20 +178,17 @@ impl Board {
         name: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let paper = self::paper(paper, orientation, margin_mm, SolidSheets::default())?;
-        let of_tags = || Tags {
-            family,
-            tags_in: TagsIn::Black,
-            spacing: tag_spacing,
-            border_bits: tag_border,
-            first_id,
-        };
+        let spacing = spacing_of(tag_spacing)?;
+        let first_id = whole("first_id", first_id, errors::target)?;
+        let of_tags =
+            || Tags { family, tags_in: TagsIn::Black, spacing, border_bits: tag_border, first_id };
         let wanted = Wanted {
             grid: GridKind::Deltille,
-            size: [rows, cols],
+            size: size_of(rows, cols)?,
             edge_mm,
             tags: tags.then(of_tags),
-            boards,
-            board_id,
+            boards: whole("boards", boards, errors::target)?,
+            board_id: whole("board_id", board_id, errors::target)?,
             inverted,
             name: name.to_owned(),
             paper,
@@ -214,16 +222,16 @@ impl Checkerboard {
         orientation = "auto", margin_mm = None, name = "checkerboard"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
-        rows: u32,
-        cols: u32,
+        rows: i64,
+        cols: i64,
         edge_mm: Option<f64>,
         family: Option<FamilyChoice>,
         tags_in: &str,
-        tag_spacing: Option<u32>,
+        tag_spacing: Option<i64>,
         tag_border: Option<f64>,
-        first_id: u32,
-        boards: u32,
-        board_id: u32,
+        first_id: i64,
+        boards: i64,
+        board_id: i64,
         inverted: bool,
         paper: Option<&str>,
         orientation: &str,
@@ -235,20 +243,22 @@ impl Checkerboard {
             "white" => TagsIn::White,
             _ => return Err(raised::TargetError::new_err("tags_in: give black or white")),
         };
+        let spacing = spacing_of(tag_spacing)?;
+        let first_id = whole("first_id", first_id, errors::target)?;
         let of_tags = |family| Tags {
             family: Some(family),
             tags_in,
-            spacing: tag_spacing,
+            spacing,
             border_bits: tag_border,
             first_id,
         };
         let wanted = Wanted {
             grid: GridKind::Checker,
-            size: [rows, cols],
+            size: size_of(rows, cols)?,
             edge_mm,
             tags: family.map(of_tags),
-            boards,
-            board_id,
+            boards: whole("boards", boards, errors::target)?,
+            board_id: whole("board_id", board_id, errors::target)?,
             inverted,
             name: name.to_owned(),
             paper: self::paper(paper, orientation, margin_mm, SolidSheets::default())?,

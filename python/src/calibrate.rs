@@ -8,12 +8,14 @@ use deltille::export::calibration::read_sheet;
 use deltille::limits::Limits;
 use deltille::targets;
 use pyo3::prelude::*;
+use pyo3::types::PyMapping;
 
 use crate::calibration::{Calibration, Rig, calibration};
 use crate::camera::Camera;
 use crate::detection::{Detection, Results, Targets};
-use crate::errors::{self, Raise, raised};
-use crate::solving::{How, ModelChoice, OneCamera, PrintScale, Seen, named, solve};
+use crate::detector::sides;
+use crate::errors::{self, RaiseFile, raised};
+use crate::solving::{How, ModelChoice, OneCamera, Seen, named, solve};
 
 /// Calibrates a camera from detections.
 ///
@@ -65,7 +67,7 @@ use crate::solving::{How, ModelChoice, OneCamera, PrintScale, Seen, named, solve
 #[pyfunction]
 #[pyo3(signature = (detections, target = None, model = "radtan", *, camera = None, grid = None, rows = None,
     cols = None, edge_mm = None, hold_out = None, loss = "huber", weights = "covariance", board_shape = false,
-    measure_target = false, shape = None, print_scale = None, distances_mm = Vec::new(), names = None))]
+    measure_target = false, shape = None, print_scale = None, distances_mm = None, names = None))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn calibrate(
     py: Python<'_>,
@@ -74,23 +76,23 @@ pub fn calibrate(
     model: &str,
     camera: Option<PyRef<'_, Camera>>,
     grid: Option<&str>,
-    rows: Option<u32>,
-    cols: Option<u32>,
+    rows: Option<i64>,
+    cols: Option<i64>,
     edge_mm: Option<f64>,
-    hold_out: Option<usize>,
+    hold_out: Option<i64>,
     loss: &str,
     weights: &str,
     board_shape: bool,
     measure_target: bool,
     shape: Option<PathBuf>,
-    print_scale: Option<PrintScale>,
-    distances_mm: Vec<f64>,
+    print_scale: Option<&Bound<'_, PyAny>>,
+    distances_mm: Option<Vec<f64>>,
     names: Option<Vec<String>>,
 ) -> PyResult<Py<Calibration>> {
     let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
     if let Some(path) = shape {
-        let text = Limits::default().read_text(&path).raise(errors::file)?;
+        let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
         let sheet = read_sheet(&text);
         let wrong = |error| {
             raised::FileError::new_err(format!("{}: {}", path.display(), errors::told(&error)))
@@ -98,13 +100,13 @@ pub fn calibrate(
         how.sheet = sheet.map_err(wrong)?;
     }
     let target = target.or_else(|| of_detections(&detections.all, grid.is_some()));
-    let seen = Seen::of(target, grid, [rows, cols], edge_mm)?;
+    let seen = Seen::of(target, grid, sides(rows, cols)?, edge_mm)?;
     let model = ModelChoice::of(model)?;
     let names = detections.names(names);
     let detections = named(py, &detections.all, names)?;
     let known = camera.map(|camera| camera.0.clone());
     let one = OneCamera { name: "camera".to_owned(), detections, known };
-    let solved = solve(py, seen, vec![one], model, how)?;
+    let solved = solve(py, seen, vec![one], false, model, how)?;
     Py::new(py, calibration(Arc::new(solved)))
 }
 
@@ -143,28 +145,28 @@ fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Option<T
 #[pyfunction]
 #[pyo3(signature = (cameras, target = None, model = "radtan", *, known = None, refine_target = false,
     hold_out = None, loss = "huber", weights = "covariance", board_shape = false, measure_target = false,
-    print_scale = None, distances_mm = Vec::new()))]
+    print_scale = None, distances_mm = None))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn rig(
     py: Python<'_>,
-    cameras: &Bound<'_, pyo3::types::PyDict>,
+    cameras: &Bound<'_, PyMapping>,
     target: Option<Targets>,
     model: &str,
     known: Option<BTreeMap<String, PyRef<'_, Camera>>>,
     refine_target: bool,
-    hold_out: Option<usize>,
+    hold_out: Option<i64>,
     loss: &str,
     weights: &str,
     board_shape: bool,
     measure_target: bool,
-    print_scale: Option<PrintScale>,
-    distances_mm: Vec<f64>,
+    print_scale: Option<&Bound<'_, PyAny>>,
+    distances_mm: Option<Vec<f64>>,
 ) -> PyResult<Rig> {
     let wrong = |what: String| Err(raised::CalibrationError::new_err(what));
     let mut how = How::of(loss, weights, hold_out, distances_mm, print_scale)?;
     (how.board_shape, how.measure_target) = (board_shape, measure_target);
     how.refine_target = refine_target;
-    if cameras.len() < 2 && !refine_target {
+    if cameras.len()? < 2 && !refine_target {
         return wrong(
             "a rig has at least two cameras; calibrate takes one, and so does refine_target"
                 .to_owned(),
@@ -172,8 +174,8 @@ pub fn rig(
     }
     let mut known = known.unwrap_or_default();
     let (mut all, mut target) = (Vec::new(), target);
-    for (name, detections) in cameras.iter() {
-        let name: String = name.extract()?;
+    for camera in cameras.items()?.iter() {
+        let (name, detections): (String, Bound<'_, PyAny>) = camera.extract()?;
         targets::Name::new(&name)
             .map_err(|error| raised::CalibrationError::new_err(errors::told(&error)))?;
         let detections: Results<'_> = detections.extract()?;
@@ -199,6 +201,6 @@ pub fn rig(
         return wrong(format!("known: there is no camera {name}"));
     }
     let seen = Seen::of(target, None, [None, None], None)?;
-    let solved = solve(py, seen, all, ModelChoice::of(model)?, how)?;
+    let solved = solve(py, seen, all, true, ModelChoice::of(model)?, how)?;
     Ok(Rig { solved: Arc::new(solved) })
 }

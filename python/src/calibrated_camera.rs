@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use deltille::calibrate::{self as solver, CameraEstimate, Source, ViewEstimate};
-use deltille::glam::DVec2;
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, Points};
+use crate::arrays;
+use crate::calibration::{pickled, restored};
 use crate::camera::Camera;
+use crate::comparison::distance;
 use crate::detection::record;
 use crate::errors::{raised, unlocked};
 use crate::pose::Pose;
@@ -34,6 +35,28 @@ impl CalibratedCamera {
     /// A figure of the file that it was read from.
     fn in_file(&self, figure: &str) -> Option<f64> {
         self.solved.in_file(Some(self.index))?[figure].as_f64()
+    }
+}
+
+/// What a part of a calibration is restored from: the whole, its targets, the camera, and the view, if it is one.
+pub type Part = (String, Vec<String>, usize, Option<usize>);
+
+/// A camera, or one of its views, that was pickled.
+#[pyfunction]
+pub fn _part<'py>(
+    py: Python<'py>,
+    json: &str,
+    targets: Vec<String>,
+    camera: usize,
+    view: Option<usize>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let solved = Arc::new(restored(json, &targets)?);
+    let found = solved.estimate.cameras.get(camera);
+    let is_there = found.is_some_and(|found| view.is_none_or(|view| view < found.views.len()));
+    match (is_there, view) {
+        (false, _) => Err(raised::CalibrationError::new_err("there is no such camera or view")),
+        (true, None) => Ok(Bound::new(py, CalibratedCamera { solved, index: camera })?.into_any()),
+        (true, Some(view)) => Ok(Bound::new(py, View { solved, camera, view })?.into_any()),
     }
 }
 
@@ -144,10 +167,10 @@ impl CalibratedCamera {
     }
 
     /// Standard deviations of that pose, 6, float64: a rotation (rad) and a translation (mm) about the camera's axes;
-    /// ``None`` where it was not to be found.
+    /// NaN where it was not to be found, as of the first camera.
     #[getter]
-    fn pose_sd<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.estimate().pose_sd.map(|sd| arrays::column(py, sd))
+    fn pose_sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        arrays::column(py, self.estimate().pose_sd.unwrap_or([f64::NAN; 6]))
     }
 
     /// By how many frames its pictures are late.
@@ -187,7 +210,7 @@ impl CalibratedCamera {
     ///     Standard deviation of a coordinate, px; ``None`` where it is not known.
     #[pyo3(signature = (distance_mm = None, source = "noise"))]
     fn projection_sd(&self, distance_mm: Option<f64>, source: &str) -> PyResult<Option<f64>> {
-        Ok(self.estimate().projection_sd_px(distance_mm, self::source(source)?))
+        Ok(self.estimate().projection_sd_px(distance(distance_mm)?, self::source(source)?))
     }
 
     /// How sure projections are over the image.
@@ -208,7 +231,7 @@ impl CalibratedCamera {
         distance_mm: Option<f64>,
         source: &str,
     ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let source = self::source(source)?;
+        let (source, distance_mm) = (self::source(source)?, distance(distance_mm)?);
         let map = unlocked(py, || self.estimate().uncertainty_map(distance_mm, source))?;
         Ok(map.map(|map| {
             let sd = |i: usize, j: usize| map.sd_px[i * map.columns + j].unwrap_or(f64::NAN);
@@ -234,17 +257,16 @@ impl CalibratedCamera {
     fn projection_covariance<'py>(
         &self,
         py: Python<'py>,
-        pixels: Points<'py>,
+        pixels: &Bound<'py, PyAny>,
         distance_mm: Option<f64>,
         source: &str,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let source = self::source(source)?;
-        let wrong =
-            || raised::Error::new_err(format!("pixels are N × 2, not {}", arrays::shape(&pixels)));
-        let pixels = arrays::points2(&pixels).ok_or_else(wrong)?;
+        let (source, distance_mm) = (self::source(source)?, distance(distance_mm)?);
+        let pixels = arrays::rows_of::<2>("pixels", pixels)?;
         let found = unlocked(py, || {
-            let one = |pixel: DVec2| {
-                let found = self.estimate().projection_covariance(pixel, distance_mm, source)?;
+            let one = |pixel: [f64; 2]| {
+                let found =
+                    self.estimate().projection_covariance(pixel.into(), distance_mm, source)?;
                 Some([found[0][0], found[0][1], found[1][1]])
             };
             pixels.into_iter().map(one).collect::<Vec<_>>()
@@ -265,6 +287,12 @@ impl CalibratedCamera {
             })
         };
         record(py, &tried.iter().map(one).collect::<Vec<_>>())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, Part> {
+        let own = slf.get();
+        let (restore, (json, targets)) = pickled(slf.py(), "_part", &own.solved)?;
+        Ok((restore, (json, targets, own.index, None)))
     }
 
     pub fn __repr__(&self) -> String {

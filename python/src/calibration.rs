@@ -16,7 +16,7 @@ use crate::arrays;
 use crate::calibrated_camera::CalibratedCamera;
 use crate::camera::save_text;
 use crate::detection::{Targets, record};
-use crate::errors::{self, Raise, raised, unlocked};
+use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::pose::Pose;
 use crate::solving::Solved;
 use crate::targets::Target;
@@ -113,7 +113,7 @@ macro_rules! whole {
             /// str
             #[pyo3(signature = (*, residuals = false))]
             fn to_json($self: $kind, residuals: bool) -> PyResult<String> {
-                text_of(&$solved, $is_rig, residuals)
+                text_of(&$solved, residuals)
             }
 
             /// Writes a page that shows what the calibration is worth, and what would make it better.
@@ -207,7 +207,7 @@ impl Calibration {
     ) -> PyResult<PathBuf> {
         let own = slf.as_super();
         let text = match format {
-            "json" => text_of(&own.solved, false, residuals)?,
+            "json" => text_of(&own.solved, residuals)?,
             _ => {
                 let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                 let camera = own.estimate();
@@ -231,19 +231,41 @@ impl Calibration {
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Vec<String>)> {
-        let solved = slf.as_super().get().solved.clone();
-        let restore = slf.py().import("deltille._core")?.getattr("_calibration")?;
-        let targets = solved.targets.iter().map(targets::Target::to_json).collect();
-        Ok((restore, (solved.json(false, Residuals::Listed), targets)))
+        pickled(slf.py(), "_calibration", &slf.as_super().get().solved)
     }
+
+    fn __eq__(slf: PyRef<'_, Self>, other: PyRef<'_, Self>) -> bool {
+        slf.as_super().solved.is_same(&other.as_super().solved)
+    }
+}
+
+/// What pickle restores a calibration or a rig by.
+pub fn pickled<'py>(
+    py: Python<'py>,
+    restore: &str,
+    solved: &Solved,
+) -> crate::Reduced<'py, (String, Vec<String>)> {
+    let restore = py.import("deltille._core")?.getattr(restore)?;
+    let targets = solved.targets.iter().map(targets::Target::to_json).collect();
+    Ok((restore, (solved.json(Residuals::Listed), targets)))
 }
 
 /// A calibration that was pickled.
 #[pyfunction]
 pub fn _calibration(py: Python<'_>, json: &str, targets: Vec<String>) -> PyResult<Py<Calibration>> {
+    Py::new(py, calibration(Arc::new(restored(json, &targets)?)))
+}
+
+/// A rig that was pickled.
+#[pyfunction]
+pub fn _rig(json: &str, targets: Vec<String>) -> PyResult<Rig> {
+    Ok(Rig { solved: Arc::new(restored(json, &targets)?) })
+}
+
+/// What was pickled.
+pub fn restored(json: &str, targets: &[String]) -> PyResult<Solved> {
     let targets = targets.iter().map(|text| targets::Target::from_json(text).raise(errors::target));
-    let solved = of_text(json, targets.collect::<PyResult<_>>()?).raise(errors::calibration)?;
-    Py::new(py, calibration(Arc::new(solved)))
+    of_text(json, targets.collect::<PyResult<_>>()?).raise(errors::calibration)
 }
 
 #[pymethods]
@@ -254,7 +276,7 @@ impl Rig {
     /// ----------
     /// path : path-like
     /// target : Target or sequence of Target, optional
-    ///     What was photographed.
+    ///     What was photographed, from which the ids of corners come.
     ///
     /// Returns
     /// -------
@@ -340,7 +362,7 @@ impl Rig {
         let estimate = &self.solved.estimate;
         let cameras = || estimate.cameras.iter();
         let text = match format {
-            "json" => text_of(&self.solved, true, residuals)?,
+            "json" => text_of(&self.solved, residuals)?,
             "kalibr" => {
                 let placed = cameras().map(|found| (&found.camera, found.camera_from_rig));
                 kalibr(&placed.collect::<Vec<_>>(), &estimate.overlaps()).raise(errors::camera)?
@@ -364,27 +386,30 @@ impl Rig {
         let (cameras, frames) = (found.cameras.len(), found.frames.len());
         format!("<Rig: {cameras} cameras, {frames} frames, rms {:.4} px>", found.rms_px)
     }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Vec<String>)> {
+        pickled(slf.py(), "_rig", &slf.get().solved)
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.solved.is_same(&other.solved)
+    }
 }
 
-/// A calibration or rig of a text.
 /// The text of a file, with its corners where they are asked for.
-fn text_of(solved: &Solved, is_rig: bool, residuals: bool) -> PyResult<String> {
+fn text_of(solved: &Solved, residuals: bool) -> PyResult<String> {
     if residuals && !solved.has_corners() {
         let what = "residuals: the file that this was loaded from has none: save them where it was calibrated";
         return Err(errors::calibration(what.to_owned()));
     }
     let listed = if residuals { Residuals::Listed } else { Residuals::LeftOut };
-    Ok(solved.json(is_rig, listed))
+    Ok(solved.json(listed))
 }
 
+/// A calibration or rig of a text.
 fn of_text(text: &str, targets: Vec<targets::Target>) -> Result<Solved, saved::SavedError> {
     let estimate: Estimate = match targets.as_slice() {
-        [] => {
-            let mut estimate = Estimate::default();
-            estimate.cameras = saved::read_cameras(text)?;
-            estimate.rms_px = estimate.cameras.first().map_or(0.0, |camera| camera.rms_px);
-            estimate
-        }
+        [] => saved::read_without_target(text)?,
         [only] => saved::read(text, &Reference::Target(only))?,
         several => saved::read(text, &Reference::Scene(several))?,
     };
@@ -394,18 +419,17 @@ fn of_text(text: &str, targets: Vec<targets::Target>) -> Result<Solved, saved::S
 }
 
 fn read(path: &std::path::Path, target: Option<Targets>, is_rig: bool) -> PyResult<Solved> {
-    let text = Limits::default().read_text(path).raise(errors::file)?;
+    let text = Limits::default().read_text(path).raise_of_file(path, errors::file)?;
     let targets = target.map(|targets| targets.0).unwrap_or_default();
     let targets = targets.iter().map(|target| (*target.target).clone()).collect();
     let wrong = |what: String| raised::FileError::new_err(format!("{}: {what}", path.display()));
     let solved = of_text(&text, targets).map_err(|error| wrong(errors::told(&error)))?;
-    let is_of_rig = solved.in_file(None).is_some_and(|file| file.get("cameras").is_some());
-    if is_rig && !is_of_rig {
+    if is_rig && !solved.is_rig {
         return Err(wrong(
             "this is a calibration of one camera: read it by Calibration.load".to_owned(),
         ));
     }
-    if !is_rig && solved.estimate.cameras.len() != 1 {
+    if !is_rig && solved.is_rig {
         return Err(wrong("this is a rig: read it by Rig.load".to_owned()));
     }
     Ok(solved)

@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use deltille::camera::{self, Lens};
 use deltille::export::artifacts::write_set;
 use deltille::export::camera as formats;
+use deltille::quantity::{Range, coefficient, focal_px, place_px};
 use deltille::{camera_file, glam};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use serde_json::json;
 
-use crate::arrays::{self, Points};
-use crate::errors::{self, Raise, raised, unlocked};
+use crate::arrays::{self, number, vector, whole};
+use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
 
 /// A camera with its lens: where points are seen, and along which rays pixels look.
 ///
@@ -27,7 +28,9 @@ use crate::errors::{self, Raise, raised, unlocked};
 /// centre_px : (float, float), optional
 ///     Principal point, px; the middle of the image if left out.
 /// model : str, optional
-///     ``"pinhole"`` (Brown–Conrady), ``"fisheye"`` (Kannala–Brandt), ``"eucm"``, ``"double-sphere"`` or ``"pupil"``.
+///     ``"pinhole"`` (Brown–Conrady), ``"fisheye"`` (Kannala–Brandt), ``"eucm"``, ``"double-sphere"`` or ``"pupil"``; the
+///     names of :func:`calibrate` are taken too, of which ``"radtan"``, ``"radtan5"``, ``"rational"`` and
+///     ``"thin-prism"`` are a pinhole with 4, 5, 8 and 12 coefficients, and ``"kannala-brandt"`` is a fisheye.
 /// distortion : sequence of floats, optional
 ///     Coefficients in the order of the model: of ``"pinhole"`` k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 as in OpenCV, of
 ///     ``"fisheye"`` k1 k2 k3 k4 or more; what is left out at the end is zero.
@@ -40,33 +43,55 @@ use crate::errors::{self, Raise, raised, unlocked};
 #[derive(Clone, PartialEq)]
 pub struct Camera(pub camera::Camera);
 
-/// One focal length, or two.
-#[derive(FromPyObject)]
-enum Focal {
-    One(f64),
-    Two([f64; 2]),
+/// What focal lengths are, px.
+const FOCAL: Range = focal_px::RANGE;
+
+/// The lens of a camera file that a model is, and with how many coefficients at most.
+fn lens_of(model: &str) -> (&str, usize) {
+    match model {
+        "radtan" => ("pinhole", 4),
+        "radtan5" => ("pinhole", 5),
+        "rational" => ("pinhole", 8),
+        "thin-prism" => ("pinhole", 12),
+        "kannala-brandt" => ("fisheye", 4),
+        _ => (model, usize::MAX),
+    }
 }
 
 #[pymethods]
 impl Camera {
     #[new]
-    #[pyo3(signature = (width, height, focal_px, centre_px = None, *, model = "pinhole", distortion = Numbers(Vec::new())))]
+    #[pyo3(signature = (width, height, focal_px, centre_px = None, *, model = "pinhole", distortion = None))]
     fn new(
-        width: u32,
-        height: u32,
-        focal_px: Focal,
-        centre_px: Option<[f64; 2]>,
+        width: i64,
+        height: i64,
+        focal_px: &Bound<'_, PyAny>,
+        centre_px: Option<&Bound<'_, PyAny>>,
         model: &str,
-        distortion: Numbers,
+        distortion: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let focal = match focal_px {
-            Focal::One(both) => [both; 2],
-            Focal::Two(each) => each,
+        let width: u32 = whole("width", width, errors::camera)?;
+        let height: u32 = whole("height", height, errors::camera)?;
+        let focal = match focal_px.extract::<f64>() {
+            Ok(both) => [number("focal_px", both, FOCAL, errors::camera)?; 2],
+            Err(_) => vector("focal_px", focal_px, FOCAL, errors::camera)?,
         };
         let middle = [width, height].map(|side| (f64::from(side) - 1.0) / 2.0);
+        let centre = centre_px.map_or(Ok(middle), |centre| {
+            vector("centre_px", centre, place_px::RANGE, errors::camera)
+        })?;
+        let distortion = distortion
+            .map(|all| arrays::numbers("distortion", all, coefficient::RANGE, errors::camera));
+        let distortion = distortion.transpose()?.unwrap_or_default();
+        let (lens, most) = lens_of(model);
+        if distortion.len() > most {
+            let count = distortion.len();
+            let what = format!("distortion: {model} has {most} coefficients, not {count}");
+            return Err(errors::camera(what));
+        }
         let text = json!({
             "width": width, "height": height, "focal_px": focal,
-            "centre_px": centre_px.unwrap_or(middle), "model": model, "distortion": distortion.0,
+            "centre_px": centre, "model": lens, "distortion": distortion,
         });
         camera::Camera::from_yaml(&text.to_string()).map(Self).raise(errors::camera)
     }
@@ -82,7 +107,7 @@ impl Camera {
     /// Camera
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
-        camera_file::read(&path).map(Self).raise(errors::file)
+        camera_file::read(&path).map(Self).raise_of_file(&path, errors::file)
     }
 
     /// The camera of a text, as :meth:`load` reads it from files.
@@ -192,13 +217,12 @@ impl Camera {
     fn project<'py>(
         &self,
         py: Python<'py>,
-        points: Points<'py>,
+        points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let wrong =
-            || raised::Error::new_err(format!("points are N × 3, not {}", arrays::shape(&points)));
-        let points = arrays::points3(&points).ok_or_else(wrong)?;
+        let points = arrays::rows_of::<3>("points", points)?;
         let seen = unlocked(py, || {
-            let seen = |point: DVec3| self.0.project(point).unwrap_or(DVec2::NAN).to_array();
+            let seen =
+                |point: [f64; 3]| self.0.project(point.into()).unwrap_or(DVec2::NAN).to_array();
             points.into_iter().map(seen).collect::<Vec<_>>()
         })?;
         Ok(arrays::rows(py, seen))
@@ -219,7 +243,7 @@ impl Camera {
     fn unproject<'py>(
         &self,
         py: Python<'py>,
-        pixels: Points<'py>,
+        pixels: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         Ok(self.rays(py, pixels)?.1)
     }
@@ -241,13 +265,11 @@ impl Camera {
     fn rays<'py>(
         &self,
         py: Python<'py>,
-        pixels: Points<'py>,
+        pixels: &Bound<'py, PyAny>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
-        let wrong =
-            || raised::Error::new_err(format!("pixels are N × 2, not {}", arrays::shape(&pixels)));
-        let pixels = arrays::points2(&pixels).ok_or_else(wrong)?;
+        let pixels = arrays::rows_of::<2>("pixels", pixels)?;
         let rays = unlocked(py, || {
-            let ray = |pixel| match self.0.unproject(pixel) {
+            let ray = |pixel: [f64; 2]| match self.0.unproject(pixel.into()) {
                 Some(ray) => (ray.origin.to_array(), ray.direction.to_array()),
                 None => ([f64::NAN; 3], [f64::NAN; 3]),
             };
@@ -311,21 +333,6 @@ pub fn save_text(path: PathBuf, text: String, force: bool) -> PyResult<PathBuf> 
         return Err(raised::FileError::new_err(format!("{} is not a file name", path.display())));
     };
     let files = [(name.to_string_lossy().into_owned(), text.into_bytes())];
-    write_set(&folder, &files, force).raise(errors::file)?;
+    write_set(&folder, &files, force).raise_of_file(&path, errors::file)?;
     Ok(path)
-}
-
-/// Numbers in a row, also where an array has them in several dimensions, as OpenCV's coefficients.
-pub struct Numbers(pub Vec<f64>);
-
-impl<'a, 'py> FromPyObject<'a, 'py> for Numbers {
-    type Error = PyErr;
-
-    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        let flat = match given.hasattr("ravel")? {
-            true => given.call_method0("ravel")?,
-            false => given.to_owned(),
-        };
-        flat.extract().map(Self)
-    }
 }

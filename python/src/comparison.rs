@@ -2,22 +2,25 @@
 
 use std::sync::Arc;
 
-use deltille::calibrate::{self, CameraEstimate, CameraMotion, Diagnosis, Region, Words, views};
+use deltille::calibrate::{
+    self, CameraEstimate, CameraMotion, Diagnosis, Reference, Region, Words, views,
+};
+use deltille::export::calibration::Sheet;
 use deltille::export::{comparison, pose};
 use deltille::glam::DVec2;
-use deltille::{export, targets};
-use export::calibration::Sheet;
+use deltille::quantity::edge_mm;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-use crate::arrays;
+use crate::arrays::{self, number};
 use crate::calibrated_camera::CalibratedCamera;
 use crate::calibration::Rig;
 use crate::camera::Camera;
 use crate::detection::{Detection, Targets};
 use crate::errors::{self, Raise, raised, unlocked};
 use crate::pose::Pose;
-use crate::solving::{PrintScale, Seen};
+use crate::solving::print_scale_of;
+use crate::targets::Target;
 
 /// A camera as found, or as given.
 pub enum Compared {
@@ -138,13 +141,24 @@ impl Comparison {
     }
 
     fn __repr__(&self) -> String {
-        let significant = match self.found.is_significant() {
-            Some(true) => ", more than chance makes",
-            Some(false) => ", no more than chance makes",
-            None => "",
-        };
-        format!("<Comparison: {:.4} px rms{significant}>", self.found.rms_px)
+        let said = told_significant(self.found.is_significant());
+        format!("<Comparison: {:.4} px rms{said}>", self.found.rms_px)
     }
+}
+
+fn told_significant(is_significant: Option<bool>) -> &'static str {
+    match is_significant {
+        Some(true) => ", more than chance makes",
+        Some(false) => ", no more than chance makes",
+        None => "",
+    }
+}
+
+/// A distance at which projections are looked at, mm; infinity where none is given.
+pub fn distance(distance_mm: Option<f64>) -> PyResult<Option<f64>> {
+    let given = distance_mm.filter(|mm| *mm != f64::INFINITY);
+    let checked = given.map(|mm| number("distance_mm", mm, edge_mm::RANGE, errors::calibration));
+    checked.transpose()
 }
 
 /// How a camera of a rig is elsewhere than before.
@@ -188,6 +202,13 @@ impl Motion {
     fn is_significant(&self) -> Option<bool> {
         self.0.is_significant()
     }
+
+    fn __repr__(&self) -> String {
+        let CameraMotion { from, to, turn_rad, moved_mm, .. } = &self.0;
+        let (turn, moved) = (turn_rad.length(), moved_mm.length());
+        let said = told_significant(self.0.is_significant());
+        format!("<Motion of {to} from {from}: {turn:.6} rad, {moved:.4} mm{said}>")
+    }
 }
 
 fn compared(
@@ -196,6 +217,7 @@ fn compared(
     distance_mm: Option<f64>,
     region: Region,
 ) -> PyResult<Vec<Comparison>> {
+    let distance_mm = distance(distance_mm)?;
     let found = unlocked(py, || {
         let one = |(one, other): &(&CameraEstimate, &CameraEstimate)| {
             calibrate::Comparison::of(one, other, distance_mm, region)
@@ -279,11 +301,21 @@ pub fn compare_rigs(
 /// Where a target is in a picture of a known camera.
 #[pyclass(frozen, module = "deltille")]
 pub struct Located {
+    asked: Asked,
     estimate: Option<Arc<calibrate::Estimate>>,
     why: Option<String>,
     warnings: Vec<String>,
     image: String,
     target: String,
+}
+
+/// What a pose comes from.
+#[derive(Clone)]
+struct Asked {
+    detection: Detection,
+    camera: Camera,
+    target: Target,
+    print_scale: Option<[f64; 2]>,
 }
 
 impl Located {
@@ -345,6 +377,14 @@ impl Located {
         self.estimate.is_some()
     }
 
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> crate::Reduced<'py, (Detection, Camera, Target, Option<[f64; 2]>)> {
+        let restore = slf.py().import("deltille._core")?.getattr("_located")?;
+        let Asked { detection, camera, target, print_scale } = slf.get().asked.clone();
+        Ok((restore, (detection, camera, target, print_scale)))
+    }
+
     fn __repr__(&self) -> String {
         match (self.view(), &self.why) {
             (Some(view), _) => {
@@ -379,54 +419,71 @@ pub fn pose_of(
     detection: PyRef<'_, Detection>,
     camera: PyRef<'_, Camera>,
     target: Option<Targets>,
-    print_scale: Option<PrintScale>,
+    print_scale: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Located> {
-    let target = target.or_else(|| Some(Targets(detection.targets.clone())));
-    let seen = Seen::of(target, None, [None, None], None)?;
-    let found = detection.found.clone();
-    let own = camera.0.clone();
-    let sheet = Sheet { print_scale: print_scale.map(PrintScale::both), shape: None };
-    let [target] = seen.targets() else {
-        let what = "several targets were looked for: say which one";
-        return Err(raised::CalibrationError::new_err(what));
-    };
-    let target: &targets::Target = target;
-    unlocked(py, || {
-        let reference = seen.reference();
-        let named = [(found.image.clone(), (*found).clone())];
-        let shown = views(&named, &reference);
-        let (image, name) = (found.image.clone(), target.name.to_string());
-        let nowhere = |why: String| Located {
-            estimate: None,
-            why: Some(why),
-            warnings: Vec::new(),
-            image: image.clone(),
-            target: name.clone(),
+    let targets = target.map_or_else(|| detection.targets.clone(), |targets| targets.0);
+    let wrong = |what: &str| Err(raised::CalibrationError::new_err(what.to_owned()));
+    let [target] = targets.as_slice() else {
+        return match targets.is_empty() {
+            true => wrong("give a target: the detection does not know what was looked for"),
+            false => wrong("several targets were looked for: say which one"),
         };
-        let mut views = match shown {
+    };
+    let print_scale = print_scale.map(print_scale_of).transpose()?;
+    let (detection, camera, target) = (detection.clone(), camera.clone(), target.clone());
+    Asked { detection, camera, target, print_scale }.located(py)
+}
+
+/// A pose that was pickled: it is found again.
+#[pyfunction]
+pub fn _located(
+    py: Python<'_>,
+    detection: &Detection,
+    camera: &Camera,
+    target: &Target,
+    print_scale: Option<[f64; 2]>,
+) -> PyResult<Located> {
+    let (detection, camera, target) = (detection.clone(), camera.clone(), target.clone());
+    Asked { detection, camera, target, print_scale }.located(py)
+}
+
+impl Asked {
+    fn located(self, py: Python<'_>) -> PyResult<Located> {
+        unlocked(py, || self.solve())?
+    }
+
+    fn solve(self) -> PyResult<Located> {
+        let (found, target) = (&self.detection.found, self.target.target.clone());
+        let sheet = Sheet { print_scale: self.print_scale, shape: None };
+        let reference = Reference::Target(&target);
+        let named = [(found.image.clone(), (**found).clone())];
+        let of = |why: Option<String>, estimate: Option<calibrate::Estimate>, warnings| Located {
+            estimate: estimate.map(Arc::new),
+            why,
+            warnings,
+            image: found.image.clone(),
+            target: target.name.to_string(),
+            asked: self.clone(),
+        };
+        let nowhere = |why: String| of(Some(why), None, Vec::new());
+        let mut views = match views(&named, &reference) {
             Ok(shown) => shown.views,
             Err(error) => return Ok(nowhere(errors::told(&error))),
         };
-        sheet.put_on(Some(target), &mut views).raise(errors::calibration)?;
+        sheet.put_on(Some(&target), &mut views).raise(errors::calibration)?;
         let panels = sheet.panels(&reference).raise(errors::calibration)?;
-        let calibration = calibrate::Calibration::new(panels).camera("", views, own);
-        let located = calibration.located(&found).raise(errors::calibration)?;
-        Ok(match located {
-            Err(why) => nowhere(errors::told(&why)),
+        let camera = self.camera.0.clone();
+        let calibration = calibrate::Calibration::new(panels).camera("", views, camera);
+        match calibration.located(found).raise(errors::calibration)? {
+            Err(why) => Ok(nowhere(errors::told(&why))),
             Ok(estimate) => {
                 let words = Words::new(&estimate, None);
                 let is_of_picture = |said: &&Diagnosis| !matches!(said, Diagnosis::LensEnds { .. });
                 let said = estimate.inspect();
                 let said = said.iter().filter(is_of_picture).map(|said| words.sentence(said));
                 let warnings = said.collect();
-                Located {
-                    estimate: Some(Arc::new(estimate)),
-                    why: None,
-                    warnings,
-                    image,
-                    target: name,
-                }
+                Ok(of(None, Some(estimate), warnings))
             }
-        })
-    })?
+        }
+    }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use deltille::calibrate::Reference;
 use deltille::detect::{self, GridCorner};
 use deltille::export::tables::{Picture, folder};
 use deltille::export::{csv, detection, orpc};
@@ -12,15 +13,18 @@ use deltille::targets;
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::arrays;
 use crate::camera::save_text;
-use crate::errors::{self, Raise, raised};
+use crate::errors::{self, Raise, RaiseFile, raised};
 use crate::families;
+use crate::pickles;
 use crate::targets::Target;
 
 /// Why a picture, or a grid in it, has no labels.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq, Serialize, Deserialize)]
 pub struct Reason(pub detect::Reason);
 
 #[pymethods]
@@ -59,9 +63,11 @@ impl Reason {
     }
 }
 
+pickles!(Reason);
+
 /// A tag that was read in a picture.
-#[pyclass(frozen, get_all, module = "deltille")]
-#[derive(Clone)]
+#[pyclass(frozen, get_all, module = "deltille", eq)]
+#[derive(Clone, PartialEq, Serialize, Deserialize)]
 pub struct DecodedTag {
     /// Id of the tag.
     id: u32,
@@ -76,6 +82,8 @@ pub struct DecodedTag {
     /// Number of cells that were misread and corrected.
     errors: u32,
 }
+
+pickles!(DecodedTag);
 
 #[pymethods]
 impl DecodedTag {
@@ -122,22 +130,9 @@ impl Detection {
 
     /// The same, where its labels are those of its targets: of others they would be places that were never seen.
     fn checked(self) -> PyResult<Self> {
-        for grid in &self.found.grids {
-            let Some(target) = self.target_of(grid) else { continue };
-            let panel = grid.panel.and_then(|id| target.panels.iter().find(|panel| panel.id == id));
-            let place = |id: u32| {
-                let corner = panel?.corners.iter().find(|corner| corner.id == id)?;
-                Some((corner.row, corner.col))
-            };
-            for corner in &grid.corners {
-                let Some(id) = corner.id else { continue };
-                if place(id) != Some((corner.row, corner.col)) {
-                    return Err(errors::detection(format!(
-                        "corner {id} in row {}, column {} is not on {}: give the target that was looked for",
-                        corner.row, corner.col, target.name
-                    )));
-                }
-            }
+        let labelled = self.found.grids.iter().filter(|grid| grid.panel.is_some());
+        for (grid, target) in labelled.filter_map(|grid| Some((grid, self.target_of(grid)?))) {
+            Reference::Target(target).check_labels(grid).raise(errors::detection)?;
         }
         Ok(self)
     }
@@ -269,6 +264,12 @@ impl Grid {
         let panel = grid.panel.map_or("no labels".to_owned(), |panel| format!("panel {panel}"));
         format!("<Grid {}: {panel}, {} corners>", self.kind(), grid.corners.len())
     }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (Detection, usize)> {
+        let restore = slf.py().import("deltille._core")?.getattr("_grid")?;
+        let own = slf.get();
+        Ok((restore, (own.of.clone(), own.index)))
+    }
 }
 
 #[pymethods]
@@ -287,7 +288,7 @@ impl Detection {
     #[staticmethod]
     #[pyo3(signature = (path, *, target = None))]
     fn load(path: PathBuf, target: Option<Targets>) -> PyResult<Self> {
-        let text = Limits::default().read_text(&path).raise(errors::file)?;
+        let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
         let wrong = |error: PyErr| {
             let what = format!("{}: {}", path.display(), error);
             raised::FileError::new_err(what.replace("DetectionError: ", ""))
@@ -452,6 +453,15 @@ impl Detection {
 pub fn _detection(json: &str, targets: Vec<PyRef<'_, Target>>) -> PyResult<Detection> {
     let found = Arc::new(detection::read(json).raise(errors::detection)?);
     Ok(Detection { found, targets: targets.iter().map(|target| (**target).clone()).collect() })
+}
+
+/// A grid that was pickled.
+#[pyfunction]
+pub fn _grid(of: &Detection, index: usize) -> PyResult<Grid> {
+    match index < of.found.grids.len() {
+        true => Ok(Grid { of: of.clone(), index }),
+        false => Err(raised::DetectionError::new_err(format!("there is no grid {index}"))),
+    }
 }
 
 /// Plain data as a dictionary.

@@ -11,8 +11,9 @@ use deltille::targets::SIDES;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arrays::whole;
 use crate::detection::{Detection, Targets};
-use crate::errors::{self, Raise, raised, unlocked};
+use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::image::Picture;
 use crate::targets::Target;
 
@@ -100,6 +101,14 @@ pub fn tiling(name: &str) -> PyResult<GridKind> {
     }
 }
 
+/// Rows and columns, where they are given.
+pub fn sides(rows: Option<i64>, cols: Option<i64>) -> PyResult<[Option<u32>; 2]> {
+    let side = |name: &str, side: Option<i64>| {
+        side.map(|side| whole(name, side, errors::detection)).transpose()
+    };
+    Ok([side("rows", rows)?, side("cols", cols)?])
+}
+
 /// A board's rows and columns, which are both known or neither.
 pub fn size(rows: Option<u32>, cols: Option<u32>) -> PyResult<Option<(u32, u32)>> {
     let wrong = |what: &str| Err(raised::DetectionError::new_err(what.to_owned()));
@@ -122,16 +131,20 @@ impl Detector {
     fn new(
         target: Option<Targets>,
         grid: Option<&str>,
-        rows: Option<u32>,
-        cols: Option<u32>,
+        rows: Option<i64>,
+        cols: Option<i64>,
         tone: Option<NameOrNumber>,
         ink: Option<NameOrNumber>,
         allow_mirrored: bool,
-        max_errors: Option<u32>,
+        max_errors: Option<i64>,
         refine: &str,
-        max_pixels: u64,
+        max_pixels: i64,
     ) -> PyResult<Self> {
         let wrong = |what: String| raised::DetectionError::new_err(what);
+        let [rows, cols] = sides(rows, cols)?;
+        let max_errors = max_errors.map(|most| whole("max_errors", most, errors::detection));
+        let max_errors = max_errors.transpose()?;
+        let max_pixels = whole("max_pixels", max_pixels, errors::detection)?;
         let asked = Asked {
             grid: grid.map(str::to_owned),
             rows,
@@ -246,8 +259,10 @@ impl Detector {
     ///
     /// Raises
     /// ------
+    /// FileError
+    ///     Where the file cannot be opened; a :class:`MissingFileError` where it is not there.
     /// ImageError
-    ///     Where the file cannot be read.
+    ///     Where it is no picture.
     #[pyo3(signature = (path, *, accept_damaged = false))]
     fn detect_file(
         &self,
@@ -257,7 +272,7 @@ impl Detector {
     ) -> PyResult<Detection> {
         let found = unlocked(py, || {
             let read = photograph::read_with_notes(&path, &self.limits, accept_damaged);
-            let photograph = read.raise(errors::image)?;
+            let photograph = read.raise_of_file(&path, errors::image)?;
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             let mut found = self.detector.detect(&photograph.image, &name);
             found.file = photograph.notes;

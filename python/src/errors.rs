@@ -1,7 +1,10 @@
 //! From the library's errors to exceptions, in the words of Python.
 
 use std::borrow::Cow;
+use std::error::Error;
 use std::fmt::Display;
+use std::io;
+use std::path::Path;
 
 use deltille::limits;
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -11,6 +14,7 @@ use pyo3::prelude::*;
 pub mod raised {
     #![allow(missing_docs, reason = "the macro makes types without documentation")]
     pyo3::import_exception!(deltille.errors, Error);
+    pyo3::import_exception!(deltille.errors, ArgumentError);
     pyo3::import_exception!(deltille.errors, TargetError);
     pyo3::import_exception!(deltille.errors, FamilyError);
     pyo3::import_exception!(deltille.errors, ImageError);
@@ -19,6 +23,7 @@ pub mod raised {
     pyo3::import_exception!(deltille.errors, CameraError);
     pyo3::import_exception!(deltille.errors, VerifyError);
     pyo3::import_exception!(deltille.errors, FileError);
+    pyo3::import_exception!(deltille.errors, MissingFileError);
 }
 
 /// What messages of the library call a setting, and what it is called here.
@@ -147,6 +152,7 @@ macro_rules! classes {
 }
 
 classes! {
+    argument => ArgumentError: "An array of another shape, or a number out of range.";
     target => TargetError: "A target that cannot be made or used.";
     family => FamilyError: "A family that cannot be used.";
     image => ImageError: "A picture that is none.";
@@ -155,6 +161,44 @@ classes! {
     camera => CameraError: "A camera that cannot be used.";
     verify => VerifyError: "A file that cannot be compared.";
     file => FileError: "A file that cannot be read or written.";
+}
+
+/// Makes exceptions of the errors of a file.
+pub trait RaiseFile<T> {
+    /// An exception of a class, with the error's words. Where the system does not give the file, it is a `FileError`
+    /// with its number and the file's name, of a missing file a `MissingFileError`.
+    ///
+    /// # Errors
+    /// Where there is an error.
+    fn raise_of_file(self, path: &Path, class: fn(String) -> PyErr) -> PyResult<T>;
+}
+
+impl<T, E: Error + 'static> RaiseFile<T> for Result<T, E> {
+    fn raise_of_file(self, path: &Path, class: fn(String) -> PyErr) -> PyResult<T> {
+        self.map_err(|error| {
+            let mut cause: Option<&(dyn Error + 'static)> = Some(&error);
+            let mut system = None;
+            while let Some(error) = cause {
+                system = system.or(error.downcast_ref::<io::Error>());
+                cause = error.source();
+            }
+            let Some((system, number)) = system.and_then(|of| Some((of, of.raw_os_error()?)))
+            else {
+                return class(told(&error));
+            };
+            let raised = match system.kind() {
+                io::ErrorKind::NotFound => raised::MissingFileError::new_err(told(&error)),
+                _ => raised::FileError::new_err(told(&error)),
+            };
+            Python::attach(|py| {
+                let value = raised.value(py);
+                // An exception that takes no attributes is one all the same.
+                let _ = value.setattr("errno", number);
+                let _ = value.setattr("filename", path.display().to_string());
+            });
+            raised
+        })
+    }
 }
 
 /// Does work without the interpreter's lock; a panic becomes an exception.

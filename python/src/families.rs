@@ -1,5 +1,6 @@
 //! Families of tags: codes, decoding, search.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -12,7 +13,7 @@ use deltille::lattice::{Dimension, GridKind};
 use numpy::{PyArray1, PyArrayLike1};
 use pyo3::prelude::*;
 
-use crate::arrays;
+use crate::arrays::{self, whole};
 use crate::errors::{self, Raise, raised, unlocked};
 use crate::interrupt::interruptible;
 
@@ -197,7 +198,7 @@ impl Family {
         &self,
         py: Python<'py>,
         words: PyArrayLike1<'py, u64>,
-        max_errors: Option<u32>,
+        max_errors: Option<i64>,
     ) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>)>
     {
         let words: Vec<u64> = words.as_array().iter().copied().collect();
@@ -206,7 +207,8 @@ impl Family {
             let what = format!("{word:#x} has more than the {bits} bits of {}", self.name());
             return Err(raised::FamilyError::new_err(what));
         }
-        let most = max_errors.unwrap_or(self.correctable());
+        let most = max_errors.map(|most| whole("max_errors", most, errors::family));
+        let most = most.transpose()?.unwrap_or(self.correctable());
         let own = self.clone();
         let found = unlocked(py, move || {
             let decoder = own.decoder.get_or_init(|| Decoder::new(&own.family));
@@ -221,6 +223,16 @@ impl Family {
             numbers(|found| found.turns.into()),
             numbers(|found| found.errors.into()),
         ))
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.to_json() == other.to_json()
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.to_json().hash(&mut hasher);
+        hasher.finish()
     }
 
     fn __len__(&self) -> usize {
@@ -271,8 +283,8 @@ pub fn search_family(
     py: Python<'_>,
     name: &str,
     seconds: f64,
-    work: Option<u32>,
-    seed: u64,
+    work: Option<i64>,
+    seed: i64,
     from_nothing: bool,
     callback: Option<Py<PyAny>>,
 ) -> PyResult<Family> {
@@ -284,13 +296,13 @@ pub fn search_family(
     let dimension = Dimension::from_bits(bits).raise(errors::family)?;
     family::check_name(name, dimension, distance).raise(errors::family)?;
     if !(0.0..=1e9).contains(&seconds) {
-        return Err(wrong("seconds: give a time from 0"));
+        return Err(wrong("seconds: give a time from 0 to 1e9"));
     }
     let budget = match work {
-        Some(steps) => Budget::Work(steps),
+        Some(steps) => Budget::Work(whole("work", steps, errors::family)?),
         None => Budget::Time(Duration::from_secs_f64(seconds), clock::now),
     };
-    let search = Best::new(dimension, distance, budget).seed(seed);
+    let search = Best::new(dimension, distance, budget).seed(whole("seed", seed, errors::family)?);
     let own_name = name.to_owned();
     let raised_by_callback: Arc<Mutex<Option<PyErr>>> = Arc::default();
     let error = raised_by_callback.clone();

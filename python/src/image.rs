@@ -10,6 +10,7 @@ use numpy::{Element, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayMethods, Py
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods, dtype};
 use pyo3::prelude::*;
 
+use crate::arrays::shape_in_words;
 use crate::errors::{self, Raise, raised};
 
 /// A picture that Python holds, or a copy of it.
@@ -44,11 +45,16 @@ impl<'py> Picture<'py> {
         };
         let shape = found.shape().to_vec();
         if shape.contains(&0) {
-            return Err(refused(format!("an array of {} has no pixels", told(&shape))));
+            return Err(refused(format!("an array of {} has no pixels", shape_in_words(&shape))));
         }
         let [height, width] = match shape.as_slice() {
             [height, width] | [height, width, 3] => [*height, *width],
-            _ => return Err(refused(format!("an array of {} is no picture", told(&shape)))),
+            _ => {
+                return Err(refused(format!(
+                    "an array of {} is no picture",
+                    shape_in_words(&shape)
+                )));
+            }
         };
         let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
         let (wide, high) = (side(width), side(height));
@@ -124,14 +130,6 @@ impl<'py> Picture<'py> {
             Self::Deep(pixels) => pixels.into(),
             Self::Float(pixels) => pixels.into(),
         })
-    }
-}
-
-/// A shape as it is read.
-fn told(shape: &[usize]) -> String {
-    match shape {
-        [] => "no dimension".to_owned(),
-        _ => shape.iter().map(usize::to_string).collect::<Vec<_>>().join(" × "),
     }
 }
 

@@ -41,6 +41,28 @@ use pyo3::prelude::*;
 /// What pickle restores a value by: a function and its arguments.
 type Reduced<'py, A> = PyResult<(Bound<'py, PyAny>, A)>;
 
+/// Makes a class of plain data one that pickle and copy take, as JSON.
+macro_rules! pickles {
+    ($class:ident) => {
+        #[pymethods]
+        impl $class {
+            fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String,)> {
+                let text = serde_json::to_string(slf.get()).unwrap_or_default();
+                Ok((slf.get_type().getattr("_from_json")?, (text,)))
+            }
+
+            #[staticmethod]
+            fn _from_json(text: &str) -> PyResult<Self> {
+                let wrong = |error: serde_json::Error| {
+                    crate::errors::raised::Error::new_err(error.to_string())
+                };
+                serde_json::from_str(text).map_err(wrong)
+            }
+        }
+    };
+}
+pub(crate) use pickles;
+
 /// The compiled part of the package.
 #[pymodule]
 mod _core {
@@ -51,15 +73,17 @@ mod _core {
     #[pymodule_export]
     use super::calibrate::{calibrate, rig};
     #[pymodule_export]
-    use super::calibrated_camera::CalibratedCamera;
+    use super::calibrated_camera::{_part, CalibratedCamera};
     #[pymodule_export]
-    use super::calibration::{_calibration, Calibration, Rig};
+    use super::calibration::{_calibration, _rig, Calibration, Rig};
     #[pymodule_export]
     use super::camera::Camera;
     #[pymodule_export]
-    use super::comparison::{Comparison, Located, Motion, compare, compare_rigs, pose_of};
+    use super::comparison::{
+        _located, Comparison, Located, Motion, compare, compare_rigs, pose_of,
+    };
     #[pymodule_export]
-    use super::detection::{_detection, _tables, DecodedTag, Detection, Grid, Reason};
+    use super::detection::{_detection, _grid, _tables, DecodedTag, Detection, Grid, Reason};
     #[pymodule_export]
     use super::detector::{_detector, Detector};
     #[pymodule_export]

@@ -2,11 +2,13 @@
 
 use deltille::camera;
 use deltille::glam::{DMat3, DQuat, DVec3};
+use deltille::quantity::{angle_rad, place_mm};
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use crate::arrays::{self, Points};
-use crate::errors::raised;
+use crate::arrays::{self, vector};
+use crate::errors::{self, raised};
 
 /// A rigid motion ``y = R x + t`` between two frames, in millimetres.
 ///
@@ -26,18 +28,20 @@ use crate::errors::raised;
 /// >>> pose = deltille.Pose(rvec=(0, 0, 0.1), tvec=(0, 0, 500))
 /// >>> (pose @ pose.inverse()).matrix.shape
 /// (4, 4)
-#[pyclass(frozen, module = "deltille")]
-#[derive(Clone, Copy)]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(Clone, Copy, PartialEq)]
 pub struct Pose(pub camera::Pose);
 
 #[pymethods]
 impl Pose {
     #[new]
-    #[pyo3(signature = (rvec = [0.0; 3], tvec = [0.0; 3]))]
-    fn new(rvec: [f64; 3], tvec: [f64; 3]) -> PyResult<Self> {
-        if rvec.iter().chain(&tvec).any(|number| !number.is_finite()) {
-            return Err(raised::Error::new_err("a pose is made of finite numbers"));
-        }
+    #[pyo3(signature = (rvec = None, tvec = None))]
+    fn new(rvec: Option<&Bound<'_, PyAny>>, tvec: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let rvec = rvec.map_or(Ok([0.0; 3]), |rvec| {
+            vector("rvec", rvec, angle_rad::RANGE, errors::argument)
+        })?;
+        let tvec = tvec
+            .map_or(Ok([0.0; 3]), |tvec| vector("tvec", tvec, place_mm::RANGE, errors::argument))?;
         let rotation = DQuat::from_scaled_axis(rvec.into());
         Ok(Self(camera::Pose { rotation, translation: tvec.into() }))
     }
@@ -55,11 +59,15 @@ impl Pose {
     /// -------
     /// Pose
     #[staticmethod]
-    #[pyo3(signature = (eye, at, up = None))]
-    pub fn looking_at(eye: [f64; 3], at: [f64; 3], up: Option<[f64; 3]>) -> PyResult<Self> {
-        let pose = camera::Pose::viewing(eye.into(), at.into(), up.map(DVec3::from));
-        let wrong = "up must not be parallel to the line of sight, nor eye be at";
-        pose.map(Self).ok_or_else(|| raised::Error::new_err(wrong))
+    #[pyo3(name = "looking_at", signature = (eye, at, up = None))]
+    fn looking_at_of(
+        eye: &Bound<'_, PyAny>,
+        at: &Bound<'_, PyAny>,
+        up: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let up = up.map(|up| vector("up", up, place_mm::RANGE, errors::argument)).transpose()?;
+        let place = |name: &str, place| vector(name, place, place_mm::RANGE, errors::argument);
+        Self::looking_at(place("eye", eye)?, place("at", at)?, up)
     }
 
     /// The pose of a 4 × 4 matrix.
@@ -68,20 +76,34 @@ impl Pose {
     /// ----------
     /// matrix : array of 4 × 4, or of 3 × 4
     ///     Rotation and translation (mm).
+    ///
+    /// Returns
+    /// -------
+    /// Pose
     #[staticmethod]
-    fn from_matrix(matrix: Points<'_>) -> PyResult<Self> {
-        let m = matrix.as_array();
-        let wrong =
-            || raised::Error::new_err("a pose is a rotation and a translation, 4 × 4 or 3 × 4");
-        if !matches!(m.dim(), (3 | 4, 4)) || m.iter().any(|number| !number.is_finite()) {
-            return Err(wrong());
+    fn from_matrix(matrix: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let wrong = |what: &str| Err(raised::ArgumentError::new_err(format!("matrix: {what}")));
+        let rows = arrays::rows_of::<4>("matrix", matrix)?;
+        let ([x, y, z] | [x, y, z, _]) = rows.as_slice() else {
+            return wrong("a pose is 4 × 4, or 3 × 4");
+        };
+        let outside = rows.iter().flatten().find_map(|&number| place_mm::RANGE.check(number).err());
+        if let Some(outside) = outside {
+            return wrong(&outside.to_string());
         }
-        let column = |j: usize| DVec3::new(m[[0, j]], m[[1, j]], m[[2, j]]);
+        if rows.get(3).is_some_and(|last| *last != [0.0, 0.0, 0.0, 1.0]) {
+            return wrong("the last row of a pose is 0 0 0 1");
+        }
+        let column = |j: usize| DVec3::new(x[j], y[j], z[j]);
         let rotation = DMat3::from_cols(column(0), column(1), column(2));
         let off = rotation.transpose() * rotation - DMat3::IDENTITY;
-        if off.to_cols_array().iter().any(|part| part.abs() > 1e-6) || rotation.determinant() < 0.0
-        {
-            return Err(wrong());
+        if off.to_cols_array().iter().any(|part| part.abs() > 1e-6) {
+            return wrong(
+                "its first three columns are no rotation: not of length 1 at right angles",
+            );
+        }
+        if rotation.determinant() < 0.0 {
+            return wrong("its first three columns are a reflection, not a rotation");
         }
         let rotation = DQuat::from_mat3(&rotation).normalize();
         Ok(Self(camera::Pose { rotation, translation: column(3) }))
@@ -142,29 +164,47 @@ impl Pose {
     fn apply<'py>(
         &self,
         py: Python<'py>,
-        points: Points<'py>,
+        points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let wrong =
-            || raised::Error::new_err(format!("points are N × 3, not {}", arrays::shape(&points)));
-        let points = arrays::points3(&points).ok_or_else(wrong)?;
-        Ok(arrays::rows(py, points.into_iter().map(|point| self.0.apply(point).to_array())))
+        let points = arrays::rows_of::<3>("points", points)?;
+        let moved = points.into_iter().map(|point| self.0.apply(point.into()).to_array());
+        Ok(arrays::rows(py, moved))
     }
 
-    fn __matmul__(&self, first: &Self) -> Self {
-        Self(self.0.after(&first.0))
+    fn __matmul__(&self, first: &Bound<'_, PyAny>) -> PyResult<Self> {
+        match first.cast::<Self>() {
+            Ok(first) => Ok(Self(self.0.after(&first.get().0))),
+            Err(_) => Err(PyTypeError::new_err(
+                "pose @ pose is a pose; points are moved by pose.apply(points)",
+            )),
+        }
     }
 
     fn __repr__(&self) -> String {
         self.told()
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, ([f64; 3], [f64; 3])> {
-        let [turn, _] = slf.get().0.off(&camera::Pose::IDENTITY);
-        Ok((slf.get_type().into_any(), (turn.to_array(), slf.get().0.translation.to_array())))
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, ([f64; 4], [f64; 3])> {
+        let camera::Pose { rotation, translation } = slf.get().0;
+        Ok((slf.get_type().getattr("_of")?, (rotation.to_array(), translation.to_array())))
+    }
+
+    /// A pose that was pickled.
+    #[staticmethod]
+    fn _of(quaternion: [f64; 4], translation: [f64; 3]) -> Self {
+        let rotation = DQuat::from_array(quaternion);
+        Self(camera::Pose { rotation, translation: translation.into() })
     }
 }
 
 impl Pose {
+    /// The pose of a camera that stands somewhere and looks at something.
+    pub fn looking_at(eye: [f64; 3], at: [f64; 3], up: Option<[f64; 3]>) -> PyResult<Self> {
+        let pose = camera::Pose::viewing(eye.into(), at.into(), up.map(DVec3::from));
+        let wrong = "up must not be parallel to the line of sight, nor eye be at";
+        pose.map(Self).ok_or_else(|| raised::ArgumentError::new_err(wrong))
+    }
+
     /// As it is made.
     pub fn told(&self) -> String {
         let [turn, _] = self.0.off(&camera::Pose::IDENTITY);

@@ -1,17 +1,20 @@
 //! Synthetic pictures of targets, with the true places of their corners.
 
+use std::path::PathBuf;
+
 use deltille::export::truth;
 use deltille::glam::DVec3;
 use deltille::limits::Limits;
+use deltille::quantity::{blur_px, light_gradient, of_full_scale, place_mm};
 use deltille::synth::{Light, TruthCorner, scene_of_target};
 use deltille::targets::TargetSpec;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-use crate::arrays;
+use crate::arrays::{self, number, vector, whole};
 use crate::camera::Camera;
-use crate::errors::{self, Raise, raised};
+use crate::errors::{self, Raise, RaiseFile, raised};
 use crate::interrupt::interruptible;
 use crate::pose::Pose;
 use crate::targets::Target;
@@ -63,10 +66,33 @@ impl Truth {
         arrays::column(py, self.corners.iter().map(|corner| i64::from(corner.panel)))
     }
 
-    /// Camera from target.
+    /// Where the target is: camera from target.
     #[getter]
     fn pose(&self) -> Pose {
         self.pose
+    }
+
+    /// Reads what ``deltille render`` writes beside a picture.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///
+    /// Returns
+    /// -------
+    /// Truth
+    #[staticmethod]
+    fn load(path: PathBuf) -> PyResult<Self> {
+        let text = Limits::default().read_text(&path).raise_of_file(&path, errors::file)?;
+        let found = truth::read(&text);
+        let wrong = |error| errors::file(format!("{}: {}", path.display(), errors::told(&error)));
+        found.map(Self::from).map_err(wrong)
+    }
+
+    /// The truth of a text, as :meth:`load` reads it from files.
+    #[staticmethod]
+    fn from_json(text: &str) -> PyResult<Self> {
+        truth::read(text).map(Self::from).raise(errors::file)
     }
 
     /// The text that ``deltille render`` writes beside a picture.
@@ -84,8 +110,19 @@ impl Truth {
         self.corners.len()
     }
 
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String,)> {
+        Ok((slf.get_type().getattr("from_json")?, (slf.get().to_json(""),)))
+    }
+
     fn __repr__(&self) -> String {
         format!("<Truth of {}: {} corners>", self.target, self.corners.len())
+    }
+}
+
+impl From<truth::Truth> for Truth {
+    fn from(found: truth::Truth) -> Self {
+        let truth::Truth { target, camera_from_target, light, corners, .. } = found;
+        Self { corners, pose: Pose(camera_from_target), light, target }
     }
 }
 
@@ -109,7 +146,7 @@ impl Truth {
 /// noise : float, optional
 ///     Standard deviation of the noise, of full scale 1.
 /// gradient : (float, float), optional
-///     Relative change of the light across and down the picture.
+///     Relative change of the light across and down the picture, -2 to 2; none if left out.
 /// white, black, background : float, optional
 ///     Grey values of paper, print and what is around, of full scale 1.
 /// seed : int, optional
@@ -120,27 +157,28 @@ impl Truth {
 /// Returns
 /// -------
 /// image : ndarray of H × W
+///     Grey values of the type that was asked for.
 /// truth : Truth
 ///     The true places of all corners in view.
 #[pyfunction]
 #[pyo3(signature = (target, camera, pose = None, *, eye = None, look_at = None, up = None, blur_px = 0.8,
-    noise = 0.01, gradient = [0.0, 0.0], white = 0.9, black = 0.1, background = 0.5, seed = 0, dtype = "uint8"))]
+    noise = 0.01, gradient = None, white = 0.9, black = 0.1, background = 0.5, seed = 0, dtype = "uint8"))]
 #[expect(clippy::too_many_arguments, reason = "keywords")]
 pub fn render<'py>(
     py: Python<'py>,
     target: PyRef<'_, Target>,
     camera: PyRef<'_, Camera>,
     pose: Option<PyRef<'_, Pose>>,
-    eye: Option<[f64; 3]>,
-    look_at: Option<[f64; 3]>,
-    up: Option<[f64; 3]>,
+    eye: Option<&Bound<'_, PyAny>>,
+    look_at: Option<&Bound<'_, PyAny>>,
+    up: Option<&Bound<'_, PyAny>>,
     blur_px: f64,
     noise: f64,
-    gradient: [f64; 2],
+    gradient: Option<&Bound<'_, PyAny>>,
     white: f64,
     black: f64,
     background: f64,
-    seed: u64,
+    seed: i64,
     dtype: &str,
 ) -> PyResult<(Bound<'py, PyAny>, Truth)> {
     let wrong = |what: String| raised::TargetError::new_err(what);
@@ -153,27 +191,31 @@ pub fn render<'py>(
     }
     let camera = camera.0.clone();
     Limits::default().check_pixels(camera.width, camera.height).raise(errors::camera)?;
-    let in_range = |name: &str, value: f64, most: f64| match (0.0..=most).contains(&value) {
-        true => Ok(value),
-        false => Err(wrong(format!("{name}: {value} is not between 0 and {most}"))),
-    };
-    if gradient.iter().any(|part| !(-2.0..=2.0).contains(part)) {
-        return Err(wrong("gradient: it must be between -2 and 2".to_owned()));
-    }
+    let grey = |name: &str, value| number(name, value, of_full_scale::RANGE, errors::target);
+    let gradient =
+        gradient.map(|parts| vector("gradient", parts, light_gradient::RANGE, errors::target));
     let light = Light::default()
-        .blur_px(in_range("blur_px", blur_px, 100.0)?)
-        .noise(in_range("noise", noise, 1.0)?)
-        .white(in_range("white", white, 1.0)?)
-        .black(in_range("black", black, 1.0)?)
-        .background(in_range("background", background, 1.0)?)
-        .gradient(gradient.into())
-        .seed(seed);
+        .blur_px(number("blur_px", blur_px, blur_px::RANGE, errors::target)?)
+        .noise(grey("noise", noise)?)
+        .white(grey("white", white)?)
+        .black(grey("black", black)?)
+        .background(grey("background", background)?)
+        .gradient(gradient.unwrap_or(Ok([0.0; 2]))?.into())
+        .seed(whole("seed", seed, errors::target)?);
+    let place = |name: &str, place| vector(name, place, place_mm::RANGE, errors::target);
+    let look_at = look_at.map(|at| place("look_at", at)).transpose()?;
+    let up = up.map(|up| place("up", up)).transpose()?;
     let pose = match (pose, eye) {
-        (Some(pose), None) => *pose,
+        (Some(pose), None) if look_at.or(up).is_none() => *pose,
+        (Some(_), None) => {
+            return Err(wrong(
+                "look_at and up belong to eye: a pose says where it looks".to_owned(),
+            ));
+        }
         (None, Some(eye)) => {
             let places = own.all().map(|(_, corner)| corner.target_mm);
             let middle = places.sum::<DVec3>() / own.all().count().max(1) as f64;
-            Pose::looking_at(eye, look_at.unwrap_or(middle.to_array()), up)?
+            Pose::looking_at(place("eye", eye)?, look_at.unwrap_or(middle.to_array()), up)?
         }
         _ => {
             let what = "give pose, or eye for where the camera stands";

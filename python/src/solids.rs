@@ -11,8 +11,9 @@ use deltille::targets::{
 };
 use pyo3::prelude::*;
 
-use crate::boards::{Tags, paper as paper_of};
-use crate::errors::{self, Raise, raised};
+use crate::arrays::whole;
+use crate::boards::{Tags, paper as paper_of, spacing_of};
+use crate::errors::{self, Raise, RaiseFile, raised};
 use crate::families::FamilyChoice;
 use crate::targets::Target;
 
@@ -90,13 +91,13 @@ macro_rules! solid {
             #[expect(clippy::too_many_arguments, reason = "keywords")]
             fn new(
                 edge_mm: Option<f64>,
-                tiles: Option<u32>,
+                tiles: Option<i64>,
                 face_margin_mm: Option<f64>,
                 family: Option<FamilyChoice>,
-                tag_spacing: Option<u32>,
+                tag_spacing: Option<i64>,
                 tag_border: Option<f64>,
-                first_id: u32,
-                board_id: u32,
+                first_id: i64,
+                board_id: i64,
                 skeleton: bool,
                 panel_thickness_mm: Option<f64>,
                 wall_mm: Option<f64>,
@@ -111,10 +112,10 @@ macro_rules! solid {
                 let solids = Solids {
                     shape: $shape,
                     edge_mm,
-                    tiles,
+                    tiles: tiles.map(|tiles| whole("tiles", tiles, errors::target)).transpose()?,
                     face_margin_mm,
-                    tags: tags_of(family, tag_spacing, tag_border, first_id),
-                    board_id,
+                    tags: tags_of(family, tag_spacing, tag_border, first_id)?,
+                    board_id: whole("board_id", board_id, errors::target)?,
                     skeleton: frame(skeleton, sizes)?,
                     name,
                     paper: paper_of(paper, orientation, margin_mm, sheets(per_face))?,
@@ -127,11 +128,13 @@ macro_rules! solid {
 
 fn tags_of(
     family: Option<FamilyChoice>,
-    spacing: Option<u32>,
+    tag_spacing: Option<i64>,
     border_bits: Option<f64>,
-    first_id: u32,
-) -> Tags {
-    Tags { family, tags_in: TagsIn::Black, spacing, border_bits, first_id }
+    first_id: i64,
+) -> PyResult<Tags> {
+    let spacing = spacing_of(tag_spacing)?;
+    let first_id = whole("first_id", first_id, errors::target)?;
+    Ok(Tags { family, tags_in: TagsIn::Black, spacing, border_bits, first_id })
 }
 
 fn sheets(per_face: bool) -> SolidSheets {
@@ -195,13 +198,13 @@ impl Solid {
         scale: f64,
         allow_skew: bool,
         edge_mm: Option<f64>,
-        tiles: Option<u32>,
+        tiles: Option<i64>,
         face_margin_mm: Option<f64>,
         family: Option<FamilyChoice>,
-        tag_spacing: Option<u32>,
+        tag_spacing: Option<i64>,
         tag_border: Option<f64>,
-        first_id: u32,
-        board_id: u32,
+        first_id: i64,
+        board_id: i64,
         skeleton: bool,
         panel_thickness_mm: Option<f64>,
         wall_mm: Option<f64>,
@@ -217,10 +220,10 @@ impl Solid {
         let solids = Solids {
             shape: SolidShape::Mesh(read_mesh(&mesh, scale, allow_skew)?),
             edge_mm,
-            tiles,
+            tiles: tiles.map(|tiles| whole("tiles", tiles, errors::target)).transpose()?,
             face_margin_mm,
-            tags: tags_of(family, tag_spacing, tag_border, first_id),
-            board_id,
+            tags: tags_of(family, tag_spacing, tag_border, first_id)?,
+            board_id: whole("board_id", board_id, errors::target)?,
             skeleton: frame(skeleton, sizes)?,
             name: Some(name.unwrap_or(stem)),
             paper: paper_of(paper, orientation, margin_mm, sheets(per_face))?,
@@ -230,7 +233,7 @@ impl Solid {
 }
 
 fn read_mesh(path: &Path, scale: f64, allow_skew: bool) -> PyResult<ClosedMesh> {
-    let text = Limits::default().read(path).raise(errors::file)?;
+    let text = Limits::default().read(path).raise_of_file(path, errors::file)?;
     let wrong = |what: String| raised::TargetError::new_err(format!("{}: {what}", path.display()));
     let (mesh, _) = obj::read(&text).map_err(|error| wrong(errors::told(&error)))?;
     let (face, deviation) = mesh.most_skewed();

@@ -12,11 +12,13 @@ use deltille::camera;
 use deltille::detect;
 use deltille::export::calibration::{Print, Residuals, Sheet};
 use deltille::export::{calibration, rig};
+use deltille::quantity::{edge_mm, print_scale};
 use deltille::targets;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use serde_json::Value;
 
+use crate::arrays::{number, vector, whole};
 use crate::detection::{Detection, Targets};
 use crate::detector::{size, tiling};
 use crate::errors::{self, Raise, raised};
@@ -48,11 +50,10 @@ impl Seen {
                 Ok(Self::Targets(found.iter().map(own).collect()))
             }
             (found, Some(grid)) if found.is_empty() => {
-                let Some(edge_mm) = edge_mm.filter(|mm| (1.0..=1000.0).contains(mm)) else {
-                    return wrong(
-                        "edge_mm: a board of a grid needs the edge of its tiles, 1 mm to 1 m",
-                    );
+                let Some(edge_mm) = edge_mm else {
+                    return wrong("edge_mm: a board of a grid needs the edge of its tiles, mm");
                 };
+                let edge_mm = number("edge_mm", edge_mm, edge_mm::RANGE, errors::calibration)?;
                 let size = size(rows, cols)?.map(|(rows, cols)| [rows, cols]);
                 Ok(Self::Grid(UntaggedGrid { kind: tiling(grid)?, edge_mm, size }))
             }
@@ -98,9 +99,9 @@ impl How {
     pub fn of(
         loss: &str,
         weights: &str,
-        hold_out: Option<usize>,
-        distances_mm: Vec<f64>,
-        print_scale: Option<PrintScale>,
+        hold_out: Option<i64>,
+        distances_mm: Option<Vec<f64>>,
+        print_scale: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let wrong = |what: &str| raised::CalibrationError::new_err(what.to_owned());
         let loss = match loss {
@@ -117,18 +118,16 @@ impl How {
         if hold_out.is_some_and(|every| every < 2) {
             return Err(wrong("hold_out: every n-th view is kept out, n from 2"));
         }
+        let hold_out = hold_out.map(|every| whole("hold_out", every, errors::calibration));
+        let distances_mm = distances_mm.unwrap_or_default();
         if !distances_mm.iter().all(|mm| (1.0..=1e6).contains(mm)) {
             return Err(wrong("distances_mm: give distances from 1 mm to 1000 m"));
         }
-        let print_scale = print_scale.map(PrintScale::both);
-        let is_scale = |scale: &f64| (0.5..=2.0).contains(scale);
-        if print_scale.is_some_and(|scales| !scales.iter().all(is_scale)) {
-            return Err(wrong("print_scale: give measured length over stated length, near 1"));
-        }
+        let print_scale = print_scale.map(print_scale_of).transpose()?;
         Ok(Self {
             loss,
             weights,
-            hold_out,
+            hold_out: hold_out.transpose()?,
             board_shape: false,
             measure_target: false,
             refine_target: false,
@@ -138,19 +137,11 @@ impl How {
     }
 }
 
-/// How a print came out: one number, or two.
-#[derive(FromPyObject)]
-pub enum PrintScale {
-    One(f64),
-    Two([f64; 2]),
-}
-
-impl PrintScale {
-    pub fn both(self) -> [f64; 2] {
-        match self {
-            Self::One(both) => [both; 2],
-            Self::Two(each) => each,
-        }
+/// How a print came out across and up the sheet: measured over stated length, one number or two.
+pub fn print_scale_of(given: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
+    match given.extract::<f64>() {
+        Ok(both) => Ok([number("print_scale", both, print_scale::RANGE, errors::calibration)?; 2]),
+        Err(_) => vector("print_scale", given, print_scale::RANGE, errors::calibration),
     }
 }
 
@@ -162,7 +153,13 @@ impl ModelChoice {
     pub fn of(text: &str) -> PyResult<Self> {
         match text {
             "auto" => Ok(Self(None)),
-            _ => Ok(Self(Some(text.parse().raise(errors::calibration)?))),
+            _ => match text.parse() {
+                Ok(model) => Ok(Self(Some(model))),
+                Err(error) => {
+                    let what = format!("{}, or auto, which chooses one", errors::told(&error));
+                    Err(errors::calibration(what))
+                }
+            },
         }
     }
 
@@ -197,6 +194,9 @@ pub fn named(
         let name = names.as_ref().map(|names| names[index].clone());
         let name = name.or(stem.map(|stem| stem.into_owned())).filter(|name| !name.is_empty());
         let name = name.unwrap_or_else(|| format!("{index:04}"));
+        // Pictures of several folders may have the same file name.
+        let is_taken = names.is_none() && all.iter().any(|(taken, _)| *taken == name);
+        let name = if is_taken { found.image.clone() } else { name };
         let is_same = |(_, other): &&(String, detect::Detection)| {
             !found.grids.is_empty() && found.grids == other.grids
         };
@@ -222,6 +222,8 @@ pub struct Solved {
     pub models: Vec<Vec<Candidate>>,
     pub targets: Vec<targets::Target>,
     pub model: String,
+    /// Whether it is a rig, which may have one camera.
+    pub is_rig: bool,
     /// The file that it was read from, and what that says.
     pub file: Option<(String, Value)>,
 }
@@ -234,7 +236,8 @@ impl Solved {
         model: String,
         text: &str,
     ) -> Self {
-        let file = serde_json::from_str(text).ok().map(|value| (text.to_owned(), value));
+        let whole: Option<Value> = serde_json::from_str(text).ok();
+        let file = whole.map(|whole| (text.to_owned(), whole));
         let (diagnoses, models) = (Vec::new(), Vec::new());
         Self {
             estimate,
@@ -244,6 +247,7 @@ impl Solved {
             models,
             targets,
             model,
+            is_rig: file.as_ref().is_some_and(|(_, whole)| whole.get("cameras").is_some()),
             file,
         }
     }
@@ -268,36 +272,34 @@ impl Solved {
     }
 
     /// What the programs write of it.
-    pub fn json(&self, is_rig: bool, residuals: Residuals) -> String {
+    pub fn json(&self, residuals: Residuals) -> String {
         if let Some((text, _)) = &self.file {
             return text.clone();
         }
         let Self { estimate, diagnoses, print, .. } = self;
-        match is_rig {
+        match self.is_rig {
             true => rig::write(estimate, diagnoses, &self.model, *print, residuals),
             false => calibration::write(estimate, diagnoses, *print, residuals).unwrap_or_default(),
         }
     }
 
+    /// Whether another one is the same, corner by corner.
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.json(Residuals::Listed) == other.json(Residuals::Listed)
+    }
+
     /// What is said of it, as plain data with a sentence each.
     pub fn said(&self) -> Vec<(Value, bool)> {
         if let Some(file) = self.in_file(None) {
-            let records = file["diagnoses"].as_array().cloned().unwrap_or_default();
-            let is_failure = |record: &Value| {
-                matches!(
-                    record["kind"].as_str(),
-                    Some("foreign_camera" | "absurd_fit" | "many_left_out")
-                )
-            };
-            return records
+            let is_failure =
+                |record: &Value| record["kind"].as_str().is_some_and(calibration::is_failure);
+            return records_of(file)
                 .into_iter()
                 .map(|record| (record.clone(), is_failure(&record)))
                 .collect();
         }
-        let is_rig = self.estimate.cameras.len() != 1;
-        let file: Value =
-            serde_json::from_str(&self.json(is_rig, Residuals::LeftOut)).unwrap_or_default();
-        let records = file["diagnoses"].as_array().cloned().unwrap_or_default();
+        let file = serde_json::from_str(&self.json(Residuals::LeftOut)).unwrap_or_default();
+        let records = records_of(&file);
         let words = Words::new(&self.estimate, self.print.scale);
         let said = |diagnosis: &Diagnosis| {
             let text = words.sentence(diagnosis);
@@ -307,6 +309,12 @@ impl Solved {
         };
         self.diagnoses.iter().map(said).collect()
     }
+}
+
+/// What a file says of a calibration: what is wrong together, and the other diagnoses.
+fn records_of(file: &Value) -> Vec<Value> {
+    let all = ["findings", "diagnoses"].map(|list| file[list].as_array().cloned());
+    all.into_iter().flatten().flatten().collect()
 }
 
 /// A camera to be found, or known, with what it saw.
@@ -321,19 +329,20 @@ pub fn solve(
     py: Python<'_>,
     seen: Seen,
     cameras: Vec<OneCamera>,
+    is_rig: bool,
     model: ModelChoice,
     how: How,
 ) -> PyResult<Solved> {
     let seen = Arc::new(seen);
     let mut all = Vec::new();
     let (mut left_out, mut ink, mut panels) = (Vec::new(), Vec::new(), Vec::new());
-    let is_rig = cameras.len() > 1;
+    let is_named = cameras.len() > 1;
     {
         let reference = seen.reference();
         panels.extend(how.sheet.panels(&reference).raise(errors::calibration)?);
         let mut taken: BTreeSet<(usize, String)> = BTreeSet::new();
         for (index, camera) in cameras.into_iter().enumerate() {
-            if is_rig
+            if is_named
                 && let Some((twice, _)) =
                     camera.detections.iter().find(|(name, _)| !taken.insert((index, name.clone())))
             {
@@ -346,7 +355,7 @@ pub fn solve(
             }));
             let shown = views(&camera.detections, &reference).raise(errors::calibration)?;
             let mut of_camera: Vec<View> = shown.views;
-            let name = is_rig.then(|| camera.name.clone());
+            let name = is_named.then(|| camera.name.clone());
             left_out.extend(
                 shown.left_out.into_iter().map(|(_, out)| Excluded { camera: name.clone(), ..out }),
             );
@@ -407,5 +416,5 @@ pub fn solve(
         Err(shared) => shared.targets().to_vec(),
     };
     let model = model.name();
-    Ok(Solved { estimate, diagnoses, print, stated, models, targets, model, file: None })
+    Ok(Solved { estimate, diagnoses, print, stated, models, targets, model, is_rig, file: None })
 }

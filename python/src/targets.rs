@@ -11,11 +11,15 @@ use export::dsc::Dialect;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use serde::{Deserialize, Serialize};
 
 use crate::arrays;
-use crate::errors::{self, Raise, raised, unlocked};
+use crate::boards::{Board, Checkerboard};
+use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::families::{Family, FamilyChoice};
 use crate::interrupt::interruptible;
+use crate::pickles;
+use crate::solids::{Icosahedron, Octahedron, Solid, Tetrahedron};
 use crate::verdict::{Proof, Verdict};
 
 /// What is printed, photographed and found: panels with corners and tags, in millimetres.
@@ -75,7 +79,8 @@ impl Target {
     #[staticmethod]
     #[pyo3(signature = (path, *, family = None))]
     fn load(path: PathBuf, family: Option<FamilyChoice>) -> PyResult<Self> {
-        let target = target_file::read(&path, &Limits::default()).raise(errors::file)?;
+        let target =
+            target_file::read(&path, &Limits::default()).raise_of_file(&path, errors::file)?;
         Self::with_family(target, family)
     }
 
@@ -199,10 +204,10 @@ impl Target {
     /// -------
     /// str
     #[pyo3(signature = (page = 0))]
-    fn svg(&self, page: usize) -> PyResult<String> {
+    fn svg(&self, page: i64) -> PyResult<String> {
         let pages = self.made("svg", Making::default())?;
         let count = pages.len();
-        let found = pages.into_iter().nth(page);
+        let found = usize::try_from(page).ok().and_then(|page| pages.into_iter().nth(page));
         let none =
             || raised::TargetError::new_err(format!("page {page}: there are {count}, from 0"));
         Ok(String::from_utf8_lossy(&found.ok_or_else(none)?.1).into_owned())
@@ -247,7 +252,7 @@ impl Target {
     /// folder : path-like
     ///     Where they go; it is made where there is none.
     /// formats : sequence of str, optional
-    ///     Of those of :meth:`files`; the ``.json`` is always written.
+    ///     Of those of :meth:`files`; PDF if left out. The ``.json`` is always written.
     /// dpi : float, optional
     ///     Resolution of PNG pages, dots per inch.
     /// texture_dpi : float, optional
@@ -259,12 +264,12 @@ impl Target {
     /// -------
     /// list of pathlib.Path
     ///     The files, the description first.
-    #[pyo3(signature = (folder, formats = Formats::One("pdf".to_owned()), *, dpi = 300.0, texture_dpi = None, force = false))]
+    #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, force = false))]
     fn save(
         &self,
         py: Python<'_>,
         folder: PathBuf,
-        formats: Formats,
+        formats: Option<Formats>,
         dpi: f64,
         texture_dpi: Option<f64>,
         force: bool,
@@ -272,7 +277,7 @@ impl Target {
         let making = making(dpi, texture_dpi)?;
         unlocked(py, || {
             let mut files = self.made("json", making)?;
-            let formats = formats.into_vec();
+            let formats = formats.map_or_else(|| vec!["pdf".to_owned()], Formats::into_vec);
             for format in formats.iter().filter(|format| *format != "json") {
                 files.extend(self.made(format, making)?);
             }
@@ -321,6 +326,15 @@ impl Target {
     }
 
     /// Makes the list of corners and tags that the reference detector reads.
+    ///
+    /// Parameters
+    /// ----------
+    /// dialect : str, optional
+    ///     ``"fork"`` or ``"original"``, as that detector's version reads.
+    ///
+    /// Returns
+    /// -------
+    /// str
     #[pyo3(signature = (dialect = "fork"))]
     fn dsc(&self, dialect: &str) -> PyResult<String> {
         let dialect = dialect.parse::<Dialect>().raise(errors::target)?;
@@ -363,21 +377,41 @@ impl Target {
         self.target == other.target
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, (String, Option<String>)> {
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> crate::Reduced<'py, (String, String, Option<String>)> {
         let restore = slf.py().import("deltille._core")?.getattr("_target")?;
         let own = slf.get();
         let family = own.family.as_ref().map(|family| family.to_json());
-        Ok((restore, (own.target.to_json(), family)))
+        let class = slf.get_type().name()?.to_string();
+        Ok((restore, (class, own.target.to_json(), family)))
     }
 }
 
 /// A target that was pickled.
 #[pyfunction]
-pub fn _target(json: &str, family: Option<&str>) -> PyResult<Target> {
+pub fn _target<'py>(
+    py: Python<'py>,
+    class_: &str,
+    json: &str,
+    family: Option<&str>,
+) -> PyResult<Bound<'py, PyAny>> {
     let target = targets::Target::from_json(json).raise(errors::target)?;
     let family =
         family.map(deltille::family::Family::from_json).transpose().raise(errors::family)?;
-    Ok(Target { target: Arc::new(target), family: family.map(Arc::new) })
+    let target = Target { target: Arc::new(target), family: family.map(Arc::new) };
+    macro_rules! of_class {
+        ($($class:ident),*) => {
+            match class_ {
+                $(stringify!($class) => {
+                    let made = PyClassInitializer::from(target).add_subclass($class);
+                    Ok(Bound::new(py, made)?.into_any())
+                })*
+                _ => Ok(Bound::new(py, target)?.into_any()),
+            }
+        };
+    }
+    of_class!(Board, Checkerboard, Tetrahedron, Octahedron, Icosahedron, Solid)
 }
 
 fn making(dpi: f64, texture_dpi: Option<f64>) -> PyResult<Making> {
@@ -390,8 +424,8 @@ fn making(dpi: f64, texture_dpi: Option<f64>) -> PyResult<Making> {
 }
 
 /// A tag of a target.
-#[pyclass(frozen, get_all, module = "deltille")]
-#[derive(Clone)]
+#[pyclass(frozen, get_all, module = "deltille", eq)]
+#[derive(Clone, PartialEq, Serialize, Deserialize)]
 pub struct Tag {
     /// Id of the tag: the index of its code in the family.
     id: u32,
@@ -404,6 +438,8 @@ pub struct Tag {
     /// Its centre in the target's frame, mm.
     centre: [f64; 3],
 }
+
+pickles!(Tag);
 
 #[pymethods]
 impl Tag {

@@ -7,15 +7,20 @@ use deltille::calibrate::{self as solver, ViewEstimate};
 use deltille::targets;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::arrays;
+use crate::calibrated_camera::Part;
+use crate::calibration::pickled;
 use crate::detection::record;
 use crate::errors;
+use crate::pickles;
 use crate::pose::Pose;
 use crate::solving::Solved;
 
 /// Something that is said of a calibration, with what to do about it.
-#[pyclass(frozen, module = "deltille")]
+#[pyclass(frozen, module = "deltille", eq)]
+#[derive(PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     pub record: serde_json::Value,
     pub is_failure: bool,
@@ -72,8 +77,11 @@ impl Excluded {
     }
 }
 
+pickles!(Diagnosis);
+
 /// A view, frame or panel that took no part, and why.
-#[pyclass(frozen, get_all, module = "deltille")]
+#[pyclass(frozen, get_all, module = "deltille", eq)]
+#[derive(PartialEq, Serialize, Deserialize)]
 pub struct Excluded {
     /// Name of the view, or of the frame of a rig.
     pub view: String,
@@ -88,6 +96,8 @@ pub struct Excluded {
     /// Why.
     pub reason: String,
 }
+
+pickles!(Excluded);
 
 #[pymethods]
 impl Excluded {
@@ -204,6 +214,12 @@ impl View {
 
     fn __len__(&self) -> usize {
         self.estimate().corners.len()
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> crate::Reduced<'py, Part> {
+        let own = slf.get();
+        let (restore, (json, targets)) = pickled(slf.py(), "_part", &own.solved)?;
+        Ok((restore, (json, targets, own.camera, Some(own.view))))
     }
 
     fn __repr__(&self) -> String {

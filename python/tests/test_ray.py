@@ -171,3 +171,13 @@ def test_a_folder_of_another_target_is_refused(tmp_path):
     for changed in ({"target": other}, {"target": board, "tone": "linear"}):
         with pytest.raises(deltille.DetectionError, match="give another folder"):
             deltille.ray.detect_to(found, pictures, **changed)
+
+
+def test_the_example(root, shots, target, tmp_path):
+    """As a script, on a cluster of its own."""
+    target.save(tmp_path, formats=[])
+    description = next(tmp_path.glob("*.json"))
+    command = [sys.executable, root / "python/examples/cluster.py", description, shots, tmp_path / "found"]
+    done = subprocess.run([f"{part}" for part in command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "10 pictures" in done.stdout and "1 errors, 0 skipped" in done.stdout and "broken.png: " in done.stdout

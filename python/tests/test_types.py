@@ -1,6 +1,7 @@
 """Stubs and module agree, and a user's script is clean."""
 
 import importlib.util
+import re
 import shutil
 import subprocess
 import sys
@@ -60,6 +61,18 @@ def user(tmp_path):
 def test_a_users_script_is_clean_under_mypy(user):
     pytest.importorskip("mypy")
     done = subprocess.run([sys.executable, "-m", "mypy", "--strict", str(user)], capture_output=True, text=True, cwd=user.parent)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_recipes_of_the_guide_are_clean_under_mypy(root, tmp_path):
+    pytest.importorskip("mypy")
+    recipes = re.findall(r"```python\n(.*?)```", (root / "docs/python.md").read_text(), re.S)
+    assert len(recipes) >= 8
+    # Each goes on where the one before ended.
+    (tmp_path / "recipes.py").write_text("\n".join(recipes))
+    # Names are used again for other things, as readers of one recipe do not mind; of OpenCV's types nothing is said.
+    command = [sys.executable, "-m", "mypy", "--strict", "--allow-redefinition", "--ignore-missing-imports", "recipes.py"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -227,6 +227,12 @@ quantities! {
     dots_per_inch: 1.0 to 1e6 "dpi";
     /// Millimetres in the unit of a mesh.
     unit_mm: 1e-6 to 1e6 "mm";
+    /// The blur of a synthetic picture.
+    blur_px: 0.0 to 100.0 "px";
+    /// A grey value, or noise, of full scale.
+    of_full_scale: 0.0 to 1.0 "of full scale";
+    /// The relative change of the light across a synthetic picture.
+    light_gradient: -2.0 to 2.0 "";
     /// Anything else that was measured.
     figure: -1e15 to 1e15 "";
     /// A standard deviation of that.

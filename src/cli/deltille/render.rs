@@ -12,9 +12,10 @@ use super::limits::ImageLimits;
 use super::{camera_file, target_file};
 use crate::camera::{Camera, Pose};
 use crate::cli::output::{self, Overwrite, say, tell};
+use crate::cli::values::number;
 use crate::export::kind::signed_png;
 use crate::export::truth;
-use crate::quantity::place_mm;
+use crate::quantity::{Range, blur_px, light_gradient, of_full_scale, place_mm};
 use crate::synth::{Light, scene_of_target};
 use crate::targets::TargetSpec;
 
@@ -44,13 +45,15 @@ pub struct Args {
           requires = "eye")]
     up: Option<[f64; 3]>,
     /// Standard deviation of the blur, px
-    #[arg(long, default_value_t = 0.8, value_name = "PX", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.8, value_name = "PX", allow_negative_numbers = true,
+          value_parser = number(blur_px::RANGE.least..=blur_px::RANGE.most))]
     blur: f64,
     /// Standard deviation of the noise, percent of full scale
-    #[arg(long, default_value_t = 1.0, value_name = "PERCENT", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1.0, value_name = "PERCENT", allow_negative_numbers = true,
+          value_parser = number(0.0..=100.0 * of_full_scale::RANGE.most))]
     noise: f64,
     /// Relative change of the light across and down the picture
-    #[arg(long, value_name = "ACROSS,DOWN", value_parser = numbers::<2>,
+    #[arg(long, value_name = "ACROSS,DOWN", value_parser = gradient,
           allow_hyphen_values = true, default_value = "0,0")]
     gradient: [f64; 2],
     /// Seed of the noise
@@ -85,18 +88,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let file = args.camera.display();
         format!("--camera: {file}: a picture of {} × {} px", camera.width, camera.height)
     })?;
-    let in_range = |option: &str, value: f64, most: f64| match (0.0..=most).contains(&value) {
-        true => Ok(value),
-        false => bail!("{option}: {value} is not between 0 and {most}"),
-    };
     let light = Light::default()
-        .blur_px(in_range("--blur", args.blur, 100.0)?)
-        .noise(in_range("--noise", args.noise, 100.0)? / 100.0)
+        .blur_px(args.blur)
+        .noise(args.noise / 100.0)
         .gradient(args.gradient.into())
         .seed(args.seed);
-    if args.gradient.iter().any(|g| !(-2.0..=2.0).contains(g)) {
-        bail!("--gradient: it must be between -2 and 2");
-    }
     let corners = || target.panels.iter().flat_map(|panel| &panel.corners);
     let middle = corners().map(|c| c.target_mm).sum::<DVec3>();
     let pose = args.camera_from_target(middle / corners().count() as f64)?;
@@ -160,7 +156,17 @@ impl Args {
 
 /// So many numbers of a size that places have, separated by commas.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let parsed = text.split(',').map(|word| place_mm::RANGE.parse(word));
+    numbers_of(place_mm::RANGE, text)
+}
+
+/// A relative change of the light across and down a picture.
+fn gradient(text: &str) -> Result<[f64; 2], String> {
+    numbers_of(light_gradient::RANGE, text)
+}
+
+/// So many numbers of a range, separated by commas.
+fn numbers_of<const N: usize>(range: Range, text: &str) -> Result<[f64; N], String> {
+    let parsed = text.split(',').map(|word| range.parse(word));
     let numbers = parsed.collect::<Result<Vec<f64>, _>>()?;
     numbers.try_into().map_err(|v: Vec<f64>| format!("{} numbers instead of {N}", v.len()))
 }

@@ -221,6 +221,14 @@ impl Reference<'_> {
 }
 
 impl Reference<'_> {
+    /// Compares the labels of a grid with what is on the target: panel, corners and tags.
+    ///
+    /// # Errors
+    /// A sentence that says what is not on it.
+    pub fn check_labels(&self, grid: &Grid) -> Result<(), String> {
+        self.on_targets(grid).map(drop)
+    }
+
     /// The corners of a grid on the panel of its target; `None` where it is none of theirs, or was not labelled.
     fn on_targets(&self, grid: &Grid) -> Result<Option<Sighting>, String> {
         let targets = self.targets();

@@ -187,6 +187,11 @@ impl fmt::Display for Reason {
             ReasonKind::Ambiguous => {
                 write!(f, "a grid of {} could lie in more than one way", count("corners", "corner"))
             }
+            ReasonKind::NotWhole if figure("corners") == figure("expected") => write!(
+                f,
+                "a grid of {} has other rows and columns than the board: are they exchanged?",
+                count("corners", "corner")
+            ),
             ReasonKind::NotWhole => write!(
                 f,
                 "a grid of {} is not the whole board of {}",

@@ -4,6 +4,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+pub use super::estimate::is_failure;
 use super::estimate::{
     CoverageRecord, DiagnosisRecord, MapRecord, ParameterRecord, ProjectionRecord, ShapeRecord,
     ViewRecord, correlations, coverage, diagnoses, map, parameters, projection, shape, spline,
@@ -196,7 +197,7 @@ pub fn write(
             excluded: &test.excluded,
         }),
         excluded: &found.excluded,
-        findings: records(found),
+        findings: records(found, print.scale),
         diagnoses: diagnoses(found, said, print.scale),
     };
     Some(json::to_text(&file, 4))

@@ -299,6 +299,15 @@ pub(super) fn map<'a>(estimate: &'a Estimate, found: &'a TargetMap) -> MapRecord
     }
 }
 
+/// Kinds of diagnoses in files after which a calibration is not to be used as it is.
+const FAILURES: [&str; 3] = ["foreign_camera", "absurd_fit", "many_left_out"];
+
+/// Whether a diagnosis of this kind in a file says that the calibration is not to be used as it is,
+/// as [`Diagnosis::is_failure`] does.
+pub fn is_failure(kind: &str) -> bool {
+    FAILURES.contains(&kind)
+}
+
 /// The diagnoses that are not findings, which files list separately.
 pub(super) fn diagnoses<'a>(
     estimate: &'a Estimate,
@@ -392,4 +401,32 @@ pub(super) fn diagnoses<'a>(
         })
     };
     diagnoses.iter().filter_map(record).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_in_files_are_those_of_the_library() {
+        let mut estimate = Estimate::default();
+        estimate.cameras = vec![CameraEstimate::given("camera", test_camera())];
+        let all = [
+            Diagnosis::ForeignCamera { camera: 0, rms_px: 100.0 },
+            Diagnosis::AbsurdFit { camera: 0, rms_px: 100.0 },
+            Diagnosis::ManyLeftOut { left_out: 5, all: 8 },
+            Diagnosis::PoorFit { camera: 0, rms_px: 2.0 },
+            Diagnosis::Late { camera: 0, frames: 1 },
+        ];
+        for (said, record) in all.iter().zip(diagnoses(&estimate, &all, None)) {
+            assert_eq!(is_failure(record.kind), said.is_failure(), "{}", record.kind);
+        }
+    }
+
+    fn test_camera() -> deltille_core::camera::Camera {
+        deltille_core::camera::Camera::from_yaml(
+            r#"{"width": 640, "height": 480, "focal_px": [500, 500], "centre_px": [320, 240], "model": "pinhole"}"#,
+        )
+        .unwrap()
+    }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use deltille_core::calibrate::{Estimate, Finding, PanelRef, Shared};
+use deltille_core::calibrate::{Diagnosis, Estimate, Finding, PanelRef, Shared, Words};
 
 /// A finding as files store it; `panel` is an id, `camera` a name.
 #[derive(Debug, Default, Serialize)]
@@ -26,16 +26,20 @@ pub(super) struct FindingRecord {
     moved_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     turned_rad: Option<f64>,
+    /// The sentence that says it.
+    text: String,
 }
 
 /// The records of an estimate's findings.
-pub(super) fn records(estimate: &Estimate) -> Vec<FindingRecord> {
+pub(super) fn records(estimate: &Estimate, print_scale: Option<[f64; 2]>) -> Vec<FindingRecord> {
+    let words = Words::new(estimate, print_scale);
     let record = |finding: &Finding| {
         let name = |camera: usize| estimate.camera_name(camera).map(str::to_owned);
         let counts = FindingRecord {
             outliers: finding.outliers,
             corners: finding.corners,
             left_out: finding.left_out,
+            text: words.sentence(&Diagnosis::GrossErrors(finding.clone())),
             ..FindingRecord::default()
         };
         Some(match &finding.shared {

@@ -139,7 +139,7 @@ pub fn write(
         frames: frames(found),
         held_out,
         excluded: &found.excluded,
-        findings: records(found),
+        findings: records(found, print.scale),
         diagnoses: diagnoses(found, said, print.scale),
     };
     json::to_text(&file, 4)

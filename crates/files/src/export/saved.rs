@@ -60,13 +60,21 @@ fn estimate(text: &str, reference: Panels) -> Result<Estimate, SavedError> {
     }
 }
 
-/// Reads the cameras of a calibration or a rig without knowing the target; the panels of corners
-/// are then identified by id only.
+/// Reads the estimate of a camera or a rig without knowing the target; the panels of corners are
+/// then identified by id only.
+///
+/// # Errors
+/// When the file is not a calibration, or a field is not valid.
+pub fn read_without_target(text: &str) -> Result<Estimate, SavedError> {
+    estimate(text, None)
+}
+
+/// Reads the cameras of a calibration or a rig without knowing the target.
 ///
 /// # Errors
 /// When the file is not a calibration, or a field is not valid.
 pub fn read_cameras(text: &str) -> Result<Vec<CameraEstimate>, SavedError> {
-    Ok(estimate(text, None)?.cameras)
+    Ok(read_without_target(text)?.cameras)
 }
 
 /// The target that was photographed, if known.
@@ -240,7 +248,7 @@ struct SavedCorner {
 }
 
 #[derive(Deserialize)]
-struct SavedPose {
+pub(super) struct SavedPose {
     #[serde(deserialize_with = "quantity::cosine::de")]
     rotation: [f64; 9],
     #[serde(deserialize_with = "quantity::figure::de")]
@@ -528,7 +536,7 @@ fn lens_of(names: &[&str], spline: Option<SplineGrid>) -> Option<Lens> {
 }
 
 impl SavedPose {
-    fn pose(&self) -> Pose {
+    pub(super) fn pose(&self) -> Pose {
         let rotation = DMat3::from_cols_array(&self.rotation).transpose();
         Pose { rotation: DQuat::from_mat3(&rotation).normalize(), translation: self.translation_mm }
     }

@@ -1,14 +1,50 @@
 //! Ground truth of a synthetic photograph as JSON, schema `deltille/truth/1`.
 
 use glam::DVec2;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::motion::Motion;
+use super::saved::SavedPose;
 use deltille_core::camera::Pose;
+use deltille_core::json::{self, ReadError};
+use deltille_core::quantity;
 use deltille_core::synth::{Light, TruthCorner};
 
 /// Schema and version that this crate writes.
 pub const SCHEMA: &str = "deltille/truth/1";
+
+/// What is known of a synthetic photograph.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Truth {
+    /// File name of the picture; empty where it has none.
+    pub image: String,
+    /// Name of the target.
+    pub target: String,
+    /// Pose of the target in the camera frame, mm.
+    pub camera_from_target: Pose,
+    /// Light and blur; grey values are not in the file.
+    pub light: Light,
+    /// The corners in view.
+    pub corners: Vec<TruthCorner>,
+}
+
+/// Why a ground truth cannot be read from a file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TruthError {
+    /// The file is something else.
+    #[error("not the ground truth of a synthetic photograph")]
+    Foreign,
+    /// A field is missing, or has an invalid value.
+    #[error("field `{field}`: {problem}")]
+    Field {
+        /// The field.
+        field: String,
+        /// What is wrong.
+        problem: String,
+    },
+}
 
 #[derive(Serialize)]
 struct TruthFile<'a> {
@@ -44,5 +80,60 @@ pub fn write(
         seed,
         corners,
     };
-    deltille_core::json::to_text(&file, 2)
+    json::to_text(&file, 2)
+}
+
+#[derive(Deserialize)]
+struct SavedTruth {
+    image: String,
+    target: String,
+    camera_from_target: SavedPose,
+    #[serde(deserialize_with = "quantity::blur_px::de")]
+    blur_px: f64,
+    #[serde(deserialize_with = "quantity::of_full_scale::de")]
+    noise: f64,
+    #[serde(deserialize_with = "quantity::light_gradient::de")]
+    gradient: DVec2,
+    seed: u64,
+    corners: Vec<TruthCorner>,
+}
+
+/// Reads what [`write`] wrote.
+///
+/// # Errors
+/// When the text is something else, or a field is not valid.
+pub fn read(text: &str) -> Result<Truth, TruthError> {
+    if json::schema(text.as_bytes()).ok().flatten().as_deref() != Some(SCHEMA) {
+        return Err(TruthError::Foreign);
+    }
+    let found: SavedTruth = json::read(text).map_err(|error| match error {
+        ReadError::Json(_) => TruthError::Foreign,
+        ReadError::Field { field, problem } => TruthError::Field { field, problem },
+    })?;
+    let SavedTruth { image, target, camera_from_target, blur_px, noise, gradient, seed, corners } =
+        found;
+    let light = Light::default().blur_px(blur_px).noise(noise).gradient(gradient).seed(seed);
+    Ok(Truth { image, target, camera_from_target: camera_from_target.pose(), light, corners })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DQuat, DVec3};
+
+    #[test]
+    fn what_is_written_is_read() {
+        let pose = Pose {
+            rotation: DQuat::from_scaled_axis(DVec3::new(0.1, -0.2, 0.3)),
+            translation: DVec3::new(1.0, 2.0, 500.0),
+        };
+        let light = Light::default().blur_px(1.25).noise(0.02).seed(7);
+        let text = write("view.png", "board", &pose, &light, &[]);
+        let found = read(&text).unwrap();
+        assert_eq!((found.image.as_str(), found.target.as_str()), ("view.png", "board"));
+        assert!(found.camera_from_target.off(&pose).iter().all(|part| part.length() < 1e-9));
+        assert_eq!((found.light, found.corners.len()), (light, 0));
+        assert!(read(&text.replace("truth/1", "truth/2")).is_err());
+        assert!(read(&text.replace("\"blur_px\": 1.25", "\"blur_px\": -1")).is_err());
+    }
 }
