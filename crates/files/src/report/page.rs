@@ -35,11 +35,7 @@ pub(super) fn html(report: &Report) -> String {
     };
     page += "</header>\n<section><h2>What to make of it</h2><ul class=\"advice\">";
     for piece in advice {
-        let (class, sign) = match piece.weight {
-            Weight::Good => ("good", "✓"),
-            Weight::Hint => ("hint", "→"),
-            Weight::Warning => ("warning", "!"),
-        };
+        let (class, sign) = look(piece.weight);
         let _ = write!(
             page,
             "<li class=\"{class}\"><span class=\"sign\">{sign}</span><span>{}</span></li>",
@@ -116,22 +112,42 @@ fn in_space(report: &Report) -> String {
     section("In space", &figures(drawn))
 }
 
-/// Good or bad, at a glance.
+/// The verdict before all else: that of the most serious piece of advice, in its colour and with its
+/// sign.
 fn verdict(report: &Report, advice: &[Advice]) -> String {
-    let warnings = advice.iter().filter(|piece| piece.weight == Weight::Warning).count();
     let is_failure = report.diagnoses.iter().any(Diagnosis::is_failure);
-    let (class, sign, head, why) = match (is_failure, warnings) {
-        (true, _) => ("warning", "✕", "Not to be used", "See why below.".to_owned()),
-        (false, 0) => ("good", "✓", "Good", "Nothing speaks against it.".to_owned()),
-        (false, n) => {
-            let warnings = if n == 1 { "warning".to_owned() } else { counted(n, "warning") };
-            ("hint", "!", "Use with care", format!("See the {warnings} below."))
+    let worst = advice.iter().map(|piece| piece.weight).max().unwrap_or(Weight::Good);
+    let (class, own_sign) = look(worst);
+    let of_worst = advice.iter().filter(|piece| piece.weight == worst).count();
+    let below = |thing: &str| match of_worst {
+        1 => format!("the {thing} below"),
+        n => format!("the {} below", counted(n, thing)),
+    };
+    let (sign, head, why) = match worst {
+        _ if is_failure => ("✕", "Not to be used", "See why below.".to_owned()),
+        Weight::Warning => {
+            (own_sign, "Use with care", format!("First see to {}.", below("warning")))
         }
+        Weight::Hint => {
+            let verb = if of_worst == 1 { "says" } else { "say" };
+            let why = format!("No warnings; {} {verb} what would improve it.", below("hint"));
+            (own_sign, "Usable", why)
+        }
+        Weight::Good => (own_sign, "Good", "Nothing speaks against it.".to_owned()),
     };
     let sureness = if is_failure { String::new() } else { sureness(report) };
     format!(
         "<p class=\"verdict {class}\"><span class=\"seal\">{sign}</span><span><b>{head}.</b> {why}{sureness}</span></p>\n"
     )
+}
+
+/// CSS class and sign of advice by its weight.
+fn look(weight: Weight) -> (&'static str, &'static str) {
+    match weight {
+        Weight::Good => ("good", "✓"),
+        Weight::Hint => ("hint", "→"),
+        Weight::Warning => ("warning", "!"),
+    }
 }
 
 /// Summary of the uncertainty of projections of a single camera.
@@ -279,4 +295,40 @@ fn with_whole_options(text: &str) -> String {
 /// A text with the characters escaped that HTML gives a meaning.
 pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deltille_core::calibrate::{Estimate, Model};
+    use deltille_core::camera::Camera;
+
+    #[test]
+    fn the_verdict_is_that_of_the_most_serious_advice() {
+        let mut estimate = Estimate::default();
+        let camera = Camera::centred(640, 480, 500.0, Model::Radtan.lens());
+        estimate.cameras =
+            ["left", "right"].map(|of| CameraEstimate::given(of, camera.clone())).into();
+        let of = |weights: &[Weight], diagnoses: &[Diagnosis]| {
+            let mut report = Report::new("rig", &estimate);
+            report.diagnoses = diagnoses;
+            let advice = |&weight| Advice { weight, text: String::new() };
+            verdict(&report, &weights.iter().map(advice).collect::<Vec<_>>())
+        };
+        use Weight::{Good, Hint, Warning};
+        let late = [Diagnosis::Late { camera: 1, frames: 2 }];
+        let many_out = [Diagnosis::ManyLeftOut { left_out: 3, all: 9 }];
+        for (weights, diagnoses, class, head, why) in [
+            (&[Good, Good][..], &[][..], "good", "Good", "Nothing speaks against it."),
+            (&[Hint, Good], &[], "hint", "Usable", "the hint below says"),
+            (&[Hint, Hint, Good], &[], "hint", "Usable", "the 2 hints below say"),
+            (&[Warning, Hint, Good], &late, "warning", "Use with care", "the warning below."),
+            (&[Warning, Warning, Good], &late, "warning", "Use with care", "the 2 warnings below."),
+            (&[Warning, Good], &many_out, "warning", "Not to be used", "See why below."),
+        ] {
+            let told = of(weights, diagnoses);
+            assert!(told.contains(&format!("class=\"verdict {class}\"")), "{told}");
+            assert!(told.contains(&format!("<b>{head}.</b>")) && told.contains(why), "{told}");
+        }
+    }
 }

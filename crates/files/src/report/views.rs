@@ -80,9 +80,14 @@ pub(super) fn section(report: &Report, index: usize, survey: &Survey) -> String 
         true => format!("The worst {MOST_VIEWS} of {all} views in a table"),
         false => format!("All {} in a table", counted(all + of_test.len(), "view")),
     };
+    let bent = match report.has_panels() {
+        true => "panels are not flat or not in their places",
+        false => "the board is bent",
+    };
     let arrows = format!(
         "<p class=\"note\">Arrows are residuals, {enlarged} times enlarged; outliers are red. All one way: the picture moved, or \
-         its board; outwards or in turns: the lens, or the board is bent.</p>"
+         its {}; outwards or in turns: the lens, or {bent}.</p>",
+        report.target_noun()
     );
     let body = format!(
         "{excluded}<div class=\"cards\">{cards}</div>{arrows}<details><summary>{what}</summary><div class=\"wide-table\">\
