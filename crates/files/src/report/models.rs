@@ -1,7 +1,6 @@
 //! Comparison of lens models on held-out views.
 
 use super::page::{escaped, meter};
-use super::table::aligned;
 use deltille_core::calibrate::{CameraEstimate, Candidate, Comparison, Region};
 
 /// A model's camera against the one that was found.
@@ -16,16 +15,7 @@ pub(super) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
         return String::new();
     }
     let worst = tried.iter().filter_map(|one| one.held_out_px).fold(f64::MIN_POSITIVE, f64::max);
-    let against: Vec<_> =
-        tried.iter().map(|one| one.found.as_ref().and_then(|of| against(camera, of))).collect();
-    let column = |figure: fn(&Against) -> String| {
-        let texts = against.iter().map(|of| of.as_ref().map_or("–".to_owned(), figure));
-        aligned(&texts.collect::<Vec<_>>())
-    };
-    let rms = column(|of| format!("{:.3}", of.rms_px));
-    let largest = column(|of| format!("{:.2}", of.largest_px));
-    let rows = tried.iter().zip(rms.iter().zip(&largest));
-    let rows = rows.map(|(one, (rms, largest))| row(camera, one, worst, [rms, largest]));
+    let rows = tried.iter().map(|one| row(camera, one, worst));
     let best = tried.iter().find(|one| one.chosen).map(|one| one.model);
     let told = match (best, camera.model) {
         (Some(best), Some(own)) if best == own => {
@@ -52,15 +42,18 @@ pub(super) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
     )
 }
 
-/// A model in the table; `worst` is the largest RMS on views held out, px, and `against` are the
-/// cells of the differences, rms and largest.
-fn row(camera: &CameraEstimate, one: &Candidate, worst: f64, against: [&String; 2]) -> String {
+/// A model in the table; `worst` is the largest RMS on views held out, px.
+fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
     let own = camera.model == Some(one.model);
     let held_out = one
         .held_out_px
         .map_or("no camera".to_owned(), |px| format!("{px:.4}{}", meter(px / worst)));
     let rms =
         one.found.as_ref().map_or("–".to_owned(), |of| format!("{:.4}", of.inlier_rms_px()));
+    let against = one.found.as_ref().and_then(|of| against(camera, of));
+    let [differs, most] = against.map_or(["–", "–"].map(str::to_owned), |of| {
+        [format!("{:.3}", of.rms_px), format!("{:.2}", of.largest_px)]
+    });
     let notes = [
         (own, "of this page"),
         (one.chosen, "smallest that holds"),
@@ -71,12 +64,10 @@ fn row(camera: &CameraEstimate, one: &Candidate, worst: f64, against: [&String; 
         notes.iter().filter(|(is_so, _)| *is_so).map(|(_, note)| *note).collect();
     format!(
         "<tr{}><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{held_out}</td>\
-         <td class=\"number\">{rms}</td>{}{}<td>{}</td></tr>",
+         <td class=\"number\">{rms}</td><td class=\"number\">{differs}</td><td class=\"number\">{most}</td><td>{}</td></tr>",
         if own { " class=\"own\"" } else { "" },
         escaped(&one.model.to_string()),
         one.parameters,
-        against[0],
-        against[1],
         notes.join(", ")
     )
 }

@@ -126,7 +126,7 @@ fn verdict(report: &Report, advice: &[Advice]) -> String {
     let (sign, head, why) = match worst {
         _ if is_failure => ("✕", "Not to be used", "See why below.".to_owned()),
         Weight::Warning => {
-            (own_sign, "Use with care", format!("First see to {}.", below("warning")))
+            (own_sign, "Use with care", format!("Look at {} first.", below("warning")))
         }
         Weight::Hint => {
             let verb = if of_worst == 1 { "says" } else { "say" };
@@ -322,8 +322,20 @@ mod tests {
             (&[Good, Good][..], &[][..], "good", "Good", "Nothing speaks against it."),
             (&[Hint, Good], &[], "hint", "Usable", "the hint below says"),
             (&[Hint, Hint, Good], &[], "hint", "Usable", "the 2 hints below say"),
-            (&[Warning, Hint, Good], &late, "warning", "Use with care", "the warning below."),
-            (&[Warning, Warning, Good], &late, "warning", "Use with care", "the 2 warnings below."),
+            (
+                &[Warning, Hint, Good],
+                &late,
+                "warning",
+                "Use with care",
+                "Look at the warning below first.",
+            ),
+            (
+                &[Warning, Warning, Good],
+                &late,
+                "warning",
+                "Use with care",
+                "Look at the 2 warnings below first.",
+            ),
             (&[Warning, Good], &many_out, "warning", "Not to be used", "See why below."),
         ] {
             let told = of(weights, diagnoses);

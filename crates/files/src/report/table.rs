@@ -14,14 +14,15 @@
 /// one end before it; texts that are no numbers, such as a dash, are right-aligned.
 pub(super) fn aligned(texts: &[String]) -> Vec<String> {
     let longest = texts.iter().filter(|text| is_number(text)).map(|text| split(text).1.len()).max();
-    let longest = longest.unwrap_or(0);
+    // A decimal point is about half as wide as a digit.
+    let digits = longest.unwrap_or(0).saturating_sub(1);
     let cell = |text: &String| {
-        if longest == 0 || !is_number(text) {
+        if digits == 0 || !is_number(text) {
             return format!("<td class=\"number\">{text}</td>");
         }
         let (whole, fraction) = split(text);
         format!(
-            "<td class=\"number\">{whole}<span class=\"fraction\" style=\"width:{longest}ch\">{fraction}</span></td>"
+            "<td class=\"number\">{whole}<span class=\"fraction\" style=\"width:{digits}.5ch\">{fraction}</span></td>"
         )
     };
     texts.iter().map(cell).collect()
@@ -47,7 +48,7 @@ mod tests {
         let cells = aligned(&texts);
         let fraction = |whole: &str, fraction: &str| {
             format!(
-                "<td class=\"number\">{whole}<span class=\"fraction\" style=\"width:5ch\">{fraction}</span></td>"
+                "<td class=\"number\">{whole}<span class=\"fraction\" style=\"width:4.5ch\">{fraction}</span></td>"
             )
         };
         assert_eq!(cells[0], fraction("899", ".97"));
