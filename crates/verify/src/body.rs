@@ -1,9 +1,18 @@
 //! Verification of bodies to print, as STL: a closed surface with its normals outwards and of the
 //! stated shape.
 //!
-//! A skeleton is probed from outside with rays: on the ribs they hit the planes of the faces, in
-//! the seats they stop at the thickness of a panel below, and in the windows they pass. Then it is
-//! compared triangle by triangle, as the solid is.
+//! A skeleton, which holds a panel on each face, is probed from outside with rays: on the ribs they
+//! must hit the plane of the face, in the seats they must stop deeper by the thickness of a panel,
+//! and through the windows they must pass. Then it is compared triangle by triangle, as the solid is.
+//!
+//! ```text
+//!      ray   ray      ray    ray
+//!       │     │        │      │
+//!     ▄▄▼▄▄   │        │      │        face
+//!     █████▄▄▄▼▄▄▄▄▄▄▄▄▼▄▄    │        panel thickness below it
+//!     ████████████████████    ▼ …
+//!      rib        seat       window
+//! ```
 
 use std::path::Path;
 
@@ -21,24 +30,30 @@ use deltille_core::targets::{
 };
 use deltille_files::export::stl::skeleton_name;
 
-/// Tolerance of a unit normal: single precision on small triangles.
+/// Tolerance of the distance of a stated unit normal from that of its triangle: vertices are in
+/// single precision, and some triangles are small.
 const NORMAL_SLACK: f64 = 1e-3;
 
-/// Relative difference of volumes: single precision.
+/// Tolerance of the ratio of the volumes from 1, as vertices are in single precision.
 const VOLUME_SLACK: f64 = 1e-4;
 
-/// Rays start this far above a face, mm, and are sent down this far beside the line where ribs,
-/// seats and windows meet.
+/// Rays start this far above a face, mm, and keep this distance from the lines where ribs, seats and
+/// windows meet, mm: on such a line the depth is not defined.
 const ABOVE_MM: f64 = 0.5;
 const BESIDE_MM: f64 = 0.02;
 
-/// Triangles that may have one middle.
+/// Number of triangles nearest to the stated centroid that are compared: some share a centroid.
 const SAME_MIDDLE: usize = 4;
 
-/// Places along a side of a face at which it is felt.
+/// Positions along a side of a face, as fractions of its length, at which rays are sent.
 const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
 
-/// Reads an STL and compares it with the target.
+/// Reads the STL of a solid or of its skeleton and compares it with the target.
+///
+/// # Errors
+///
+/// The file cannot be read as a binary STL, the target is no solid, or the file is named as a
+/// skeleton and the target has none. Deviations are findings of the verdict.
 pub(super) fn verify(
     verifier: &Verifier,
     reader: &Reader,
@@ -88,7 +103,8 @@ pub(super) fn verify(
     Ok(Verdict { body: Some(body), ..Verdict::new(path, Format::Stl, findings) })
 }
 
-/// Closed, one piece, outside out, normals those of the triangles.
+/// Findings unless the surface is closed, in one piece and oriented outwards, and the stated normals
+/// are those of the triangles.
 fn check_surface(facets: &[Facet]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let vertices: Vec<DVec3> = facets.iter().flat_map(|facet| facet.vertices_mm).collect();
@@ -100,7 +116,7 @@ fn check_surface(facets: &[Facet]) -> Vec<Finding> {
         Err(error) => Some(error.to_string()),
     };
     findings.extend(problem.map(|problem| MeshFinding::Body { problem }.into()));
-    // A normal that is no number is wrong too.
+    // NaN compares as false, so it is asked for separately.
     let wrong = facets.iter().filter(|facet| {
         let [a, b, c] = facet.vertices_mm;
         let off = facet.normal.distance((b - a).cross(c - a).normalize_or_zero());
@@ -113,7 +129,9 @@ fn check_surface(facets: &[Facet]) -> Vec<Finding> {
     findings
 }
 
-/// Every stated triangle is there once, and nothing else.
+/// Adds findings unless the file has the stated triangles, mm, and no others; the order of triangles
+/// is free, and so is the vertex with which each begins. A wrong volume is reported as a wrong scale,
+/// as every triangle would only repeat it.
 fn check_triangles(
     facets: &[Facet],
     stated: &[[DVec3; 3]],
@@ -156,7 +174,8 @@ fn check_triangles(
     }
 }
 
-/// Every seat has its depth and its outline.
+/// Findings about faces whose ribs, seats and windows do not have the stated depths, mm, found by
+/// rays along the inward normal of each face; counts the seats that agree.
 fn check_seats(
     facets: &[Facet],
     solid: &Polyhedron,
@@ -212,7 +231,8 @@ fn check_seats(
     findings
 }
 
-/// Distance at which a ray hits the surface, mm.
+/// Distance along a ray with a unit direction to the first triangle that it hits, mm; infinite where
+/// it hits none.
 fn depth(facets: &[Facet], from: DVec3, direction: DVec3) -> f64 {
     let meets = facets.iter().filter_map(|facet| {
         let [a, b, c] = facet.vertices_mm;
@@ -226,7 +246,8 @@ fn depth(facets: &[Facet], from: DVec3, direction: DVec3) -> f64 {
     meets.fold(f64::INFINITY, f64::min)
 }
 
-/// The volume inside a closed surface, by the divergence theorem.
+/// The volume enclosed by a closed surface, mm³, by the divergence theorem: the sum of a · (b × c) / 6
+/// over triangles a b c, negative where they are oriented inwards.
 fn volume(triangles: impl Iterator<Item = [DVec3; 3]>) -> f64 {
     triangles.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }

@@ -1,4 +1,5 @@
-//! The texture of a face of a mesh, laid out flat.
+//! The texture of a face of a mesh, drawn flat as seen from its front, so that a face is checked like
+//! a printed page.
 
 use glam::{DVec2, DVec3};
 
@@ -10,7 +11,7 @@ use deltille_core::targets::{Panel, Placement};
 /// Greatest distance of the triangles of a face from the plane of its panel, mm.
 const IN_PLANE_MM: f64 = 0.25;
 
-/// Samples per pixel and axis.
+/// Samples of the texture per pixel of the page along each axis.
 const SAMPLES: usize = 2;
 
 /// The texture of a loaded mesh on the face of a panel, seen from its front, as a page, and the
@@ -18,7 +19,7 @@ const SAMPLES: usize = 2;
 ///
 /// `outline` is that of the face, counter-clockwise in the panel frame, mm: triangles in its plane
 /// outside it belong to another face. `area_mm` is the left, lower, right and upper end of the page
-/// in the panel frame.
+/// in the panel frame, and `px_per_mm` its resolution.
 pub(super) fn face_page(
     model: &Model,
     panel: &Panel,
@@ -34,7 +35,7 @@ pub(super) fn face_page(
     let texture = &model.texture;
     let size = DVec2::new(texture.width() as f64, texture.height() as f64);
     let mut shades = vec![u8::MAX; width * height];
-    // The largest pixel of the texture, px of the page.
+    // Side of the largest pixel of the texture, px of the page: it smears edges by as much.
     let mut texel_px = 0.0f64;
     for triangle in &model.triangles {
         let flat = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v));
@@ -46,11 +47,12 @@ pub(super) fn face_page(
         if flat.iter().any(|p| p.z.abs() > IN_PLANE_MM) || !(0..3).all(inside) {
             continue;
         }
-        // Sample positions, y down.
+        // In samples of the page, whose centres are integers; y runs down there and up on the panel.
         let [a, b, c] =
             flat.map(|p| DVec2::new(p.x - left, upper - p.y) * scale - DVec2::splat(0.5));
         let area = (b - a).perp_dot(c - a);
-        // On the screen a front is clockwise.
+        // Faces are counter-clockwise from the front, so with y down the front is clockwise, and its
+        // signed area in these coordinates negative.
         if area >= 0.0 {
             continue;
         }

@@ -132,23 +132,24 @@ pub enum FoldFinding {
     },
 }
 
-/// Numbers in words.
+/// Numbers as part of a sentence.
 fn enumerate(numbers: &[usize]) -> String {
     let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
     if numbers.is_empty() { "no number".to_owned() } else { numbers.join(" and ") }
 }
 
-/// Page positions of the corners found on a sheet: by panel, then by corner.
+/// Positions of the corners detected on a sheet, mm in the frame of the sheet: by panel id, then by
+/// corner id.
 pub(super) type Seen = BTreeMap<u32, BTreeMap<u32, DVec2>>;
 
-/// Whether a target's sheets are those of a net.
+/// Whether the sheets of a target are a net: whether faces of a solid are joined by folds.
 pub(super) fn is_net(target: &Target) -> bool {
     let folds = |sheet: &SheetLayout| sheet.lines.iter().any(|line| line.kind.joins_faces());
     matches!(target.spec, TargetSpec::Solid(_)) && target.sheets.iter().any(folds)
 }
 
-/// Folds the detected net, and adds findings to the verdicts. Faces that were not detected cannot
-/// be checked.
+/// Folds the net that was detected, and adds what deviates to the verdicts of the sheets, which are
+/// in the order of `seen`. If a face was not detected, nothing is checked: the sheet lacks it anyway.
 pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict]) {
     let Some(net) = Net::new(target, seen) else { return };
     let mut carried = vec![None; net.faces.len()];
@@ -191,26 +192,31 @@ pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict
     }
 }
 
-/// A face as it was found.
+/// A face of the net as it was detected. Side i runs from vertex i to vertex i + 1.
 struct PrintedFace {
+    /// Panel id.
     panel: u32,
+    /// Index of the sheet that it is on.
     sheet: usize,
-    /// Its outline on the page, from the pose of its corners there, mm.
+    /// Its outline on the page, counter-clockwise, mm: the stated one at the detected pose.
     outline_mm: [DVec2; 3],
+    /// Its pose on the page, fitted to the detected corners.
     page_from_panel: Rigid,
-    /// Vertices of the solid at the corners of its outline.
+    /// Indices of the vertices of the solid at the corners of its outline.
     vertices: [usize; 3],
-    /// The corners found: on the page and, stated, in space; mm.
+    /// The detected corners: the position on the page and the stated one in the target frame, mm.
     corners: Vec<(DVec2, DVec3)>,
-    /// Numbers printed along each of its sides.
+    /// Edge numbers printed along each of its sides.
     numbers: [Vec<usize>; 3],
-    /// Faces that tabs along its sides say that they go under: side and number of the face.
+    /// Tabs on its sides: the side, and the number of the face under which the tab says that it is
+    /// to be glued.
     under: Vec<(usize, usize)>,
-    /// Numbers of the face that are printed in it.
+    /// Face numbers printed in it.
     names: Vec<usize>,
 }
 
-/// `page = turn · panel + shift`.
+/// A rigid motion of the plane, mm: `page = turn · panel + shift`, where `turn` is a unit complex
+/// number.
 #[derive(Clone, Copy)]
 struct Rigid {
     turn: DVec2,
@@ -218,7 +224,9 @@ struct Rigid {
 }
 
 impl Rigid {
-    /// The least-squares rigid motion: with centred p and q as complex numbers, turn ∝ Σ p̄ q.
+    /// The least-squares rigid motion that takes the first point of each pair to the second; `None`
+    /// where the points do not determine the rotation. With p and q as complex numbers about their
+    /// means, turn ∝ Σ p̄ q.
     fn fit(pairs: &[(DVec2, DVec2)]) -> Option<Self> {
         let n = pairs.len() as f64;
         let p0 = pairs.iter().map(|(p, _)| *p).sum::<DVec2>() / n;
@@ -234,7 +242,8 @@ impl Rigid {
     }
 }
 
-/// `space = linear · (x, y, 0) + shift`: the plane of the page laid into space.
+/// A pose of a plane in the target frame, mm: `space = linear · (x, y, 0) + shift` with a rotation
+/// `linear`. The plane is that of the page, or of a panel.
 #[derive(Clone, Copy)]
 struct SpaceFromPage {
     linear: DMat3,
@@ -246,7 +255,8 @@ impl SpaceFromPage {
         self.linear * p.extend(0.0) + self.shift
     }
 
-    /// The same map rotated about the line through two points of the page.
+    /// The same pose followed by a rotation by an angle about the line from the first to the second of
+    /// two points of the page.
     fn folded(&self, [p, q]: [DVec2; 2], angle_rad: f64) -> Self {
         let (a, b) = (self.apply(p), self.apply(q));
         let turn = DMat3::from_axis_angle((b - a).normalize_or(DVec3::X), angle_rad);
@@ -254,19 +264,25 @@ impl SpaceFromPage {
     }
 }
 
-/// The place of the solid that a printed face came to lie in.
+/// The face of the solid in whose place a printed face comes to lie when the net is folded.
 struct Place {
     /// Index of the face that belongs there.
     slot: usize,
-    /// Vertices of the solid at the corners of the printed outline.
+    /// Vertices of the solid where the corners of the printed outline come to lie.
     vertices: [usize; 3],
+    /// Pose of the part of the page with this face.
     space_from_page: SpaceFromPage,
 }
 
+/// The faces of a sheet after folding.
 struct Folded {
+    /// Index of each face that was reached, and its place.
     places: Vec<(usize, Place)>,
+    /// Deviations from the target.
     findings: Vec<FoldFinding>,
+    /// Whether a face is in the place of another, rotated, or was not reached.
     misplaced: bool,
+    /// Largest distance of a folded corner from its stated position, mm, of faces in their places.
     deviation_mm: f64,
 }
 
@@ -275,22 +291,25 @@ struct Edge {
     sides: [(usize, usize); 2],
 }
 
+/// The net as it was detected, and the solid that is to come of it. A side is the index of a face and
+/// the number of its side.
 struct Net {
+    /// All faces, in the order of the target's panels.
     faces: Vec<PrintedFace>,
-    /// Places of the vertices of the solid, as the panels' poses state them, mm.
+    /// Stated positions of the vertices of the solid in the target frame, mm.
     vertices_mm: BTreeMap<usize, DVec3>,
-    /// Pose of each panel: rotation and shift.
+    /// Stated pose of each panel in the target frame.
     poses: Vec<SpaceFromPage>,
-    /// Face and side along a directed edge.
+    /// The side that runs from one vertex of the solid to another.
     along: BTreeMap<[usize; 2], (usize, usize)>,
-    /// For each side the one that it is folded against.
+    /// The side of another face from which each side is separated by a fold only.
     folds: BTreeMap<(usize, usize), (usize, usize)>,
     /// Sides along which a tab is folded.
     tabs: BTreeSet<(usize, usize)>,
 }
 
 impl Net {
-    /// The faces that were found, all of them.
+    /// The net of a target from the corners detected on each sheet; `None` where a face is missing.
     fn new(target: &Target, seen: &[Seen]) -> Option<Self> {
         let TargetSpec::Solid(spec) = &target.spec else { return None };
         let (outlines, solid) = (spec.faces().ok()?, spec.polyhedron());
@@ -341,17 +360,20 @@ impl Net {
         Some(net)
     }
 
+    /// Ends of a side on the page, mm.
     fn ends(&self, (face, side): (usize, usize)) -> [DVec2; 2] {
         let outline = self.faces[face].outline_mm;
         [outline[side], outline[(side + 1) % 3]]
     }
 
+    /// The sides of all faces on a sheet.
     fn sides_on(&self, sheet: usize) -> impl Iterator<Item = (usize, usize)> {
         let faces = (0..self.faces.len()).filter(move |&face| self.faces[face].sheet == sheet);
         faces.flat_map(|face| (0..3).map(move |side| (face, side)))
     }
 
-    /// Sides of two faces on the same fold line, and of one where a tab hangs on it.
+    /// Notes which sides of two faces lie on one fold line of the layout, and which side of a single
+    /// face does, so that a tab hangs on it.
     fn find_folds(&mut self, sheet: usize, layout: &SheetLayout) {
         let sides: Vec<_> = self.sides_on(sheet).map(|side| (side, self.ends(side))).collect();
         for line in layout.lines.iter().filter(|line| line.kind.joins_faces()) {
@@ -371,8 +393,8 @@ impl Net {
         }
     }
 
-    /// Gives each number to the face that it stands in, and to the side that it stands at: in a
-    /// face one of that face, else the nearest that is cut.
+    /// Assigns each printed number to the face in which it stands, or to a side: within a face the
+    /// nearest side of that face, outside all faces, as on a tab, the nearest side without a fold.
     fn read_numbers(&mut self, sheet: usize, layout: &SheetLayout) {
         for text in &layout.texts {
             if !text.text.is_number() {
@@ -410,7 +432,8 @@ impl Net {
         }
     }
 
-    /// The fold from the root that leads to the fewest contradictions.
+    /// Folds the faces of a sheet, `members`, about several roots and returns the result with the
+    /// fewest findings: if a misprinted face is the root, all others are off.
     fn best_fold(&self, members: &[usize]) -> Folded {
         let mut best: Option<Folded> = None;
         for &root in members.iter().take(MOST_ROOTS) {
@@ -432,7 +455,7 @@ impl Net {
         best.unwrap_or(nothing)
     }
 
-    /// Lays `root` where it is stated to be, and folds the others onto it.
+    /// Lays `root` in its stated place, and folds the others one after the other, breadth first.
     fn fold(&self, members: &[usize], root: usize) -> Folded {
         let face = &self.faces[root];
         let pose = &self.poses[root];
@@ -459,7 +482,9 @@ impl Net {
         self.judge(members, places)
     }
 
-    /// The place of a face that hangs on one whose place is known.
+    /// The place of a face `child` whose side `own` is folded against a side of a face that lies in the
+    /// place `parent`; `None` where the solid has no face across that edge. The fold is turned by the
+    /// angle between the stated normals of the two places about their edge.
     fn across(
         &self,
         parent: &Place,
@@ -483,7 +508,7 @@ impl Net {
         Some(Place { slot, vertices, space_from_page })
     }
 
-    /// Compares the places of the faces with those that they should have.
+    /// Compares the places of the faces with their own, and folded corners with stated ones.
     fn judge(&self, members: &[usize], places: BTreeMap<usize, Place>) -> Folded {
         let (mut findings, mut deviation_mm, mut misplaced) = (Vec::new(), 0.0f64, false);
         for &index in members {
@@ -518,15 +543,19 @@ impl Net {
         Folded { places: places.into_iter().collect(), findings, misplaced, deviation_mm }
     }
 
-    /// All edges of the solid.
+    /// All edges of the solid, each once.
     fn edges(&self) -> Vec<Edge> {
         let forward = self.along.iter().filter(|([a, b], _)| a < b);
         let both = forward.filter_map(|([a, b], &one)| Some([one, *self.along.get(&[*b, *a])?]));
         both.map(|sides| Edge { sides }).collect()
     }
 
-    /// Distance in space of the two sides of an edge, if they belong together: folded against each
-    /// other on the page, or cut and carrying the same number, with a tab on one.
+    /// Distance of the two sides of an edge after folding, mm, if they belong together: folded
+    /// against each other on the page, or cut, with the same single number, and with one tab.
+    ///
+    /// # Errors
+    ///
+    /// The finding, where they do not belong together or lie apart.
     fn check_edge(
         &self,
         edge: &Edge,
@@ -556,7 +585,7 @@ impl Net {
         }
     }
 
-    /// Findings about the number of a face and the numbers on its tabs.
+    /// Findings about the number printed in a face and the faces that its tabs name.
     fn check_words(&self, index: usize) -> Vec<FoldFinding> {
         let face = &self.faces[index];
         let mut findings = Vec::new();
@@ -574,7 +603,7 @@ impl Net {
         findings
     }
 
-    /// Numbers that more than two sides carry.
+    /// Findings about edge numbers that stand on more than two sides.
     fn numbers_used_twice(&self) -> Vec<FoldFinding> {
         let mut count = BTreeMap::<usize, usize>::new();
         let numbers = self.faces.iter().flat_map(|face| face.numbers.iter().flatten());
@@ -584,7 +613,7 @@ impl Net {
     }
 }
 
-/// Distance of a point from a segment.
+/// Distance of a point from a segment of positive length, mm.
 fn distance(at: DVec2, [p, q]: [DVec2; 2]) -> f64 {
     let along = ((at - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
     at.distance(p + (q - p) * along)

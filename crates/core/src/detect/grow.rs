@@ -1,9 +1,14 @@
 //! Grids from linked corners: initial quads, breadth-first growth, and filling of gaps.
 //!
-//! Every corner of a grid has a lattice vertex and a *turn*: ray k of the corner points along step
-//! `k + turn` of the lattice ([`step`]). Even rays begin dark sectors. On a deltille grid turns are
-//! even, and the upright tiles are the dark ones, whatever the board's colours. On a checkerboard
-//! the turn is even where row + column is, and there the square up and right is dark.
+//! A corner has N rays, six or four, along the edges that meet there, and is *linked* along a ray to
+//! the corner at the other end of the edge. In a grid it has a lattice vertex and a *turn*: its ray k
+//! points along step `k + turn` (mod N) of the lattice ([`step`]). Rays with even numbers begin dark
+//! sectors. On a deltille grid turns are therefore even, and the upright tiles are the dark ones,
+//! whatever the board's colours. On a checkerboard the turn is even where row + column is, and there
+//! the square up and right is dark.
+//!
+//! Every grid has a lattice frame of its own, known up to a motion of the lattice;
+//! [`label`](super::label) finds what it is on the target.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 
@@ -23,20 +28,23 @@ use super::tiling::{kind, neighbours, step, tiles_at};
 use crate::lattice::{GridKind, Vertex};
 use crate::raster::Pyramid;
 
-/// Greatest distance of a corner from the position that its neighbours predict, in edge lengths.
+/// Greatest distance of a missing corner from the position that its neighbours predict, as a fraction
+/// of the edge length there.
 const MAX_SURPRISE: f64 = 0.2;
 
-/// Corners nearer to each other than this fraction of an edge are the same: under blur and motion
-/// one may be detected twice.
+/// Corners nearer to each other than this fraction of the distance to the nearest neighbour are the
+/// same one: under blur and motion a corner may be detected twice.
 const SAME_PART: f64 = 0.2;
 
-/// A corner that is missing is looked for in several views.
+/// Effort for a missing corner, which is sought in the picture and in several rectified views of it.
 const LOOKS_FOR_CORNER: usize = 20;
 
 /// A corner's place in a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place {
+    /// Its lattice vertex.
     vertex: Vertex,
+    /// Ray k points along step `k + turn` (mod N) of the lattice.
     turn: usize,
 }
 
@@ -45,7 +53,7 @@ struct Place {
 pub struct PlacedSaddle {
     /// Position, px.
     pub position: DVec2,
-    /// Half the contrast around it.
+    /// Half the difference of the grey values of bright and dark tiles around it.
     pub amplitude: f64,
 }
 
@@ -62,7 +70,7 @@ pub struct GrownSaddle<const N: usize> {
 }
 
 impl<const N: usize> GrownSaddle<N> {
-    /// The ray along step `k` of the lattice.
+    /// Index of the ray along step `k` of the lattice.
     pub fn ray(&self, k: usize) -> usize {
         (k + N - self.turn) % N
     }
@@ -71,8 +79,9 @@ impl<const N: usize> GrownSaddle<N> {
 /// A grid while it grows.
 pub type Growing<const N: usize> = BTreeMap<Vertex, GrownSaddle<N>>;
 
-/// All grids among the saddle points, largest first, by lattice vertex; none where there are more
-/// saddle points than on any board. A grid that shows the `whole` board has no gaps to be filled.
+/// All grids among the saddle points, by lattice vertex, those with most corners first. There are none
+/// where there are more saddle points than any board has. Corners that were not detected are sought
+/// where a grid has gaps or goes on; not so in a grid that shows the `whole` board, if that is given.
 pub fn grids<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -104,7 +113,8 @@ pub fn grids<const N: usize>(
         if !whole.is_some_and(|whole| whole.is_shown_by(&grid)) {
             fill_gaps(finder, pyramid, &mut grid, &mut effort);
         }
-        // What is found in a gap may have been found before, without its links.
+        // A corner that is found in a gap may be a known saddle point that was not linked: it is dropped
+        // if another grid has that, or if it is in this grid under another vertex.
         grid.retain(|&vertex, grown| match same(&index, &grown.saddle) {
             Some(corner) if growth.taken[corner] => false,
             Some(corner) => *own.entry(corner).or_insert(vertex) == vertex,
@@ -130,18 +140,19 @@ pub fn grids<const N: usize>(
     grids
 }
 
+/// A corner without what only growing needs.
 fn plain<const N: usize>(grown: &GrownSaddle<N>) -> PlacedSaddle {
     PlacedSaddle { position: grown.saddle.position, amplitude: grown.saddle.sectors.amplitude }
 }
 
-/// Index of the known saddle point that is the same as another one.
+/// Index of the nearest known saddle point that counts as the same as `saddle`.
 fn same<const N: usize>(places: &Buckets, saddle: &Saddle<N>) -> Option<usize> {
     let near = places.within(saddle.position, merge_px(saddle.level));
     near.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(i, _)| i)
 }
 
-/// Removes corners from grids that are in a larger grid, or under another vertex of the same;
-/// `places` are known from before, and empty at first.
+/// Removes corners that also are in a larger grid, or under another vertex of the same grid. `places`
+/// is an empty index over the image, to which the positions that stay are added.
 fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
     for grid in grids.iter_mut() {
         let whole = grid.clone();
@@ -162,8 +173,8 @@ fn each_once(grids: &mut Vec<SaddleGrid>, mut places: Buckets) {
     grids.retain(|grid| !grid.is_empty());
 }
 
-/// Drops grids that lie within one tile of a larger grid: the cells of a tag form a tiling, too.
-/// The largest grid comes first.
+/// Drops every grid that lies within a single tile of a larger one: the cells of a tag form a tiling,
+/// too. `grids` are sorted with the largest first.
 fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGrid> {
     if grids.len() < 2 {
         return grids;
@@ -187,7 +198,8 @@ fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGr
         let Some(first) = grid.values().next() else {
             return false;
         };
-        // What lies in a tile of a grid that is dropped itself lies in the tile around that.
+        // The larger grid may be dropped itself: its tile then lies in the tile of a third grid, which
+        // holds this one as well.
         !middles.within(first.position, reach_px).any(|(index, _)| {
             let (i, tile) = &tiles[index];
             Some(*i) < own && grid.values().all(|placed| is_inside(tile, placed.position))
@@ -196,14 +208,15 @@ fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGr
     grids
 }
 
-/// The tiles of which all vertices are in a grid.
+/// Positions of the vertices, px, of every tile all of whose vertices are in a grid.
 fn tiles_of<const N: usize>(grid: &SaddleGrid) -> impl Iterator<Item = Vec<DVec2>> {
     let place = |v: &Vertex| grid.get(v).map(|p| p.position);
     let tiles = grid.keys().flat_map(|&v| tiles_at::<N>(v));
     tiles.filter_map(move |tile| tile.iter().map(place).collect())
 }
 
-/// Whether a point lies in a tile. Counter-clockwise on the print is clockwise in the image's axes.
+/// Whether a point lies within a tile, px. Vertices that are counter-clockwise on the print have a
+/// negative signed area in the image, where y runs down.
 fn is_inside(tile: &[DVec2], p: DVec2) -> bool {
     (0..tile.len()).all(|i| {
         let (a, b) = (tile[i], tile[(i + 1) % tile.len()]);
@@ -211,13 +224,13 @@ fn is_inside(tile: &[DVec2], p: DVec2) -> bool {
     })
 }
 
-/// A corner with its place.
+/// Index of a corner, and its place.
 type Placed = (usize, Place);
 
 /// The four corners from which a grid grows.
 type Seed = [Placed; 4];
 
-/// The seeds, those with the most complete surroundings first.
+/// All seeds, those whose corners have most links first, as links are missing near what is wrong.
 ///
 /// ```text
 ///     D ───── C          A at (0,0), B at (0,1), C at (1,0), D at (1,−1): the two tiles A B C and
@@ -226,7 +239,8 @@ type Seed = [Placed; 4];
 ///        A ───── B       on a checkerboard C at (1,1) and D at (1,0): the one dark square A B C D
 /// ```
 ///
-/// All five edges, or four, are linked both ways.
+/// All five edges of the two triangles, or four of the square, must be linked, which they are from both
+/// ends.
 fn seeds<const N: usize>(links: &[Links<N>]) -> Vec<Seed> {
     let root = Place { vertex: Vertex::new(0, 0), turn: 0 };
     let mut seeds: Vec<(usize, Seed)> = Vec::new();
@@ -255,7 +269,8 @@ fn follow<const N: usize>(links: &[Links<N>], (corner, place): Placed, k: usize)
     Some((link.corner, across::<N>(place, k, link)))
 }
 
-/// The corners of the square that steps `k` and `l` span at `a`, when all four edges are linked.
+/// The corners of the square that steps `k` and `l` span at `a`, in order around it; `None` unless all
+/// four edges are linked.
 fn square<const N: usize>(links: &[Links<N>], a: Placed, k: usize, l: usize) -> Option<Seed> {
     let (b, d) = (follow(links, a, k)?, follow(links, a, l)?);
     let c = follow(links, b, l)?;
@@ -264,20 +279,22 @@ fn square<const N: usize>(links: &[Links<N>], a: Placed, k: usize, l: usize) -> 
 
 /// The place at the far end of the link that leaves `from` along step `k` of the lattice.
 fn across<const N: usize>(from: Place, k: usize, link: Link) -> Place {
-    // The ray that looks back points along the opposite step.
+    // `link.ray` is the ray of the other corner that looks back, so it points along the opposite step.
     Place { vertex: from.vertex + step::<N>(k), turn: (k + N / 2 + N - link.ray) % N }
 }
 
 /// Grids that grow along links, one after the other.
 struct Growth<'a, const N: usize> {
     links: &'a [Links<N>],
-    /// By corner, whether another grid has it.
+    /// For each corner, whether an earlier grid has it.
     taken: Vec<bool>,
-    /// By corner, its place in the grid that grows.
+    /// For each corner, its place in the grid that grows.
     places: Vec<Option<Place>>,
-    /// The corners of the grid that grows, as they came.
+    /// The corners of the grid that grows, in the order in which they joined.
     members: Vec<usize>,
+    /// The vertices of these corners.
     occupied: HashSet<Vertex>,
+    /// Corners whose links are to be followed.
     queue: VecDeque<usize>,
 }
 
@@ -295,10 +312,11 @@ impl<'a, const N: usize> Growth<'a, N> {
         }
     }
 
-    /// Breadth-first growth: corners join when they close a tile with the grid.
+    /// Grows a grid from a seed, breadth first, and returns its corners with their places.
     ///
-    /// A corner closes a triangle, or a corner that a row bends around closes a square, when two of the
-    /// grid agree on its place. A square on a straight side is closed by two new corners at once.
+    /// A corner joins when it closes a tile, as a single link may be wrong: it closes a triangle, or a
+    /// square in a re-entrant angle of the grid, when two corners of the grid agree on its place. On a
+    /// straight side of a checkerboard, a square is closed by two new corners at once.
     fn grow(&mut self, seed: &Seed) -> Vec<Placed> {
         self.occupied.clear();
         seed.iter().for_each(|&placed| self.add(placed));
@@ -323,6 +341,7 @@ impl<'a, const N: usize> Growth<'a, N> {
         members.filter_map(|corner| Some((corner, self.places[corner].take()?))).collect()
     }
 
+    /// Adds a corner, whose links are then followed.
     fn add(&mut self, (corner, place): Placed) {
         self.places[corner] = Some(place);
         self.members.push(corner);
@@ -330,29 +349,31 @@ impl<'a, const N: usize> Growth<'a, N> {
         self.queue.push_back(corner);
     }
 
-    /// Whether neither the corner nor its vertex belongs to a grid.
+    /// Whether the corner belongs to no grid yet, and its vertex is not occupied in this one.
     fn is_free(&self, (corner, place): Placed) -> bool {
         !self.taken[corner]
             && self.places[corner].is_none()
             && !self.occupied.contains(&place.vertex)
     }
 
-    /// Number of corners of the grid that link to `next` at its place; `None` when one links to it
-    /// as if it were elsewhere.
+    /// Number of corners of the grid that are linked to `next` as its place requires; `None` where one
+    /// is linked to it as if it had another place.
     fn votes(&self, next: Placed) -> Option<usize> {
         let linked = (0..N).filter_map(|k| follow(self.links, next, k));
         let mut known = linked.filter_map(|(corner, place)| Some(self.places[corner]? == place));
         known.try_fold(0, |votes, agrees| agrees.then_some(votes + 1))
     }
 
+    /// Adds a corner, and follows the links of its neighbours in the grid once more.
     fn join(&mut self, next: Placed) {
         self.add(next);
-        // Corners that were one vote short may now have it.
+        // Corners beside it that lacked one vote may now have it.
         let linked = (0..N).filter_map(|k| follow(self.links, next, k)).map(|(corner, _)| corner);
         self.queue.extend(linked.filter(|&corner| self.places[corner].is_some()));
     }
 
-    /// The corner that follows `at` along step `k` joins together with the next one beside it.
+    /// Adds the corner that follows `at` along step `k` together with one beside it, where these two close
+    /// a square with an edge of the grid.
     fn join_by_square(&mut self, at: Placed, k: usize) {
         for side in [k + 1, k + N - 1] {
             let Some([_, next, beside, known]) = square(self.links, at, k, side % N) else {
@@ -368,7 +389,8 @@ impl<'a, const N: usize> Growth<'a, N> {
     }
 }
 
-/// Looks for missing corners where their neighbours predict them, until none is found.
+/// Seeks corners at empty vertices beside those of a grid, within it and around it, where neighbours
+/// predict them, until no more are found.
 fn fill_gaps<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -392,7 +414,7 @@ fn fill_gaps<const N: usize>(
             {
                 grid.insert(vertex, placed);
                 grown = true;
-                // What this corner's surroundings predict has changed.
+                // The vertices around it are predicted anew, so they are tried again.
                 tried.retain(|v: &Vertex| !neighbours::<N>(vertex).contains(v));
             } else {
                 tried.insert(vertex);
@@ -404,9 +426,16 @@ fn fill_gaps<const N: usize>(
     }
 }
 
-/// Prediction of a missing corner: the position at which the straight (or evenly bent) rows through
-/// `vertex` continue, px, and the length of an edge there, px; `None` unless two rows predict it,
-/// or two neighbours and those around them.
+/// Position of a missing corner, px, and the length of an edge there, px: the mean of what the rows
+/// through `vertex` predict. With the next three corners p, q, r of a row, the position is
+///
+/// ```text
+///     3 p − 3 q + r        a row that bends evenly (its second difference is constant)
+///     2 p − q              where r is missing: a straight row with equal edges
+/// ```
+///
+/// Where fewer than two rows predict it, a local map of the corners around does, if there are two
+/// neighbours; else the result is `None`.
 fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<(DVec2, f64)> {
     let at = |v: Vertex| grid.get(&v).map(|grown| grown.saddle.position);
     let mut sum = DVec2::ZERO;
@@ -427,15 +456,15 @@ fn predict<const N: usize>(grid: &Growing<N>, vertex: Vertex) -> Option<(DVec2, 
     if count >= 2.0 {
         return Some((sum / count, edge / count));
     }
-    // The first quad of a grid has no rows, but two of its corners beside the vertex.
+    // The seed of a grid has no rows yet, but two of its corners beside the vertex.
     let beside: Vec<DVec2> = neighbours::<N>(vertex).into_iter().filter_map(at).collect();
     let map = (beside.len() >= 2).then(|| LocalMap::about::<N>(vertex, at, Bend::usual()))??;
     let px = |p: &DVec2| (p.x - map.place.x).hypot(p.y - map.place.y);
     Some((map.place, beside.iter().map(px).sum::<f64>() / beside.len() as f64))
 }
 
-/// The corner at `vertex`, if one is found near `position`, in the picture as it is or rectified to
-/// the frame of its neighbours.
+/// The corner at `vertex`, if one is found near the predicted `position`, px: in the picture, or, where
+/// the board is seen at a steep angle, in a view that is rectified by the edges to its neighbours.
 fn corner_near<const N: usize>(
     finder: &SaddleFinder<N>,
     pyramid: &Pyramid,
@@ -448,7 +477,7 @@ fn corner_near<const N: usize>(
     }
     let reach = (MAX_SURPRISE * edge_px).max(1.0);
     let neighbours = neighbours::<N>(vertex);
-    // A blurred corner is found best in the view in which its neighbours were found.
+    // A blurred corner is found best on the pyramid level on which its neighbours were found.
     let levels = neighbours.iter().filter_map(|v| Some(grid.get(v)?.saddle.level));
     let level = levels.max().unwrap_or(0);
     let at_place = |saddle| placed_at(pyramid, grid, vertex, saddle);
@@ -464,7 +493,8 @@ fn corner_near<const N: usize>(
     })
 }
 
-/// A corner at `vertex` of a grid, if it has clean edges to two neighbours that agree on its turn.
+/// A saddle point as the corner at `vertex` of a grid, if it has clean edges to two neighbours at least
+/// that agree on its turn, and rays parallel to theirs.
 fn placed_at<const N: usize>(
     pyramid: &Pyramid,
     grid: &Growing<N>,
@@ -489,7 +519,8 @@ fn placed_at<const N: usize>(
     (votes[turn] >= 2 && parallel_to_neighbours(grid, vertex, &grown)).then_some(grown)
 }
 
-/// Whether all rays point where those of each neighbour do, within what one tile may bend.
+/// Whether all rays of a corner are parallel to those of each neighbour, within the angle by which
+/// distortion and perspective may bend a tile.
 fn parallel_to_neighbours<const N: usize>(
     grid: &Growing<N>,
     vertex: Vertex,

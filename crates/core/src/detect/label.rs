@@ -69,8 +69,9 @@ const BEYOND_DOUBT: f64 = 40.0;
 /// Evidence from which a code that the target does not have is reported, nats.
 const CLEARLY_OTHER: f64 = 7.0;
 
-/// Fractions of the tiles of a board that may be plain: from tags in nearly all tiles to one in a
-/// corner of the board.
+/// Fractions of the tiles of a board that may be plain, for the board that shows plain tiles and codes
+/// as it likes: from tags in nearly all tiles to a single tag. The one that explains the picture best
+/// counts.
 const PLAIN_PARTS: [f64; 5] = [1.0 / 16.0, 1.0 / 4.0, 1.0 / 2.0, 3.0 / 4.0, 15.0 / 16.0];
 
 /// Least evidence of a single tile that proposes a placement, nats.
@@ -79,16 +80,17 @@ const PROPOSING: f64 = 1.0;
 /// Most placements that are evaluated, best proposals first.
 const MOST_PROPOSALS: usize = 64;
 
-/// Most tiles that are read in a grid; more would add no information.
+/// Most tiles that are read in a grid: the evidence of so many is beyond doubt, or worth nothing.
 const MOST_TILES: usize = 2000;
 
-/// Cost of reading a tile, in comparisons of a tile with a code.
+/// Time to read a tile from the image, in units of a comparison of a tile with one word.
 const READING_COST: usize = 1000;
 
-/// Budget of a picture, in comparisons: some hundredths of a second.
+/// Comparisons of a tile with a word that are made in a picture: some hundredths of a second.
 const BUDGET: usize = 4_000_000;
 
-/// The remaining computing budget of a picture.
+/// The computing time that is left for reading tags in a picture, in comparisons of a tile with a
+/// word; counted rather than measured, so that results are the same on every computer.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget(usize);
 
@@ -103,11 +105,11 @@ impl Default for Budget {
 pub struct Labelled {
     /// Index of the panel in the target.
     pub panel: usize,
-    /// Whether it is seen as in a mirror.
+    /// Whether the picture shows it as in a mirror.
     pub mirrored: bool,
-    /// Panel vertex of every grid vertex that belongs to it.
+    /// Panel vertex of every grid vertex that is a corner of the panel.
     pub vertices: BTreeMap<Vertex, Vertex>,
-    /// Tags that agree, in panel vertices.
+    /// Tags whose reading speaks for the placement, with rows and columns of the panel, sorted by them.
     pub tags: Vec<DecodedTag>,
 }
 
@@ -118,7 +120,7 @@ pub struct TagEvidence {
     pub found: Vec<Labelled>,
     /// Tiles that may carry a tag.
     pub tiles: usize,
-    /// The median length of a bit, px.
+    /// The median side of a cell of a tag, px.
     pub bit_px: f64,
     /// Standard deviation of the blur, px.
     pub blur_px: f64,
@@ -138,18 +140,26 @@ pub struct TagEvidence {
     pub is_cut_short: bool,
 }
 
-/// Labels grids with the panels of a tagged target.
+/// Labels grids with the panels of a tagged target. A *word* is a code as its cells are read from one
+/// of the orientations of its tile, so that each code has three words on a deltille grid and four on
+/// a checkerboard.
 #[derive(Clone, Debug)]
 pub struct TagLabeller {
+    /// One for each way in which the tags of a panel lie in their tiles.
     readers: Vec<TagReader>,
+    /// Name of the family.
     family: String,
+    /// Decoder of the whole family.
     decoder: Decoder,
-    /// Errors at which a word is read as a code without doubt.
+    /// Greatest number of misread cells at which a word certainly is a code of the family.
     sure_errors: u32,
     /// The number of words of the family.
     family_words: usize,
+    /// Greatest number of misread cells of a tag that counts, if there is one.
     max_errors: Option<u32>,
+    /// The words of the target.
     words: TargetWords,
+    /// What labelling needs of each panel of the target, in their order.
     panels: Vec<LabelPanel>,
     /// Whether panels may lie in one grid, as the faces of a solid.
     panels_abut: bool,
@@ -157,68 +167,87 @@ pub struct TagLabeller {
     places: Vec<Vec<(usize, Tile)>>,
 }
 
+/// A panel of the target as labelling needs it, in its lattice coordinates.
 #[derive(Clone, Debug)]
 struct LabelPanel {
-    /// Index into the readers, by where tags lie in their tiles.
+    /// Index of the reader for the place of tags in their tiles.
     reader: usize,
+    /// Whether black and white are exchanged.
     inverted: bool,
+    /// Its corners.
     corners: BTreeSet<Vertex>,
-    /// Index of the code in each tile.
+    /// Index of the target's code in each tile with a tag.
     tags: BTreeMap<Tile, usize>,
-    /// All tiles of the colour that tags are in.
+    /// All tiles of the colour that tags are in, with a tag or without.
     tiles: BTreeSet<Tile>,
 }
 
-/// The readings of the tiles of a grid, all read alike and seen from the same side.
+/// The readings of the tiles of a grid by one reader, as the picture shows them or in its mirror image.
 struct Sight {
+    /// Index of the reader.
     reader: usize,
+    /// Whether black and white are exchanged.
     inverted: bool,
+    /// Whether it is the mirror image.
     mirrored: bool,
+    /// Index of the reading of each tile.
     index: BTreeMap<Tile, usize>,
+    /// The readings; their tiles are mirrored with them.
     readings: Vec<Reading>,
-    /// Λ of each reading and word of the target.
+    /// Λ of each reading for each word of the target, nats.
     evidence: Vec<Vec<f32>>,
+    /// The contents of each reading.
     shown: Vec<Shown>,
 }
 
-/// The contents of a tile regardless of placements: log-likelihood ratios over drawn cells.
+/// What a tile shows, whatever the placement: log-likelihood ratios, nats, over cells drawn at random.
 #[derive(Clone, Copy, Debug)]
 struct Shown {
-    /// If it is predicted to be plain, for each of [`DIRTY`].
+    /// If it is predicted to be plain, for each probability in [`DIRTY`].
     if_plain: [f64; DIRTY.len()],
     /// The word of the target that fits best.
     word: usize,
-    /// If it shows drawn cells or one of all codes, whichever fits better; with `word`, and without it.
+    /// If it shows random cells, or the best of all codes, whichever fits better: with `word` among the
+    /// codes, and without it.
     code: [f64; 2],
-    /// If it belongs to a board of which these parts are plain.
+    /// If it belongs to a board of which each fraction in [`PLAIN_PARTS`] is plain and the other tiles
+    /// show the best code: with `word` and without it, as above.
     of_board: [[f64; PLAIN_PARTS.len()]; 2],
 }
 
-/// A tile under a placement: log-likelihood ratios over drawn cells.
+/// A tile under a placement: log-likelihood ratios, nats, over cells drawn at random.
 #[derive(Clone, Copy, Debug)]
 struct Judged {
-    /// As the placement predicts it, for each of [`DIRTY`].
+    /// If it is as the placement predicts, for each probability in [`DIRTY`].
     predicted: [f64; DIRTY.len()],
-    /// On a board with another code in this tile.
+    /// If the board has tags in the same tiles, but another code in this one.
     other_code: [f64; DIRTY.len()],
-    /// On a board that shows what it likes, as far as the tile is of the panel.
+    /// If the board shows plain tiles and codes as it likes, for each fraction in [`PLAIN_PARTS`]; `None`
+    /// for tiles beyond the panel.
     of_board: Option<[f64; PLAIN_PARTS.len()]>,
 }
 
-/// A placement of a grid on a panel: `map` takes the grid, mirrored if `sight` is, to the panel.
+/// A placement of a grid on a panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Placement {
+    /// Index of the sight.
     sight: usize,
+    /// Index of the panel.
     panel: usize,
+    /// Motion of the lattice from the grid, mirrored if the sight is, to the panel.
     map: LatticeMap,
+    /// Evidence for it, nats; of a proposal the sum over the tiles that speak for it.
     evidence: f64,
 }
 
-/// Placements with evidence enough.
+/// The placements with sufficient evidence, and why there are no others.
 #[derive(Default)]
 struct Placed {
+    /// The placements, which have no corner of the grid in common.
     placements: Vec<Placement>,
+    /// See [`TagEvidence::is_ambiguous`].
     is_ambiguous: bool,
+    /// See [`TagEvidence::contradicted`].
     contradicted: Option<[usize; 2]>,
 }
 
@@ -269,8 +298,8 @@ impl TagLabeller {
         })
     }
 
-    /// Identifies the panels in a grid by the tags that are read in `image`; `budget` is reduced by
-    /// the cost.
+    /// Identifies the panels in a grid, whose positions are px of `image`, by the tags that are read
+    /// there; `budget` is reduced by the cost, and where it is exhausted nothing more is read.
     pub fn label(&self, image: ImageView, grid: &SaddleGrid, budget: &mut Budget) -> TagEvidence {
         let mut evidence = TagEvidence::default();
         let mut sights = Vec::new();
@@ -292,7 +321,8 @@ impl TagLabeller {
         self.decide(sights, grid, evidence)
     }
 
-    /// The placements for which the sights of a grid, direct and mirrored, are evidence.
+    /// Completes the evidence of a grid by the panels that its sights identify. The mirror image is
+    /// tested only where the picture as it is leaves doubt.
     fn decide(
         &self,
         mut sights: Vec<Sight>,
@@ -334,13 +364,15 @@ impl TagLabeller {
         evidence
     }
 
-    /// Readers, and whether for inverted boards, that the target's panels need.
+    /// The ways in which the target's panels are read: index of the reader, and whether black and white
+    /// are exchanged.
     fn ways_to_read(&self) -> BTreeSet<(usize, bool)> {
         let tagged = self.panels.iter().filter(|panel| !panel.tags.is_empty());
         tagged.map(|panel| (panel.reader, panel.inverted)).collect()
     }
 
-    /// Compares readings with all words.
+    /// Compares readings with all words of the target; what they say beyond that, such as codes of the
+    /// family that the target does not have, is added to `noted`.
     fn sight(
         &self,
         (reader, inverted, mirrored): (usize, bool, bool),
@@ -367,7 +399,7 @@ impl TagLabeller {
         Sight { reader, inverted, mirrored, index, readings, evidence, shown }
     }
 
-    /// The contents of a tile by its evidence for all words; `plain` is the word that it has
+    /// What a tile shows, by its evidence for the words of the target; `plain` is the word of a tile
     /// without a tag.
     fn shown(
         &self,
@@ -375,6 +407,7 @@ impl TagLabeller {
         of_words: &[f32],
         noted: &mut TagEvidence,
     ) -> Shown {
+        // e^Λ has the mean 1 for each of n words, so that of the best is up to n: ln n is subtracted.
         let among = |words: usize| (words.max(1) as f64).ln();
         let (mut word, mut most, mut second) = (0, f32::NEG_INFINITY, f32::NEG_INFINITY);
         for (index, &evidence) in of_words.iter().enumerate() {
@@ -386,7 +419,7 @@ impl TagLabeller {
         }
         let of_target = |evidence: f32| f64::from(evidence) - among(of_words.len());
         let mut code = [most, second].map(|evidence| of_target(evidence).max(0.0));
-        // Another code of the family, where none of the target's fits.
+        // A code of the family that the target does not have may fit better than all of these.
         if let Some(decoded) = self.decoder.decode(reading.word(), self.sure_errors)
             && self.words.code_of(decoded.id).is_none()
         {
@@ -409,10 +442,14 @@ impl TagLabeller {
         Shown { if_plain, word, code, of_board }
     }
 
-    /// The placements that the sights of a grid are evidence for, those with the most first.
+    /// The placements with sufficient evidence, best first. Each takes its corners from the grid, and
+    /// the others are judged again by the tiles that are left, as several faces of a solid may lie in
+    /// one grid.
     fn place(&self, sights: &[Sight], grid: &SaddleGrid) -> Placed {
         let proposals = self.proposals(sights);
         let tiles: usize = sights.iter().map(|sight| sight.readings.len()).sum();
+        // Bonferroni: about as many placements may be proposed as there are tiles times words, and by chance
+        // the best of n exceeds E with a probability of up to n e^−E.
         let ways = ((tiles * self.words.len()).max(1) as f64).ln();
         let mut placed = Placed::default();
         let mut taken = BTreeSet::new();
@@ -442,6 +479,7 @@ impl TagLabeller {
             let is_ambiguous = rivals.into_iter().any(|rival| {
                 self.on_panel(sights, grid, rival).keys().any(|v| vertices.contains_key(v))
             });
+            // An ambiguous one takes its corners, too: nothing else is to label them.
             let before = taken.len();
             taken.extend(vertices.into_keys());
             if is_ambiguous {
@@ -463,8 +501,9 @@ impl TagLabeller {
         placed
     }
 
-    /// The placements that tiles speak for, with the sum of their evidence, which grows with what is for
-    /// a placement and leaves out what is against it.
+    /// The placements for which single tiles speak, with the sum of the evidence of these tiles, most
+    /// first. The sum leaves out what is against a placement: it serves to choose which ones are
+    /// judged.
     fn proposals(&self, sights: &[Sight]) -> Vec<Placement> {
         let turns = self.words.turns();
         let mut sums: HashMap<(usize, usize, LatticeMap), f64> = HashMap::new();
@@ -495,7 +534,8 @@ impl TagLabeller {
         proposals
     }
 
-    /// Evidence for a placement in nats, from tiles none of whose corners is taken.
+    /// Evidence for a placement, nats, from tiles none of whose corners is taken: the log-likelihood of
+    /// its prediction, less that of the better of the two boards that are not the target.
     fn evidence(&self, sight: &Sight, placement: &Placement, taken: &BTreeSet<Vertex>) -> f64 {
         let mut predicted = [0.0; DIRTY.len()];
         let mut other_codes = [0.0; DIRTY.len()];
@@ -508,7 +548,8 @@ impl TagLabeller {
         mean(predicted) - greatest(of_board).max(mean(other_codes))
     }
 
-    /// Numbers of tiles that agree and that disagree with a placement.
+    /// Numbers of tiles that agree and that disagree with a placement; a tile disagrees if a board that
+    /// shows what it likes explains it clearly better.
     fn agreement(&self, sight: &Sight, placement: &Placement) -> [usize; 2] {
         let against = |tile: &Judged| {
             greatest(tile.predicted) < tile.of_board.map_or(0.0, greatest) - PROPOSING
@@ -518,7 +559,7 @@ impl TagLabeller {
         [agreeing.len(), against.len()]
     }
 
-    /// The tiles of a grid under a placement, but for those of whose corners some is taken.
+    /// The tiles of a sight under a placement, without those that have a corner which is taken.
     fn judged(
         &self,
         sight: &Sight,
@@ -555,14 +596,14 @@ impl TagLabeller {
         (surplus, counts)
     }
 
-    /// A tile under a placement that says something of it.
+    /// A reading under a placement; `None` where this predicts nothing of its tile.
     fn judge(&self, sight: &Sight, placement: &Placement, index: usize) -> Option<Judged> {
         let panel = &self.panels[placement.panel];
         let (tile, shown) = (sight.readings[index].tile, &sight.shown[index]);
         let on_panel = placement.map.apply_tile(tile);
         if let Some(code) = panel.tags.get(&on_panel) {
             let word = self.words.turns() * code + turns_of(placement.map, tile);
-            // Other codes than that.
+            // The boards that it is compared with have the best code other than the predicted one.
             let but = usize::from(shown.word == word);
             let evidence = sight.evidence[index][word].into();
             let predicted = [or_spoilt(evidence, SPOILT); DIRTY.len()];
@@ -581,7 +622,8 @@ impl TagLabeller {
         }
     }
 
-    /// Grid tile, in the mirror if need be, code and turns of every tag of a panel under a placement.
+    /// The tags of the panel under a placement: tile of the grid (mirrored if its sight is), index of the
+    /// code, and the number of counter-clockwise turns of the tag in that tile.
     fn expected(&self, placement: &Placement) -> impl Iterator<Item = (Tile, usize, usize)> {
         let grid_from_panel = placement.map.inverse();
         self.panels[placement.panel].tags.iter().map(move |(&tile, &code)| {
@@ -592,7 +634,7 @@ impl TagLabeller {
         })
     }
 
-    /// Panel vertex of every grid vertex that a placement puts on a corner of its panel.
+    /// Panel vertex of every grid vertex that a placement takes to a corner of its panel.
     fn on_panel(
         &self,
         sights: &[Sight],
@@ -608,6 +650,7 @@ impl TagLabeller {
             .collect()
     }
 
+    /// The corners and tags of a placement.
     fn labelled(&self, sights: &[Sight], grid: &SaddleGrid, placement: &Placement) -> Labelled {
         let sight = &sights[placement.sight];
         let mut tags: Vec<DecodedTag> = self
@@ -637,28 +680,31 @@ impl TagLabeller {
     }
 }
 
-/// Log-likelihood ratio, over drawn cells, of a tile that shows what is predicted or, with
-/// probability `chance`, drawn cells.
+/// Log-likelihood ratio, nats, of a tile that shows what is predicted, for which it is `evidence`, or
+/// with the probability `chance` random cells: ln( h + (1 − h) e^Λ ).
 fn or_spoilt(evidence: f64, chance: f64) -> f64 {
     (chance + (1.0 - chance) * evidence.exp()).ln()
 }
 
+/// Adds log-likelihoods, as independent tiles multiply likelihoods.
 fn add<const N: usize>(sums: &mut [f64; N], logs: [f64; N]) {
     sums.iter_mut().zip(logs).for_each(|(sum, log)| *sum += log);
 }
 
+/// The greatest of some log-likelihoods: that of the alternative that fits best.
 fn greatest<const N: usize>(logs: [f64; N]) -> f64 {
     logs.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Logarithm of the mean of likelihoods, given their logarithms.
+/// Logarithm of the mean of likelihoods, given their logarithms: that of alternatives of equal prior
+/// probability.
 fn mean<const N: usize>(logs: [f64; N]) -> f64 {
     let most = greatest(logs);
     most + (logs.iter().map(|log| (log - most).exp()).sum::<f64>() / N as f64).ln()
 }
 
-/// Number of counter-clockwise turns, by 120° or 90°, of a tag in a grid tile that this map puts on
-/// a panel.
+/// Number of counter-clockwise turns, by 120° or 90°, by which a tag in the panel's frame is turned in a
+/// tile of the grid that this map takes to the panel.
 fn turns_of(panel_from_grid: LatticeMap, on_grid: Tile) -> usize {
     let a = panel_from_grid.inverse().apply(panel_from_grid.apply_tile(on_grid).frame()[0]);
     on_grid.vertices().position(|v| v == a).unwrap_or(0)

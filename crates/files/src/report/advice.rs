@@ -1,5 +1,5 @@
 //! Advice on what would improve a calibration. Every rule has its reason; none depends on the kind
-//! of camera.
+//! of camera. Every diagnosis is a warning, so that the page says no less than the program does.
 
 use super::{Report, Survey};
 use deltille_core::calibrate::{CameraEstimate, Diagnosis, Excluded, Parameter};
@@ -68,31 +68,23 @@ const HOLDOUT: f64 = 1.25;
 pub fn advice(report: &Report, surveys: &[Survey]) -> Vec<Advice> {
     let mut found = Vec::new();
     let mut add = |weight, text: String| found.push(Advice { weight, text });
-    told(report, &mut add, Diagnosis::is_failure);
+    told(report, &mut add, Topic::Whole);
     let cameras = || report.estimate.cameras.iter().zip(surveys).enumerate();
     for (index, (camera, survey)) in cameras() {
         let mut add = |weight, text: String| {
             found.push(Advice { weight, text: of_camera(report, camera, text) });
         };
         views(report, camera, survey, &mut add);
-        coverage(camera, survey, &mut add);
-        told(
-            report,
-            &mut add,
-            |diagnosis| matches!(diagnosis, Diagnosis::LensEnds { camera, .. } if *camera == index),
-        );
+        coverage(report, camera, survey, &mut add);
+        told(report, &mut add, Topic::Lens(index));
         superfluous(camera, &mut add);
-        told(
-            report,
-            &mut add,
-            |diagnosis| matches!(diagnosis, Diagnosis::IllConditioned { camera, .. } if *camera == index),
-        );
+        told(report, &mut add, Topic::Parameters(index));
         correlated(camera, &mut add);
     }
     let mut add = |weight, text: String| found.push(Advice { weight, text });
     left_out(report, &mut add, |out| report.is_rig() && out.camera.is_none());
-    told(report, &mut add, |diagnosis| matches!(diagnosis, Diagnosis::GrossErrors(_)));
-    told(report, &mut add, is_cause);
+    told(report, &mut add, Topic::Errors);
+    told(report, &mut add, Topic::Cause);
     for (index, (camera, survey)) in cameras() {
         let mut add = |weight, text: String| {
             found.push(Advice { weight, text: of_camera(report, camera, text) });
@@ -152,26 +144,41 @@ fn of_camera(report: &Report, camera: &CameraEstimate, text: String) -> String {
     }
 }
 
-/// The texts of the diagnoses of a kind.
-fn told(
-    report: &Report,
-    add: &mut impl FnMut(Weight, String),
-    of_kind: impl Fn(&Diagnosis) -> bool,
-) {
-    for diagnosis in report.diagnoses.iter().filter(|diagnosis| of_kind(diagnosis)) {
-        add(Weight::Warning, sentence(&report.words().sentence(diagnosis)));
+/// What a diagnosis is about, which decides where among the advice it stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Topic {
+    /// The whole result, or anything without a topic of its own; it stands first.
+    Whole,
+    /// The lens of a camera, by its index.
+    Lens(usize),
+    /// The parameters of a camera, by its index.
+    Parameters(usize),
+    /// Corners that are wrong together.
+    Errors,
+    /// Why residuals are not noise.
+    Cause,
+}
+
+impl Topic {
+    fn of(diagnosis: &Diagnosis) -> Self {
+        match diagnosis {
+            Diagnosis::LensEnds { camera, .. } => Self::Lens(*camera),
+            Diagnosis::IllConditioned { camera, .. } => Self::Parameters(*camera),
+            Diagnosis::GrossErrors(_) => Self::Errors,
+            Diagnosis::Remedied { .. }
+            | Diagnosis::LackOfFit(_)
+            | Diagnosis::PoorFit { .. }
+            | Diagnosis::OtherMinimum { .. } => Self::Cause,
+            _ => Self::Whole,
+        }
     }
 }
 
-/// Whether a diagnosis explains why residuals are not noise.
-fn is_cause(diagnosis: &Diagnosis) -> bool {
-    matches!(
-        diagnosis,
-        Diagnosis::Remedied { .. }
-            | Diagnosis::LackOfFit(_)
-            | Diagnosis::PoorFit { .. }
-            | Diagnosis::OtherMinimum { .. }
-    )
+/// Adds the diagnoses of a topic.
+fn told(report: &Report, add: &mut impl FnMut(Weight, String), topic: Topic) {
+    for diagnosis in report.diagnoses.iter().filter(|diagnosis| Topic::of(diagnosis) == topic) {
+        add(Weight::Warning, sentence(&report.words().sentence(diagnosis)));
+    }
 }
 
 fn views(
@@ -195,7 +202,8 @@ fn views(
                 Weight::Warning,
                 format!(
                     "Only {tilted} of {count} views tilted by more than 20°: focal length and distance are \
-                     hardly told apart. Tilt the board by 30° to 50°, to all four sides."
+                     hardly told apart. Tilt the {} by 30° to 50°, to all four sides.",
+                    report.target_noun()
                 ),
             );
         } else {
@@ -211,8 +219,10 @@ fn views(
     let bad = camera.views.iter().filter(|view| view.rms_px > BAD_VIEW * median);
     let bad: Vec<&str> = bad.map(|view| view.name.as_str()).collect();
     if !bad.is_empty() {
+        let bent =
+            if report.has_panels() { "a panel that is bent or loose" } else { "a bent board" };
         let text = format!(
-            "Much worse than the others: {}. Look for motion blur, a bent board, or reflections.",
+            "Much worse than the others: {}. Look for motion blur, {bent}, or reflections.",
             named(&bad)
         );
         add(Weight::Hint, text);
@@ -244,14 +254,20 @@ fn named(names: &[&str]) -> String {
     }
 }
 
-fn coverage(camera: &CameraEstimate, survey: &Survey, add: &mut impl FnMut(Weight, String)) {
+fn coverage(
+    report: &Report,
+    camera: &CameraEstimate,
+    survey: &Survey,
+    add: &mut impl FnMut(Weight, String),
+) {
     let (covered, reach) = (survey.covered(), survey.reach(camera));
     let of_what = if survey.circle.is_some() { "image circle" } else { "image" };
     if covered < COVERED {
         let text = format!(
-            "Corners cover {:.0} % of the {of_what}: bring the board to the empty cells of the map, \
+            "Corners cover {:.0} % of the {of_what}: bring the {} to the empty cells of the map, \
              parts of it may lie outside.",
-            100.0 * covered
+            100.0 * covered,
+            report.target_noun()
         );
         add(Weight::Hint, text);
     } else {
@@ -337,15 +353,25 @@ fn residuals(report: &Report, index: usize, survey: &Survey, add: &mut impl FnMu
     let means = survey.means_px.iter().flatten().map(|cell| cell.mean_px);
     let count = means.clone().count().max(1) as f64;
     let size = (means.map(|mean| mean.length_squared() / 2.0).sum::<f64>() / count).sqrt();
-    match survey.pattern().filter(|_| !report.diagnoses.iter().any(is_cause)) {
-        Some(pattern) if pattern > PATTERN && size > PATTERN_PART * camera.rms_px => add(
-            Weight::Hint,
-            format!(
-                "Residuals leave a pattern over the image, {pattern:.1} times what chance makes and \
-                 {size:.3} px strong: less than noise, but the model does not describe this lens \
-                 wholly, or the board is not flat. Try a richer model, or `Calibration::board_shape`."
-            ),
-        ),
+    let is_explained = report.diagnoses.iter().any(|of| Topic::of(of) == Topic::Cause);
+    match survey.pattern().filter(|_| !is_explained) {
+        Some(pattern) if pattern > PATTERN && size > PATTERN_PART * camera.rms_px => {
+            let (target, remedy) = match report.has_panels() {
+                true => (
+                    "panels are not flat or not where the target's file has them",
+                    "`Calibration::refine_panels`",
+                ),
+                false => ("the board is not flat", "`Calibration::board_shape`"),
+            };
+            add(
+                Weight::Hint,
+                format!(
+                    "Residuals leave a pattern over the image, {pattern:.1} times what chance makes and \
+                     {size:.3} px strong: less than noise, but the model does not describe this lens \
+                     wholly, or {target}. Try a richer model, or {remedy}."
+                ),
+            );
+        }
         Some(_) => {
             add(Weight::Good, "Residuals leave no strong pattern over the image.".to_owned())
         }
@@ -358,8 +384,8 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use deltille_core::calibrate::{Estimate, Model};
-    use deltille_core::camera::Camera;
+    use deltille_core::calibrate::{Estimate, LackOfFit, Model, PanelPlace};
+    use deltille_core::camera::{Camera, Pose};
 
     /// What is advised where no parameter of the lens is told from zero.
     fn advised(model: Model) -> String {
@@ -380,6 +406,64 @@ mod tests {
         let report = Report::new("camera", &estimate);
         let advice = advice(&report, &surveys);
         advice.into_iter().map(|advice| advice.text + "\n").collect()
+    }
+
+    /// An estimate of so many cameras and panels, without views.
+    fn estimate(cameras: usize, panels: usize) -> Estimate {
+        let camera = |index: usize| {
+            let camera = Camera::centred(640, 480, 500.0, Model::Radtan.lens());
+            CameraEstimate::given(&format!("c{index}"), camera)
+        };
+        let place = PanelPlace { target_from_panel: Pose::IDENTITY, covariance: None };
+        let mut estimate = Estimate::default();
+        estimate.cameras = (0..cameras).map(camera).collect();
+        estimate.panels = vec![place; panels];
+        estimate
+    }
+
+    #[test]
+    fn every_diagnosis_is_a_warning_once() {
+        let estimate = estimate(2, 1);
+        let other = estimate.cameras[0].camera.clone();
+        let diagnoses = [
+            Diagnosis::ForeignCamera { camera: 0, rms_px: 9.0 },
+            Diagnosis::AbsurdFit { camera: 1, rms_px: 9.0 },
+            Diagnosis::ManyLeftOut { left_out: 3, all: 9 },
+            Diagnosis::Late { camera: 1, frames: 2 },
+            Diagnosis::OtherMinimum { camera: 0, other, rms_px: 0.1 },
+            Diagnosis::LackOfFit(LackOfFit::Lens { camera: 0, rms_px: 0.1 }),
+            Diagnosis::PoorFit { camera: 1, rms_px: 2.0 },
+            Diagnosis::IllConditioned {
+                camera: 1,
+                parameters: vec!["cx".to_owned()],
+                sufficient: None,
+            },
+        ];
+        let mut report = Report::new("rig", &estimate);
+        report.diagnoses = &diagnoses;
+        let surveys: Vec<Survey> = estimate.cameras.iter().map(Survey::new).collect();
+        let found = advice(&report, &surveys);
+        for diagnosis in &diagnoses {
+            let text = sentence(&report.words().sentence(diagnosis));
+            let told: Vec<&Advice> = found.iter().filter(|advice| advice.text == text).collect();
+            assert_eq!(told.len(), 1, "{text}");
+            assert_eq!(told[0].weight, Weight::Warning, "{text}");
+        }
+        // What is said of the whole result comes first.
+        assert!(found[3].text.starts_with("Camera c1 is 2 frames late"), "{found:?}");
+    }
+
+    #[test]
+    fn what_has_several_panels_is_no_board() {
+        for (panels, noun, other) in [(1, "board", "target"), (20, "target", "board")] {
+            let estimate = estimate(1, panels);
+            let report = Report::new("camera", &estimate);
+            let surveys = [Survey::new(&estimate.cameras[0])];
+            let found = advice(&report, &surveys);
+            let texts: String = found.into_iter().map(|advice| advice.text + "\n").collect();
+            assert!(texts.contains(&format!("bring the {noun} to the empty cells")), "{texts}");
+            assert!(!texts.contains(other), "{texts}");
+        }
     }
 
     #[test]

@@ -14,54 +14,62 @@ use std::fmt::Write as _;
 
 use glam::DVec2;
 
-/// Room around the axes for their numbers and names.
+/// Room around the frame for the numbers and names of its axes, user units.
 const LEFT: f64 = 64.0;
 const BELOW: f64 = 40.0;
 const ABOVE: f64 = 10.0;
 const RIGHT: f64 = 12.0;
 
-/// Width of the frames of all plots, and how high they are at least and at most.
+/// Width of the frames of all plots, and their least and greatest height, user units.
 const FRAME: f64 = 444.0;
 const FRAME_HEIGHTS: [f64; 2] = [240.0, 444.0];
 
-/// Width of a digit, room between numbers side by side, and height of a line.
+/// Width of a digit, least gap between numbers side by side, and height of a line, user units.
 const DIGIT: f64 = 7.0;
 const APART: f64 = 8.0;
 const LINE: f64 = 16.0;
 
-/// Most steps between the ticks of an axis.
+/// Greatest number of intervals between the ticks of an axis.
 const STEPS: f64 = 7.0;
 
-/// Steps are tried over so many powers of ten.
+/// Number of powers of ten over which intervals between ticks are tried, from the finest on.
 const DECADES: i32 = 4;
 
-/// The frame of all plots about a camera whose image is so large: an image of usual shape fills it.
+/// Width and height, user units, of the frame of every plot about a camera with an image of this
+/// size, px. It has the proportions of the image unless that is very wide or very high.
 pub(super) fn frame(image_px: DVec2) -> DVec2 {
     let [low, high] = FRAME_HEIGHTS;
     DVec2::new(FRAME, (FRAME * image_px.y / image_px.x).clamp(low, high).round())
 }
 
-/// A frame with axes, to draw into.
+/// A frame with axes, into which data are drawn. Points are given in the units of the axes; all
+/// other lengths are user units of the SVG.
 pub(super) struct Axes {
+    /// Values of the axes at the left and at the right end of the frame.
     x: [f64; 2],
+    /// Values at the lower and at the upper end; the first is the larger one where y runs downwards.
     y: [f64; 2],
-    /// Of the frame, and of the room in whose middle it is.
+    /// Size of the frame.
     size: DVec2,
+    /// Size of the area in whose middle the frame stands, equal for all plots of a camera.
     room: DVec2,
+    /// SVG elements drawn so far.
     body: String,
+    /// Height of what stands below the axes, and its SVG elements.
     foot: (f64, String),
     /// Whether there is a frame, with ticks and names.
     is_framed: bool,
 }
 
 impl Axes {
-    /// Axes over two ranges; `y` grows upwards.
+    /// A frame of this size, user units, with axes over two ranges; y grows upwards.
     pub(super) fn new(size: DVec2, x: [f64; 2], y: [f64; 2]) -> Self {
         let (body, foot) = (String::new(), (0.0, String::new()));
         Self { x, y, size, room: size, body, foot, is_framed: true }
     }
 
-    /// Axes over an image, from its upper left corner; y runs downwards.
+    /// A frame with the proportions of an image whose size is given in px. Its axes are pixel
+    /// coordinates, which are integers in the middles of pixels; y runs downwards.
     pub(super) fn of_image(image_px: DVec2) -> Self {
         let room = frame(image_px);
         let size = image_px * (room / image_px).min_element();
@@ -69,13 +77,13 @@ impl Axes {
         Self { room, ..Self::new(size, [-0.5, far.x], [far.y, -0.5]) }
     }
 
-    /// As much room as [`Self::of_image`] has, without a frame.
+    /// The same area as [`Self::of_image`], without frame, ticks and names.
     pub(super) fn bare(image_px: DVec2) -> Self {
         Self { is_framed: false, ..Self::new(frame(image_px), [0.0, 1.0], [0.0, 1.0]) }
     }
 
-    /// Upper left corner and size of the area that may be drawn into; without a frame it includes
-    /// the room that other plots use for numbers.
+    /// Upper left corner and size, user units, of the area that may be drawn into; without a frame
+    /// it includes the margins that other plots use for numbers.
     pub(super) fn bounds(&self) -> [DVec2; 2] {
         match self.is_framed {
             true => [self.corner(), self.size],
@@ -83,24 +91,24 @@ impl Axes {
         }
     }
 
-    /// Place of a point.
+    /// The position in the picture, user units, of a point given in the units of the axes.
     pub(super) fn at(&self, DVec2 { x, y }: DVec2) -> DVec2 {
         let part = |v: f64, [low, high]: [f64; 2]| (v - low) / (high - low);
         let parts = DVec2::new(part(x, self.x), 1.0 - part(y, self.y));
         self.corner() + parts * self.size
     }
 
-    /// The upper left corner of the frame.
+    /// The upper left corner of the frame, user units.
     fn corner(&self) -> DVec2 {
         DVec2::new(LEFT, ABOVE) + ((self.room - self.size) / 2.0).floor()
     }
 
-    /// How long something is in the picture.
+    /// User units per unit of the x axis and of the y axis.
     pub(super) fn scale(&self) -> DVec2 {
         self.size / DVec2::new(self.x[1] - self.x[0], self.y[1] - self.y[0]).abs()
     }
 
-    /// Adds what is shown only as far as it is within the frame: all that `draw` adds.
+    /// Clips everything that `draw` adds to the frame.
     pub(super) fn within(&mut self, draw: impl FnOnce(&mut Self)) {
         let (DVec2 { x, y }, DVec2 { x: w, y: h }) = (self.corner(), self.size);
         let _ = write!(
@@ -112,22 +120,23 @@ impl Axes {
         self.body.push_str("</svg>");
     }
 
-    /// Sets what is below the axes, so high: elements of SVG whose origin is below the left end of the frame.
+    /// Sets the legend below the axes: its height, user units, and its SVG elements, whose origin is
+    /// below the axes at the left end of the frame.
     pub(super) fn foot(&mut self, height: f64, elements: String) {
         self.foot = (height, elements);
     }
 
-    /// How wide the foot may be.
+    /// Greatest width of the legend set by [`Self::foot`], user units.
     pub(super) fn foot_width(&self) -> f64 {
         self.room.x
     }
 
-    /// Adds an element of SVG.
+    /// Adds an SVG element whose coordinates are user units.
     pub(super) fn add(&mut self, element: &str) {
         self.body.push_str(element);
     }
 
-    /// A dot of a class.
+    /// Adds a dot of a CSS class; the radius is in user units.
     pub(super) fn dot(&mut self, point: DVec2, radius: f64, class: &str) {
         let DVec2 { x: cx, y: cy } = self.at(point);
         let _ = write!(
@@ -136,7 +145,7 @@ impl Axes {
         );
     }
 
-    /// Adds a text of a class at a place, `anchor` as SVG has it.
+    /// Adds a text at a point, moved by `by`, user units; `anchor` is a value of `text-anchor`.
     pub(super) fn text(&mut self, point: DVec2, by: DVec2, anchor: &str, text: &str) {
         let DVec2 { x, y } = self.at(point) + by;
         let _ = write!(
@@ -145,7 +154,7 @@ impl Axes {
         );
     }
 
-    /// A broken line of a class.
+    /// Adds a polyline of a CSS class.
     pub(super) fn line(&mut self, points: &[DVec2], class: &str) {
         let places = points.iter().map(|&point| {
             let DVec2 { x, y } = self.at(point);
@@ -155,7 +164,7 @@ impl Axes {
         let _ = write!(self.body, "<polyline class=\"{class}\" points=\"{}\"/>", places.join(" "));
     }
 
-    /// A rectangle between two corners, of a class.
+    /// Adds a rectangle of a CSS class between two opposite corners; `style` are further attributes.
     pub(super) fn bar(&mut self, low: DVec2, high: DVec2, class: &str, style: &str) {
         let (low, high) = (self.at(low), self.at(high));
         let (DVec2 { x, y }, size) = (low.min(high), (high - low).abs());
@@ -167,12 +176,13 @@ impl Axes {
         );
     }
 
-    /// The picture, with the names of its axes, for readers without eyes with what it shows.
+    /// The finished picture with the names of the x and y axes; `shows` is what screen readers say.
     pub(super) fn svg(self, names: [&str; 2], shows: &str) -> String {
         self.svg_with(names, shows, "", "")
     }
 
-    /// The same with attributes of the picture and a style of its own.
+    /// The same with further attributes of the `svg` element and with a `style` element, for a file
+    /// of its own, which has no page's style sheet.
     pub(super) fn svg_with(
         self,
         names: [&str; 2],
@@ -235,8 +245,9 @@ impl Axes {
     }
 }
 
-/// Round numbers in a range and their texts, as close as the room for the texts allows; `length` is
-/// that of the range, and `room` what a text needs of it.
+/// Values and texts of the ticks in a range, at the smallest round interval at which the texts do
+/// not touch. `length` is the length of the axis and `room` the length that a text takes up along
+/// it, both in user units.
 fn ticks([low, high]: [f64; 2], length: f64, room: impl Fn(&str) -> f64) -> Vec<(f64, String)> {
     let (low, high) = (low.min(high), low.max(high));
     let rough = (high - low) / STEPS;
@@ -257,7 +268,8 @@ fn ticks([low, high]: [f64; 2], length: f64, room: impl Fn(&str) -> f64) -> Vec<
     fitting.map_or_else(Vec::new, |(_, ticks)| ticks)
 }
 
-/// A tick's number, with the places that a step of this decade needs.
+/// Text of the number at a tick, with the decimal places that an interval of this power of ten
+/// needs.
 fn number(value: f64, decade: i32) -> String {
     let places = (-decade).max(0) as usize;
     let text = format!("{value:.places$}");

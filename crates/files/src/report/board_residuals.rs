@@ -195,7 +195,7 @@ pub(super) fn plot(
     let svg = axes.svg(["", ""], "Residuals of each corner of the target");
     let sure = corners.iter().filter(|corner| corner.is_sure).count();
     let caption = format!(
-        "Residuals of each corner of the target over all views: colour is their rms, arrows show where on the board they \
+        "Residuals of each corner of the target over all views: colour is their rms, arrows show where on its panel they \
          would have the corner, {enlarged} times enlarged; {sure} of {} by more than chance makes (the others are grey).",
         corners.len()
     );

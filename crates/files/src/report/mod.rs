@@ -3,7 +3,7 @@
 //! ```text
 //!  estimate ─── survey ─→ coverage and mean residuals of a camera ───┬─ fit, distortion, board_residuals, scene ─→ SVG
 //!  diagnoses ───────────→ reasons for lack of fit ───────────────────├─ advice ───────────────────→ words
-//!  photographs ─────────→ thumbnails and a sample ───────────────────├─ models, parameters, views ─→ tables
+//!  photographs ─────────→ thumbnails and a sample ───────────────────├─ models, parameters, views, rig ─→ tables
 //!  models that were tried ───────────────────────────────────────────┴─ page ─────────────────────→ HTML
 //! ```
 //!
@@ -25,6 +25,7 @@ mod rig;
 mod sample;
 mod scene;
 mod survey;
+mod table;
 mod target_map;
 mod thumbnail;
 mod views;
@@ -84,6 +85,16 @@ impl<'a> Report<'a> {
     /// Whether there are several cameras.
     fn is_rig(&self) -> bool {
         self.estimate.cameras.len() > 1
+    }
+
+    /// What the target is called: a board has one panel, and solids and scenes have several.
+    fn target_noun(&self) -> &'static str {
+        if self.has_panels() { "target" } else { "board" }
+    }
+
+    /// Whether the target has several panels.
+    fn has_panels(&self) -> bool {
+        self.estimate.panels.len() > 1
     }
 
     fn words(&self) -> Words<'_> {

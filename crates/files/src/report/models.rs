@@ -33,7 +33,7 @@ pub(super) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
     format!(
         "<section><h2>Models</h2><p>{}</p><div class=\"wide-table\"><table class=\"plain models\"><tr>\
          <th>model</th><th>parameters</th><th>held out, px</th><th>its own views, px</th>\
-         <th>differs by, px</th><th></th></tr>{}</table></div><p class=\"note\">Each was found from two thirds of some views \
+         <th>differs by, px</th><th>at most, px</th><th></th></tr>{}</table></div><p class=\"note\">Each was found from two thirds of some views \
          and held against the others, where only poses are found: a model that is too small leaves more there, one that \
          is too large does not leave less. The difference (rms, and the largest) is that of projections at infinity from the \
          camera of this page, where corners were, after the turn that makes it least; that of the model of this page is what fewer views make.</p></section>\n",
@@ -42,6 +42,7 @@ pub(super) fn section(camera: &CameraEstimate, tried: &[Candidate]) -> String {
     )
 }
 
+/// A model in the table; `worst` is the largest RMS on views held out, px.
 fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
     let own = camera.model == Some(one.model);
     let held_out = one
@@ -50,8 +51,8 @@ fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
     let rms =
         one.found.as_ref().map_or("–".to_owned(), |of| format!("{:.4}", of.inlier_rms_px()));
     let against = one.found.as_ref().and_then(|of| against(camera, of));
-    let against = against.map_or("–".to_owned(), |Against { rms_px, largest_px }| {
-        format!("{rms_px:.3}, {largest_px:.2}")
+    let [differs, most] = against.map_or(["–", "–"].map(str::to_owned), |of| {
+        [format!("{:.3}", of.rms_px), format!("{:.2}", of.largest_px)]
     });
     let notes = [
         (own, "of this page"),
@@ -63,7 +64,7 @@ fn row(camera: &CameraEstimate, one: &Candidate, worst: f64) -> String {
         notes.iter().filter(|(is_so, _)| *is_so).map(|(_, note)| *note).collect();
     format!(
         "<tr{}><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{held_out}</td>\
-         <td class=\"number\">{rms}</td><td class=\"number\">{against}</td><td>{}</td></tr>",
+         <td class=\"number\">{rms}</td><td class=\"number\">{differs}</td><td class=\"number\">{most}</td><td>{}</td></tr>",
         if own { " class=\"own\"" } else { "" },
         escaped(&one.model.to_string()),
         one.parameters,

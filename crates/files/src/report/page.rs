@@ -1,4 +1,5 @@
-//! Assembly of the HTML page.
+//! Assembly of the HTML page: verdict, key figures and advice first, then the sections of each
+//! camera, and the elements that all sections share.
 
 use std::fmt::Write as _;
 
@@ -14,6 +15,7 @@ use deltille_core::words::{counted, places};
 
 const STYLE: &str = include_str!("page.css");
 
+/// The page as one HTML file.
 pub(super) fn html(report: &Report) -> String {
     let cameras = &report.estimate.cameras;
     let surveys: Vec<Survey> = cameras.iter().map(Survey::new).collect();
@@ -33,11 +35,7 @@ pub(super) fn html(report: &Report) -> String {
     };
     page += "</header>\n<section><h2>What to make of it</h2><ul class=\"advice\">";
     for piece in advice {
-        let (class, sign) = match piece.weight {
-            Weight::Good => ("good", "✓"),
-            Weight::Hint => ("hint", "→"),
-            Weight::Warning => ("warning", "!"),
-        };
+        let (class, sign) = look(piece.weight);
         let _ = write!(
             page,
             "<li class=\"{class}\"><span class=\"sign\">{sign}</span><span>{}</span></li>",
@@ -79,20 +77,22 @@ pub(super) fn html(report: &Report) -> String {
     page
 }
 
-/// Sections about all cameras: the measured target, and the scene in space.
+/// Sections that do not belong to one camera: the measured target, refined panels, and the scene in
+/// space.
 fn shared(report: &Report) -> String {
     let map = report.estimate.map.as_ref().map_or(String::new(), target);
     map + &rig::panels(report) + &in_space(report)
 }
 
-/// Plots of the distortion of a lens.
+/// The section with the plots of the distortion of a lens.
 fn distortion(camera: &CameraEstimate, survey: &Survey) -> String {
     let grid = distortion::grid_plot(camera, survey);
     let curve = distortion::curve_plot(camera, survey);
     section("Distortion", &figures(curve.into_iter().chain([grid])))
 }
 
-/// Cameras and targets in space, seen from both.
+/// The section with the scene in space, once in the frame of the cameras and once in that of the
+/// target; empty where nothing was seen.
 fn in_space(report: &Report) -> String {
     let image_px = report.estimate.cameras.first().map(|of| [of.camera.width, of.camera.height]);
     let image_px = DVec2::from(image_px.unwrap_or([4, 3]).map(f64::from));
@@ -112,22 +112,42 @@ fn in_space(report: &Report) -> String {
     section("In space", &figures(drawn))
 }
 
-/// Good or bad, at a glance.
+/// The verdict before all else: that of the most serious piece of advice, in its colour and with its
+/// sign.
 fn verdict(report: &Report, advice: &[Advice]) -> String {
-    let warnings = advice.iter().filter(|piece| piece.weight == Weight::Warning).count();
     let is_failure = report.diagnoses.iter().any(Diagnosis::is_failure);
-    let (class, sign, head, why) = match (is_failure, warnings) {
-        (true, _) => ("warning", "✕", "Not to be used", "See why below.".to_owned()),
-        (false, 0) => ("good", "✓", "Good", "Nothing speaks against it.".to_owned()),
-        (false, n) => {
-            let warnings = if n == 1 { "warning".to_owned() } else { counted(n, "warning") };
-            ("hint", "!", "Use with care", format!("See the {warnings} below."))
+    let worst = advice.iter().map(|piece| piece.weight).max().unwrap_or(Weight::Good);
+    let (class, own_sign) = look(worst);
+    let of_worst = advice.iter().filter(|piece| piece.weight == worst).count();
+    let below = |thing: &str| match of_worst {
+        1 => format!("the {thing} below"),
+        n => format!("the {} below", counted(n, thing)),
+    };
+    let (sign, head, why) = match worst {
+        _ if is_failure => ("✕", "Not to be used", "See why below.".to_owned()),
+        Weight::Warning => {
+            (own_sign, "Use with care", format!("Look at {} first.", below("warning")))
         }
+        Weight::Hint => {
+            let verb = if of_worst == 1 { "says" } else { "say" };
+            let why = format!("No warnings; {} {verb} what would improve it.", below("hint"));
+            (own_sign, "Usable", why)
+        }
+        Weight::Good => (own_sign, "Good", "Nothing speaks against it.".to_owned()),
     };
     let sureness = if is_failure { String::new() } else { sureness(report) };
     format!(
         "<p class=\"verdict {class}\"><span class=\"seal\">{sign}</span><span><b>{head}.</b> {why}{sureness}</span></p>\n"
     )
+}
+
+/// CSS class and sign of advice by its weight.
+fn look(weight: Weight) -> (&'static str, &'static str) {
+    match weight {
+        Weight::Good => ("good", "✓"),
+        Weight::Hint => ("hint", "→"),
+        Weight::Warning => ("warning", "!"),
+    }
 }
 
 /// Summary of the uncertainty of projections of a single camera.
@@ -143,7 +163,7 @@ fn sureness(report: &Report) -> String {
     })
 }
 
-/// A figure and what it is.
+/// A key figure with its unit, as HTML, and what it is.
 type Figure = (String, &'static str);
 
 /// The key figures of a camera.
@@ -187,18 +207,20 @@ fn of_rig(report: &Report) -> Vec<Figure> {
     cells
 }
 
+/// The ink spread of the print, where it was measured together with its deviation.
 fn of_print(report: &Report) -> Option<Figure> {
     let (um, deviation) = report.print.ink.and_then(|ink| ink.um.zip(ink.um_deviation))?;
     let (um, deviation) = rounded(um, Some(deviation));
     Some((format!("{um} ± {deviation} µm"), "ink spread"))
 }
 
+/// Key figures as a row of boxes.
 fn cells(cells: &[Figure]) -> String {
     let cells = cells.iter().map(|(value, name)| format!("<div><b>{value}</b>{name}</div>"));
     format!("<div class=\"figures\">{}</div>", cells.collect::<String>())
 }
 
-/// Pictures with their captions, evenly beside each other; what is empty is left out.
+/// Pictures and captions side by side; a picture that is empty is left out with its caption.
 pub(super) fn figures(pictures: impl IntoIterator<Item = (String, String)>) -> String {
     let pictures = pictures.into_iter().filter(|(svg, _)| !svg.is_empty());
     let pictures = pictures
@@ -206,17 +228,17 @@ pub(super) fn figures(pictures: impl IntoIterator<Item = (String, String)>) -> S
     format!("<div class=\"plots\">{}</div>", pictures.collect::<String>())
 }
 
-/// A part of the page.
+/// A section of the page; `body` is HTML.
 pub(super) fn section(title: &str, body: &str) -> String {
     format!("<section><h2>{title}</h2>{body}</section>\n")
 }
 
-/// A bar for a part of the whole, below a number.
+/// A bar below a number in a table; `part` is its length as a fraction of the longest, 0 to 1.
 pub(super) fn meter(part: f64) -> String {
     format!("<div class=\"meter\" style=\"width:{:.0}%\"></div>", 100.0 * part)
 }
 
-/// A PNG within the page.
+/// A PNG as a `data:` URL, so that the page needs no other file.
 pub(super) fn data_url(png: &[u8]) -> String {
     let data = base64::engine::general_purpose::STANDARD.encode(png);
     format!("data:image/png;base64,{data}")
@@ -270,7 +292,55 @@ fn with_whole_options(text: &str) -> String {
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// A text as it stands in HTML.
+/// A text with the characters escaped that HTML gives a meaning.
 pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deltille_core::calibrate::{Estimate, Model};
+    use deltille_core::camera::Camera;
+
+    #[test]
+    fn the_verdict_is_that_of_the_most_serious_advice() {
+        let mut estimate = Estimate::default();
+        let camera = Camera::centred(640, 480, 500.0, Model::Radtan.lens());
+        estimate.cameras =
+            ["left", "right"].map(|of| CameraEstimate::given(of, camera.clone())).into();
+        let of = |weights: &[Weight], diagnoses: &[Diagnosis]| {
+            let mut report = Report::new("rig", &estimate);
+            report.diagnoses = diagnoses;
+            let advice = |&weight| Advice { weight, text: String::new() };
+            verdict(&report, &weights.iter().map(advice).collect::<Vec<_>>())
+        };
+        use Weight::{Good, Hint, Warning};
+        let late = [Diagnosis::Late { camera: 1, frames: 2 }];
+        let many_out = [Diagnosis::ManyLeftOut { left_out: 3, all: 9 }];
+        for (weights, diagnoses, class, head, why) in [
+            (&[Good, Good][..], &[][..], "good", "Good", "Nothing speaks against it."),
+            (&[Hint, Good], &[], "hint", "Usable", "the hint below says"),
+            (&[Hint, Hint, Good], &[], "hint", "Usable", "the 2 hints below say"),
+            (
+                &[Warning, Hint, Good],
+                &late,
+                "warning",
+                "Use with care",
+                "Look at the warning below first.",
+            ),
+            (
+                &[Warning, Warning, Good],
+                &late,
+                "warning",
+                "Use with care",
+                "Look at the 2 warnings below first.",
+            ),
+            (&[Warning, Good], &many_out, "warning", "Not to be used", "See why below."),
+        ] {
+            let told = of(weights, diagnoses);
+            assert!(told.contains(&format!("class=\"verdict {class}\"")), "{told}");
+            assert!(told.contains(&format!("<b>{head}.</b>")) && told.contains(why), "{told}");
+        }
+    }
 }

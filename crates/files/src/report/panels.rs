@@ -1,5 +1,6 @@
-//! Plot of values at the corners of a target: a coloured dot at the place of each corner on its
-//! panel, and an arrow.
+//! Drawing of values at the corners of a target: a coloured dot at the position of each corner on
+//! its panel, and an arrow from it. All panels of a target are drawn to one scale, beside each other
+//! in rows.
 
 use std::fmt::Write as _;
 
@@ -8,45 +9,55 @@ use glam::DVec2;
 use deltille_core::calibrate::PanelRef;
 use deltille_core::statistics::median;
 
-/// Room around every panel, user units, and below those that have a name.
+/// Margin around every panel, user units; below, it holds the name of the panel.
 const MARGIN: f64 = 26.0;
 
-/// Most panels beside each other.
+/// Greatest number of panels in a row.
 const PANELS_IN_A_ROW: usize = 5;
 
-/// A dot is at most so large, as a part of the distance between corners, and at most and least in user units.
+/// Radius of a dot as a fraction of the distance between corners, and its least and greatest value,
+/// user units.
 const DOT_PART: f64 = 0.16;
 const DOTS: [f64; 2] = [1.2, 7.0];
 
-/// What is shown of a corner.
+/// The values that are shown at a corner.
 #[derive(Clone, Debug)]
 pub(super) struct Mark {
+    /// Its panel.
     pub panel: PanelRef,
+    /// Its lattice row on the panel.
     pub row: i32,
+    /// Its lattice column.
     pub col: i32,
-    /// Its position on the panel, mm.
+    /// Its position in the panel frame, mm; y up.
     pub at_mm: DVec2,
-    /// Its arrow before that is enlarged, mm.
+    /// Its offset in the panel frame, mm, drawn as an enlarged arrow.
     pub by_mm: DVec2,
-    /// Whether the arrow is more than chance makes.
+    /// Whether the offset is significant; others are drawn in grey.
     pub is_sure: bool,
+    /// CSS colour of the dot.
     pub colour: String,
-    /// What is said where a mouse rests on it.
+    /// Tooltip; none where it is empty.
     pub title: String,
 }
 
-/// Marks on panels beside each other, sorted by panel.
+/// The layout of the panels in the drawing.
 pub(super) struct Panels<'a> {
+    /// Marks of each panel.
     panels: Vec<&'a [Mark]>,
-    /// Of a panel with its margins, user units.
+    /// Size of a panel with its margins, user units.
     cell: DVec2,
+    /// Margin around the marks, with room for the arrows of the outermost corners, user units.
     margin: f64,
+    /// User units per millimetre on the panel.
     per_mm: f64,
+    /// Usual distance of neighbouring corners, mm.
     spacing_mm: f64,
 }
 
 impl<'a> Panels<'a> {
-    /// As large as a width and a height allow.
+    /// Lays out marks, which are sorted by panel, at the largest scale that fits a width and a height,
+    /// user units.
     pub(super) fn new(marks: &'a [Mark], width: f64, most_height: f64) -> Self {
         let panels: Vec<&[Mark]> = marks.chunk_by(|a, b| a.panel == b.panel).collect();
         let in_a_row = panels.len().clamp(1, PANELS_IN_A_ROW);
@@ -62,23 +73,23 @@ impl<'a> Panels<'a> {
         Self { panels, cell, margin, per_mm, spacing_mm }
     }
 
-    /// The usual distance from a corner to the next in its row, mm.
+    /// The median distance from a corner to the next in its row, mm.
     pub(super) fn spacing_mm(&self) -> f64 {
         self.spacing_mm
     }
 
-    /// User units of a millimetre.
+    /// User units per millimetre on the panel.
     pub(super) fn per_mm(&self) -> f64 {
         self.per_mm
     }
 
-    /// The height of all, user units.
+    /// Height of the whole drawing, user units.
     pub(super) fn height(&self) -> f64 {
         let in_a_row = self.panels.len().clamp(1, PANELS_IN_A_ROW);
         self.panels.len().div_ceil(in_a_row) as f64 * self.cell.y
     }
 
-    /// The picture, with arrows so many times enlarged.
+    /// The SVG elements of all panels, with offsets enlarged by a factor.
     pub(super) fn drawn(&self, enlarged: f64) -> String {
         let in_a_row = self.panels.len().clamp(1, PANELS_IN_A_ROW);
         let mut drawn = String::new();
@@ -98,7 +109,8 @@ impl<'a> Panels<'a> {
         drawn
     }
 
-    /// A panel whose lower left corner of all, mm, is at a place of the picture.
+    /// The SVG elements of one panel. `low` is the lower left end of its marks, mm, which is drawn at
+    /// `origin`, user units; y is up on the panel and down in the picture.
     fn panel(&self, marks: &[Mark], low: DVec2, origin: DVec2, enlarged: f64) -> String {
         let up = DVec2::new(1.0, -1.0);
         let [least, most] = DOTS;
@@ -125,18 +137,20 @@ impl<'a> Panels<'a> {
     }
 }
 
-/// Least and largest places of marks, mm.
+/// Lower left and upper right end of the positions of marks, mm.
 fn extent_mm(marks: &[Mark]) -> [DVec2; 2] {
     let places = marks.iter().map(|mark| mark.at_mm);
     places
         .fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], at| [low.min(at), high.max(at)])
 }
 
+/// Width and height of the positions of marks, mm.
 fn size_mm(marks: &[Mark]) -> DVec2 {
     let [low, high] = extent_mm(marks);
     high - low
 }
 
+/// Median distance of marks that follow each other in a row of a panel, mm; 1 mm where none do.
 fn spacing_mm(marks: &[Mark]) -> f64 {
     let pairs = marks.windows(2).filter(|pair| {
         (pair[0].panel, pair[0].row, pair[0].col + 1) == (pair[1].panel, pair[1].row, pair[1].col)
@@ -144,7 +158,7 @@ fn spacing_mm(marks: &[Mark]) -> f64 {
     median(pairs.map(|pair| pair[0].at_mm.distance(pair[1].at_mm)).collect()).unwrap_or(1.0)
 }
 
-/// The largest of 1, 2 and 5 times a power of ten that is no more.
+/// The largest value of the form 1, 2 or 5 times a power of ten that does not exceed `value`.
 pub(super) fn round_down(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     let digit = [5.0, 2.0].into_iter().find(|digit| digit * decade <= value * (1.0 + 1e-9));

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::page::{self, escaped, rounded};
+use super::table::aligned;
 use deltille_core::calibrate::{CameraEstimate, Parameter, Source};
 use deltille_core::camera::{Lens, SplineGrid};
 
@@ -22,24 +23,24 @@ pub(super) fn section(camera: &CameraEstimate) -> String {
         );
         return page::section("Parameters", &told);
     }
-    let mut rows = String::new();
     let told = |(p, _): &(&Parameter, Option<f64>)| p.sd.is_some() || p.value != 0.0;
     let is_observed = camera.covariance_from(Source::Observed).is_some();
+    let (mut names, mut columns) = (Vec::new(), [Vec::new(), Vec::new(), Vec::new()]);
     for (parameter, observed) in camera.parameters.iter().zip(camera.observed_sd()).filter(told) {
         let (value, sd) = rounded(parameter.value, parameter.sd);
-        let observed = match (is_observed, observed) {
-            (false, _) => String::new(),
-            (true, None) => "<td></td>".to_owned(),
-            (true, Some(_)) => {
-                format!("<td class=\"number\">{}</td>", rounded(parameter.value, observed).1)
-            }
-        };
-        let _ = write!(
-            rows,
-            "<tr><td>{}</td><td class=\"number\">{value}</td><td class=\"number\">{sd}</td>{observed}</tr>",
-            escaped(&parameter.name)
-        );
+        let observed = observed.map(|_| rounded(parameter.value, observed).1);
+        names.push(escaped(&parameter.name));
+        for (column, text) in columns.iter_mut().zip([value, sd, observed.unwrap_or_default()]) {
+            column.push(text);
+        }
     }
+    let columns = columns.map(|column| aligned(&column));
+    let shown = if is_observed { &columns[..] } else { &columns[..2] };
+    let rows = names.iter().enumerate().map(|(row, name)| {
+        let cells = shown.iter().map(|column| column[row].as_str());
+        format!("<tr><td>{name}</td>{}</tr>", cells.collect::<String>())
+    });
+    let rows: String = rows.collect();
     let heads = match is_observed {
         true => "<th>± from noise</th><th>± observed</th>",
         false => "<th>± from noise</th>",

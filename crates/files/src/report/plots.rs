@@ -1,4 +1,7 @@
-//! The plots of a page, each an SVG.
+//! Plots of the residuals of a camera over the image, the radius and the views, each as an SVG.
+//!
+//! Outliers are drawn in red and take no part in ranges, means and rings. A corner whose residual is
+//! larger than the range of a plot is a ring on its rim, so that it is not overlooked.
 
 use glam::DVec2;
 
@@ -7,7 +10,7 @@ use super::panels::round_down;
 use super::survey::Survey;
 use deltille_core::calibrate::{CameraEstimate, Corner};
 
-/// Room for scales below a map, user units.
+/// Height of the legend below a map, user units.
 const FOOT: f64 = 58.0;
 
 /// Most dots of a scatter plot: more only make the page heavy.
@@ -19,7 +22,7 @@ const BEYOND: f64 = 3.0;
 /// Bins of the histogram on either side of zero.
 const BINS: usize = 20;
 
-/// Most bars of views.
+/// Most bars of the plot of views; of more views, each bar is the worst of several.
 const MOST_BARS: usize = 200;
 
 /// Bins of the radial curve.
@@ -28,7 +31,8 @@ const RINGS: usize = 12;
 /// Length of the longest arrow of the residual map, cells.
 const ARROW_CELLS: f64 = 1.2;
 
-/// A range for residuals: four standard deviations, so that the bulk fills the plot.
+/// Range of the plots of residuals, px: four times the RMS of the inliers, so that noise fills a
+/// plot.
 fn range_px(camera: &CameraEstimate) -> f64 {
     let inliers = || camera.corners().filter(|corner| !corner.outlier);
     let sum: f64 = inliers().flat_map(|corner| corner.residual.to_array()).map(|r| r * r).sum();
@@ -36,13 +40,13 @@ fn range_px(camera: &CameraEstimate) -> f64 {
     (4.0 * rms).max(1e-6)
 }
 
-/// Every n-th corner, so that few enough are left.
+/// Every n-th corner of a camera, with n such that at most [`MOST_DOTS`] are left.
 fn thinned(camera: &CameraEstimate) -> impl Iterator<Item = &Corner> {
     let step = camera.corner_count().div_ceil(MOST_DOTS).max(1);
     camera.corners().step_by(step)
 }
 
-/// Residuals as a cloud.
+/// Scatter plot of the residuals of all corners, px.
 pub(super) fn scatter(camera: &CameraEstimate, survey: &Survey) -> String {
     let size = frame(survey.size_px);
     // As many pixels in all directions, however wide the frame is.
@@ -68,7 +72,8 @@ pub(super) fn scatter(camera: &CameraEstimate, survey: &Survey) -> String {
     axes.svg(["residual to the right, px", "residual upwards, px"], "Residuals of all corners")
 }
 
-/// Residuals of both coordinates, with the normal distribution of the same deviation.
+/// Histogram of the residuals of both coordinates, px, with the normal distribution of the same
+/// standard deviation.
 pub(super) fn histogram(camera: &CameraEstimate, survey: &Survey) -> String {
     let range = range_px(camera);
     let width = range / BINS as f64;
@@ -100,19 +105,19 @@ pub(super) fn histogram(camera: &CameraEstimate, survey: &Survey) -> String {
     axes.svg(["residual of a coordinate, px", "% of coordinates"], "Histogram of residuals")
 }
 
-/// Columns and rows of the maps.
+/// Number of columns and of rows of the maps.
 fn cells(survey: &Survey) -> DVec2 {
     survey.cells.map(|count| count as f64).into()
 }
 
-/// Middle of a cell, px.
+/// Pixel coordinates of the middle of a cell, by its index in the maps.
 fn middle(survey: &Survey, index: usize) -> DVec2 {
     let columns = survey.cells[0];
     let at = DVec2::new((index % columns) as f64, (index / columns) as f64);
     (at + 0.5) / cells(survey) * survey.size_px - 0.5
 }
 
-/// As much of an arrow as the image has room for.
+/// The arrow from a pixel, px, shortened so that it ends within the image.
 fn within(survey: &Survey, from: DVec2, arrow: DVec2) -> DVec2 {
     let room = |i: usize| match arrow[i] {
         v if v > 0.0 => (survey.size_px[i] - 0.5 - from[i]) / v,
@@ -122,7 +127,7 @@ fn within(survey: &Survey, from: DVec2, arrow: DVec2) -> DVec2 {
     room(0).min(room(1)).min(1.0) * arrow
 }
 
-/// Mean residuals over the image, and in words what it is.
+/// Map of the mean residuals over the image, enlarged, and its caption.
 pub(super) fn residual_map(survey: &Survey) -> (String, String) {
     let cell = survey.size_px.x / survey.cells[0] as f64;
     let means = || survey.means_px.iter().flatten();
@@ -157,7 +162,7 @@ pub(super) fn residual_map(survey: &Survey) -> (String, String) {
     (axes.svg(["x, px", "y, px"], "Mean residuals over the image"), caption)
 }
 
-/// Corners in each part of the image.
+/// Map of the number of corners in each cell of the image.
 pub(super) fn coverage(survey: &Survey) -> String {
     let most = survey.counts.iter().copied().max().unwrap_or(0).max(1) as f64;
     let mut axes = Axes::of_image(survey.size_px);
@@ -181,7 +186,8 @@ pub(super) fn coverage(survey: &Survey) -> String {
     axes.svg(["x, px", "y, px"], "Number of corners over the image")
 }
 
-/// Error against the distance from the principal point: every corner, and the rms of rings.
+/// Length of each residual, px, against the distance of its corner from the principal point, px,
+/// and the RMS per coordinate of concentric rings.
 pub(super) fn against_radius(camera: &CameraEstimate, survey: &Survey) -> String {
     let radius = |corner: &Corner| camera.camera.radius_px(corner.pixel);
     let error = |corner: &Corner| corner.residual.x.hypot(corner.residual.y);
@@ -217,8 +223,8 @@ pub(super) fn against_radius(camera: &CameraEstimate, survey: &Survey) -> String
     axes.svg(["distance from the principal point, px", "error, px"], "Error against radius")
 }
 
-/// Error of each view against its tilt, or of solids, which show faces at all tilts, against their distance; and in words
-/// what it is.
+/// RMS of each view, px, against the tilt of the board, degrees, or for solids, whose faces are seen
+/// at all tilts at once, against the distance of the target, mm; and the caption.
 pub(super) fn against_place(camera: &CameraEstimate, survey: &Survey) -> (String, &'static str) {
     let tilts = survey.views.iter().map(|view| view.tilt_rad.map(f64::to_degrees));
     let (places, least, name, shows, caption) = match tilts.collect::<Option<Vec<f64>>>() {
@@ -247,7 +253,7 @@ pub(super) fn against_place(camera: &CameraEstimate, survey: &Survey) -> (String
     (axes.svg([name, "rms of the view, px"], shows), caption)
 }
 
-/// Error of each view, in their order.
+/// RMS of each view, px, in their order, and that of all as a line.
 pub(super) fn of_views(camera: &CameraEstimate, survey: &Survey) -> String {
     let views = &camera.views;
     let worst = views.iter().map(|view| view.rms_px).fold(1e-6, f64::max);

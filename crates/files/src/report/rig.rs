@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::Report;
 use super::page::{escaped, meter, out_row, rounded};
+use super::table::aligned;
 use super::views::MOST_VIEWS;
 use deltille_core::calibrate::{FrameEstimate, PanelPlace};
 use deltille_core::camera::Pose;
@@ -13,21 +14,10 @@ use deltille_core::camera::Pose;
 /// Relative camera poses.
 pub(super) fn places(report: &Report) -> String {
     let first = report.estimate.cameras.first().map_or("", |camera| camera.name.as_str());
-    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
     let rows = report.estimate.cameras.iter().map(|camera| {
-        let at = camera.camera_from_rig.inverse().translation;
-        // Adding zero makes a negative zero positive.
-        let at = at.to_array().map(|mm| (100.0 * mm).round() / 100.0 + 0.0);
-        let at = at.map(|mm| format!("{mm:.2}").replace('-', "−")).join(", ");
-        let [turn, _] = camera.camera_from_rig.off(&Pose::IDENTITY);
-        let turned = turn.length().to_degrees();
-        let sd = camera.pose_sd.map_or("–".to_owned(), |sd| {
-            format!("{:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
-        });
+        let place = pose_cells(&camera.camera_from_rig.inverse(), camera.pose_sd);
         format!(
-            "<tr><td>{}</td><td class=\"number\">{at}</td><td class=\"number\">{turned:.3}°</td>\
-             <td class=\"number\">{sd}</td>\
-             <td class=\"number\">{:.4}</td><td class=\"number\">{}</td></tr>",
+            "<tr><td>{}</td>{place}<td class=\"number\">{:.4}</td><td class=\"number\">{}</td></tr>",
             escaped(&camera.name),
             camera.rms_px,
             camera.corner_count()
@@ -35,9 +25,9 @@ pub(super) fn places(report: &Report) -> String {
     });
     format!(
         "<section><h2>Relative camera poses</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>camera</th>\
-         <th>place, mm</th><th>turned by</th><th>± standard deviation</th><th>rms, px</th><th>corners</th></tr>{}\
-         </table></div><p class=\"note\">Places of the optical centres, and angles of rotation, relative to \
-         camera {}.</p></section>\n",
+         {POSE_HEADS}<th>rms, px</th><th>corners</th></tr>{}</table></div><p class=\"note\">Places of the optical \
+         centres, and angles of rotation, relative to camera {}, with the largest standard deviations along any \
+         axis.</p></section>\n",
         rows.collect::<String>(),
         escaped(first)
     )
@@ -49,28 +39,38 @@ pub(super) fn targets(report: &Report) -> String {
     if targets.len() < 2 {
         return String::new();
     }
-    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
     let rows = targets.iter().map(|target| {
-        let at = target.scene_from_target.translation.to_array();
-        let at = at.map(|mm| format!("{:.2}", mm + 0.0).replace('-', "−")).join(", ");
-        let [turn, _] = target.scene_from_target.off(&Pose::IDENTITY);
-        let sd = target.pose_sd.map_or("–".to_owned(), |sd| {
-            format!("{:.3} mm, {:.4}°", largest(&sd[3..]), largest(&sd[..3]).to_degrees())
-        });
-        format!(
-            "<tr><td>{}</td><td class=\"number\">{at}</td><td class=\"number\">{:.3}°</td>\
-             <td class=\"number\">{sd}</td></tr>",
-            escaped(&target.name),
-            turn.length().to_degrees()
-        )
+        let place = pose_cells(&target.scene_from_target, target.pose_sd);
+        format!("<tr><td>{}</td>{place}</tr>", escaped(&target.name))
     });
     format!(
-        "<section><h2>Relative target poses</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>target</th><th>place, mm</th>\
-         <th>turned by</th><th>± standard deviation</th></tr>{}</table></div><p class=\"note\">Where the frame of each target \
-         is, relative to that of target {}.</p></section>\n",
+        "<section><h2>Relative target poses</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>target</th>{POSE_HEADS}\
+         </tr>{}</table></div><p class=\"note\">Where the frame of each target is, relative to that of target {}, with the \
+         largest standard deviations along any axis.</p></section>\n",
         rows.collect::<String>(),
         escaped(&targets[0].name)
     )
+}
+
+/// Heads of the columns of [`pose_cells`].
+const POSE_HEADS: &str =
+    "<th>x, mm</th><th>y, mm</th><th>z, mm</th><th>± mm</th><th>turned by, °</th><th>± °</th>";
+
+/// The cells of a pose: translation, mm, angle of rotation, degrees, and the largest deviation of
+/// each. `sd` are those of rotation, rad, and translation, mm; where they are not known, the pose is
+/// the one that others are relative to.
+fn pose_cells(pose: &Pose, sd: Option<[f64; 6]>) -> String {
+    let largest = |sd: &[f64]| sd.iter().copied().fold(0.0, f64::max);
+    // Adding zero makes a negative zero positive.
+    let at = pose.translation.to_array().map(|mm| (100.0 * mm).round() / 100.0 + 0.0);
+    let [x, y, z] = at.map(|mm| format!("{mm:.2}").replace('-', "−"));
+    let [turn, _] = pose.off(&Pose::IDENTITY);
+    let turned = format!("{:.3}", turn.length().to_degrees());
+    let [sd_mm, sd_deg] = sd.map_or(["–", "–"].map(str::to_owned), |sd| {
+        [format!("{:.3}", largest(&sd[3..])), format!("{:.4}", largest(&sd[..3]).to_degrees())]
+    });
+    let cells = [x, y, z, sd_mm, turned, sd_deg];
+    cells.map(|cell| format!("<td class=\"number\">{cell}</td>")).concat()
 }
 
 /// Refined panel poses against those of the target file.
@@ -78,16 +78,23 @@ pub(super) fn panels(report: &Report) -> String {
     let seen = report.estimate.corners().map(|corner| (corner.panel.index(), corner.panel.id()));
     let ids: BTreeMap<usize, u32> = seen.collect();
     let found = report.estimate.panels.iter().zip(report.stated).enumerate();
-    let rows = found.filter_map(|(index, (found, stated))| {
+    let (mut named, mut columns) = (Vec::new(), [const { Vec::new() }; 4]);
+    let figures = found.filter_map(|(index, (found, stated))| {
         let ([turn, shift], covariance) = (off(found, stated), found.covariance?);
         let (mm, mm_sd) = rounded(shift.length(), Some(deviation(shift, &covariance, 3)));
         let [turned, turned_sd] = [turn.length(), deviation(turn, &covariance, 0)];
         let (turned, turned_sd) = rounded(turned.to_degrees(), Some(turned_sd.to_degrees()));
         let id = ids.get(&index)?;
-        Some(format!(
-            "<tr><td>{id}</td><td class=\"number\">{mm}</td><td class=\"number\">{mm_sd}</td>\
-             <td class=\"number\">{turned}°</td><td class=\"number\">{turned_sd}°</td></tr>"
-        ))
+        Some((id, [mm, mm_sd, turned, turned_sd]))
+    });
+    for (id, figures) in figures {
+        named.push(id);
+        columns.iter_mut().zip(figures).for_each(|(column, text)| column.push(text));
+    }
+    let columns = columns.map(|column| aligned(&column));
+    let rows = named.into_iter().enumerate().map(|(row, id)| {
+        let cells = columns.iter().map(|column| column[row].as_str());
+        format!("<tr><td>{id}</td>{}</tr>", cells.collect::<String>())
     });
     let rows: String = rows.collect();
     if rows.is_empty() {
@@ -95,7 +102,7 @@ pub(super) fn panels(report: &Report) -> String {
     }
     format!(
         "<section><h2>Refined panels</h2><div class=\"wide-table\"><table class=\"plain\"><tr><th>panel</th>\
-         <th>moved by, mm</th><th>±</th><th>turned by</th><th>±</th></tr>{rows}</table></div>\
+         <th>moved by, mm</th><th>± mm</th><th>turned by, °</th><th>± °</th></tr>{rows}</table></div>\
          <p class=\"note\">Origins of the panels against where the target's file has them, with standard \
          deviations. A panel that is not listed stays in place, or was not seen.</p></section>\n"
     )
@@ -141,7 +148,7 @@ pub(super) fn frames(report: &Report) -> String {
     let excluded = excluded.map(|out| format!("<tr>{}", out_row(out, 3)));
     format!(
         "<section><h2 class=\"frames\">Frames</h2>{note}<div class=\"wide-table\"><table class=\"plain\"><tr><th>frame</th>\
-         <th>cameras</th><th>corners</th><th>rms, px</th></tr>{}</table></div></section>\n",
+         <th class=\"words\">cameras</th><th>corners</th><th>rms, px</th></tr>{}</table></div></section>\n",
         rows.chain(excluded).collect::<String>()
     )
 }
@@ -154,7 +161,7 @@ fn row(report: &Report, index: usize, frame: &FrameEstimate, worst: f64) -> Stri
     });
     let (cameras, corners): (Vec<String>, Vec<usize>) = views.unzip();
     format!(
-        "<tr><td class=\"name\">{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+        "<tr><td class=\"name\">{}</td><td>{}</td><td class=\"number\">{}</td>\
          <td class=\"number\">{:.4}{}</td></tr>",
         escaped(&frame.name),
         cameras.join(", "),

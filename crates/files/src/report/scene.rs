@@ -16,17 +16,18 @@ use deltille_core::statistics::median;
 /// Margin of the picture, user units.
 const MARGIN: f64 = 36.0;
 
-/// Views that are drawn of a camera, evenly over all: more hide each other.
+/// Most views of a camera that are drawn, spread evenly over all of them: more hide each other.
 const MOST_VIEWS: usize = 60;
 
-/// How long a drawn camera is, as a part of the median distance of the target: one, and each of many.
+/// Length of the pyramid that stands for a camera, as a fraction of the median distance of the
+/// target: of a fixed camera, and of one of many poses around a fixed target.
 const CAMERA_PART: f64 = 0.12;
 const SMALL_CAMERA_PART: f64 = 0.07;
 
-/// More views than this are drawn as outlines alone.
+/// Of more views than this, the areas of the target are drawn nearly transparent.
 const FEW_VIEWS: usize = 12;
 
-/// What stays where it is in the picture.
+/// The frame in which a scene is drawn, and the direction from which it is viewed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fixed {
     /// The cameras, and the viewer stands above and behind the first.
@@ -36,7 +37,7 @@ pub(super) enum Fixed {
 }
 
 impl Fixed {
-    /// As the viewer sees a point: x right, y down, z away; turned to the side and down, rad.
+    /// A point or direction, mm, in the axes of the viewer: x right, y down, z away from the viewer.
     fn turned(self, point: DVec3) -> DVec3 {
         match self {
             Self::Rig => DQuat::from_rotation_x(0.5) * (DQuat::from_rotation_y(0.6) * point),
@@ -49,17 +50,22 @@ impl Fixed {
     }
 }
 
-/// Half a drawn camera's width where the lens has no ray at the corners of its picture: as of 90°.
+/// Half the width of a drawn camera over its length, where the lens has no ray ahead at the corners
+/// of its image, or a wider one: that of a field of 90°.
 const WIDE: f64 = 1.0;
 
-/// What is drawn: corners in space, mm, in the rig frame.
+/// A polygon in space.
 struct Shape {
+    /// Its corners, mm, in the frame that stays fixed: of the rig, or of the target.
     corners: Vec<DVec3>,
+    /// CSS class.
     class: &'static str,
+    /// Tooltip.
     title: String,
 }
 
-/// The picture, as large as other plots of a camera with so large an image; empty where nothing was seen.
+/// The scene as an SVG of the size of the other plots of a camera with this image, px; empty where
+/// nothing was seen.
 pub(super) fn drawing(estimate: &Estimate, fixed: Fixed, image_px: DVec2) -> String {
     let [_, size_px] = Axes::bare(image_px).bounds();
     let (width, height) = (size_px.x, size_px.y);
@@ -127,19 +133,21 @@ pub(super) fn drawing(estimate: &Estimate, fixed: Fixed, image_px: DVec2) -> Str
     svg
 }
 
-/// 1, 2 or 5 times a power of ten, at most so much.
+/// The longest scale bar of 1, 2 or 5 times a power of ten, mm, that does not exceed `most`.
 fn round_length(most: f64) -> f64 {
     let power = 10f64.powf(most.max(f64::MIN_POSITIVE).log10().floor());
     [5.0, 2.0, 1.0].map(|n| n * power).into_iter().find(|mm| *mm <= most).unwrap_or(power)
 }
 
 impl Shape {
+    /// Mean of its corners, mm.
     fn middle(&self) -> DVec3 {
         self.corners.iter().sum::<DVec3>() / self.corners.len().max(1) as f64
     }
 }
 
-/// The pyramid before a camera that it sees along, and its base, in another frame than that of the rig.
+/// The field of view of a camera as a pyramid: four sides from the optical centre, and the base at
+/// the distance `long`, mm, on its axis. `frame_from_rig` takes it to the frame that is drawn.
 fn pyramid(camera: &CameraEstimate, frame_from_rig: &Pose, long: f64) -> Vec<Shape> {
     let frame_from_camera = frame_from_rig.after(&camera.camera_from_rig.inverse());
     let base = corners_ahead(&camera.camera)
@@ -153,7 +161,8 @@ fn pyramid(camera: &CameraEstimate, frame_from_rig: &Pose, long: f64) -> Vec<Sha
     sides.chain([shape(base.to_vec(), "camera-base")]).collect()
 }
 
-/// The panels of the target as far as they were seen, and the cameras in all frames.
+/// In the target frame: every panel, by the view that shows most of it, and all poses of the cameras
+/// as pyramids of the length `long`, mm.
 fn around_target(estimate: &Estimate, long: f64) -> Vec<Shape> {
     let worst = estimate.frames.iter().map(|frame| frame.rms_px).fold(0.0, f64::max);
     let mut widest: BTreeMap<PanelRef, (f64, Shape)> = BTreeMap::new();
@@ -185,7 +194,7 @@ fn around_target(estimate: &Estimate, long: f64) -> Vec<Shape> {
     widest.into_values().map(|(_, shape)| shape).chain(cameras).collect()
 }
 
-/// The corners of the picture projected onto a plane ahead.
+/// The corners of the image in order around it, projected onto the plane z = 1 of the camera frame.
 fn corners_ahead(camera: &Camera) -> [DVec2; 4] {
     let [a, b, c, d] = camera.corners_px();
     [a, b, d, c].map(|corner| {
@@ -196,7 +205,7 @@ fn corners_ahead(camera: &Camera) -> [DVec2; 4] {
     })
 }
 
-/// The outlines of the panels in all views, as far as corners were seen.
+/// The outlines of the panels in all views, in the rig frame, as far as corners were seen.
 fn targets(estimate: &Estimate) -> Vec<Shape> {
     let worst = estimate.frames.iter().map(|frame| frame.rms_px).fold(0.0, f64::max);
     let of_camera = |camera: &'_ CameraEstimate| {
@@ -212,6 +221,8 @@ fn targets(estimate: &Estimate) -> Vec<Shape> {
     estimate.cameras.iter().flat_map(of_camera).collect()
 }
 
+/// The panels that a view shows, in the rig frame: the convex hull of the inliers of each, placed on
+/// the plane of the panel by the pose of the view.
 fn panels(
     estimate: &Estimate,
     camera: &CameraEstimate,
@@ -234,7 +245,7 @@ fn panels(
     seen.into_iter().filter_map(shape).filter(|(_, shape)| shape.corners.len() > 2).collect()
 }
 
-/// The convex hull, in the order along it (Andrew's monotone chain).
+/// The convex hull of points in the plane of a panel, counter-clockwise (Andrew's monotone chain).
 fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let half = |points: &mut dyn Iterator<Item = DVec2>| {

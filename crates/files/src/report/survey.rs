@@ -1,9 +1,20 @@
+//! What the views of a camera cover: corners and mean residuals by cell of the image, and the tilt
+//! and the distance of each view.
+//!
+//! ```text
+//!     mean of a cell  m = Σ r / n        r: residuals (seen less predicted) of its n inliers, px
+//!     its deviation   s = √( Σ |r − m|² / 2(n − 1) / n )              of each coordinate, px
+//! ```
+//!
+//! Where residuals are noise, m / s is of the order of 1 in every cell; a model that does not
+//! describe the lens leaves neighbouring means that are larger and point alike.
+
 use glam::{DVec2, DVec3};
 
 use deltille_core::calibrate::{CameraEstimate, ImageCircle, ViewEstimate};
 use deltille_core::camera::Camera;
 
-/// Cells of the maps along the longer side of the image.
+/// Number of cells of the maps along the longer side of the image; cells are nearly square.
 const CELLS: usize = 16;
 
 /// Statistics of the views of a camera: coverage of the image, mean residuals, tilts and distances.
@@ -12,16 +23,17 @@ const CELLS: usize = 16;
 pub struct Survey {
     /// Width and height of the image, px.
     pub size_px: DVec2,
-    /// Columns and rows of the maps.
+    /// Number of columns and of rows of the maps.
     pub cells: [usize; 2],
-    /// Corners in each cell, row by row from the top.
+    /// Number of corners in each cell, outliers included, row by row from the upper left.
     pub counts: Vec<usize>,
-    /// Mean residual of each cell and its standard deviation, px; `None` in cells with fewer than
-    /// four corners.
+    /// Mean residual of each cell and its standard deviation, px, in the order of `counts`; `None`
+    /// in cells with fewer than four inliers.
     pub means_px: Vec<Option<CellMean>>,
-    /// The views.
+    /// Tilt and distance of each view, in the order of the camera's views.
     pub views: Vec<SurveyedView>,
-    /// Whether the target is a plane.
+    /// Whether only the first panel was seen, so that the target is a plane as far as this camera
+    /// can tell.
     pub planar: bool,
     /// Image circle of the lens, where it does not fill the image.
     pub circle: Option<ImageCircle>,
@@ -48,11 +60,11 @@ pub struct SurveyedView {
     pub distance_mm: f64,
 }
 
-/// Least number of corners for a mean.
+/// Least number of inliers for a mean: of fewer, the standard deviation says little.
 const LEAST_IN_CELL: usize = 4;
 
 impl Survey {
-    /// Surveys the views of a camera.
+    /// Surveys the views of a camera, those that the calibration used.
     pub fn new(camera: &CameraEstimate) -> Self {
         let size_px = DVec2::new(camera.camera.width.into(), camera.camera.height.into());
         let cells = (size_px / (size_px.max_element() / CELLS as f64)).round().to_array();
@@ -118,6 +130,8 @@ impl Survey {
     }
 }
 
+/// Mean of the residuals of a cell, px, with its standard deviation; `None` where they are too few,
+/// or all the same.
 fn cell_mean(residuals: &[DVec2]) -> Option<CellMean> {
     if residuals.len() < LEAST_IN_CELL {
         return None;
@@ -130,6 +144,8 @@ fn cell_mean(residuals: &[DVec2]) -> Option<CellMean> {
     (sd_px > 0.0).then_some(CellMean { mean_px, sd_px })
 }
 
+/// Tilt and distance of a view; without a tilt where the target is no plane, or where the lens has
+/// no ray for the mean position of the corners.
 fn surveyed(camera: &Camera, view: &ViewEstimate, planar: bool) -> SurveyedView {
     let normal = view.pose.rotation * DVec3::Z;
     let count = view.corners.len().max(1) as f64;

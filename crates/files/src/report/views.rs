@@ -24,6 +24,7 @@ pub fn shown_views(camera: &CameraEstimate) -> Vec<&ViewEstimate> {
     order(camera).into_iter().map(|index| &camera.views[index]).collect()
 }
 
+/// Indices of the views that are shown, those with the largest RMS first.
 fn order(camera: &CameraEstimate) -> Vec<usize> {
     let mut order: Vec<usize> = (0..camera.views.len()).collect();
     let rms = |index: usize| camera.views[index].rms_px;
@@ -32,7 +33,8 @@ fn order(camera: &CameraEstimate) -> Vec<usize> {
     order
 }
 
-/// The views, the worst first: some in pictures, all in a folded table.
+/// The section about the views of a camera: the worst as pictures with enlarged residuals, and all,
+/// held-out views included, in a folded table.
 pub(super) fn section(report: &Report, index: usize, survey: &Survey) -> String {
     let camera = &report.estimate.cameras[index];
     let (order, all) = (order(camera), camera.views.len());
@@ -78,9 +80,14 @@ pub(super) fn section(report: &Report, index: usize, survey: &Survey) -> String 
         true => format!("The worst {MOST_VIEWS} of {all} views in a table"),
         false => format!("All {} in a table", counted(all + of_test.len(), "view")),
     };
+    let bent = match report.has_panels() {
+        true => "panels are not flat or not in their places",
+        false => "the board is bent",
+    };
     let arrows = format!(
         "<p class=\"note\">Arrows are residuals, {enlarged} times enlarged; outliers are red. All one way: the picture moved, or \
-         its board; outwards or in turns: the lens, or the board is bent.</p>"
+         its {}; outwards or in turns: the lens, or {bent}.</p>",
+        report.target_noun()
     );
     let body = format!(
         "{excluded}<div class=\"cards\">{cards}</div>{arrows}<details><summary>{what}</summary><div class=\"wide-table\">\
@@ -90,7 +97,8 @@ pub(super) fn section(report: &Report, index: usize, survey: &Survey) -> String 
     page::section("Views, the worst first", &body)
 }
 
-/// By how much residuals of some views are enlarged in their pictures.
+/// The factor by which the residuals of these views are enlarged in their pictures, the same for
+/// all of them: a round number.
 fn enlarged(camera: &CameraEstimate, views: &[usize]) -> f64 {
     let corners = views.iter().flat_map(|&index| &camera.views[index].corners);
     let corners = corners.filter(|corner| !corner.outlier);
@@ -99,7 +107,7 @@ fn enlarged(camera: &CameraEstimate, views: &[usize]) -> f64 {
     round_down(ARROW_PART * f64::from(camera.camera.width) / longest).max(1.0)
 }
 
-/// A view in a picture.
+/// The picture of a view with its key figures; `worst` is the largest RMS of any view, px.
 fn card(
     report: &Report,
     camera: usize,
@@ -126,7 +134,7 @@ fn card(
     )
 }
 
-/// A view in the table; `worst` is the largest rms in it, px.
+/// A view in the table; `worst` is the largest RMS of any view, px, and `note` follows its name.
 fn row(
     report: &Report,
     camera: usize,
@@ -153,17 +161,17 @@ fn row(
     )
 }
 
-/// How a picture is shown.
+/// Where the picture of a view is shown. A photograph that is shown twice is embedded once.
 enum Shown {
     /// In the table alone.
     Only,
-    /// In a card, with residuals so many times enlarged.
+    /// In a card, with an id for its photograph, and residuals enlarged by a factor.
     First { id: String, enlarged: f64 },
-    /// In the table, after a card with this id.
+    /// In the table, with the photograph of the card that has this id.
     Again(String),
 }
 
-/// What a card's picture is called on the page.
+/// Id of the photograph in the card of a view, by the indices of camera and view.
 fn id(camera: usize, of_view: usize) -> String {
     format!("picture-{camera}-{of_view}")
 }

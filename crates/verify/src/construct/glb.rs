@@ -16,13 +16,18 @@ use deltille_files::export::gltf::{
 };
 use deltille_files::limits::{Exceeded, Limits};
 
+/// The mode of a primitive that is a list of triangles, in glTF.
 const TRIANGLES: u32 = 4;
 
-/// Tolerance, relative, of the transformation of a node from a rotation with one scale for all
-/// axes: single precision.
+/// Relative tolerance by which the transform of a node may differ from a rotation with one scale for
+/// all axes: its numbers are in single precision.
 const SLACK: f64 = 1e-5;
 
 /// Inspects a `.glb` for constructs that are not permitted.
+///
+/// # Errors
+///
+/// It is no glTF or cut off, or exceeds the limits.
 pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Findings, String> {
     let mut found = Findings::default();
     let Some(Chunks { json, binary }) = Chunks::read(bytes, &mut found)? else { return Ok(found) };
@@ -47,7 +52,8 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
         found.add("the JSON", "a list for an object or within a list");
         return Ok(found);
     }
-    // Of a key that is spelled in two ways, or repeated, readers take one or the other.
+    // If a key is repeated, or spelled with escapes, readers differ in which value they take. So the
+    // JSON must be what its values are when they are written again.
     let anew = value.to_string();
     let filled = anew.len().next_multiple_of(4) == json.len();
     if !filled || json.trim_ascii_end() != anew.as_bytes() {
@@ -70,7 +76,8 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
     Ok(walk.found)
 }
 
-/// Whether objects are written as such: as types are read, a list of their values would do.
+/// Whether what is to be an object is written as one: serde also reads a struct from a list of its
+/// values, which other readers refuse.
 fn has_objects(value: &Value) -> bool {
     const OBJECTS: [&str; 4] = ["asset", "attributes", "pbrMetallicRoughness", "baseColorTexture"];
     match value {
@@ -83,14 +90,14 @@ fn has_objects(value: &Value) -> bool {
     }
 }
 
-/// The two parts of a file.
+/// The two chunks of a `.glb`.
 struct Chunks<'a> {
     json: &'a [u8],
     binary: &'a [u8],
 }
 
 impl<'a> Chunks<'a> {
-    /// The parts, unless the container is of another version.
+    /// The chunks of a file; `None`, with a finding, where the container is of another version.
     fn read(bytes: &'a [u8], found: &mut Findings) -> Result<Option<Self>, String> {
         let word = |at: usize| -> Option<u32> {
             bytes.get(at..at + 4)?.first_chunk::<4>().copied().map(u32::from_le_bytes)
@@ -123,7 +130,7 @@ impl<'a> Chunks<'a> {
     }
 }
 
-/// The way through a file.
+/// The inspection of a file whose JSON has only permitted keys.
 struct Walk<'a> {
     root: &'a Root,
     binary: &'a [u8],
@@ -132,7 +139,8 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// One of each of what the reader takes one of, and all bytes where they are said to be.
+    /// Checks that there is one of each thing of which the reader takes the first, and that views and
+    /// accessors lie within the binary chunk.
     fn counts(&mut self) {
         let root = self.root;
         let version = &root.asset.version;
@@ -172,7 +180,8 @@ impl Walk<'_> {
         }
     }
 
-    /// The bytes of an accessor.
+    /// The bytes of an accessor's values; `None` where its view does not hold them, or for a type that
+    /// is not permitted.
     fn bytes(&self, accessor: &Accessor) -> Option<&[u8]> {
         let view = self.root.buffer_views.get(accessor.buffer_view)?;
         let components = match accessor.kind.as_str() {
@@ -191,7 +200,7 @@ impl Walk<'_> {
         view.get(..length)
     }
 
-    /// No more nodes and triangles than are looked at.
+    /// Checks the number of nodes and triangles against the limits.
     fn sizes(&self, limits: &Limits) -> Result<(), Exceeded> {
         let root = self.root;
         let shapes = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
@@ -199,8 +208,8 @@ impl Walk<'_> {
         limits.check_nodes(root.nodes.len() + indices.map(|list| list.count / 3).sum::<usize>())
     }
 
-    /// The scene reaches every node, each on one way: there are no cycles and no node is shown
-    /// twice. Motions keep shapes and sides.
+    /// Checks that the scene is a tree of all nodes, without cycles and without a node that is shown
+    /// twice, that all meshes are shown, and that transforms neither mirror nor skew.
     fn nodes(&mut self, limits: &Limits) -> Result<(), Exceeded> {
         let root = self.root;
         let mut parents = vec![0usize; root.nodes.len()];
@@ -233,7 +242,7 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// The words are those of the target.
+    /// Checks that names and extras are those of the target.
     fn names(&mut self) {
         let (root, title) = (self.root, &self.words.title);
         self.found.unseen_unless(
@@ -255,8 +264,9 @@ impl Walk<'_> {
         }
     }
 
-    /// The bytes of the views follow each other, filled up with zeros to whole words, and there are no
-    /// others; values fill their view, which is said to hold what it holds.
+    /// Checks that the views follow each other in the binary chunk, padded with zeros to words of four
+    /// bytes, that there are no other bytes, that values fill their view, and that the stated target
+    /// of a view fits its values. So nothing is hidden between what is shown.
     fn layout(&mut self) {
         let (root, binary) = (self.root, self.binary);
         let mut end = 0usize;
@@ -288,7 +298,7 @@ impl Walk<'_> {
         self.found.unless(bare, "images[0]", "a view for values");
     }
 
-    /// Everything that is there is part of what is shown.
+    /// Checks that every accessor and every view is part of what is shown.
     fn unused(&mut self) {
         let root = self.root;
         let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
@@ -307,6 +317,7 @@ impl Walk<'_> {
         }
     }
 
+    /// Checks the primitives of all meshes.
     fn primitives(&mut self) {
         let root = self.root;
         for (m, mesh) in root.meshes.iter().enumerate() {
@@ -316,6 +327,8 @@ impl Walk<'_> {
         }
     }
 
+    /// Checks that a primitive is a list of triangles with the one material, that its attributes are
+    /// finite floats of equal number, and that texture coordinates lie on the texture.
     fn primitive(&mut self, primitive: &Primitive, place: &str) {
         let mode = primitive.mode.unwrap_or(TRIANGLES);
         self.found.unless(mode == TRIANGLES, place, format!("mode {mode} instead of triangles"));
@@ -352,7 +365,8 @@ impl Walk<'_> {
         self.indices(primitive.indices, count.unwrap_or_default(), place);
     }
 
-    /// The finite values of an accessor of floats.
+    /// The values of an accessor of floats of this type; `None` where it is another, or a value is not
+    /// finite.
     fn floats(&self, index: usize, kind: &str) -> Option<Vec<f32>> {
         let accessor = self.root.accessors.get(index)?;
         if accessor.kind != kind || accessor.component_type != FLOAT {
@@ -363,7 +377,7 @@ impl Walk<'_> {
         values.iter().all(|value| value.is_finite()).then_some(values)
     }
 
-    /// Viewers leave out what lies outside the stated bounds of the positions.
+    /// Checks that the stated bounds of positions are theirs: viewers leave out what lies outside.
     fn bounds(&mut self, index: usize, values: &[f32]) {
         let accessor = &self.root.accessors[index];
         let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
@@ -379,6 +393,7 @@ impl Walk<'_> {
         );
     }
 
+    /// Checks that the indices are those of whole triangles and point to vertices.
     fn indices(&mut self, index: usize, vertices: usize, place: &str) {
         let accessor = self.root.accessors.get(index);
         let Some(accessor) =
@@ -394,7 +409,8 @@ impl Walk<'_> {
         self.found.unless(inside, place, "an index that points nowhere");
     }
 
-    /// The texture is shown as it is, on opaque triangles that are seen from outside.
+    /// Checks that the material shows the texture as it is, on opaque triangles that are seen from
+    /// outside only.
     fn material(&mut self, material: &Material) {
         let place = "materials[0]";
         let Surface { base_color_texture, base_color_factor, metallic_factor, roughness_factor } =
@@ -426,6 +442,7 @@ impl Walk<'_> {
         }
     }
 
+    /// Checks the sampler, and the texture as a PNG; the error says that this exceeds the limits.
     fn texture(&mut self, sampler: &Sampler, limits: &Limits) -> Result<(), String> {
         let root = self.root;
         let Sampler { mag_filter, min_filter, wrap_s, wrap_t } = *sampler;
@@ -451,7 +468,8 @@ impl Walk<'_> {
     }
 }
 
-/// Whether a node turns, moves and scales alike along all axes, without a mirror.
+/// Whether the transform of a node is a rotation, a translation and one scale for all axes, without
+/// a mirror: only that keeps the shapes of tiles.
 fn keeps_shapes(node: &Node) -> bool {
     let parts = node.translation.is_some() || node.rotation.is_some() || node.scale.is_some();
     let matrix = match node.matrix {

@@ -1,8 +1,14 @@
-//! The JSON of a `.glb` that every viewer shows alike, as types: what has no field here is refused.
+//! The JSON of a `.glb` that every viewer shows alike, as types: a key that has no field here is
+//! refused.
+//!
+//! Names and meanings are those of glTF 2.0; a number that refers to another object is its index in
+//! the list of that kind in [`Root`]. Optional fields may be missing, as their default is what every
+//! viewer assumes. [`glb`](super::glb) checks the values.
 
 use serde::Deserialize;
 use serde_json::Value;
 
+/// The whole file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Root {
@@ -20,6 +26,7 @@ pub(super) struct Root {
     pub buffers: Vec<Buffer>,
 }
 
+/// Version of glTF, writer, and facts about the target.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Asset {
@@ -34,6 +41,8 @@ pub(super) struct Scene {
     pub nodes: Vec<usize>,
 }
 
+/// A node with its transform to its parent: a matrix, column by column, or a translation in metres, a
+/// rotation as a quaternion x, y, z, w, and a scale.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Node {
@@ -54,6 +63,7 @@ pub(super) struct Mesh {
     pub primitives: Vec<Primitive>,
 }
 
+/// Triangles with one material.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Primitive {
@@ -63,6 +73,8 @@ pub(super) struct Primitive {
     pub mode: Option<u32>,
 }
 
+/// The accessors of the vertices' attributes. All three are required; colours, tangents or a second
+/// set of texture coordinates are not permitted.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "SCREAMING_SNAKE_CASE")]
 pub(super) struct Attributes {
@@ -82,6 +94,7 @@ pub(super) struct Material {
     pub double_sided: Option<bool>,
 }
 
+/// The surface of the metallic-roughness model.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Surface {
@@ -122,6 +135,7 @@ pub(super) struct Image {
     pub buffer_view: usize,
 }
 
+/// Typed values in a view, from its beginning.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Accessor {
@@ -134,6 +148,7 @@ pub(super) struct Accessor {
     pub max: Option<Vec<f32>>,
 }
 
+/// A range of bytes of the buffer, without a stride.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct BufferView {
@@ -144,6 +159,7 @@ pub(super) struct BufferView {
     pub target: Option<u32>,
 }
 
+/// The binary chunk.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Buffer {

@@ -1,20 +1,22 @@
-//! Bounds on the amount of drawing on a page. Lines that cross it a thousand times, or a thousand
-//! areas on top of each other, keep a renderer busy for hours, and no target has them.
+//! Bounds on the marks of a page: on their amount, as lines that cross it a thousand times, or a
+//! thousand areas on top of each other, keep a renderer busy for hours; and on what viewers draw
+//! differently, marks that are very thin or drawn twice. No target has any of these.
 
 use std::collections::HashSet;
 
 use glam::DVec2;
 use kurbo::{BezPath, PathEl, Shape};
 
-/// Length of all contours over the area of the page, 1/mm: tags in all tiles, with cells of
-/// 0.1 mm, have less.
+/// Most length of all contours per area of the page, 1/mm: tags in all tiles, with cells of 0.1 mm,
+/// have less.
 const MOST_PER_MM: f64 = 40.0;
 
-/// Area around all contours in pages: tiles and cells have one each, and do not overlap.
+/// Most area of the rectangles around filled paths, and of strokes, in areas of the page: those of
+/// tiles and cells overlap each other little.
 const MOST_PAGES: f64 = 40.0;
 
-/// Areas and lines thinner than this are drawn by some viewers as wide as a pixel, and by others not at all, mm. Cells
-/// and strokes of letters have more.
+/// Least width of an area or a line, mm: thinner ones are drawn by some viewers as wide as a pixel,
+/// and by others not at all. Cells and strokes of letters are wider.
 const LEAST_WIDTH_MM: f64 = 0.01;
 
 /// Problem of a mark that is thinner.
@@ -33,26 +35,29 @@ type Outline = [i64; 7];
 pub(super) struct Ink {
     /// Area of the page.
     page: f64,
-    /// Millimetres in a unit.
+    /// Millimetres per unit of the page.
     mm: f64,
+    /// Length of all contours so far.
     length: f64,
+    /// Area of the rectangles around filled paths, and of strokes, so far.
     area: f64,
+    /// The marks so far, to recognise equal ones.
     marks: HashSet<Outline>,
 }
 
 impl Ink {
-    /// An empty page of this width and height, with so many millimetres in a unit.
+    /// An empty page of this width and height, in units of `mm` millimetres.
     pub fn new(size: DVec2, mm: f64) -> Self {
         Self { page: size.element_product(), mm, length: 0.0, area: 0.0, marks: HashSet::new() }
     }
 
-    /// Adds a filled path, or one that is stroked with a pen of some width; returns the reason if
-    /// not all viewers draw it alike.
+    /// Adds a path that is filled by the even-odd rule, or stroked where the width of a pen is given,
+    /// in units of the page; returns the problem if not all viewers draw it alike.
     pub fn add(&mut self, path: &BezPath, pen: Option<f64>) -> Option<&'static str> {
         let (length, count) = length(path);
         let around = path.control_box();
         match pen {
-            // Either side of the line, and the ends or corners.
+            // Both sides of the line, and the ends or corners of each segment.
             Some(width) => {
                 self.length += 2.0 * length + 4.0 * width * count;
                 self.area += width * (length + width * count);
@@ -83,8 +88,8 @@ impl Ink {
         (!is_new).then_some(TWICE)
     }
 
-    /// Whether a filled path, or one that is drawn by a pen of some width, is thick enough in each of its contours
-    /// that all viewers draw it alike.
+    /// Whether the pen, or without one each contour of a filled path, is wide enough that all viewers
+    /// draw it alike.
     fn is_thick(&self, path: &BezPath, pen: Option<f64>) -> bool {
         let least = LEAST_WIDTH_MM / self.mm;
         if let Some(width) = pen {
@@ -95,15 +100,15 @@ impl Ink {
         let contours = elements.chunk_by(|_, next| !is_start(next));
         contours.map(|contour| BezPath::from_vec(contour.to_vec())).all(|mut contour| {
             contour.close_path();
-            // Of a long rectangle this is its width.
+            // Twice the area over the perimeter is the width of a long rectangle.
             let width = 2.0 * contour.area().abs() / length(&contour).0;
             width >= least
         })
     }
 
-    /// Whether a target may have so much.
+    /// Whether the marks so far are within the bounds, so that rendering them takes little time.
     pub fn is_drawable(&self) -> bool {
-        // Negations, so that what is no number is refused too.
+        // Written so that NaN is refused too.
         self.length <= MOST_PER_MM * self.mm * self.page && self.area <= MOST_PAGES * self.page
     }
 }

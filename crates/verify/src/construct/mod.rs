@@ -28,10 +28,10 @@ use deltille_core::artwork::subject;
 use deltille_core::targets::Target;
 use deltille_files::export::mesh::extras;
 
-/// Problem of marks outside the page, which viewers that show more than the page show, too.
+/// Problem of marks outside the page: some viewers show more than the page, and then these as well.
 const OFF_PAGE: &str = "a mark that reaches over the edge of the page";
 
-/// Most characters of a number.
+/// Most characters of a number: readers differ in how many they take.
 const MOST_DIGITS: usize = 40;
 
 /// Most findings that are listed for a file.
@@ -90,17 +90,18 @@ impl Findings {
         }
     }
 
-    /// Whether the file is not drawn.
+    /// Whether the file has a construct that is not permitted, so that it is not rendered.
     fn refuse(&self) -> bool {
         refuse(&self.0)
     }
 
-    /// Whether no more is listed.
+    /// Whether as many findings are listed as are listed at all; more are dropped.
     fn is_full(&self) -> bool {
         self.0.len() >= MOST_LISTED
     }
 
-    /// Adds the findings of a file that belongs to this one, with its name.
+    /// Adds the findings of a file that belongs to this one, such as a texture, with its name before
+    /// the places.
     fn add_of(&mut self, file: &str, other: Findings) {
         for finding in other.0 {
             match finding {
@@ -116,7 +117,8 @@ impl Findings {
     }
 }
 
-/// Whether there is something in a file that not every viewer shows alike, so that it is not drawn.
+/// Whether a file has a construct that not every viewer shows alike, so that it is not rendered.
+/// Hidden content alone does not prevent that.
 pub(super) fn refuse(findings: &[Finding]) -> bool {
     let refuses = |finding: &Finding| {
         matches!(finding, Finding::Construct(ConstructFinding::Construct { .. }))
@@ -127,7 +129,8 @@ pub(super) fn refuse(findings: &[Finding]) -> bool {
     })
 }
 
-/// Texts about the target in files, for people and programs that do not look at the picture.
+/// What the texts in a file must say about the target: they are read by people and programs that do
+/// not look at the picture.
 struct Words {
     /// Its name.
     title: String,
@@ -138,6 +141,7 @@ struct Words {
 }
 
 impl Words {
+    /// The texts that belong to a target.
     fn of(target: &Target) -> Self {
         Self { title: target.name.to_string(), subject: subject(target), extras: extras(target) }
     }
@@ -158,8 +162,12 @@ fn is_creator(words: &str) -> bool {
 }
 
 /// Inspects a printed page, a mesh or a body: constructs that are not permitted, texts that are not
-/// those of the target, and the files that belong to it, as an OBJ names them. An error means that
-/// a file cannot be read at all.
+/// those of the target, and the files that belong to it, as an OBJ names them. Returns the findings
+/// and the contents of those files.
+///
+/// # Errors
+///
+/// A file cannot be read at all, or exceeds the limits.
 pub(super) fn check(
     reader: &Reader,
     path: &Path,
@@ -183,12 +191,12 @@ pub(super) fn check(
     Ok((found.0, Vec::new()))
 }
 
-/// The text of a file.
+/// The content of a text file.
 fn text(bytes: &[u8]) -> Result<&str, String> {
     std::str::from_utf8(bytes).map_err(|_| "not a text file in UTF-8".to_owned())
 }
 
-/// The first characters of what is named in a finding.
+/// The first characters of a text that is quoted in a finding.
 fn start(text: &str, characters: usize) -> String {
     text.chars().take(characters).collect()
 }
@@ -229,7 +237,8 @@ fn unpack(packed: &[u8], most: u64, mut each: impl FnMut(&[u8])) -> Option<u64> 
     }
 }
 
-/// Whether a name is that of a file in the same folder.
+/// Whether a name is that of a file in the same folder on every system: without a path, a drive or
+/// control characters.
 fn is_plain_file_name(name: &str) -> bool {
     let listed = |c: char| !matches!(c, '/' | '\\' | ':') && !c.is_control();
     !name.is_empty() && name != ".." && name.trim() == name && name.chars().all(listed)

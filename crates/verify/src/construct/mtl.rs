@@ -16,8 +16,8 @@ pub(super) struct Material {
     pub texture: Option<String>,
 }
 
-/// Inspects a material library: the comment about its writer, and each statement once, the name
-/// first.
+/// Inspects a material library, which has a comment about its writer, and then each statement once,
+/// the name of the material first; returns the material and the findings.
 pub(super) fn check(text: &str) -> (Material, Findings) {
     let (mut material, mut found) = (Material::default(), Findings::default());
     let mut stated: Vec<&str> = Vec::new();
@@ -35,7 +35,7 @@ pub(super) fn check(text: &str) -> (Material, Findings) {
         let of_stated = |listed: &&str| listed.split(' ').next() == Some(word);
         let holds = match word {
             "newmtl" => once(&mut material.name) && index == 1,
-            // A first word with a dash would be an option.
+            // A word that begins with a dash would be an option of the statement.
             "map_Kd" => {
                 once(&mut material.texture) && is_plain_file_name(rest) && !rest.starts_with('-')
             }

@@ -10,8 +10,12 @@ use super::{Findings, Words, decimal, is_creator, is_plain_file_name, mtl, png, 
 use crate::reader::Reader;
 use crate::{Artifact, DocumentError};
 
-/// Inspects an OBJ, its material library and its texture, and returns these two if they were
-/// reached.
+/// Inspects an OBJ, its material library and its texture; returns the findings, and these two files as
+/// far as nothing before them was refused.
+///
+/// # Errors
+///
+/// One of the files cannot be read, is no text or no PNG, or exceeds the limits.
 pub(super) fn check(
     reader: &Reader,
     path: &Path,
@@ -65,21 +69,25 @@ fn lines(text: &str, words: &Words) -> Lines {
     lines
 }
 
-/// The state of the inspection.
+/// The state of the inspection after some lines.
 #[derive(Default)]
 struct Lines {
     found: Findings,
+    /// File name of the material library.
     library: Option<String>,
+    /// Name of the object.
     object: Option<String>,
+    /// Name of the material.
     material: Option<String>,
-    /// Positions, texture coordinates and normals.
+    /// Numbers of positions, texture coordinates and normals so far.
     counts: [usize; 3],
-    /// Which of them faces have.
+    /// Indices, from 1 on, of those that faces use.
     used: [BTreeSet<usize>; 3],
 }
 
 impl Lines {
-    /// The first two lines say what wrote the file, and of what target.
+    /// Inspects a comment: the first line says what wrote the file and the unit, the second describes
+    /// the target as JSON, and there are no others.
     fn comment(&mut self, comment: &str, index: usize, words: &Words, place: &str) {
         let holds = match index {
             0 => comment.strip_suffix(", millimetres").is_some_and(is_creator),
@@ -89,12 +97,13 @@ impl Lines {
             }),
             _ => false,
         };
-        // Behind a backslash the next line belongs to the comment, or not.
+        // After a backslash some readers take the next line for a part of the comment.
         let listed = index < 2 && !comment.contains('\\');
         self.found.unless(listed, place, "a comment");
         self.found.unseen_unless(!listed || holds, place, "words that do not describe the target");
     }
 
+    /// Inspects a line that is no comment.
     fn line(&mut self, line: &str, place: &str) {
         let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
         let once = |slot: &mut Option<String>| slot.replace(rest.to_owned()).is_none();
@@ -117,7 +126,7 @@ impl Lines {
         self.found.unless(holds, place, format!("`{}`", start(line, 60)));
     }
 
-    /// Whether a line holds so many numbers; they are counted.
+    /// Whether a line of one of the three lists holds `count` numbers; the line is counted.
     fn numbers(&mut self, rest: &str, list: usize, count: usize) -> bool {
         self.counts[list] += 1;
         let numbers: Option<Vec<f64>> = rest.split(' ').map(decimal).collect();
@@ -142,7 +151,8 @@ impl Lines {
     }
 }
 
-/// A number without a sign or zeros before it.
+/// An index without a sign or leading zeros; negative ones, which count from the end, are not
+/// permitted.
 fn index(word: &str) -> Option<usize> {
     word.parse().ok().filter(|index: &usize| index.to_string() == word)
 }

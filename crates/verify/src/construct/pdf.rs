@@ -11,23 +11,27 @@ use super::{Findings, Words, is_creator, pdf_content, unpack};
 use deltille_files::export::pdf::VERSION;
 use deltille_files::limits::Limits;
 
-/// The keys of a trailer.
+/// The permitted keys of the trailer, the catalogue, the information, the page tree and a page.
 const TRAILER: [&str; 4] = ["Root", "Info", "Size", "ID"];
 const CATALOG: [&str; 5] = ["Type", "Pages", "PageLayout", "PageMode", "ViewerPreferences"];
 const INFO: [&str; 3] = ["Title", "Subject", "Creator"];
 const PAGES: [&str; 3] = ["Type", "Count", "Kids"];
 const PAGE: [&str; 8] =
     ["Type", "Parent", "MediaBox", "TrimBox", "CropBox", "Resources", "Contents", "Annots"];
-/// Kinds of resources that may be listed, as long as there are none.
+/// Kinds of resources that a page may list with no entries.
 const RESOURCES: [&str; 4] = ["Font", "XObject", "ExtGState", "Shading"];
-/// The bytes before the content of a stream.
+/// The bytes before the content of a stream, and the permitted keys of its dictionary.
 const STREAM_BEGINS: &[u8] = b">>stream";
 const STREAM: [&str; 2] = ["Length", "Filter"];
 
-/// Bytes that are no text, for programs that tell files by them.
+/// The second line of the file: bytes that are no text, so that programs take the file for binary.
 const BINARY_MARK: &[u8] = b"\n%\xbb\xad\xc0\xde\n";
 
 /// Inspects a PDF for constructs that are not permitted.
+///
+/// # Errors
+///
+/// It is no readable PDF, or exceeds the limits.
 pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Findings, String> {
     if positions(bytes, b"%PDF-").is_empty() {
         return Err("not a readable PDF (its head)".to_owned());
@@ -62,7 +66,7 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
     Ok(found)
 }
 
-/// The version, from the first byte on.
+/// Checks that the file begins with the version and the binary mark.
 fn head(bytes: &[u8], found: &mut Findings) {
     let Some(rest) = bytes.strip_prefix(b"%PDF-") else {
         return found.add("the head", "data before the PDF");
@@ -76,7 +80,8 @@ fn head(bytes: &[u8], found: &mut Findings) {
     found.add("the head", format!("version {version} instead of {VERSION}"));
 }
 
-/// Every object begins where the table says.
+/// Checks that every object begins where the cross-reference table says: readers that rebuild the
+/// table would otherwise find other objects than those that follow it.
 fn table(document: &Document, bytes: &[u8], found: &mut Findings) {
     for (number, entry) in &document.reference_table.entries {
         let &XrefEntry::Normal { offset, generation } = entry else { continue };
@@ -87,8 +92,8 @@ fn table(document: &Document, bytes: &[u8], found: &mut Findings) {
     }
 }
 
-/// The objects that are read, written again, are the file: nothing of it is passed over, mended or found
-/// elsewhere than its table says.
+/// Checks that the objects as they were read, written again, are the file byte by byte: so the reader
+/// passed over nothing, and mended nothing.
 fn written_anew(document: &mut Document, bytes: &[u8], found: &mut Findings) {
     let mut anew = Vec::with_capacity(bytes.len());
     let written = document.save_to(&mut anew).is_ok();
@@ -100,8 +105,8 @@ fn written_anew(document: &mut Document, bytes: &[u8], found: &mut Findings) {
     found.add(format!("byte {at}"), "spelling, order or a table that is not that of its objects");
 }
 
-/// One revision that begins with the first byte and ends with the last, its trailer with no key but
-/// those listed: an earlier revision, encryption and a second table would have one.
+/// Checks that there is one revision, which ends with the file, and that its trailer has permitted
+/// keys only: an earlier revision, encryption and a second table would each need another.
 fn trailer(bytes: &[u8], found: &mut Findings) {
     let Some(&at) = positions(bytes, b"trailer").last() else { return };
     let text = String::from_utf8_lossy(&bytes[at..]);
@@ -171,7 +176,7 @@ fn references(document: &Document, object: &Object, used: &mut BTreeSet<ObjectId
     }
 }
 
-/// The way through a document.
+/// The inspection of a document that was parsed.
 struct Walk<'a> {
     document: &'a Document,
     /// The parts of the file between streams.
@@ -183,7 +188,7 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// The object with references resolved.
+    /// The object itself, or the one that it refers to.
     fn resolve(&self, object: &'a Object) -> Option<&'a Object> {
         self.document.dereference(object).ok().map(|(_, object)| object)
     }
@@ -205,11 +210,12 @@ impl<'a> Walk<'a> {
         self.resolve(dictionary.get(key.as_bytes()).ok()?)
     }
 
+    /// A value of a dictionary that is a name.
     fn name(&self, dictionary: &'a Dictionary, key: &str) -> Option<&'a [u8]> {
         self.value(dictionary, key)?.as_name().ok()
     }
 
-    /// Names the keys of a dictionary that are not listed.
+    /// Checks that a dictionary has listed keys only.
     fn keys(&mut self, dictionary: &Dictionary, place: &str, listed: &[&str]) {
         for (key, _) in dictionary {
             let key = String::from_utf8_lossy(key).into_owned();
@@ -218,6 +224,7 @@ impl<'a> Walk<'a> {
         }
     }
 
+    /// Checks that the catalogue opens single pages, and that printing does not scale them.
     fn catalog(&mut self) {
         let place = "the catalogue";
         let document = self.document;
@@ -241,7 +248,7 @@ impl<'a> Walk<'a> {
         self.found.unless(unscaled, "the viewer preferences", "print scaling other than None");
     }
 
-    /// The words are those of the target: what they say otherwise is shown by viewers and programs too.
+    /// Checks that title, subject and creator are those of the target: viewers show them.
     fn info(&mut self, words: &Words) {
         let document = self.document;
         let place = "the information";
@@ -261,7 +268,8 @@ impl<'a> Walk<'a> {
         self.found.unseen_unless(creator, place, "a Creator other than deltille");
     }
 
-    /// Two identifiers that differ are of a file that was changed after it was written.
+    /// Checks that both identifiers are the same: of a file that was changed after it was written, the
+    /// second differs.
     fn identifier(&mut self) {
         let id = self.document.trailer.get(b"ID").and_then(Object::as_array).ok();
         let same = id.is_some_and(|id| {
@@ -270,7 +278,7 @@ impl<'a> Walk<'a> {
         self.found.unless(same, "the trailer", "an ID that is not one digest, twice");
     }
 
-    /// Every object is part of what is shown.
+    /// Checks that every object is reached from the trailer.
     fn unused(&mut self) {
         let document = self.document;
         let mut used = BTreeSet::new();
@@ -281,6 +289,8 @@ impl<'a> Walk<'a> {
         }
     }
 
+    /// Checks the page tree, which is one list, and every page; the error says that a page exceeds the
+    /// limits.
     fn pages(&mut self) -> Result<(), String> {
         let document = self.document;
         let place = "the page tree";
@@ -315,6 +325,7 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
+    /// Checks a page: its boxes, that it has neither annotations nor resources, and its content.
     fn page(&mut self, page: &'a Dictionary, parent: ObjectId, place: &str) -> Result<(), String> {
         if self.name(page, "Type") != Some(b"Page") {
             self.found.add(place, "an object that is no page");
@@ -360,6 +371,7 @@ impl<'a> Walk<'a> {
         }
     }
 
+    /// Checks the content of a page: one stream, compressed as stated, with permitted operators.
     fn content(&mut self, page: &'a Dictionary, size_pt: DVec2, place: &str) -> Result<(), String> {
         let stream = self.value(page, "Contents").and_then(|object| object.as_stream().ok());
         let Some(stream) = stream else {

@@ -8,9 +8,10 @@ use super::ink::Ink;
 use super::{Findings, OFF_PAGE, start};
 use deltille_files::limits::{Exceeded, Limits};
 
+/// Millimetres per point of 1/72 inch.
 const MM_PER_PT: f64 = 25.4 / 72.0;
 
-/// Words that an operator with its operands has on the average.
+/// Usual number of words of an operator with its operands, by which words are counted as nodes.
 const WORDS: usize = 3;
 
 /// The effect of an operator on the current path.
@@ -26,7 +27,8 @@ enum Role {
     Paint,
 }
 
-/// Operators with the number of their operands.
+/// The permitted operators with the number of their operands: fill and stroke colour in CMYK, line
+/// width, move, line, curve, close, even-odd fill and stroke.
 const OPERATORS: [(&str, usize, Role); 9] = [
     ("k", 4, Role::State),
     ("K", 4, Role::State),
@@ -39,17 +41,22 @@ const OPERATORS: [(&str, usize, Role); 9] = [
     ("S", 0, Role::Paint),
 ];
 
-/// Pure K.
+/// Black ink alone: cyan, magenta, yellow, black.
 const BLACK: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// Coordinates beyond this are not held exactly by all viewers, points.
+/// Greatest coordinate, points: larger ones are not exact in all viewers.
 const FARTHEST_PT: f64 = 1e5;
 
-/// Distance by which a path may reach over the edge of the page, points, by the number of digits.
+/// Distance by which a path may reach over the edge of the page, points: coordinates are rounded.
 const EDGE_SLACK_PT: f64 = 0.01;
 
-/// Inspects the content of a page of that width and height in points: numbers and permitted
-/// operators only, and all painted marks on the page, with the stated paint.
+/// Inspects the content of a page of this width and height, points: there are numbers and permitted
+/// operators only, colour and width are set before they are used, and all marks are on the page.
+/// `page` is its name in findings.
+///
+/// # Errors
+///
+/// There are more operators than the limits allow.
 pub(super) fn check(
     content: &[u8],
     size_pt: DVec2,
@@ -98,21 +105,26 @@ pub(super) fn check(
 
 /// The graphics state of a page.
 struct Painter {
+    /// Width and height of the page, points.
     size_pt: DVec2,
-    /// Operators that tell what paths are painted with.
+    /// Operators so far that set colour or line width.
     said: Vec<&'static str>,
-    /// Width of lines.
+    /// Line width, points.
     width_pt: f64,
-    /// Ends of the path that is being built: left, lower, right, upper.
+    /// Left, lower, right and upper end of the path that is being built, points; `None` between paths.
     path: Option<[f64; 4]>,
-    /// The same path, and all that was painted before.
+    /// The same path.
     contours: BezPath,
+    /// All marks that were painted.
     ink: Ink,
 }
 
 impl Painter {
-    /// Takes an operator, and says whether what it paints is on the page; an error names what is not on the
-    /// list.
+    /// Executes an operator; returns whether what it paints, if anything, is on the page.
+    ///
+    /// # Errors
+    ///
+    /// The construct, where the operator, its operands or its place are not permitted.
     fn operator(&mut self, word: &str, operands: &[f64]) -> Result<bool, String> {
         let listed = OPERATORS.iter().find(|(name, ..)| *name == word);
         let Some(&(name, count, role)) = listed else {
@@ -154,7 +166,8 @@ impl Painter {
         Ok(true)
     }
 
-    /// Fills a path, or draws it by a pen of some width.
+    /// Fills the path, or strokes it with a pen of this width, points; `needed` are the operators that
+    /// must have set the colour and width. Returns whether the mark is on the page.
     fn paint(
         &mut self,
         needed: &[&str],
@@ -179,7 +192,7 @@ impl Painter {
     }
 }
 
-/// The ends of a path that goes on by these points.
+/// Left, lower, right and upper end of a path after further points, given as x, y, x, y, …
 fn reach(path: Option<[f64; 4]>, points: &[f64]) -> [f64; 4] {
     let none = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     points.as_chunks::<2>().0.iter().fold(path.unwrap_or(none), |ends, &[x, y]| {
@@ -191,7 +204,7 @@ fn reach(path: Option<[f64; 4]>, points: &[f64]) -> [f64; 4] {
 fn is_listed(operator: &str, operands: &[f64]) -> bool {
     match operator {
         "k" | "K" => operands == BLACK,
-        // The thinnest line that a device has is not the same on all.
+        // A width of zero is the thinnest line of a device, which differs from one to another.
         "w" => operands.iter().all(|&width| width > 0.0),
         _ => operands.iter().all(|value| value.abs() < FARTHEST_PT),
     }

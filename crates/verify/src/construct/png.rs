@@ -5,18 +5,23 @@ use super::{Findings, is_creator, unpack};
 use deltille_files::export::kind::SOFTWARE;
 use deltille_files::limits::{Exceeded, Limits};
 
+/// The first bytes of every PNG.
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
-/// Pixels, their size on paper, what wrote them, and a title.
+/// The permitted chunks: head, resolution, writer, title, pixels and end.
 const CHUNKS: [&[u8]; 6] = [b"IHDR", b"pHYs", b"tEXt", b"iTXt", b"IDAT", b"IEND"];
 
 /// The bytes before the title: a keyword, and flags for neither compression nor a language.
 const TITLE: &[u8] = b"Title\0\0\0\0\0";
 
-/// Depth, colour type, compression, filter and interlace of 8-bit grey.
+/// Bit depth, colour type, compression, filter and interlace method of 8-bit grey, row by row.
 const GREY: [u8; 5] = [8, 0, 0, 0, 0];
 
-/// Inspects the chunks of a PNG with that title.
+/// Inspects a PNG chunk by chunk; its title is to be `title`.
+///
+/// # Errors
+///
+/// It is no PNG or cut off, or has more pixels than the limits allow.
 pub(super) fn check(bytes: &[u8], title: &str, limits: &Limits) -> Result<Findings, String> {
     let mut rest = bytes.strip_prefix(&SIGNATURE).ok_or("not a readable PNG (its signature)")?;
     let mut found = Findings::default();
@@ -77,39 +82,39 @@ pub(super) fn check(bytes: &[u8], title: &str, limits: &Limits) -> Result<Findin
     Ok(found)
 }
 
-/// Whether words name this program as the software.
+/// Whether the data of a `tEXt` chunk name this program as the software.
 fn names_writer(words: &[u8]) -> bool {
     let name = words.strip_prefix(SOFTWARE.as_bytes()).and_then(|rest| rest.strip_prefix(b"\0"));
     name.and_then(|name| std::str::from_utf8(name).ok()).is_some_and(is_creator)
 }
 
-/// Refuses a picture of too many pixels by its head.
+/// Checks the number of pixels in the data of an `IHDR` chunk against the limits.
 fn check_size(head: &[u8], limits: &Limits) -> Result<(), Exceeded> {
     let (width, height) = size(head).unwrap_or_default();
     limits.check_pixels(width, height)
 }
 
-/// Refuses a PNG of too many pixels; one that is damaged is left to [`check`].
+/// Checks the number of pixels of a PNG against the limits; one that is damaged is left to [`check`].
 pub(super) fn check_pixels(bytes: &[u8], limits: &Limits) -> Result<(), Exceeded> {
     let head = bytes.strip_prefix(&SIGNATURE).and_then(Chunk::first_of);
     head.map_or(Ok(()), |head| check_size(head.data, limits))
 }
 
-/// Width and height, with which the head of a PNG begins.
+/// Width and height, px, from the data of an `IHDR` chunk.
 fn size(head: &[u8]) -> Option<(u32, u32)> {
     let word = |at: usize| head.get(at..)?.first_chunk::<4>().map(|b| u32::from_be_bytes(*b));
     Some((word(0)?, word(4)?))
 }
 
-/// Whether the packed pixels are whole, with their check sum and nothing behind it, and fill the picture: a byte and
-/// the pixels of each row.
+/// Whether the compressed pixels are complete, with the right checksum and nothing after it, and fill
+/// the picture: a byte for the filter and the pixels of each row. `head` is the data of `IHDR`.
 fn is_whole(packed: &[u8], head: &[u8]) -> bool {
     let Some((width, height)) = size(head) else { return false };
     let length = (u64::from(width) + 1) * u64::from(height);
     unpack(packed, length, |_| ()) == Some(length)
 }
 
-/// A chunk, which begins with the length of its content and ends with a check sum.
+/// A chunk: the length of its data, its name, the data, and a checksum of name and data.
 struct Chunk<'a> {
     /// Its name.
     kind: &'a [u8],

@@ -5,12 +5,16 @@ use super::Findings;
 use deltille_files::export::stl::header;
 use deltille_files::limits::Limits;
 
-/// Bytes before the triangles, of a triangle, and of a triangle without its attributes.
+/// Number of bytes before the triangles, of a triangle, and of a triangle without its attributes.
 const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 const GEOMETRY: usize = 48;
 
-/// Inspects an STL of a target of that name. A truncated file is left to the reader.
+/// Inspects a binary STL of a target of this name. A truncated file is left to its reader.
+///
+/// # Errors
+///
+/// There are more triangles than the limits allow.
 pub(super) fn check(bytes: &[u8], name: &str, limits: &Limits) -> Result<Findings, String> {
     let count = bytes.len().saturating_sub(HEAD) / TRIANGLE;
     limits.check_nodes(count).map_err(|exceeded| exceeded.to_string())?;

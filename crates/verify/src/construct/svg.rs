@@ -1,4 +1,5 @@
-//! The SVG elements, attributes and values that every viewer draws alike.
+//! The SVG elements, attributes and values that every viewer draws alike: a white page, and black
+//! paths with absolute coordinates.
 
 use glam::DVec2;
 use kurbo::BezPath;
@@ -8,12 +9,13 @@ use super::ink::Ink;
 use super::{Findings, OFF_PAGE, Words, decimal, is_creator, start, text};
 use deltille_files::limits::{Kind, Limits};
 
+/// The XML namespace of SVG.
 const NAMESPACE: &str = "http://www.w3.org/2000/svg";
 
 /// The declaration before the drawing.
 const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>";
 
-/// Elements with their parents and attributes. An `id` is on the list since nothing that is could
+/// Permitted elements with their parents and attributes. An `id` is harmless, as nothing permitted can
 /// refer to it.
 const ELEMENTS: [(&str, &str, &[&str]); 6] = [
     ("svg", "", &["width", "height", "viewBox"]),
@@ -24,17 +26,22 @@ const ELEMENTS: [(&str, &str, &[&str]); 6] = [
     ("path", "g", &["d", "id", "fill", "stroke", "stroke-width"]),
 ];
 
-/// Coordinates beyond this are drawn differently by arithmetic of different precision.
+/// Greatest coordinate, units of the drawing: beyond it, viewers that calculate in single precision
+/// draw something else.
 const FARTHEST: f64 = 1e5;
 
-/// Distance by which a path may reach over the edge of the page, and by which the shape of the
-/// drawing may differ from that of the page, mm, by the number of digits.
+/// Distance by which a path may reach over the edge of the page, and by which the proportions of the
+/// drawing may differ from those of the page: coordinates are rounded.
 const EDGE_SLACK_MM: f64 = 1e-3;
 
-/// Attributes of an element are compared with each other by readers, so that many take for ever.
+/// Most attributes of an element: readers compare each with all others.
 const MOST_ATTRIBUTES: usize = 1000;
 
 /// Inspects an SVG for constructs that are not permitted.
+///
+/// # Errors
+///
+/// It is no readable SVG, or exceeds the limits.
 pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Findings, String> {
     let text = text(bytes)?;
     if text.split('<').any(|tag| tag.matches('=').count() > MOST_ATTRIBUTES) {
@@ -97,7 +104,7 @@ pub(super) fn check(bytes: &[u8], words: &Words, limits: &Limits) -> Result<Find
     Ok(found)
 }
 
-/// XML 1.0 in UTF-8, from the first byte on.
+/// Checks that the file begins with the declaration of XML 1.0 in UTF-8.
 fn head(text: &str, found: &mut Findings) {
     if text.starts_with('\u{feff}') {
         return found.add("the head", "a byte order mark");
@@ -108,14 +115,14 @@ fn head(text: &str, found: &mut Findings) {
     }
 }
 
-/// Whether a comment names this program, before the drawing begins.
+/// Whether a comment is the first node of the file and names this program.
 fn is_writer(comment: &Node) -> bool {
     let words = comment.text().and_then(|text| text.strip_prefix(' ')?.strip_suffix(' '));
     let first = comment.prev_sibling().is_none() && comment.parent_element().is_none();
     first && words.is_some_and(is_creator)
 }
 
-/// Adds the mark of a path; returns the reason if not all viewers draw it alike.
+/// Adds the mark of a path; returns the problem if not all viewers draw it alike.
 fn add(node: &Node, ink: &mut Ink) -> Option<&'static str> {
     let path = BezPath::from_svg(node.attribute("d").unwrap_or_default()).ok()?;
     let pen = node.attribute("stroke").map(|_| {
@@ -125,7 +132,7 @@ fn add(node: &Node, ink: &mut Ink) -> Option<&'static str> {
     ink.add(&path, pen)
 }
 
-/// The words are those of the target: viewers show them for a title, and read them aloud.
+/// Checks that title and description are those of the target: viewers show them, and read them aloud.
 fn title(document: &Document, words: &Words, found: &mut Findings) {
     for (name, stated, problem) in [
         ("title", &*words.title, "a title other than the target's name"),
@@ -137,16 +144,18 @@ fn title(document: &Document, words: &Words, found: &mut Findings) {
     }
 }
 
-/// The part of the drawing that is the page: its left, upper, right and lower end.
+/// The part of the drawing that is the page.
 #[derive(Default)]
 struct View {
+    /// Left, upper, right and lower end, units of the drawing; y down.
     ends: [f64; 4],
-    /// Millimetres in a unit of the drawing.
+    /// Millimetres per unit of the drawing.
     unit_mm: f64,
 }
 
 impl View {
-    /// The view of a drawing with the proportions of the page, in some unit.
+    /// The view of an SVG; `None` where its size is not in mm, or the `viewBox` has other proportions
+    /// than the page, so that viewers would have to choose a scale.
     fn of(svg: &Node) -> Option<Self> {
         let [width, height] = ["width", "height"].map(|key| length(svg.attribute(key)?));
         let ends = svg.attribute("viewBox")?.split(' ').map(decimal).collect::<Option<Vec<_>>>()?;
@@ -156,13 +165,13 @@ impl View {
         (across > 0.0 && down > 0.0 && same).then_some(Self { ends, unit_mm: width? / across })
     }
 
-    /// Width and height.
+    /// Width and height, units of the drawing.
     fn size(&self) -> DVec2 {
         let [x0, y0, x1, y1] = self.ends;
         DVec2::new(x1 - x0, y1 - y0)
     }
 
-    /// Whether marks with these ends are on the page.
+    /// Whether a mark with these ends, left, upper, right and lower, is on the page.
     fn holds(&self, [left, upper, right, lower]: [f64; 4]) -> bool {
         let [x0, y0, x1, y1] = self.ends;
         left >= x0 - EDGE_SLACK_MM
@@ -172,12 +181,13 @@ impl View {
     }
 }
 
-/// A length in millimetres.
+/// A positive length in millimetres, such as `210mm`.
 fn length(value: &str) -> Option<f64> {
     decimal(value.strip_suffix("mm")?).filter(|&length| length > 0.0)
 }
 
-/// Black marks are seen on white paper, and on nothing where a viewer has a dark background.
+/// Checks that a white rectangle lies below all marks: without it, black marks are not seen in a viewer
+/// with a dark background.
 fn paper(document: &Document, found: &mut Findings) {
     let children = document.root_element().children().filter(Node::is_element);
     let drawn: Vec<&str> = children.map(|node| node.tag_name().name()).collect();
@@ -186,7 +196,7 @@ fn paper(document: &Document, found: &mut Findings) {
     found.unless(!drawn.any(|name| name == "rect"), "the page", "paper above the marks");
 }
 
-/// The parts of an element that are not permitted.
+/// The constructs of an element that are not permitted.
 fn element(node: &Node) -> Vec<String> {
     let name = node.tag_name().name();
     let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());
@@ -201,7 +211,7 @@ fn element(node: &Node) -> Vec<String> {
         constructs.push(format!("element <{name}> within <{parent}>"));
     }
     let has = |key: &str| node.has_attribute(key);
-    // Of lines all is said; of a filled path its data.
+    // A stroked path states fill, stroke and width; a filled one takes them from its group.
     let needed = |key: &&&str| match (name, **key) {
         ("path", "stroke" | "stroke-width") => has("stroke") || has("stroke-width"),
         ("path", "fill") => has("stroke") || has("stroke-width"),
@@ -226,7 +236,8 @@ fn element(node: &Node) -> Vec<String> {
     constructs
 }
 
-/// Whether a path is on the page; what is none is told elsewhere.
+/// Whether a path, with the width of its pen, is on the page. Other elements, and paths whose data are
+/// not permitted, pass.
 fn is_on_page(node: &Node, view: &View) -> bool {
     let width = node.attribute("stroke-width").and_then(decimal).unwrap_or_default();
     let ends = node.attribute("d").and_then(path_ends);
@@ -236,7 +247,7 @@ fn is_on_page(node: &Node, view: &View) -> bool {
     })
 }
 
-/// Only titles and descriptions have words.
+/// The construct of a text that is in neither a title nor a description.
 fn loose_text(node: &Node) -> Vec<String> {
     let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());
     let blank = node.text().unwrap_or_default().trim().is_empty();
@@ -246,7 +257,7 @@ fn loose_text(node: &Node) -> Vec<String> {
     vec!["text between elements".to_owned()]
 }
 
-/// Whether the value of a listed attribute is one that all viewers understand alike.
+/// Whether the value of a permitted attribute is one that all viewers understand alike.
 fn holds(element: &str, key: &str, value: &str) -> bool {
     match (element, key) {
         ("svg", "width" | "height") => length(value).is_some(),
@@ -267,8 +278,8 @@ fn holds(element: &str, key: &str, value: &str) -> bool {
     }
 }
 
-/// The ends of a path of absolute moves, lines, curves and closings, without exponents or arcs: left,
-/// upper, right and lower.
+/// Left, upper, right and lower end of the control points of path data, units of the drawing; `None`
+/// unless they consist of absolute moves, lines, curves and closings, with plain decimals.
 fn path_ends(data: &str) -> Option<[f64; 4]> {
     let mut ends = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     let mut rest = data;

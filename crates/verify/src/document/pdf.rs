@@ -1,3 +1,5 @@
+//! Pages of a PDF, rendered by hayro.
+
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -14,24 +16,26 @@ use deltille_core::raster::Gray;
 
 const MM_PER_PT: f64 = 25.4 / 72.0;
 
-/// Rows drawn at a time.
+/// Number of rows of pixels rendered at a time, which bounds the memory for a large page.
 const BAND: usize = 1024;
 
-/// A PDF, drawn by hayro.
+/// A parsed PDF with at least one page.
 pub(super) struct Pdf(hayro_syntax::Pdf);
 
 impl Pdf {
+    /// Parses a PDF; the error says why that fails.
     pub fn parse(bytes: Arc<Vec<u8>>) -> Result<Self, String> {
         let pdf = hayro_syntax::Pdf::new(bytes)
             .map_err(|_| "not a readable PDF; it may be truncated".to_owned())?;
         if pdf.pages().is_empty() { Err("a PDF without pages".to_owned()) } else { Ok(Self(pdf)) }
     }
 
+    /// Number of pages.
     pub fn pages(&self) -> usize {
         self.0.pages().len()
     }
 
-    /// The visible part of the page.
+    /// Width and height of the visible part of a page, mm, as it is shown, after its rotation.
     pub fn size_mm(&self, index: usize) -> DVec2 {
         let page = &self.0.pages()[index];
         let visible = page.intersected_crop_box();
@@ -42,6 +46,7 @@ impl Pdf {
         if upright == shown { size } else { size.yx() }
     }
 
+    /// Renders a page at a resolution; after the time `end` the rest stays white.
     pub fn render(&self, index: usize, px_per_mm: f64, end: Option<Instant>) -> Gray<u8> {
         let page = &self.0.pages()[index];
         let DVec2 { x: width_mm, y: height_mm } = self.size_mm(index);
@@ -74,6 +79,8 @@ fn stretch(mut image: Gray<u8>) -> Gray<u8> {
     image
 }
 
+/// Renders a band of a page, of this width and height, px, from row `y` on, and appends its grey
+/// values; `scale` is in px per unit of the page.
 fn band<'a>(
     page: &'a Page<'a>,
     cache: &RenderCache<'a>,
@@ -82,7 +89,7 @@ fn band<'a>(
     y: usize,
     grey: &mut Vec<u8>,
 ) {
-    // The picture is bounded, see MAX_PIXELS; a strip longer than 65535 px is cut there.
+    // The renderer counts in 16 bits: of a page wider than 65535 px, the rest is filled with white.
     let side = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
     let mut context = RenderContext::new(side(width), side(height));
     let transform = Affine::translate((0.0, -(y as f64)))
@@ -101,7 +108,7 @@ fn band<'a>(
     }
 }
 
-/// hayro's own conversion is private to its crates.
+/// Conversion of a transform of hayro to one of kurbo; hayro's own is private to its crates.
 trait ToKurbo {
     fn to_kurbo_affine(self) -> Affine;
 }

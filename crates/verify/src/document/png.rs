@@ -1,3 +1,5 @@
+//! A page as a PNG: decoded by the image crate, with the size on paper from its resolution.
+
 use std::io::Cursor;
 
 use glam::DVec2;
@@ -9,15 +11,19 @@ use deltille_files::limits::Limits;
 
 /// A PNG with its resolution.
 pub(super) struct Png {
-    /// Its pixels, or the means of so many by so many of them.
+    /// Its pixels, or of a very large one the means of squares of them.
     image: Gray<u8>,
+    /// Side of such a square, px; 1 where the pixels are those of the file.
     reduced: usize,
+    /// Width and height of the file, px.
     size_px: [usize; 2],
     /// Resolution of the file.
     px_per_mm: f64,
 }
 
 impl Png {
+    /// Decodes a PNG. The error says why that fails: it is damaged or too large, states no resolution
+    /// in pixels per metre, or its pixels are not square.
     pub fn parse(bytes: &[u8], limits: &Limits) -> Result<Self, String> {
         let broken = |error: &dyn std::fmt::Display| format!("not a readable PNG ({error})");
         let reader =
@@ -52,6 +58,7 @@ impl Png {
         Ok(Self { image, reduced, size_px: [width, height], px_per_mm })
     }
 
+    /// Width and height on paper, mm.
     pub fn size_mm(&self) -> DVec2 {
         DVec2::from(self.size_px.map(|px| px as f64)) / self.px_per_mm
     }
@@ -66,12 +73,14 @@ impl Png {
         self.px_per_mm / self.reduced as f64
     }
 
+    /// Its grey values, at the resolution [`image_px_per_mm`](Self::image_px_per_mm).
     pub fn image(&self) -> &Gray<u8> {
         &self.image
     }
 }
 
-/// The means of squares of pixels, with paper beyond the edges.
+/// The means of squares of `side` × `side` pixels; squares that reach over the right or the lower
+/// edge count white there.
 fn means(image: &Gray<u8>, side: usize) -> Gray<u8> {
     let [width, height] = [image.width(), image.height()];
     let paper = u64::from(u8::MAX);

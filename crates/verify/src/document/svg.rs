@@ -1,3 +1,5 @@
+//! A page as an SVG, rendered by resvg.
+
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -10,13 +12,15 @@ use deltille_core::raster::Gray;
 use deltille_files::export::{Block, SUBPIXELS, supersample};
 use deltille_files::limits::{self, Broken};
 
-/// An SVG, drawn by resvg.
+/// A parsed SVG with its size on paper.
 pub(super) struct Svg {
     tree: usvg::Tree,
+    /// Width and height of the page, mm.
     size_mm: DVec2,
 }
 
 impl Svg {
+    /// Parses an SVG; the error says why that fails, such as a width that is no length.
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
         let text = std::str::from_utf8(bytes).map_err(|_| "not a text file".to_owned())?;
         let xml = roxmltree::Document::parse(text)
@@ -33,15 +37,18 @@ impl Svg {
         Ok(Self { tree, size_mm })
     }
 
+    /// Width and height on paper, mm, as the file states them.
     pub fn size_mm(&self) -> DVec2 {
         self.size_mm
     }
 
+    /// Renders the page at a resolution; after the time `end` the rest stays white. It is an error if
+    /// the renderer panics.
     pub fn render(&self, px_per_mm: f64, end: Option<Instant>) -> Result<Gray<u8>, String> {
         let [width, height] = self.size_mm.to_array().map(|mm| pixels(mm, px_per_mm));
         let scale = px_per_mm * self.size_mm.x / f64::from(self.tree.size().width());
         let mut grey = Vec::with_capacity(width * height);
-        // Blocks are drawn on threads that are not this one.
+        // Blocks are drawn on other threads, where a panic would otherwise end the program.
         let is_broken = AtomicBool::new(false);
         let blank = |block: Block| vec![0; block.width * block.height * SUBPIXELS * SUBPIXELS];
         let coverage = |block| {
@@ -66,6 +73,8 @@ impl Svg {
         }
     }
 
+    /// Coverage by ink, 0 to 255, of the subpixels of a block of the page; `scale` is in px per unit of
+    /// the drawing.
     fn coverage(&self, block: Block, scale: f64) -> Vec<u8> {
         let size = [block.width, block.height].map(|n| (n * SUBPIXELS) as u32);
         let mut pixmap = Pixmap::new(size[0], size[1]).expect("a block has pixels");

@@ -1,3 +1,12 @@
+//! Textured meshes, `.glb` and `.obj`, loaded through the gltf and tobj crates, as other programs
+//! load them.
+//!
+//! Whatever the format, positions are returned in millimetres, and texture coordinates with the
+//! origin in the upper left corner. The files were inspected before, see [`construct`], so that
+//! nothing is interpreted here beyond what every viewer shows alike.
+//!
+//! [`construct`]: crate::construct
+
 use std::io::Cursor;
 use std::path::Path;
 
@@ -11,6 +20,11 @@ use deltille_core::raster::Gray;
 use deltille_files::limits::Limits;
 
 /// Loads a `.glb`, or an `.obj` with its `parts`: material library and texture.
+///
+/// # Errors
+///
+/// The file cannot be read or exceeds the limits, the crate that loads it refuses it, a vertex lacks
+/// its normal or texture coordinate, or there are no triangles or no texture.
 pub(crate) fn load(
     reader: &Reader,
     path: &Path,
@@ -29,15 +43,16 @@ pub(crate) fn load(
     Ok(model)
 }
 
+/// Loads a `.glb`; the error says what is wrong with it.
 fn glb(bytes: &[u8], limits: &Limits) -> Result<Model, String> {
     let file = gltf::Gltf::from_slice(bytes).map_err(|error| format!("not glTF: {error}"))?;
     let blob = file.blob.as_deref().ok_or("it has no binary part")?;
     let mut triangles = Vec::new();
     let mut texture = None;
-    // The crate counts through all nodes for each child.
+    // By index: for each child, the crate would count through all nodes.
     let nodes: Vec<gltf::Node> = file.nodes().collect();
     let roots = file.default_scene().into_iter().flat_map(|scene| scene.nodes());
-    // Every node is reached once, as was seen to before.
+    // Every node is reached once, as was checked before, so this ends.
     let mut open: Vec<(usize, DMat4)> = roots.map(|node| (node.index(), DMat4::IDENTITY)).collect();
     while let Some((index, parent)) = open.pop() {
         let here = visit(&nodes[index], parent, blob, &mut triangles, &mut texture)?;
@@ -48,7 +63,8 @@ fn glb(bytes: &[u8], limits: &Limits) -> Result<Model, String> {
     Ok(Model { triangles, texture: image(texture, limits)? })
 }
 
-/// Adds the triangles of a node, and tells its motion; glTF is in metres.
+/// Adds the triangles of a node, converted from the metres of glTF to mm, and notes its texture;
+/// returns the transform from the node to the scene.
 fn visit<'a>(
     node: &gltf::Node<'a>,
     parent: DMat4,
@@ -83,6 +99,7 @@ fn visit<'a>(
     Ok(here)
 }
 
+/// Loads an `.obj`, which is in mm, with its material library and texture from `parts`.
 fn obj(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, String> {
     let part = |name: &Path| parts.iter().find(|part| Path::new(part.name()) == name);
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
@@ -115,7 +132,8 @@ fn obj(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, Strin
     Ok(Model { triangles, texture: image(texture.bytes(), limits)? })
 }
 
-/// Adds triangles from indexed lists.
+/// Adds the triangles of indexed lists: three entries each of the indices into positions, mm, and of
+/// those into normals and texture coordinates.
 fn add(
     triangles: &mut Vec<Triangle>,
     indices: &[u32],
@@ -144,6 +162,7 @@ fn add(
     Ok(())
 }
 
+/// Decodes a texture to grey values.
 fn image(bytes: &[u8], limits: &Limits) -> Result<Gray<u8>, String> {
     let broken = |error: &dyn std::fmt::Display| format!("its texture: {error}");
     // Only PNG comes so far.

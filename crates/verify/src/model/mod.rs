@@ -12,23 +12,28 @@ pub(super) use load::load;
 pub(super) use stl::{Facet, load_stl};
 pub(super) use view::View;
 
-/// A loaded mesh: textured triangles, mm.
+/// A loaded mesh with one texture, in the target frame.
 pub(super) struct Model {
+    /// Its triangles.
     pub triangles: Vec<Triangle>,
+    /// Its texture as grey values.
     pub texture: Gray<u8>,
 }
 
-/// A triangle as loaded.
+/// A triangle as loaded, with the attributes of its three vertices.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Triangle {
+    /// Positions in the target frame, mm; counter-clockwise from outside.
     pub vertices_mm: [DVec3; 3],
+    /// Stated normals in the target frame.
     pub normals: [DVec3; 3],
-    /// (0,0) is the upper left corner of the texture.
+    /// Texture coordinates, 0 to 1: (0, 0) is the upper left corner of the texture, (1, 1) the lower
+    /// right one.
     pub uv: [DVec2; 3],
 }
 
 impl Triangle {
-    /// Normal by the order of the vertices, of any length.
+    /// Normal that follows from the order of the vertices; its length is twice the area, mm².
     pub fn winding(&self) -> DVec3 {
         let [a, b, c] = self.vertices_mm;
         (b - a).cross(c - a)

@@ -1,3 +1,6 @@
+//! Binary STL, read by code of its own: a header of 80 bytes, the number of triangles, and 50 bytes
+//! for each: normal, three vertices, and two attribute bytes.
+
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
@@ -5,17 +8,24 @@ use glam::{DVec3, Vec3};
 use crate::DocumentError;
 use crate::reader::Reader;
 
-/// Bytes before the triangles of a binary STL, and of a triangle.
+/// Number of bytes before the triangles, and of a triangle.
 const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 
-/// A triangle of an STL, mm.
+/// A triangle of an STL.
 pub(crate) struct Facet {
+    /// The stated normal.
     pub normal: DVec3,
+    /// Positions of its vertices, mm; counter-clockwise from outside.
     pub vertices_mm: [DVec3; 3],
 }
 
-/// Loads a binary STL.
+/// Loads the triangles of a binary STL.
+///
+/// # Errors
+///
+/// The file cannot be read, is too short, has no triangles, or its length is not that of the number
+/// of triangles that it states; text STL is refused by that as well.
 pub(crate) fn load_stl(reader: &Reader, path: &Path) -> Result<Vec<Facet>, DocumentError> {
     let unreadable = |problem: &str| DocumentError::unreadable(path, problem);
     let bytes = reader.read(path)?;
@@ -33,6 +43,7 @@ pub(crate) fn load_stl(reader: &Reader, path: &Path) -> Result<Vec<Facet>, Docum
     Ok(facets.collect())
 }
 
+/// Three numbers in single precision, little endian.
 fn vector(bytes: &[u8; 12]) -> DVec3 {
     let number =
         |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);

@@ -1,24 +1,29 @@
+//! A virtual camera before a loaded mesh: renders it with its texture, and finds the point of the
+//! mesh behind a pixel.
+
 use glam::{DVec2, DVec3};
 
 use super::Model;
 use deltille_core::camera::{Camera, Pose};
 use deltille_core::raster::Gray;
 
-/// Samples per pixel and axis.
+/// Samples per pixel along each axis.
 const SAMPLES: usize = 2;
 
-/// Level around the object.
+/// Grey value around the mesh, between the black and white of the print.
 const BACKGROUND: u8 = 128;
 
 /// A pinhole camera before a loaded mesh.
 pub(crate) struct View {
+    /// The camera; it has no distortion.
     pub camera: Camera,
+    /// Its pose.
     pub camera_from_target: Pose,
 }
 
 impl View {
-    /// The picture of the mesh: the nearest triangle that turns its front to the camera, by the
-    /// order of its vertices, with its texture.
+    /// Renders the mesh: at each sample the texture of the nearest triangle whose front, by the order
+    /// of its vertices, faces the camera. A triangle with a vertex that is not projected is left out.
     pub fn render(&self, model: &Model) -> Gray<u8> {
         let [width, height] = [self.camera.width, self.camera.height].map(|n| n as usize * SAMPLES);
         let mut nearest = vec![0.0f32; width * height];
@@ -52,7 +57,8 @@ impl View {
                     if weights.iter().any(|&w| w < 0.0) {
                         continue;
                     }
-                    // What is affine on the triangle is affine on the screen after division by z.
+                    // Texture coordinates over z and 1/z are affine on the screen, so these are
+                    // interpolated; 1/z also tells which triangle is nearest.
                     let per_z = [0, 1, 2].map(|i| weights[i] / seen[i].z);
                     let inverse_z: f64 = per_z.iter().sum();
                     let at = y * width + x;
@@ -74,7 +80,8 @@ impl View {
         })
     }
 
-    /// The first point of the mesh on the ray of a pixel, in the target frame, mm.
+    /// The first point of a front side of the mesh on the ray of a pixel, in the target frame, mm;
+    /// `None` where the ray hits nothing.
     pub fn meet(&self, model: &Model, pixel: DVec2) -> Option<DVec3> {
         let target_from_camera = self.camera_from_target.inverse();
         let eye = target_from_camera.translation;
@@ -98,6 +105,7 @@ impl View {
     }
 }
 
+/// The three values, if all are there.
 fn all<T: Copy>(values: [Option<T>; 3]) -> Option<[T; 3]> {
     let [a, b, c] = values;
     Some([a?, b?, c?])
