@@ -760,7 +760,9 @@ impl CornerFitter {
         let root = factor.l().try_inverse()?;
         let column = |weights: [f32; PARAMS]| -> Vec<f32> {
             let mut sums = vec![0.0; window.count];
-            for (weight, column) in weights.iter().zip(&self.columns[..ANGLE + K]) {
+            let columns = weights.iter().zip(&self.columns[..ANGLE + K]);
+            // Half of those of a triangle are nothing.
+            for (weight, column) in columns.filter(|(weight, _)| **weight != 0.0) {
                 sums.iter_mut().zip(column).for_each(|(sum, value)| *sum += weight * value);
             }
             sums
@@ -1149,82 +1151,72 @@ fn with_prior<const K: usize>(
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn products<const N: usize>(columns: &mut Columns, count: usize) -> [[f64; N]; N] {
     let padded = count.next_multiple_of(LANES).min(MAX_PIXELS);
+    // All of the last vector, as bits: a choice for each pixel would be a branch.
+    let kept: [u32; LANES] =
+        std::array::from_fn(|k| if padded - LANES + k < count { u32::MAX } else { 0 });
     for column in columns.iter_mut().take(N) {
-        // All of the last vector, which is one comparison.
         if let Some(last) = column[..padded].last_chunk_mut::<LANES>() {
-            for (k, value) in last.iter_mut().enumerate() {
-                *value = if padded - LANES + k < count { *value } else { 0.0 };
+            for (value, kept) in last.iter_mut().zip(kept) {
+                *value = f32::from_bits(value.to_bits() & kept);
             }
         }
     }
     let mut products = [[0.0; N]; N];
     for i in (0..N).step_by(2) {
         for j in (i / 4 * 4..N).step_by(4) {
-            let sums = products_of_blocks(&columns[i..i + 2], &columns[j..j + 4], padded);
-            for (row, sums) in sums.iter().enumerate() {
-                products[i + row][j..j + 4].copy_from_slice(sums);
+            let mut sums = [[0.0; HALF]; 8];
+            products_of_blocks(&columns[i..i + 2], &columns[j..j + 4], padded, &mut sums);
+            for (k, eight) in sums.iter().enumerate() {
+                products[i + k / 4][j + k % 4] = f64::from(sum_of_eight(eight));
             }
         }
     }
     products
 }
 
-/// Products of two columns with four others: eight sums that do not wait for each other.
+/// Lanes of a sum of products: so many of eight sums stay in registers.
+const HALF: usize = LANES / 2;
+
+/// Products of two columns with four others: eight sums that do not wait for each other. They are named one by one so
+/// that each is a vector.
 #[inline(always)]
 fn products_of_blocks(
     two: &[[f32; MAX_PIXELS]],
     four: &[[f32; MAX_PIXELS]],
     count: usize,
-) -> [[f64; 4]; 2] {
-    let first = half_products(two, four, count, 0);
-    let second = half_products(two, four, count, LANES / 2);
-    let mut products = [[0.0; 4]; 2];
-    for (row, sums) in products.iter_mut().enumerate() {
-        let mut fours = [[0.0; LANES / 4]; 4];
-        for (column, four) in fours.iter_mut().enumerate() {
-            let (a, b) = (&first[4 * row + column], &second[4 * row + column]);
-            for k in 0..LANES / 4 {
-                four[k] = (a[k] + b[k]) + (a[k + LANES / 4] + b[k + LANES / 4]);
-            }
-        }
-        for (sum, [a, b, c, d]) in sums.iter_mut().zip(fours) {
-            *sum = f64::from(((a + b) + c) + d);
+    sums: &mut [[f32; HALF]; 8],
+) {
+    let (a, _) = two[0][..count].as_chunks::<HALF>();
+    let (b, _) = two[1][..count].as_chunks::<HALF>();
+    let (c, _) = four[0][..count].as_chunks::<HALF>();
+    let (d, _) = four[1][..count].as_chunks::<HALF>();
+    let (e, _) = four[2][..count].as_chunks::<HALF>();
+    let (f, _) = four[3][..count].as_chunks::<HALF>();
+    let [mut ac, mut ad, mut ae, mut af] = [[0.0; HALF]; 4];
+    let [mut bc, mut bd, mut be, mut bf] = [[0.0; HALF]; 4];
+    for (((((a, b), c), d), e), f) in a.iter().zip(b).zip(c).zip(d).zip(e).zip(f) {
+        for k in 0..HALF {
+            ac[k] += a[k] * c[k];
+            ad[k] += a[k] * d[k];
+            ae[k] += a[k] * e[k];
+            af[k] += a[k] * f[k];
+            bc[k] += b[k] * c[k];
+            bd[k] += b[k] * d[k];
+            be[k] += b[k] * e[k];
+            bf[k] += b[k] * f[k];
         }
     }
-    products
+    *sums = [ac, ad, ae, af, bc, bd, be, bf];
 }
 
-/// The sums of half of the lanes, from one on: so many stay in registers. They are named one by one so that each
-/// is a vector.
+/// Their sum, by halves.
 #[inline(always)]
-fn half_products(
-    two: &[[f32; MAX_PIXELS]],
-    four: &[[f32; MAX_PIXELS]],
-    count: usize,
-    first: usize,
-) -> [[f32; LANES / 2]; 8] {
-    let (a, _) = two[0][..count].as_chunks::<LANES>();
-    let (b, _) = two[1][..count].as_chunks::<LANES>();
-    let (c, _) = four[0][..count].as_chunks::<LANES>();
-    let (d, _) = four[1][..count].as_chunks::<LANES>();
-    let (e, _) = four[2][..count].as_chunks::<LANES>();
-    let (f, _) = four[3][..count].as_chunks::<LANES>();
-    let [mut ac, mut ad, mut ae, mut af] = [[0.0; LANES / 2]; 4];
-    let [mut bc, mut bd, mut be, mut bf] = [[0.0; LANES / 2]; 4];
-    for (((((a, b), c), d), e), f) in a.iter().zip(b).zip(c).zip(d).zip(e).zip(f) {
-        for k in 0..LANES / 2 {
-            let i = first + k;
-            ac[k] += a[i] * c[i];
-            ad[k] += a[i] * d[i];
-            ae[k] += a[i] * e[i];
-            af[k] += a[i] * f[i];
-            bc[k] += b[i] * c[i];
-            bd[k] += b[i] * d[i];
-            be[k] += b[i] * e[i];
-            bf[k] += b[i] * f[i];
-        }
+fn sum_of_eight(lanes: &[f32; HALF]) -> f32 {
+    let mut four = [0.0; HALF / 2];
+    for k in 0..HALF / 2 {
+        four[k] = lanes[k] + lanes[k + HALF / 2];
     }
-    [ac, ad, ae, af, bc, bd, be, bf]
+    (four[0] + four[2]) + (four[1] + four[3])
 }
 
 #[cfg(test)]

@@ -54,8 +54,8 @@ pub const CORNERS: usize = 10;
 const HAT_EVERY: usize = 4;
 
 impl Influence {
-    /// What is the same at opposite pixels, or of opposite sign, of those that have both.
-    fn part(&self, sign: f32) -> Self {
+    /// Pairs of opposite pixels, each of which is the first of one.
+    fn pairs(&self) -> Vec<(usize, usize)> {
         // Where each pixel of the square around the corner is among them.
         let reach =
             self.places.iter().flatten().map(|c| c.unsigned_abs() as i32).max().unwrap_or(0);
@@ -72,21 +72,55 @@ impl Influence {
         }
         let opposite =
             |[u, v]: [i32; 2]| at[index([self.twice_middle[0] - u, self.twice_middle[1] - v])?];
-        let pairs: Vec<(usize, usize)> =
-            (0..self.places.len()).filter_map(|i| Some((i, opposite(self.places[i])?))).collect();
-        let part = |values: &[f32]| -> Vec<f32> {
-            let sum = |&(i, j): &(usize, usize)| values[i] + sign * values[j];
-            pairs.iter().map(|pair| std::f32::consts::FRAC_1_SQRT_2 * sum(pair)).collect()
-        };
-        Self {
-            places: pairs.iter().map(|&(i, _)| self.places[i]).collect(),
-            residuals: part(&self.residuals),
-            on_position: [0, 1].map(|i| part(&self.on_position[i])),
-            hat: self.hat.iter().map(|q| part(q)).collect(),
-            ..*self
-        }
+        let pair = |(i, &place): (usize, &[i32; 2])| Some((i, opposite(place)?));
+        self.places.iter().enumerate().filter_map(pair).collect()
     }
 
+    /// What is the same at opposite pixels, and what is of opposite sign, of those that have both; with the columns of
+    /// the hat matrix where they are asked for.
+    fn parts(&self, with_hat: bool) -> [Part; 2] {
+        let pairs = self.pairs();
+        let mut squares = [1.0, -1.0].map(|_| vec![0.0; pairs.len()]);
+        let [even, odd] = &mut squares;
+        for q in &self.hat {
+            for ((even, odd), &(i, j)) in even.iter_mut().zip(&mut *odd).zip(&pairs) {
+                *even += 0.5 * (q[i] + q[j]).powi(2);
+                *odd += 0.5 * (q[i] - q[j]).powi(2);
+            }
+        }
+        let [even, odd] = squares;
+        [(1.0, even), (-1.0, odd)].map(|(sign, diagonal)| {
+            let part = |values: &[f32]| -> Vec<f32> {
+                let sum = |&(i, j): &(usize, usize)| values[i] + sign * values[j];
+                pairs.iter().map(|pair| std::f32::consts::FRAC_1_SQRT_2 * sum(pair)).collect()
+            };
+            let hat: &[Vec<f32>] = if with_hat { &self.hat } else { &[] };
+            Part {
+                places: pairs.iter().map(|&(i, _)| self.places[i]).collect(),
+                residuals: part(&self.residuals),
+                on_position: [0, 1].map(|i| part(&self.on_position[i])),
+                diagonal,
+                hat: hat.iter().map(|q| part(q)).collect(),
+                noise: self.noise,
+            }
+        })
+    }
+}
+
+/// What is even, or odd, about a corner.
+#[derive(Clone, Debug)]
+struct Part {
+    places: Vec<[i32; 2]>,
+    residuals: Vec<f32>,
+    on_position: [Vec<f32>; 2],
+    /// The diagonal of H.
+    diagonal: Vec<f32>,
+    /// The columns of Q, of one in [`HAT_EVERY`].
+    hat: Vec<Vec<f32>>,
+    noise: f64,
+}
+
+impl Part {
     /// Sum of the squares of the influence.
     fn strength(&self) -> f64 {
         self.on_position.iter().flatten().map(|c| f64::from(c * c)).sum()
@@ -99,11 +133,11 @@ pub fn inflation(corners: &[Influence]) -> f64 {
     if corners.is_empty() {
         return 1.0;
     }
-    let part = |sign| corners.iter().map(|corner| corner.part(sign)).collect::<Vec<Influence>>();
-    let (even, odd) = (part(1.0), part(-1.0));
+    let parts = corners.iter().enumerate().map(|(i, corner)| corner.parts(i % HAT_EVERY == 0));
+    let (even, odd): (Vec<Part>, Vec<Part>) = parts.map(|[even, odd]| (even, odd)).unzip();
     let (mut factor, mut strength) = (both(&even, &odd), 0.0);
     for parts in [even, odd] {
-        let weight: f64 = parts.iter().map(Influence::strength).sum();
+        let weight: f64 = parts.iter().map(Part::strength).sum();
         factor += weight * factor_of(&parts);
         strength += weight;
     }
@@ -112,15 +146,15 @@ pub fn inflation(corners: &[Influence]) -> f64 {
 }
 
 /// The factor of what is even, or odd.
-fn factor_of(parts: &[Influence]) -> f64 {
+fn factor_of(parts: &[Part]) -> f64 {
     let (narrow, rim) = lagged(parts, LAGS_PX[0]);
     let lags = if rim > WIDE { lagged(parts, LAGS_PX[1]).0 } else { narrow };
     uneven(parts) * lags
 }
 
 /// What the even and the odd part have in common: noise of another strength in black than in white.
-fn both(even: &[Influence], odd: &[Influence]) -> f64 {
-    let common = |(even, odd): (&Influence, &Influence)| {
+fn both(even: &[Part], odd: &[Part]) -> f64 {
+    let common = |(even, odd): (&Part, &Part)| {
         let at = |i: usize| {
             let [x, y] = [0, 1].map(|k| even.on_position[k][i] * odd.on_position[k][i]);
             f64::from((x + y) * even.residuals[i] * odd.residuals[i])
@@ -131,12 +165,12 @@ fn both(even: &[Influence], odd: &[Influence]) -> f64 {
 }
 
 /// How much larger residuals are where positions come from.
-fn uneven(corners: &[Influence]) -> f64 {
+fn uneven(corners: &[Part]) -> f64 {
     let (mut seen, mut white) = (0.0, 0.0);
     for corner in corners {
         for i in 0..corner.residuals.len() {
-            let hat: f32 = corner.hat.iter().map(|q| q[i] * q[i]).sum();
-            let square = f64::from(corner.residuals[i].powi(2) / (1.0 - hat).max(0.1));
+            let rest = (1.0 - corner.diagonal[i]).max(0.1);
+            let square = f64::from(corner.residuals[i].powi(2) / rest);
             let influence: f32 = corner.on_position.iter().map(|c| c[i] * c[i]).sum();
             seen += f64::from(influence) * square / corner.noise.powi(2);
             white += f64::from(influence);
@@ -146,7 +180,7 @@ fn uneven(corners: &[Influence]) -> f64 {
 }
 
 /// The part of the lags, and the mean correlation at the largest.
-fn lagged(corners: &[Influence], reach: i32) -> (f64, f64) {
+fn lagged(corners: &[Part], reach: i32) -> (f64, f64) {
     let lags: Vec<[i32; 2]> = (0..=reach)
         .flat_map(|v| (-reach..=reach).map(move |u| [u, v]))
         .filter(|&[u, v]| v > 0 || u > 0)
@@ -156,7 +190,7 @@ fn lagged(corners: &[Influence], reach: i32) -> (f64, f64) {
     let mut influences = vec![0.0; lags.len()];
     let (mut square, mut count, mut white) = (0.0, 0.0, 0.0);
     let hats = corners.len() as f64 / corners.len().div_ceil(HAT_EVERY) as f64;
-    for (i, corner) in corners.iter().enumerate() {
+    for corner in corners {
         let field = Field::of(corner, reach);
         let mask = field.spread([vec![1.0; corner.residuals.len()].as_slice()]);
         let residual = field.spread([corner.residuals.as_slice()]);
@@ -171,7 +205,7 @@ fn lagged(corners: &[Influence], reach: i32) -> (f64, f64) {
             products[k] += field.product(&residual, offset) / variance;
             influences[k] += field.product(&on_position, offset);
         }
-        if i % HAT_EVERY == 0 {
+        if !corner.hat.is_empty() {
             let hat = field.spread(corner.hat.iter().map(Vec::as_slice));
             square += hats * field.product(&hat, 0);
             for (k, lag) in lags.iter().enumerate() {
@@ -200,7 +234,7 @@ struct Field {
 }
 
 impl Field {
-    fn of(corner: &Influence, reach: i32) -> Self {
+    fn of(corner: &Part, reach: i32) -> Self {
         let ends = |i: usize| {
             let values = || corner.places.iter().map(|p| p[i]);
             (values().min().unwrap_or(0), values().max().unwrap_or(0))
