@@ -98,7 +98,7 @@ struct SavedTruth {
     corners: Vec<TruthCorner>,
 }
 
-/// Reads what [`write`] wrote.
+/// Reads what [`write()`] wrote.
 ///
 /// # Errors
 /// When the text is something else, or a field is not valid.
