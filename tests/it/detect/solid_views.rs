@@ -98,43 +98,6 @@ fn corners_are_where_the_truth_says_to_a_five_hundredth_of_a_pixel() {
     assert!(checked > 500, "{checked}");
 }
 
-/// Tags lie on one side of the corners beside them, and draw these along by some thousandths of a pixel. Their
-/// neighbours must not follow: errors of small tiles with little noise are what the covariances say.
-#[test]
-fn corners_do_not_follow_the_errors_of_their_neighbours() {
-    let spec = SolidSpec { edge_mm: 100.0, ..SolidSpec::new(SolidShape::Icosahedron) };
-    let family = Family::shipped("delTag25h7").unwrap();
-    let target = Target::build("small", &TargetSpec::Solid(spec), Some(&family), None).unwrap();
-    let scene = scene_of_target(&target, Some(&family)).unwrap();
-    let camera = Camera::pinhole(1000, 800, 2.0 * (500.0f64 / 1400.0).atan());
-    let config = DetectorConfig::default();
-    let detector = Detector::for_target(&target, Some(&family), config);
-    let mut rng = ChaCha8Rng::seed_from_u64(7);
-    let (mut sum, mut count) = (0.0, 0);
-    for seed in 0..16 {
-        let direction = DVec3::from_array([0; 3].map(|_| rng.random_range(-1.0..1.0)));
-        let pose = Pose::looking_at(direction.normalize() * 700.0, DVec3::ZERO, DVec3::X);
-        let light = Light::default().noise(0.002).seed(seed);
-        let image = scene.render(&camera, &pose, &light).map(|v| (v * 65535.0 + 0.5) as u16);
-        let truth = scene.truth(&camera, &pose, 0.0).corners;
-        let places: BTreeMap<(u32, u32), DVec2> =
-            truth.iter().map(|c| ((c.panel, c.id), DVec2::new(c.x, c.y))).collect();
-        for grid in &detector.detect(&image, "small").grids {
-            for corner in &grid.corners {
-                let (Some(panel), Some(id)) = (grid.panel, corner.id) else { continue };
-                let Some([xx, xy, yy]) = corner.cov else { continue };
-                let off = corner.position() - places[&(panel, id)];
-                let inverse = DMat2::from_cols(DVec2::new(xx, xy), DVec2::new(xy, yy)).inverse();
-                sum += off.dot(inverse * off) / 2.0;
-                count += 1;
-            }
-        }
-    }
-    let mean = sum / f64::from(count);
-    // With bends of the edges as three neighbours show them it is 1.3.
-    assert!(count > 2000 && mean < 1.15, "{mean} of {count} corners");
-}
-
 /// Two objects in one picture, with other ids, are told apart.
 #[test]
 fn two_solids_in_one_picture_are_told_apart() {

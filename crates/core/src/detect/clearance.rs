@@ -13,7 +13,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2};
-use nalgebra::{Matrix6, Vector6};
 
 use super::detection::{Grid, GridCorner};
 use super::local_map::{Bend, LocalMap};
@@ -29,13 +28,6 @@ const BLUR_MARGIN_SIGMAS: f64 = 2.0;
 /// Greatest distance of a corner from the chord of its neighbours, relative to the distance to
 /// them: lenses bend an edge by less than 0.3 rad from one corner to the next.
 const MOST_SAG: f64 = 0.15;
-
-/// Variances of second differences, in those of a corner across the line: of one, and of the means of two and three in
-/// a row, in which most corners cancel.
-const OF_MEANS: [f64; 3] = [6.0, 1.0, 4.0 / 9.0];
-
-/// Likewise of half of a fourth difference, in which a bend that changes linearly cancels too.
-const OF_FOURTHS: f64 = 17.5;
 
 /// Tiles by the id of their panel.
 type TilesOfPanels = BTreeMap<u32, BTreeSet<Tile>>;
@@ -185,27 +177,17 @@ impl Surroundings {
 /// of those of the grid. For a corner whose neighbours are collinear nothing is known, and nothing
 /// counts as clear.
 pub fn surroundings(grid: &Grid, tags: &TagAreas, scale: f64) -> Vec<Surroundings> {
-    let places = Places::of(grid, scale);
-    let bends = Bends::of(grid, &places);
-    surroundings_in(grid, tags, (&places, &bends), 0..grid.corners.len())
+    surroundings_of(grid, tags, scale, 0..grid.corners.len())
 }
 
-/// The surroundings of some of the corners, by their index; their edges are bent as they show by themselves.
+/// The surroundings of some of the corners, by their index.
 pub fn surroundings_of(
     grid: &Grid,
     tags: &TagAreas,
     scale: f64,
     corners: impl Iterator<Item = usize>,
 ) -> Vec<Surroundings> {
-    surroundings_in(grid, tags, (&Places::of(grid, scale), &Bends::default()), corners)
-}
-
-fn surroundings_in(
-    grid: &Grid,
-    tags: &TagAreas,
-    (places, bends): (&Places, &Bends),
-    corners: impl Iterator<Item = usize>,
-) -> Vec<Surroundings> {
+    let places = Places::of(grid, scale);
     let bend = LazyCell::new(|| places.bend(grid));
     let around = |corner: &GridCorner| {
         let vertex = Vertex::new(corner.row, corner.col);
@@ -223,7 +205,7 @@ fn surroundings_in(
             None => map.map_or(DVec2::ZERO, |map| map.along(step)),
         };
         let place = |step| seen(step).or_else(|| beyond(step, seen)).unwrap_or_else(|| usual(step));
-        let edges = edges(grid, (places, bends), vertex, place);
+        let edges = edges(grid, &places, vertex, place);
         let is_inner = grid.kind.steps().iter().all(|&step| seen(step).is_some());
         let mut found = Surroundings { edges, is_inner, ..Default::default() };
         for tile in grid.kind.tiles_around(vertex) {
@@ -305,13 +287,6 @@ impl Places {
         *self.places.get(self.index(vertex)?)?
     }
 
-    /// The second difference across the line along a step through a vertex and both neighbours, to the left of the
-    /// way, px: over the product of the ways to them the line's curvature in the middle.
-    fn sag(&self, vertex: Vertex, step: Vertex) -> Option<f64> {
-        let [a, b, c] = [self.get(vertex - step)?, self.get(vertex)?, self.get(vertex + step)?];
-        Some((c - a).normalize_or_zero().perp_dot(a - 2.0 * b + c))
-    }
-
     fn bend(&self, grid: &Grid) -> Bend {
         let vertices = grid.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
         match grid.kind {
@@ -352,124 +327,25 @@ fn affine(known: impl Iterator<Item = (Vertex, DVec2)>) -> Option<impl Fn(Vertex
     })
 }
 
-/// How the edges of a grid are bent, by second differences across its lines.
-///
-/// A lens makes them a smooth function of row and column, linear where its distortion grows with the cube of the radius,
-/// here quadratic. That, and what differs from it, count as far as they are more than the corners' errors: these
-/// alternate from corner to corner, so fourth differences tell them from bends. Otherwise a corner would follow its
-/// neighbours' errors, among them those that tags beside them make, which have a direction on the board.
-#[derive(Clone, Debug)]
-struct Bends {
-    /// Of each direction, by the terms of [`Self::terms`].
-    smooth: [Vector6<f64>; 3],
-    /// The part that counts of what the mean of one, two and three differs from that.
-    trust: [f64; 3],
-    /// The middle of the grid and half its size, in columns and rows.
-    middle: DVec2,
-    half: f64,
-}
-
-impl Default for Bends {
-    /// Bends that are as they are seen.
-    fn default() -> Self {
-        Self { smooth: [Vector6::zeros(); 3], trust: [1.0; 3], middle: DVec2::ZERO, half: 1.0 }
-    }
-}
-
-impl Bends {
-    fn of(grid: &Grid, places: &Places) -> Self {
-        Self::estimated(grid, places).unwrap_or_default()
-    }
-
-    /// `None` where too few corners lie in a line.
-    fn estimated(grid: &Grid, places: &Places) -> Option<Self> {
-        let steps = &grid.kind.steps()[..grid.kind.steps().len() / 2];
-        let vertices = || grid.corners.iter().map(|corner| Vertex::new(corner.row, corner.col));
-        let count = grid.corners.len() as f64;
-        let place = |v: Vertex| DVec2::new(v.col.into(), v.row.into());
-        let middle = vertices().map(place).sum::<DVec2>() / count;
-        let half = vertices().map(|v| (place(v) - middle).abs().max_element()).fold(1.0, f64::max);
-        let mut found = Self { middle, half, ..Self::default() };
-        let ([mut threes, mut fourths, mut smooths], mut count) = ([0.0; 3], 0.0);
-        for (k, &step) in steps.iter().enumerate() {
-            let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
-            for vertex in vertices() {
-                let Some(sag) = places.sag(vertex, step) else { continue };
-                let terms = found.terms(vertex);
-                normal += terms * terms.transpose();
-                right += sag * terms;
-            }
-            // The terms are no more than 1: what is as small is not determined.
-            let factor = normal.cholesky().filter(|f| f.l_dirty().diagonal().min() > 1e-3)?;
-            found.smooth[k] = factor.solve(&right);
-            let off = |v| Some(places.sag(v, step)? - found.smooth_at(k, v));
-            for vertex in vertices() {
-                let Some(here) = off(vertex) else { continue };
-                smooths += found.smooth_at(k, vertex).powi(2);
-                if let (Some(before), Some(after)) = (off(vertex - step), off(vertex + step)) {
-                    threes += ((before + here + after) / 3.0).powi(2);
-                    fourths += (here - (before + after) / 2.0).powi(2);
-                    count += 1.0;
-                }
-            }
-        }
-        if count == 0.0 {
-            return None;
-        }
-        let of_corners = fourths / count / OF_FOURTHS;
-        let of_bends = (threes / count - OF_MEANS[2] * of_corners).max(0.0);
-        found.trust = OF_MEANS.map(|of_mean| match of_bends + of_mean * of_corners {
-            0.0 => 1.0,
-            all => of_bends / all,
-        });
-        // By chance it is as large as its parameters make it (James and Stein 1961).
-        let parameters = (found.smooth[0].len() * steps.len()) as f64;
-        let by_chance = parameters * OF_MEANS[0] * of_corners;
-        let part = if smooths > 0.0 { (1.0 - by_chance / smooths).max(0.0) } else { 0.0 };
-        found.smooth = found.smooth.map(|smooth| part * smooth);
-        Some(found)
-    }
-
-    /// What a quadratic function of row and column is made of.
-    fn terms(&self, vertex: Vertex) -> Vector6<f64> {
-        let place = DVec2::new(vertex.col.into(), vertex.row.into());
-        let DVec2 { x, y } = (place - self.middle) / self.half;
-        Vector6::new(1.0, x, y, x * x, x * y, y * y)
-    }
-
-    fn smooth_at(&self, k: usize, vertex: Vertex) -> f64 {
-        self.smooth[k].dot(&self.terms(vertex))
-    }
-
-    /// The second difference across the line through a vertex along a step of the given number.
-    fn sag(&self, grid: &Grid, places: &Places, vertex: Vertex, (k, step): (usize, Vertex)) -> f64 {
-        let off = |v: Vertex| Some(places.sag(v, step)? - self.smooth_at(k, v));
-        // Three along a line tell more than one, and where the line is too short the next ones are bent like it.
-        let along = [vertex, vertex + step, vertex - step].into_iter().filter_map(off);
-        let (count, own) = mean(along).unwrap_or_else(|| {
-            let (_, others) =
-                mean(grid.kind.neighbours(vertex).filter_map(off)).unwrap_or_default();
-            (1, others)
-        });
-        self.smooth_at(k, vertex) + self.trust[count - 1] * own
-    }
-}
-
 /// The edges through the corner at `vertex`, along the chords between its neighbours.
 fn edges(
     grid: &Grid,
-    (places, bends): (&Places, &Bends),
+    places: &Places,
     vertex: Vertex,
     place: impl Fn(Vertex) -> DVec2,
 ) -> Vec<Edge> {
     let steps = grid.kind.steps();
-    let edge = |(k, &step): (usize, &Vertex)| {
-        let (ahead, behind) = (place(step), place(Vertex::new(0, 0) - step));
-        let chord = ahead - behind;
+    let at = |v: Vertex| places.get(v);
+    let bend_at = |v: Vertex, step: Vertex| Some(bend([at(v - step)?, at(v)?, at(v + step)?]));
+    let edge = |&step: &Vertex| {
+        let chord = place(step) - place(Vertex::new(0, 0) - step);
+        // Bends change slowly: three along a line tell more than one, and where the line is too short
+        // the next ones are bent like it.
+        let along = [vertex, vertex + step, vertex - step].into_iter();
+        let bend = mean(along.filter_map(|v| bend_at(v, step)))
+            .or_else(|| mean(grid.kind.neighbours(vertex).filter_map(|v| bend_at(v, step))))
+            .unwrap_or(0.0);
         let along = chord.normalize_or_zero();
-        let squared = -along.dot(ahead) * along.dot(behind);
-        let bend = bends.sag(grid, places, vertex, (k, step)) / squared;
-        let bend = if bend.is_finite() { bend } else { 0.0 };
         let off = steps.iter().map(|&other| along.perp_dot(place(other)).abs());
         let across_px = off.sum::<f64>() / rows_apart(grid.kind);
         let angle_rad = chord.to_angle();
@@ -480,7 +356,7 @@ fn edges(
             _ => Edge { angle_rad, bend, across_px },
         }
     };
-    let mut edges: Vec<Edge> = steps[..steps.len() / 2].iter().enumerate().map(edge).collect();
+    let mut edges: Vec<Edge> = steps[..steps.len() / 2].iter().map(edge).collect();
     edges.sort_by(|a, b| a.angle_rad.total_cmp(&b.angle_rad));
     edges
 }
@@ -493,10 +369,19 @@ fn rows_apart(kind: GridKind) -> f64 {
     }
 }
 
-/// How many there are, and their mean.
-fn mean(values: impl Iterator<Item = f64>) -> Option<(usize, f64)> {
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (count, sum) = values.fold((0, 0.0), |(count, sum), value| (count + 1, sum + value));
-    (count > 0).then(|| (count, sum / count as f64))
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+/// Curvature of the parabola through three points in the second, to the left of the way, 1/px.
+fn bend([a, b, c]: [DVec2; 3]) -> f64 {
+    let along = (c - a).normalize_or_zero();
+    let (before, after) = (b - a, c - b);
+    let (t0, t1) = (along.dot(before), along.dot(after));
+    let slopes = along.perp_dot(after) / t1 - along.perp_dot(before) / t0;
+    let bend = 2.0 * slopes / (t0 + t1);
+    if bend.is_finite() { bend } else { 0.0 }
 }
 
 /// The sides of what a tile shows of a tag, positive outside.
@@ -524,9 +409,6 @@ fn line(a: DVec2, b: DVec2, inside: DVec2) -> Line {
 
 #[cfg(test)]
 mod tests {
-    use rand::{Rng, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
     use super::*;
 
     /// A grid of 5 × 5 corners in the picture.
@@ -579,31 +461,6 @@ mod tests {
         let along_row = around[12].edges[0];
         assert!(along_row.angle_rad.abs() < 1e-9, "{along_row:?}");
         assert!((400.0 * along_row.bend - 1.0).abs() < 0.01, "{along_row:?}");
-    }
-
-    /// Lines of a steep view are straight; what bends them are errors.
-    #[test]
-    fn errors_of_corners_bend_no_edges() {
-        let image = |DVec2 { x, y }: DVec2| {
-            let depth = 1.0 + 0.1 * x - 0.05 * y;
-            DVec2::new(300.0 + 30.0 * (x - 0.2 * y) / depth, 200.0 - 25.0 * y / depth)
-        };
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        for kind in [GridKind::Deltille, GridKind::Checker] {
-            let mut grid = grid(kind, image);
-            for corner in &mut grid.corners {
-                let mut error = || rng.random_range(-0.02..0.02);
-                corner.move_to(corner.position() + DVec2::new(error(), error()));
-            }
-            let size = |around: Vec<Surroundings>| {
-                let bends = around.iter().flat_map(|around| &around.edges);
-                bends.map(|edge| edge.bend.powi(2)).sum::<f64>().sqrt()
-            };
-            let nothing = TagAreas::default();
-            let seen = size(surroundings_of(&grid, &nothing, 1.0, 0..25));
-            let bends = size(surroundings(&grid, &nothing, 1.0));
-            assert!(bends < 0.5 * seen, "{kind:?}: {bends} of {seen}");
-        }
     }
 
     #[test]
