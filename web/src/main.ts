@@ -1,0 +1,44 @@
+// The page: four parts, of which one is shown; the address says which, and with what settings.
+import { families } from "./families";
+import { calibrate } from "./calibrate";
+import { el } from "./dom";
+import { drawing } from "./library";
+import { make } from "./make";
+import { see } from "./see";
+import { words } from "./words";
+
+const parts = { make, see, calibrate, families };
+type Part = keyof typeof parts;
+
+const main = document.getElementById("main") as HTMLElement;
+const tabs = document.getElementById("tabs") as HTMLElement;
+const shown = new Map<Part, HTMLElement>();
+
+function asked(): Part {
+  const name = location.hash.slice(1).split("?")[0] ?? "";
+  return name in parts ? (name as Part) : "make";
+}
+
+function show(): void {
+  const part = asked();
+  const page = shown.get(part) ?? parts[part]();
+  shown.set(part, page);
+  main.replaceChildren(page);
+  document.title = `${words.tabs[part]} · ${words.title}`;
+  for (const link of tabs.querySelectorAll("a")) {
+    const isIt = link.dataset.part === part;
+    if (isIt) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+}
+
+for (const part of Object.keys(parts) as Part[]) {
+  const link = el("a", { href: `#${part}`, "data-part": part }, words.tabs[part]);
+  tabs.append(link);
+}
+const footer = document.getElementById("footer") as HTMLElement;
+const version = el("span");
+footer.append(el("p", {}, words.privacy), el("p", {}, version));
+window.addEventListener("hashchange", show);
+show();
+drawing.call("version").then((of) => version.replaceChildren(words.version(of)), () => undefined);

@@ -1,0 +1,11 @@
+// What the parts of the page know of each other.
+import type { Sought } from "./worker";
+
+/** The target of “Make”. */
+export const made = { json: "", name: "" };
+
+/** A photograph that was looked at. */
+export type Shot = { name: string; json: string; corners: number; labelled: boolean };
+
+/** What was seen, and in what. */
+export const seen: { sought: Sought | null; shots: Shot[] } = { sought: null, shots: [] };

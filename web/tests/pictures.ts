@@ -1,0 +1,46 @@
+// What the tests show to the page: photographs of a board, made by the program, and a video of it for the webcam.
+import { execFileSync } from "node:child_process";
+import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { PNG } from "pngjs";
+
+const root = fileURLToPath(new URL("../..", import.meta.url));
+export const program = process.env.DELTILLE_PROGRAM ?? join(root, "target/release/deltille");
+export const folder = join(root, "web/test-results/pictures");
+
+const EYES = ["0,-50,420", "300,60,330", "-90,200,380", "250,280,350", "80,-160,300", "380,200,300", "100,60,330", "-40,20,300", "180,300,300", "330,-80,380"];
+
+export function deltille(...given: string[]): string {
+  return execFileSync(program, given, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
+}
+
+export default function make(): void {
+  mkdirSync(folder, { recursive: true });
+  if (existsSync(join(folder, "../webcam.y4m"))) return;
+  const camera = join(root, "templates/camera.yaml");
+  deltille("board", "--rows", "8", "--cols", "9", "--name", "board", "-o", folder, "--force");
+  EYES.forEach((eye, i) => {
+    deltille("render", join(folder, "board.json"), "--camera", camera, "--eye", eye, "--seed", String(i), "-o", join(folder, `${i}.png`), "--force");
+  });
+  // 640 × 480, twelve pictures of each of a few places, at thirty a second.
+  const small = join(folder, "small.yaml");
+  writeFileSync(small, "width: 640\nheight: 480\nfocal_px: [550, 550]\ncentre_px: [319.5, 239.5]\nmodel: pinhole\ndistortion: []\n");
+  const frames: Buffer[] = [Buffer.from("YUV4MPEG2 W640 H480 F30:1 Ip A1:1 C420jpeg\n")];
+  const chroma = Buffer.alloc((640 * 480) / 2, 128);
+  ["100,-60,380", "250,120,330", "-40,180,340"].forEach((eye, i) => {
+    const path = join(folder, `frame-${i}.png`);
+    deltille("render", join(folder, "board.json"), "--camera", small, "--eye", eye, "--seed", String(i), "-o", path, "--force");
+    const grey = pixels(path);
+    for (let again = 0; again < 20; again++) frames.push(Buffer.from("FRAME\n"), grey, chroma);
+  });
+  writeFileSync(join(folder, "../webcam.y4m"), Buffer.concat(frames));
+}
+
+/** Grey values of a picture. */
+function pixels(path: string): Buffer {
+  const { data } = PNG.sync.read(readFileSync(path));
+  return Buffer.from(data.filter((_, i) => i % 4 === 0));
+}
+
+export const content = (name: string): Buffer => readFileSync(join(folder, name));

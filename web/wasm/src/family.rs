@@ -1,0 +1,67 @@
+//! Codes of tags, looked at and damaged.
+
+use deltille_core::family::{Decoder, Family, shipped_names};
+use wasm_bindgen::prelude::*;
+
+use crate::errors::Raise;
+
+/// The families that are shipped, by their names.
+#[wasm_bindgen]
+pub fn families() -> Vec<String> {
+    shipped_names().into_iter().map(str::to_owned).collect()
+}
+
+/// A family, with what decodes words that were read.
+#[wasm_bindgen]
+pub struct Codes {
+    family: Family,
+    decoder: Decoder,
+}
+
+#[wasm_bindgen]
+impl Codes {
+    /// A shipped family.
+    ///
+    /// # Errors
+    /// In words, where there is none of that name.
+    #[wasm_bindgen(constructor)]
+    pub fn new(name: &str) -> Result<Self, JsError> {
+        let family = Family::shipped(name).raise()?;
+        let decoder = Decoder::new(&family);
+        Ok(Self { family, decoder })
+    }
+
+    /// What is known of it, as JSON: bits, codes, distance, and how many pairs of codes have each distance.
+    pub fn figures(&self) -> String {
+        let family = &self.family;
+        serde_json::json!({
+            "name": family.name(), "bits": family.dimension().bits(), "codes": family.len(),
+            "distance": family.distance(), "correctable": family.correctable(),
+            "kind": family.kind(), "histogram": family.histogram(),
+            "false_positives": family.false_positive_rates(),
+        })
+        .to_string()
+    }
+
+    /// The cells of a tag as JSON: of each its corners on a tile of edge 1 with a border of so many widths of a cell.
+    pub fn cells(&self, border: f64) -> String {
+        let cells = self.family.cells();
+        let bits = self.family.dimension().bits();
+        let all: Vec<Vec<[f64; 2]>> = (0..bits)
+            .map(|bit| cells.corners(bit, border).iter().map(|corner| corner.to_array()).collect())
+            .collect();
+        serde_json::to_string(&all).unwrap_or_default()
+    }
+
+    /// The code of a tag.
+    pub fn code(&self, id: u32) -> Option<u64> {
+        self.family.code(id)
+    }
+
+    /// The tag that a word is nearest to, with its turns and the number of cells that were wrong; nothing where none is
+    /// near enough.
+    pub fn decode(&self, word: u64, max_errors: u32) -> Option<Vec<u32>> {
+        let found = self.decoder.decode(word, max_errors)?;
+        Some(vec![found.id, found.turns.into(), found.errors])
+    }
+}
