@@ -536,6 +536,8 @@ class _Writing:
             self.filesystem.create_dir(f"{root}/{table}", recursive=True)
 
     def __call__(self, both: pa.Table) -> pa.Table:
+        if not len(both):
+            return pa.table({"pictures": [0], "corners": [0], "errors": [0]})
         both = both.combine_chunks()
         pictures = both.select(PICTURES.names).cast(PICTURES)
         pictures = pictures.replace_schema_metadata({**(PICTURES.metadata or {}), ASKED: self.asked})

@@ -8,7 +8,7 @@ use deltille::calibrate::{
 use deltille::export::calibration::Sheet;
 use deltille::export::{comparison, pose};
 use deltille::glam::DVec2;
-use deltille::quantity::edge_mm;
+use deltille::quantity::distance_mm;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
@@ -157,7 +157,8 @@ fn told_significant(is_significant: Option<bool>) -> &'static str {
 /// A distance at which projections are looked at, mm; infinity where none is given.
 pub fn distance(distance_mm: Option<f64>) -> PyResult<Option<f64>> {
     let given = distance_mm.filter(|mm| *mm != f64::INFINITY);
-    let checked = given.map(|mm| number("distance_mm", mm, edge_mm::RANGE, errors::calibration));
+    let checked =
+        given.map(|mm| number("distance_mm", mm, distance_mm::RANGE, errors::calibration));
     checked.transpose()
 }
 

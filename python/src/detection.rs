@@ -492,9 +492,10 @@ type Row = (String, Option<Detection>, Option<String>);
 #[pyfunction]
 pub fn _tables(paths: Vec<PathBuf>, targets: Option<Targets>) -> PyResult<Vec<Row>> {
     let mut files = Vec::new();
+    let first = paths.first().cloned().unwrap_or_default();
     for path in paths {
         if path.is_dir() {
-            files.extend(folder::files(&path).raise(errors::file)?);
+            files.extend(folder::files(&path).raise_of_file(&path, errors::file)?);
         } else {
             let other = folder::beside(&path).filter(|other| !files.contains(other));
             files.extend(other);
@@ -509,7 +510,7 @@ pub fn _tables(paths: Vec<PathBuf>, targets: Option<Targets>) -> PyResult<Vec<Ro
         }
         Err(why) => Ok((picture.image, None, Some(why))),
     };
-    let read = folder::read(&files, &Limits::default()).raise(errors::file)?;
+    let read = folder::read(&files, &Limits::default()).raise_of_file(&first, errors::file)?;
     read.pictures.into_iter().map(row).collect()
 }
 

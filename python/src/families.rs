@@ -14,7 +14,7 @@ use numpy::{PyArray1, PyArrayLike1};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, whole};
-use crate::errors::{self, Raise, raised, unlocked};
+use crate::errors::{self, Raise, RaiseFile, raised, unlocked};
 use crate::interrupt::interruptible;
 
 /// A family of tags: codes with a Hamming distance in all turns.
@@ -55,7 +55,7 @@ impl FamilyChoice {
             Self::Family(family) => Ok((family.name().to_owned(), family)),
             Self::Name(path) => {
                 let name = path.to_string_lossy().into_owned();
-                let found = family::resolve(&name).raise(errors::family)?;
+                let found = family::resolve(&name).raise_of_file(&path, errors::family)?;
                 Ok((name, Arc::new(found)))
             }
         }
@@ -76,7 +76,8 @@ impl Family {
     /// Family
     #[staticmethod]
     fn load(name_or_path: PathBuf) -> PyResult<Self> {
-        let found = family::resolve(&name_or_path.to_string_lossy()).raise(errors::family)?;
+        let found = family::resolve(&name_or_path.to_string_lossy());
+        let found = found.raise_of_file(&name_or_path, errors::family)?;
         Ok(Arc::new(found).into())
     }
 

@@ -192,15 +192,16 @@ pub fn render<'py>(
     let camera = camera.0.clone();
     Limits::default().check_pixels(camera.width, camera.height).raise(errors::camera)?;
     let grey = |name: &str, value| number(name, value, of_full_scale::RANGE, errors::target);
-    let gradient =
-        gradient.map(|parts| vector("gradient", parts, light_gradient::RANGE, errors::target));
+    let gradient = gradient
+        .map(|parts| vector("gradient", parts, light_gradient::RANGE, errors::target))
+        .transpose()?;
     let light = Light::default()
         .blur_px(number("blur_px", blur_px, blur_px::RANGE, errors::target)?)
         .noise(grey("noise", noise)?)
         .white(grey("white", white)?)
         .black(grey("black", black)?)
         .background(grey("background", background)?)
-        .gradient(gradient.unwrap_or(Ok([0.0; 2]))?.into())
+        .gradient(gradient.unwrap_or([0.0; 2]).into())
         .seed(whole("seed", seed, errors::target)?);
     let place = |name: &str, place| vector(name, place, place_mm::RANGE, errors::target);
     let look_at = look_at.map(|at| place("look_at", at)).transpose()?;

@@ -12,7 +12,7 @@ use deltille::camera;
 use deltille::detect;
 use deltille::export::calibration::{Print, Residuals, Sheet};
 use deltille::export::{calibration, rig};
-use deltille::quantity::{edge_mm, print_scale};
+use deltille::quantity::{distance_mm, edge_mm, print_scale};
 use deltille::targets;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -120,8 +120,8 @@ impl How {
         }
         let hold_out = hold_out.map(|every| whole("hold_out", every, errors::calibration));
         let distances_mm = distances_mm.unwrap_or_default();
-        if !distances_mm.iter().all(|mm| (1.0..=1e6).contains(mm)) {
-            return Err(wrong("distances_mm: give distances from 1 mm to 1000 m"));
+        for &mm in &distances_mm {
+            number("distances_mm", mm, distance_mm::RANGE, errors::calibration)?;
         }
         let print_scale = print_scale.map(print_scale_of).transpose()?;
         Ok(Self {
@@ -194,9 +194,6 @@ pub fn named(
         let name = names.as_ref().map(|names| names[index].clone());
         let name = name.or(stem.map(|stem| stem.into_owned())).filter(|name| !name.is_empty());
         let name = name.unwrap_or_else(|| format!("{index:04}"));
-        // Pictures of several folders may have the same file name.
-        let is_taken = names.is_none() && all.iter().any(|(taken, _)| *taken == name);
-        let name = if is_taken { found.image.clone() } else { name };
         let is_same = |(_, other): &&(String, detect::Detection)| {
             !found.grids.is_empty() && found.grids == other.grids
         };

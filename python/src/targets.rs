@@ -281,7 +281,7 @@ impl Target {
             for format in formats.iter().filter(|format| *format != "json") {
                 files.extend(self.made(format, making)?);
             }
-            write_set(&folder, &files, force).raise(errors::file)
+            write_set(&folder, &files, force).raise_of_file(&folder, errors::file)
         })?
     }
 

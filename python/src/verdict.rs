@@ -8,7 +8,7 @@ use deltille::verify::{self, Artifact, Verifier};
 use pyo3::prelude::*;
 use serde_json::Value;
 
-use crate::errors::{self, Raise};
+use crate::errors::{self, Raise, RaiseFile};
 use crate::targets::Target;
 
 /// Content of a file, or where it is.
@@ -34,14 +34,15 @@ impl Verdict {
     ) -> PyResult<Self> {
         let verifier = Verifier::new(&target.target, target.family.as_deref());
         let verifier = verifier.raise(errors::verify)?.stopped_by(stop);
+        let path = Path::new(&name);
         let verdict = match files {
-            None => verifier.verify_path(Path::new(&name)),
+            None => verifier.verify_path(path),
             Some(files) => {
                 let artifact = |(name, bytes): (String, Vec<u8>)| Artifact::new(name, bytes);
                 verifier.verify(&name, &files.into_iter().map(artifact).collect::<Vec<_>>())
             }
         };
-        let verdict = verdict.raise(errors::verify)?;
+        let verdict = verdict.raise_of_file(path, errors::verify)?;
         let record = serde_json::to_value(&verdict).unwrap_or_default();
         Ok(Self { verdict, record })
     }

@@ -44,6 +44,9 @@ def test_errors_are_of_python_with_the_words_of_the_library(tmp_path):
         (deltille.ArgumentError, ValueError, lambda: deltille.Camera(640, 480, 500).project([[1, 2]]), "points: N × 3 are wanted, not 1 × 2"),
         (deltille.MissingFileError, FileNotFoundError, lambda: deltille.Detector(grid="checker").detect_file(tmp_path / "a.png"), "a.png"),
         (deltille.MissingFileError, FileNotFoundError, lambda: deltille.Camera.load(tmp_path / "a.yaml"), "a.yaml"),
+        (deltille.MissingFileError, FileNotFoundError, lambda: deltille.Family.load(tmp_path / "f.json"), "f.json"),
+        (deltille.MissingFileError, FileNotFoundError, lambda: deltille.load_detections(tmp_path / "t.parquet"), "t.parquet"),
+        (deltille.MissingFileError, FileNotFoundError, lambda: deltille.Board(4, 5).verify(tmp_path / "b.pdf"), "b.pdf"),
     ]
     for kind, base, wrong, words in cases:
         with pytest.raises(kind) as raised:

@@ -53,7 +53,10 @@ export function see(): HTMLElement {
     if (value === "made") sought = { target: made.json };
     else if (value === "described" && described) sought = { target: described.json };
     else sought = { grid: value };
-    for (const photo of photos) photo.result = photo.found = null;
+    for (const photo of photos) {
+      photo.result = photo.found = null;
+      photo.error = "";
+    }
     void look();
   }
 
@@ -69,14 +72,10 @@ export function see(): HTMLElement {
     chooser.value = "";
     const target = files.find((file) => file.name.endsWith(".json"));
     const shots = files.filter((file) => file !== target);
-    if (target) {
-      described = { name: target.name, json: await target.text() };
-      photos = photos.concat(shots.map((file) => ({ file, result: null, found: null, error: "" })));
-      offer("described");
-      return;
-    }
     photos = photos.concat(shots.map((file) => ({ file, result: null, found: null, error: "" })));
-    await look();
+    if (!target) return look();
+    described = { name: target.name, json: await target.text() };
+    offer("described");
   }
 
   async function look(): Promise<void> {
@@ -84,8 +83,7 @@ export function see(): HTMLElement {
     seen.sought = of;
     for (const [index, photo] of photos.entries()) {
       if (of !== sought) return;
-      if (photo.result || (photo.error && photo.found)) continue;
-      photo.error = "";
+      if (photo.result || photo.error) continue;
       try {
         photo.result = await looking.call("photograph", of, photo.file.name, new Uint8Array(await photo.file.arrayBuffer()));
         photo.found = JSON.parse(photo.result.json) as Detection;
@@ -155,7 +153,7 @@ export function see(): HTMLElement {
     if (!photo.result || !photo.found) {
       canvas.width = canvas.height = 0;
       hint.hidden = true;
-      told.textContent = `${photo.file.name}: ${figures(photo)}`.replace(`${photo.file.name}: ${photo.file.name}`, photo.file.name);
+      told.textContent = figures(photo);
       return;
     }
     const { width, height, grey, ms, reasons } = photo.result;

@@ -84,7 +84,6 @@ const calls = {
     const { Made } = await maker();
     const made = new Made(settings);
     try {
-      if (format === "json") return inFiles(made.files("json", 300));
       return inFiles(made.files(format, 300));
     } finally {
       made.free();

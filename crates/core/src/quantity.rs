@@ -227,6 +227,8 @@ quantities! {
     dots_per_inch: 1.0 to 1e6 "dpi";
     /// Millimetres in the unit of a mesh.
     unit_mm: 1e-6 to 1e6 "mm";
+    /// How far a point is at which projections are looked at.
+    distance_mm: 1.0 to 1e6 "mm";
     /// The blur of a synthetic picture.
     blur_px: 0.0 to 100.0 "px";
     /// A grey value, or noise, of full scale.

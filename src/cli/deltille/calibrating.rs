@@ -21,6 +21,7 @@ use crate::cli::values::whole;
 use crate::export::calibration::{Print, Residuals};
 use crate::export::camera::FormatError;
 use crate::export::kind::Kind;
+use crate::quantity::distance_mm;
 use crate::report::target_map_svg;
 use crate::targets::{self, Target, parse_length_mm};
 use crate::words::counted;
@@ -301,8 +302,7 @@ pub fn left_out(refused: &[FormatError]) -> Option<ExitCode> {
 /// How far a point is, mm.
 pub fn distance(text: &str) -> Result<f64, String> {
     let mm = parse_length_mm(text).map_err(|error| error.to_string())?;
-    let range = 1.0..=1e6;
-    range.contains(&mm).then_some(mm).ok_or_else(|| format!("{text}: not between 1 mm and 1000 m"))
+    distance_mm::RANGE.check(mm).map_err(|_| format!("{text}: not between 1 mm and 1000 m"))
 }
 
 /// How sure projections are where corners were, a line for each camera of which it is known.

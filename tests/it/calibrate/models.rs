@@ -268,6 +268,10 @@ fn views_that_determine_no_camera_are_refused() {
     let (views, _) = simulated(&truth, 12, 0.8, 5);
     let refused = |views: &[View]| of(views, Model::Radtan).solve().unwrap_err();
     assert!(matches!(refused(&views[..1]), CalibrationError::TooFewViews { found: 1, .. }));
+    let no_panels: [Pose; 0] = [];
+    let calibration = Calibration::new(no_panels).camera("", views.clone(), Model::Radtan);
+    let error = calibration.solve().unwrap_err();
+    assert!(matches!(error, CalibrationError::WrongDetection { .. }), "{error}");
     let mut noise = || 0.0;
     let flat = |z: f64| {
         let rotation = DQuat::from_rotation_x(std::f64::consts::PI);

@@ -177,24 +177,9 @@ impl Made {
         Ok(Self { target, family })
     }
 
-    /// The target of a description: the `.json` that the programs write.
-    ///
-    /// # Errors
-    /// In words, where it is none.
-    pub fn from_json(text: &str) -> Result<Self, JsError> {
-        let target = Target::from_json(text).raise()?;
-        let family = target.family().raise()?;
-        Ok(Self { target, family })
-    }
-
     /// The description.
     pub fn json(&self) -> String {
         self.target.to_json()
-    }
-
-    /// How many pages are printed.
-    pub fn page_count(&self) -> usize {
-        self.target.page_count()
     }
 
     /// How many corners there are.

@@ -71,11 +71,23 @@ impl Calibration {
         Ok(Estimate { held_out: held_out.map(Box::new), ..estimate })
     }
 
+    /// Refuses views of panels whose places are not given.
+    fn check_panels(&self) -> Result<(), CalibrationError> {
+        let views = self.cameras.iter().flat_map(|camera| &camera.views);
+        let mut seen = views.flat_map(|view| view.sightings.iter().map(move |of| (view, of.panel)));
+        let Some((view, panel)) = seen.find(|(_, panel)| panel.index() >= self.panels.len()) else {
+            return Ok(());
+        };
+        let problem = format!("panel {panel} is none of those whose places are given");
+        Err(CalibrationError::WrongDetection { view: view.name.clone(), problem })
+    }
+
     /// [`Self::solve`] without holding anything out.
     pub(super) fn adjusted(&self) -> Result<Estimate, CalibrationError> {
         if self.board_shape && self.panels.len() > 1 {
             return Err(CalibrationError::ShapeOfMany { panels: self.panels.len() });
         }
+        self.check_panels()?;
         if self.stop.is_raised() {
             return Err(CalibrationError::Stopped);
         }
