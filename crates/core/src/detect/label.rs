@@ -256,6 +256,16 @@ impl TagLabeller {
     /// target has no tags. Tags with more than `max_errors` misread cells do not count, where that
     /// is given.
     pub fn new(target: &Target, family: &Family, max_errors: Option<u32>) -> Option<Self> {
+        Self::with_decoder(target, family, max_errors, || Decoder::new(family))
+    }
+
+    /// See [`Self::new`]; the decoder of the whole family is asked for where the target has tags.
+    fn with_decoder(
+        target: &Target,
+        family: &Family,
+        max_errors: Option<u32>,
+        decoder: impl FnOnce() -> Decoder,
+    ) -> Option<Self> {
         let ids: BTreeSet<u32> =
             target.panels.iter().flat_map(|panel| &panel.tags).map(|tag| tag.id).collect();
         let ids: Vec<u32> = ids.into_iter().filter(|&id| family.code(id).is_some()).collect();
@@ -287,7 +297,7 @@ impl TagLabeller {
         (!ids.is_empty()).then(|| Self {
             readers,
             family: family.name().to_owned(),
-            decoder: Decoder::new(family),
+            decoder: decoder(),
             sure_errors: family.correctable() / 2,
             family_words: family.len() * usize::from(family.kind().turns()),
             max_errors,
@@ -740,6 +750,7 @@ fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
 #[cfg(test)]
 mod tests {
     use glam::{DVec2, DVec3};
+    use rayon::prelude::*;
 
     use super::super::grow::PlacedSaddle;
     use super::*;
@@ -755,7 +766,16 @@ mod tests {
     /// What is found of `asked` where the tiles of another target, or of the same, are read without doubt, in the grid
     /// that a picture of it or of its mirror image gives.
     fn found_in(family: &Family, asked: &Target, shown: &Target, flopped: bool) -> TagEvidence {
-        let labeller = TagLabeller::new(asked, family, None).unwrap();
+        found_by(&TagLabeller::new(asked, family, None).unwrap(), family, shown, flopped)
+    }
+
+    /// The same by the labeller of the target that is looked for.
+    fn found_by(
+        labeller: &TagLabeller,
+        family: &Family,
+        shown: &Target,
+        flopped: bool,
+    ) -> TagEvidence {
         let side = |v: Vertex| if flopped { mirrored(v) } else { v };
         let panel = &shown.panels[0];
         let placed = PlacedSaddle { position: DVec2::ZERO, amplitude: 1.0 };
@@ -798,12 +818,17 @@ mod tests {
     fn labels_are_those_of_the_print(first_ids: usize) {
         for name in shipped_names().into_iter().chain(square_names()) {
             let family = Family::shipped(name).unwrap();
-            for first_id in (0..family.len()).step_by(family.len().div_ceil(first_ids)) {
+            let decoder = Decoder::new(&family);
+            let step = family.len().div_ceil(first_ids);
+            (0..family.len().div_ceil(step)).into_par_iter().for_each(|index| {
+                let first_id = index * step;
                 let Some(target) = board(&family, first_id as u32) else {
-                    continue;
+                    return;
                 };
+                let labeller =
+                    TagLabeller::with_decoder(&target, &family, None, || decoder.clone()).unwrap();
                 for flopped in [false, true] {
-                    let found = found_in(&family, &target, &target, flopped).found;
+                    let found = found_by(&labeller, &family, &target, flopped).found;
                     let of = format!("{name}, first id {first_id}, flopped: {flopped}");
                     assert_eq!(found.len(), 1, "{of}");
                     assert_eq!(found[0].mirrored, flopped, "{of}");
@@ -813,7 +838,7 @@ mod tests {
                     assert!(found[0].vertices.iter().all(right), "{of}");
                     assert_eq!(found[0].vertices.len(), target.panels[0].corners.len(), "{of}");
                 }
-            }
+            });
         }
     }
 
