@@ -47,6 +47,7 @@ const NAMED: &[Named] = &[
     named("SkeletonSpec::wall_mm", "deltille icosahedron", "--wall"),
     named("SolidShape::Mesh", "deltille solid", "--mesh"),
     named("SolidSheets::PerFace", "deltille icosahedron", "--per-face"),
+    named("SolidSheets::SeamedNet", "deltille icosahedron", "--allow-seams"),
     named("SolidSpec::board_id", "deltille icosahedron", "--board-id"),
     named("SolidSpec::edge_mm", "deltille icosahedron", "--edge"),
     named("SolidSpec::margin_mm", "deltille icosahedron", "--face-margin"),

@@ -56,7 +56,9 @@ impl Target {
             TargetSpec::Solid(spec) => {
                 let (panels, family) = solid::panels(spec, family)?;
                 let sheets = layout.map(|paper| match paper.solids {
-                    SolidSheets::Net => net::sheets(&name, spec, &panels, family.as_ref(), paper),
+                    SolidSheets::Net | SolidSheets::SeamedNet => {
+                        net::sheets(&name, spec, &panels, family.as_ref(), paper)
+                    }
                     SolidSheets::PerFace => {
                         face_sheet::sheets(&name, spec, &panels, family.as_ref(), paper)
                     }

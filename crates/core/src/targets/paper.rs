@@ -44,9 +44,12 @@ pub struct PaperSpec {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SolidSheets {
-    /// As a net, to be folded.
+    /// As a net, to be folded; where it is larger than the paper, in pieces of whole faces.
     #[default]
     Net,
+    /// As a net, to be folded; where it is larger than the paper, over pages that are joined along seams
+    /// through its tiles.
+    SeamedNet,
     /// Each on a sheet of its own, to be glued on a rigid skeleton.
     PerFace,
 }

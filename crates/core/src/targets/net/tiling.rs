@@ -1,11 +1,11 @@
 //! A net that is larger than the paper, over several pages.
 //!
 //! ```text
-//!   A1────┬┬────┐A2     The sheet is as large as the windows of all pages together. Neighbouring
-//!   │     ││    │       windows overlap; crosses in the overlap are printed on both pages. Rows
-//!   ├─────┼┼────┤ ×     are letters from the top, columns numbers from the left. Windows that
-//!   ├─────┼┼────┤       show nothing of the net are not printed.
-//!   B1────┴┴────┘B2
+//!   1─────┬┬────┐2      The sheet is as large as the windows of all pages together. Neighbouring
+//!   │     ││    │       windows overlap; crosses in the overlap are printed on both pages. Pages
+//!   ├─────┼┼────┤ ×     are numbered row by row from the upper left. Windows that show nothing of
+//!   ├─────┼┼────┤       the net are not printed.
+//!   3─────┴┴────┘4
 //! ```
 
 use glam::DVec2;
@@ -200,17 +200,16 @@ impl Tiling {
                 }
             }
         }
-        let name = |(column, row): (usize, usize)| format!("{}{}", letters(row), column + 1);
-        let pages = shown.iter().map(|&(column, row)| {
+        let pages = shown.iter().enumerate().map(|(index, &(column, row))| {
             let [left, lower, ..] = self.window_mm;
             let window = self.window_on_sheet(column, row);
-            let label = format!("{label} · page {}", name((column, row)));
-            let mut marks = self.page.sheet(0, [0.0; 4], label);
+            let name = format!("{} of {}", index + 1, shown.len());
+            let mut marks = self.page.sheet(0, [0.0; 4], format!("{label} · page {name}"));
             marks.placements.clear();
-            self.explain(&mut marks, name((column, row)), &sheet.lines);
+            self.explain(&mut marks, name, &sheet.lines);
             self.draw_overview(&mut marks, &overview, window);
             SheetPage {
-                label: name((column, row)),
+                label: (index + 1).to_string(),
                 window_mm: self.window_mm,
                 sheet_at_mm: DVec2::new(left - window[0], lower - window[1]),
                 marks,
@@ -272,18 +271,6 @@ impl Tiling {
                 width_mm: FRAME_MM,
             })
         }));
-    }
-}
-
-/// Rows after Z are AA, AB, …
-fn letters(mut row: usize) -> String {
-    let mut letters = String::new();
-    loop {
-        letters.insert(0, char::from(b'A' + (row % 26) as u8));
-        if row < 26 {
-            return letters;
-        }
-        row = row / 26 - 1;
     }
 }
 
