@@ -37,6 +37,7 @@ const NAMED: &[Named] = &[
     named("Limits::max_pixels_per_byte", "deltille verify", "--max-pixels-per-byte"),
     named("Limits::max_seconds", "deltille verify", "--max-seconds"),
     named("PaperSpec::margin_mm", "deltille board", "--margin"),
+    named("PaperSpec::poster", "deltille board", "--poster"),
     named("PaperSpec::size", "deltille board", "--paper"),
     named("Print::scale", "deltille calibrate", "--print-scale"),
     named("Region::Image", "deltille compare", "--region image"),

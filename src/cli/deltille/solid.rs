@@ -277,6 +277,7 @@ impl Args {
                 (false, true) => SolidSheets::SeamedNet,
                 (false, false) => SolidSheets::Net,
             },
+            ..PaperSpec::default()
         })
     }
 

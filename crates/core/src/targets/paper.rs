@@ -38,6 +38,8 @@ pub struct PaperSpec {
     pub margin_mm: f64,
     /// How the faces of a solid are printed.
     pub solids: SolidSheets,
+    /// Whether a board that is larger than the paper is printed over several pages.
+    pub poster: bool,
 }
 
 /// How the faces of a solid are printed.
@@ -61,6 +63,7 @@ impl Default for PaperSpec {
             orientation: Orientation::Auto,
             margin_mm: DEFAULT_MARGIN_MM,
             solids: SolidSheets::default(),
+            poster: false,
         }
     }
 }

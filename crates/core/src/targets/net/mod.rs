@@ -19,10 +19,9 @@
 //! than the paper stays in one piece, over several pages that are joined first.
 
 mod nest;
-mod plane;
+pub(super) mod plane;
 mod sheet;
 mod tabs;
-mod tiling;
 mod unfold;
 
 pub(super) use sheet::sheets;

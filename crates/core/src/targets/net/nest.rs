@@ -202,7 +202,9 @@ impl Page {
 
     fn is_free(&self, stamp: &Stamp, [x, y]: [usize; 2]) -> bool {
         let mut rows = self.rows[y..].iter().zip(&stamp.rows);
-        rows.all(|(taken, cells)| shifted(cells, x).all(|(at, word)| word == 0 || taken[at] & word == 0))
+        rows.all(|(taken, cells)| {
+            shifted(cells, x).all(|(at, word)| word == 0 || taken[at] & word == 0)
+        })
     }
 
     fn take(&mut self, stamp: &Stamp, [x, y]: [usize; 2]) {

@@ -7,13 +7,13 @@ use glam::DVec2;
 use super::nest::{self, Outline, Place};
 use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
-use super::tiling;
 use super::unfold::{self, Piece, Side, Sides};
 use crate::lattice::Vertex;
 use crate::targets::face_sheet::edge_numbers;
 use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use crate::targets::length::format_mm;
 use crate::targets::paper::{PaperSize, PaperSpec, SolidSheets};
+use crate::targets::poster::Poster;
 use crate::targets::{
     Face, FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine,
     SheetText, SolidSpec, TargetError,
@@ -128,24 +128,45 @@ fn seamed(
         let problem = "the faces leave no room for glue tabs: take `SolidSheets::PerFace`";
         return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
     };
-    let tiles: Vec<(u32, [DVec2; 3])> =
-        drawing.panels.iter().map(|panel| (panel.id, tiles_outline(panel))).collect();
     let count = net.pieces.len();
     let pieces = net.pieces.iter().zip(&net.tabs).enumerate();
     pieces
         .map(|(index, (piece, tabs))| {
-            let points = points(piece, tabs);
-            let tiling = tiling::Tiling::new(spec, &points, paper)?;
-            let mut sheet = tiling.sheet();
-            drawing.draw(&mut sheet, piece, tabs, &tiling.sheet_from_net());
+            let poster = Poster::new(&points(piece, tabs), paper)?;
+            check_size(&poster, spec, paper)?;
+            let mut sheet = poster.sheet();
+            drawing.draw(&mut sheet, piece, tabs, &poster.sheet_from_points());
             let of = match count {
                 1 => "net".to_owned(),
                 _ => format!("net, piece {} of {count}", index + 1),
             };
-            tiling.add_pages(&mut sheet, &tiles, &drawing.label(&of));
+            let tiles = sheet.placements.iter().filter_map(|placement| {
+                let panel = drawing.panels.iter().find(|panel| panel.id == placement.panel)?;
+                Some(tiles_outline(panel).map(|p| placement.page_from_panel(p)).to_vec())
+            });
+            let (tiles, lines) = (tiles.collect(), sheet.lines.clone());
+            let words = |at: DVec2, room: f64| instructions(&lines, at, room).to_vec();
+            poster.add_pages(&mut sheet, tiles, &lines, &drawing.label(&of), words);
             Ok(sheet)
         })
         .collect()
+}
+
+/// Refuses a net of more pages than can be assembled and verified.
+fn check_size(poster: &Poster, spec: &SolidSpec, paper: &PaperSpec) -> Result<(), TargetError> {
+    let excess = poster.excess();
+    if excess <= 1.0 {
+        return Ok(());
+    }
+    let edge = (spec.edge_mm / excess.sqrt() * 0.95).floor();
+    let problem = format!(
+        "the net of a solid with {} edges takes {} pages of {}, more than can be assembled and verified: take \
+         `SolidSheets::PerFace`, `SolidSpec::edge_mm` of at most {edge} mm, or larger `PaperSpec::size`",
+        format_mm(spec.edge_mm),
+        poster.windows(),
+        Poster::paper_size(paper),
+    );
+    Err(TargetError::invalid("SolidSpec::edge_mm", problem))
 }
 
 /// Pieces of whole faces, nested on pages: on the smallest paper that takes them all, or on as few pages as will do of the
@@ -494,7 +515,7 @@ impl<'a> Drawing<'a> {
 
 /// How to make the solid from a print of these lines, two lines of text; the lower one stands at
 /// `at`.
-pub(super) fn instructions(lines: &[SheetLine], at: DVec2, room: f64) -> [SheetText; 2] {
+fn instructions(lines: &[SheetLine], at: DVec2, room: f64) -> [SheetText; 2] {
     let has = |kind| lines.iter().any(|line| line.kind == kind);
     let mut folds = if has(LineKind::Valley) {
         "Cut along solid lines. Score and fold dashed lines away from the print, dash-dotted ones \
