@@ -225,7 +225,12 @@ fn nested(
                 drawing.draw(&mut sheet, piece, tabs, &page_from_net);
             }
             let at = DVec2::new(left, lower + BLANK_MM);
-            drawing.explain(&mut sheet, at, right - BLANK_MM, (count > 1).then(|| [number, count]));
+            drawing.explain(
+                &mut sheet,
+                at,
+                right - BLANK_MM,
+                (count > 1).then_some([number, count]),
+            );
             sheet
         };
         return Ok((0..count).map(sheet).collect());
