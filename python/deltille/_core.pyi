@@ -148,6 +148,7 @@ class Board(Target):
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
+        poster: bool = False,
         name: str = "board",
     ) -> Board: ...
 
@@ -170,6 +171,7 @@ class Checkerboard(Target):
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
+        poster: bool = False,
         name: str = "checkerboard",
     ) -> Checkerboard: ...
 
@@ -191,6 +193,7 @@ class Tetrahedron(Target):
         wall_mm: float | None = None,
         rib_mm: float | None = None,
         per_face: bool = False,
+        allow_seams: bool = False,
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
@@ -215,6 +218,7 @@ class Octahedron(Target):
         wall_mm: float | None = None,
         rib_mm: float | None = None,
         per_face: bool = False,
+        allow_seams: bool = False,
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
@@ -239,6 +243,7 @@ class Icosahedron(Target):
         wall_mm: float | None = None,
         rib_mm: float | None = None,
         per_face: bool = False,
+        allow_seams: bool = False,
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,
@@ -266,6 +271,7 @@ class Solid(Target):
         wall_mm: float | None = None,
         rib_mm: float | None = None,
         per_face: bool = False,
+        allow_seams: bool = False,
         paper: str | None = None,
         orientation: Orientation = "auto",
         margin_mm: float | None = None,

@@ -28,6 +28,7 @@ pub fn paper(
         orientation: orientation.parse().raise(errors::target)?,
         margin_mm: margin_mm.unwrap_or(DEFAULT_MARGIN_MM),
         solids,
+        ..PaperSpec::default()
     })
 }
 
@@ -136,6 +137,8 @@ pub fn spacing_of(tag_spacing: Option<i64>) -> PyResult<Option<u32>> {
 ///     ``"auto"``, ``"portrait"`` or ``"landscape"``.
 /// margin_mm : float, optional
 ///     Blank along the edges of the paper, mm.
+/// poster : bool, optional
+///     Whether a board that is larger than the paper is printed over several pages, to be joined.
 /// name : str, optional
 ///     Stem of the names of its files, printed on the sheet.
 ///
@@ -158,7 +161,7 @@ impl Board {
     #[new]
     #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags = true, tag_spacing = None,
         tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
-        orientation = "auto", margin_mm = None, name = "board"))]
+        orientation = "auto", margin_mm = None, poster = false, name = "board"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         rows: i64,
@@ -175,9 +178,11 @@ impl Board {
         paper: Option<&str>,
         orientation: &str,
         margin_mm: Option<f64>,
+        poster: bool,
         name: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let paper = self::paper(paper, orientation, margin_mm, SolidSheets::default())?;
+        let paper = PaperSpec { poster, ..paper };
         let spacing = spacing_of(tag_spacing)?;
         let first_id = whole("first_id", first_id, errors::target)?;
         let of_tags =
@@ -209,7 +214,7 @@ impl Board {
 ///     ``"aprilTag36h11"``, ``"aprilTag25h9"`` or ``"aprilTag16h5"``; no tags if left out.
 /// tags_in : str, optional
 ///     Squares that carry the tags, ``"black"`` or ``"white"``.
-/// tag_spacing, tag_border, first_id, boards, board_id, inverted, paper, orientation, margin_mm, name
+/// tag_spacing, tag_border, first_id, boards, board_id, inverted, paper, orientation, margin_mm, poster, name
 ///     As of :class:`Board`.
 #[pyclass(frozen, extends = Target, module = "deltille")]
 pub struct Checkerboard;
@@ -219,7 +224,7 @@ impl Checkerboard {
     #[new]
     #[pyo3(signature = (rows, cols, *, edge_mm = None, family = None, tags_in = "black", tag_spacing = None,
         tag_border = None, first_id = 0, boards = 1, board_id = 0, inverted = false, paper = None,
-        orientation = "auto", margin_mm = None, name = "checkerboard"))]
+        orientation = "auto", margin_mm = None, poster = false, name = "checkerboard"))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         rows: i64,
@@ -236,6 +241,7 @@ impl Checkerboard {
         paper: Option<&str>,
         orientation: &str,
         margin_mm: Option<f64>,
+        poster: bool,
         name: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let tags_in = match tags_in {
@@ -261,7 +267,10 @@ impl Checkerboard {
             board_id: whole("board_id", board_id, errors::target)?,
             inverted,
             name: name.to_owned(),
-            paper: self::paper(paper, orientation, margin_mm, SolidSheets::default())?,
+            paper: PaperSpec {
+                poster,
+                ..self::paper(paper, orientation, margin_mm, SolidSheets::default())?
+            },
         };
         Ok(PyClassInitializer::from(wanted.make()?).add_subclass(Self))
     }

@@ -76,6 +76,9 @@ macro_rules! solid {
         ///     Sizes of that frame, mm.
         /// per_face : bool, optional
         ///     Whether each face is printed on a sheet of its own instead of a net.
+        /// allow_seams : bool, optional
+        ///     Whether a net that is larger than the paper stays in one piece, over pages that are joined along seams \
+        ///     through its tiles, instead of in pieces of whole faces.
         /// paper, orientation, margin_mm, name
         ///     As of :class:`Board`.
         #[pyclass(frozen, extends = Target, module = "deltille")]
@@ -86,7 +89,7 @@ macro_rules! solid {
             #[new]
             #[pyo3(signature = (*, edge_mm = None, tiles = None, face_margin_mm = None, family = None,
                 tag_spacing = None, tag_border = None, first_id = 0, board_id = 0, skeleton = false,
-                panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, paper = None,
+                panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, allow_seams = false, paper = None,
                 orientation = "auto", margin_mm = None, name = None))]
             #[expect(clippy::too_many_arguments, reason = "keywords")]
             fn new(
@@ -103,6 +106,7 @@ macro_rules! solid {
                 wall_mm: Option<f64>,
                 rib_mm: Option<f64>,
                 per_face: bool,
+                allow_seams: bool,
                 paper: Option<&str>,
                 orientation: &str,
                 margin_mm: Option<f64>,
@@ -118,7 +122,7 @@ macro_rules! solid {
                     board_id: whole("board_id", board_id, errors::target)?,
                     skeleton: frame(skeleton, sizes)?,
                     name,
-                    paper: paper_of(paper, orientation, margin_mm, sheets(per_face))?,
+                    paper: paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?,
                 };
                 Ok(PyClassInitializer::from(solids.make()?).add_subclass(Self))
             }
@@ -137,8 +141,15 @@ fn tags_of(
     Ok(Tags { family, tags_in: TagsIn::Black, spacing, border_bits, first_id })
 }
 
-fn sheets(per_face: bool) -> SolidSheets {
-    if per_face { SolidSheets::PerFace } else { SolidSheets::Net }
+fn sheets(per_face: bool, allow_seams: bool) -> PyResult<SolidSheets> {
+    match (per_face, allow_seams) {
+        (false, false) => Ok(SolidSheets::Net),
+        (false, true) => Ok(SolidSheets::SeamedNet),
+        (true, false) => Ok(SolidSheets::PerFace),
+        (true, true) => Err(errors::argument(
+            "allow_seams: single faces have no seams: leave per_face out".to_owned(),
+        )),
+    }
 }
 
 /// The skeleton that is asked for; its sizes say nothing without it.
@@ -180,7 +191,7 @@ solid!(
 /// edge_mm : float, optional
 ///     Mean edge to which the mesh is scaled, mm; as it is if left out.
 /// tiles, face_margin_mm, family, tag_spacing, tag_border, first_id, board_id, skeleton, panel_thickness_mm, wall_mm, \
-/// rib_mm, per_face, paper, orientation, margin_mm, name
+/// rib_mm, per_face, allow_seams, paper, orientation, margin_mm, name
 ///     As of :class:`Icosahedron`.
 #[pyclass(frozen, extends = Target, module = "deltille")]
 pub struct Solid;
@@ -190,7 +201,7 @@ impl Solid {
     #[new]
     #[pyo3(signature = (mesh, *, scale = 1.0, allow_skew = false, edge_mm = None, tiles = None,
         face_margin_mm = None, family = None, tag_spacing = None, tag_border = None, first_id = 0, board_id = 0,
-        skeleton = false, panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, paper = None,
+        skeleton = false, panel_thickness_mm = None, wall_mm = None, rib_mm = None, per_face = false, allow_seams = false, paper = None,
         orientation = "auto", margin_mm = None, name = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn new(
@@ -210,6 +221,7 @@ impl Solid {
         wall_mm: Option<f64>,
         rib_mm: Option<f64>,
         per_face: bool,
+        allow_seams: bool,
         paper: Option<&str>,
         orientation: &str,
         margin_mm: Option<f64>,
@@ -226,7 +238,7 @@ impl Solid {
             board_id: whole("board_id", board_id, errors::target)?,
             skeleton: frame(skeleton, sizes)?,
             name: Some(name.unwrap_or(stem)),
-            paper: paper_of(paper, orientation, margin_mm, sheets(per_face))?,
+            paper: paper_of(paper, orientation, margin_mm, sheets(per_face, allow_seams)?)?,
         };
         Ok(PyClassInitializer::from(solids.make()?).add_subclass(Self))
     }

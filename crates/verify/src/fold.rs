@@ -156,14 +156,20 @@ pub(super) fn check(target: &Target, seen: &[Seen], verdicts: &mut [SheetVerdict
     let mut misplaced = false;
     let mut deviations = vec![0.0f64; verdicts.len()];
     for sheet in 0..seen.len() {
-        let members: Vec<usize> =
-            (0..net.faces.len()).filter(|&face| net.faces[face].sheet == sheet).collect();
-        let folded = net.best_fold(&members);
-        misplaced |= folded.misplaced;
-        deviations[sheet] = folded.deviation_mm;
-        verdicts[sheet].findings.extend(folded.findings.into_iter().map(Finding::from));
-        for (face, at) in folded.places {
-            carried[face] = Some(at.space_from_page);
+        for (index, members) in net.pieces(sheet).into_iter().enumerate() {
+            if index > 0 && net.is_broken_off(&members) {
+                misplaced = true;
+                let loose = |face: usize| FoldFinding::FaceLoose { panel: net.faces[face].panel };
+                verdicts[sheet].findings.extend(members.into_iter().map(loose).map(Finding::from));
+                continue;
+            }
+            let folded = net.best_fold(&members);
+            misplaced |= folded.misplaced;
+            deviations[sheet] = deviations[sheet].max(folded.deviation_mm);
+            verdicts[sheet].findings.extend(folded.findings.into_iter().map(Finding::from));
+            for (face, at) in folded.places {
+                carried[face] = Some(at.space_from_page);
+            }
         }
     }
     // Edges of faces that lie in each other's places would only repeat that.
@@ -274,7 +280,7 @@ struct Place {
     space_from_page: SpaceFromPage,
 }
 
-/// The faces of a sheet after folding.
+/// The faces of a piece after folding.
 struct Folded {
     /// Index of each face that was reached, and its place.
     places: Vec<(usize, Place)>,
@@ -432,7 +438,36 @@ impl Net {
         }
     }
 
-    /// Folds the faces of a sheet, `members`, about several roots and returns the result with the
+    /// The pieces of a sheet: faces that hang together by folds, the largest piece first.
+    fn pieces(&self, sheet: usize) -> Vec<Vec<usize>> {
+        let mut left: BTreeSet<usize> =
+            (0..self.faces.len()).filter(|&face| self.faces[face].sheet == sheet).collect();
+        let mut pieces = Vec::new();
+        while let Some(first) = left.pop_first() {
+            let mut piece = vec![first];
+            let mut next = 0;
+            while let Some(&face) = piece.get(next) {
+                let beside = (0..3).filter_map(|side| self.folds.get(&(face, side)));
+                piece.extend(beside.filter(|(face, _)| left.remove(face)).map(|(face, _)| *face));
+                next += 1;
+            }
+            piece.sort_unstable();
+            pieces.push(piece);
+        }
+        pieces.sort_by_key(|piece| std::cmp::Reverse(piece.len()));
+        pieces
+    }
+
+    /// Whether faces lack the fold by which they belong to another piece: whether a side of theirs is neither folded nor
+    /// numbered.
+    fn is_broken_off(&self, members: &[usize]) -> bool {
+        let mut sides = members.iter().flat_map(|&face| (0..3).map(move |side| (face, side)));
+        sides.any(|(face, side)| {
+            !self.folds.contains_key(&(face, side)) && self.faces[face].numbers[side].is_empty()
+        })
+    }
+
+    /// Folds the faces of a piece, `members`, about several roots and returns the result with the
     /// fewest findings: if a misprinted face is the root, all others are off.
     fn best_fold(&self, members: &[usize]) -> Folded {
         let mut best: Option<Folded> = None;

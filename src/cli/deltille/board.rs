@@ -106,5 +106,11 @@ fn summary(target: &Target) -> String {
         let last = ids.next_back().unwrap_or(first);
         text += &format!(", {} {}", family.name, id_range(first, last));
     }
-    text + &format!(", page {} × {} mm", sheet.width_mm, sheet.height_mm)
+    let page = sheet.pages.first().map_or(sheet, |page| &page.marks);
+    let [width, height] = [page.width_mm, page.height_mm].map(|mm| (mm * 1e3).round() / 1e3);
+    let pages = match sheet.page_count() {
+        1 => "page".to_owned(),
+        count => format!("{count} pages"),
+    };
+    text + &format!(", {pages} {width} × {height} mm")
 }

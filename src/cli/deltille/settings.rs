@@ -83,6 +83,10 @@ pub struct Settings {
     /// to A0 that takes the board]
     #[arg(long, value_name = "SIZE")]
     paper: Option<String>,
+    /// Print a board that is larger than the paper over several pages, to be joined
+    #[arg(long)]
+    #[serde(skip_serializing_if = "is_false")]
+    poster: bool,
     /// auto, portrait or landscape [default: auto]
     #[arg(long)]
     orientation: Option<String>,
@@ -204,6 +208,7 @@ impl Settings {
             boards: self.boards.or(template.boards),
             invert: self.invert || template.invert,
             paper: self.paper.or(template.paper),
+            poster: self.poster || template.poster,
             orientation: self.orientation.or(template.orientation),
             margin: self.margin.or(template.margin),
             pdf: self.pdf || (template.pdf && !formats),
@@ -233,6 +238,7 @@ impl Settings {
                 None => Default::default(),
             },
             margin_mm: length("margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
+            poster: self.poster,
             ..PaperSpec::default()
         };
         if grid == GridKind::Deltille && self.tags_in.is_some() {

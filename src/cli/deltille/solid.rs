@@ -95,6 +95,10 @@ pub struct Args {
     /// Print each face on a sheet of its own, to be glued on a rigid skeleton, instead of the net
     #[arg(long)]
     per_face: bool,
+    /// Print a net that is larger than the paper in one piece, over pages that are joined along seams
+    /// through its tiles, instead of in pieces of whole faces
+    #[arg(long, conflicts_with = "per_face")]
+    allow_seams: bool,
     /// Write <name>.dsc, for the reference detector or its fork
     #[arg(long)]
     dsc: bool,
@@ -105,7 +109,7 @@ pub struct Args {
     #[arg(long, value_parser = whole(200..=2400u32))]
     dpi: Option<u32>,
     /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm; a net that is larger is
-    /// printed on several pages [default: the smallest of A4 to A0 that takes it, else A0]
+    /// printed in several pieces of whole faces [default: the smallest of A4 to A0 that takes it, else A0]
     #[arg(long, value_name = "SIZE")]
     paper: Option<String>,
     /// auto, portrait or landscape [default: auto]
@@ -212,6 +216,7 @@ impl Args {
             ("--orientation", self.orientation.is_some()),
             ("--margin", self.margin.is_some()),
             ("--per-face", self.per_face),
+            ("--allow-seams", self.allow_seams),
         ];
         match layout.into_iter().find(|(_, given)| *given) {
             Some((option, _)) if !(self.printed() || self.dxf) => {
@@ -267,7 +272,12 @@ impl Args {
                 None => Default::default(),
             },
             margin_mm: length("--margin", &self.margin)?.unwrap_or(DEFAULT_MARGIN_MM),
-            solids: if self.per_face { SolidSheets::PerFace } else { SolidSheets::Net },
+            solids: match (self.per_face, self.allow_seams) {
+                (true, _) => SolidSheets::PerFace,
+                (false, true) => SolidSheets::SeamedNet,
+                (false, false) => SolidSheets::Net,
+            },
+            ..PaperSpec::default()
         })
     }
 

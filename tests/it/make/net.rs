@@ -10,7 +10,8 @@ use deltille::artwork::{self, Artwork, Part};
 use deltille::export::{pdf, png, sheet_file_name, svg};
 use deltille::family::Family;
 use deltille::targets::{
-    Label, LineKind, PaperSpec, SheetText, SolidShape, SolidSpec, Target, TargetSpec,
+    BoardSpec, Label, LineKind, PaperSpec, SheetText, SolidShape, SolidSheets, SolidSpec, Target,
+    TargetSpec,
 };
 use deltille::verify::{Finding, FoldFinding, Verdict, Verifier};
 use glam::DVec2;
@@ -32,7 +33,14 @@ fn net(paper: &PaperSpec) -> Target {
     Target::build("t", &TargetSpec::Solid(spec), Some(&family()), Some(paper)).unwrap()
 }
 
+/// On four pages that are joined.
 fn tiled() -> Target {
+    let size = Some("100x150mm".parse().unwrap());
+    net(&PaperSpec { size, solids: SolidSheets::SeamedNet, ..PaperSpec::default() })
+}
+
+/// In pieces of whole faces.
+fn in_pieces() -> Target {
     net(&PaperSpec { size: Some("100x150mm".parse().unwrap()), ..PaperSpec::default() })
 }
 
@@ -70,6 +78,50 @@ fn a_net_is_proved_in_every_format_on_one_page_and_on_several() {
             assert!(fold.edges == 6 && fold.max_deviation_mm < 0.02, "{fold:?}");
         }
     }
+}
+
+#[test]
+fn a_net_in_pieces_is_proved_and_folded_across_its_sheets() {
+    let target = in_pieces();
+    assert!(target.sheets.len() > 1);
+    assert!(target.sheets.iter().all(|sheet| sheet.pages.is_empty()));
+    for extension in ["pdf", "svg", "png"] {
+        let verdict = verify(&target, &draw(&target), extension);
+        assert!(verdict.passed, "{verdict}");
+    }
+    let verdict = verify(&target, &draw(&target), "pdf");
+    let edges: usize = verdict.sheets.iter().map(|sheet| sheet.fold.unwrap().edges).sum();
+    assert_eq!(edges, 6);
+    // A number that leads from one sheet to another.
+    let mut renumbered = target.clone();
+    let texts = &mut renumbered.sheets[0].texts;
+    texts.iter_mut().find(|text| is_of_edge(text)).unwrap().text = Label::Edge(9);
+    let verdict = verify(&renumbered, &draw(&renumbered), "pdf");
+    assert!(!verdict.passed, "{verdict}");
+}
+
+#[test]
+fn a_board_larger_than_the_paper_is_a_poster() {
+    let size = Some("100x150mm".parse().unwrap());
+    let paper = PaperSpec { size, poster: true, ..PaperSpec::default() };
+    let spec = TargetSpec::Board(BoardSpec::deltille(5, 6, 25.0));
+    let target = Target::build("t", &spec, Some(&family()), Some(&paper)).unwrap();
+    assert_eq!((target.sheets.len(), target.page_count()), (1, 4));
+    assert_eq!(Target::from_json(&target.to_json()).unwrap(), target);
+    for extension in ["pdf", "svg", "png"] {
+        let verdict = verify(&target, &draw(&target), extension);
+        assert!(verdict.passed, "{verdict}");
+        assert_eq!((verdict.sheets[0].corners_found, verdict.sheets[0].pages), (30, 4));
+    }
+    let mut shifted = draw(&target);
+    for shape in &mut shifted.sheets[1].shapes {
+        shape.path = Affine::translate((0.4, 0.0)) * &shape.path;
+    }
+    assert_found(&verify(&target, &shifted, "pdf"), [json!({ "kind": "pages_differ" })]);
+    // Without it, the board is refused.
+    let paper = PaperSpec { poster: false, ..paper };
+    let error = Target::build("t", &spec, Some(&family()), Some(&paper)).unwrap_err();
+    assert!(error.to_string().contains("`PaperSpec::poster`"), "{error}");
 }
 
 /// The panel of another placement in the place of this one, as if the layout were wrong.
@@ -207,7 +259,7 @@ fn pages_that_do_not_join_are_found() {
     let own = |part: Part| matches!(part, Part::Label { index } if index >= texts);
     unnamed.sheets[2].shapes.retain(|shape| !own(shape.part));
     let finding = json!({ "kind": "text_differs", "text": 1 });
-    let on_page = json!({ "kind": "on_page", "page": "B1", "finding": finding });
+    let on_page = json!({ "kind": "on_page", "page": "3", "finding": finding });
     assert_found(&verify(&target, &unnamed, "svg"), [on_page]);
 }
 
@@ -243,7 +295,8 @@ fn every_solid_prints_as_a_net() {
 fn a_net_larger_than_the_paper_takes_several_pages() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    deltille(at, "octahedron --edge 130mm --tiles 7 --pdf --svg --paper A4").success();
+    deltille(at, "octahedron --edge 130mm --tiles 7 --pdf --svg --paper A4 --allow-seams")
+        .success();
     // Any of the files stands for all; one that is missing is named.
     let whole = report(at, "octahedron.json octahedron-3.svg", 0);
     let sheet = &whole["artifacts"][0]["sheets"][0];

@@ -448,29 +448,36 @@ fn single_faces_are_cut_to_the_seats_of_the_skeleton() {
     assert!(sheet.texts.iter().any(|text| text.text.to_string() == "edge 0 · face 3"));
 }
 
-/// The net is one outline around all faces and tabs, with a line to fold for each edge between two
+/// A piece of a net is one outline around its faces and tabs, with a line to fold for each edge between two
 /// faces and for each tab.
 #[test]
 fn the_net_to_cut_holds_all_faces_and_tabs() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    for (options, name, printed) in [("", "bare", false), ("--paper A4 --svg", "tiled", true)] {
+    let cases = [
+        ("", "bare", 1, false),
+        ("--paper A4 --svg --allow-seams", "seamed", 1, true),
+        ("--paper A4 --svg", "in-pieces", 2, true),
+    ];
+    for (options, name, pieces, printed) in cases {
         let args = "icosahedron --edge 60mm --tiles 7 --face-margin 4mm --dxf --no-verify";
         deltille(path, &format!("{args} --name {name} {options}")).success();
         assert_eq!(path.join(format!("{name}-2.svg")).exists(), printed);
         let text = std::fs::read_to_string(path.join(format!("{name}-net.dxf"))).unwrap();
         let outlines = closed_polylines(&text, "CUT");
-        assert_eq!(outlines.len(), 1);
-        let outline = &outlines[0];
-        let next = |i: usize| outline[(i + 1) % outline.len()];
-        let twice: f64 =
-            outline.iter().enumerate().map(|(i, a)| a[0] * next(i)[1] - a[1] * next(i)[0]).sum();
+        assert_eq!(outlines.len(), pieces);
+        let area = |outline: &Vec<DVec2>| -> f64 {
+            let next = |i: usize| outline[(i + 1) % outline.len()];
+            let corners = outline.iter().enumerate();
+            0.5 * corners.map(|(i, a)| a.perp_dot(next(i))).sum::<f64>()
+        };
         let faces_mm2 = 20.0 * 60.0 * 60.0 * 0.75f64.sqrt() / 2.0;
-        let tab_mm2 = (twice / 2.0 - faces_mm2) / 11.0;
+        let tabs = 10 + pieces;
+        let tab_mm2 = (outlines.iter().map(area).sum::<f64>() - faces_mm2) / tabs as f64;
         assert!((60.0..900.0).contains(&tab_mm2), "{tab_mm2}");
-        // 19 edges join faces, the other 11 have tabs.
+        // Edges that join faces, and the others, which have tabs.
         let folds = text.matches("LINE\n  8\nFOLD\n").count();
-        assert_eq!(folds, 19 + 11);
+        assert_eq!(folds, 20 - pieces + tabs);
         let texts = closed_polylines(&text, "ENGRAVE").len();
         assert!((100..600).contains(&texts), "{texts}");
     }

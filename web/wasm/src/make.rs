@@ -82,6 +82,7 @@ impl Wanted {
             orientation: self.orientation.parse().raise()?,
             margin_mm: self.margin_mm.unwrap_or(DEFAULT_MARGIN_MM),
             solids: if self.per_face { SolidSheets::PerFace } else { SolidSheets::Net },
+            ..PaperSpec::default()
         })
     }
 

@@ -1,8 +1,11 @@
+use glam::DVec2;
+
 use super::layout::{arrange, label};
 use super::paper::{PaperSpec, SolidSheets};
+use super::poster::Poster;
 use super::{
-    BoardSpec, FamilyRef, Name, Panel, SheetLayout, Target, TargetError, TargetSpec, board,
-    face_sheet, net, solid, tag_sheet,
+    BoardSpec, FamilyRef, LineKind, Name, Panel, Placement, SheetLayout, SheetLine, Target,
+    TargetError, TargetSpec, board, face_sheet, net, solid, tag_sheet,
 };
 use crate::family::{Family, FamilyError};
 
@@ -56,7 +59,9 @@ impl Target {
             TargetSpec::Solid(spec) => {
                 let (panels, family) = solid::panels(spec, family)?;
                 let sheets = layout.map(|paper| match paper.solids {
-                    SolidSheets::Net => net::sheets(&name, spec, &panels, family.as_ref(), paper),
+                    SolidSheets::Net | SolidSheets::SeamedNet => {
+                        net::sheets(&name, spec, &panels, family.as_ref(), paper)
+                    }
                     SolidSheets::PerFace => {
                         face_sheet::sheets(&name, spec, &panels, family.as_ref(), paper)
                     }
@@ -119,15 +124,68 @@ fn board_parts(
     layout: Option<&PaperSpec>,
 ) -> Result<Parts, TargetError> {
     board.check()?;
-    let arrangement = layout.map(|paper| arrange(board, paper)).transpose()?;
+    let arrangement = layout.map(|paper| (arrange(board, paper), paper));
     let (panels, family) = board::panels(board, family)?;
-    let sheet = |panel: &Panel| {
-        let ink = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
-        let words = label(name, board, panel, family.as_ref());
-        Some(arrangement.as_ref()?.sheet(panel.id, ink, words))
+    let words = |panel: &Panel| label(name, board, panel, family.as_ref());
+    let sheets = match arrangement {
+        None => Vec::new(),
+        Some((Ok(arrangement), _)) => {
+            let sheet = |panel: &Panel| {
+                let ink = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
+                arrangement.sheet(panel.id, ink, words(panel))
+            };
+            panels.iter().map(sheet).collect()
+        }
+        Some((Err(TargetError::DoesNotFit { .. }), paper)) if paper.poster => {
+            let sheet = |panel: &Panel| poster(board, panel, paper, &words(panel));
+            panels.iter().map(sheet).collect::<Result<_, _>>()?
+        }
+        Some((Err(error), _)) => return Err(error),
     };
-    let sheets = panels.iter().filter_map(sheet).collect();
     Ok((panels, family, sheets))
+}
+
+/// A board that is larger than the paper, over several pages.
+fn poster(
+    board: &BoardSpec,
+    panel: &Panel,
+    paper: &PaperSpec,
+    label: &str,
+) -> Result<SheetLayout, TargetError> {
+    let [left, lower, right, upper] = panel.field_mm();
+    let corners = [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from);
+    let poster = Poster::new(&corners, paper)?;
+    let excess = poster.excess();
+    if excess > 1.0 {
+        let edge = (board.edge_mm / excess.sqrt() * 0.95).floor();
+        let problem = format!(
+            "the board takes {} pages of {}, more than can be assembled and verified: take `BoardSpec::edge_mm` of at most \
+             {edge} mm, or larger `PaperSpec::size`",
+            poster.windows(),
+            Poster::paper_size(paper),
+        );
+        return Err(TargetError::invalid("BoardSpec::edge_mm", problem));
+    }
+    let mut sheet = poster.sheet();
+    let motion = poster.sheet_from_points();
+    sheet.placements.push(Placement {
+        panel: panel.id,
+        angle_rad: motion.turn.to_angle(),
+        origin_mm: motion.shift,
+    });
+    // Crosses keep out of the board and its quiet zone.
+    let field = corners.map(|corner| motion.apply(corner));
+    let outline = field.iter().zip(field.iter().cycle().skip(1));
+    let outline: Vec<SheetLine> = outline
+        .map(|(&from_mm, &to_mm)| SheetLine {
+            kind: LineKind::Align,
+            from_mm,
+            to_mm,
+            width_mm: 0.15,
+        })
+        .collect();
+    poster.add_pages(&mut sheet, vec![field.to_vec()], &outline, label, |_, _| Vec::new());
+    Ok(sheet)
 }
 
 /// Lowest and highest of some ids.

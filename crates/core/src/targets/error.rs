@@ -59,7 +59,8 @@ pub enum TargetError {
     /// The board is too large for the paper.
     #[error(
         "`PaperSpec::size`: {rows} × {cols} corners with {edge} edges and what is printed around them do \
-         not fit {paper}: take larger paper, fewer `BoardSpec::rows` or `BoardSpec::cols`, or {}",
+         not fit {paper}: take larger paper, several pages by `PaperSpec::poster`, fewer `BoardSpec::rows` or \
+         `BoardSpec::cols`, or {}",
         match fitting_edge_mm {
             Some(mm) => format!("`BoardSpec::edge_mm` of at most {mm} mm"),
             None => "a smaller `PaperSpec::margin_mm`".to_owned(),

@@ -22,6 +22,7 @@ mod panel;
 mod paper;
 mod polyhedron;
 mod pose;
+mod poster;
 mod skeleton;
 mod solid;
 mod spec;

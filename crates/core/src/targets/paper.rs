@@ -38,15 +38,20 @@ pub struct PaperSpec {
     pub margin_mm: f64,
     /// How the faces of a solid are printed.
     pub solids: SolidSheets,
+    /// Whether a board that is larger than the paper is printed over several pages.
+    pub poster: bool,
 }
 
 /// How the faces of a solid are printed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SolidSheets {
-    /// As a net, to be folded.
+    /// As a net, to be folded; where it is larger than the paper, in pieces of whole faces.
     #[default]
     Net,
+    /// As a net, to be folded; where it is larger than the paper, over pages that are joined along seams
+    /// through its tiles.
+    SeamedNet,
     /// Each on a sheet of its own, to be glued on a rigid skeleton.
     PerFace,
 }
@@ -58,6 +63,7 @@ impl Default for PaperSpec {
             orientation: Orientation::Auto,
             margin_mm: DEFAULT_MARGIN_MM,
             solids: SolidSheets::default(),
+            poster: false,
         }
     }
 }

@@ -13,13 +13,15 @@
 //! ```
 //!
 //! Faces never overlap, and tabs overlap neither faces nor each other: see [`plane::gap_mm`]. A
-//! solid whose faces cannot be laid out in one piece is printed in several, each on a sheet of its
-//! own; tabs and numbers then lead from one to the other.
+//! solid whose faces cannot be laid out in one piece, or whose net is larger than the paper, is printed
+//! in several pieces of whole faces, nested on as few pages as will do; tabs and numbers then lead from
+//! one to the other. With [`SolidSheets::SeamedNet`](super::SolidSheets::SeamedNet) a net that is larger
+//! than the paper stays in one piece, over several pages that are joined first.
 
-mod plane;
+mod nest;
+pub(super) mod plane;
 mod sheet;
 mod tabs;
-mod tiling;
 mod unfold;
 
 pub(super) use sheet::sheets;

@@ -4,15 +4,16 @@ use std::f64::consts::PI;
 
 use glam::DVec2;
 
+use super::nest::{self, Outline, Place};
 use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
-use super::tiling;
 use super::unfold::{self, Piece, Side, Sides};
 use crate::lattice::Vertex;
 use crate::targets::face_sheet::edge_numbers;
 use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use crate::targets::length::format_mm;
-use crate::targets::paper::{PaperSize, PaperSpec};
+use crate::targets::paper::{PaperSize, PaperSpec, SolidSheets};
+use crate::targets::poster::Poster;
 use crate::targets::{
     Face, FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine,
     SheetText, SolidSpec, TargetError,
@@ -45,6 +46,22 @@ const LEGIBLE_CAP_MM: f64 = 1.2;
 const WORDS_CAP_MM: f64 = 2.2;
 const WORDS_STEP_MM: f64 = 3.6;
 
+/// Smallest room for pieces of a net, mm.
+const LEAST_ROOM_MM: f64 = 40.0;
+
+/// Largest pieces that are tried, in parts of the room of a page: large ones are less work to glue, small ones leave less
+/// of the paper unused.
+const PARTS_OF_ROOM: [f64; 6] = [1.0, 0.7, 0.5, 0.35, 0.25, 0.18];
+
+/// Orders of growth that are tried for each of them.
+const ORDERS: u64 = 4;
+
+/// Most pages of a net: an afternoon's work.
+const MOST_PAGES: usize = 120;
+
+/// Capital height of the number of a page, mm.
+const PAGE_CAP_MM: f64 = 5.0;
+
 /// Blank between the net, the instructions and the marks along the margins, mm.
 const BLANK_MM: f64 = 2.5;
 
@@ -62,7 +79,7 @@ struct Laid<'a> {
     page_from_net: Motion,
 }
 
-/// The sheets of a solid's net, one for each piece.
+/// The sheets of a solid's net.
 pub fn sheets(
     name: &str,
     spec: &SolidSpec,
@@ -84,42 +101,173 @@ pub fn sheets(
     let nets = nets(&solid, spec, &faces, &sides);
     let drawing = Drawing::new(name, spec, &solid, &faces, panels, family, &sides);
 
-    let mut best: Option<(f64, Vec<SheetLayout>)> = None;
+    let mut best: Option<(f64, SheetLayout)> = None;
     for net in &nets {
-        let count = net.pieces.len();
-        let mut laid = Vec::with_capacity(count);
-        for (piece, tabs) in net.pieces.iter().zip(&net.tabs) {
-            let Some(piece) = lay(piece, tabs, paper)? else { break };
-            laid.push(piece);
-        }
-        let area: f64 = laid.iter().map(|l| l.arrangement.page_mm().element_product()).sum();
-        if laid.len() == count && best.as_ref().is_none_or(|(least, _)| area < *least) {
-            let sheets = laid.iter().enumerate();
-            let sheets = sheets.map(|(index, laid)| drawing.sheet(laid, [index, count]));
-            best = Some((area, sheets.collect()));
+        let ([piece], [tabs]) = (&net.pieces[..], &net.tabs[..]) else { continue };
+        let Some(laid) = lay(piece, tabs, paper)? else { continue };
+        let area = laid.arrangement.page_mm().element_product();
+        if best.as_ref().is_none_or(|(least, _)| area < *least) {
+            best = Some((area, drawing.sheet(&laid)));
         }
     }
-    if let Some((_, sheets)) = best {
-        return Ok(sheets);
+    match best {
+        Some((_, sheet)) => Ok(vec![sheet]),
+        None if paper.solids == SolidSheets::SeamedNet => seamed(&nets, spec, &drawing, paper),
+        None => nested(spec, &drawing, paper),
     }
-    let [net, ..] = &nets[..] else {
+}
+
+/// A net that is larger than the paper, over pages that are joined along seams.
+fn seamed(
+    nets: &[Net],
+    spec: &SolidSpec,
+    drawing: &Drawing,
+    paper: &PaperSpec,
+) -> Result<Vec<SheetLayout>, TargetError> {
+    let [net, ..] = nets else {
         let problem = "the faces leave no room for glue tabs: take `SolidSheets::PerFace`";
         return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
     };
-    let tiles: Vec<(u32, [DVec2; 3])> =
-        panels.iter().map(|panel| (panel.id, tiles_outline(panel))).collect();
     let count = net.pieces.len();
     let pieces = net.pieces.iter().zip(&net.tabs).enumerate();
     pieces
         .map(|(index, (piece, tabs))| {
-            let points = points(piece, tabs);
-            let tiling = tiling::Tiling::new(spec, &points, paper)?;
-            let mut sheet = tiling.sheet();
-            drawing.draw(&mut sheet, piece, tabs, &tiling.sheet_from_net());
-            tiling.add_pages(&mut sheet, &tiles, &drawing.label([index, count]));
+            let poster = Poster::new(&points(piece, tabs), paper)?;
+            check_size(&poster, spec, paper)?;
+            let mut sheet = poster.sheet();
+            drawing.draw(&mut sheet, piece, tabs, &poster.sheet_from_points());
+            let of = match count {
+                1 => "net".to_owned(),
+                _ => format!("net, piece {} of {count}", index + 1),
+            };
+            let tiles = sheet.placements.iter().filter_map(|placement| {
+                let panel = drawing.panels.iter().find(|panel| panel.id == placement.panel)?;
+                Some(tiles_outline(panel).map(|p| placement.page_from_panel(p)).to_vec())
+            });
+            let (tiles, lines) = (tiles.collect(), sheet.lines.clone());
+            let words = |at: DVec2, room: f64| instructions(&lines, at, room).to_vec();
+            poster.add_pages(&mut sheet, tiles, &lines, &drawing.label(&of), words);
             Ok(sheet)
         })
         .collect()
+}
+
+/// Refuses a net of more pages than can be assembled and verified.
+fn check_size(poster: &Poster, spec: &SolidSpec, paper: &PaperSpec) -> Result<(), TargetError> {
+    let excess = poster.excess();
+    if excess <= 1.0 {
+        return Ok(());
+    }
+    let edge = (spec.edge_mm / excess.sqrt() * 0.95).floor();
+    let problem = format!(
+        "the net of a solid with {} edges takes {} pages of {}, more than can be assembled and verified: take \
+         `SolidSheets::PerFace`, `SolidSpec::edge_mm` of at most {edge} mm, or larger `PaperSpec::size`",
+        format_mm(spec.edge_mm),
+        poster.windows(),
+        Poster::paper_size(paper),
+    );
+    Err(TargetError::invalid("SolidSpec::edge_mm", problem))
+}
+
+/// Pieces of whole faces, nested on pages: on the smallest paper that takes them all, or on as few pages as will do of the
+/// size that is asked for, or of the largest.
+fn nested(
+    spec: &SolidSpec,
+    drawing: &Drawing,
+    paper: &PaperSpec,
+) -> Result<Vec<SheetLayout>, TargetError> {
+    let sizes: Vec<PaperSize> = match &paper.size {
+        Some(size) => vec![size.clone()],
+        None => PaperSize::automatic().collect(),
+    };
+    let flat: Vec<[DVec2; 3]> = drawing.faces.iter().map(|face| face.outline_mm).collect();
+    let area: f64 = flat.iter().map(|&[a, b, c]| 0.5 * (b - a).perp_dot(c - a)).sum();
+    for (index, size) in sizes.iter().enumerate() {
+        let paper = PaperSpec { size: Some(size.clone()), ..paper.clone() };
+        let least = Footprint {
+            width: LEAST_ROOM_MM,
+            height: LEAST_ROOM_MM + WORDS_MM,
+            edge_blank: paper.margin_mm,
+            mark_blank: BLANK_MM,
+        };
+        let is_last = index + 1 == sizes.len();
+        let Some(page) = fit_upright(&least, &paper)? else { continue };
+        let [left, lower, right, upper] = page.clear_mm();
+        let room = DVec2::new(right - left - BLANK_MM, upper - lower - WORDS_MM - BLANK_MM);
+        if !is_last && area > room.element_product() {
+            continue;
+        }
+        let Some((net, places)) = nest_on(&flat, drawing.sides, room) else { continue };
+        let count = 1 + places.iter().map(|place| place.page).max().unwrap_or_default();
+        if count > 1 && !is_last {
+            continue;
+        }
+        if count > MOST_PAGES {
+            let problem = format!(
+                "the net of a solid with {} edges takes {count} pages of {size}, more than can be assembled: take \
+                 `SolidSheets::PerFace`, a shorter `SolidSpec::edge_mm`, or larger `PaperSpec::size`",
+                format_mm(spec.edge_mm),
+            );
+            return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
+        }
+        let corner = DVec2::new(left, lower + WORDS_MM + BLANK_MM);
+        let sheet = |number: usize| {
+            let of = match count {
+                1 => format!("net in {} pieces", net.pieces.len()),
+                _ => format!("net, page {} of {count}", number + 1),
+            };
+            let mut sheet = page.sheet(0, [0.0; 4], drawing.label(&of));
+            sheet.placements.clear();
+            let pieces = net.pieces.iter().zip(&net.tabs).zip(&places);
+            for ((piece, tabs), place) in pieces.filter(|(_, place)| place.page == number) {
+                let motion = place.room_from_piece;
+                let page_from_net = Motion { shift: motion.shift + corner, ..motion };
+                drawing.draw(&mut sheet, piece, tabs, &page_from_net);
+            }
+            let at = DVec2::new(left, lower + BLANK_MM);
+            drawing.explain(
+                &mut sheet,
+                at,
+                right - BLANK_MM,
+                (count > 1).then_some([number, count]),
+            );
+            sheet
+        };
+        return Ok((0..count).map(sheet).collect());
+    }
+    let size = sizes.last().map(ToString::to_string).unwrap_or_default();
+    let seams = if paper.size.is_some() { ", larger `PaperSpec::size`" } else { "" };
+    let problem = format!(
+        "a face with {} edges and its tabs is larger than {size}: take `SolidSheets::SeamedNet`{seams}, or a shorter \
+         `SolidSpec::edge_mm`",
+        format_mm(spec.edge_mm),
+    );
+    Err(TargetError::invalid("SolidSpec::edge_mm", problem))
+}
+
+/// The net whose pieces take the fewest pages with a room of this size, then that with the fewest pieces.
+fn nest_on(flat: &[[DVec2; 3]], sides: &Sides, room: DVec2) -> Option<(Net, Vec<Place>)> {
+    let mut best: Option<([usize; 2], Net, Vec<Place>)> = None;
+    for part in PARTS_OF_ROOM {
+        for seed in 0..ORDERS {
+            let most = room * part;
+            let fit = |points: &[DVec2]| nest::fits(points, tabs::MOST_DEPTH_MM, most);
+            let pieces = unfold::in_pieces_that_fit(flat, sides, seed, fit);
+            let Some(tabs) = tabs::place(&pieces, sides) else { continue };
+            let outline = |(piece, tabs): (&Piece, &Vec<Tab>)| -> Outline {
+                let faces = piece.iter().map(|face| face.corners.to_vec());
+                faces.chain(tabs.iter().map(|tab| tab.corners.to_vec())).collect()
+            };
+            let outlines: Vec<Outline> = pieces.iter().zip(&tabs).map(outline).collect();
+            let Some(places) = nest::nest(&outlines, room) else { continue };
+            let pages = 1 + places.iter().map(|place| place.page).max().unwrap_or_default();
+            let value = [pages, pieces.len()];
+            if best.as_ref().is_none_or(|(least, ..)| value < *least) {
+                best = Some((value, Net { pieces, tabs }, places));
+            }
+        }
+    }
+    best.map(|(_, net, places)| (net, places))
 }
 
 /// The unfoldings that have room for tabs, best liked first.
@@ -235,16 +383,33 @@ impl<'a> Drawing<'a> {
         Self { name, spec, faces, panels, family, sides, numbers, folds }
     }
 
-    /// The sheet of a piece that fits its paper.
-    fn sheet(&self, laid: &Laid, of: [usize; 2]) -> SheetLayout {
-        let mut sheet = laid.arrangement.sheet(0, [0.0; 4], self.label(of));
+    /// The sheet of a net in one piece that fits its paper.
+    fn sheet(&self, laid: &Laid) -> SheetLayout {
+        let mut sheet = laid.arrangement.sheet(0, [0.0; 4], self.label("net"));
         sheet.placements.clear();
         self.draw(&mut sheet, laid.piece, laid.tabs, &laid.page_from_net);
         let [left, lower, right, _] = laid.arrangement.clear_mm();
-        let at = DVec2::new(left, lower + BLANK_MM);
-        let words = instructions(&sheet.lines, at, right - left - BLANK_MM);
-        sheet.texts.extend(words);
+        self.explain(&mut sheet, DVec2::new(left, lower + BLANK_MM), right - BLANK_MM, None);
         sheet
+    }
+
+    /// Adds the instructions from `at` to the right end, and before them which page of how many it is.
+    fn explain(&self, sheet: &mut SheetLayout, at: DVec2, right: f64, page: Option<[usize; 2]>) {
+        let mut start = at;
+        if let Some([number, count]) = page {
+            let text = Label::Words(format!("{} of {count}", number + 1));
+            let max_width_mm = width(&text, PAGE_CAP_MM);
+            start.x += max_width_mm + BLANK_MM;
+            sheet.texts.push(SheetText {
+                text,
+                at_mm: at + DVec2::Y * (WORDS_MM - BLANK_MM - PAGE_CAP_MM) / 2.0,
+                angle_rad: 0.0,
+                cap_height_mm: PAGE_CAP_MM,
+                max_width_mm,
+            });
+        }
+        let words = instructions(&sheet.lines, start, right - start.x);
+        sheet.texts.extend(words);
     }
 
     /// Adds the panels, lines and numbers of a piece to a sheet.
@@ -332,16 +497,13 @@ impl<'a> Drawing<'a> {
     }
 
     /// All that is needed to make the net again.
-    fn label(&self, [index, count]: [usize; 2]) -> String {
+    fn label(&self, of: &str) -> String {
         let (spec, name) = (self.spec, self.name);
         let mut parts = vec![
             name.to_owned(),
             format!("{} edge {}", spec.shape.name(), format_mm(spec.edge_mm)),
         ];
-        parts.push(match count {
-            1 => "net".to_owned(),
-            _ => format!("net, piece {} of {count}", index + 1),
-        });
+        parts.push(of.to_owned());
         parts.push(format!("{} tiles, margin {}", spec.tiles, format_mm(spec.margin_mm)));
         let tags = || self.panels.iter().flat_map(|panel| &panel.tags);
         if let (Some(family), Some(first), Some(last)) = (self.family, tags().next(), tags().last())
@@ -358,7 +520,7 @@ impl<'a> Drawing<'a> {
 
 /// How to make the solid from a print of these lines, two lines of text; the lower one stands at
 /// `at`.
-pub(super) fn instructions(lines: &[SheetLine], at: DVec2, room: f64) -> [SheetText; 2] {
+fn instructions(lines: &[SheetLine], at: DVec2, room: f64) -> [SheetText; 2] {
     let has = |kind| lines.iter().any(|line| line.kind == kind);
     let mut folds = if has(LineKind::Valley) {
         "Cut along solid lines. Score and fold dashed lines away from the print, dash-dotted ones \
@@ -444,12 +606,12 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// Every face once, none on another, all on the sheet; no words on lines, tiles or words;
-        /// on several pages every line is shown, and every cross on two.
+        /// Every face once, none on another, all on its sheet; no words on lines, tiles or words;
+        /// on several pages of one sheet every line is shown, and every cross on two.
         #[test]
         fn nothing_on_a_net_meets_anything_else(
             shape in 0usize..3, edge_mm in 60.0f64..200.0, tiles in 6u32..12, margin_mm in 2.5f64..7.0,
-            paper in 0usize..3,
+            paper in 0usize..3, seams in any::<bool>(),
         ) {
             use SolidShape::{Icosahedron, Octahedron, Tetrahedron};
             let shape = [Tetrahedron, Octahedron, Icosahedron][shape].clone();
@@ -457,51 +619,116 @@ mod tests {
             spec.tags.family = "delTag36h11".to_owned();
             let family = Family::shipped("delTag36h11").unwrap();
             let size = [None, Some("A4".parse().unwrap()), Some("A2".parse().unwrap())];
-            let paper = PaperSpec { size: size[paper].clone(), ..PaperSpec::default() };
+            let solids = if seams { SolidSheets::SeamedNet } else { SolidSheets::Net };
+            let paper = PaperSpec { size: size[paper].clone(), solids, ..PaperSpec::default() };
             let target =
                 Target::build("net", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
             prop_assert_eq!(&Target::from_json(&target.to_json()).unwrap(), &target);
-            prop_assert_eq!(target.sheets.len(), 1);
-            let sheet = &target.sheets[0];
-            let mut faces: Vec<u32> = sheet.placements.iter().map(|p| p.panel).collect();
+            prop_assert!(!seams || target.sheets.len() == 1);
+            let placements = target.sheets.iter().flat_map(|sheet| &sheet.placements);
+            let mut faces: Vec<u32> = placements.map(|p| p.panel).collect();
             faces.sort_unstable();
             prop_assert_eq!(faces, target.panels.iter().map(|p| p.id).collect::<Vec<_>>());
+            for sheet in &target.sheets {
+                check_sheet(&target, sheet)?;
+            }
+        }
+    }
 
-            let triangles: Vec<_> =
-                sheet.placements.iter().map(|p| triangle(&target, p)).collect();
-            for (n, a) in triangles.iter().enumerate() {
-                prop_assert!(a.iter().all(|p| p.x > 0.0 && p.y > 0.0));
-                prop_assert!(a.iter().all(|p| p.x < sheet.width_mm && p.y < sheet.height_mm));
-                prop_assert!(triangles[n + 1..].iter().all(|b| gap_mm(a, b) > -1e-6));
-            }
-            let tiles = sheet.placements.iter().map(|placement| {
-                let panel = target.panels.iter().find(|p| p.id == placement.panel).unwrap();
-                tiles_outline(panel).map(|p| placement.page_from_panel(p)).to_vec()
-            });
-            let lines = sheet.lines.iter().map(|l| vec![l.from_mm, l.to_mm]);
-            let marks: Vec<Vec<DVec2>> = tiles.chain(lines).collect();
-            let boxes: Vec<_> = sheet.texts.iter().map(text_box).collect();
-            for (n, text) in boxes.iter().enumerate() {
-                let words = &sheet.texts[n].text;
-                prop_assert!(marks.iter().all(|mark| gap_mm(text, mark) > 0.2), "{}", words);
-                prop_assert!(boxes[n + 1..].iter().all(|other| gap_mm(text, other) > 0.2), "{}", words);
-            }
-            for line in sheet.lines.iter().filter(|_| !sheet.pages.is_empty()) {
-                let shown = |at: DVec2| {
-                    let on = |page: &&crate::targets::SheetPage| {
-                        let [left, lower, right, upper] = page.window_mm;
-                        let DVec2 { x, y } = at + page.sheet_at_mm;
-                        left <= x && x <= right && lower <= y && y <= upper
-                    };
-                    sheet.pages.iter().filter(on).count()
+    fn check_sheet(target: &Target, sheet: &SheetLayout) -> Result<(), TestCaseError> {
+        let triangles: Vec<_> = sheet.placements.iter().map(|p| triangle(target, p)).collect();
+        for (n, a) in triangles.iter().enumerate() {
+            prop_assert!(a.iter().all(|p| p.x > 0.0 && p.y > 0.0));
+            prop_assert!(a.iter().all(|p| p.x < sheet.width_mm && p.y < sheet.height_mm));
+            prop_assert!(triangles[n + 1..].iter().all(|b| gap_mm(a, b) > -1e-6));
+        }
+        let tiles = sheet.placements.iter().map(|placement| {
+            let panel = target.panels.iter().find(|p| p.id == placement.panel).unwrap();
+            tiles_outline(panel).map(|p| placement.page_from_panel(p)).to_vec()
+        });
+        let lines = sheet.lines.iter().map(|l| vec![l.from_mm, l.to_mm]);
+        let marks: Vec<Vec<DVec2>> = tiles.chain(lines).collect();
+        let boxes: Vec<_> = sheet.texts.iter().map(text_box).collect();
+        for (n, text) in boxes.iter().enumerate() {
+            let words = &sheet.texts[n].text;
+            prop_assert!(marks.iter().all(|mark| gap_mm(text, mark) > 0.2), "{}", words);
+            prop_assert!(boxes[n + 1..].iter().all(|other| gap_mm(text, other) > 0.2), "{}", words);
+        }
+        for line in sheet.lines.iter().filter(|_| !sheet.pages.is_empty()) {
+            let shown = |at: DVec2| {
+                let on = |page: &&crate::targets::SheetPage| {
+                    let [left, lower, right, upper] = page.window_mm;
+                    let DVec2 { x, y } = at + page.sheet_at_mm;
+                    left <= x && x <= right && lower <= y && y <= upper
                 };
-                let least = if line.kind == LineKind::Align { 2 } else { 1 };
-                for part in 0..=10 {
-                    let part = f64::from(part) / 10.0;
-                    let at = line.from_mm.lerp(line.to_mm, part);
-                    prop_assert!(shown(at) >= least, "{:?}", line);
-                }
+                sheet.pages.iter().filter(on).count()
+            };
+            let least = if line.kind == LineKind::Align { 2 } else { 1 };
+            for part in 0..=10 {
+                let part = f64::from(part) / 10.0;
+                let at = line.from_mm.lerp(line.to_mm, part);
+                prop_assert!(shown(at) >= least, "{:?}", line);
             }
+        }
+        Ok(())
+    }
+
+    /// Sheets of a target, and the part of their area that faces take.
+    fn used(target: &Target) -> (usize, f64) {
+        let area = |placement: &Placement| {
+            let [a, b, c] = triangle(target, placement);
+            0.5 * (b - a).perp_dot(c - a)
+        };
+        let faces: f64 = target.sheets.iter().flat_map(|s| &s.placements).map(area).sum();
+        let paper: f64 = target.sheets.iter().map(|s| s.width_mm * s.height_mm).sum();
+        (target.sheets.len(), faces / paper)
+    }
+
+    #[test]
+    fn a_net_that_is_larger_than_the_paper_has_whole_faces_on_every_page() {
+        let spec = TargetSpec::Solid(SolidSpec::new(SolidShape::Icosahedron));
+        let family = Family::shipped("delTag25h7").unwrap();
+        let paper = PaperSpec { size: Some("A4".parse().unwrap()), ..PaperSpec::default() };
+        let target = Target::build("net", &spec, Some(&family), Some(&paper)).unwrap();
+        let (sheets, _) = used(&target);
+        assert!(sheets <= 10, "{sheets}");
+        assert_eq!(target.page_count(), sheets);
+    }
+
+    /// A sphere of 320 faces.
+    #[test]
+    fn pieces_of_a_mesh_are_nested() {
+        let ball = crate::targets::Polyhedron::icosahedron(100.0);
+        let (mut vertices, mut faces) = (ball.vertices_mm, ball.faces);
+        for _ in 0..2 {
+            let mut between = std::collections::BTreeMap::new();
+            let mut middle = |a: usize, b: usize| {
+                *between.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                    let radius = vertices[0].length();
+                    vertices.push((vertices[a] + vertices[b]).normalize() * radius);
+                    vertices.len() - 1
+                })
+            };
+            faces = faces
+                .iter()
+                .flat_map(|&[a, b, c]| {
+                    let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+                    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+                })
+                .collect();
+        }
+        let (mesh, _) = crate::targets::ClosedMesh::new(&vertices, &faces).unwrap();
+        let mut spec =
+            SolidSpec { tiles: 6, edge_mm: 130.0, ..SolidSpec::new(SolidShape::Mesh(mesh)) };
+        spec.tags.family = "d36h9".to_owned();
+        let family = Family::shipped("d36h9").unwrap();
+        let paper = PaperSpec::default();
+        let target =
+            Target::build("ball", &TargetSpec::Solid(spec), Some(&family), Some(&paper)).unwrap();
+        let (sheets, part) = used(&target);
+        assert!(sheets <= 4 && part >= 0.55, "{sheets} sheets, {part:.2} of them used");
+        for sheet in &target.sheets {
+            check_sheet(&target, sheet).unwrap();
         }
     }
 

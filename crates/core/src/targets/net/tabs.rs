@@ -16,7 +16,10 @@ use super::unfold::{Piece, Side, Sides};
 
 /// Depth of a tab in lengths of its edge, and its least and most, mm: the least takes its words,
 /// the most is what glue needs.
-const DEPTH: (f64, f64, f64) = (0.15, 4.0, 9.0);
+const DEPTH: (f64, f64, f64) = (0.15, 4.0, MOST_DEPTH_MM);
+
+/// Depth of the deepest tabs, mm.
+pub const MOST_DEPTH_MM: f64 = 9.0;
 
 /// Angles between a tab's edge and its legs, degrees: the usual one, flatter ones for narrow gaps,
 /// a steep one for short edges; tried in this order.

@@ -1,6 +1,7 @@
 //! Unfolding: faces laid side by side in the plane, joined along edges of the solid.
 
 use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 use rand::{Rng, SeedableRng};
@@ -14,6 +15,10 @@ const SEED: u64 = 20;
 
 /// Grown nets that are looked at further.
 const MOST_GROWN: usize = 8;
+
+/// Least angle between two sides that are cut and meet in a vertex, radians: room for a tab with the flattest legs,
+/// and for scissors.
+const LEAST_GAP_RAD: f64 = 25.0 / 180.0 * PI;
 
 /// Orders of growth tried for a mesh: fewer for many faces, since each takes a time that grows
 /// with their square.
@@ -103,7 +108,7 @@ fn usual(solid: &Polyhedron, shape: &SolidShape, flat: &[[DVec2; 3]]) -> Vec<Vec
 fn grown(solid: &Polyhedron, flat: &[[DVec2; 3]]) -> Vec<Vec<Piece>> {
     let sides = Sides::new(solid);
     let mut grown: Vec<Vec<Piece>> =
-        (0..tries(flat.len())).map(|n| grow_all(flat, &sides, n, flat.len())).collect();
+        (0..tries(flat.len())).map(|n| grow_all(flat, &sides, n, |_, _| true)).collect();
     grown.sort_by(|a, b| a.len().cmp(&b.len()).then(area(a).total_cmp(&area(b))));
     grown.truncate(MOST_GROWN);
     grown
@@ -116,7 +121,49 @@ pub fn in_small_pieces(
     most: usize,
 ) -> impl Iterator<Item = Vec<Piece>> {
     let sides = Sides::new(solid);
-    (0..tries(flat.len())).map(move |seed| grow_all(flat, &sides, seed, most))
+    let few = move |piece: &[FlatFace], _: &FlatFace| piece.len() < most;
+    (0..tries(flat.len())).map(move |seed| grow_all(flat, &sides, seed, few))
+}
+
+/// Nets of pieces whose corners `fit`, with room for a tab along every side that is cut.
+pub fn in_pieces_that_fit(
+    flat: &[[DVec2; 3]],
+    sides: &Sides,
+    seed: u64,
+    fit: impl Fn(&[DVec2]) -> bool,
+) -> Vec<Piece> {
+    grow_all(flat, sides, seed, |piece, face| {
+        let corners = || piece.iter().chain([face]).flat_map(|face| face.corners);
+        leaves_gaps(piece, face) && fit(&corners().collect::<Vec<_>>())
+    })
+}
+
+/// Whether a face that is laid beside a piece leaves wide gaps, or none along its hinge, to the others that meet it in
+/// a vertex.
+fn leaves_gaps(piece: &[FlatFace], face: &FlatFace) -> bool {
+    // Directions at a corner: to the next corner, and to the one before; the face lies to the left of the first.
+    let sector = |corners: &[DVec2; 3], n: usize| {
+        [1, 2].map(|way| (corners[(n + way) % 3] - corners[n]).to_angle())
+    };
+    let own_side = face.hinge.map(|(_, own)| own.side);
+    (0..3).all(|n| {
+        let [first, last] = sector(&face.corners, n);
+        // The sides that lie along these directions.
+        let [on_first, on_last] = [n, (n + 2) % 3].map(|side| own_side == Some(side));
+        piece.iter().all(|other| {
+            let Some(at) =
+                (0..3).find(|&m| other.corners[m].distance(face.corners[n]) < TOUCHING_MM)
+            else {
+                return true;
+            };
+            let [from, to] = sector(&other.corners, at);
+            [(from - last, on_last), (first - to, on_first)].into_iter().all(|(gap, hinged)| {
+                let gap = gap.rem_euclid(TAU);
+                let closed = gap.min(TAU - gap) < 1e-6;
+                if closed { hinged } else { gap >= LEAST_GAP_RAD }
+            })
+        })
+    })
 }
 
 fn area(pieces: &[Piece]) -> f64 {
@@ -211,8 +258,13 @@ fn is_free(piece: &[FlatFace], corners: &[DVec2; 3]) -> bool {
     })
 }
 
-/// Grows pieces of at most `most` faces until every face is in one.
-fn grow_all(flat: &[[DVec2; 3]], sides: &Sides, seed: u64, most: usize) -> Vec<Piece> {
+/// Grows pieces until every face is in one; a piece takes a face that it `may`.
+fn grow_all(
+    flat: &[[DVec2; 3]],
+    sides: &Sides,
+    seed: u64,
+    may: impl Fn(&[FlatFace], &FlatFace) -> bool,
+) -> Vec<Piece> {
     let mut random = ChaCha8Rng::seed_from_u64(SEED + seed);
     let mut placed = vec![false; flat.len()];
     let mut pieces = Vec::new();
@@ -221,7 +273,7 @@ fn grow_all(flat: &[[DVec2; 3]], sides: &Sides, seed: u64, most: usize) -> Vec<P
         let root = if seed == 0 { first } else { free[random.random_range(0..free.len())] };
         // Half of the orders keep the piece round, the others are free.
         let round = seed.is_multiple_of(2);
-        pieces.push(grow(flat, sides, root, round, most, &mut placed, &mut random));
+        pieces.push(grow(flat, sides, (root, round), &may, &mut placed, &mut random));
     }
     pieces
 }
@@ -230,9 +282,8 @@ fn grow_all(flat: &[[DVec2; 3]], sides: &Sides, seed: u64, most: usize) -> Vec<P
 fn grow(
     flat: &[[DVec2; 3]],
     sides: &Sides,
-    root: usize,
-    round: bool,
-    most: usize,
+    (root, round): (usize, bool),
+    may: &impl Fn(&[FlatFace], &FlatFace) -> bool,
     placed: &mut [bool],
     random: &mut ChaCha8Rng,
 ) -> Piece {
@@ -240,7 +291,7 @@ fn grow(
     placed[root] = true;
     let mut piece = vec![FlatFace { face: root, corners: flat[root], hinge: None }];
     let mut open: Vec<(usize, usize)> = (0..3).map(|side| (0, side)).collect();
-    while !open.is_empty() && piece.len() < most {
+    while !open.is_empty() {
         let distance = |&(at, side): &(usize, usize)| {
             let [p, q] = piece[at].ends(side);
             ((p + q) / 2.0).distance_squared(centre)
@@ -256,7 +307,7 @@ fn grow(
         let side = Side { face: piece[at].face, side };
         let Some(own) = sides.partner(side).filter(|own| !placed[own.face]) else { continue };
         let face = beside(flat, &piece[at], side, own);
-        if is_free(&piece, &face.corners) {
+        if may(&piece, &face) && is_free(&piece, &face.corners) {
             placed[own.face] = true;
             open.extend((0..3).filter(|&s| s != own.side).map(|s| (piece.len(), s)));
             piece.push(face);

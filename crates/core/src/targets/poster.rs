@@ -1,28 +1,24 @@
-//! A net that is larger than the paper, over several pages.
+//! A net or a board that is larger than the paper, over several pages.
 //!
 //! ```text
-//!   A1────┬┬────┐A2     The sheet is as large as the windows of all pages together. Neighbouring
-//!   │     ││    │       windows overlap; crosses in the overlap are printed on both pages. Rows
-//!   ├─────┼┼────┤ ×     are letters from the top, columns numbers from the left. Windows that
-//!   ├─────┼┼────┤       show nothing of the net are not printed.
-//!   B1────┴┴────┘B2
+//!   1─────┬┬────┐2      The sheet is as large as the windows of all pages together. Neighbouring
+//!   │     ││    │       windows overlap; crosses in the overlap are printed on both pages. Pages
+//!   ├─────┼┼────┤ ×     are numbered row by row from the upper left. Windows that show nothing of
+//!   ├─────┼┼────┤       it are not printed.
+//!   3─────┴┴────┘4      A page with another on its left or above has a line there to be trimmed along.
 //! ```
 
 use glam::DVec2;
 
-use super::plane::{Motion, bounds, gap_mm};
-use super::sheet::instructions;
-use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
-use crate::targets::length::format_mm;
-use crate::targets::paper::{Orientation, PaperSize, PaperSpec};
-use crate::targets::{
-    Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText, SolidSpec, TargetError,
-};
+use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
+use super::net::plane::{Motion, bounds, gap_mm};
+use super::paper::{Orientation, PaperSize, PaperSpec};
+use super::{Label, LineKind, SheetLayout, SheetLine, SheetPage, SheetText, TargetError};
 
 /// Width of what neighbouring windows share, mm.
 const OVERLAP_MM: f64 = 10.0;
 
-/// Blank around the net on its sheet, mm.
+/// Blank around what is printed, on its sheet, mm.
 const BORDER_MM: f64 = 3.0;
 
 /// Blank between the window and the marks of the page, mm.
@@ -31,10 +27,10 @@ const BLANK_MM: f64 = 1.5;
 /// Height of the words between window and check bar, mm; the overview beside them is as high.
 const WORDS_MM: f64 = 13.0;
 
-/// Smallest window, mm: on less there is more overlap than net.
+/// Smallest window, mm: on less there is more overlap than anything else.
 const LEAST_WINDOW_MM: f64 = 40.0;
 
-/// Most pages of a net: an afternoon's work.
+/// Most pages of a sheet: an afternoon's work.
 const MOST_PAGES: usize = 120;
 
 /// Largest sheet, mm²: pictures of it that still resolve its hairlines can be verified.
@@ -49,30 +45,30 @@ const CROSS_STEP_MM: f64 = 0.5;
 /// Width of the lines of crosses, and of the overview's, mm.
 const LINE_MM: f64 = 0.15;
 
+/// Distance of the line to be trimmed along from the window, mm: the paper that it leaves hides nothing.
+const TRIM_MM: f64 = 0.3;
+
 /// Width of the frame around the page's own window on the overview, mm.
 const FRAME_MM: f64 = 0.5;
 
 /// Capital height of the page's name, mm.
 const NAME_CAP_MM: f64 = 6.0;
 
-/// How a net lies over pages.
-pub struct Tiling {
-    /// A page as it would be without a net.
+/// How a net or a board lies over pages.
+pub(super) struct Poster {
+    /// A page as it would be without a window.
     page: Arrangement,
     /// The window on the page: left, lower, right, upper end, mm.
     window_mm: [f64; 4],
     /// Columns and rows of windows.
     counts: [usize; 2],
-    sheet_from_net: Motion,
+    sheet_from_points: Motion,
 }
 
-impl Tiling {
-    /// The tiling with the fewest windows, on A0 unless the paper is said.
-    pub fn new(spec: &SolidSpec, points: &[DVec2], paper: &PaperSpec) -> Result<Self, TargetError> {
-        let size = match &paper.size {
-            Some(size) => size.clone(),
-            None => PaperSize::automatic().last().expect("there are sizes"),
-        };
+impl Poster {
+    /// That with the fewest windows that shows all points, on A0 unless the paper is said.
+    pub fn new(points: &[DVec2], paper: &PaperSpec) -> Result<Self, TargetError> {
+        let size = Self::paper_size(paper);
         let orientations = match paper.orientation {
             Orientation::Auto => vec![Orientation::Portrait, Orientation::Landscape],
             one => vec![one],
@@ -88,24 +84,29 @@ impl Tiling {
             };
             let Some(page) = fit_upright(&least, &paper)? else { continue };
             for angle in [0.0, std::f64::consts::FRAC_PI_2] {
-                let tiling = Self::on(&page, Motion::turning(angle), points);
-                let count = |t: &Self| t.counts[0] * t.counts[1];
-                if best.as_ref().is_none_or(|best| count(&tiling) < count(best)) {
-                    best = Some(tiling);
+                let poster = Self::on(&page, Motion::turning(angle), points);
+                if best.as_ref().is_none_or(|best| poster.windows() < best.windows()) {
+                    best = Some(poster);
                 }
             }
         }
-        let Some(tiling) = best else {
-            let problem = format!("{size} is too small for pages of a net: take larger paper");
-            return Err(TargetError::invalid("PaperSpec::size", problem));
-        };
-        tiling.check(spec, &size)?;
-        Ok(tiling)
+        best.ok_or_else(|| {
+            let problem =
+                format!("{size} is too small for the pages of a larger sheet: take larger paper");
+            TargetError::invalid("PaperSpec::size", problem)
+        })
+    }
+
+    /// The paper of its pages.
+    pub fn paper_size(paper: &PaperSpec) -> PaperSize {
+        let largest = || PaperSize::automatic().last().expect("there are sizes");
+        paper.size.clone().unwrap_or_else(largest)
     }
 
     fn on(page: &Arrangement, turn: Motion, points: &[DVec2]) -> Self {
         let [left, lower, right, upper] = page.clear_mm();
-        let window_mm = [left, lower + BLANK_MM + WORDS_MM, right - BLANK_MM, upper];
+        let trim = 2.0 * TRIM_MM;
+        let window_mm = [left + trim, lower + BLANK_MM + WORDS_MM, right - BLANK_MM, upper - trim];
         let window = DVec2::new(window_mm[2] - window_mm[0], window_mm[3] - window_mm[1]);
         let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
         let [x0, y0, x1, y1] = bounds(&turned);
@@ -114,34 +115,27 @@ impl Tiling {
             beyond.ceil().max(1.0) as usize
         };
         let counts = [count(x1 - x0, window.x), count(y1 - y0, window.y)];
-        let mut tiling = Self { page: *page, window_mm, counts, sheet_from_net: turn };
-        // The net lies in the middle of the sheet.
+        let mut poster = Self { page: *page, window_mm, counts, sheet_from_points: turn };
+        // The points lie in the middle of the sheet.
         let middle = DVec2::new(x0 + x1, y0 + y1) / 2.0;
-        tiling.sheet_from_net.shift = tiling.size_mm() / 2.0 - middle;
-        tiling
+        poster.sheet_from_points.shift = poster.size_mm() / 2.0 - middle;
+        poster
     }
 
-    fn check(&self, spec: &SolidSpec, size: &PaperSize) -> Result<(), TargetError> {
-        let pages = self.counts[0] * self.counts[1];
+    /// The windows, whether they show anything or not.
+    pub fn windows(&self) -> usize {
+        self.counts[0] * self.counts[1]
+    }
+
+    /// How many times more pages, or a larger area, it has than can be assembled and verified; at most 1 where it can.
+    pub fn excess(&self) -> f64 {
         let area = self.size_mm().element_product();
-        let too_large = (area / MOST_AREA_MM2).max(pages as f64 / MOST_PAGES as f64);
-        if too_large <= 1.0 {
-            return Ok(());
-        }
-        let edge = (spec.edge_mm / too_large.sqrt() * 0.95).floor();
-        let problem = format!(
-            "the net of a solid with {} edges takes {pages} pages of {size}, more than can be \
-             assembled and verified: take `SolidSheets::PerFace`, or \
-             `SolidSpec::edge_mm` of at most {edge} mm{}",
-            format_mm(spec.edge_mm),
-            if area <= MOST_AREA_MM2 { ", or larger `PaperSpec::size`" } else { "" }
-        );
-        Err(TargetError::invalid("SolidSpec::edge_mm", problem))
+        (area / MOST_AREA_MM2).max(self.windows() as f64 / MOST_PAGES as f64)
     }
 
-    /// Where the net lies on the sheet.
-    pub fn sheet_from_net(&self) -> Motion {
-        self.sheet_from_net
+    /// Where the points lie on the sheet.
+    pub fn sheet_from_points(&self) -> Motion {
+        self.sheet_from_points
     }
 
     /// The sheet, still empty.
@@ -177,10 +171,19 @@ impl Tiling {
         [left, upper - window.y, left + window.x, upper]
     }
 
-    /// Adds crosses to a sheet that holds the net, and its pages. `faces` holds the outline of the
-    /// tiles of each panel, by its id.
-    pub fn add_pages(&self, sheet: &mut SheetLayout, faces: &[(u32, [DVec2; 3])], label: &str) {
-        let obstacles = obstacles(sheet, faces);
+    /// Adds crosses to a sheet that holds everything else, and its pages.
+    ///
+    /// `areas` are convex polygons of the sheet that no cross may meet, beside its lines and texts; the `overview` is drawn
+    /// small on every page; the `words` are set from a place on, in a room of some width.
+    pub fn add_pages(
+        &self,
+        sheet: &mut SheetLayout,
+        areas: Vec<Vec<DVec2>>,
+        overview: &[SheetLine],
+        label: &str,
+        words: impl Fn(DVec2, f64) -> Vec<SheetText>,
+    ) {
+        let obstacles = obstacles(sheet, areas);
         let [columns, rows] = self.counts;
         let shown: Vec<(usize, usize)> = (0..rows)
             .flat_map(|row| (0..columns).map(move |column| (column, row)))
@@ -189,7 +192,6 @@ impl Tiling {
                 obstacles.iter().any(|polygon| gap_mm(polygon, &window) < 0.0)
             })
             .collect();
-        let overview = sheet.lines.clone();
         for &(column, row) in &shown {
             for next in [(column + 1, row), (column, row + 1)] {
                 if shown.contains(&next) {
@@ -200,23 +202,41 @@ impl Tiling {
                 }
             }
         }
-        let name = |(column, row): (usize, usize)| format!("{}{}", letters(row), column + 1);
-        let pages = shown.iter().map(|&(column, row)| {
+        let pages = shown.iter().enumerate().map(|(index, &(column, row))| {
             let [left, lower, ..] = self.window_mm;
             let window = self.window_on_sheet(column, row);
-            let label = format!("{label} · page {}", name((column, row)));
-            let mut marks = self.page.sheet(0, [0.0; 4], label);
+            let name = format!("{} of {}", index + 1, shown.len());
+            let mut marks = self.page.sheet(0, [0.0; 4], format!("{label} · page {name}"));
             marks.placements.clear();
-            self.explain(&mut marks, name((column, row)), &sheet.lines);
-            self.draw_overview(&mut marks, &overview, window);
+            self.explain(&mut marks, name, &words);
+            self.draw_overview(&mut marks, overview, window);
+            let is_shown =
+                |beside: Option<(usize, usize)>| beside.is_some_and(|at| shown.contains(&at));
+            let before = column.checked_sub(1).map(|column| (column, row));
+            let above = row.checked_sub(1).map(|row| (column, row));
+            marks.lines.extend(self.trims(is_shown(before), is_shown(above)));
             SheetPage {
-                label: name((column, row)),
+                label: (index + 1).to_string(),
                 window_mm: self.window_mm,
                 sheet_at_mm: DVec2::new(left - window[0], lower - window[1]),
                 marks,
             }
         });
         sheet.pages = pages.collect();
+    }
+
+    /// The lines of a page to be trimmed along, where another lies on its left or above.
+    fn trims(&self, left: bool, above: bool) -> impl Iterator<Item = SheetLine> {
+        let [x0, y0, x1, y1] = self.window_mm;
+        let (x, y) = (x0 - TRIM_MM, y1 + TRIM_MM);
+        let upright = left.then_some([DVec2::new(x, y0), DVec2::new(x, y)]);
+        let level = above.then_some([DVec2::new(x, y), DVec2::new(x1, y)]);
+        upright.into_iter().chain(level).map(|[from_mm, to_mm]| SheetLine {
+            kind: LineKind::Align,
+            from_mm,
+            to_mm,
+            width_mm: LINE_MM,
+        })
     }
 
     /// Size of the overview, mm, and its scale.
@@ -228,7 +248,12 @@ impl Tiling {
     }
 
     /// The name of the page, and what to do with it.
-    fn explain(&self, marks: &mut SheetLayout, name: String, lines: &[SheetLine]) {
+    fn explain(
+        &self,
+        marks: &mut SheetLayout,
+        name: String,
+        words: impl Fn(DVec2, f64) -> Vec<SheetText>,
+    ) {
         let [left, lower, right, _] = self.page.clear_mm();
         let at = lower + BLANK_MM;
         let (overview, _) = self.overview();
@@ -244,9 +269,11 @@ impl Tiling {
         };
         let middle = at + (WORDS_MM - 2.0 * BLANK_MM - NAME_CAP_MM) / 2.0;
         marks.texts.push(text(name, (left, middle), NAME_CAP_MM, width));
-        marks.texts.extend(instructions(lines, DVec2::new(start, at), room));
-        let join = "Join the pages first: what overlaps is the same on both; lay cross on cross.";
-        marks.texts.push(text(join.to_owned(), (start, at + 7.2), 2.2, room));
+        let words = words(DVec2::new(start, at), room);
+        let above = at + words.len() as f64 * 3.6;
+        marks.texts.extend(words);
+        let join = "Trim each page along its line on the left and above; glue it on the page before, cross on cross.";
+        marks.texts.push(text(join.to_owned(), (start, above), 2.2, room));
     }
 
     /// A small picture of the sheet with the window of the page framed.
@@ -275,29 +302,13 @@ impl Tiling {
     }
 }
 
-/// Rows after Z are AA, AB, …
-fn letters(mut row: usize) -> String {
-    let mut letters = String::new();
-    loop {
-        letters.insert(0, char::from(b'A' + (row % 26) as u8));
-        if row < 26 {
-            return letters;
-        }
-        row = row / 26 - 1;
-    }
-}
-
 /// A rectangle, counter-clockwise.
 fn rectangle([left, lower, right, upper]: [f64; 4]) -> [DVec2; 4] {
     [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
 }
 
 /// Everything printed on a sheet, as convex polygons.
-fn obstacles(sheet: &SheetLayout, faces: &[(u32, [DVec2; 3])]) -> Vec<Vec<DVec2>> {
-    let tiles = sheet.placements.iter().filter_map(|placement| {
-        let (_, face) = faces.iter().find(|(panel, _)| *panel == placement.panel)?;
-        Some(face.map(|p| placement.page_from_panel(p)).to_vec())
-    });
+fn obstacles(sheet: &SheetLayout, areas: Vec<Vec<DVec2>>) -> Vec<Vec<DVec2>> {
     let lines = sheet.lines.iter().map(|l| vec![l.from_mm, l.to_mm]);
     let texts = sheet.texts.iter().map(|text| {
         let width = text.text.characters() as f64 * ADVANCE_CAPS * text.cap_height_mm;
@@ -307,7 +318,7 @@ fn obstacles(sheet: &SheetLayout, faces: &[(u32, [DVec2; 3])]) -> Vec<Vec<DVec2>
         let below = at - up * 0.33;
         vec![below, below + along * width, at + up + along * width, at + up]
     });
-    tiles.chain(lines).chain(texts).collect()
+    areas.into_iter().chain(lines).chain(texts).collect()
 }
 
 /// Up to two crosses in an area, as far apart as what is printed there allows.

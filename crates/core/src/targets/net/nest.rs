@@ -1,0 +1,290 @@
+//! Pieces nested on pages: as few pages as a greedy search finds.
+//!
+//! ```text
+//!   ┌─────────────┐   The page and each piece, in twelve directions, are fields of cells. Pieces come in the
+//!   │    ╱╲╱╲     │   order of their size; each goes to the first page that has room for it, where its upper
+//!   │ ╱╲╱╲╱╲╱╲ ╱╲ │   end is lowest, then as far left as it can. A cell belongs to a piece where any part of
+//!   │ ╲╱╲╱╲╱  ╱╲╱ │   it is nearer than half the blank between pieces, so that what fits never overlaps.
+//!   └─────────────┘
+//! ```
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::DVec2;
+
+use super::plane::{Motion, bounds};
+
+/// Blank between pieces, mm: scissors pass.
+const BLANK_MM: f64 = 2.0;
+
+/// Cells along the longer side of a page: on A0 a cell is 4 mm, half a glue tab.
+const CELLS: f64 = 300.0;
+
+/// Smallest cell, mm.
+const LEAST_CELL_MM: f64 = 1.0;
+
+/// Directions in which a piece is tried.
+const TURNS: usize = 12;
+
+/// A piece to be nested: convex polygons in a frame of its own, mm.
+pub type Outline = Vec<Vec<DVec2>>;
+
+/// Where a piece lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Index of the page.
+    pub page: usize,
+    /// From the frame of the piece to that of the room on a page, whose lower left corner is the origin.
+    pub room_from_piece: Motion,
+}
+
+/// Nests pieces in rooms of this width and height, mm; `None` where a piece fits none.
+pub fn nest(pieces: &[Outline], room: DVec2) -> Option<Vec<Place>> {
+    let cell = (room.max_element() / CELLS).max(LEAST_CELL_MM);
+    let mut order: Vec<usize> = (0..pieces.len()).collect();
+    let areas: Vec<f64> = pieces.iter().map(|piece| piece.iter().map(|p| area(p)).sum()).collect();
+    order.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));
+    let mut pages: Vec<Page> = Vec::new();
+    let mut places = vec![None; pieces.len()];
+    for index in order {
+        let stamps = stamps(&pieces[index], room, cell);
+        let on_page = |(page, fields): (usize, &Page)| Some((page, fields.best(&stamps)?));
+        let found = pages.iter().enumerate().find_map(on_page);
+        let (page, (stamp, at)) = match found {
+            Some(found) => found,
+            None => {
+                let fields = Page::new(room, cell);
+                let best = fields.best(&stamps)?;
+                pages.push(fields);
+                (pages.len() - 1, best)
+            }
+        };
+        let stamp = &stamps[stamp];
+        pages[page].take(stamp, at);
+        let shift = DVec2::new(at[0] as f64, at[1] as f64) * cell - stamp.lower_left;
+        let room_from_piece = Motion { shift, ..stamp.turn };
+        places[index] = Some(Place { page, room_from_piece });
+    }
+    places.into_iter().collect()
+}
+
+/// Whether a piece with these points, and a rim of this width around it, can lie in a room.
+pub fn fits(points: &[DVec2], rim: f64, room: DVec2) -> bool {
+    directions(points).into_iter().any(|turn| {
+        let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
+        let [left, lower, right, upper] = bounds(&turned);
+        let size = DVec2::new(right - left, upper - lower) + 2.0 * rim + BLANK_MM;
+        size.cmple(room).all()
+    })
+}
+
+fn area(polygon: &[DVec2]) -> f64 {
+    let ends = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    0.5 * ends.map(|(a, b)| a.perp_dot(*b)).sum::<f64>()
+}
+
+/// The turns in which a piece is tried: from the one in which its bounding box is smallest, all round.
+fn directions(points: &[DVec2]) -> [Motion; TURNS] {
+    // A box that touches an edge of the convex hull is the smallest; to a degree is near enough.
+    let size = |degrees: u32| {
+        let turn = Motion::turning(f64::from(degrees).to_radians());
+        let turned: Vec<DVec2> = points.iter().map(|&p| turn.apply(p)).collect();
+        let [left, lower, right, upper] = bounds(&turned);
+        (right - left) * (upper - lower)
+    };
+    let smallest = (0..90).min_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
+    let first = f64::from(smallest).to_radians();
+    std::array::from_fn(|n| {
+        // Right angles first, which the edges of the page have.
+        let (quarter, rest) = (n % 4, n / 4);
+        let rest = rest as f64 * TAU / TURNS as f64;
+        Motion::turning(first + quarter as f64 * FRAC_PI_2 + rest)
+    })
+}
+
+/// A piece in one of its directions.
+struct Stamp {
+    turn: Motion,
+    /// The place of its first cell, in the frame of the turned piece, mm.
+    lower_left: DVec2,
+    /// How many cells it is wide.
+    width: usize,
+    /// Cells that it takes, by rows from below, 64 to a word.
+    rows: Vec<Vec<u64>>,
+}
+
+fn stamps(piece: &Outline, room: DVec2, cell: f64) -> Vec<Stamp> {
+    let points: Vec<DVec2> = piece.iter().flatten().copied().collect();
+    let half = BLANK_MM / 2.0;
+    let stamp = |turn: Motion| {
+        let turned: Vec<Vec<DVec2>> =
+            piece.iter().map(|p| p.iter().map(|&v| turn.apply(v)).collect()).collect();
+        let [left, lower, right, upper] = bounds(turned.iter().flatten());
+        let lower_left = DVec2::new(left, lower) - half;
+        let size = DVec2::new(right - left, upper - lower) + BLANK_MM;
+        if size.cmpgt(room).any() {
+            return None;
+        }
+        let [width, height] = [size.x, size.y].map(|side| (side / cell).ceil() as usize);
+        let mut rows = vec![vec![0u64; width.div_ceil(64)]; height];
+        for (row, words) in rows.iter_mut().enumerate() {
+            let from = lower_left.y + row as f64 * cell - half;
+            for polygon in &turned {
+                let Some([first, last]) = extent(polygon, [from, from + cell + BLANK_MM]) else {
+                    continue;
+                };
+                let column = |x: f64| ((x - lower_left.x) / cell).floor().max(0.0) as usize;
+                for x in column(first - half)..=column(last + half).min(width - 1) {
+                    words[x / 64] |= 1 << (x % 64);
+                }
+            }
+        }
+        Some(Stamp { turn, lower_left, width, rows })
+    };
+    directions(&points).into_iter().filter_map(stamp).collect()
+}
+
+/// Ends of the part of a convex polygon within a strip from below to above.
+fn extent(polygon: &[DVec2], [below, above]: [f64; 2]) -> Option<[f64; 2]> {
+    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+    let mut take = |x: f64| ends = [ends[0].min(x), ends[1].max(x)];
+    for (&p, &q) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+        if (below..=above).contains(&p.y) {
+            take(p.x);
+        }
+        for y in [below, above] {
+            if (p.y < y) != (q.y < y) {
+                take(p.x + (q.x - p.x) * (y - p.y) / (q.y - p.y));
+            }
+        }
+    }
+    (ends[0] <= ends[1]).then_some(ends)
+}
+
+/// The cells of a page that are taken.
+struct Page {
+    width: usize,
+    /// By rows from below, 64 cells to a word.
+    rows: Vec<Vec<u64>>,
+}
+
+impl Page {
+    fn new(room: DVec2, cell: f64) -> Self {
+        let [width, height] = [room.x, room.y].map(|side| (side / cell).floor() as usize);
+        Self { width, rows: vec![vec![0; width.div_ceil(64)]; height] }
+    }
+
+    /// The stamp and its place with the lowest upper end, then the leftmost one.
+    fn best(&self, stamps: &[Stamp]) -> Option<(usize, [usize; 2])> {
+        let mut best: Option<([usize; 2], usize, [usize; 2])> = None;
+        for (index, stamp) in stamps.iter().enumerate() {
+            let height = stamp.rows.len();
+            let (Some(last_x), Some(last_y)) =
+                (self.width.checked_sub(stamp.width), self.rows.len().checked_sub(height))
+            else {
+                continue;
+            };
+            for y in 0..=last_y {
+                if best.is_some_and(|(least, ..)| y + height > least[0]) {
+                    break;
+                }
+                if let Some(x) = (0..=last_x).find(|&x| self.is_free(stamp, [x, y])) {
+                    let value = [y + height, x];
+                    if best.is_none_or(|(least, ..)| value < least) {
+                        best = Some((value, index, [x, y]));
+                    }
+                    break;
+                }
+            }
+        }
+        best.map(|(_, stamp, at)| (stamp, at))
+    }
+
+    fn is_free(&self, stamp: &Stamp, [x, y]: [usize; 2]) -> bool {
+        let mut rows = self.rows[y..].iter().zip(&stamp.rows);
+        rows.all(|(taken, cells)| {
+            shifted(cells, x).all(|(at, word)| word == 0 || taken[at] & word == 0)
+        })
+    }
+
+    fn take(&mut self, stamp: &Stamp, [x, y]: [usize; 2]) {
+        for (taken, cells) in self.rows[y..].iter_mut().zip(&stamp.rows) {
+            for (at, word) in shifted(cells, x).filter(|(_, word)| *word != 0) {
+                taken[at] |= word;
+            }
+        }
+    }
+}
+
+/// The words of a row that is moved to the right, and their places.
+fn shifted(cells: &[u64], by: usize) -> impl Iterator<Item = (usize, u64)> {
+    let (words, bits) = (by / 64, by % 64);
+    cells.iter().enumerate().flat_map(move |(n, &cells)| {
+        let beyond = cells.checked_shr(64 - bits as u32).unwrap_or(0);
+        [(words + n, cells << bits), (words + n + 1, beyond)]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::plane::gap_mm;
+    use super::*;
+
+    fn triangle(edge: f64) -> Outline {
+        let corners = [0.0, 120.0, 240.0];
+        let radius = edge / 3f64.sqrt();
+        vec![corners.map(|at: f64| DVec2::from_angle(at.to_radians()) * radius).to_vec()]
+    }
+
+    /// Two triangles of the same kind fill a parallelogram, and what does not fit any more gets a page of its own.
+    #[test]
+    fn pages_are_filled_before_another_is_taken() {
+        let pieces = vec![triangle(100.0); 9];
+        // Four times two in rows of 87 mm.
+        let places = nest(&pieces, DVec2::new(275.0, 190.0)).unwrap();
+        let on = |page| places.iter().filter(|place| place.page == page).count();
+        assert!(on(0) >= 8 && on(0) + on(1) == 9, "{places:?}");
+        assert_eq!(nest(&pieces, DVec2::new(80.0, 60.0)), None);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        /// Pieces of triangles keep the blank between them, and stay in the room.
+        #[test]
+        fn nested_pieces_are_apart(
+            edges in prop::collection::vec(20.0f64..120.0, 2..14),
+            room in (150.0f64..400.0, 150.0f64..400.0),
+        ) {
+            let room = DVec2::from(room);
+            // Each with a tab of a third of its edge.
+            let pieces: Vec<Outline> = edges.iter().map(|&edge| {
+                let mut piece = triangle(edge);
+                let [a, b] = [piece[0][0], piece[0][1]];
+                let out = -(b - a).perp() / 3.0;
+                piece.push(vec![b, a, a + out + (b - a) / 3.0, b + out - (b - a) / 3.0]);
+                piece
+            }).collect();
+            let Some(places) = nest(&pieces, room) else { return Ok(()) };
+            let moved: Vec<Outline> = pieces.iter().zip(&places).map(|(piece, place)| {
+                let motion = place.room_from_piece;
+                piece.iter().map(|p| p.iter().map(|&v| motion.apply(v)).collect()).collect()
+            }).collect();
+            for (n, piece) in moved.iter().enumerate() {
+                let [left, lower, right, upper] = bounds(piece.iter().flatten());
+                prop_assert!(left >= 0.0 && lower >= 0.0 && right <= room.x && upper <= room.y);
+                for (m, other) in moved.iter().enumerate().skip(n + 1) {
+                    if places[n].page == places[m].page {
+                        let gap = |a: &Vec<DVec2>| {
+                            other.iter().map(|b| gap_mm(a, b)).fold(f64::INFINITY, f64::min)
+                        };
+                        let least = piece.iter().map(gap).fold(f64::INFINITY, f64::min);
+                        prop_assert!(least > 0.0, "{least}");
+                    }
+                }
+            }
+        }
+    }
+}
