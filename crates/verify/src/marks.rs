@@ -19,7 +19,7 @@ use super::document::{MAX_INK_ERROR, Page};
 use super::tiles::{EDGE_PX, PROBES, PlacedPanel};
 use super::{Finding, SheetVerdict};
 use deltille_core::artwork;
-use deltille_core::lattice::Tile;
+use deltille_core::lattice::{Orientation, Tile};
 use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::{CHECK_BAR_STROKE_MM, Label, LineKind, SheetLayout};
 
@@ -412,10 +412,55 @@ pub(super) fn spots(page: &Page, known: &[bool], panels: &[PlacedPanel]) -> Vec<
     spots
 }
 
+/// The tiles of a panel, as a table over all places between their ends.
+struct TileMap {
+    first: [i32; 2],
+    /// Rows and columns.
+    size: [usize; 2],
+    /// Two places for each: the inverted triangle, and the other tile.
+    has: Vec<bool>,
+}
+
+impl TileMap {
+    fn new(tiles: &BTreeSet<Tile>) -> Self {
+        let ends = |of: fn(&Tile) -> i32| {
+            let values = || tiles.iter().map(of);
+            let (least, most) = (values().min().unwrap_or(0), values().max().unwrap_or(-1));
+            (least, (most - least + 1) as usize)
+        };
+        let (rows, cols) = (ends(|tile| tile.anchor.row), ends(|tile| tile.anchor.col));
+        let mut map = Self {
+            first: [rows.0, cols.0],
+            size: [rows.1, cols.1],
+            has: vec![false; 2 * rows.1 * cols.1],
+        };
+        for &tile in tiles {
+            if let Some(place) = map.place(tile) {
+                map.has[place] = true;
+            }
+        }
+        map
+    }
+
+    fn place(&self, tile: Tile) -> Option<usize> {
+        let [row, col] = [tile.anchor.row - self.first[0], tile.anchor.col - self.first[1]];
+        let (row, col) = (usize::try_from(row).ok()?, usize::try_from(col).ok()?);
+        let other = usize::from(tile.orientation != Orientation::Inverted);
+        (row < self.size[0] && col < self.size[1]).then_some(2 * (row * self.size[1] + col) + other)
+    }
+
+    fn contains(&self, tile: Tile) -> bool {
+        self.place(tile).is_some_and(|place| self.has[place])
+    }
+}
+
 /// The area of a panel on its page.
 struct Ground<'a> {
     placed: &'a PlacedPanel<'a>,
-    tiles: BTreeSet<Tile>,
+    tiles: TileMap,
+    /// Directions in which tiles are looked for beside a pixel: fine enough that no tip of a tile, also a lone
+    /// one, slips between two.
+    probes: Vec<DVec2>,
     /// The tiles and the black field of an inverted panel: left, lower, right, upper end, mm.
     field: [f64; 4],
     /// Where on the picture that may be: left, upper, right, lower end, px.
@@ -433,7 +478,9 @@ impl<'a> Ground<'a> {
         let first = a.min(b).min(c).min(d) - reach_px;
         let last = a.max(b).max(c).max(d) + reach_px;
         let around_px = [first.x, first.y, last.x, last.y];
-        Self { placed, tiles: panel.tiles(), field, around_px }
+        let angles = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
+        let probes = angles.map(DVec2::from_angle).collect();
+        Self { placed, tiles: TileMap::new(&panel.tiles()), probes, field, around_px }
     }
 
     fn inverted(&self) -> bool {
@@ -458,12 +505,10 @@ impl<'a> Ground<'a> {
         let edge_mm = self.placed.panel.edge_mm;
         let near = near_px / page.px_per_mm;
         let reaches = |off: DVec2| {
-            self.tiles.contains(&self.placed.panel.kind.tile_at((place + off) / edge_mm))
+            self.tiles.contains(self.placed.panel.kind.tile_at((place + off) / edge_mm))
         };
-        // Fine enough that no tip of a tile, also a lone one, slips between two directions.
-        let around = (0..PROBES).map(|n| f64::from(n) * TAU / f64::from(PROBES));
-        let in_tile = reaches(DVec2::ZERO)
-            || around.into_iter().any(|angle| reaches(near * DVec2::from_angle(angle)));
+        let in_tile =
+            reaches(DVec2::ZERO) || self.probes.iter().any(|&probe| reaches(near * probe));
         let undecided = in_tile || (self.inverted() && inside < near_px);
         if undecided { Some(None) } else { self.inverted().then_some(Some(1.0)) }
     }

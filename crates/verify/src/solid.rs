@@ -260,7 +260,7 @@ fn check_print(
     let area_mm = [low.x, low.y, high.x, high.y];
     let (page, placement) = face_page(model, panel, outline, area_mm, px_per_mm);
     let found_from_stated = AffineMap::IDENTITY;
-    let placed = PlacedPanel { page: &page, panel, placement: &placement, found_from_stated };
+    let placed = PlacedPanel::new(&page, panel, &placement, found_from_stated);
     if let Some(finding) = wrong_tones(&placed) {
         verdict.findings.push(finding);
         return;

@@ -216,8 +216,9 @@ pub(super) struct TagLooks {
     margin: f64,
     inset: f64,
     width: f64,
-    /// Bit of each cell, by (row, column, upright).
-    bits: BTreeMap<(u32, u32, bool), u32>,
+    /// Bit of each cell, in rows of `columns` places, two to a column: inverted, upright.
+    bits: Vec<Option<u32>>,
+    columns: usize,
 }
 
 /// A part of a tile with a tag.
@@ -232,10 +233,17 @@ impl TagLooks {
     pub fn new(family: &Family, panel: &Panel) -> Self {
         let cells = family.cells();
         let (margin, inset) = (panel.tag_margin_bits(), panel.tag_inset_bits());
-        let bits = cells.cells().iter().enumerate();
-        let bits = bits.map(|(bit, c)| ((c.row, c.col, c.upright), bit as u32)).collect();
+        let most = |of: fn(&deltille_core::lattice::Cell) -> u32| {
+            cells.cells().iter().map(of).max().map_or(0, |most| most as usize + 1)
+        };
+        let columns = most(|cell| cell.col);
+        let mut bits = vec![None; most(|cell| cell.row) * columns * 2];
+        for (bit, cell) in (0..).zip(cells.cells()) {
+            let place = cell.row as usize * columns + cell.col as usize;
+            bits[2 * place + usize::from(cell.upright)] = Some(bit);
+        }
         let width = cells.width(inset);
-        Self { cells, margin, inset, width, bits }
+        Self { cells, margin, inset, width, bits, columns }
     }
 
     /// The region at tile coordinates.
@@ -258,7 +266,10 @@ impl TagLooks {
             return None;
         }
         let upright = self.cells.kind() == GridKind::Checker || u.fract() + v.fract() < 1.0;
-        self.bits.get(&(v as u32, u as u32, upright)).copied()
+        let (row, col) = (v as usize, u as usize);
+        let place = row * self.columns + col;
+        let known = col < self.columns;
+        known.then(|| self.bits.get(2 * place + usize::from(upright)).copied()).flatten().flatten()
     }
 }
 
@@ -279,17 +290,30 @@ pub(super) struct PlacedPanel<'a> {
     pub placement: &'a Placement,
     /// From stated to found page positions.
     pub found_from_stated: AffineMap,
+    /// Where the panel's x axis points on the page.
+    along: DVec2,
 }
 
-impl PlacedPanel<'_> {
+impl<'a> PlacedPanel<'a> {
+    pub fn new(
+        page: &'a Page,
+        panel: &'a Panel,
+        placement: &'a Placement,
+        found_from_stated: AffineMap,
+    ) -> Self {
+        let along = DVec2::from_angle(placement.angle_rad);
+        Self { page, panel, placement, found_from_stated, along }
+    }
+
     /// Stated page position of a point of the panel.
     pub fn page_from_panel(&self, point: DVec2) -> DVec2 {
-        DVec2::from_angle(self.placement.angle_rad).rotate(point) + self.placement.origin_mm
+        self.along.rotate(point) + self.placement.origin_mm
     }
 
     /// Stated panel position of a point of the page.
     pub fn panel_from_page(&self, point: DVec2) -> DVec2 {
-        DVec2::from_angle(-self.placement.angle_rad).rotate(point - self.placement.origin_mm)
+        let back = DVec2::new(self.along.x, -self.along.y);
+        back.rotate(point - self.placement.origin_mm)
     }
 
     /// The ink of the tiles that should be white and black, in the middle of plain tiles; `None`
@@ -383,6 +407,16 @@ impl PlacedPanel<'_> {
             GridKind::Deltille => u >= 0.0 && v >= 0.0 && u + v <= 1.0,
             GridKind::Checker => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
         };
+        // Parts of the tile's heights that a circle reaches.
+        let reach = further.iter().fold(DVec2::ZERO, |most, off| most.max(off.abs()));
+        let slanting = further.iter().map(|off| off.element_sum().abs()).fold(0.0, f64::max);
+        let clear_of_edges = |p: DVec2| {
+            let near = p.cmpge(reach).all();
+            near && match self.panel.kind {
+                GridKind::Deltille => p.element_sum() <= 1.0 - slanting,
+                GridKind::Checker => p.cmple(1.0 - reach).all(),
+            }
+        };
         let fourth = match self.panel.kind {
             GridKind::Deltille => c,
             GridKind::Checker => b + c - a,
@@ -404,11 +438,14 @@ impl PlacedPanel<'_> {
                 let black = black_at(p);
                 let found = 1.0 - f64::from(image.at(x, y)) / 255.0;
                 let error = (found - f64::from(u8::from(black))).abs();
+                // A plain tile is of one colour wherever its edges are far enough.
+                let is_far = expected.tag.is_none() && clear_of_edges(p);
                 let is_uniform = |around: &[DVec2], step: usize| {
-                    around.iter().step_by(step).all(|&off| {
-                        let q = p + off;
-                        inside(q) && black_at(q) == black
-                    })
+                    is_far
+                        || around.iter().step_by(step).all(|&off| {
+                            let q = p + off;
+                            inside(q) && black_at(q) == black
+                        })
                 };
                 let is_wrong = error > most_at_edges && is_uniform(&around, 1)
                     || error > MAX_INK_ERROR && is_uniform(&further, 1);

@@ -109,8 +109,8 @@ struct Stamp {
     lower_left: DVec2,
     /// How many cells it is wide.
     width: usize,
-    /// Cells that it takes, by rows from below, 64 to a word.
-    rows: Vec<Vec<u64>>,
+    /// Cells that it takes, by rows from below: first and last of those that lie beside each other.
+    rows: Vec<Vec<[usize; 2]>>,
 }
 
 fn stamps(piece: &Outline, room: DVec2, cell: f64) -> Vec<Stamp> {
@@ -126,22 +126,32 @@ fn stamps(piece: &Outline, room: DVec2, cell: f64) -> Vec<Stamp> {
             return None;
         }
         let [width, height] = [size.x, size.y].map(|side| (side / cell).ceil() as usize);
-        let mut rows = vec![vec![0u64; width.div_ceil(64)]; height];
-        for (row, words) in rows.iter_mut().enumerate() {
+        let row = |row: usize| {
             let from = lower_left.y + row as f64 * cell - half;
-            for polygon in &turned {
-                let Some([first, last]) = extent(polygon, [from, from + cell + BLANK_MM]) else {
-                    continue;
-                };
-                let column = |x: f64| ((x - lower_left.x) / cell).floor().max(0.0) as usize;
-                for x in column(first - half)..=column(last + half).min(width - 1) {
-                    words[x / 64] |= 1 << (x % 64);
-                }
-            }
-        }
+            let column = |x: f64| ((x - lower_left.x) / cell).floor().max(0.0) as usize;
+            let run = |polygon: &Vec<DVec2>| {
+                let [first, last] = extent(polygon, [from, from + cell + BLANK_MM])?;
+                Some([column(first - half), column(last + half).min(width - 1)])
+            };
+            joined(turned.iter().filter_map(run).collect())
+        };
+        let rows = (0..height).map(row).collect();
         Some(Stamp { turn, lower_left, width, rows })
     };
     directions(&points).into_iter().filter_map(stamp).collect()
+}
+
+/// Runs of cells, those that meet or overlap as one.
+fn joined(mut runs: Vec<[usize; 2]>) -> Vec<[usize; 2]> {
+    runs.sort_unstable();
+    let mut joined: Vec<[usize; 2]> = Vec::with_capacity(runs.len());
+    for [first, last] in runs {
+        match joined.last_mut() {
+            Some(run) if first <= run[1] + 1 => run[1] = run[1].max(last),
+            _ => joined.push([first, last]),
+        }
+    }
+    joined
 }
 
 /// Ends of the part of a convex polygon within a strip from below to above.
@@ -188,40 +198,56 @@ impl Page {
                 if best.is_some_and(|(least, ..)| y + height > least[0]) {
                     break;
                 }
-                if let Some(x) = (0..=last_x).find(|&x| self.is_free(stamp, [x, y])) {
-                    let value = [y + height, x];
-                    if best.is_none_or(|(least, ..)| value < least) {
-                        best = Some((value, index, [x, y]));
-                    }
-                    break;
+                let Some(x) = self.leftmost(stamp, y, last_x) else { continue };
+                let value = [y + height, x];
+                if best.is_none_or(|(least, ..)| value < least) {
+                    best = Some((value, index, [x, y]));
                 }
+                break;
             }
         }
         best.map(|(_, stamp, at)| (stamp, at))
     }
 
-    fn is_free(&self, stamp: &Stamp, [x, y]: [usize; 2]) -> bool {
-        let mut rows = self.rows[y..].iter().zip(&stamp.rows);
-        rows.all(|(taken, cells)| {
-            shifted(cells, x).all(|(at, word)| word == 0 || taken[at] & word == 0)
-        })
+    /// The leftmost column up to `most` where a stamp is free in a row.
+    fn leftmost(&self, stamp: &Stamp, y: usize, most: usize) -> Option<usize> {
+        let mut x = 0;
+        while x <= most {
+            let mut rows = self.rows[y..].iter().zip(&stamp.rows);
+            let beyond = rows.find_map(|(taken, runs)| {
+                runs.iter().find_map(|&[first, last]| {
+                    // The run that meets a cell does so until it has passed it.
+                    Some(last_taken(taken, [x + first, x + last])? + 1 - first)
+                })
+            });
+            match beyond {
+                None => return Some(x),
+                Some(beyond) => x = beyond,
+            }
+        }
+        None
     }
 
     fn take(&mut self, stamp: &Stamp, [x, y]: [usize; 2]) {
-        for (taken, cells) in self.rows[y..].iter_mut().zip(&stamp.rows) {
-            for (at, word) in shifted(cells, x).filter(|(_, word)| *word != 0) {
-                taken[at] |= word;
+        for (taken, runs) in self.rows[y..].iter_mut().zip(&stamp.rows) {
+            for cell in runs.iter().flat_map(|&[first, last]| x + first..=x + last) {
+                taken[cell / 64] |= 1 << (cell % 64);
             }
         }
     }
 }
 
-/// The words of a row that is moved to the right, and their places.
-fn shifted(cells: &[u64], by: usize) -> impl Iterator<Item = (usize, u64)> {
-    let (words, bits) = (by / 64, by % 64);
-    cells.iter().enumerate().flat_map(move |(n, &cells)| {
-        let beyond = cells.checked_shr(64 - bits as u32).unwrap_or(0);
-        [(words + n, cells << bits), (words + n + 1, beyond)]
+/// The last cell of a row that is taken, from a first to a last one.
+fn last_taken(row: &[u64], [first, last]: [usize; 2]) -> Option<usize> {
+    (first / 64..=last / 64).rev().find_map(|word| {
+        let mut cells = row[word];
+        if word == last / 64 {
+            cells &= u64::MAX >> (63 - last % 64);
+        }
+        if word == first / 64 {
+            cells &= u64::MAX << (first % 64);
+        }
+        (cells != 0).then(|| 64 * word + 63 - cells.leading_zeros() as usize)
     })
 }
 

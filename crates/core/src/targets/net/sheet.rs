@@ -249,10 +249,12 @@ fn nested(
 fn nest_on(flat: &[[DVec2; 3]], sides: &Sides, room: DVec2) -> Option<(Net, Vec<Place>)> {
     let mut best: Option<([usize; 2], Net, Vec<Place>)> = None;
     for part in PARTS_OF_ROOM {
+        let mut fewest = usize::MAX;
         for seed in 0..ORDERS {
             let most = room * part;
             let fit = |points: &[DVec2]| nest::fits(points, tabs::MOST_DEPTH_MM, most);
             let pieces = unfold::in_pieces_that_fit(flat, sides, seed, fit);
+            fewest = fewest.min(pieces.len());
             let Some(tabs) = tabs::place(&pieces, sides) else { continue };
             let outline = |(piece, tabs): (&Piece, &Vec<Tab>)| -> Outline {
                 let faces = piece.iter().map(|face| face.corners.to_vec());
@@ -265,6 +267,10 @@ fn nest_on(flat: &[[DVec2; 3]], sides: &Sides, room: DVec2) -> Option<(Net, Vec<
             if best.as_ref().is_none_or(|(least, ..)| value < *least) {
                 best = Some((value, Net { pieces, tabs }, places));
             }
+        }
+        // There are no smaller pieces than single faces.
+        if fewest == flat.len() {
+            break;
         }
     }
     best.map(|(_, net, places)| (net, places))
