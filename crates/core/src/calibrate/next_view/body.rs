@@ -26,7 +26,7 @@ const MARGIN_PX: f64 = 8.0;
 
 /// A board that is cut off by the picture is labelled where some tags are whole, and tells enough of its pose with
 /// this part of its corners.
-const LEAST_PART: f64 = 0.35;
+const LEAST_PART: f64 = 0.5;
 
 /// A panel of a target.
 #[derive(Clone, Debug)]

@@ -50,6 +50,10 @@ const FILLS: [f64; 3] = [0.4, 0.65, 0.95];
 /// Tilts, rad: 30° and 50°, of which the last is as far as a hand still gets right.
 const TILTS: [f64; 2] = [0.52, 0.87];
 
+/// Unless said otherwise no board is held nearer than this many times its reach, half of a board's diagonal: nearer
+/// the camera shades it, and few lenses are in focus.
+const NEAREST: f64 = 1.0;
+
 /// Directions of a tilt.
 const DIRECTIONS: usize = 8;
 
@@ -178,14 +182,22 @@ impl Guide {
         let is_spline = matches!(assumed.lens, Lens::Spline(_));
         let is_image =
             width > 0 && height > 0 && [assumed.width, assumed.height] == [width, height];
-        let distances_mm = [0.0, f64::INFINITY];
+        let distances_mm = [NEAREST * body.reach_mm(), f64::INFINITY];
         (!is_spline && is_image).then_some(Self { body, intrinsics, assumed, distances_mm })
     }
 
-    /// With the nearest and the farthest distance, mm, at which boards can be held and are in focus.
+    /// With the nearest and the farthest distance, mm, at which boards can be held and are in focus; unless said
+    /// otherwise from half of the board's diagonal on, and as far as corners are found.
     #[must_use]
-    pub fn within_mm(self, nearest: f64, farthest: f64) -> Self {
-        Self { distances_mm: [nearest, farthest], ..self }
+    pub fn within_mm(self, nearest: Option<f64>, farthest: Option<f64>) -> Self {
+        let [near, far] = self.distances_mm;
+        let distances_mm = [nearest.unwrap_or(near), farthest.unwrap_or(far)];
+        Self { distances_mm, ..self }
+    }
+
+    /// Width and height of the pictures, px.
+    pub fn size_px(&self) -> [u32; 2] {
+        [self.assumed.width, self.assumed.height]
     }
 
     /// What so many views are worth, and which one to take next. It finds the camera anew, which takes longer than
@@ -235,7 +247,7 @@ impl Guide {
         let placing = Placing { at, distance_mm: 1.0, tilt, away, roll: 0.0 };
         let placing = placing.filling(FIRST_FILL, camera, &self.body);
         let placing = placing.map(|placing| Placing {
-            distance_mm: placing.distance_mm.clamp(self.distances_mm[0], self.distances_mm[1]),
+            distance_mm: placing.distance_mm.max(self.distances_mm[0]).min(self.distances_mm[1]),
             ..placing
         });
         placing.and_then(|placing| self.view(camera, placing)).unwrap_or_else(|| {
