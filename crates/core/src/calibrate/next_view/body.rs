@@ -37,6 +37,8 @@ pub(super) struct BodyPanel {
     pub corners: Vec<BodyCorner>,
     /// Indices of the corners by which it is judged.
     sampled: Vec<usize>,
+    /// Indices of the corners around which all others lie.
+    rim: Vec<usize>,
     edge_mm: f64,
     has_tags: bool,
     /// Around its tiles, in the target frame, mm.
@@ -126,6 +128,9 @@ impl BodyPanel {
                 target_mm: panel.place_mm(corner),
             })
             .collect();
+        let around = hull(corners.iter().map(|corner| corner.panel_mm.truncate()).collect());
+        let is_rim = |corner: &BodyCorner| around.contains(&corner.panel_mm.truncate());
+        let rim = (0..corners.len()).filter(|&index| is_rim(&corners[index])).collect();
         let mut step = corners.len().div_ceil(most).max(1);
         let across = panel.matrix[0] as usize;
         // Otherwise only some columns were taken.
@@ -144,6 +149,7 @@ impl BodyPanel {
             panel: PanelRef::new(index, panel.id),
             normal: panel.pose.matrix() * DVec3::Z,
             sampled: (0..corners.len()).step_by(step).collect(),
+            rim,
             edge_mm: panel.edge_mm,
             has_tags: !panel.tags.is_empty(),
             outline: outline.map(|place| panel.pose.target_from_panel(place)).collect(),
@@ -174,21 +180,23 @@ impl BodyPanel {
         let size = DVec2::new(camera.width.into(), camera.height.into());
         let weight = if all { 1.0 } else { self.corners.len() as f64 / self.sampled.len() as f64 };
         let chosen = if all { self.corners.len() } else { self.sampled.len() };
-        for k in 0..chosen {
-            let corner = if all { k } else { self.sampled[k] };
+        let find = |corner: usize| {
             let point = pose.apply(self.corners[corner].target_mm);
             if -normal.dot(point) < MOST_TILT_COS * point.length() {
-                continue;
+                return None;
             }
-            let Some(at) = camera.project_with_derivatives(point) else { continue };
+            let at = camera.project_with_derivatives(point)?;
             let is_inside = at.pixel.cmpge(DVec2::splat(MARGIN_PX)).all()
                 && at.pixel.cmple(size - 1.0 - MARGIN_PX).all();
-            if is_inside && self.edge_mm * narrowest(&at, &turn) >= least_px {
-                seen.push(Seen { panel: index, corner, point, at, weight });
-            }
-        }
-        let found = (seen.len() - first) as f64;
+            let is_found = is_inside && self.edge_mm * narrowest(&at, &turn) >= least_px;
+            is_found.then_some(Seen { panel: index, corner, point, at, weight })
+        };
         // Without tags rows and columns are known where the board is seen whole.
+        if !self.has_tags && !self.rim.iter().all(|&corner| find(corner).is_some()) {
+            return;
+        }
+        seen.extend((0..chosen).filter_map(|k| find(if all { k } else { self.sampled[k] })));
+        let found = (seen.len() - first) as f64;
         let least = if self.has_tags { LEAST_PART * chosen as f64 } else { chosen as f64 };
         if found < least {
             seen.truncate(first);

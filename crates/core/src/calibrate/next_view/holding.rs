@@ -8,7 +8,7 @@ use super::NextView;
 use super::body::hull;
 use crate::calibrate::panel::PanelRef;
 use crate::calibrate::pose::estimate_pose;
-use crate::calibrate::view::View;
+use crate::calibrate::view::{Sighting, View};
 use crate::camera::Pose;
 use crate::statistics::median;
 
@@ -158,17 +158,18 @@ impl Holding {
         if overlap < LEAST_OVERLAP {
             return Some(Held::Elsewhere { overlap });
         }
-        let pose = estimate_pose(&self.next.camera, &self.panels, &view.sightings);
+        let is_known = |s: &Sighting| s.panel.index() < self.panels.len();
+        let pose = view.sightings.iter().all(is_known).then_some(());
+        let pose =
+            pose.and_then(|()| estimate_pose(&self.next.camera, &self.panels, &view.sightings));
         let off_rad = pose.map_or(0.0, |pose| {
             let [now, wanted] = [pose, self.next.camera_from_target].map(|pose| pose.rotation);
-            // Seen from the camera a turn in the plane of the board matters little, and without tags it is not known.
-            view.sightings
-                .iter()
-                .map(|sighting| {
-                    let normal = self.panels[sighting.panel.index()].rotation * DVec3::Z;
-                    (now * normal).angle_between(wanted * normal)
-                })
-                .fold(0.0, f64::max)
+            // A turn in the plane of the board matters little, and without tags it is not known.
+            let off = view.sightings.iter().filter_map(|sighting| {
+                let normal = self.panels.get(sighting.panel.index())?.rotation * DVec3::Z;
+                Some((now * normal).angle_between(wanted * normal))
+            });
+            off.fold(0.0, f64::max)
         });
         if off_rad > MOST_TURN_RAD {
             return Some(Held::Turned { off_rad });

@@ -14,6 +14,8 @@ mod body;
 mod gain;
 mod holding;
 mod place;
+#[cfg(test)]
+mod tests;
 mod words;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -252,7 +254,7 @@ impl Guide {
         });
         placing.and_then(|placing| self.view(camera, placing)).unwrap_or_else(|| {
             // In the middle of an image any lens sees.
-            let placing = Placing { at: DVec2::splat(0.5), distance_mm: 1000.0, ..UPRIGHT };
+            let placing = Placing { distance_mm: 1000.0, ..UPRIGHT };
             let camera_from_target = placing.pose(camera, &self.body).unwrap_or(Pose::IDENTITY);
             self.described(camera, camera_from_target, placing)
         })
@@ -269,8 +271,13 @@ impl Guide {
         judged.sort_by(|a, b| a.1.total_cmp(&b.1));
         judged.truncate(KEPT);
         let refined = judged.into_par_iter().map(|start| self.refined(gain, start));
-        let refined: Vec<(Placing, f64)> = refined.collect();
-        refined.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))
+        let mut refined: Vec<(Placing, f64)> = refined.collect();
+        refined.sort_by(|a, b| a.1.total_cmp(&b.1));
+        // They were judged by some corners; a board without tags needs all.
+        refined.into_iter().find(|(placing, _)| {
+            let pose = placing.pose(&gain.camera, &self.body);
+            pose.is_some_and(|pose| self.body.seen(&gain.camera, &pose, true).is_some())
+        })
     }
 
     /// How sure projections are with a view; `None` where the board cannot be held or found there.
