@@ -94,6 +94,7 @@ pub struct Guide {
     /// The camera as it is assumed to be before there is an estimate.
     assumed: Camera,
     distances_mm: [f64; 2],
+    refused: Vec<Placing>,
 }
 
 /// A view that is proposed.
@@ -185,7 +186,14 @@ impl Guide {
         let is_image =
             width > 0 && height > 0 && [assumed.width, assumed.height] == [width, height];
         let distances_mm = [NEAREST * body.reach_mm(), f64::INFINITY];
-        (!is_spline && is_image).then_some(Self { body, intrinsics, assumed, distances_mm })
+        let refused = Vec::new();
+        (!is_spline && is_image).then_some(Self {
+            body,
+            intrinsics,
+            assumed,
+            distances_mm,
+            refused,
+        })
     }
 
     /// With the nearest and the farthest distance, mm, at which boards can be held and are in focus; unless said
@@ -195,6 +203,19 @@ impl Guide {
         let [near, far] = self.distances_mm;
         let distances_mm = [nearest.unwrap_or(near), farthest.unwrap_or(far)];
         Self { distances_mm, ..self }
+    }
+
+    /// Without views like these, which cannot be taken: a wall is in the way, or an arm too short.
+    #[must_use]
+    pub fn avoiding<'a>(self, refused: impl IntoIterator<Item = &'a NextView>) -> Self {
+        let placings = refused.into_iter().map(|view| Placing {
+            at: view.at,
+            distance_mm: view.distance_mm,
+            tilt: view.tilt_rad,
+            away: view.away_rad,
+            roll: view.roll_rad,
+        });
+        Self { refused: placings.collect(), ..self }
     }
 
     /// Width and height of the pictures, px.
@@ -236,10 +257,10 @@ impl Guide {
     /// A view of the first set: facing, then tilted to three sides, then around the image.
     fn first(&self, taken: usize) -> NextView {
         let camera = &self.assumed;
-        let (at, tilt, away) = match taken {
+        let (at, tilt, away) = match taken + self.refused.len() {
             0 => (DVec2::splat(0.5), 0.0, 0.0),
-            _ => {
-                let turn = taken - 1;
+            number => {
+                let turn = number - 1;
                 // Right, below, left, above, and between these the next time round.
                 let away = FRAC_PI_2 * (turn % 4) as f64 + 0.25 * PI * (turn / 4 % 2) as f64;
                 let aside = if turn < 3 { 0.0 } else { 0.2 };
@@ -285,7 +306,12 @@ impl Guide {
         let [nearest, farthest] = self.distances_mm;
         let is_far_enough = (nearest..=farthest).contains(&placing.distance_mm);
         let is_in_image = placing.at.cmpge(DVec2::ZERO).all() && placing.at.cmple(DVec2::ONE).all();
-        if !is_far_enough || !is_in_image || !(0.0..=MOST_TILT).contains(&placing.tilt) {
+        let is_refused = self.refused.iter().any(|refused| placing.is_like(refused));
+        if is_refused
+            || !is_far_enough
+            || !is_in_image
+            || !(0.0..=MOST_TILT).contains(&placing.tilt)
+        {
             return None;
         }
         let pose = placing.pose(&gain.camera, &self.body)?;

@@ -1,9 +1,17 @@
 //! How a board is held: where in the picture, how large, how tilted and turned, and the pose that follows.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::{DMat3, DQuat, DVec2};
 
 use super::body::Body;
 use crate::camera::{Camera, Pose};
+
+/// Poses are alike within this part of the image, so many rad (20°), and this part of the distance: twice of what a hand
+/// is off by.
+const LIKE_AT: f64 = 0.12;
+const LIKE_RAD: f64 = 0.35;
+const LIKE_DEEP: f64 = 0.2;
 
 /// How a board is held into a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +94,16 @@ impl Body {
 }
 
 impl Placing {
+    /// Whether a hand would hardly tell it from another.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let lean = |placing: &Self| placing.tilt * DVec2::from_angle(placing.away);
+        let turn = (self.roll - other.roll + PI).rem_euclid(TAU) - PI;
+        self.at.distance(other.at) < LIKE_AT
+            && lean(self).distance(lean(other)) < LIKE_RAD
+            && turn.abs() < LIKE_RAD
+            && (self.distance_mm / other.distance_mm).ln().abs() < LIKE_DEEP
+    }
+
     /// With one of its coordinates changed: x, y, the logarithm of the distance, tilt, away, roll.
     pub(super) fn moved(self, coordinate: usize, by: f64) -> Self {
         let mut moved = self;

@@ -148,6 +148,28 @@ fn corners_that_are_proposed_are_found_and_poses_are_as_told() {
 }
 
 #[test]
+fn what_cannot_be_held_is_not_proposed_again() {
+    let (_, _, last) = guided(6, |guide| guide);
+    let estimate = last.estimate.unwrap();
+    let guide = Guide::new(&board(), [1280, 960], Model::Radtan).unwrap();
+    let mut refused = vec![last.next];
+    for _ in 0..4 {
+        let next = guide.clone().avoiding(&refused).next(6, Some(&estimate));
+        let is_known = |before: &NextView| {
+            let turn = next.camera_from_target.off(&before.camera_from_target)[0].length();
+            turn < 0.2
+                && next.at.distance(before.at) < 0.1
+                && next.distance_mm == before.distance_mm
+        };
+        assert!(!refused.iter().any(is_known), "{next}");
+        assert!(next.expected_px.unwrap() >= refused[0].expected_px.unwrap());
+        refused.push(next);
+    }
+    let first = guide.next(0, None);
+    assert!(guide.avoiding([&first]).next(0, None).tilt_rad > 0.5, "the first set goes on");
+}
+
+#[test]
 fn distances_are_kept() {
     let (_, proposed, _) = guided(8, |guide| guide.within_mm(Some(280.0), Some(420.0)));
     for next in &proposed {
