@@ -458,14 +458,21 @@ pub fn text(setup: Setup, runs: &[Run]) -> String {
         let of: Vec<&Run> = runs.iter().filter(|run| run.subject == *name).collect();
         for view in 1..=setup.guided {
             let at = |run: &Run| run.guided.iter().find(|worth| worth.views == view).copied();
-            let expected = middle(&of, |run| at(run)?.expected_px);
             if of.iter().all(|run| at(run).is_none()) {
                 continue;
             }
+            let known =
+                of.iter().any(|run| at(run).is_some_and(|worth| worth.expected_px.is_some()));
+            let shown = |value: f64, places: usize| match known {
+                true => format!("{value:.places$}"),
+                false => String::new(),
+            };
+            let expected = shown(middle(&of, |run| at(run)?.expected_px), 4);
             let ratio = middle(&of, |run| Some(at(run)?.said_px / at(run)?.expected_px?));
+            let ratio = shown(ratio, 2);
             let _ = writeln!(
                 text,
-                "{name:9} {view:4}  {expected:12.4}  {:8.4}  {:8.4}  {ratio:8.2}",
+                "{name:9} {view:4}  {expected:>12}  {:8.4}  {:7.4}  {ratio:>15}",
                 middle(&of, |run| Some(at(run)?.said_px)),
                 middle(&of, |run| Some(at(run)?.off_px)),
             );
