@@ -56,7 +56,7 @@ fn held(target: &Target, next: &NextView, moved: Pose, index: usize) -> View {
 
 /// A hand that is off by some degrees and a hundredth of the distance, each time otherwise.
 fn hand(next: &NextView, index: usize) -> Pose {
-    let turn = DVec3::new(0.05, -0.03, 0.04) * if index % 2 == 0 { 1.0 } else { -1.0 };
+    let turn = DVec3::new(0.05, -0.03, 0.04) * if index.is_multiple_of(2) { 1.0 } else { -1.0 };
     let rotation = DQuat::from_scaled_axis(turn);
     let middle = next.camera_from_target.translation;
     Pose { rotation, translation: middle - rotation * middle + 0.01 * next.distance_mm }
