@@ -41,6 +41,7 @@ __all__ = [
     "Icosahedron",
     "Located",
     "Motion",
+    "NextView",
     "Octahedron",
     "Pose",
     "Reason",
@@ -67,6 +68,7 @@ __all__ = [
     "calibrate",
     "compare",
     "compare_rigs",
+    "next_view",
     "pose",
     "render",
     "rig",
@@ -797,6 +799,42 @@ def rig(
     print_scale: ArrayLike | None = None,
     distances_mm: Sequence[float] | None = None,
 ) -> Rig: ...
+@final
+class NextView:
+    @property
+    def views(self) -> int: ...
+    @property
+    def words(self) -> str: ...
+    @property
+    def camera_from_target(self) -> Pose: ...
+    @property
+    def outlines(self) -> list[Floats]: ...
+    @property
+    def pixels(self) -> Floats: ...
+    @property
+    def labels(self) -> Ints: ...
+    @property
+    def distance_mm(self) -> float: ...
+    @property
+    def tilt_rad(self) -> float: ...
+    @property
+    def uncertainty_px(self) -> float | None: ...
+    @property
+    def expected_px(self) -> float | None: ...
+    def is_enough(self, until_px: float | None = None) -> bool: ...
+    def to_json(self) -> str: ...
+
+def next_view(
+    detections: Iterable[Detection | Failure],
+    target: Target | Sequence[Target] | None = None,
+    model: str = "radtan",
+    *,
+    size_px: tuple[int, int] | None = None,
+    camera: Camera | None = None,
+    nearest_mm: float | None = None,
+    farthest_mm: float | None = None,
+    avoid: Sequence[NextView] | None = None,
+) -> NextView: ...
 @final
 class Comparison:
     @property

@@ -111,7 +111,7 @@ pub fn calibrate(
 }
 
 /// The targets that detections looked for, where nothing else is said.
-fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Option<Targets> {
+pub fn of_detections(detections: &[PyRef<'_, Detection>], is_grid: bool) -> Option<Targets> {
     let first = detections.first().filter(|_| !is_grid)?;
     (!first.targets.is_empty()).then(|| Targets(first.targets.clone()))
 }

@@ -10,6 +10,7 @@
 //! | `camera`, `pose` | cameras and rigid motions |
 //! | `calibrate`, `solving` | corners to cameras and rigs: keywords, and the work |
 //! | `calibration`, `calibrated_camera`, `views` | what came of it |
+//! | `next_view` | which view to take next |
 //! | `comparison` | whether two calibrations differ; where a target is |
 //! | `rendering` | synthetic pictures |
 //! | `programs` | the programs `deltille` and `deltag` |
@@ -27,6 +28,7 @@ mod errors;
 mod families;
 mod image;
 mod interrupt;
+mod next_view;
 mod pose;
 mod programs;
 mod rendering;
@@ -90,6 +92,8 @@ mod _core {
     use super::errors::_keywords;
     #[pymodule_export]
     use super::families::{Family, search_family};
+    #[pymodule_export]
+    use super::next_view::{NextView, next_view};
     #[pymodule_export]
     use super::pose::Pose;
     #[pymodule_export]

@@ -35,6 +35,27 @@ def test_a_camera_is_found_with_its_uncertainties(calibration, camera, detection
     assert calibration.excluded == [] and all(said.sentence for said in calibration.diagnoses)
 
 
+def test_the_next_view_is_where_the_camera_is_known_least(board, camera, detections):
+    first = deltille.next_view([], board, size_px=(1280, 960))
+    assert first.uncertainty_px is None and not first.is_enough() and "facing the camera" in first.words
+    assert first.pixels.shape == (len(first.labels), 2) and len(first.outlines) == 1
+    few, more = (deltille.next_view(detections[:count]) for count in (5, 10))
+    assert (few.views, more.views) == (5, 10)
+    assert few.expected_px < few.uncertainty_px and more.uncertainty_px < few.uncertainty_px
+    assert few.is_enough(few.uncertainty_px) and not few.is_enough(0.99 * few.uncertainty_px)
+    middle = few.camera_from_target.apply(board.corners.mean(axis=0, keepdims=True))
+    assert numpy.linalg.norm(middle) == pytest.approx(few.distance_mm)
+    other = deltille.next_view(detections[:5], avoid=[few])
+    assert other.expected_px >= few.expected_px and other.words != few.words
+    assert json.loads(few.to_json())["schema"] == "deltille/next-view/1"
+    assert deltille.next_view(detections[:5], camera=camera).uncertainty_px > 0
+    for wrong in ({"model": "auto"}, {"model": "spline"}, {"nearest_mm": -1.0}):
+        with pytest.raises(deltille.CalibrationError):
+            deltille.next_view(detections, **wrong)
+    with pytest.raises(deltille.CalibrationError, match="size_px"):
+        deltille.next_view([], board)
+
+
 def test_residuals_are_those_of_the_projection(calibration, board):
     view = calibration.views[3]
     order = numpy.argsort(board.corner_ids)

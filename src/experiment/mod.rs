@@ -2,6 +2,7 @@
 
 mod bound;
 pub mod corners;
+pub mod guide;
 pub mod photographs;
 pub mod plot;
 pub mod rig;

@@ -17,7 +17,7 @@ use crate::cli::{interrupt, output, progress};
 use crate::detect::Tone;
 use crate::experiment::photographs::axes::Axis;
 use crate::experiment::photographs::{self, Kind, Subject, table};
-use crate::experiment::{corners, plot, rig, table2};
+use crate::experiment::{corners, guide, plot, rig, table2};
 use crate::family;
 use crate::limits::Limits;
 
@@ -33,6 +33,9 @@ enum Experiment {
     /// Precision of refined corners against blur, noise and tilt, with the Cramér–Rao bound:
     /// corners.csv, corners.svg and corners.png
     Corners(CornersArgs),
+    /// Views that are proposed one after the other against views at random: how far calibrations are off, and
+    /// what was expected: guide.csv
+    Guide(GuideArgs),
     /// Detection on photographs of a printed page of which everything is known, one thing spoiled at
     /// a time: photographs.csv, .json, .svg and .png
     Photographs(PhotographsArgs),
@@ -42,6 +45,37 @@ enum Experiment {
     /// The paper's Table 2: calibrate on the first half of a sequence of photographs, find poses
     /// on the second
     Table2(Table2Args),
+}
+
+#[derive(clap::Args)]
+struct GuideArgs {
+    /// Views that are proposed
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = whole(4..=100u32))]
+    views: u32,
+    /// Views at random
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = whole(4..=1000u32))]
+    random: u32,
+    /// Runs with each of the cameras
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = whole(1..=10_000u32))]
+    runs: u32,
+    /// Deviation of a coordinate of a corner, px
+    #[arg(long, value_name = "PX", default_value = "0.1", value_parser = noise_px)]
+    noise: f64,
+    /// Render every picture and detect its corners instead, with the noise of pixels alone
+    #[arg(long, conflicts_with = "noise")]
+    pictures: bool,
+    /// Which cameras [default: all]
+    #[arg(long, value_name = "CAMERA", value_delimiter = ',',
+          value_parser = ["webcam", "fisheye", "long"])]
+    camera: Vec<String>,
+    #[command(flatten)]
+    simulation: SimulationArgs,
+}
+
+/// A deviation in px at which corners are still told apart.
+fn noise_px(text: &str) -> Result<f64, String> {
+    let px: Option<f64> = text.parse().ok().filter(|px| (0.001..=1.0).contains(px));
+    px.ok_or_else(|| "write pixels from 0.001 to 1".to_owned())
 }
 
 #[derive(clap::Args)]
@@ -125,6 +159,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     interrupt::stands("no result was written");
     match args.experiment {
         Experiment::Corners(args) => run_corners(args),
+        Experiment::Guide(args) => run_guide(args),
         Experiment::Photographs(args) => run_photographs(args),
         Experiment::Rig(args) => run_rig(args),
         Experiment::Table2(args) => {
@@ -152,6 +187,26 @@ impl SimulationArgs {
         bar.finish_and_clear();
         Ok(result)
     }
+}
+
+fn run_guide(args: GuideArgs) -> anyhow::Result<ExitCode> {
+    let GuideArgs { views, random, runs, noise, pictures, camera, simulation } = args;
+    let noise_px = (!pictures).then_some(noise);
+    let (guided, random) = (views as usize, random as usize);
+    let setup =
+        guide::Setup { guided, random, runs: runs as usize, noise_px, seed: simulation.seed };
+    let mut subjects = guide::subjects();
+    subjects.retain(|subject| camera.is_empty() || camera.iter().any(|name| name == subject.name));
+    let outcome = simulation.run(setup.runs * subjects.len(), "runs", |tick| {
+        guide::run(setup, &subjects, interrupt::flag(), tick)
+    })?;
+    let Some(outcome) = outcome? else {
+        return Err(Interrupted("nothing was written".to_owned()).into());
+    };
+    let path = simulation.output.join("guide.csv");
+    output::write(&path, guide::csv(&outcome).as_bytes(), simulation.overwrite)?;
+    output::print(&format!("{}wrote {}\n", guide::text(setup, &outcome), path.display()))?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn run_rig(args: RigArgs) -> anyhow::Result<ExitCode> {

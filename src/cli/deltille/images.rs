@@ -60,8 +60,17 @@ impl Images {
     }
 }
 
-/// The images right inside a folder, by name.
+/// The images right inside a folder, by name; an error where there are none.
 fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let images = photographs_in(folder)?;
+    if images.is_empty() {
+        bail!("{}: no PNG, JPEG, TIFF, BMP, PGM or WebP file in this folder", folder.display());
+    }
+    Ok(images)
+}
+
+/// The images right inside a folder, by name, and none where there are none.
+pub fn photographs_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder);
     let entries = entries.with_context(|| format!("cannot read {}", folder.display()))?;
     let mut images = Vec::new();
@@ -73,9 +82,6 @@ fn in_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
         if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) && !drawn && path.is_file() {
             images.push(path);
         }
-    }
-    if images.is_empty() {
-        bail!("{}: no PNG, JPEG, TIFF, BMP, PGM or WebP file in this folder", folder.display());
     }
     images.sort();
     Ok(images)

@@ -11,6 +11,7 @@ mod detect;
 mod experiment;
 pub(in crate::cli) mod files;
 mod finder;
+mod guide;
 mod images;
 mod in_flight;
 mod limits;
@@ -62,6 +63,8 @@ enum Command {
     Detect(detect::Args),
     /// Find a camera from detections
     Calibrate(calibrate::Args),
+    /// Say which photograph of a target to take next, until the camera is known well enough
+    Guide(Box<guide::Args>),
     /// Say whether two calibrations of a camera or rig differ by more than chance
     Compare(compare::Args),
     /// Time the stages of detection on this machine
@@ -90,6 +93,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Bench(args) => bench::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Guide(args) => guide::run(*args),
         Command::Board(args) => board::run(GridKind::Deltille, *args),
         Command::Checkerboard(args) => board::run(GridKind::Checker, *args),
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),

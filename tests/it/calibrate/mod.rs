@@ -2,6 +2,7 @@ mod board_shape;
 mod cameras;
 mod commands;
 mod gross_errors;
+mod guide;
 mod models;
 mod page;
 mod rig;

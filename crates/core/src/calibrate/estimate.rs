@@ -14,12 +14,13 @@ use super::lack_of_fit::{LackOfFit, lack_of_fit};
 use super::lens_end::LensEnd;
 use super::minimise::Minimum;
 use super::model::Model;
+use super::next_view::KnownSoFar;
 use super::normal::Covariances;
 use super::panel::PanelRef;
 use super::problem::Problem;
 use super::reweighting::{Settled, variance};
 use super::roughness::Roughness;
-use super::shape::{BoardShape, Shape};
+use super::shape::{BoardShape, COUNT as SHAPE_COEFFICIENTS, Shape};
 use super::start::Frame;
 use super::target_map::{CornerOffset, TargetMap};
 use super::uncertainty::{ObservedCovariance, ProjectionUncertainty};
@@ -65,6 +66,8 @@ pub struct Estimate {
     pub held_out: Option<Box<Estimate>>,
     /// Number of iterations of the last bundle adjustment.
     pub steps: usize,
+    /// What the corners say of the first camera and the board's shape, by which views are proposed.
+    pub(super) known: Option<KnownSoFar>,
 }
 
 /// The estimate of one camera.
@@ -436,6 +439,7 @@ impl Estimate {
             sigma: variance.sqrt(),
             lack_of_fit: lack_of_fit(problem, whitening),
             steps: *steps,
+            known: known(settled, &found, variance),
             cameras,
             ..Self::default()
         })
@@ -537,6 +541,30 @@ fn projection(
     });
     let (whitening, free) = (&settled.whitening, camera.free());
     ProjectionUncertainty::of(problem, whitening, index, &free, distances_mm, observed)
+}
+
+/// What corners say of the first camera and of the board's shape, all else that is shared taken out.
+fn known(settled: &Settled, found: &Covariances, variance: f64) -> Option<KnownSoFar> {
+    let Settled { minimum, whitening, .. } = settled;
+    let layout = &minimum.layout;
+    let of_camera = layout.parameters.first()?.iter().map(|&(_, column)| column);
+    let of_shape = layout.shape.into_iter().flat_map(|first| first..first + SHAPE_COEFFICIENTS);
+    let columns: Vec<usize> = of_camera.chain(of_shape).collect();
+    let n = columns.len();
+    let information = match n == layout.shared {
+        true => found.root.inverse.tr_mul(&found.root.inverse),
+        false => {
+            let of = |i: usize, j: usize| found.shared[(columns[i], columns[j])];
+            let scale: Vec<f64> = (0..n).map(|i| of(i, i).sqrt().recip()).collect();
+            let own = DMatrix::from_fn(n, n, |i, j| of(i, j) * scale[i] * scale[j]);
+            let inverse = own.cholesky()?.inverse();
+            DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j])
+        }
+    };
+    // W is triangular: the determinant of WᵀW is the square of its diagonal's product.
+    let corners = whitening.blocks.iter().flatten().map(|[a, _, c]| 1.0 / (a * c));
+    let corner_variance_px2 = variance * median(corners.collect())?;
+    Some(KnownSoFar { information: information / variance, corner_variance_px2 })
 }
 
 fn target_map(

@@ -23,6 +23,7 @@ pub mod kind;
 #[cfg(feature = "meshes")]
 pub mod mesh;
 mod motion;
+pub mod next_view;
 pub mod npy;
 #[cfg(feature = "meshes")]
 pub mod obj;

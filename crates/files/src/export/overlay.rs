@@ -64,6 +64,55 @@ pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayErr
     Ok(signed_png(png))
 }
 
+/// The PNG file of an image of a size, px, black where no photograph is given, with outlines and places drawn in by lines
+/// so wide, px.
+pub(super) fn outlined(
+    image: Option<&AnyGray>,
+    [width, height]: [u32; 2],
+    outlines: &[Vec<DVec2>],
+    places: &[DVec2],
+    line_px: f64,
+    [r, g, b]: [u8; 3],
+) -> Result<Vec<u8>, OverlayError> {
+    let mut canvas = match image {
+        Some(AnyGray::U8(image)) => background(image, 1)?,
+        Some(AnyGray::U16(image)) => background(image, 1)?,
+        None => {
+            let mut black =
+                Pixmap::new(width, height).ok_or(OverlayError::TooLarge(width, height))?;
+            black.fill(Color::BLACK);
+            black
+        }
+    };
+    let colour = Color::from_rgba8(r, g, b, 255);
+    // Pixel centres are at integers here, at halves in tiny-skia.
+    let at = |place: DVec2| ((place.x + 0.5) as f32, (place.y + 0.5) as f32);
+    for outline in outlines {
+        let mut path = PathBuilder::new();
+        for (index, &place) in outline.iter().enumerate() {
+            let (x, y) = at(place);
+            if index == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
+        }
+        path.close();
+        let Some(path) = path.finish() else { continue };
+        let mut faint = colour;
+        faint.set_alpha(0.15);
+        let identity = Transform::identity();
+        canvas.fill_path(&path, &solid(faint), FillRule::Winding, identity, None);
+        stroke(&mut canvas, Some(path), colour, line_px);
+    }
+    let mut dots = PathBuilder::new();
+    for &place in places {
+        let (x, y) = at(place);
+        dots.push_circle(x, y, line_px as f32);
+    }
+    if let Some(dots) = dots.finish() {
+        canvas.fill_path(&dots, &solid(colour), FillRule::Winding, Transform::identity(), None);
+    }
+    let png = canvas.encode_png().map_err(|error| OverlayError::Encode(error.to_string()))?;
+    Ok(signed_png(png))
+}
+
 /// The factor by which the photograph is enlarged.
 fn enlargement(width: u32, height: u32, detection: &Detection) -> u32 {
     let edges = detection.grids.iter().filter_map(Grid::edge_px);

@@ -1,0 +1,241 @@
+//! A target as it is held into a picture: its corners, its outline, and which of it a detector finds.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use crate::calibrate::panel::PanelRef;
+use crate::camera::{Camera, Pose, Projection};
+use crate::targets::{Panel, Target, TargetSpec};
+
+/// Corners by which a panel is judged: more tell the same more slowly. Of several panels, of which a picture shows
+/// some, each has fewer.
+const SAMPLED: [usize; 2] = [40, 14];
+
+/// Steps along a side of an outline, so that it bends with the lens.
+const STEPS: usize = 6;
+
+/// What the detector needs of an edge in its most foreshortened direction, px: tags are read from 12 px on,
+/// untagged grids found from 7 px on (`docs/choosing.md`), and a hand is a quarter farther away than it should be.
+const TAGGED_EDGE_PX: f64 = 15.0;
+const PLAIN_EDGE_PX: f64 = 8.75;
+
+/// Corners are found up to 75° of tilt; here the limit leaves a hand room to be wrong by 12°.
+const MOST_TILT_COS: f64 = 0.454;
+
+/// A corner is located where the detector's window around it is in the picture, px.
+const MARGIN_PX: f64 = 8.0;
+
+/// A board that is cut off by the picture is labelled where some tags are whole, and tells enough of its pose with
+/// this part of its corners.
+const LEAST_PART: f64 = 0.5;
+
+/// A panel of a target.
+#[derive(Clone, Debug)]
+pub(super) struct BodyPanel {
+    pub panel: PanelRef,
+    /// The direction of its front in the target frame.
+    normal: DVec3,
+    pub corners: Vec<BodyCorner>,
+    /// Indices of the corners by which it is judged.
+    sampled: Vec<usize>,
+    /// Indices of the corners around which all others lie.
+    rim: Vec<usize>,
+    edge_mm: f64,
+    has_tags: bool,
+    /// Around its tiles, in the target frame, mm.
+    outline: Vec<DVec3>,
+}
+
+/// A corner of a panel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BodyCorner {
+    pub row: i32,
+    pub col: i32,
+    /// In the panel frame as it is planned, mm.
+    pub panel_mm: DVec3,
+    /// In the target frame, as it was measured or else planned, mm.
+    pub target_mm: DVec3,
+}
+
+/// A target, and where its front is.
+#[derive(Clone, Debug)]
+pub(super) struct Body {
+    pub panels: Vec<BodyPanel>,
+    /// Target_from_front: the origin is the middle of the first panel, x to its right, y up, z out of it.
+    pub front: Pose,
+    /// Turns a vector of the panel frame to the target frame, of each panel.
+    pub turns: Vec<DMat3>,
+}
+
+/// A corner that a camera sees, and for how many it stands.
+pub(super) struct Seen {
+    /// Index of its panel in the body.
+    pub panel: usize,
+    /// Index of the corner.
+    pub corner: usize,
+    /// In the camera frame, mm.
+    pub point: DVec3,
+    pub at: Projection,
+    pub weight: f64,
+}
+
+impl Body {
+    /// `None` where the target has no corners. Of boards that lie about only the first is taken.
+    pub(super) fn new(target: &Target) -> Option<Self> {
+        let is_loose = !matches!(target.spec, TargetSpec::Solid(_) | TargetSpec::Listed(_));
+        let count = if is_loose { 1 } else { target.panels.len() };
+        let panels = target.panels.iter().enumerate().filter(|(_, of)| !of.corners.is_empty());
+        let panels = panels.take(count);
+        let panels: Vec<(usize, &Panel)> = panels.collect();
+        let most = SAMPLED[usize::from(panels.len() > 1)];
+        let &(_, first) = panels.first()?;
+        let turn = glam::DQuat::from_mat3(&first.pose.matrix());
+        let front = Pose { rotation: turn, translation: first.middle_mm() };
+        let turns = panels.iter().map(|(_, panel)| panel.pose.matrix()).collect();
+        let panels = panels.into_iter().map(|(index, panel)| BodyPanel::new(index, panel, most));
+        Some(Self { panels: panels.collect(), front, turns })
+    }
+
+    /// The corners that a detector finds where the target is at a pose: all, or those by which it is judged. `None`
+    /// where it finds none, or too few of them for a view.
+    pub(super) fn seen(&self, camera: &Camera, pose: &Pose, all: bool) -> Option<Vec<Seen>> {
+        let mut seen = Vec::new();
+        for (index, panel) in self.panels.iter().enumerate() {
+            panel.seen(index, camera, pose, &self.turns[index], all, &mut seen);
+        }
+        (!seen.is_empty()).then_some(seen)
+    }
+
+    /// Outlines of the panels that are seen from the front, px, as far as the lens shows them.
+    pub(super) fn outlines(&self, camera: &Camera, pose: &Pose) -> Vec<Vec<DVec2>> {
+        let panels = self.panels.iter().filter(|panel| panel.is_towards(pose));
+        let outlines = panels.map(|panel| {
+            let points = panel.outline.iter().map(|&point| pose.apply(point));
+            points.filter_map(|point| camera.project(point)).collect::<Vec<DVec2>>()
+        });
+        outlines.filter(|outline| outline.len() > 2).collect()
+    }
+}
+
+impl BodyPanel {
+    fn new(index: usize, panel: &Panel, most: usize) -> Self {
+        let corners: Vec<BodyCorner> = panel
+            .corners
+            .iter()
+            .map(|corner| BodyCorner {
+                row: corner.row,
+                col: corner.col,
+                panel_mm: corner.panel_mm.extend(0.0),
+                target_mm: panel.place_mm(corner),
+            })
+            .collect();
+        let around = hull(corners.iter().map(|corner| corner.panel_mm.truncate()).collect());
+        let is_rim = |corner: &BodyCorner| around.contains(&corner.panel_mm.truncate());
+        let rim = (0..corners.len()).filter(|&index| is_rim(&corners[index])).collect();
+        let mut step = corners.len().div_ceil(most).max(1);
+        let across = panel.matrix[0] as usize;
+        // Otherwise only some columns were taken.
+        while step > 1 && across.is_multiple_of(step) {
+            step += 1;
+        }
+        let tiles = panel.dark_tiles();
+        let vertices = tiles.iter().flat_map(|tile| tile.vertices());
+        let places = hull(vertices.map(|vertex| panel.lattice_mm(vertex)).collect());
+        let next = |i: usize| places[(i + 1) % places.len()];
+        let outline = places.iter().enumerate().flat_map(|(i, &place)| {
+            let next = next(i);
+            (0..STEPS).map(move |k| place.lerp(next, k as f64 / STEPS as f64))
+        });
+        Self {
+            panel: PanelRef::new(index, panel.id),
+            normal: panel.pose.matrix() * DVec3::Z,
+            sampled: (0..corners.len()).step_by(step).collect(),
+            rim,
+            edge_mm: panel.edge_mm,
+            has_tags: !panel.tags.is_empty(),
+            outline: outline.map(|place| panel.pose.target_from_panel(place)).collect(),
+            corners,
+        }
+    }
+
+    /// Whether its front is towards the camera, in its middle.
+    fn is_towards(&self, pose: &Pose) -> bool {
+        let middle = self.corners.iter().map(|corner| corner.target_mm).sum::<DVec3>();
+        let middle = pose.apply(middle / self.corners.len() as f64);
+        (pose.rotation * self.normal).dot(middle) < 0.0
+    }
+
+    fn seen(
+        &self,
+        index: usize,
+        camera: &Camera,
+        pose: &Pose,
+        turn: &DMat3,
+        all: bool,
+        seen: &mut Vec<Seen>,
+    ) {
+        let first = seen.len();
+        let turn = DMat3::from_quat(pose.rotation) * *turn;
+        let normal = turn.z_axis;
+        let least_px = if self.has_tags { TAGGED_EDGE_PX } else { PLAIN_EDGE_PX };
+        let size = DVec2::new(camera.width.into(), camera.height.into());
+        let weight = if all { 1.0 } else { self.corners.len() as f64 / self.sampled.len() as f64 };
+        let chosen = if all { self.corners.len() } else { self.sampled.len() };
+        let find = |corner: usize| {
+            let point = pose.apply(self.corners[corner].target_mm);
+            if -normal.dot(point) < MOST_TILT_COS * point.length() {
+                return None;
+            }
+            let at = camera.project_with_derivatives(point)?;
+            let is_inside = at.pixel.cmpge(DVec2::splat(MARGIN_PX)).all()
+                && at.pixel.cmple(size - 1.0 - MARGIN_PX).all();
+            let is_found = is_inside && self.edge_mm * narrowest(&at, &turn) >= least_px;
+            is_found.then_some(Seen { panel: index, corner, point, at, weight })
+        };
+        // Without tags rows and columns are known where the board is seen whole.
+        if !self.has_tags && !self.rim.iter().all(|&corner| find(corner).is_some()) {
+            return;
+        }
+        seen.extend((0..chosen).filter_map(|k| find(if all { k } else { self.sampled[k] })));
+        let found = (seen.len() - first) as f64;
+        let least = if self.has_tags { LEAST_PART * chosen as f64 } else { chosen as f64 };
+        if found < least {
+            seen.truncate(first);
+        }
+    }
+}
+
+/// How many px a millimetre of a plane has at least, in its most foreshortened direction.
+fn narrowest(at: &Projection, turn: &DMat3) -> f64 {
+    let rows = at.by_point.map(DVec3::from);
+    let [a, b] = rows.map(|row| row.dot(turn.x_axis));
+    let [c, d] = rows.map(|row| row.dot(turn.y_axis));
+    let (sum, product) = (a * a + b * b + c * c + d * d, a * d - b * c);
+    (0.5 * (sum - (sum * sum - 4.0 * product * product).max(0.0).sqrt())).max(0.0).sqrt()
+}
+
+/// The convex hull of places, counterclockwise where y is up.
+pub(super) fn hull(mut places: Vec<DVec2>) -> Vec<DVec2> {
+    places.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    places.dedup();
+    if places.len() < 3 {
+        return places;
+    }
+    let mut hull: Vec<DVec2> = Vec::new();
+    let mut side = |places: &mut dyn Iterator<Item = DVec2>| {
+        let first = hull.len();
+        for place in places {
+            while hull.len() >= first + 2 {
+                let (a, b) = (hull[hull.len() - 2], hull[hull.len() - 1]);
+                if (b - a).perp_dot(place - b) > 0.0 {
+                    break;
+                }
+                hull.pop();
+            }
+            hull.push(place);
+        }
+        hull.pop();
+    };
+    side(&mut places.iter().copied());
+    side(&mut places.iter().rev().copied());
+    hull
+}

@@ -1,0 +1,306 @@
+//! What a view would tell: its part of the normal equations with its own pose eliminated, and how sure projections
+//! are with it.
+//!
+//! ```text
+//!     view:  Σ Jᵀ J / σ²  of (θ, ξ)  =  ⎡ S  Bᵀ ⎤       tells of θ:  S − Bᵀ A⁻¹ B
+//!                                       ⎣ B  A  ⎦
+//!
+//!     V = (I₀ + S − Bᵀ A⁻¹ B)⁻¹,     K = −(A₀ + A)⁻¹ (B₀ + B)
+//!     mean variance of a coordinate = tr(M V) / 2,   M = mean of (J_θ + J_ξ K)ᵀ (J_θ + J_ξ K) over the image
+//! ```
+//!
+//! θ are parameters of the camera, and of the board's shape where that is found too; ξ is a turn and a move of what
+//! the camera sees, by which a pose and the alignment of [`uncertainty`](super::super::uncertainty) are the same.
+
+use glam::{DMat3, DVec2};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix};
+
+use super::body::{Body, Seen};
+use crate::calibrate::estimate::{CameraEstimate, Estimate};
+use crate::calibrate::model::Model;
+use crate::calibrate::shape::{self, Shape};
+use crate::calibrate::uncertainty::{by_motion, by_parameters, seen_at};
+use crate::camera::{Camera, PROJECTION_PARAMETERS};
+
+/// Places along the longer side of the image by which projections are judged.
+const PLACES: usize = 16;
+
+/// A parameter that alone moves projections by more than this part of the image's longer side, rms, makes another lens.
+/// It is what is expected before corners are seen, and keeps what they leave open finite.
+const EXPECTED_PART: f64 = 0.05;
+
+/// The same of a sheet's shape, parts of its reach: what is bent more nobody calls a board.
+const EXPECTED_BEND: f64 = 0.02;
+
+/// What is known of a camera from views, and how views are judged by it.
+pub(super) struct Gain {
+    /// The lens as it is believed to be, also where no corner was.
+    pub camera: Camera,
+    /// Indices of the parameters that are found.
+    free: Vec<usize>,
+    shape: Option<Shape>,
+    /// Information on the unknowns so far.
+    known: DMatrix<f64>,
+    /// Sums of the corners so far, for the alignment.
+    sums: Sums,
+    field: Field,
+    /// Variance that a coordinate of a corner is expected to have, px².
+    variance: f64,
+}
+
+/// Sums over corners, Jᵀ J of parameters and motion.
+#[derive(Clone)]
+struct Sums {
+    /// Unknowns by unknowns, lower triangle.
+    own: DMatrix<f64>,
+    /// Motion by unknowns.
+    across: DMatrix<f64>,
+    motion: Matrix6<f64>,
+}
+
+/// Means over the places of an image, at infinity.
+struct Field {
+    own: DMatrix<f64>,
+    turns_across: DMatrix<f64>,
+    turns: Matrix3<f64>,
+}
+
+impl Gain {
+    /// Of what an estimate found of its only camera; `None` where it does not say.
+    pub(super) fn of(estimate: &Estimate, body: &Body) -> Option<Self> {
+        let [found] = estimate.cameras.as_slice() else { return None };
+        let known = estimate.known.as_ref()?;
+        let free = found.free();
+        let shape = estimate.shape.map(|found| found.shape);
+        let unknowns = free.len() + shape.map_or(0, |_| shape::COUNT);
+        if known.information.nrows() != unknowns || free.is_empty() {
+            return None;
+        }
+        let start = found.model.map(Model::lens);
+        let (camera, expected) = believed(&found.camera, start, &free, known);
+        let field = Field::of(&camera, &free)?;
+        let mut information = known.information.clone();
+        let spread = shape.map_or(1.0, |shape| EXPECTED_BEND * shape.reach_mm);
+        for i in 0..unknowns {
+            let expected = expected.get(i).copied().unwrap_or(spread);
+            information[(i, i)] += expected.powi(-2);
+        }
+        let variance = known.corner_variance_px2;
+        let sums = Sums::zeros(unknowns);
+        let mut gain = Self { camera, free, shape, known: information, sums, field, variance };
+        gain.sums = gain.seen_so_far(found, body);
+        Some(gain)
+    }
+
+    /// The corners that took part.
+    fn seen_so_far(&self, found: &CameraEstimate, body: &Body) -> Sums {
+        let mut sums = self.sums.clone();
+        let mut row = DMatrix::zeros(2, self.unknowns());
+        for view in &found.views {
+            for corner in view.corners.iter().filter(|corner| !corner.outlier) {
+                let Some(panel) = body.panels.iter().find(|of| of.panel == corner.panel) else {
+                    continue;
+                };
+                let place = (corner.row, corner.col);
+                let index = panel.corners.binary_search_by_key(&place, |of| (of.row, of.col));
+                let Ok(index) = index else { continue };
+                let point = view.pose.apply(panel.corners[index].target_mm);
+                let Some(at) = self.camera.project_with_derivatives(point) else { continue };
+                row.columns_mut(0, self.free.len()).copy_from(&by_parameters(&at, &self.free));
+                sums.add(&row, &by_motion(&at, point), 1.0, false);
+            }
+        }
+        sums
+    }
+
+    fn unknowns(&self) -> usize {
+        self.known.nrows()
+    }
+
+    /// How sure projections are at infinity, over the image, px: the root mean square of a coordinate.
+    pub(super) fn now_px(&self) -> Option<f64> {
+        self.px(&self.known, &self.sums)
+    }
+
+    /// The same with one more view, in which these corners are seen; `None` where they do not tell its pose.
+    pub(super) fn with_px(&self, body: &Body, seen: &[Seen], turn: &DMat3) -> Option<f64> {
+        let count = self.free.len();
+        let mut sums = Sums::zeros(self.unknowns());
+        let mut row = DMatrix::zeros(2, self.unknowns());
+        for Seen { panel, corner, point, at, weight } in seen {
+            row.columns_mut(0, count).copy_from(&by_parameters(at, &self.free));
+            if let Some(shape) = &self.shape {
+                let turn = *turn * body.turns[*panel];
+                let place = body.panels[*panel].corners[*corner].panel_mm;
+                for (k, bend) in shape.directions(place).into_iter().enumerate() {
+                    let bend = turn * bend;
+                    for i in 0..2 {
+                        row[(i, count + k)] = bend.dot(at.by_point[i].into());
+                    }
+                }
+            }
+            sums.add(&row, &by_motion(at, *point), *weight, true);
+        }
+        let through = solved(&sums.motion, &sums.across)?;
+        let mut told = &sums.own - sums.across.tr_mul(&through);
+        told /= self.variance;
+        let mut aligned = sums;
+        aligned.motion += self.sums.motion;
+        aligned.across += &self.sums.across;
+        self.px(&(&self.known + told), &aligned)
+    }
+
+    fn px(&self, information: &DMatrix<f64>, sums: &Sums) -> Option<f64> {
+        let count = self.free.len();
+        let covariance = inverse(information)?;
+        let across = sums.across.columns(0, count).into_owned();
+        let turns = -solved(&sums.motion, &across)?.rows(0, 3).into_owned();
+        let Field { own, turns_across, turns: of_turns } = &self.field;
+        let crossed = turns_across.tr_mul(&turns);
+        let m = own + &crossed + crossed.transpose() + turns.transpose() * of_turns * &turns;
+        let of_camera = covariance.view((0, 0), (count, count));
+        let sum: f64 = m.iter().zip(of_camera.iter()).map(|(m, v)| m * v).sum();
+        (sum >= 0.0).then(|| (0.5 * sum).sqrt())
+    }
+}
+
+impl Sums {
+    fn zeros(unknowns: usize) -> Self {
+        let own = DMatrix::zeros(unknowns, unknowns);
+        Self { own, across: DMatrix::zeros(6, unknowns), motion: Matrix6::zeros() }
+    }
+
+    /// Adds a corner by its derivatives.
+    fn add(
+        &mut self,
+        by_unknowns: &DMatrix<f64>,
+        by_motion: &SMatrix<f64, 2, 6>,
+        weight: f64,
+        with_own: bool,
+    ) {
+        let n = by_unknowns.ncols();
+        for j in 0..n {
+            let [x, y] = [0, 1].map(|i| weight * by_unknowns[(i, j)]);
+            if x == 0.0 && y == 0.0 {
+                continue;
+            }
+            if with_own {
+                for i in 0..n {
+                    self.own[(i, j)] += x * by_unknowns[(0, i)] + y * by_unknowns[(1, i)];
+                }
+            }
+            for i in 0..6 {
+                self.across[(i, j)] += x * by_motion[(0, i)] + y * by_motion[(1, i)];
+            }
+        }
+        self.motion += by_motion.transpose() * by_motion * weight;
+    }
+}
+
+impl Field {
+    fn of(camera: &Camera, free: &[usize]) -> Option<Self> {
+        let mut count = 0.0;
+        let mut field = Self {
+            own: DMatrix::zeros(free.len(), free.len()),
+            turns_across: DMatrix::zeros(3, free.len()),
+            turns: Matrix3::zeros(),
+        };
+        for pixel in places(camera) {
+            let Some(point) = seen_at(camera, pixel, None) else { continue };
+            let Some(at) = camera.project_with_derivatives(point) else { continue };
+            let (by_unknowns, motion) = (by_parameters(&at, free), by_motion(&at, point));
+            let turns = motion.fixed_columns::<3>(0).into_owned();
+            field.own += by_unknowns.transpose() * &by_unknowns;
+            field.turns_across += turns.transpose() * &by_unknowns;
+            field.turns += turns.transpose() * turns;
+            count += 1.0;
+        }
+        (count > 0.0).then(|| {
+            field.own /= count;
+            field.turns_across /= count;
+            field.turns /= count;
+            field
+        })
+    }
+}
+
+/// Places over an image, px.
+fn places(camera: &Camera) -> impl Iterator<Item = DVec2> + use<> {
+    let size = DVec2::new(camera.width.into(), camera.height.into());
+    let parts = (size * PLACES as f64 / size.max_element()).round().max(DVec2::ONE);
+    let (columns, rows) = (parts.x as usize, parts.y as usize);
+    (0..columns * rows).map(move |place| {
+        let at = DVec2::new((place % columns) as f64, (place / columns) as f64) + 0.5;
+        at * size / parts - 0.5
+    })
+}
+
+/// What corners say of the unknowns of one camera, and of the shape of the board.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::calibrate) struct KnownSoFar {
+    /// Inverse covariance of the parameters that were found, then of the shape.
+    pub information: DMatrix<f64>,
+    /// Variance of a coordinate of a corner, px², the median.
+    pub corner_variance_px2: f64,
+}
+
+/// The camera that is most likely with what is expected of a lens beforehand, and the deviation that is expected of
+/// each parameter. Where no corner was, a polynomial runs anywhere; so what views leave open goes back to where
+/// the model starts, and what they determine stays.
+fn believed(
+    camera: &Camera,
+    start: Option<crate::camera::Lens>,
+    free: &[usize],
+    known: &KnownSoFar,
+) -> (Camera, Vec<f64>) {
+    let values = camera.parameters();
+    let before =
+        start.map_or(values.clone(), |lens| Camera { lens, ..camera.clone() }.parameters());
+    let at_start = camera.with_parameters(&before);
+    let reach = EXPECTED_PART * f64::from(camera.width.max(camera.height));
+    let mut squares = vec![0.0; free.len()];
+    let mut count: f64 = 0.0;
+    for pixel in places(&at_start) {
+        let Some(point) = seen_at(&at_start, pixel, None) else { continue };
+        let Some(at) = at_start.project_with_derivatives(point) else { continue };
+        count += 1.0;
+        for (square, &index) in squares.iter_mut().zip(free) {
+            let [x, y] = at.by_parameter(index);
+            *square += x * x + y * y;
+        }
+    }
+    let expected = squares.iter().map(|square| reach / (square / count.max(1.0)).sqrt().max(1e-12));
+    let expected: Vec<f64> = expected.collect();
+    let n = free.len();
+    let own = known.information.view((0, 0), (n, n));
+    let mut whole = own.into_owned();
+    (0..n).for_each(|i| whole[(i, i)] += expected[i].powi(-2));
+    let off = DVector::from_fn(n, |i, _| {
+        let is_lens = free[i] >= PROJECTION_PARAMETERS.len();
+        if is_lens { (before[free[i]] - values[free[i]]) * expected[i].powi(-2) } else { 0.0 }
+    });
+    let Some(inverse) = inverse(&whole) else { return (camera.clone(), expected) };
+    let step = inverse * off;
+    let mut values = values;
+    free.iter().enumerate().for_each(|(i, &index)| values[index] += step[i]);
+    (camera.with_parameters(&values), expected)
+}
+
+/// The inverse of a positive matrix whose unknowns have different units.
+fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = matrix.nrows();
+    let scale = DVector::from_fn(n, |i, _| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// A⁻¹ B of turns and moves, which have different units.
+fn solved(a: &Matrix6<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale =
+        SMatrix::<f64, 6, 1>::from_fn(|i, _| a[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
+    let scaled = Matrix6::from_fn(|i, j| a[(i, j)] * scale[i] * scale[j]);
+    let right = DMatrix::from_fn(6, b.ncols(), |i, j| b[(i, j)] * scale[i]);
+    let solution = scaled.cholesky()?.solve(&right);
+    Some(DMatrix::from_fn(6, b.ncols(), |i, j| solution[(i, j)] * scale[i]))
+}

@@ -1,0 +1,132 @@
+//! The view to take next, schema `deltille/next-view/1`, and as a picture: the outline in which to hold the board.
+
+#[cfg(feature = "print")]
+use std::fmt::Write as _;
+
+use glam::DVec2;
+use serde::Serialize;
+
+use super::motion::Motion;
+#[cfg(feature = "print")]
+use super::overlay::{self, OverlayError};
+#[cfg(feature = "print")]
+use super::svg::HEAD;
+use deltille_core::calibrate::NextView;
+#[cfg(feature = "print")]
+use deltille_core::raster::AnyGray;
+
+/// Schema and version that this crate writes.
+pub const SCHEMA: &str = "deltille/next-view/1";
+
+/// Colour of the outline: bright on black and on white.
+#[cfg(feature = "print")]
+const COLOUR: [u8; 3] = [255, 150, 0];
+
+#[derive(Serialize)]
+struct File<'a> {
+    schema: &'static str,
+    target: &'a str,
+    views: usize,
+    enough: bool,
+    uncertainty_px: Option<f64>,
+    expected_px: Option<f64>,
+    words: String,
+    image_size_px: [u32; 2],
+    camera_from_target: Motion,
+    distance_mm: f64,
+    tilt_rad: f64,
+    away_rad: f64,
+    roll_rad: f64,
+    middle_px: DVec2,
+    outlines_px: &'a [Vec<DVec2>],
+    corners: Vec<Corner>,
+}
+
+#[derive(Serialize)]
+struct Corner {
+    panel: u32,
+    row: i32,
+    col: i32,
+    x: f64,
+    y: f64,
+}
+
+/// The text of the file: the view to take next after so many of a target, and whether these are enough.
+pub fn write(next: &NextView, target: &str, views: usize, enough: bool) -> String {
+    let corners = next.corners.iter().map(|corner| Corner {
+        panel: corner.panel.id(),
+        row: corner.row,
+        col: corner.col,
+        x: corner.pixel.x,
+        y: corner.pixel.y,
+    });
+    let size = [next.camera.width, next.camera.height];
+    let file = File {
+        schema: SCHEMA,
+        target,
+        views,
+        enough,
+        uncertainty_px: next.now_px,
+        expected_px: next.expected_px,
+        words: next.to_string(),
+        image_size_px: size,
+        camera_from_target: Motion::new(&next.camera_from_target, None),
+        distance_mm: next.distance_mm,
+        tilt_rad: next.tilt_rad,
+        away_rad: next.away_rad,
+        roll_rad: next.roll_rad,
+        middle_px: next.at * DVec2::from(size.map(f64::from)) - 0.5,
+        outlines_px: &next.outlines,
+        corners: corners.collect(),
+    };
+    serde_json::to_string_pretty(&file).expect("plain data has a JSON form") + "\n"
+}
+
+/// The outline and the corners as an SVG of the image's size, to be laid over a live picture.
+#[cfg(feature = "print")]
+pub fn svg(next: &NextView) -> String {
+    let [r, g, b] = COLOUR;
+    let (width, height) = (next.camera.width, next.camera.height);
+    let line = line_px(next);
+    let mut text = format!(
+        "{HEAD}<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"-0.5 -0.5 {width} {height}\" width=\"{width}\" \
+         height=\"{height}\" role=\"img\" aria-label=\"{next}\">\n"
+    );
+    let colour = format!("rgb({r},{g},{b})");
+    for outline in &next.outlines {
+        let points = outline.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
+        let points = points.collect::<Vec<_>>().join(" ");
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "<polygon points=\"{points}\" fill=\"{colour}\" fill-opacity=\"0.15\" stroke=\"{colour}\" \
+             stroke-width=\"{line:.1}\"/>"
+        );
+    }
+    for corner in &next.corners {
+        let DVec2 { x, y } = corner.pixel;
+        let _ = writeln!(
+            text,
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{line:.1}\" fill=\"{colour}\"/>"
+        );
+    }
+    text + "</svg>\n"
+}
+
+/// The same as a PNG, over the photograph that was taken last; on black without one, or where its size is another.
+///
+/// # Errors
+/// When the picture is too large to draw on, or cannot be encoded.
+#[cfg(feature = "print")]
+pub fn png(next: &NextView, last: Option<&AnyGray>) -> Result<Vec<u8>, OverlayError> {
+    let size = [next.camera.width, next.camera.height];
+    let last = last.filter(|last| [last.width() as u32, last.height() as u32] == size);
+    let corners: Vec<DVec2> = next.corners.iter().map(|corner| corner.pixel).collect();
+    overlay::outlined(last, size, &next.outlines, &corners, line_px(next), COLOUR)
+}
+
+/// A line that is seen on a small picture of the image, px.
+#[cfg(feature = "print")]
+fn line_px(next: &NextView) -> f64 {
+    f64::from(next.camera.width.max(next.camera.height)) / 400.0
+}

@@ -1,0 +1,174 @@
+//! `deltille guide` on folders that are filled while it looks.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+use crate::common::command::deltille;
+use crate::common::page::Page;
+use deltille::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille::glam::{DMat3, DQuat, DVec3};
+use deltille::lattice::GridKind;
+use deltille::synth::{Light, scene_of_target};
+use deltille::targets::{BoardSpec, Target};
+use serde_json::Value;
+
+fn board() -> Target {
+    Target::new("desk", BoardSpec::new(GridKind::Deltille, 8, 10, 20.0)).unwrap()
+}
+
+fn camera() -> Camera {
+    let lens = BrownConrady { radial: [-0.2, 0.05, 0.0], ..BrownConrady::default() };
+    Camera::centred(1024, 768, 900.0, Lens::BrownConrady(lens))
+}
+
+/// The photograph of a board at a pose, as a PNG.
+fn photograph(target: &Target, pose: &Pose, seed: u64) -> Vec<u8> {
+    let scene = scene_of_target(target, target.family().unwrap().as_ref()).unwrap();
+    let light = Light::default().noise(0.01).seed(seed);
+    let image = scene.render(&camera(), pose, &light).map(|grey| (255.0 * grey + 0.5) as u8);
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    let image = image::GrayImage::from_raw(width, height, image.pixels().to_vec()).unwrap();
+    let mut png = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    png.into_inner()
+}
+
+/// Poses as somebody takes them who was told to tilt the board.
+fn poses(target: &Target, count: usize) -> Vec<Pose> {
+    let middle = target.panels[0].middle_mm();
+    let pose = |index: usize| {
+        let (sin, cos) = (2.4 * index as f64).sin_cos();
+        let tilt = DQuat::from_scaled_axis(DVec3::new(0.5 * cos, 0.5 * sin, 0.2 * sin));
+        let rotation = tilt * DQuat::from_rotation_x(std::f64::consts::PI);
+        let centre = DVec3::new(50.0 * sin, 30.0 * cos, 330.0);
+        Pose { rotation, translation: centre - rotation * middle }
+    };
+    (0..count).map(pose).collect()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// The pose that a file proposes.
+fn proposed(next: &Value) -> Pose {
+    let numbers = |of: &Value| -> Vec<f64> {
+        of.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+    };
+    let motion = &next["camera_from_target"];
+    let rotation: [f64; 9] = numbers(&motion["rotation"]).try_into().unwrap();
+    Pose {
+        rotation: DQuat::from_mat3(&DMat3::from_cols_array(&rotation).transpose()),
+        translation: DVec3::from_slice(&numbers(&motion["translation_mm"])),
+    }
+}
+
+#[test]
+fn photographs_that_are_asked_for_are_taken_until_they_are_enough() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let target = board();
+    std::fs::write(at.join("desk.json"), target.to_json()).unwrap();
+    std::fs::create_dir(at.join("photos")).unwrap();
+    let command = "guide photos --target desk.json --once -o next.json --picture next.svg";
+
+    let empty = deltille(at, command).success().get_output().clone();
+    assert!(said(&empty).contains("hold the board in the middle"), "{}", said(&empty));
+    assert!(!at.join("next.json").exists(), "the size of the pictures is not known");
+
+    let mut pose = poses(&target, 1)[0];
+    let mut sure = Vec::new();
+    for index in 0..8 {
+        let png = photograph(&target, &pose, index);
+        std::fs::write(at.join(format!("photos/{index}.png")), png).unwrap();
+        let output = deltille(at, command).success().get_output().clone();
+        let next = json(&at.join("next.json"));
+        assert_eq!(next["schema"], "deltille/next-view/1");
+        assert_eq!(next["views"], index + 1, "{}", said(&output));
+        assert!(said(&output).contains(next["words"].as_str().unwrap()), "{}", said(&output));
+        let svg = std::fs::read_to_string(at.join("next.svg")).unwrap();
+        let circles = svg.matches("<circle").count();
+        assert_eq!(circles, next["corners"].as_array().unwrap().len());
+        sure.push(next["uncertainty_px"].as_f64());
+        pose = proposed(&next);
+    }
+    let sure: Vec<f64> = sure.into_iter().flatten().collect();
+    assert!(sure.len() > 4, "a camera from the fourth photograph on: {sure:?}");
+    let falls = sure.windows(2).all(|pair| pair[1] < pair[0]);
+    assert!(falls, "every photograph that is asked for makes projections surer: {sure:?}");
+
+    // What it watches is enough at once, and it ends by itself.
+    let until = 1.01 * sure[sure.len() - 1];
+    let watch = format!("guide photos --target desk.json --until {until} --picture next.png");
+    let output = deltille(at, &watch).success().get_output().clone();
+    assert!(said(&output).contains("enough: calibrate the photographs of photos"));
+    let picture = image::open(at.join("next.png")).unwrap();
+    assert_eq!((picture.width(), picture.height()), (1024, 768));
+}
+
+#[test]
+fn a_photograph_that_still_grows_is_waited_for_and_what_is_none_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let target = board();
+    std::fs::write(at.join("desk.json"), target.to_json()).unwrap();
+    std::fs::create_dir(at.join("photos")).unwrap();
+    let poses = poses(&target, 5);
+    for (index, pose) in poses[..4].iter().enumerate() {
+        let png = photograph(&target, pose, index as u64);
+        std::fs::write(at.join(format!("photos/{index}.png")), png).unwrap();
+    }
+    let last = photograph(&target, &poses[4], 4);
+    let growing = at.join("photos/4.png");
+    std::fs::write(&growing, &last[..last.len() / 2]).unwrap();
+    std::fs::write(at.join("photos/note.png"), "no picture").unwrap();
+    let child = Command::new(env!("CARGO_BIN_EXE_deltille"))
+        .current_dir(at)
+        .args(["guide", "photos", "--target", "desk.json", "--once"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    std::fs::write(&growing, &last).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    let said = said(&output);
+    assert!(said.contains("4.png: 80 corners") && said.contains("5 views: "), "{said}");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(stderr.contains("note.png") && !stderr.contains("4.png"), "{stderr}");
+}
+
+#[test]
+fn what_cannot_be_guided_is_refused_in_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("desk.json"), board().to_json()).unwrap();
+    let loose = BoardSpec { boards: 2, ..BoardSpec::new(GridKind::Deltille, 8, 10, 20.0) };
+    std::fs::write(at.join("two.json"), Target::new("two", loose).unwrap().to_json()).unwrap();
+    std::fs::create_dir(at.join("photos")).unwrap();
+    std::fs::write(at.join("mine.json"), "{}").unwrap();
+    let mut page = Page::default();
+    for arguments in [
+        "nowhere --target desk.json",
+        "photos --target nothing.json",
+        "photos --target two.json",
+        "photos --target desk.json --model spline",
+        "photos --target desk.json --model auto",
+        "photos --target desk.json --until 0",
+        "photos --target desk.json --nearest 1m --farthest 50cm",
+        "photos --target desk.json --picture next.gif",
+        "photos --target desk.json --picture photos/next.png",
+        "photos --target desk.json -o mine.json",
+        "photos --target desk.json --camera desk.json",
+        "photos --target desk.json --once",
+    ] {
+        page.run(at, &format!("deltille guide {arguments}"));
+    }
+    page.is("guide");
+}
