@@ -42,3 +42,6 @@ footer.append(el("p", {}, words.privacy), el("p", {}, version));
 window.addEventListener("hashchange", show);
 show();
 drawing.call("version").then((of) => version.replaceChildren(words.version(of)), () => undefined);
+
+// Once loaded, the page works without a network.
+if ("serviceWorker" in navigator && import.meta.env.PROD) void navigator.serviceWorker.register("./sw.js").catch(() => undefined);

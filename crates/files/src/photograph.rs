@@ -132,14 +132,6 @@ pub enum ImageError {
     },
 }
 
-/// Grey values of `rgb`, as photographs of colour have them; `None` where there are not three bytes for each pixel.
-pub fn grey_of_colours(width: u32, height: u32, rgb: Vec<u8>) -> Option<Gray<u8>> {
-    match from_dynamic(DynamicImage::ImageRgb8(RgbImage::from_raw(width, height, rgb)?)) {
-        AnyGray::U8(grey) => Some(grey),
-        AnyGray::U16(_) => None,
-    }
-}
-
 /// Reads a PNG, JPEG, TIFF, BMP, PGM/PPM or WebP file as a grey image in sensor orientation. Colour
 /// becomes luma (Rec. 709 weights), transparency is ignored, and a depth beyond 8 bits is kept as
 /// 16 bits.
@@ -499,6 +491,16 @@ fn from_dynamic(image: DynamicImage) -> AnyGray {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Colours that come as arrays, or from a browser, are grey as they are in a file.
+    #[test]
+    fn colours_are_as_grey_without_a_file() {
+        let colours: Vec<u8> =
+            (0..30_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        let image = RgbImage::from_raw(100, 100, colours.clone()).unwrap();
+        let grey = deltille_core::raster::grey_of_colours::<3>(100, 100, &colours).unwrap();
+        assert_eq!(from_dynamic(DynamicImage::ImageRgb8(image)), AnyGray::U8(grey));
+    }
 
     #[test]
     fn depth_is_kept_and_colour_becomes_luma() {

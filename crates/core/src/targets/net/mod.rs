@@ -16,11 +16,13 @@
 //! solid whose faces cannot be laid out in one piece is printed in several, each on a sheet of its
 //! own; tabs and numbers then lead from one to the other.
 
+mod hinge;
 mod plane;
 mod sheet;
 mod tabs;
 mod tiling;
 mod unfold;
 
+pub use hinge::Hinge;
 pub(super) use sheet::sheets;
 pub(super) use unfold::{Side, Sides};
