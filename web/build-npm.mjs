@@ -14,7 +14,7 @@ mkdirSync(join(folder, "families"), { recursive: true });
 let readme = readFileSync(join(web, "npm", "README.md"), "utf8");
 for (const name of modules) {
   cpSync(join(web, "pkg", name), join(folder, name), { recursive: true });
-  writeFileSync(join(folder, name, "browser.js"), `import init from "./deltille.js";\n\nawait init();\n\nexport * from "./deltille.js";\n`);
+  writeFileSync(join(folder, name, "browser.js"), `import init from "./deltille.js";\n\nawait init({ module_or_path: new URL("./deltille_bg.wasm", import.meta.url) });\n\nexport * from "./deltille.js";\n`);
   writeFileSync(
     join(folder, name, "node.js"),
     `import { readFileSync } from "node:fs";\nimport { initSync } from "./deltille.js";\n\ninitSync({ module: readFileSync(new URL("./deltille_bg.wasm", import.meta.url)) });\n\nexport * from "./deltille.js";\n`,

@@ -1,19 +1,24 @@
 // The worker's side: calls of the page to the WebAssembly modules.
 import type * as Make from "../pkg/make/deltille.js";
+import makeCode from "../pkg/make/deltille_bg.wasm?url";
 import type * as Photo from "../pkg/photo/deltille.js";
+import photoCode from "../pkg/photo/deltille_bg.wasm?url";
 import type * as Prove from "../pkg/prove/deltille.js";
+import proveCode from "../pkg/prove/deltille_bg.wasm?url";
 import type * as See from "../pkg/see/deltille.js";
+import seeCode from "../pkg/see/deltille_bg.wasm?url";
 import type * as Solve from "../pkg/solve/deltille.js";
+import solveCode from "../pkg/solve/deltille_bg.wasm?url";
 import { familyFile, familyNames } from "./families-files";
 
-type Module<T> = T & { default: (options?: unknown) => Promise<unknown> };
+type Module<T> = T & { default: (options: { module_or_path: URL }) => Promise<unknown> };
 
 /** A module that is loaded when it is first asked for. */
-function once<T>(load: () => Promise<unknown>): () => Promise<T> {
+function once<T>(code: string, load: () => Promise<unknown>): () => Promise<T> {
   let loading: Promise<T> | null = null;
   const begin = async () => {
     const module = (await load()) as Module<T>;
-    await module.default();
+    await module.default({ module_or_path: new URL(code, import.meta.url) });
     return module as T;
   };
   return () => {
@@ -24,11 +29,11 @@ function once<T>(load: () => Promise<unknown>): () => Promise<T> {
   };
 }
 
-const maker = once<typeof Make>(() => import("../pkg/make/deltille.js"));
-const prover = once<typeof Prove>(() => import("../pkg/prove/deltille.js"));
-const photographer = once<typeof Photo>(() => import("../pkg/photo/deltille.js"));
-const seer = once<typeof See>(() => import("../pkg/see/deltille.js"));
-const solver = once<typeof Solve>(() => import("../pkg/solve/deltille.js"));
+const maker = once<typeof Make>(makeCode, () => import("../pkg/make/deltille.js"));
+const prover = once<typeof Prove>(proveCode, () => import("../pkg/prove/deltille.js"));
+const photographer = once<typeof Photo>(photoCode, () => import("../pkg/photo/deltille.js"));
+const seer = once<typeof See>(seeCode, () => import("../pkg/see/deltille.js"));
+const solver = once<typeof Solve>(solveCode, () => import("../pkg/solve/deltille.js"));
 
 export type Reach = { corners: number; tags: number; ids_left: number; detail_mm: number; needed_px: number; size_mm: number };
 export type Hinge = { face: number; on: number | null; ends_mm: [number, number, number][]; angle_rad: number };
