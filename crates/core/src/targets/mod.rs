@@ -7,6 +7,7 @@
 //! Frames: a *panel* frame has its origin on the panel's lattice vertex (0,0), x along the rows, y
 //! up on the print, z towards the viewer; `target = rotation · panel + translation`.
 
+mod angles;
 mod board;
 mod build;
 mod capacity;
@@ -329,7 +330,7 @@ pub struct Placement {
 impl Placement {
     /// Page position of a point of the panel, mm.
     pub fn page_from_panel(&self, point: DVec2) -> DVec2 {
-        let right = DVec2::from_angle(self.angle_rad);
+        let right = angles::direction(self.angle_rad);
         self.origin_mm + right * point.x + right.perp() * point.y
     }
 }

@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::unfold::{Side, Sides};
+use crate::targets::angles::angle;
 use crate::targets::{Incircle, SolidSpec, Target, TargetSpec};
 
 /// Sides that lie on each other on a sheet differ by less, mm.
@@ -85,7 +86,7 @@ fn of_sheets(target: &Target, spec: &SolidSpec) -> Option<Vec<Hinge>> {
                 let ends_mm = [corners[side.side], corners[(side.side + 1) % 3]];
                 let axis = (ends_mm[1] - ends_mm[0]).normalize_or_zero();
                 let (from, to) = (normal(own.face), normal(on));
-                let angle_rad = axis.dot(from.cross(to)).atan2(from.dot(to));
+                let angle_rad = angle(axis.dot(from.cross(to)), from.dot(to));
                 hinges.push(Hinge { face: own.face, on: Some(on), ends_mm, angle_rad });
             }
         }

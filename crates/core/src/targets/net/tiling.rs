@@ -12,6 +12,7 @@ use glam::DVec2;
 
 use super::plane::{Motion, bounds, gap_mm};
 use super::sheet::instructions;
+use crate::targets::angles::direction;
 use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use crate::targets::length::format_mm;
 use crate::targets::paper::{Orientation, PaperSize, PaperSpec};
@@ -302,7 +303,7 @@ fn obstacles(sheet: &SheetLayout, faces: &[(u32, [DVec2; 3])]) -> Vec<Vec<DVec2>
     let texts = sheet.texts.iter().map(|text| {
         let width = text.text.characters() as f64 * ADVANCE_CAPS * text.cap_height_mm;
         let width = width.min(text.max_width_mm);
-        let along = DVec2::from_angle(text.angle_rad);
+        let along = direction(text.angle_rad);
         let (at, up) = (text.at_mm, along.perp() * text.cap_height_mm);
         let below = at - up * 0.33;
         vec![below, below + along * width, at + up + along * width, at + up]
