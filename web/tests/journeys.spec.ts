@@ -355,6 +355,7 @@ test("once loaded, the page works without a network", async ({ page, context }) 
   await page.reload();
   await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
   await page.getByRole("link", { name: "See" }).click();
+  await expect(page.getByRole("button", { name: "Choose photographs" })).toBeVisible();
   await chooseFiles(page, [join(folder, "0.png")]);
   await expect(page.getByRole("button", { name: /0\.png 72 corners/ })).toBeVisible({ timeout: 60_000 });
 });
