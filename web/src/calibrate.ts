@@ -6,6 +6,7 @@ import { words } from "./words";
 import type { Result } from "./worker";
 
 const models: [string, string][] = ["radtan", "radtan5", "rational", "kannala-brandt", "eucm", "double-sphere"].map((model) => [model, model]);
+
 export function calibrate(): HTMLElement {
   let model = "radtan";
   let taken: Shot[] = [];
@@ -50,8 +51,10 @@ export function calibrate(): HTMLElement {
   function show({ figures, said, files }: Result): void {
     const text = words.calibrate;
     const digits = (value: number, sd: number | null) => (sd && sd > 0 ? value.toFixed(Math.max(0, 2 - Math.floor(Math.log10(sd)))) : value.toPrecision(7));
-    const rows = figures.names.map((name, i) => {
+    const rows = figures.names.flatMap((name, i) => {
       const [value = 0, sd = null] = [figures.values[i], figures.sd[i]];
+      // What the model does not have.
+      if (sd === null && value === 0) return [];
       return el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, digits(value, sd)), el("td", {}, sd ? sd.toPrecision(2) : ""));
     });
     const sure = figures.projection_sd_px;
@@ -92,19 +95,22 @@ export function calibrate(): HTMLElement {
   }
 
   async function watch(): Promise<void> {
-    const context = over.getContext("2d", { willReadFrequently: true });
+    const context = over.getContext("2d");
+    // A frame is shown with what was found in it, not before.
+    const hidden = el("canvas", {});
+    const frame = hidden.getContext("2d", { willReadFrequently: true });
     await looking.call("watch");
     let rate = 0;
-    while (stream && context && over.isConnected) {
+    while (stream && context && frame && over.isConnected) {
       const begin = performance.now();
       const [width, height] = [video.videoWidth, video.videoHeight];
       if (width === 0) {
         await new Promise(requestAnimationFrame);
         continue;
       }
-      if (over.width !== width || over.height !== height) [over.width, over.height] = [width, height];
-      context.drawImage(video, 0, 0);
-      const { data } = context.getImageData(0, 0, width, height);
+      if (over.width !== width || over.height !== height) [over.width, over.height, hidden.width, hidden.height] = [width, height, width, height];
+      frame.drawImage(video, 0, 0);
+      const { data } = frame.getImageData(0, 0, width, height);
       const name = `webcam-${String(taken.length).padStart(3, "0")}`;
       try {
         // The pixels are handed over, and come back with what was found.

@@ -94,7 +94,7 @@ export function make(): HTMLElement {
     const hasTags = ofSolid || (settings.family ?? usualFamily) !== "";
     const kinds = Object.entries(text.kinds).filter(([kind]) => kind !== "mesh" || settings.mesh !== null);
     const sizes = ofSolid
-      ? [number(text.solidEdge, "edge_mm", 1, 100_000, text.usualEdge), number(text.tiles, "tiles", 3, 200, text.usual)]
+      ? [number(text.solidEdge, "edge_mm", 1, 100_000, settings.kind === "mesh" ? text.usualEdge : text.usual), number(text.tiles, "tiles", 3, 200, text.usual)]
       : [number(text.rows, "rows", 2, 500), number(text.cols, "cols", 2, 500), number(text.edge, "edge_mm", 0.1, 1000, text.fitting)];
     const choose = (kind: string) => changed({ kind, family: null, edge_mm: null, name: settings.name === nameOf(settings.kind) ? nameOf(kind) : settings.name }, true);
     form.replaceChildren(

@@ -113,7 +113,8 @@ export function see(): HTMLElement {
   async function sampled(sample: Sample): Promise<void> {
     const bytes = async () => new Uint8Array(await (await fetch(sample.address)).arrayBuffer());
     photos.push({ name: sample.name, bytes, result: null, found: null, error: "" });
-    at = photos.length - 1;
+    at = -1;
+    blank();
     await look();
   }
 
@@ -203,7 +204,8 @@ export function see(): HTMLElement {
   }
 
   function figures(photo: Photo): string {
-    if (photo.error) return photo.error;
+    // The name stands before it.
+    if (photo.error) return photo.error.startsWith(`${photo.name}: `) ? photo.error.slice(photo.name.length + 2) : photo.error;
     if (!photo.found || !photo.result) return words.see.looking;
     const corners = photo.found.grids.reduce((sum, grid) => sum + grid.corners.length, 0);
     const tags = photo.found.grids.reduce((sum, grid) => sum + grid.tags.length, 0);
@@ -222,7 +224,9 @@ export function see(): HTMLElement {
       ...(photos.length > 0 ? [el("li", {}, el("button", { type: "button", class: "quiet", click: () => clear() }, words.see.remove))] : []),
     );
     heading.hidden = photos.length === 0;
-    invitation.hidden = photos.length > 0;
+    invitation.hidden = at >= 0;
+    invitation.textContent = photos.length > 0 ? words.see.looking : words.see.empty;
+    invitation.classList.toggle("busy", photos.length > 0);
   }
 
   function clear(): void {
@@ -230,12 +234,16 @@ export function see(): HTMLElement {
     at = -1;
     asking += 1;
     if (choice === "auto") choose("auto");
+    blank();
+    share();
+    fill();
+  }
+
+  function blank(): void {
     canvas.width = canvas.height = 0;
     told.textContent = "";
     hint.hidden = credit.hidden = lens.hidden = true;
     downloads.replaceChildren();
-    share();
-    fill();
   }
 
   function tell(error: unknown): void {

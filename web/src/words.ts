@@ -23,7 +23,7 @@ export const words = {
     solidEdge: "Edge of the solid, mm",
     usual: "as usual",
     fitting: "as fits the paper",
-    usualEdge: "as usual, or as the mesh is",
+    usualEdge: "as the mesh is",
     tiles: "Tiles along a face",
     family: "Family of the tags",
     noTags: "no tags",
@@ -83,7 +83,7 @@ export const words = {
     choose: "Choose photographs",
     samples: {
       photograph: "Take a photograph that comes along",
-      rendered: "Take a rendered picture of a board with tags",
+      rendered: "Take a rendered board with tags",
       credit:
         "Photograph of the data set github.com/deltille/dataset (Ha, Perdoch, Alismail, So Kweon and Sheikh, “Deltille Grids for Geometric Camera Calibration”, ICCV 2017), under CC BY 4.0 (creativecommons.org/licenses/by/4.0), re-encoded as grey PNG.",
     },
@@ -119,8 +119,8 @@ export const words = {
     start: "Calibrate",
     few: (count: number) => `${count} photographs with labelled corners; ten or more, tilted by 20° to 45°, make a good calibration.`,
     solving: "Calibrating…",
-    rms: (rms: string, views: number) => `Residuals of ${rms} px over ${views} views`,
-    sure: (px: string) => `Projections at infinity are known to ${px} px`,
+    rms: (rms: string, views: number) => `Residuals of ${rms} px over ${views} views.`,
+    sure: (px: string) => `Projections of distant points are known to ${px} px.`,
     parameter: "Parameter",
     value: "Value",
     deviation: "Deviation",

@@ -232,7 +232,7 @@ test.describe("see", () => {
 
   test("targets are recognised by their tags, in the pictures that come along too", async ({ page }) => {
     await page.goto("/#see");
-    await page.getByRole("button", { name: "Take a rendered picture" }).click();
+    await page.getByRole("button", { name: "Take a rendered board" }).click();
     await expect(page.getByText("Recognised: a deltille board of 9 × 12 corners with tags of delTag25h7 from id 0 on.")).toBeVisible({ timeout: 60_000 });
     await expect(page.getByRole("button", { name: /board\.png 108 corners, 12 tags/ })).toBeVisible({ timeout: 30_000 });
     await page.getByLabel("Edge of its tiles, mm").fill("24.5");
@@ -247,6 +247,7 @@ test.describe("see", () => {
     await page.getByRole("button", { name: "Remove all" }).click();
     await chooseFiles(page, [join(folder, "solid.png")]);
     await expect(page.getByText(/Recognised: the icosahedron, by \d+ tags/)).toBeVisible({ timeout: 60_000 });
+    await expect(page.getByRole("button", { name: /solid\.png \d{3} corners/ })).toBeVisible({ timeout: 30_000 });
     await screen(page, "see-solid");
   });
 
