@@ -1,9 +1,7 @@
 // Builds the library as five modules, which the page loads when it needs them: `make` draws targets, `prove` reads their files
 // back, `photo` decodes photographs, `see` finds corners, `solve` calibrates. Needs the Rust target wasm32-unknown-unknown.
 //
-//     node build-wasm.mjs [--small] [MODULE…]
-//
-// --small makes them some percent smaller by wasm-opt, which takes as long again: what is published is made so.
+//     node build-wasm.mjs [MODULE…]
 import { execFileSync } from "node:child_process";
 import { mkdirSync, readFileSync, rmSync, statSync } from "node:fs";
 import { dirname, join } from "node:path";
@@ -15,12 +13,8 @@ const root = dirname(web);
 const target = process.env.CARGO_TARGET_DIR ?? join(root, "target");
 const built = join(target, "wasm32-unknown-unknown", "web", "deltille_web.wasm");
 const all = ["make", "prove", "photo", "see", "solve"];
-/** What all browsers of the last years understand. */
-const features = ["simd", "bulk-memory", "nontrapping-float-to-int", "sign-ext", "mutable-globals", "reference-types", "multivalue"];
 
-const given = process.argv.slice(2);
-const isSmall = given.includes("--small");
-const parts = given.filter((argument) => argument !== "--small");
+const parts = process.argv.slice(2);
 const unknown = parts.find((part) => !all.includes(part));
 if (unknown !== undefined) {
   console.error(`${unknown}: there is no such module, only ${all.join(", ")}`);
@@ -37,6 +31,5 @@ for (const part of parts.length > 0 ? parts : all) {
   mkdirSync(folder, { recursive: true });
   execFileSync(join(target, "debug", "deltille-bindgen"), [built, folder, "deltille"], { stdio: "inherit" });
   const made = join(folder, "deltille_bg.wasm");
-  if (isSmall) execFileSync(join(web, "node_modules/.bin/wasm-opt"), ["-Os", ...features.map((name) => `--enable-${name}`), made, "-o", made], { stdio: "inherit" });
   console.log(`${part}: ${(statSync(made).size / 1e6).toFixed(2)} MB, ${(gzipSync(readFileSync(made)).length / 1e3).toFixed(0)} KB gzipped`);
 }
