@@ -261,7 +261,7 @@ export function see(): HTMLElement {
     if (!photo.result || !photo.found) {
       canvas.width = canvas.height = 0;
       hint.hidden = true;
-      told.textContent = figures(photo);
+      told.textContent = photo.error || figures(photo);
       return;
     }
     const { width, height, grey, ms, reasons } = photo.result;
