@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 
 use deltille::limits::Limits;
-use deltille::raster::{Gray, ImageView, Intensity, View, grey_of_colours};
+use deltille::photograph::grey_of_colours;
+use deltille::raster::{Gray, ImageView, Intensity, View};
 use numpy::ndarray::{ArrayView2, ArrayView3};
 use numpy::{Element, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayMethods, PyUntypedArray};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods, dtype};
@@ -66,7 +67,7 @@ impl<'py> Picture<'py> {
                 return Err(refused(format!("colours of {kind}")));
             }
             let colours = array.cast::<PyArray3<u8>>()?.try_readonly()?;
-            let grey = grey_of_colours::<3>(wide, high, &bytes_of(colours.as_array()));
+            let grey = grey_of_colours(wide, high, bytes_of(colours.as_array()));
             return Ok(Self::Grey(grey.ok_or_else(|| refused("colours".to_owned()))?));
         }
         // Of another byte order they are of an equal type only after a copy.

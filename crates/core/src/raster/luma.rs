@@ -5,8 +5,11 @@ use super::Gray;
 /// Weights of red, green and blue (Rec. 709), in ten-thousandths.
 const WEIGHTS: [u32; 3] = [2126, 7152, 722];
 
-/// Grey values of pixels of so many bytes, whose first three are red, green and blue: what photographs of colour become,
-/// too. `None` where these are not as many bytes as width and height say.
+/// Their sum.
+const WHOLE: u32 = 10_000;
+
+/// Grey values of pixels of so many bytes, whose first three are red, green and blue, as of a video: those that a photograph of
+/// these colours has, to one of the 256. `None` where these are not as many bytes as width and height say.
 ///
 /// ```
 /// use deltille_core::raster::grey_of_colours;
@@ -23,7 +26,7 @@ pub fn grey_of_colours<const BYTES: usize>(
     let (width, height) = (width as usize, height as usize);
     let grey = |pixel: &[u8; BYTES]| {
         let sum = WEIGHTS.iter().zip(pixel).map(|(weight, &value)| weight * u32::from(value));
-        (sum.sum::<u32>() / WEIGHTS.iter().sum::<u32>()) as u8
+        ((sum.sum::<u32>() + WHOLE / 2) / WHOLE) as u8
     };
     let (pixels, rest) = colours.as_chunks::<BYTES>();
     let is_whole = rest.is_empty() && width.checked_mul(height) == Some(pixels.len());
