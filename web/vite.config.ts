@@ -1,8 +1,39 @@
-import { defineConfig } from "vite";
+import { createHash } from "node:crypto";
+import { readFileSync, readdirSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { type Plugin, defineConfig } from "vite";
+
+/** What is kept from the beginning, so that the page works without a network once it was loaded: all but the pictures. */
+const KEPT = /\.(html|js|css|svg|wasm|json)$/;
+
+/** Writes the service worker with the names of all files, and a version that changes with any of them. */
+function offline(): Plugin {
+  let folder = "dist";
+  return {
+    name: "offline",
+    apply: "build",
+    configResolved: (config) => void (folder = config.build.outDir),
+    closeBundle() {
+      const files = readdirSync(folder, { recursive: true, withFileTypes: true })
+        .filter((entry) => entry.isFile())
+        .map((entry) => join(entry.parentPath, entry.name).slice(folder.length + 1))
+        .filter((name) => name !== "sw.js" && KEPT.test(name))
+        .sort();
+      const sum = createHash("sha256");
+      for (const name of files) sum.update(name).update(readFileSync(join(folder, name)));
+      const filled = readFileSync("src/offline.js", "utf8")
+        .replace('"VERSION"', JSON.stringify(sum.digest("hex").slice(0, 16)))
+        .replace('["FILES"]', JSON.stringify(files));
+      writeFileSync(join(folder, "sw.js"), filled);
+    },
+  };
+}
 
 // Relative addresses: the folder is served from anywhere.
 export default defineConfig({
   base: "./",
-  build: { target: "es2022", outDir: "dist", assetsInlineLimit: 0 },
+  build: { target: "es2022", outDir: "dist", assetsInlineLimit: 0, chunkSizeWarningLimit: 800 },
   worker: { format: "es" },
+  server: { fs: { allow: [".."] } },
+  plugins: [offline()],
 });

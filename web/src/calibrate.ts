@@ -6,15 +6,13 @@ import { words } from "./words";
 import type { Result } from "./worker";
 
 const models: [string, string][] = ["radtan", "radtan5", "rational", "kannala-brandt", "eucm", "double-sphere"].map((model) => [model, model]);
-/** A picture of the webcam is taken where the board's corners moved by less than this part of the width since the last one… */
-const STILL = 0.004;
-/** …and by more than this since the last that was taken. */
-const ELSEWHERE = 0.08;
 
 export function calibrate(): HTMLElement {
   let model = "radtan";
   let taken: Shot[] = [];
   let stream: MediaStream | null = null;
+  /** Frames that were looked at since the page was opened. */
+  let frames = 0;
 
   const count = el("p", { class: "facts", "aria-live": "polite" });
   const result = el("div", { class: "result", "aria-live": "polite" });
@@ -36,6 +34,10 @@ export function calibrate(): HTMLElement {
   async function solve(): Promise<void> {
     problem.hidden = true;
     tally();
+    if (shots().length === 0) {
+      tell(new Error(words.calibrate.noShots));
+      return;
+    }
     result.replaceChildren(el("p", { class: "busy" }, words.calibrate.solving));
     try {
       const all = shots();
@@ -49,8 +51,10 @@ export function calibrate(): HTMLElement {
   function show({ figures, said, files }: Result): void {
     const text = words.calibrate;
     const digits = (value: number, sd: number | null) => (sd && sd > 0 ? value.toFixed(Math.max(0, 2 - Math.floor(Math.log10(sd)))) : value.toPrecision(7));
-    const rows = figures.names.map((name, i) => {
+    const rows = figures.names.flatMap((name, i) => {
       const [value = 0, sd = null] = [figures.values[i], figures.sd[i]];
+      // What the model does not have.
+      if (sd === null && value === 0) return [];
       return el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, digits(value, sd)), el("td", {}, sd ? sd.toPrecision(2) : ""));
     });
     const sure = figures.projection_sd_px;
@@ -64,6 +68,10 @@ export function calibrate(): HTMLElement {
   }
 
   async function start(): Promise<void> {
+    if (!target()) {
+      tell(new Error(words.calibrate.noTarget));
+      return;
+    }
     try {
       stream = await navigator.mediaDevices.getUserMedia({ video: { width: { ideal: 1280 }, facingMode: "environment" } });
     } catch {
@@ -86,56 +94,55 @@ export function calibrate(): HTMLElement {
     live.textContent = "";
   }
 
-  type Places = Map<number, [number, number]>;
-
-  /** Mean distance of corners that both have, as a part of the width; infinite where there are none. */
-  function moved(one: Places, other: Places | null, width: number): number {
-    const both = other ? [...one].flatMap(([id, [x, y]]) => (other.has(id) ? [Math.hypot(x - (other.get(id)?.[0] ?? 0), y - (other.get(id)?.[1] ?? 0))] : [])) : [];
-    return both.length > 0 ? both.reduce((sum, by) => sum + by, 0) / both.length / width : Infinity;
-  }
-
   async function watch(): Promise<void> {
-    const context = over.getContext("2d", { willReadFrequently: true });
-    let last: Places | null = null;
-    const views: Places[] = [];
+    const context = over.getContext("2d");
+    // A frame is shown with what was found in it, not before.
+    const hidden = el("canvas", {});
+    const frame = hidden.getContext("2d", { willReadFrequently: true });
+    await looking.call("watch");
     let rate = 0;
-    while (stream && context && over.isConnected) {
+    while (stream && context && frame && over.isConnected) {
       const begin = performance.now();
       const [width, height] = [video.videoWidth, video.videoHeight];
       if (width === 0) {
         await new Promise(requestAnimationFrame);
         continue;
       }
-      if (over.width !== width || over.height !== height) [over.width, over.height] = [width, height];
-      context.drawImage(video, 0, 0);
-      const pixels = context.getImageData(0, 0, width, height);
+      if (over.width !== width || over.height !== height) [over.width, over.height, hidden.width, hidden.height] = [width, height, width, height];
+      frame.drawImage(video, 0, 0);
+      const { data } = frame.getImageData(0, 0, width, height);
       const name = `webcam-${String(taken.length).padStart(3, "0")}`;
       try {
-        const found = await looking.call("frame", { target: target() }, name, width, height, pixels.data);
-        const grids = (JSON.parse(found.json) as { grids: { panel: number | null; corners: { id: number | null; x: number; y: number }[] }[] }).grids;
-        const corners = grids.filter((grid) => grid.panel !== null).flatMap((grid) => grid.corners);
-        const places: Places = new Map(corners.flatMap(({ id, x, y }) => (id === null ? [] : [[id, [x, y]]])));
-        context.putImageData(pixels, 0, 0);
-        context.fillStyle = "#30d158";
-        for (const [x, y] of places.values()) context.fillRect(x - 2, y - 2, 5, 5);
-        const isStill = moved(places, last, width) < STILL;
-        const isElsewhere = views.every((view) => moved(places, view, width) > ELSEWHERE);
-        if (places.size >= 12 && isStill && isElsewhere) {
-          views.push(places);
-          taken.push({ name, json: found.json, corners: places.size, labelled: true });
+        // The pixels are handed over, and come back with what was found.
+        const found = await looking.handing([data.buffer], "frame", { target: target() }, name, width, height, data);
+        if (!stream) break;
+        context.putImageData(new ImageData(found.pixels as Uint8ClampedArray<ArrayBuffer>, width, height), 0, 0);
+        const corners = mark(context, found.json);
+        if (found.keep) {
+          taken.push({ name, json: found.json, corners, labelled: true });
           tally();
         }
-        last = places;
       } catch (error) {
         tell(error);
         stop();
         return;
       }
+      frames += 1;
+      over.dataset.frames = String(frames);
       rate = 0.8 * rate + 0.2 * (1000 / (performance.now() - begin));
       live.textContent = `${words.calibrate.hold} ${words.calibrate.taken(taken.length)}, ${words.calibrate.rate(rate)}.`;
       await new Promise(requestAnimationFrame);
     }
     if (stream) stop();
+  }
+
+  /** Marks the labelled corners of a frame, and counts them. */
+  function mark(context: CanvasRenderingContext2D, json: string): number {
+    const { grids } = JSON.parse(json) as { grids: { panel: number | null; corners: { x: number; y: number }[] }[] };
+    const corners = grids.filter((grid) => grid.panel !== null).flatMap((grid) => grid.corners);
+    context.fillStyle = "#30d158";
+    for (const { x, y } of corners) context.fillRect(x - 2, y - 2, 5, 5);
+    return corners.length;
   }
 
   const whole = el(

@@ -30,6 +30,28 @@ export function select(options: [string, string][], value: string, changed: (val
   return made;
 }
 
+/** A place for files to be dropped. */
+export function dropZone(take: (files: File[]) => void, ...children: Child[]): HTMLElement {
+  const zone = el(
+    "div",
+    {
+      class: "drop",
+      dragover: (event) => {
+        event.preventDefault();
+        zone.classList.add("over");
+      },
+      dragleave: () => zone.classList.remove("over"),
+      drop: (event) => {
+        event.preventDefault();
+        zone.classList.remove("over");
+        take([...((event as DragEvent).dataTransfer?.files ?? [])]);
+      },
+    },
+    ...children,
+  );
+  return zone;
+}
+
 /** Offers a file to be saved. */
 export function save(name: string, content: BlobPart, type = "application/octet-stream"): void {
   const url = URL.createObjectURL(new Blob([content], { type }));

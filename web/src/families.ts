@@ -1,6 +1,6 @@
 // Families: codes of tags, damaged and decoded.
 import { el, field, select } from "./dom";
-import { looking } from "./library";
+import { drawing as looking } from "./library";
 import { words } from "./words";
 
 type Figures = { name: string; bits: number; codes: number; distance: number; correctable: number; kind: string; histogram: Record<string, number> };
@@ -107,7 +107,8 @@ export function families(): HTMLElement {
     );
   }
 
-  looking.call("families").then((names) => {
+  looking.call("families").then((all) => {
+    const names = all.map(({ name }) => name);
     const first = names.includes("delTag25h7") ? "delTag25h7" : (names[0] ?? "");
     chooser.replaceChildren(field(words.families.family, select(names.map((name) => [name, name]), first, (name) => void choose(name))));
     return choose(first);

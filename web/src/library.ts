@@ -1,4 +1,4 @@
-// The library, in workers, so that the page never waits. Two modules are loaded when they are first asked for.
+// The library, in workers, so that the page never waits. Modules are loaded when they are first asked for.
 import type { Calls, Name } from "./worker";
 
 type Waiting = { resolve: (value: unknown) => void; reject: (error: Error) => void };
@@ -12,10 +12,15 @@ class Door {
   private next = 0;
 
   call<N extends Name>(name: N, ...given: Parameters<Calls[N]>): Promise<Awaited<ReturnType<Calls[N]>>> {
+    return this.handing([], name, ...given);
+  }
+
+  /** The same, with buffers that are handed over instead of copied. */
+  handing<N extends Name>(buffers: Transferable[], name: N, ...given: Parameters<Calls[N]>): Promise<Awaited<ReturnType<Calls[N]>>> {
     const id = ++this.next;
     return new Promise((resolve, reject) => {
       this.waiting.set(id, { resolve: resolve as (value: unknown) => void, reject });
-      this.start().postMessage({ id, name, given });
+      this.start().postMessage({ id, name, given }, buffers);
     });
   }
 

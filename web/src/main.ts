@@ -39,6 +39,11 @@ for (const part of Object.keys(parts) as Part[]) {
 const footer = document.getElementById("footer") as HTMLElement;
 const version = el("span");
 footer.append(el("p", {}, words.privacy), el("p", {}, version));
+// A file that is dropped beside its place must not take the place of the page.
+for (const name of ["dragover", "drop"]) window.addEventListener(name, (event) => event.preventDefault());
 window.addEventListener("hashchange", show);
 show();
 drawing.call("version").then((of) => version.replaceChildren(words.version(of)), () => undefined);
+
+// Once loaded, the page works without a network.
+if ("serviceWorker" in navigator && import.meta.env.PROD) void navigator.serviceWorker.register("./sw.js").catch(() => undefined);

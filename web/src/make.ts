@@ -1,11 +1,14 @@
 // Make: settings, the sheet as it will be printed, files, and their proof.
-import { el, field, save, select, settled } from "./dom";
-import { LibraryError, drawing, looking, proving } from "./library";
-import { type Settings, asked, isSolid, query, read } from "./settings";
+import { dropZone, el, field, save, select, settled } from "./dom";
+import { LibraryError, drawing, proving } from "./library";
+import { type Settings, asked, isSolid, nameOf, ofTemplate, query, read, settled as settingsOf, template } from "./settings";
 import { made } from "./shared";
+import type { Folding } from "./solid";
+import { templates } from "./templates";
 import { words } from "./words";
-import type { Pages } from "./worker";
+import type { FamilyFacts, Pages } from "./worker";
 
+/** Formats that the library writes, and how they are proved by name. */
 const formats: [string, string][] = [
   ["pdf", "PDF"],
   ["svg", "SVG"],
@@ -20,6 +23,8 @@ const solidFormats: [string, string][] = [
   ["net", "DXF (net)"],
   ["panels", "DXF (panels)"],
 ];
+/** A description proves nothing: the others are compared with it. */
+const PROVED_BY_ALL = "json";
 const types: Record<string, string> = { pdf: "application/pdf", svg: "image/svg+xml", png: "image/png", json: "application/json" };
 const papers = ["A5", "A4", "A3", "A2", "A1", "A0", "letter", "legal", "tabloid"];
 
@@ -27,27 +32,31 @@ export function make(): HTMLElement {
   let settings: Settings = read(location.hash.split("?")[1] ?? "");
   let pages: Pages | null = null;
   let at = 0;
-  let drawn = 0;
+  let fov = 60;
+  let wide = 1920;
+  let isTurning = false;
+  let folding: Folding | null = null;
+  let families: FamilyFacts[] = [];
 
   const form = el("form", { class: "form", submit: (event) => event.preventDefault() });
   const picture = el("img", { class: "sheet", alt: words.make.preview });
-  const solid = el("div", { class: "solid", hidden: true });
+  const solid = el("div", { class: "solid" });
+  const slider = el("input", { type: "range", min: 0, max: 100, value: 0, input: () => folding?.unfold(Number(slider.value) / 100) });
+  const fold = field(words.make.unfold, slider);
+  const space = el("div", { hidden: true }, solid, fold);
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
   const facts = el("p", { class: "facts", "aria-live": "polite" });
-  const range = el("p", { class: "facts" });
+  const range = el("p", { class: "facts", "aria-live": "polite" });
   const pager = el("p", { class: "pager" });
   const views = el("p", { class: "pager" });
   const downloads = el("div", { class: "buttons" });
   const verdict = el("div", { class: "verdict", "aria-live": "polite" });
-  const templates = el("input", { type: "file", accept: ".json,application/json", hidden: true, change: () => void load() });
-  let fov = 60;
-  let wide = 1920;
-  let isTurning = false;
+  const chooser = el("input", { type: "file", accept: ".toml,.json,.obj,.stl,.glb", hidden: true, change: () => void load([...(chooser.files ?? [])]) });
 
   const changed = (change: Partial<Settings>, isForm = false): void => {
     settings = { ...settings, ...change };
     if (isForm) fill();
-    later();
+    void draw();
   };
 
   function number(label: string, key: keyof Settings, least: number, most: number, usual?: string): HTMLElement {
@@ -56,7 +65,7 @@ export function make(): HTMLElement {
       type: "number",
       min: least,
       max: most,
-      step: key.endsWith("_mm") ? "any" : 1,
+      step: key.endsWith("_mm") || key === "tag_border" ? "any" : 1,
       value: value ?? "",
       placeholder: usual,
       input: () => changed({ [key]: control.value === "" ? null : Number(control.value) } as Partial<Settings>),
@@ -72,64 +81,77 @@ export function make(): HTMLElement {
     return whole;
   }
 
-  let names: string[] = [];
-
   function fill(): void {
     const text = words.make;
     const isSquare = settings.kind === "checker";
-    const fitting = names.filter((name) => name.startsWith("april") === isSquare);
-    const families: [string, string][] = fitting.map((name) => [name, name]);
-    const isPlain = isSolid(settings) ? [] : [["", text.noTags] as [string, string]];
-    const usualFamily = isSquare ? "" : "delTag25h7";
+    const ofSolid = isSolid(settings);
+    const names = families.filter(({ kind }) => kind === (isSquare ? "checker" : "deltille")).map(({ name }) => name);
+    const options: [string, string][] = names.map((name) => [name, name]);
+    if (!ofSolid) options.push(["", text.noTags]);
+    const usualFamily = pages?.family ?? (isSquare ? "" : (names[0] ?? ""));
     const name = el("input", { type: "text", value: settings.name, input: () => changed({ name: name.value }) });
     const isOpen = form.querySelector("details")?.open ?? false;
-    const sizes = isSolid(settings)
-      ? [number(text.solidEdge, "edge_mm", 1, 100_000, "150"), number(text.tiles, "tiles", 3, 200, "10")]
-      : [number(text.rows, "rows", 2, 500), number(text.cols, "cols", 2, 500), number(text.edge, "edge_mm", 0.1, 1000, text.usual)];
+    const hasTags = ofSolid || (settings.family ?? usualFamily) !== "";
+    const kinds = Object.entries(text.kinds).filter(([kind]) => kind !== "mesh" || settings.mesh !== null);
+    const sizes = ofSolid
+      ? [number(text.solidEdge, "edge_mm", 1, 100_000, settings.kind === "mesh" ? text.usualEdge : text.usual), number(text.tiles, "tiles", 3, 200, text.usual)]
+      : [number(text.rows, "rows", 2, 500), number(text.cols, "cols", 2, 500), number(text.edge, "edge_mm", 0.1, 1000, text.fitting)];
+    const choose = (kind: string) => changed({ kind, family: null, edge_mm: null, name: settings.name === nameOf(settings.kind) ? nameOf(kind) : settings.name }, true);
     form.replaceChildren(
-      field(text.kind, select(Object.entries(text.kinds), settings.kind, (kind) => changed({ kind, family: null, edge_mm: null, name: kind === "deltille" ? "board" : kind === "checker" ? "checkerboard" : kind }, true))),
+      field(text.kind, select(kinds, settings.kind, choose)),
       ...sizes,
-      field(text.family, select([...families, ...isPlain], settings.family ?? usualFamily, (family) => changed({ family }))),
+      field(text.family, select(options, settings.family ?? usualFamily, (family) => changed({ family }, true))),
       field(text.paper, select([["", text.smallest], ...papers.map((paper) => [paper, paper] as [string, string])], settings.paper ?? "", (paper) => changed({ paper: paper || null }))),
       field(text.name, name),
       el(
         "details",
         { open: isOpen },
         el("summary", {}, text.more),
-        number(text.firstId, "first_id", 0, 1_000_000),
+        field(text.orientation, select(Object.entries(text.orientations), settings.orientation, (orientation) => changed({ orientation }))),
+        number(text.margin, "margin_mm", 0, 100, text.usual),
+        ...(hasTags
+          ? [
+              ...(ofSolid || settings.kind === "deltille" ? [] : [field(text.tagsIn, select(Object.entries(text.tagsInColours), settings.tags_in, (tags_in) => changed({ tags_in })))]),
+              number(text.spacing, "tag_spacing", 1, 500, text.usual),
+              number(text.border, "tag_border", 0.6, 10, text.usual),
+              number(text.firstId, "first_id", 0, 1_000_000),
+            ]
+          : []),
         number(text.boardId, "board_id", 0, 1_000_000),
-        isSolid(settings) ? box(text.perFace, "per_face") : box(text.inverted, "inverted"),
+        ...(ofSolid
+          ? [number(text.faceMargin, "face_margin_mm", 0, 1000, text.usual), box(text.skeleton, "skeleton"), box(text.perFace, "per_face")]
+          : [number(text.boards, "boards", 1, 500), box(text.inverted, "inverted")]),
       ),
     );
     downloads.replaceChildren(
-      ...[...formats, ...(isSolid(settings) ? solidFormats : [])].map(([format, text]) =>
-        el("button", { type: "button", click: () => void download(format) }, text),
-      ),
+      ...[...formats, ...(ofSolid ? solidFormats : [])].map(([format, text]) => el("button", { type: "button", click: () => void download(format) }, text)),
     );
     views.replaceChildren(
-      ...(isSolid(settings)
-        ? [
-            el("button", { type: "button", click: () => turn(false) }, text.view.sheet),
-            el("button", { type: "button", click: () => turn(true) }, text.view.solid),
-          ]
+      ...(ofSolid
+        ? ([false, true] as const).map((space) => el("button", { type: "button", "aria-pressed": String(isTurning === space), click: () => turn(space) }, space ? text.view.solid : text.view.sheet))
         : []),
     );
-    if (!isSolid(settings)) turn(false);
+    if (!ofSolid && isTurning) turn(false);
   }
 
   function turn(isOn: boolean): void {
     isTurning = isOn;
     picture.hidden = isOn;
     pager.hidden = isOn;
-    solid.hidden = !isOn;
+    space.hidden = !isOn;
+    for (const [index, button] of [...views.children].entries()) button.setAttribute("aria-pressed", String((index === 1) === isOn));
     if (isOn) void showSolid();
   }
 
   async function showSolid(): Promise<void> {
     const of = asked(settings);
     try {
-      const [{ showMesh }, [file]] = await Promise.all([import("./solid"), drawing.call("files", of, "gltf")]);
-      if (file && of === asked(settings)) showMesh(solid, file.bytes, words.make.solidView);
+      const [{ showMesh }, { glb, hinges }] = await Promise.all([import("./solid"), drawing.call("solid", of)]);
+      if (of !== asked(settings)) return;
+      folding?.end();
+      folding = await showMesh(solid, glb, hinges, words.make.solidView);
+      fold.hidden = hinges.length === 0;
+      folding.unfold(Number(slider.value) / 100);
     } catch (error) {
       tell(error);
     }
@@ -141,23 +163,36 @@ export function make(): HTMLElement {
     problem.hidden = false;
   }
 
+  // While one is drawn, the last of those that are asked for waits.
+  let isDrawing = false;
+  let isStale = false;
   async function draw(): Promise<void> {
-    const turnNumber = ++drawn;
-    const of = asked(settings);
     verdict.replaceChildren();
-    history.replaceState(null, "", `#make${query(settings) ? `?${query(settings)}` : ""}`);
+    isStale = true;
+    if (isDrawing) return;
+    isDrawing = true;
+    while (isStale) {
+      isStale = false;
+      await drawOnce();
+    }
+    isDrawing = false;
+  }
+
+  async function drawOnce(): Promise<void> {
+    const of = asked(settings);
+    address();
     try {
-      const found = await drawing.call("draw", of);
-      if (turnNumber !== drawn) return;
-      pages = found;
-      made.json = found.json;
+      const before = pages?.family;
+      pages = await drawing.call("draw", of);
+      made.json = pages.json;
       made.name = settings.name;
       problem.hidden = true;
-      at = Math.min(at, found.pages.length - 1);
-      show();
-      if (isTurning) await showSolid();
+      at = Math.min(at, pages.pages.length - 1);
+      await show();
+      if (pages.family !== before && settings.family === null) fill();
+      if (isTurning && !isStale) await showSolid();
     } catch (error) {
-      if (turnNumber !== drawn) return;
+      if (isStale) return;
       pages = null;
       facts.textContent = "";
       range.textContent = "";
@@ -165,15 +200,20 @@ export function make(): HTMLElement {
     }
   }
 
-  function show(): void {
+  const address = settled(() => {
+    const of = query(settings);
+    if (form.isConnected) history.replaceState(null, "", `#make${of ? `?${of}` : ""}`);
+  }, 250);
+
+  async function show(): Promise<void> {
     if (!pages) return;
     const count = pages.pages.length;
     const before = picture.src;
     picture.src = URL.createObjectURL(new Blob([pages.pages[at] ?? ""], { type: "image/svg+xml" }));
-    if (before) setTimeout(() => URL.revokeObjectURL(before), 1000);
+    if (before) URL.revokeObjectURL(before);
     const step = (by: number) => () => {
       at = (at + by + count) % count;
-      show();
+      void show();
     };
     pager.replaceChildren(
       ...(count > 1
@@ -184,21 +224,19 @@ export function make(): HTMLElement {
           ]
         : []),
     );
-    facts.textContent = words.make.facts(pages.corners, pages.tags, count);
-    const left = pages.codes - settings.first_id - pages.tags;
-    if (pages.tags > 0 && left > 0) facts.textContent += `; ${words.make.idsLeft(left, settings.family ?? "delTag25h7")}`;
-    showRange();
+    const { corners, tags, ids_left } = pages.reach;
+    facts.textContent = words.make.facts(corners, tags, count);
+    if (tags > 0) facts.textContent += ` ${words.make.idsLeft(ids_left, pages.family ?? "")}`;
+    await showRange();
   }
 
-  /** How near the target fills the picture, and how far its tags are read, or its tiles found (docs/choosing.md). */
-  function showRange(): void {
+  /** From where a camera can use it, as the library has it. */
+  async function showRange(): Promise<void> {
     if (!pages) return;
-    const [edge = 0, cell = 0, size = 0] = pages.sizes;
-    const focal = wide / 2 / Math.tan((fov * Math.PI) / 360);
-    const far = cell > 0 ? (focal * cell) / 2 : (focal * edge) / 7;
-    const near = (focal * size) / wide;
+    const found = await drawing.call("distances", asked(settings), fov, wide).catch(() => undefined);
+    if (found === undefined) return;
     const told = (mm: number) => (mm >= 1000 ? `${(mm / 1000).toFixed(1)} m` : `${(mm / 10).toFixed(0)} cm`);
-    range.textContent = far > near ? words.make.range(told(near), told(far)) : words.make.never;
+    range.textContent = found ? words.make.range(told(found[0]), told(found[1]), pages.reach.tags > 0) : words.make.never;
   }
 
   async function download(format: string): Promise<void> {
@@ -210,51 +248,97 @@ export function make(): HTMLElement {
     }
   }
 
+  /** Proves all files, each with a line as the program prints it. */
   async function prove(): Promise<void> {
-    verdict.replaceChildren(el("p", { class: "busy" }, words.make.proving));
     const of = asked(settings);
+    const lines = el("ul", { class: "lines" });
+    const sum = el("p", { class: "busy" }, words.make.proving);
+    verdict.replaceChildren(sum, lines);
+    let failed = 0;
+    let count = 0;
+    const all = [...formats, ...(isSolid(settings) ? solidFormats : [])].filter(([format]) => format !== PROVED_BY_ALL);
+    for (const [format, name] of all) {
+      try {
+        const proof = await proving.call("prove", of, format);
+        if (of !== asked(settings)) return;
+        count += 1;
+        if (!proof.passed) failed += 1;
+        const findings = proof.sentences.map((sentence) => el("li", {}, sentence));
+        lines.append(el("li", { class: proof.passed ? "passed" : "refused" }, proof.line, findings.length > 0 ? el("ul", {}, ...findings) : ""));
+      } catch (error) {
+        if (of !== asked(settings)) return;
+        lines.append(el("li", { class: "plain" }, `${name}: ${error instanceof Error && error.message ? error.message : words.failed}`));
+      }
+    }
+    sum.className = failed === 0 ? "good" : "bad";
+    sum.textContent = failed === 0 ? words.make.proved(count) : words.make.notProved(failed, count);
+  }
+
+  async function load(files: File[]): Promise<void> {
+    chooser.value = "";
+    const [file] = files;
+    if (!file) return;
     try {
-      const proof = await proving.call("prove", of, "pdf");
-      if (of !== asked(settings)) return;
-      const lines = proof.sentences.map((sentence) => el("li", {}, sentence));
-      verdict.replaceChildren(
-        el("p", { class: proof.passed ? "good" : "bad" }, proof.passed ? words.make.proved : words.make.notProved),
-        el("p", {}, proof.summary),
-        lines.length > 0 ? el("ul", {}, ...lines) : "",
-      );
+      if (/\.(obj|stl|glb)$/i.test(file.name)) {
+        const { inObj } = await import("./meshes");
+        const mesh = await inObj(file.name, new Uint8Array(await file.arrayBuffer()));
+        changed({ ...settings, kind: "mesh", mesh, edge_mm: null, family: null, name: file.name.replace(/\.[^.]*$/, "") }, true);
+        turn(true);
+        return;
+      }
+      const text = await file.text();
+      settings = /\.toml$/i.test(file.name) ? ofTemplate(text) : ofValues(text);
+      fill();
+      await draw();
     } catch (error) {
-      verdict.replaceChildren();
-      tell(error);
+      tell(new LibraryError(`${file.name}: ${error instanceof SyntaxError || !(error instanceof Error) ? words.make.noSettings : error.message}`));
     }
   }
 
-  async function load(): Promise<void> {
-    const file = templates.files?.[0];
-    templates.value = "";
-    if (!file) return;
-    try {
-      settings = read(new URLSearchParams(Object.entries(JSON.parse(await file.text()) as Record<string, unknown>).filter(([, value]) => value !== null).map(([key, value]) => [key, String(value)])).toString());
-      fill();
-      await draw();
-    } catch {
-      tell(new LibraryError(`${file.name}: these are no settings of a target`));
-    }
+  function ofValues(text: string): Settings {
+    const values = JSON.parse(text) as Record<string, unknown>;
+    if (typeof values !== "object" || values === null || !("kind" in values)) throw new Error(words.make.noSettings);
+    const given = Object.entries(values).filter(([, value]) => value !== null);
+    return settingsOf(given.map(([key, value]) => [key, String(value)]));
+  }
+
+  function store(): void {
+    if (isSolid(settings)) save(`${settings.name}.settings.json`, JSON.stringify(settings, null, 2), "application/json");
+    else save(`${settings.name}.toml`, template(settings), "application/toml");
   }
 
   const link = el("button", { type: "button", click: () => void copy() }, words.make.link);
   async function copy(): Promise<void> {
-    await navigator.clipboard.writeText(location.href).catch(() => undefined);
-    link.textContent = words.make.copied;
-    setTimeout(() => (link.textContent = words.make.link), 2000);
+    const of = query(settings);
+    const url = new URL(location.href);
+    url.hash = `make${of ? `?${of}` : ""}`;
+    const isCopied = await navigator.clipboard.writeText(url.href).then(() => true, () => false);
+    if (!isCopied) history.replaceState(null, "", url);
+    link.textContent = isCopied ? words.make.copied : words.make.inAddress;
+    setTimeout(() => (link.textContent = words.make.link), 3000);
   }
 
-  const later = settled(() => void draw(), 60);
-  const view = el("input", { type: "number", min: 1, max: 170, value: fov, input: () => ((fov = Number(view.value) || fov), showRange()) });
-  const pixels = el("input", { type: "number", min: 64, max: 20_000, value: wide, input: () => ((wide = Number(pixels.value) || wide), showRange()) });
+  const view = el("input", { type: "number", min: 1, max: 170, value: fov, input: () => ((fov = Number(view.value) || fov), void showRange()) });
+  const pixels = el("input", { type: "number", min: 64, max: 20_000, value: wide, input: () => ((wide = Number(pixels.value) || wide), void showRange()) });
+  const offered = select([["", words.make.noTemplate], ...templates.map(({ name }) => [name, name] as [string, string])], "", (name) => {
+    const chosen = templates.find((template) => template.name === name);
+    if (!chosen) return;
+    settings = ofTemplate(chosen.text);
+    fill();
+    void draw();
+  });
+  // A link to other settings, followed while the page is open.
+  window.addEventListener("hashchange", () => {
+    const [part, of = ""] = location.hash.slice(1).split("?");
+    if (part !== "make" || of === query(settings) || (of === "" && !location.hash.includes("?"))) return;
+    settings = read(of);
+    fill();
+    void draw();
+  });
   fill();
   void draw();
-  looking.call("families").then((all) => {
-    names = all;
+  drawing.call("families").then((all) => {
+    families = all;
     fill();
   }, tell);
 
@@ -265,28 +349,29 @@ export function make(): HTMLElement {
     el(
       "div",
       { class: "columns" },
-      el("div", {}, form, el("fieldset", {}, el("legend", {}, words.make.camera), field(words.make.fieldOfView, view), field(words.make.pixels, pixels), range)),
+      el(
+        "div",
+        { class: "settings" },
+        field(words.make.templates, offered),
+        form,
+        el("fieldset", {}, el("legend", {}, words.make.camera), field(words.make.fieldOfView, view), field(words.make.pixels, pixels)),
+        dropZone((files) => void load(files), el("p", {}, words.make.drop), el("div", { class: "buttons" }, el("button", { type: "button", click: () => chooser.click() }, words.make.load)), chooser),
+      ),
       el(
         "div",
         { class: "stage" },
         problem,
         views,
         picture,
-        solid,
+        space,
         pager,
         facts,
+        range,
         el("h2", {}, words.make.download),
         downloads,
-        el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void prove() }, words.make.prove), el("a", { class: "button", href: "#see" }, words.make.seeIt)),
+        el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void prove() }, words.make.prove), el("a", { class: "button", href: "#see", click: () => (made.isWanted = true) }, words.make.seeIt)),
         verdict,
-        el(
-          "div",
-          { class: "buttons quiet" },
-          link,
-          el("button", { type: "button", click: () => save(`${settings.name}.settings.json`, JSON.stringify(settings, null, 2), "application/json") }, words.make.template),
-          el("button", { type: "button", click: () => templates.click() }, words.make.load),
-          templates,
-        ),
+        el("div", { class: "buttons quiet" }, link, el("button", { type: "button", click: store }, words.make.template)),
       ),
     ),
   );

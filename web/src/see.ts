@@ -1,58 +1,89 @@
 // See: photographs that are dropped, and what is found in them.
-import { el, field, save, select } from "./dom";
-import { LibraryError, looking } from "./library";
+import { dropZone, el, field, save, select } from "./dom";
+import { LibraryError, drawing, looking } from "./library";
+import { type Sample, samples } from "./samples";
+import { asked, usual } from "./settings";
 import { made, seen } from "./shared";
 import { words } from "./words";
-import type { Seen, Sought } from "./worker";
+import type { Recognised, Shown, Sought } from "./worker";
 
 type Corner = { row: number; col: number; id: number | null; x: number; y: number; cov: [number, number, number] | null };
 type Detection = { grids: { kind: string; panel: number | null; corners: Corner[]; tags: { id: number }[] }[] };
-type Photo = { file: File; result: Seen | null; found: Detection | null; error: string };
+type Photo = { name: string; bytes: () => Promise<Uint8Array>; result: Shown | null; found: Detection | null; error: string };
+type BoardSpec = {
+  kind: "board";
+  grid?: string;
+  rows: number;
+  cols: number;
+  edge_mm: number;
+  inverted: boolean;
+  tags: { family: string; first_id: number; spacing: number; border_bits: number; tags_in?: string };
+};
 
 /** Pixels of the picture that the magnifier shows. */
 const MAGNIFIED = 24;
 /** By how much ellipses are larger than one standard deviation. */
 const ELLIPSE = 100;
+/** The file formats of results. */
+const RESULTS = ["json", "csv", "orpc"] as const;
 const COLOURS = ["#0a84ff", "#ff9f0a", "#30d158", "#ff453a", "#bf5af2", "#64d2ff"];
 
+const stem = (name: string) => name.replace(/\.[^.]*$/, "");
+
 export function see(): HTMLElement {
-  let sought: Sought = { grid: "deltille" };
+  /** What is looked for; nothing while no photograph has told what is in it. */
+  let sought: Sought | null = null;
+  let choice = "auto";
+  let recognised: Recognised | null = null;
   let photos: Photo[] = [];
   let at = -1;
+  /** Counts what was asked for, so that what was asked for before is dropped. */
+  let asking = 0;
+  /** Where the magnifier is, px of the picture. */
+  let pointed: [number, number] = [0, 0];
 
-  const canvas = el("canvas", { class: "photo", role: "img", width: 0, height: 0, mousemove: (event) => magnify(event as MouseEvent), mouseleave: () => (lens.hidden = true) });
-  const lens = el("canvas", { class: "lens", width: 240, height: 240, hidden: true });
+  const canvas = el("canvas", {
+    class: "photo",
+    role: "img",
+    width: 0,
+    height: 0,
+    pointermove: (event) => point(event as PointerEvent),
+    pointerdown: (event) => point(event as PointerEvent),
+    pointerleave: () => (lens.hidden = true),
+    blur: () => (lens.hidden = true),
+    keydown: (event) => step(event as KeyboardEvent),
+  });
+  const lens = el("canvas", { class: "lens", width: 240, height: 240, hidden: true, "aria-hidden": "true" });
   const told = el("p", { class: "facts", "aria-live": "polite" });
+  const credit = el("p", { class: "credit", hidden: true });
   const hint = el("p", { class: "facts", hidden: true }, words.see.magnifier);
   const list = el("ul", { class: "photos" });
   const downloads = el("div", { class: "buttons" });
   const chooser = el("input", { type: "file", multiple: true, hidden: true, accept: ".jpg,.jpeg,.png,.tif,.tiff,.webp,.bmp,.pgm,.ppm,.json", change: () => void take([...(chooser.files ?? [])]) });
-  const zone = el(
-    "div",
-    {
-      class: "drop",
-      dragover: (event) => {
-        event.preventDefault();
-        zone.classList.add("over");
-      },
-      dragleave: () => zone.classList.remove("over"),
-      drop: (event) => {
-        event.preventDefault();
-        zone.classList.remove("over");
-        void take([...((event as DragEvent).dataTransfer?.files ?? [])]);
-      },
-    },
+  const zone = dropZone(
+    (files) => void take(files),
     el("p", {}, words.see.drop),
     el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => chooser.click() }, words.see.choose)),
+    el("div", { class: "buttons quiet" }, ...samples.map((sample) => el("button", { type: "button", click: () => void sampled(sample) }, sample.label))),
     chooser,
   );
-  const choice = el("div", {});
+  const options = el("div", {});
+  const known = el("div", { "aria-live": "polite" });
   let described: { name: string; json: string } | null = null;
 
   function choose(value: string): void {
-    if (value === "made") sought = { target: made.json };
+    choice = value;
+    recognised = null;
+    known.replaceChildren();
+    if (value === "auto") sought = null;
+    else if (value === "made") sought = { target: made.json };
     else if (value === "described" && described) sought = { target: described.json };
     else sought = { grid: value };
+    again();
+  }
+
+  /** Looks at all photographs anew. */
+  function again(): void {
     for (const photo of photos) {
       photo.result = photo.found = null;
       photo.error = "";
@@ -60,34 +91,69 @@ export function see(): HTMLElement {
     void look();
   }
 
-  function offer(value: string): void {
-    const options: [string, string][] = Object.entries(words.see.grid);
-    if (described) options.unshift(["described", words.see.loaded(described.name)]);
-    if (made.json) options.unshift(["made", words.see.made]);
-    choice.replaceChildren(field(words.see.target, select(options, value, choose), words.see.description));
-    choose(value);
+  /** The choices there are, with the one that is taken. */
+  function offer(): void {
+    const all: [string, string][] = [["auto", words.see.auto], ...Object.entries(words.see.grid)];
+    if (described) all.unshift(["described", words.see.loaded(described.name)]);
+    if (made.json) all.unshift(["made", words.see.made]);
+    options.replaceChildren(field(words.see.target, select(all, choice, choose), words.see.description));
   }
 
   async function take(files: File[]): Promise<void> {
     chooser.value = "";
     const target = files.find((file) => file.name.endsWith(".json"));
     const shots = files.filter((file) => file !== target);
-    photos = photos.concat(shots.map((file) => ({ file, result: null, found: null, error: "" })));
+    photos = photos.concat(shots.map((file) => ({ name: file.name, bytes: async () => new Uint8Array(await file.arrayBuffer()), result: null, found: null, error: "" })));
     if (!target) return look();
     described = { name: target.name, json: await target.text() };
-    offer("described");
+    choose("described");
+    offer();
+  }
+
+  async function sampled(sample: Sample): Promise<void> {
+    const bytes = async () => new Uint8Array(await (await fetch(sample.address)).arrayBuffer());
+    photos.push({ name: sample.name, bytes, result: null, found: null, error: "" });
+    at = -1;
+    blank();
+    await look();
+  }
+
+  /** What a photograph shows, where that is not said. */
+  async function guess(photo: Photo): Promise<Sought> {
+    const bytes = await photo.bytes();
+    recognised = await looking.call("recognise", photo.name, bytes);
+    if (recognised) return { target: recognised.target };
+    // Without tags, the tiling of which there is more.
+    const counts = await Promise.all(
+      Object.keys(words.see.grid).map(async (grid): Promise<[number, string]> => {
+        const { json } = await looking.call("photograph", { grid }, photo.name, bytes);
+        return [(JSON.parse(json) as Detection).grids.reduce((sum, { corners }) => sum + corners.length, 0), grid];
+      }),
+    );
+    const [[most = 0, grid = "deltille"] = []] = counts.sort(([a], [b]) => b - a);
+    return most > 0 ? { grid } : { grid: "deltille" };
   }
 
   async function look(): Promise<void> {
-    const of = sought;
-    seen.sought = of;
+    const turn = ++asking;
+    fill();
     for (const [index, photo] of photos.entries()) {
-      if (of !== sought) return;
       if (photo.result || photo.error) continue;
       try {
-        photo.result = await looking.call("photograph", of, photo.file.name, new Uint8Array(await photo.file.arrayBuffer()));
-        photo.found = JSON.parse(photo.result.json) as Detection;
+        // What a photograph without tags shows is no target: the next may tell more.
+        const of = sought ?? (await guess(photo));
+        if (turn !== asking) return;
+        if (!sought && recognised) {
+          sought = of;
+          tellTarget(recognised);
+        }
+        const result = await looking.call("photograph", of, photo.name, await photo.bytes());
+        if (turn !== asking) return;
+        photo.result = result;
+        photo.found = JSON.parse(result.json) as Detection;
+        seen.sought = of;
       } catch (error) {
+        if (turn !== asking) return;
         photo.error = error instanceof LibraryError && error.message ? error.message : words.failed;
       }
       if (at < 0 || at === index) {
@@ -97,7 +163,34 @@ export function see(): HTMLElement {
       fill();
     }
     share();
-    fill();
+  }
+
+  /** What was recognised, with the edge that no photograph tells. */
+  function tellTarget(found: Recognised): void {
+    const spec = found.spec as BoardSpec;
+    if (spec.kind !== "board") {
+      known.replaceChildren(el("p", { class: "good" }, words.see.recognisedSolid(String((found.spec as { shape?: unknown }).shape ?? ""), found.tags)));
+      return;
+    }
+    const edge = el("input", { type: "number", min: 0.1, max: 1000, step: "any", value: spec.edge_mm, change: () => void resize(spec, Number(edge.value)) });
+    known.replaceChildren(
+      el("p", { class: "good" }, words.see.recognised(spec.grid ?? "deltille", spec.rows, spec.cols, spec.tags.family, spec.tags.first_id)),
+      el("p", { class: "facts" }, words.see.recognisedBy(found.tags, found.shown, found.corners)),
+      field(words.see.edge, edge, words.see.edgeHint),
+    );
+  }
+
+  async function resize(spec: BoardSpec, edge_mm: number): Promise<void> {
+    if (!(edge_mm > 0)) return;
+    const { family, first_id, spacing, border_bits, tags_in } = spec.tags;
+    const { rows, cols, inverted, grid = "deltille" } = spec;
+    try {
+      const settings = { ...usual, kind: grid, rows, cols, edge_mm, inverted, family, first_id, tag_spacing: spacing, tag_border: border_bits, tags_in: tags_in ?? "black" };
+      sought = { target: (await drawing.call("draw", asked(settings))).json };
+      again();
+    } catch (error) {
+      tell(error);
+    }
   }
 
   function share(): void {
@@ -106,13 +199,14 @@ export function see(): HTMLElement {
       .map((photo) => {
         const grids = photo.found?.grids ?? [];
         const corners = grids.reduce((sum, grid) => sum + grid.corners.length, 0);
-        return { name: photo.file.name, json: photo.result?.json ?? "", corners, labelled: grids.some((grid) => grid.panel !== null) };
+        return { name: photo.name, json: photo.result?.json ?? "", corners, labelled: grids.some((grid) => grid.panel !== null) };
       });
   }
 
   function figures(photo: Photo): string {
-    if (photo.error) return photo.error;
-    if (!photo.found || !photo.result) return words.loading;
+    // The name stands before it.
+    if (photo.error) return photo.error.startsWith(`${photo.name}: `) ? photo.error.slice(photo.name.length + 2) : photo.error;
+    if (!photo.found || !photo.result) return words.see.looking;
     const corners = photo.found.grids.reduce((sum, grid) => sum + grid.corners.length, 0);
     const tags = photo.found.grids.reduce((sum, grid) => sum + grid.tags.length, 0);
     return corners === 0 ? words.see.none : words.see.found(corners, tags);
@@ -124,22 +218,32 @@ export function see(): HTMLElement {
         el(
           "li",
           {},
-          el("button", { type: "button", "aria-pressed": index === at ? "true" : "false", click: () => ((at = index), draw(), fill()) }, el("strong", {}, photo.file.name), ` ${figures(photo)}`),
+          el("button", { type: "button", "aria-pressed": index === at ? "true" : "false", click: () => ((at = index), draw(), fill()) }, el("strong", {}, photo.name), ` ${figures(photo)}`),
         ),
       ),
       ...(photos.length > 0 ? [el("li", {}, el("button", { type: "button", class: "quiet", click: () => clear() }, words.see.remove))] : []),
     );
+    heading.hidden = photos.length === 0;
+    invitation.hidden = at >= 0;
+    invitation.textContent = photos.length > 0 ? words.see.looking : words.see.empty;
+    invitation.classList.toggle("busy", photos.length > 0);
   }
 
   function clear(): void {
     photos = [];
     at = -1;
-    canvas.width = canvas.height = 0;
-    told.textContent = "";
-    hint.hidden = true;
-    downloads.replaceChildren();
+    asking += 1;
+    if (choice === "auto") choose("auto");
+    blank();
     share();
     fill();
+  }
+
+  function blank(): void {
+    canvas.width = canvas.height = 0;
+    told.textContent = "";
+    hint.hidden = credit.hidden = lens.hidden = true;
+    downloads.replaceChildren();
   }
 
   function tell(error: unknown): void {
@@ -149,16 +253,22 @@ export function see(): HTMLElement {
   function draw(): void {
     const photo = photos[at];
     downloads.replaceChildren();
+    lens.hidden = true;
     if (!photo) return;
+    const sample = samples.find(({ name }) => name === photo.name);
+    credit.textContent = sample?.credit ?? "";
+    credit.hidden = !sample?.credit;
     if (!photo.result || !photo.found) {
       canvas.width = canvas.height = 0;
       hint.hidden = true;
-      told.textContent = figures(photo);
+      told.textContent = photo.error || figures(photo);
       return;
     }
     const { width, height, grey, ms, reasons } = photo.result;
     canvas.width = width;
     canvas.height = height;
+    canvas.tabIndex = 0;
+    pointed = [width / 2, height / 2];
     const context = canvas.getContext("2d");
     if (!context) return;
     context.putImageData(new ImageData(grey as Uint8ClampedArray<ArrayBuffer>, width, height), 0, 0);
@@ -167,9 +277,11 @@ export function see(): HTMLElement {
       context.strokeStyle = context.fillStyle = COLOURS[index % COLOURS.length] ?? "#0a84ff";
       context.lineWidth = thick;
       const places = new Map(grid.corners.map((corner) => [`${corner.row},${corner.col}`, corner]));
+      const steps = [[0, 1], [1, 0], ...(grid.kind === "checker" ? [] : [[1, -1]])];
       context.beginPath();
       for (const corner of grid.corners) {
-        for (const next of [places.get(`${corner.row},${corner.col + 1}`), places.get(`${corner.row + 1},${corner.col}`)]) {
+        for (const [rows = 0, cols = 0] of steps) {
+          const next = places.get(`${corner.row + rows},${corner.col + cols}`);
           if (!next) continue;
           context.moveTo(corner.x + 0.5, corner.y + 0.5);
           context.lineTo(next.x + 0.5, next.y + 0.5);
@@ -184,37 +296,54 @@ export function see(): HTMLElement {
         context.fill();
       }
     });
-    canvas.setAttribute("aria-label", `${photo.file.name}: ${figures(photo)}`);
-    told.textContent = `${figures(photo)}, ${words.see.time(ms)}${reasons ? `. ${reasons.split("\n").join("; ")}` : ""}`;
-    hint.hidden = false;
+    canvas.setAttribute("aria-label", `${photo.name}: ${figures(photo)}. ${words.see.keys}`);
+    told.textContent = [`${figures(photo)}, ${words.see.time(ms)}.`, ...reasons.map((reason) => `${reason.charAt(0).toUpperCase()}${reason.slice(1)}.`)].join(" ");
+    hint.hidden = photo.found.grids.length === 0;
+    hint.textContent = words.see.magnifier;
     downloads.replaceChildren(
-      ...(["json", "csv", "orpc", "overlay"] as const).map((format) => el("button", { type: "button", click: () => void download(photo, format) }, format === "overlay" ? "PNG" : format.toUpperCase())),
+      ...RESULTS.map((format) => el("button", { type: "button", click: () => save(`${stem(photo.name)}.${format}`, photo.result?.[format] ?? "") }, format.toUpperCase())),
+      el("button", { type: "button", click: () => void overlay(photo) }, words.see.overlay),
     );
   }
 
-  async function download(photo: Photo, format: "json" | "csv" | "orpc" | "overlay"): Promise<void> {
-    if (format === "overlay") {
-      canvas.toBlob((drawn) => drawn && save(`${photo.file.name.replace(/\.[^.]*$/, "")}.overlay.png`, drawn, "image/png"));
-      return;
-    }
+  async function overlay(photo: Photo): Promise<void> {
     try {
-      const content = await looking.call("export", sought, photo.file.name, new Uint8Array(await photo.file.arrayBuffer()), format);
-      const stem = photo.file.name.replace(/\.[^.]*$/, "");
-      save(`${stem}.${format}`, content);
+      const png = await looking.call("overlay", photo.name, await photo.bytes(), photo.result?.json ?? "");
+      save(`${stem(photo.name)}.overlay.png`, png as Uint8Array<ArrayBuffer>, "image/png");
     } catch (error) {
       tell(error);
     }
   }
 
-  /** Shows the pixels about the pointer, with the corners there and their uncertainty. */
-  function magnify(event: MouseEvent): void {
+  function point(event: PointerEvent): void {
+    const box = canvas.getBoundingClientRect();
+    pointed = [((event.clientX - box.left) / box.width) * canvas.width - 0.5, ((event.clientY - box.top) / box.height) * canvas.height - 0.5];
+    magnify();
+  }
+
+  /** Arrow keys go from corner to corner. */
+  function step(event: KeyboardEvent): void {
+    const way = ({ ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] } as Record<string, [number, number]>)[event.key];
+    const corners = photos[at]?.found?.grids.flatMap((grid) => grid.corners) ?? [];
+    if (!way) return;
+    event.preventDefault();
+    // The nearest that lies more that way than across it.
+    const ahead = corners.flatMap(({ x, y }) => {
+      const [along, across] = [(x - pointed[0]) * way[0] + (y - pointed[1]) * way[1], Math.abs((x - pointed[0]) * way[1] - (y - pointed[1]) * way[0])];
+      return along > 0.5 && along > across ? [{ x, y, far: along + across }] : [];
+    });
+    const next = ahead.sort((a, b) => a.far - b.far)[0];
+    if (next) pointed = [next.x, next.y];
+    magnify();
+  }
+
+  /** Shows the pixels about a place, with the corners there and their uncertainty. */
+  function magnify(): void {
     const photo = photos[at];
     const context = lens.getContext("2d");
     if (!photo?.result || !photo.found || !context) return;
     const { width, height, grey } = photo.result;
-    const box = canvas.getBoundingClientRect();
-    const x = ((event.clientX - box.left) / box.width) * width - 0.5;
-    const y = ((event.clientY - box.top) / box.height) * height - 0.5;
+    const [x, y] = pointed;
     const scale = lens.width / MAGNIFIED;
     const [left, top] = [Math.round(x - MAGNIFIED / 2), Math.round(y - MAGNIFIED / 2)];
     const part = new ImageData(MAGNIFIED, MAGNIFIED);
@@ -252,16 +381,31 @@ export function see(): HTMLElement {
         context.stroke();
       }
     });
+    // It lies where it covers nothing that is looked at.
+    lens.classList.toggle("left", x > width / 2);
     lens.hidden = false;
     const found = nearest as Corner | null;
     hint.textContent = found?.cov ? words.see.corner(found.row, found.col, found.id, Math.sqrt(found.cov[0]), Math.sqrt(found.cov[2])) : words.see.magnifier;
   }
 
-  offer(made.json ? "made" : "deltille");
+  const heading = el("h2", {}, words.see.list);
+  const invitation = el("p", { class: "empty" }, words.see.empty);
+  /** The target of “Make” may have become known, or another one, while this part was not shown. */
+  function shown(): void {
+    if (!location.hash.startsWith("#see")) return;
+    const isOther = choice === "made" && !(sought && "target" in sought && sought.target === made.json);
+    if (made.json && (made.isWanted || isOther)) choose("made");
+    made.isWanted = false;
+    offer();
+  }
+  window.addEventListener("hashchange", shown);
+  fill();
+  shown();
+  offer();
   return el(
     "section",
     { class: "see", "aria-label": words.tabs.see },
     el("p", { class: "lead" }, words.see.lead),
-    el("div", { class: "columns" }, el("div", {}, zone, choice, el("h2", {}, words.see.list), list), el("div", { class: "stage" }, el("div", { class: "frame" }, canvas, lens), told, hint, downloads)),
+    el("div", { class: "columns" }, el("div", { class: "settings" }, zone, options, known, heading, list), el("div", { class: "stage" }, invitation, el("div", { class: "frame" }, canvas, lens), told, hint, downloads, credit)),
   );
 }

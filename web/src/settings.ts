@@ -1,17 +1,27 @@
-// What a target is made from, and the address that carries it.
+// What a target is made from: the address that carries it, and the templates of the programs.
 export type Settings = {
   kind: string;
   rows: number;
   cols: number;
   edge_mm: number | null;
   family: string | null;
+  tags_in: string;
+  tag_spacing: number | null;
+  tag_border: number | null;
   first_id: number;
   board_id: number;
+  boards: number;
   inverted: boolean;
   tiles: number | null;
+  face_margin_mm: number | null;
+  skeleton: boolean;
   per_face: boolean;
   paper: string | null;
+  orientation: string;
+  margin_mm: number | null;
   name: string;
+  /** The text of an OBJ file. */
+  mesh: string | null;
 };
 
 export const usual: Settings = {
@@ -20,40 +30,118 @@ export const usual: Settings = {
   cols: 11,
   edge_mm: null,
   family: null,
+  tags_in: "black",
+  tag_spacing: null,
+  tag_border: null,
   first_id: 0,
   board_id: 0,
+  boards: 1,
   inverted: false,
   tiles: null,
+  face_margin_mm: null,
+  skeleton: false,
   per_face: false,
   paper: null,
+  orientation: "auto",
+  margin_mm: null,
   name: "board",
+  mesh: null,
 };
+
+const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "inverted"] as const;
+const OF_SOLIDS = ["tiles", "face_margin_mm", "skeleton", "per_face"] as const;
+const NUMBERS = ["rows", "cols", "edge_mm", "tag_spacing", "tag_border", "first_id", "board_id", "boards", "tiles", "face_margin_mm", "margin_mm"];
 
 export const isSolid = (settings: Settings): boolean => settings.kind !== "deltille" && settings.kind !== "checker";
 
-/** Settings with other values than usual, as a query. */
+/** What goes without saying of a kind of target. */
+export const nameOf = (kind: string): string => ({ deltille: "board", checker: "checkerboard", mesh: "solid" })[kind] ?? kind;
+
+/** Settings with other values than usual, as a query. A mesh is too long for an address. */
 export function query(settings: Settings): string {
-  const pairs = Object.entries(settings).filter(([key, value]) => value !== usual[key as keyof Settings]);
+  const pairs = Object.entries(settings).filter(([key, value]) => key !== "mesh" && value !== usual[key as keyof Settings]);
   return new URLSearchParams(pairs.map(([key, value]) => [key, String(value)])).toString();
 }
 
-/** The settings of a query; what it does not say, or says wrongly, is as usual. */
-export function read(text: string): Settings {
+/** Settings from values by their names; what they do not say, or say wrongly, is as usual. */
+export function settled(values: Iterable<[string, string]>): Settings {
   const found: Record<string, unknown> = { ...usual };
-  for (const [key, value] of new URLSearchParams(text)) {
+  for (const [key, value] of values) {
     if (!(key in usual)) continue;
     const before = usual[key as keyof Settings];
-    const isNumber = typeof before === "number" || key.endsWith("_mm") || key === "tiles";
     if (typeof before === "boolean") found[key] = value === "true";
-    else if (isNumber) found[key] = Number.isFinite(Number(value)) ? Number(value) : before;
+    else if (NUMBERS.includes(key)) found[key] = value !== "" && Number.isFinite(Number(value)) ? Number(value) : before;
     else found[key] = value;
   }
   return found as Settings;
 }
 
+export const read = (text: string): Settings => settled(new URLSearchParams(text));
+
 /** What the library takes: nothing that says nothing of this kind of target. */
 export function asked(settings: Settings): string {
-  const { rows, cols, board_id, inverted, tiles, per_face, ...both } = settings;
-  const own = isSolid(settings) ? { tiles, board_id, per_face } : { rows, cols, board_id, inverted };
-  return JSON.stringify({ ...both, ...own });
+  const own: Partial<Settings> = { ...settings };
+  for (const key of isSolid(settings) ? OF_BOARDS : OF_SOLIDS) delete own[key];
+  if (settings.kind !== "mesh") delete own.mesh;
+  return JSON.stringify(own);
+}
+
+// Templates of the programs: TOML of one level, a setting a line.
+
+const KEYS: [string, keyof Settings][] = [
+  ["name", "name"],
+  ["rows", "rows"],
+  ["cols", "cols"],
+  ["edge", "edge_mm"],
+  ["family", "family"],
+  ["tags", "family"],
+  ["tags-in", "tags_in"],
+  ["tag-spacing", "tag_spacing"],
+  ["tag-border", "tag_border"],
+  ["first-id", "first_id"],
+  ["board-id", "board_id"],
+  ["boards", "boards"],
+  ["invert", "inverted"],
+  ["paper", "paper"],
+  ["orientation", "orientation"],
+  ["margin", "margin_mm"],
+];
+const OTHERS = ["command", "untagged", "pdf", "svg", "png", "dsc", "dsc-dialect", "dpi"];
+const UNITS: Record<string, number> = { "": 1, mm: 1, cm: 10, m: 1000, in: 25.4 };
+
+/** The settings of a template of `deltille board` or `deltille checkerboard`. */
+export function ofTemplate(text: string): Settings {
+  const values = new Map<string, string>();
+  for (const line of text.split("\n")) {
+    const bare = line.replace(/^\s*#.*$/, "").trim();
+    if (bare === "") continue;
+    const [, key = "", string, plain] = /^([\w-]+)\s*=\s*(?:"([^"]*)"|([\w.+-]+))\s*(?:#.*)?$/.exec(bare) ?? [];
+    const known = KEYS.find(([name]) => name === key)?.[1];
+    if (!known && !OTHERS.includes(key)) throw new Error(key === "" ? `${bare}: this is no setting` : `${key}: there is no such setting`);
+    const value = string ?? plain ?? "";
+    if (key === "command") values.set("kind", value === "checkerboard" ? "checker" : "deltille");
+    else if (key === "untagged" && value === "true") values.set("family", "");
+    else if (known?.endsWith("_mm")) {
+      const [, number, unit = ""] = /^([\d.]+)\s*(mm|cm|m|in)?$/.exec(value) ?? [];
+      if (number === undefined) throw new Error(`${key}: ${value} is no length, such as 20mm`);
+      values.set(known, String(Number(number) * (UNITS[unit] ?? 1)));
+    } else if (known) values.set(known, value);
+  }
+  return settled(values);
+}
+
+/** A template of these settings, for the program. */
+export function template(settings: Settings): string {
+  const lines = [`command = "${settings.kind === "checker" ? "checkerboard" : "board"}"`];
+  const done = new Set<string>();
+  for (const [key, name] of KEYS) {
+    const value = settings[name];
+    if (done.has(name)) continue;
+    done.add(name);
+    if (name === "family" && value === "") lines.push("untagged = true");
+    else if (value === null || (value === usual[name] && !["rows", "cols", "name"].includes(name))) continue;
+    else if (name.endsWith("_mm")) lines.push(`${key} = "${value}mm"`);
+    else lines.push(`${key} = ${typeof value === "string" ? JSON.stringify(value) : String(value)}`);
+  }
+  return `${lines.join("\n")}\n`;
 }

@@ -1,8 +1,8 @@
 // What the parts of the page know of each other.
 import type { Sought } from "./worker";
 
-/** The target of “Make”. */
-export const made = { json: "", name: "" };
+/** The target of “Make”, and whether it is what photographs are to be looked at for. */
+export const made = { json: "", name: "", isWanted: false };
 
 /** A photograph that was looked at. */
 export type Shot = { name: string; json: string; corners: number; labelled: boolean };

@@ -1,37 +1,126 @@
-// A solid with its texture, turned by hand.
-import { AmbientLight, Box3, DirectionalLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+// A solid with its texture: turned by hand, and unfolded into its net.
+import { AmbientLight, Box3, type BufferAttribute, DirectionalLight, Matrix4, Mesh, type Object3D, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
+import type { Hinge } from "./worker";
+
+/** Of the box around what is shown, how far away the camera is. */
+const AWAY = 1.35;
+
+const METRES = 1e-3;
 
 let renderer: WebGLRenderer | null = null;
 
-export function showMesh(place: HTMLElement, glb: Uint8Array, label: string): void {
-  new GLTFLoader().parse(glb.slice().buffer, "", (gltf) => {
-    renderer ??= new WebGLRenderer({ antialias: true, alpha: true });
-    const canvas = renderer.domElement;
-    canvas.setAttribute("aria-label", label);
-    canvas.setAttribute("role", "img");
-    canvas.tabIndex = 0;
-    if (canvas.parentElement !== place) place.replaceChildren(canvas);
+export type Folding = {
+  /** Shows it unfolded by a part: 0 is the solid, 1 the net. */
+  unfold(part: number): void;
+  /** Gives back what the graphics hardware holds of it. */
+  end(): void;
+};
+
+export function read(bytes: Uint8Array): Promise<Object3D> {
+  return new Promise((resolve, reject) => new GLTFLoader().parse(bytes.slice().buffer, "", (gltf) => resolve(gltf.scene), reject));
+}
+
+/** Each face's motion from the solid to where it lies when so much is unfolded. */
+function motions(hinges: Hinge[], part: number): Map<number, Matrix4> {
+  const found = new Map<number, Matrix4>();
+  for (const { face, on, ends_mm, angle_rad } of hinges) {
+    const before = on === null ? undefined : found.get(on);
+    const [from, to] = ends_mm.map((end) => new Vector3(...end).multiplyScalar(METRES));
+    if (!before || !from || !to) {
+      found.set(face, new Matrix4());
+      continue;
+    }
+    const turn = new Matrix4().makeRotationAxis(to.clone().sub(from).normalize(), angle_rad * part);
+    const about = new Matrix4().makeTranslation(from).multiply(turn).multiply(new Matrix4().makeTranslation(from.clone().negate()));
+    found.set(face, before.clone().multiply(about));
+  }
+  return found;
+}
+
+export async function showMesh(place: HTMLElement, glb: Uint8Array, hinges: Hinge[], label: string): Promise<Folding> {
+  const object = await read(glb);
+  renderer ??= new WebGLRenderer({ antialias: true, alpha: true });
+  const screen = renderer;
+  const canvas = screen.domElement;
+  canvas.setAttribute("aria-label", label);
+  canvas.setAttribute("role", "img");
+  canvas.tabIndex = 0;
+  if (canvas.parentElement !== place) place.replaceChildren(canvas);
+  const scene = new Scene();
+  scene.add(object, new AmbientLight(0xffffff, 2.2));
+  const camera = new PerspectiveCamera(35, 1.25);
+  const light = new DirectionalLight(0xffffff, 1.2);
+  camera.add(light);
+  scene.add(camera);
+  const controls = new OrbitControls(camera, canvas);
+  controls.listenToKeyEvents(canvas);
+  const draw = () => screen.render(scene, camera);
+  const fit = () => {
     const side = Math.max(place.clientWidth, 200);
-    renderer.setPixelRatio(window.devicePixelRatio);
-    renderer.setSize(side, side * 0.8);
-    const scene = new Scene();
-    scene.add(gltf.scene, new AmbientLight(0xffffff, 2.2));
-    const box = new Box3().setFromObject(gltf.scene);
+    screen.setPixelRatio(window.devicePixelRatio);
+    screen.setSize(side, side * 0.8);
+    draw();
+  };
+
+  const meshes: Mesh[] = [];
+  object.traverse((part) => part instanceof Mesh && meshes.push(part));
+  const places = meshes.map((mesh) => {
+    const position = mesh.geometry.getAttribute("position") as BufferAttribute;
+    const normal = mesh.geometry.getAttribute("normal") as BufferAttribute;
+    return { position, normal, positions: Float32Array.from(position.array), normals: Float32Array.from(normal.array) };
+  });
+
+  /** From where the camera looks, which stays as it was turned. */
+  let towards = new Vector3(0.9, 0.7, 1.2).normalize();
+  function look(): void {
+    const box = new Box3().setFromObject(object, true);
     const size = box.getSize(new Vector3()).length();
     const middle = box.getCenter(new Vector3());
-    const camera = new PerspectiveCamera(35, 1.25, size / 100, size * 10);
-    camera.position.copy(middle).add(new Vector3(0.9, 0.7, 1.2).normalize().multiplyScalar(size * 1.3));
-    const light = new DirectionalLight(0xffffff, 1.2);
-    camera.add(light);
-    scene.add(camera);
-    const controls = new OrbitControls(camera, canvas);
+    camera.near = size / 100;
+    camera.far = size * 10;
+    camera.updateProjectionMatrix();
+    camera.position.copy(middle).addScaledVector(towards, size * AWAY);
     controls.target.copy(middle);
-    controls.listenToKeyEvents(canvas);
-    const draw = () => renderer?.render(scene, camera);
-    controls.addEventListener("change", draw);
     controls.update();
+  }
+
+  function unfold(part: number): void {
+    towards = camera.position.clone().sub(controls.target).normalize();
+    const moved = motions(hinges, part);
+    const at = new Vector3();
+    for (const { position, normal, positions, normals } of places) {
+      for (let vertex = 0; vertex < position.count; vertex++) {
+        // Three vertices for each face, in the order of the faces.
+        const motion = moved.get(Math.floor(vertex / 3)) ?? new Matrix4();
+        at.fromArray(positions, 3 * vertex).applyMatrix4(motion);
+        position.setXYZ(vertex, at.x, at.y, at.z);
+        at.fromArray(normals, 3 * vertex).transformDirection(motion);
+        normal.setXYZ(vertex, at.x, at.y, at.z);
+      }
+      position.needsUpdate = normal.needsUpdate = true;
+    }
+    look();
     draw();
-  });
+  }
+
+  controls.addEventListener("change", draw);
+  window.addEventListener("resize", fit);
+  look();
+  fit();
+  return {
+    unfold,
+    end() {
+      window.removeEventListener("resize", fit);
+      controls.dispose();
+      for (const mesh of meshes) {
+        mesh.geometry.dispose();
+        for (const material of [mesh.material].flat()) {
+          if ("map" in material && material.map) (material.map as { dispose(): void }).dispose();
+          material.dispose();
+        }
+      }
+    },
+  };
 }

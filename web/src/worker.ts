@@ -1,28 +1,51 @@
 // The worker's side: calls of the page to the WebAssembly modules.
 import type * as Make from "../pkg/make/deltille.js";
+import makeCode from "../pkg/make/deltille_bg.wasm?url";
+import type * as Photo from "../pkg/photo/deltille.js";
+import photoCode from "../pkg/photo/deltille_bg.wasm?url";
+import type * as Prove from "../pkg/prove/deltille.js";
+import proveCode from "../pkg/prove/deltille_bg.wasm?url";
 import type * as See from "../pkg/see/deltille.js";
+import seeCode from "../pkg/see/deltille_bg.wasm?url";
 import type * as Solve from "../pkg/solve/deltille.js";
+import solveCode from "../pkg/solve/deltille_bg.wasm?url";
+import { familyFile, familyNames } from "./families-files";
 
-type Module<T> = T & { default: (options?: unknown) => Promise<unknown> };
+type Module<T> = T & { default: (options: { module_or_path: URL }) => Promise<unknown> };
 
-let make: Promise<typeof Make> | null = null;
-let see: Promise<typeof See> | null = null;
-let solve: Promise<typeof Solve> | null = null;
-
-async function started<T>(loading: Promise<Module<T>>): Promise<T> {
-  const module = await loading;
-  await module.default();
-  return module;
+/** A module that is loaded when it is first asked for. */
+function once<T>(code: string, load: () => Promise<unknown>): () => Promise<T> {
+  let loading: Promise<T> | null = null;
+  const begin = async () => {
+    const module = (await load()) as Module<T>;
+    await module.default({ module_or_path: new URL(code, import.meta.url) });
+    return module as T;
+  };
+  return () => {
+    loading ??= begin();
+    // What could not be loaded is asked for again.
+    loading.catch(() => (loading = null));
+    return loading;
+  };
 }
 
-const maker = () => (make ??= started(import("../pkg/make/deltille.js") as Promise<Module<typeof Make>>));
-const solver = () => (solve ??= started(import("../pkg/solve/deltille.js") as Promise<Module<typeof Solve>>));
-const seer = () => (see ??= started(import("../pkg/see/deltille.js") as Promise<Module<typeof See>>));
+const maker = once<typeof Make>(makeCode, () => import("../pkg/make/deltille.js"));
+const prover = once<typeof Prove>(proveCode, () => import("../pkg/prove/deltille.js"));
+const photographer = once<typeof Photo>(photoCode, () => import("../pkg/photo/deltille.js"));
+const seer = once<typeof See>(seeCode, () => import("../pkg/see/deltille.js"));
+const solver = once<typeof Solve>(solveCode, () => import("../pkg/solve/deltille.js"));
 
-export type Pages = { pages: string[]; json: string; corners: number; tags: number; codes: number; sizes: number[] };
+export type Reach = { corners: number; tags: number; ids_left: number; detail_mm: number; needed_px: number; size_mm: number };
+export type Hinge = { face: number; on: number | null; ends_mm: [number, number, number][]; angle_rad: number };
+export type Pages = { pages: string[]; json: string; reach: Reach; family: string | null };
 export type File = { name: string; bytes: Uint8Array };
-export type Proof = { passed: boolean; summary: string; sentences: string[] };
-export type Seen = { json: string; reasons: string; ms: number; width: number; height: number; grey: Uint8ClampedArray };
+export type Solid = { glb: Uint8Array; hinges: Hinge[] };
+export type Proof = { passed: boolean; line: string; sentences: string[] };
+export type Seen = { json: string; csv: string; orpc: string; reasons: string[]; ms: number };
+export type Shown = Seen & { width: number; height: number; grey: Uint8ClampedArray };
+export type Watched = Seen & { keep: boolean; pixels: Uint8ClampedArray };
+export type Recognised = { target: string; spec: Record<string, unknown>; tags: number; corners: number; shown: number };
+export type FamilyFacts = { name: string; kind: string; bits: number; distance: number; codes: number };
 export type Figures = {
   rms_px: number;
   views: number;
@@ -34,28 +57,65 @@ export type Figures = {
 };
 export type Result = { figures: Figures; said: string[]; files: { name: string; text: string }[] };
 
-let finder: { key: string; made: See.Finder } | null = null;
-
 /** What is looked for: the description of a target, or an untagged board. */
 export type Sought = { target: string } | { grid: string };
 
-async function finderOf(sought: Sought): Promise<See.Finder> {
-  const { Finder } = await seer();
-  const key = JSON.stringify(sought);
-  if (finder?.key !== key) {
-    finder?.made.free();
-    finder = null;
-    finder = { key, made: "target" in sought ? Finder.of_target(sought.target) : Finder.of_grid(sought.grid, 0, 0) };
+/** What has memory of a module, and gives it back when the work is done. */
+type Held = { free(): void };
+
+async function using<T extends Held, R>(made: T, work: (made: T) => R | Promise<R>): Promise<R> {
+  try {
+    return await work(made);
+  } finally {
+    made.free();
   }
-  return finder.made;
 }
 
-function seen(found: See.Found, ms: number, withPixels: boolean): Seen {
-  const [width = 0, height = 0] = found.size();
-  const grey = withPixels ? new Uint8ClampedArray(found.part(0, 0, width, height)) : new Uint8ClampedArray();
-  const result = { json: found.json(), reasons: found.reasons(), ms, width, height, grey };
-  found.free();
-  return result;
+let finder: { key: string; made: See.Finder } | null = null;
+let recogniser: See.Recogniser | null = null;
+let watcher: See.Watcher | null = null;
+
+async function finderOf(sought: Sought): Promise<See.Finder> {
+  const { Finder, family_of } = await seer();
+  const key = JSON.stringify(sought);
+  if (finder?.key === key) return finder.made;
+  let made: See.Finder;
+  if ("grid" in sought) made = Finder.of_grid(sought.grid, 0, 0);
+  else {
+    const name = family_of(sought.target);
+    const file = name === undefined ? undefined : await familyFile(name);
+    if (name !== undefined && file === undefined) throw new Error(`the target has tags of the family ${name}, which does not come along`);
+    made = Finder.of_target(sought.target, file);
+  }
+  finder?.made.free();
+  finder = { key, made };
+  return made;
+}
+
+async function pictureOf(photograph: Photo.Photograph): Promise<See.Picture> {
+  const { Picture } = await seer();
+  const [width = 0, height = 0] = photograph.size();
+  return Picture.of_grey(width, height, photograph.is_deep(), photograph.grey(), photograph.orientation());
+}
+
+/** What is told of a picture, and how long it took to find. */
+function told(finder: See.Finder, picture: See.Picture, name: string, also: (found: See.Found) => void = () => undefined): Seen {
+  const begin = performance.now();
+  const found = finder.find(picture, name);
+  const ms = performance.now() - begin;
+  try {
+    also(found);
+    return { json: found.json(), csv: found.csv(), orpc: found.orpc(), reasons: found.reasons(), ms };
+  } finally {
+    found.free();
+  }
+}
+
+async function madeOf(settings: string): Promise<{ made: Make.Made; family: string | undefined }> {
+  const { Made, family_of_settings } = await maker();
+  const name = family_of_settings(settings);
+  const family = name === undefined ? undefined : await familyFile(name);
+  return { made: new Made(settings, family), family: name };
 }
 
 function inFiles(made: unknown[]): File[] {
@@ -68,61 +128,85 @@ const calls = {
   async version(): Promise<string> {
     return (await maker()).version();
   },
+  async families(): Promise<FamilyFacts[]> {
+    return JSON.parse((await maker()).families()) as FamilyFacts[];
+  },
   async draw(settings: string): Promise<Pages> {
-    const { Made } = await maker();
-    const made = new Made(settings);
-    try {
+    const { made, family } = await madeOf(settings);
+    return using(made, (made) => {
       const text = new TextDecoder();
       const pages = inFiles(made.files("svg", 300)).map(({ bytes }) => text.decode(bytes));
-      const [tags = 0, codes = 0] = made.tag_counts();
-      return { pages, json: made.json(), corners: made.corner_count(), tags, codes, sizes: [...made.sizes_mm()] };
-    } finally {
-      made.free();
-    }
+      return { pages, json: made.json(), reach: JSON.parse(made.reach()) as Reach, family: family ?? null };
+    });
+  },
+  async distances(settings: string, fieldOfView: number, width: number): Promise<[number, number] | null> {
+    return using((await madeOf(settings)).made, (made) => {
+      const found = made.distances_mm(fieldOfView, width);
+      return found ? [found[0] ?? 0, found[1] ?? 0] : null;
+    });
   },
   async files(settings: string, format: string): Promise<File[]> {
-    const { Made } = await maker();
-    const made = new Made(settings);
-    try {
-      return inFiles(made.files(format, 300));
-    } finally {
-      made.free();
-    }
+    return using((await madeOf(settings)).made, (made) => inFiles(made.files(format, 300)));
+  },
+  async solid(settings: string): Promise<Solid> {
+    return using((await madeOf(settings)).made, (made) => ({
+      glb: inFiles(made.files("gltf", 300))[0]?.bytes ?? new Uint8Array(),
+      hinges: JSON.parse(made.hinges()) as Hinge[],
+    }));
   },
   async prove(settings: string, format: string): Promise<Proof> {
-    const { Made } = await maker();
-    const made = new Made(settings);
-    try {
+    const { made, family } = await madeOf(settings);
+    const { prove } = await prover();
+    return using(made, async (made) => {
       const files = inFiles(made.files(format, 300));
-      return JSON.parse(made.prove(files.map(({ name }) => name), files.map(({ bytes }) => bytes))) as Proof;
-    } finally {
-      made.free();
+      const file = family === undefined ? undefined : await familyFile(family);
+      return JSON.parse(prove(made.json(), file, files.map(({ name }) => name), files.map(({ bytes }) => bytes))) as Proof;
+    });
+  },
+  async photograph(sought: Sought, name: string, bytes: Uint8Array): Promise<Shown> {
+    const [{ Photograph }, finder] = await Promise.all([photographer(), finderOf(sought)]);
+    return using(new Photograph(name, bytes), async (photograph) => {
+      const [width = 0, height = 0] = photograph.size();
+      const seen = await using(await pictureOf(photograph), (picture) => told(finder, picture, name));
+      return { ...seen, width, height, grey: new Uint8ClampedArray(photograph.shown().buffer as ArrayBuffer) };
+    });
+  },
+  async recognise(name: string, bytes: Uint8Array): Promise<Recognised | null> {
+    const [{ Photograph }, { Recogniser }] = await Promise.all([photographer(), seer()]);
+    if (!recogniser) {
+      const files = await Promise.all(familyNames().map((family) => familyFile(family)));
+      recogniser = new Recogniser(files.filter((file) => file !== undefined));
     }
+    const known = recogniser;
+    return using(new Photograph(name, bytes), async (photograph) =>
+      using(await pictureOf(photograph), (picture) => {
+        const found = known.recognise(picture);
+        return found === undefined ? null : (JSON.parse(found) as Recognised);
+      }),
+    );
   },
-  async photograph(sought: Sought, name: string, bytes: Uint8Array): Promise<Seen> {
-    const finder = await finderOf(sought);
-    const begin = performance.now();
-    const found = finder.photograph(name, bytes);
-    return seen(found, performance.now() - begin, true);
+  async overlay(name: string, bytes: Uint8Array, found: string): Promise<Uint8Array> {
+    const { Photograph } = await photographer();
+    return using(new Photograph(name, bytes), (photograph) => photograph.overlay(found));
   },
-  async frame(sought: Sought, name: string, width: number, height: number, rgba: Uint8ClampedArray): Promise<Seen> {
-    const finder = await finderOf(sought);
-    const begin = performance.now();
-    const found = finder.pixels(name, width, height, new Uint8Array(rgba.buffer, rgba.byteOffset, rgba.byteLength));
-    return seen(found, performance.now() - begin, false);
+  /** Begins to watch a stream: no frame was seen yet. */
+  async watch(): Promise<void> {
+    const { Watcher } = await seer();
+    watcher?.free();
+    watcher = new Watcher();
   },
-  async export(sought: Sought, name: string, bytes: Uint8Array, format: "json" | "csv" | "orpc"): Promise<string> {
-    const found = (await finderOf(sought)).photograph(name, bytes);
-    try {
-      return found[format]();
-    } finally {
-      found.free();
-    }
+  async frame(sought: Sought, name: string, width: number, height: number, pixels: Uint8ClampedArray): Promise<Watched> {
+    const [{ Picture }, finder] = await Promise.all([seer(), finderOf(sought)]);
+    const rgba = new Uint8Array(pixels.buffer, pixels.byteOffset, pixels.byteLength);
+    return using(Picture.of_colours(width, height, rgba), (picture) => {
+      let keep = false;
+      const seen = told(finder, picture, name, (found) => (keep = watcher?.look(found) ?? false));
+      return { ...seen, keep, pixels };
+    });
   },
   async calibrate(target: string, detections: string[], names: string[], model: string): Promise<Result> {
     const { Solved } = await solver();
-    const solved = new Solved(target, detections, names, model);
-    try {
+    return using(new Solved(target, detections, names, model), (solved) => {
       const files = [
         { name: "camera.json", text: solved.json() },
         { name: "camera.yaml", text: solved.yaml() },
@@ -133,40 +217,36 @@ const calls = {
       const ros = solved.ros();
       if (ros !== undefined) files.push({ name: "camera.ros.yaml", text: ros });
       return { figures: JSON.parse(solved.figures()) as Figures, said: solved.said(), files };
-    } finally {
-      solved.free();
-    }
-  },
-  async families(): Promise<string[]> {
-    return (await seer()).families();
+    });
   },
   async family(name: string): Promise<{ figures: string; cells: string; codes: bigint[] }> {
-    const { Codes } = await seer();
-    const codes = new Codes(name);
-    const figures = codes.figures();
-    const count = (JSON.parse(figures) as { codes: number }).codes;
-    const all = Array.from({ length: count }, (_, id) => codes.code(id) ?? 0n);
-    const result = { figures, cells: codes.cells(1.5), codes: all };
-    codes.free();
-    return result;
+    const { Codes } = await maker();
+    return using(new Codes((await familyFile(name)) ?? ""), (codes) => ({ figures: codes.figures(), cells: codes.cells(1.5), codes: [...codes.codes()] }));
   },
   async decode(name: string, word: bigint, errors: number): Promise<number[] | null> {
-    const { Codes } = await seer();
-    const codes = new Codes(name);
-    const found = codes.decode(word, errors);
-    codes.free();
-    return found ? [...found] : null;
+    const { Codes } = await maker();
+    return using(new Codes((await familyFile(name)) ?? ""), (codes) => {
+      const found = codes.decode(word, errors);
+      return found ? [...found] : null;
+    });
   },
 };
 
 export type Calls = typeof calls;
 export type Name = keyof Calls;
 
+/** What need not be copied on its way to the page. */
+function handedOver(result: unknown): Transferable[] {
+  if (typeof result !== "object" || result === null) return [];
+  return Object.values(result).flatMap((value) => (ArrayBuffer.isView(value) && value.buffer instanceof ArrayBuffer ? [value.buffer] : []));
+}
+
 self.onmessage = async ({ data }: MessageEvent<{ id: number; name: Name; given: unknown[] }>) => {
   const { id, name, given } = data;
   try {
     const work = calls[name] as (...given: unknown[]) => Promise<unknown>;
-    self.postMessage({ id, result: await work(...given) });
+    const result = await work(...given);
+    self.postMessage({ id, result }, { transfer: handedOver(result) });
   } catch (error) {
     const broken = error instanceof WebAssembly.RuntimeError;
     self.postMessage({ id, error: broken ? "" : error instanceof Error ? error.message : String(error), broken });

@@ -11,6 +11,13 @@ export const folder = join(root, "web/test-results/pictures");
 
 const EYES = ["0,-50,420", "300,60,330", "-90,200,380", "250,280,350", "80,-160,300", "380,200,300", "100,60,330", "-40,20,300", "180,300,300", "330,-80,380"];
 
+/** A mesh of four faces with edges of 150 mm. */
+export const tetrahedron = ((side: number) => {
+  const [height, up] = [(side * Math.sqrt(3)) / 2, side * Math.sqrt(2 / 3)];
+  const places = [[0, 0, 0], [side, 0, 0], [side / 2, height, 0], [side / 2, height / 3, up]];
+  return `${places.map((at) => `v ${at.join(" ")}`).join("\n")}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n`;
+})(150);
+
 export function deltille(...given: string[]): string {
   return execFileSync(program, given, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
 }
@@ -23,6 +30,8 @@ export default function make(): void {
   EYES.forEach((eye, i) => {
     deltille("render", join(folder, "board.json"), "--camera", camera, "--eye", eye, "--seed", String(i), "-o", join(folder, `${i}.png`), "--force");
   });
+  deltille("icosahedron", "-o", folder, "--force");
+  deltille("render", join(folder, "icosahedron.json"), "--camera", camera, "--eye", "150,220,600", "-o", join(folder, "solid.png"), "--force");
   // 640 × 480, twelve pictures of each of a few places, at thirty a second.
   const small = join(folder, "small.yaml");
   writeFileSync(small, "width: 640\nheight: 480\nfocal_px: [550, 550]\ncentre_px: [319.5, 239.5]\nmodel: pinhole\ndistortion: []\n");

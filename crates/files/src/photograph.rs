@@ -500,6 +500,18 @@ fn from_dynamic(image: DynamicImage) -> AnyGray {
 mod tests {
     use super::*;
 
+    /// Frames of a video are grey as a photograph of the same colours is, to one of the 256 values.
+    #[test]
+    fn frames_are_as_grey_as_photographs() {
+        let random = |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8;
+        let colours: Vec<u8> = (0..30_000).map(random).collect();
+        let frame = deltille_core::raster::grey_of_colours::<3>(100, 100, &colours).unwrap();
+        let photograph = grey_of_colours(100, 100, colours).unwrap();
+        let pairs = frame.pixels().iter().zip(photograph.pixels());
+        assert!(pairs.clone().all(|(a, b)| a.abs_diff(*b) <= 1));
+        assert!(pairs.filter(|(a, b)| a != b).count() < 1000);
+    }
+
     #[test]
     fn depth_is_kept_and_colour_becomes_luma() {
         let dir = tempfile::tempdir().unwrap();

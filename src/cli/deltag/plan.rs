@@ -52,10 +52,15 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     };
     let tags = counted(needed as usize, "tag");
-    say!("{} x {} = {tags}: {}", args.faces, args.tags_per_face, about(&best));
+    say!(
+        "{} x {} = {tags}: {}",
+        args.faces,
+        args.tags_per_face,
+        about(&Family::shipped(best.name)?)
+    );
     // What more bits would buy.
     if let Some(more) = smallest_shipped(GridKind::Deltille, needed, best.correctable() + 1) {
-        say!("to correct more, with smaller cells: {}", about(&more));
+        say!("to correct more, with smaller cells: {}", about(&Family::shipped(more.name)?));
     }
     Ok(ExitCode::SUCCESS)
 }

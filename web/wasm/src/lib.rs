@@ -2,20 +2,27 @@
 //!
 //! | module | its one job |
 //! |---|---|
-//! | `make` | settings to targets, their files, and the files read back |
-//! | `see` | photographs and frames of a webcam to corners |
+//! | `make` | settings to targets and their files |
+//! | `prove` | files read back and compared with their target |
+//! | `photo` | photographs decoded, and detections drawn over them |
+//! | `see` | grey values, and frames of a webcam, to corners |
 //! | `solve` | corners to a camera and its page |
-//! | `family` | codes of tags, looked at and damaged |
+//! | `codes` | codes of tags, looked at and damaged |
 //! | `errors` | the library's words as exceptions |
 //!
-//! It is built thrice, as modules that a page loads when it needs them: with the feature `see`, `solve` or `make`.
-//! Values travel as JSON of the library's own formats, files as bytes.
+//! It is built once for each of the first five, as modules that a page loads when it needs them; `codes` comes with `make`.
+//! Values travel as JSON of the library's own formats, files as bytes. No module carries the families: a page fetches the
+//! file of the one that is asked for.
 
+#[cfg(feature = "make")]
+pub mod codes;
 mod errors;
-#[cfg(feature = "see")]
-pub mod family;
 #[cfg(feature = "make")]
 pub mod make;
+#[cfg(feature = "photo")]
+pub mod photo;
+#[cfg(feature = "prove")]
+pub mod prove;
 #[cfg(feature = "see")]
 pub mod see;
 #[cfg(feature = "solve")]

@@ -1,5 +1,6 @@
-//! Settings to targets, their files, and the files read back.
+//! Settings to targets and their files.
 
+use deltille_core::detect::Reach;
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::targets::{
@@ -8,13 +9,11 @@ use deltille_core::targets::{
 };
 use deltille_files::export::artifacts::{Making, What, make};
 use deltille_files::export::obj;
-use deltille_files::family_file;
-use deltille_verify::{Artifact, Verifier};
 use js_sys::{Array, Uint8Array};
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;
 
-use crate::errors::{Raise, told};
+use crate::errors::Raise;
 
 /// What a form says. What is left out is as the programs have it.
 #[derive(Deserialize)]
@@ -75,6 +74,14 @@ impl Default for Wanted {
 }
 
 impl Wanted {
+    fn spec(&self) -> Result<TargetSpec, JsError> {
+        match self.kind.as_str() {
+            "deltille" => Ok(self.board(GridKind::Deltille, &self.paper()?)),
+            "checker" => Ok(self.board(GridKind::Checker, &self.paper()?)),
+            _ => self.solid(),
+        }
+    }
+
     fn paper(&self) -> Result<PaperSpec, JsError> {
         let size = self.paper.as_deref().filter(|paper| !paper.is_empty());
         Ok(PaperSpec {
@@ -146,6 +153,16 @@ impl Wanted {
     }
 }
 
+/// The name of the family that settings ask for; nothing for a target without tags.
+///
+/// # Errors
+/// In words, where these are no settings.
+#[wasm_bindgen]
+pub fn family_of_settings(settings: &str) -> Result<Option<String>, JsError> {
+    let wanted: Wanted = serde_json::from_str(settings).raise()?;
+    Ok(wanted.spec()?.family().map(str::to_owned))
+}
+
 /// A target that was made, with the family of its tags.
 #[wasm_bindgen]
 pub struct Made {
@@ -155,25 +172,16 @@ pub struct Made {
 
 #[wasm_bindgen]
 impl Made {
-    /// The target of settings, which are JSON.
+    /// The target of settings, which are JSON, with the file of the family that these ask for ([`family_of_settings`]).
     ///
     /// # Errors
     /// In words, where there is no such target.
     #[wasm_bindgen(constructor)]
-    pub fn new(settings: &str) -> Result<Self, JsError> {
+    pub fn new(settings: &str, family: Option<String>) -> Result<Self, JsError> {
         let wanted: Wanted = serde_json::from_str(settings).raise()?;
-        let paper = wanted.paper()?;
-        let spec = match wanted.kind.as_str() {
-            "deltille" => wanted.board(GridKind::Deltille, &paper),
-            "checker" => wanted.board(GridKind::Checker, &paper),
-            _ => wanted.solid()?,
-        };
-        let tags = match &spec {
-            TargetSpec::Board(board) => board.tags.as_ref(),
-            TargetSpec::Solid(solid) => Some(&solid.tags),
-            _ => None,
-        };
-        let family = tags.map(|tags| family_file::resolve(&tags.family)).transpose().raise()?;
+        let (spec, paper) = (wanted.spec()?, wanted.paper()?);
+        let family = family.map(|file| Family::from_json(&file)).transpose().raise()?;
+        let family = family.filter(|_| spec.family().is_some());
         let target = Target::build(&wanted.name, &spec, family.as_ref(), Some(&paper)).raise()?;
         Ok(Self { target, family })
     }
@@ -183,30 +191,23 @@ impl Made {
         self.target.to_json()
     }
 
-    /// How many corners there are.
-    pub fn corner_count(&self) -> usize {
-        self.target.panels.iter().map(|panel| panel.corners.len()).sum()
+    /// What it offers and from where a camera can use it, as JSON.
+    pub fn reach(&self) -> String {
+        let reach = Reach::of(&self.target, self.family.as_ref());
+        serde_json::to_string(&reach).unwrap_or_default()
     }
 
-    /// How many tags there are, and how many codes the family has; 0 without tags.
-    pub fn tag_counts(&self) -> Vec<u32> {
-        let tags = self.target.panels.iter().map(|panel| panel.tags.len()).sum::<usize>();
-        let codes = self.family.as_ref().map_or(0, Family::len);
-        vec![tags as u32, codes as u32]
+    /// The nearest and the farthest distance, mm, at which a camera with a horizontal field of view, in degrees, and a
+    /// width of its pictures, px, can use it; nothing where there are none.
+    pub fn distances_mm(&self, field_of_view_deg: f64, width_px: f64) -> Option<Vec<f64>> {
+        let focal_px = width_px / 2.0 / (field_of_view_deg.to_radians() / 2.0).tan();
+        let reach = Reach::of(&self.target, self.family.as_ref());
+        Some(reach.distances_mm(focal_px, width_px)?.to_vec())
     }
 
-    /// Edge of a tile, width of a cell of a tag (0 without tags) and the longest side of the box around all corners, mm.
-    pub fn sizes_mm(&self) -> Vec<f64> {
-        let Some(panel) = self.target.panels.first() else { return vec![0.0; 3] };
-        let family = self.family.as_ref().filter(|_| !panel.tags.is_empty());
-        let cell = family
-            .map_or(0.0, |family| panel.edge_mm / family.cells().width(panel.tag_inset_bits()));
-        let places =
-            || self.target.panels.iter().flat_map(|panel| &panel.corners).map(|c| c.target_mm);
-        let first = places().next().unwrap_or_default();
-        let (least, most) =
-            places().fold((first, first), |(least, most), at| (least.min(at), most.max(at)));
-        vec![panel.edge_mm, cell, (most - least).max_element()]
+    /// How the faces of a solid hang together in its net, as JSON; an empty list where there is no net.
+    pub fn hinges(&self) -> String {
+        serde_json::to_string(&self.target.hinges()).unwrap_or_default()
     }
 
     /// Names and bytes of the files of a format, one after the other.
@@ -224,28 +225,5 @@ impl Made {
             files.push(&Uint8Array::from(bytes.as_slice()).into());
         }
         Ok(files)
-    }
-
-    /// Reads a file back and compares it with the target: the verdict as JSON, with the sentences of its findings.
-    ///
-    /// # Errors
-    /// In words, where nothing can be compared.
-    pub fn prove(&self, names: Vec<String>, contents: Vec<Uint8Array>) -> Result<String, JsError> {
-        let verifier = Verifier::new(&self.target, self.family.as_ref()).raise()?;
-        let artifacts = names
-            .iter()
-            .zip(&contents)
-            .map(|(name, bytes)| Artifact::new(name.clone(), bytes.to_vec()));
-        let artifacts: Vec<_> = artifacts.collect();
-        let name = names.first().ok_or_else(|| JsError::new("there is no file"))?;
-        let verdict = verifier.verify(name, &artifacts).raise()?;
-        let of_sheets = verdict.sheets.iter().flat_map(|sheet| &sheet.findings);
-        let of_faces = verdict.faces.iter().flat_map(|face| &face.findings);
-        let all = verdict.findings.iter().chain(of_sheets).chain(of_faces);
-        let sentences: Vec<String> = all.map(|finding| told(&finding)).collect();
-        let said = serde_json::json!({
-            "passed": verdict.passed, "summary": told(&verdict), "sentences": sentences, "verdict": verdict,
-        });
-        Ok(said.to_string())
     }
 }

@@ -1,48 +1,106 @@
-//! Photographs and frames of a webcam to corners.
+//! Grey values, and frames of a webcam, to corners.
 
-use std::path::Path;
-
-use deltille_core::detect::{Detection, Detector, DetectorConfig};
+use deltille_core::detect::{Detection, Detector, DetectorConfig, Watch};
+use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
-use deltille_core::raster::AnyGray;
+use deltille_core::raster::{AnyGray, FileNotes, Gray, grey_of_colours};
 use deltille_core::targets::Target;
 use deltille_files::export::{csv, detection, orpc};
-use deltille_files::limits::Limits;
-use deltille_files::photograph;
 use wasm_bindgen::prelude::*;
 
 use crate::errors::Raise;
 
-/// Most pixels of a picture: what a browser holds in memory several times.
-const MOST_PIXELS: u64 = 64_000_000;
+/// A picture that is looked at.
+#[wasm_bindgen]
+pub struct Picture {
+    image: AnyGray,
+    notes: FileNotes,
+}
+
+#[wasm_bindgen]
+impl Picture {
+    /// Grey values, row by row, of 8 bits, or of 16 with the lower byte first; `orientation` is how the file says that they
+    /// are to be turned for a viewer, 1 if not at all.
+    ///
+    /// # Errors
+    /// In words, where these are not as many bytes as width and height say.
+    pub fn of_grey(
+        width: u32,
+        height: u32,
+        is_deep: bool,
+        grey: Vec<u8>,
+        orientation: u8,
+    ) -> Result<Self, JsError> {
+        let (width, height) = (width as usize, height as usize);
+        let image = if is_deep {
+            let (pairs, _) = grey.as_chunks();
+            let values = pairs.iter().map(|&pair| u16::from_le_bytes(pair)).collect();
+            Gray::from_vec(width, height, values).map(AnyGray::U16)
+        } else {
+            Gray::from_vec(width, height, grey).map(AnyGray::U8)
+        };
+        let exif_orientation = (orientation != 1).then_some(orientation);
+        let notes = FileNotes { exif_orientation, damage: None };
+        Ok(Self { image: image.ok_or_else(wrong_size)?, notes })
+    }
+
+    /// Pixels of red, green, blue and alpha, as of a frame of a video.
+    ///
+    /// # Errors
+    /// In words, where these are not as many as width and height say.
+    pub fn of_colours(width: u32, height: u32, rgba: &[u8]) -> Result<Self, JsError> {
+        let grey = grey_of_colours::<4>(width, height, rgba).ok_or_else(wrong_size)?;
+        Ok(Self { image: AnyGray::U8(grey), notes: FileNotes::default() })
+    }
+}
+
+fn wrong_size() -> JsError {
+    JsError::new("there are not as many pixels as width and height say")
+}
 
 /// Looks for a target, or for untagged boards.
 #[wasm_bindgen]
 pub struct Finder {
     detector: Detector,
     target: Option<Target>,
-    limits: Limits,
 }
 
-/// What was found in a picture, with its grey values.
+/// What was found in a picture.
 #[wasm_bindgen]
 pub struct Found {
     detection: Detection,
-    image: AnyGray,
     target: Option<Target>,
+}
+
+/// The name of the family of a target's tags, where it has tags.
+///
+/// # Errors
+/// In words, where it is no description of a target.
+#[wasm_bindgen]
+pub fn family_of(target: &str) -> Result<Option<String>, JsError> {
+    Ok(Target::from_json(target).raise()?.family.map(|family| family.name))
 }
 
 #[wasm_bindgen]
 impl Finder {
-    /// Looks for the target of a description.
+    /// Looks for the target of a description, with the file of the family that it names.
     ///
     /// # Errors
-    /// In words, where it is no description, or the family of its tags is not shipped.
-    pub fn of_target(json: &str) -> Result<Self, JsError> {
-        let target = Target::from_json(json).raise()?;
-        let family = target.family().raise()?;
+    /// In words, where it is no description, or the family is another one.
+    pub fn of_target(target: &str, family: Option<String>) -> Result<Self, JsError> {
+        let target = Target::from_json(target).raise()?;
+        let family = family.map(|file| Family::from_json(&file)).transpose().raise()?;
+        if let (Some(wanted), Some(given)) = (&target.family, &family)
+            && wanted.fingerprint != given.fingerprint()
+        {
+            let (name, other) = (&wanted.name, given.fingerprint());
+            let stated = &wanted.fingerprint;
+            return Err(JsError::new(&format!(
+                "the target has tags of another {name} than the one that is shipped: {stated}, not {other}"
+            )));
+        }
         let detector = Detector::for_target(&target, family.as_ref(), DetectorConfig::default());
-        Ok(Self { detector, target: Some(target), limits: limits() })
+        Ok(Self { detector, target: Some(target) })
     }
 
     /// Looks for untagged boards of a tiling, `deltille` or `checker`. With rows and columns they are labelled where
@@ -58,48 +116,15 @@ impl Finder {
         };
         let size = (rows > 0 && cols > 0).then_some((rows, cols));
         let detector = Detector::for_grid(kind, size, DetectorConfig::default());
-        Ok(Self { detector, target: None, limits: limits() })
+        Ok(Self { detector, target: None })
     }
 
-    /// Looks at a photograph, which is decoded as the programs do.
-    ///
-    /// # Errors
-    /// In words, where it cannot be read.
-    pub fn photograph(&self, name: &str, content: Vec<u8>) -> Result<Found, JsError> {
-        let photograph =
-            photograph::read_bytes(Path::new(name), content, &self.limits, false).raise()?;
-        let mut detection = self.detector.detect(&photograph.image, name);
-        detection.file = photograph.notes;
-        Ok(Found { detection, image: photograph.image, target: self.target.clone() })
+    /// Looks at a picture.
+    pub fn find(&self, picture: &Picture, name: &str) -> Found {
+        let mut detection = self.detector.detect(&picture.image, name);
+        detection.file = picture.notes.clone();
+        Found { detection, target: self.target.clone() }
     }
-
-    /// Looks at pixels of red, green, blue and alpha, as of a frame of a video.
-    ///
-    /// # Errors
-    /// In words, where these are not so many.
-    pub fn pixels(
-        &self,
-        name: &str,
-        width: u32,
-        height: u32,
-        rgba: &[u8],
-    ) -> Result<Found, JsError> {
-        let rgb: Vec<u8> =
-            rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-        let grey = photograph::grey_of_colours(width, height, rgb);
-        let image =
-            AnyGray::U8(grey.ok_or_else(|| {
-                JsError::new("there are not as many pixels as width and height say")
-            })?);
-        let detection = self.detector.detect(&image, name);
-        Ok(Found { detection, image, target: self.target.clone() })
-    }
-}
-
-fn limits() -> Limits {
-    let mut limits = Limits::default();
-    limits.max_pixels = MOST_PIXELS;
-    limits
 }
 
 #[wasm_bindgen]
@@ -119,33 +144,57 @@ impl Found {
         orpc::write(&self.detection, self.target.as_ref())
     }
 
-    /// Why nothing was found or labelled, in sentences, one a line.
-    pub fn reasons(&self) -> String {
-        let sentences = self.detection.reasons.iter().map(crate::errors::told);
-        sentences.collect::<Vec<_>>().join("\n")
+    /// Why nothing was found or labelled, in sentences.
+    pub fn reasons(&self) -> Vec<String> {
+        self.detection.reasons.iter().map(crate::errors::told).collect()
+    }
+}
+
+/// Recognises targets by their tags.
+#[wasm_bindgen]
+pub struct Recogniser(deltille_core::detect::Recogniser);
+
+#[wasm_bindgen]
+impl Recogniser {
+    /// One that knows the families of these files.
+    ///
+    /// # Errors
+    /// In words, where one of them is no family file.
+    #[wasm_bindgen(constructor)]
+    pub fn new(families: Vec<String>) -> Result<Self, JsError> {
+        let read = families.iter().map(|file| Family::from_json(file));
+        let families = read.collect::<Result<Vec<_>, _>>().raise()?;
+        Ok(Self(deltille_core::detect::Recogniser::new(families)))
     }
 
-    /// Sides of the picture, px.
-    pub fn size(&self) -> Vec<u32> {
-        vec![self.detection.width, self.detection.height]
+    /// The target that a picture shows, as JSON: its description, the tags that were read, how many corners it has and how
+    /// many the picture shows. Nothing where none is known.
+    pub fn recognise(&self, picture: &Picture) -> Option<String> {
+        let found = self.0.recognise(&picture.image)?;
+        let [corners, shown] = found.corners;
+        let said = serde_json::json!({
+            "target": found.target.to_json(), "spec": found.target.spec, "tags": found.tags,
+            "corners": corners, "shown": shown,
+        });
+        Some(said.to_string())
+    }
+}
+
+/// Says which frames of a webcam are worth keeping.
+#[wasm_bindgen]
+#[derive(Default)]
+pub struct Watcher(Watch);
+
+#[wasm_bindgen]
+impl Watcher {
+    /// One that has seen nothing.
+    #[wasm_bindgen(constructor)]
+    pub fn new() -> Self {
+        Self::default()
     }
 
-    /// Grey values from 0 to 255 of a part of the picture, as red, green, blue and alpha, row by row.
-    pub fn part(&self, left: u32, top: u32, width: u32, height: u32) -> Vec<u8> {
-        let [full_width, full_height] =
-            [self.detection.width as usize, self.detection.height as usize];
-        let value = |x: usize, y: usize| match &self.image {
-            AnyGray::U8(image) => image.pixels()[y * full_width + x],
-            AnyGray::U16(image) => (image.pixels()[y * full_width + x] >> 8) as u8,
-        };
-        let mut pixels = Vec::with_capacity(4 * (width * height) as usize);
-        for y in top..top + height {
-            for x in left..left + width {
-                let (x, y) = (x as usize, y as usize);
-                let grey = if x < full_width && y < full_height { value(x, y) } else { 0 };
-                pixels.extend([grey, grey, grey, 255]);
-            }
-        }
-        pixels
+    /// Whether the next frame is worth keeping: the target is held still in it, somewhere new.
+    pub fn look(&mut self, found: &Found) -> bool {
+        self.0.look(&found.detection).is_worth_keeping()
     }
 }

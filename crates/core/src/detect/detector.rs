@@ -40,7 +40,7 @@ pub(super) const MIN_LEVEL_SIDE: usize = 24;
 
 /// The median edge of a grid that no tag vouches for is no shorter than this, px. Blur leaves nothing
 /// of smaller tiles but their fundamental wave, and that is the same for squares, dots and threads.
-const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;
+pub(super) const MIN_UNTAGGED_EDGE_PX: f64 = 7.0;
 
 /// Nor is its blur a larger part of the edge. It leaves less than a tenth of the next wave, and in the
 /// wave by itself the model reads a blur of 0.25 of the edge, of three waves 0.155.
@@ -739,7 +739,7 @@ fn refiner(kind: GridKind, config: DetectorConfig, edge_mm: Option<f64>) -> Refi
 }
 
 /// Number of levels of an image's pyramid.
-fn levels_of(image: ImageView) -> usize {
+pub(super) fn levels_of(image: ImageView) -> usize {
     let side = image.width().min(image.height());
     let fitting = (side / MIN_FURTHER_SIDE).checked_ilog2().unwrap_or(0) as usize + 1;
     fitting.max(PYRAMID_LEVELS)

@@ -736,7 +736,7 @@ pub fn panel_vertices(panel: &Panel) -> BTreeSet<Vertex> {
 
 /// The motion that takes the grid tile to the panel's `tile` when the tag in it is turned
 /// counter-clockwise `turns` times, by 120° or 90°, against the grid.
-fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
+pub fn panel_from_grid(on_grid: Tile, tile: Tile, turns: u8) -> LatticeMap {
     // The tag's lower-left vertex lies on vertex `turns` of the grid tile, and its lower edge
     // points along step 2·turns, on an inverted tile half a turn further; on a square along step
     // `turns`.

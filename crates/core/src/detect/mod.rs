@@ -17,6 +17,9 @@
 //!    whose tiles are no squares (`checker_tiles`).
 //! 7. `refine` gives the last word on positions: `cubic` or `quadric`, then `corner_model`, in windows
 //!    that `refine_grid` chooses by blur (`clearance`) and by what else they show.
+//! 8. `recognise` guesses which target it is, where none is given.
+//!
+//! Beside them `reach` says from where a target can be used, and `watch` which pictures of a stream are worth keeping.
 //!
 //! Both tilings go the same way; `tiling` says where they differ.
 
@@ -50,7 +53,9 @@ mod parts;
 mod places;
 mod polynomial;
 mod quadric;
+mod reach;
 mod reason;
+mod recognise;
 mod rectified;
 mod refine;
 mod refine_grid;
@@ -65,6 +70,7 @@ mod tags;
 mod tile_map;
 mod tile_shape;
 mod tiling;
+mod watch;
 mod why;
 
 pub use corner_model::SLOPE_PRIOR;
@@ -72,6 +78,9 @@ pub use curve::{Tone, ToneEstimate};
 pub use detection::{DecodedTag, Detection, Grid, GridCorner};
 pub use detector::{Detector, DetectorConfig};
 pub use ink::{Ink, InkEstimate};
+pub use reach::Reach;
 pub use reason::{Reason, ReasonKind};
+pub use recognise::{Recognised, Recogniser};
 pub use refine::{MAX_WINDOW_PX, RefineStatus, Refined, Refinement, Refiner};
 pub use scene::{SceneError, check_distinct};
+pub use watch::{Glance, Watch};

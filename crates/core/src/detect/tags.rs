@@ -68,6 +68,11 @@ pub struct TagPlace {
 }
 
 impl TagPlace {
+    /// That of tags with a border of so many bits.
+    pub fn with(border_bits: f64, tags_in: TagsIn) -> Self {
+        Self { border_bits, margin_bits: tags_in.margin_bits(), tags_in }
+    }
+
     /// That of the tags of `panel`.
     pub fn of(panel: &Panel) -> Self {
         let border_bits = panel.border_bits.unwrap_or(1.0);

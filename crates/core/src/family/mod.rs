@@ -51,7 +51,7 @@ pub use export::{ExportFormat, export};
 pub use file::check_name;
 pub use file::{Construction, SCHEMA};
 pub use rules::{Rules, Screen};
-pub use shipped::{shipped_names, smallest_shipped, square_names};
+pub use shipped::{ShippedFamily, shipped_families, shipped_names, smallest_shipped, square_names};
 pub use statistics::{ball, distance_histogram, false_positive_rates};
 pub use tagwords::TagWords;
 

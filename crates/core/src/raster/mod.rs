@@ -7,7 +7,7 @@ mod bands;
 mod blur;
 mod coverage;
 mod gray;
-
+mod luma;
 mod pyramid;
 mod view;
 
@@ -16,6 +16,7 @@ pub use bands::{bands, fill_bands};
 pub use blur::gaussian;
 pub use coverage::Coverage;
 pub use gray::{Gray, Intensity};
+pub use luma::grey_of_colours;
 pub use pyramid::{PYRAMID_FULL_SCALE, Pyramid};
 pub(crate) use view::of_any;
 pub use view::{ImageView, View};

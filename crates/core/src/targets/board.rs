@@ -63,7 +63,7 @@ pub(super) fn size_mm(spec: &BoardSpec) -> DVec2 {
 /// `spacing`-th row and column; on a checkerboard in the squares among them that have the right
 /// colour. Of the possible starts the one with most tags is taken, and of those the one whose tags
 /// lie most evenly about the centre of the board.
-pub(super) fn tagged_tiles(
+pub(crate) fn tagged_tiles(
     kind: GridKind,
     corners: &[Vertex],
     spacing: u32,

@@ -1,5 +1,6 @@
 use glam::DVec2;
 
+use super::angles::turn_of;
 use super::layout::{arrange, label};
 use super::paper::{PaperSpec, SolidSheets};
 use super::poster::Poster;
@@ -170,7 +171,7 @@ fn poster(
     let motion = poster.sheet_from_points();
     sheet.placements.push(Placement {
         panel: panel.id,
-        angle_rad: motion.turn.to_angle(),
+        angle_rad: turn_of(motion.turn),
         origin_mm: motion.shift,
     });
     // Crosses keep out of the board and its quiet zone.

@@ -48,8 +48,8 @@ pub(super) fn check_family(
     }
     proposals.extend(instead(there.saturating_sub(first)));
     if let Some(larger) = smallest_shipped(kind, first + needed, 0) {
-        let (name, len) = (larger.name(), larger.len());
-        proposals.push(format!("take `TagSpec::family` {name} with its {len} codes"));
+        let (name, codes) = (larger.name, larger.codes);
+        proposals.push(format!("take `TagSpec::family` {name} with its {codes} codes"));
     }
     Err(TargetError::IdsRunOut {
         first: tags.first_id,

@@ -18,6 +18,7 @@
 
 use glam::DVec2;
 
+use super::angles::turn_of;
 use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit};
 use super::length::format_mm;
 use super::net::{Side, Sides};
@@ -220,7 +221,7 @@ pub fn edge_text(
     SheetText {
         text,
         at_mm: placement.page_from_panel(at),
-        angle_rad: placement.angle_rad + side.to_angle(),
+        angle_rad: placement.angle_rad + turn_of(side),
         cap_height_mm: EDGE_CAP_MM,
         max_width_mm: length,
     }

@@ -7,6 +7,7 @@
 //! Frames: a *panel* frame has its origin on the panel's lattice vertex (0,0), x along the rows, y
 //! up on the print, z towards the viewer; `target = rotation · panel + translation`.
 
+mod angles;
 mod board;
 mod build;
 mod capacity;
@@ -34,6 +35,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::Name;
 use crate::lattice::GridKind;
 use crate::quantity;
+pub(crate) use board::tagged_tiles;
 pub use board::{board_vertices, zigzag_vertices};
 pub use build::{largest_edge_mm, usual_edge_mm};
 pub use closed_mesh::is_coordinate;
@@ -45,6 +47,7 @@ pub use label::Label;
 pub use layout::CHECK_BAR_STROKE_MM;
 pub use layout::id_range;
 pub use length::{LengthError, parse_length_mm};
+pub use net::Hinge;
 pub use paper::{DEFAULT_MARGIN_MM, Orientation, PaperError, PaperSize, PaperSpec, SolidSheets};
 pub use polyhedron::{Face, Polyhedron};
 pub use skeleton::Incircle;
@@ -328,7 +331,7 @@ pub struct Placement {
 impl Placement {
     /// Page position of a point of the panel, mm.
     pub fn page_from_panel(&self, point: DVec2) -> DVec2 {
-        let right = DVec2::from_angle(self.angle_rad);
+        let right = angles::direction(self.angle_rad);
         self.origin_mm + right * point.x + right.perp() * point.y
     }
 }

@@ -18,6 +18,16 @@ const QUIET_MIN_MM: f64 = 5.0;
 /// for one, the corners of the square for as much clear of the tag as in a black one.
 const TAG_MARGIN_BITS: f64 = 2.0;
 
+impl TagsIn {
+    /// Blank between the edges of a tile and the border of the tag in it, bit-widths.
+    pub fn margin_bits(self) -> f64 {
+        match self {
+            Self::Black => 0.0,
+            Self::White => TAG_MARGIN_BITS,
+        }
+    }
+}
+
 impl Panel {
     /// Whether it is a single tag, with no corner of the lattice around it.
     pub fn is_tag_alone(&self) -> bool {
@@ -61,10 +71,7 @@ impl Panel {
 
     /// Blank between the edges of a tile and the border of the tag in it, bit-widths.
     pub fn tag_margin_bits(&self) -> f64 {
-        match self.tags_in {
-            TagsIn::Black => 0.0,
-            TagsIn::White => TAG_MARGIN_BITS,
-        }
+        self.tags_in.margin_bits()
     }
 
     /// Distance from the edges of a tile to the cells of the tag in it, bit-widths along the edge.

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::PanelPose;
+use super::angles::direction;
 use crate::lattice::ROW_HEIGHT;
 
 /// A closed solid of triangles, mm; right-handed. Regular solids have their centre in the origin,
@@ -119,7 +120,7 @@ impl Polyhedron {
 
         let normals =
             [0, 1, 2].map(|i| (outline[(i + 1) % 3] - outline[i]).perp().normalize_or_zero());
-        let towards = [-150f64, -30.0, 90.0].map(|degrees| DVec2::from_angle(degrees.to_radians()));
+        let towards = [-150f64, -30.0, 90.0].map(|degrees| direction(degrees.to_radians()));
         let steepest = normals
             .iter()
             .flat_map(|n| towards.iter().map(move |d| -d.dot(*n)))
@@ -158,7 +159,7 @@ impl Polyhedron {
 /// `n` vertices around the z axis; the first lies `turn` steps from the plane y = 0.
 fn ring(n: usize, radius: f64, z: f64, turn: f64) -> Vec<DVec3> {
     let step = std::f64::consts::TAU / n as f64;
-    (0..n).map(|k| (DVec2::from_angle((k as f64 + turn) * step) * radius).extend(z)).collect()
+    (0..n).map(|k| (direction((k as f64 + turn) * step) * radius).extend(z)).collect()
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 
 use glam::DVec2;
 
+use super::angles::direction;
 use super::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use super::net::plane::{Motion, bounds, gap_mm};
 use super::paper::{Orientation, PaperSize, PaperSpec};
@@ -313,7 +314,7 @@ fn obstacles(sheet: &SheetLayout, areas: Vec<Vec<DVec2>>) -> Vec<Vec<DVec2>> {
     let texts = sheet.texts.iter().map(|text| {
         let width = text.text.characters() as f64 * ADVANCE_CAPS * text.cap_height_mm;
         let width = width.min(text.max_width_mm);
-        let along = DVec2::from_angle(text.angle_rad);
+        let along = direction(text.angle_rad);
         let (at, up) = (text.at_mm, along.perp() * text.cap_height_mm);
         let below = at - up * 0.33;
         vec![below, below + along * width, at + up + along * width, at + up]

@@ -17,6 +17,7 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
+use super::angles::{angle, tangent};
 use super::length::format_mm;
 use super::{ClosedMesh, Polyhedron, TargetError};
 
@@ -86,7 +87,7 @@ impl Skeleton {
         }
         // What lies h below two faces that meet at θ is h cot(θ/2) inside their edge.
         let sharpest = solid.dihedral_angles_rad().into_iter().fold(PI, f64::min);
-        let inside = |below: f64| below / (sharpest / 2.0).tan();
+        let inside = |below: f64| below / tangent(sharpest / 2.0);
         let least_rib = inside(thickness) + FOOT_MM;
         let rib = rib_mm.unwrap_or(least_rib);
         if !(rib >= least_rib - 1e-9 && rib.is_finite()) {
@@ -205,14 +206,14 @@ impl Polyhedron {
                 sides.entry([from.min(to), from.max(to)]).or_default().push((apex, normal));
             }
         }
-        let angle = |edge: [usize; 2]| {
+        let inside = |edge: [usize; 2]| {
             let [(_, one), (apex, other), ..] = sides[&edge].as_slice() else { return PI };
-            let between = one.cross(*other).length().atan2(one.dot(*other));
+            let between = angle(one.cross(*other).length(), one.dot(*other));
             // Beyond the plane of the first face the second one closes a hollow.
             let hollow = one.dot(self.vertices_mm[*apex] - self.vertices_mm[edge[0]]) > 0.0;
             if hollow { PI + between } else { PI - between }
         };
-        self.edges().into_iter().map(angle).collect()
+        self.edges().into_iter().map(inside).collect()
     }
 }
 

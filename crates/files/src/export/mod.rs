@@ -28,7 +28,7 @@ pub mod npy;
 #[cfg(feature = "meshes")]
 pub mod obj;
 pub mod orpc;
-#[cfg(feature = "print")]
+#[cfg(feature = "overlay")]
 pub mod overlay;
 #[cfg(feature = "print")]
 pub mod pdf;

@@ -18,11 +18,13 @@
 //! one to the other. With [`SolidSheets::SeamedNet`](super::SolidSheets::SeamedNet) a net that is larger
 //! than the paper stays in one piece, over several pages that are joined first.
 
+mod hinge;
 mod nest;
 pub(super) mod plane;
 mod sheet;
 mod tabs;
 mod unfold;
 
+pub use hinge::Hinge;
 pub(super) use sheet::sheets;
 pub(super) use unfold::{Side, Sides};

@@ -2,6 +2,8 @@
 
 use glam::DVec2;
 
+use crate::targets::angles::direction;
+
 /// Depth of an overlap that rounding makes of two polygons that share an edge, mm; coordinates of
 /// metres carry errors a million times smaller.
 pub const TOUCHING_MM: f64 = 1e-6;
@@ -43,7 +45,7 @@ impl Motion {
 
     /// Turn by an angle, counter-clockwise.
     pub fn turning(angle_rad: f64) -> Self {
-        Self { turn: DVec2::from_angle(angle_rad), shift: DVec2::ZERO }
+        Self { turn: direction(angle_rad), shift: DVec2::ZERO }
     }
 
     /// Image of a point.

@@ -9,6 +9,7 @@ use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
 use super::unfold::{self, Piece, Side, Sides};
 use crate::lattice::Vertex;
+use crate::targets::angles::turn_of;
 use crate::targets::face_sheet::edge_numbers;
 use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use crate::targets::length::format_mm;
@@ -428,7 +429,7 @@ impl<'a> Drawing<'a> {
             let motion = Motion::carrying([a, b], [corners[0], corners[1]]);
             let placement = Placement {
                 panel: self.panels[index].id,
-                angle_rad: motion.turn.to_angle(),
+                angle_rad: turn_of(motion.turn),
                 origin_mm: motion.shift,
             };
             sheet.placements.push(placement);
@@ -578,7 +579,7 @@ fn words(
     SheetText {
         text,
         at_mm: start + along.perp() * inwards,
-        angle_rad: along.to_angle(),
+        angle_rad: turn_of(along),
         cap_height_mm: cap,
         max_width_mm: room,
     }

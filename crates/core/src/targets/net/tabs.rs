@@ -13,6 +13,7 @@ use glam::DVec2;
 
 use super::plane::{TOUCHING_MM, bounds, gap_mm};
 use super::unfold::{Piece, Side, Sides};
+use crate::targets::angles::tangent;
 
 /// Depth of a tab in lengths of its edge, and its least and most, mm: the least takes its words,
 /// the most is what glue needs.
@@ -102,7 +103,7 @@ impl Tab {
         let outwards = -along.perp();
         let length = from.distance(to);
         let (a, b) = (from + along * inset * length, to - along * inset * length);
-        let step = along * (depth / leg_deg.to_radians().tan());
+        let step = along * (depth / tangent(leg_deg.to_radians()));
         let corners = [b, a, a + outwards * depth + step, b + outwards * depth - step];
         Self { side, corners, depth_mm: depth }
     }

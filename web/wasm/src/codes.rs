@@ -1,14 +1,20 @@
 //! Codes of tags, looked at and damaged.
 
-use deltille_core::family::{Decoder, Family, shipped_names};
+use deltille_core::family::{Decoder, Family, shipped_families};
 use wasm_bindgen::prelude::*;
 
 use crate::errors::Raise;
 
-/// The families that are shipped, by their names.
+/// What is known of the families that are shipped, as JSON: names, tilings, bits, distances, codes.
 #[wasm_bindgen]
-pub fn families() -> Vec<String> {
-    shipped_names().into_iter().map(str::to_owned).collect()
+pub fn families() -> String {
+    let known = shipped_families().map(|family| {
+        serde_json::json!({
+            "name": family.name, "kind": family.kind, "bits": family.bits,
+            "distance": family.distance, "codes": family.codes,
+        })
+    });
+    serde_json::Value::from_iter(known).to_string()
 }
 
 /// A family, with what decodes words that were read.
@@ -20,13 +26,13 @@ pub struct Codes {
 
 #[wasm_bindgen]
 impl Codes {
-    /// A shipped family.
+    /// The family of a file.
     ///
     /// # Errors
-    /// In words, where there is none of that name.
+    /// In words, where it is no family file.
     #[wasm_bindgen(constructor)]
-    pub fn new(name: &str) -> Result<Self, JsError> {
-        let family = Family::shipped(name).raise()?;
+    pub fn new(file: &str) -> Result<Self, JsError> {
+        let family = Family::from_json(file).raise()?;
         let decoder = Decoder::new(&family);
         Ok(Self { family, decoder })
     }
@@ -53,9 +59,9 @@ impl Codes {
         serde_json::to_string(&all).unwrap_or_default()
     }
 
-    /// The code of a tag.
-    pub fn code(&self, id: u32) -> Option<u64> {
-        self.family.code(id)
+    /// The codes of all tags.
+    pub fn codes(&self) -> Vec<u64> {
+        self.family.codes().to_vec()
     }
 
     /// The tag that a word is nearest to, with its turns and the number of cells that were wrong; nothing where none is

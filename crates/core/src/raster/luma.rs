@@ -1,0 +1,34 @@
+//! Grey values of colours.
+
+use super::Gray;
+
+/// Weights of red, green and blue (Rec. 709), in ten-thousandths.
+const WEIGHTS: [u32; 3] = [2126, 7152, 722];
+
+/// Their sum.
+const WHOLE: u32 = 10_000;
+
+/// Grey values of pixels of so many bytes, whose first three are red, green and blue, as of a video: those that a photograph of
+/// these colours has, to one of the 256. `None` where these are not as many bytes as width and height say.
+///
+/// ```
+/// use deltille_core::raster::grey_of_colours;
+///
+/// let grey = grey_of_colours::<4>(2, 1, &[255, 255, 255, 0, 0, 255, 0, 255]).unwrap();
+/// assert_eq!(grey.pixels(), [255, 182]);
+/// assert!(grey_of_colours::<3>(2, 1, &[0; 5]).is_none());
+/// ```
+pub fn grey_of_colours<const BYTES: usize>(
+    width: u32,
+    height: u32,
+    colours: &[u8],
+) -> Option<Gray<u8>> {
+    let (width, height) = (width as usize, height as usize);
+    let grey = |pixel: &[u8; BYTES]| {
+        let sum = WEIGHTS.iter().zip(pixel).map(|(weight, &value)| weight * u32::from(value));
+        ((sum.sum::<u32>() + WHOLE / 2) / WHOLE) as u8
+    };
+    let (pixels, rest) = colours.as_chunks::<BYTES>();
+    let is_whole = rest.is_empty() && width.checked_mul(height) == Some(pixels.len());
+    is_whole.then(|| Gray::from_vec(width, height, pixels.iter().map(grey).collect())).flatten()
+}

@@ -1,0 +1,146 @@
+//! How the faces of a solid hang together on its sheets, to be unfolded in space.
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::unfold::{Side, Sides};
+use crate::targets::angles::angle;
+use crate::targets::{Incircle, SolidSpec, Target, TargetSpec};
+
+/// Sides that lie on each other on a sheet differ by less, mm.
+const TOUCHING_MM: f64 = 0.01;
+
+/// A face of a solid, and the one that it hangs on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Hinge {
+    /// Index of the face.
+    pub face: usize,
+    /// Index of the face that it hangs on; `None` for the first of a sheet.
+    pub on: Option<usize>,
+    /// The ends of the edge that both have, in the target frame, mm.
+    pub ends_mm: [DVec3; 2],
+    /// The turn about the line from the first end to the second that brings it into the plane of the other, radians.
+    pub angle_rad: f64,
+}
+
+impl Target {
+    /// How the faces of a solid hang together on its sheets: each after the one that it hangs on. Empty where the sheets
+    /// are no nets.
+    ///
+    /// ```
+    /// use deltille_core::targets::{PaperSpec, SolidShape, SolidSpec, Target};
+    ///
+    /// let die = Target::new("die", SolidSpec::new(SolidShape::Icosahedron))?;
+    /// let hinges = die.hinges();
+    /// assert_eq!(hinges.iter().filter(|hinge| hinge.on.is_none()).count(), 1);
+    /// assert_eq!(hinges.len(), 20);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn hinges(&self) -> Vec<Hinge> {
+        let TargetSpec::Solid(spec) = &self.spec else { return Vec::new() };
+        if self.sheets.iter().all(|sheet| sheet.placements.len() < 2) {
+            return Vec::new();
+        }
+        of_sheets(self, spec).unwrap_or_default()
+    }
+}
+
+/// The hinges of the sheets of a solid; `None` where its faces have no boards.
+fn of_sheets(target: &Target, spec: &SolidSpec) -> Option<Vec<Hinge>> {
+    let (solid, faces) = (spec.polyhedron(), spec.faces().ok()?);
+    let sides = Sides::new(&solid);
+    let normal = |face: usize| Incircle::of(solid.triangle_mm(face)).normal;
+    let mut hinges = Vec::with_capacity(faces.len());
+    for sheet in &target.sheets {
+        // Of each face the ends of its sides on the sheet.
+        let mut on_sheet = vec![None; faces.len()];
+        for placement in &sheet.placements {
+            let face = target.panels.iter().position(|panel| panel.id == placement.panel)?;
+            let outline = faces.get(face)?.outline_mm;
+            on_sheet[face] = Some(outline.map(|corner| placement.page_from_panel(corner)));
+        }
+        let are_joined = |side: Side, other: Side| {
+            let (Some(one), Some(two)) = (on_sheet[side.face], on_sheet[other.face]) else {
+                return false;
+            };
+            let (from, to) = (one[side.side], one[(side.side + 1) % 3]);
+            let (first, second) = (two[other.side], two[(other.side + 1) % 3]);
+            from.distance(second).max(to.distance(first)) < TOUCHING_MM
+        };
+        let first = (0..faces.len()).find(|&face| on_sheet[face].is_some())?;
+        let mut is_hung = vec![false; faces.len()];
+        is_hung[first] = true;
+        let begin = hinges.len();
+        hinges.push(Hinge { face: first, on: None, ends_mm: [DVec3::ZERO; 2], angle_rad: 0.0 });
+        let mut next = begin;
+        while let Some(&Hinge { face: on, .. }) = hinges.get(next) {
+            next += 1;
+            for side in (0..3).map(|side| Side { face: on, side }) {
+                let Some(own) = sides.partner(side) else { continue };
+                if is_hung[own.face] || !are_joined(side, own) {
+                    continue;
+                }
+                is_hung[own.face] = true;
+                let corners = solid.triangle_mm(on);
+                let ends_mm = [corners[side.side], corners[(side.side + 1) % 3]];
+                let axis = (ends_mm[1] - ends_mm[0]).normalize_or_zero();
+                let (from, to) = (normal(own.face), normal(on));
+                let angle_rad = angle(axis.dot(from.cross(to)), from.dot(to));
+                hinges.push(Hinge { face: own.face, on: Some(on), ends_mm, angle_rad });
+            }
+        }
+    }
+    Some(hinges)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DAffine3, DQuat};
+
+    use super::*;
+    use crate::targets::SolidShape;
+
+    /// Turned about their hinges, all faces lie in one plane, as they do on the sheet.
+    #[test]
+    fn unfolded_faces_lie_as_on_the_sheet() {
+        for shape in [SolidShape::Tetrahedron, SolidShape::Octahedron, SolidShape::Icosahedron] {
+            let spec = SolidSpec::new(shape);
+            let target = Target::new("solid", spec.clone()).unwrap();
+            let (solid, faces) = (spec.polyhedron(), spec.faces().unwrap());
+            let hinges = target.hinges();
+            assert_eq!(hinges.len(), faces.len());
+            let mut moved = vec![DAffine3::IDENTITY; faces.len()];
+            for hinge in &hinges {
+                let Some(on) = hinge.on else { continue };
+                let [from, to] = hinge.ends_mm;
+                let turn = DQuat::from_axis_angle((to - from).normalize(), hinge.angle_rad);
+                let about = DAffine3::from_translation(from)
+                    * DAffine3::from_quat(turn)
+                    * DAffine3::from_translation(-from);
+                moved[hinge.face] = moved[on] * about;
+            }
+            let in_space =
+                |face: usize| solid.triangle_mm(face).map(|v| moved[face].transform_point3(v));
+            let sheet = &target.sheets[0];
+            let on_paper: Vec<_> = (0..faces.len())
+                .flat_map(|face| {
+                    let id = target.panels[face].id;
+                    let placement = sheet.placements.iter().find(|p| p.panel == id).unwrap();
+                    faces[face].outline_mm.map(|corner| placement.page_from_panel(corner))
+                })
+                .collect();
+            let flat: Vec<_> = (0..faces.len()).flat_map(in_space).collect();
+            for (i, j) in (0..flat.len()).flat_map(|i| (0..i).map(move |j| (i, j))) {
+                let (paper, space) = (on_paper[i].distance(on_paper[j]), flat[i].distance(flat[j]));
+                assert!((paper - space).abs() < 1e-6, "{paper} and {space}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_net_has_no_hinges() {
+        let board = crate::targets::BoardSpec::deltille(10, 11, 20.0);
+        assert!(Target::new("board", board).unwrap().hinges().is_empty());
+    }
+}

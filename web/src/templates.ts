@@ -1,0 +1,4 @@
+// The templates of the repository, which come along.
+const texts = import.meta.glob<string>("../../templates/*.toml", { query: "?raw", import: "default", eager: true });
+
+export const templates = Object.entries(texts).map(([path, text]) => ({ name: path.replace(/^.*\/|\.toml$/g, ""), text }));
