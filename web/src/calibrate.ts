@@ -3,7 +3,7 @@ import { el, field, save, select } from "./dom";
 import { looking } from "./library";
 import { type Shot, made, seen } from "./shared";
 import { words } from "./words";
-import type { Result } from "./worker";
+import type { Holding, Next, Result } from "./worker";
 
 const models: [string, string][] = ["radtan", "radtan5", "rational", "kannala-brandt", "eucm", "double-sphere"].map((model) => [model, model]);
 
@@ -11,6 +11,9 @@ export function calibrate(): HTMLElement {
   let model = "radtan";
   let taken: Shot[] = [];
   let stream: MediaStream | null = null;
+  /** Whether pictures are taken where they are proposed, or wherever they are new. */
+  let guided = true;
+  let next: Next | null = null;
   /** Frames that were looked at since the page was opened. */
   let frames = 0;
 
@@ -20,6 +23,11 @@ export function calibrate(): HTMLElement {
   const video = el("video", { playsinline: true, muted: true, hidden: true });
   const over = el("canvas", { class: "photo", role: "img", "aria-label": words.calibrate.webcam, hidden: true });
   const live = el("p", { class: "facts", "aria-live": "off" });
+  const wish = el("p", { class: "wish", "aria-live": "polite", hidden: true });
+  const state = el("p", { class: "facts", "aria-live": "polite", hidden: true });
+  const elsewhere = el("button", { type: "button", hidden: true, click: () => void refuse() }, words.calibrate.refuse);
+  const now = el("button", { type: "button", hidden: true, click: () => (takeNow = true) }, words.calibrate.now);
+  let takeNow = false;
   const webcam = el("button", { type: "button", click: () => void (stream ? stop() : start()) }, words.calibrate.webcam);
 
   const shots = () => [...seen.shots.filter((shot) => shot.labelled), ...taken];
@@ -67,6 +75,20 @@ export function calibrate(): HTMLElement {
     );
   }
 
+  /** Shows what is proposed, or that it is not asked for. */
+  function propose(proposed: Next | null): void {
+    next = proposed;
+    for (const part of [wish, state, elsewhere]) part.hidden = next === null;
+    if (!next) return;
+    const { words: told, uncertainty_px: px, expected_px: then, enough } = next;
+    const sure = px === null ? "" : words.calibrate.guided(px, then);
+    wish.textContent = enough ? `${words.calibrate.enough} ${sure}` : `${told.charAt(0).toUpperCase()}${told.slice(1)}. ${sure}`;
+  }
+
+  async function refuse(): Promise<void> {
+    propose(await looking.call("refuse"));
+  }
+
   async function start(): Promise<void> {
     if (!target()) {
       tell(new Error(words.calibrate.noTarget));
@@ -83,6 +105,7 @@ export function calibrate(): HTMLElement {
     video.srcObject = stream;
     await video.play();
     over.hidden = false;
+    now.hidden = false;
     void watch();
   }
 
@@ -91,7 +114,9 @@ export function calibrate(): HTMLElement {
     stream = null;
     webcam.textContent = words.calibrate.webcam;
     over.hidden = true;
+    now.hidden = true;
     live.textContent = "";
+    propose(null);
   }
 
   async function watch(): Promise<void> {
@@ -100,7 +125,7 @@ export function calibrate(): HTMLElement {
     const hidden = el("canvas", {});
     const frame = hidden.getContext("2d", { willReadFrequently: true });
     await looking.call("watch");
-    let rate = 0;
+    let [rate, asked] = [0, ""];
     while (stream && context && frame && over.isConnected) {
       const begin = performance.now();
       const [width, height] = [video.videoWidth, video.videoHeight];
@@ -109,18 +134,38 @@ export function calibrate(): HTMLElement {
         continue;
       }
       if (over.width !== width || over.height !== height) [over.width, over.height, hidden.width, hidden.height] = [width, height, width, height];
+      try {
+        // Another model, or another way to take pictures, is begun anew with what was taken.
+        const asking = guided ? `${model} ${width} ${height}` : "";
+        if (asking !== asked) {
+          asked = asking;
+          await looking.call("watch");
+          const begun = guided ? await looking.call("guide", target(), width, height, model, taken) : null;
+          if (!stream) break;
+          propose(begun);
+        }
+      } catch (error) {
+        tell(error);
+        guided = false;
+        way.value = "free";
+        continue;
+      }
       frame.drawImage(video, 0, 0);
       const { data } = frame.getImageData(0, 0, width, height);
       const name = `webcam-${String(taken.length).padStart(3, "0")}`;
       try {
         // The pixels are handed over, and come back with what was found.
-        const found = await looking.handing([data.buffer], "frame", { target: target() }, name, width, height, data);
+        const found = await looking.handing([data.buffer], "frame", { target: target() }, name, width, height, data, begin / 1000);
         if (!stream) break;
         context.putImageData(new ImageData(found.pixels as Uint8ClampedArray<ArrayBuffer>, width, height), 0, 0);
         const corners = mark(context, found.json);
-        if (found.keep) {
+        if (next) outline(context, next, found.held);
+        state.textContent = found.held ? (words.calibrate.held[found.held.held] ?? "") : "";
+        if (corners > 0 && (takeNow || (guided ? found.held?.held === "taken" : found.keep))) {
           taken.push({ name, json: found.json, corners, labelled: true });
           tally();
+          if (guided) propose(await looking.call("take", name, found.json));
+          takeNow = false;
         }
       } catch (error) {
         tell(error);
@@ -130,10 +175,27 @@ export function calibrate(): HTMLElement {
       frames += 1;
       over.dataset.frames = String(frames);
       rate = 0.8 * rate + 0.2 * (1000 / (performance.now() - begin));
-      live.textContent = `${words.calibrate.hold} ${words.calibrate.taken(taken.length)}, ${words.calibrate.rate(rate)}.`;
+      live.textContent = `${guided ? "" : `${words.calibrate.hold} `}${words.calibrate.taken(taken.length)}, ${words.calibrate.rate(rate)}.`;
       await new Promise(requestAnimationFrame);
     }
     if (stream) stop();
+  }
+
+  /** The outline in which the board is to be held; it fills while the board is held there. */
+  function outline(context: CanvasRenderingContext2D, { outlines_px }: Next, held: Holding | null): void {
+    const there = held?.held === "steady" || held?.held === "taken";
+    context.save();
+    context.strokeStyle = there ? "#30d158" : "#ff9600";
+    context.fillStyle = there ? `rgba(48, 209, 88, ${0.15 + 0.45 * (held?.part ?? 0)})` : "rgba(255, 150, 0, 0.15)";
+    context.lineWidth = Math.max(2, context.canvas.width / 300);
+    for (const polygon of outlines_px) {
+      context.beginPath();
+      for (const [x, y] of polygon) context.lineTo(x + 0.5, y + 0.5);
+      context.closePath();
+      context.fill();
+      context.stroke();
+    }
+    context.restore();
   }
 
   /** Marks the labelled corners of a frame, and counts them. */
@@ -145,6 +207,11 @@ export function calibrate(): HTMLElement {
     return corners.length;
   }
 
+  const ways: [string, string][] = [
+    ["guided", words.calibrate.ways.guided],
+    ["free", words.calibrate.ways.free],
+  ];
+  const way = select(ways, "guided", (value) => (guided = value === "guided"));
   const whole = el(
     "section",
     { class: "calibrate", "aria-label": words.tabs.calibrate },
@@ -152,8 +219,8 @@ export function calibrate(): HTMLElement {
     el(
       "div",
       { class: "columns" },
-      el("div", {}, field(words.calibrate.model, select(models, model, (value) => (model = value))), count, el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam)),
-      el("div", { class: "stage" }, problem, video, over, live, result),
+      el("div", {}, field(words.calibrate.model, select(models, model, (value) => (model = value))), field(words.calibrate.way, way), count, el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam)),
+      el("div", { class: "stage" }, problem, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, result),
     ),
   );
   window.addEventListener("hashchange", () => tally());

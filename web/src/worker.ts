@@ -43,7 +43,11 @@ export type Solid = { glb: Uint8Array; hinges: Hinge[] };
 export type Proof = { passed: boolean; line: string; sentences: string[] };
 export type Seen = { json: string; csv: string; orpc: string; reasons: string[]; ms: number };
 export type Shown = Seen & { width: number; height: number; grey: Uint8ClampedArray };
-export type Watched = Seen & { keep: boolean; pixels: Uint8ClampedArray };
+/** How the board is held against what is proposed. */
+export type Holding = { held: "unseen" | "elsewhere" | "turned" | "moving" | "blurred" | "steady" | "taken"; part: number };
+/** The next picture, and how sure the camera is. */
+export type Next = { words: string; enough: boolean; uncertainty_px: number | null; expected_px: number | null; outlines_px: [number, number][][] };
+export type Watched = Seen & { keep: boolean; held: Holding | null; pixels: Uint8ClampedArray };
 export type Recognised = { target: string; spec: Record<string, unknown>; tags: number; corners: number; shown: number };
 export type FamilyFacts = { name: string; kind: string; bits: number; distance: number; codes: number };
 export type Figures = {
@@ -74,6 +78,7 @@ async function using<T extends Held, R>(made: T, work: (made: T) => R | Promise<
 let finder: { key: string; made: See.Finder } | null = null;
 let recogniser: See.Recogniser | null = null;
 let watcher: See.Watcher | null = null;
+let guide: Solve.Guide | null = null;
 
 async function finderOf(sought: Sought): Promise<See.Finder> {
   const { Finder, family_of } = await seer();
@@ -194,14 +199,35 @@ const calls = {
     const { Watcher } = await seer();
     watcher?.free();
     watcher = new Watcher();
+    guide?.free();
+    guide = null;
   },
-  async frame(sought: Sought, name: string, width: number, height: number, pixels: Uint8ClampedArray): Promise<Watched> {
+  /** Begins to propose pictures, those that were taken in mind. */
+  async guide(target: string, width: number, height: number, model: string, taken: { name: string; json: string }[]): Promise<Next> {
+    const { Guide } = await solver();
+    guide?.free();
+    guide = new Guide(target, width, height, model);
+    for (const { name, json } of taken) guide.take(name, json);
+    return JSON.parse(guide.next()) as Next;
+  },
+  /** Without what was proposed, as it cannot be held there. */
+  async refuse(): Promise<Next | null> {
+    guide?.refuse();
+    return guide ? (JSON.parse(guide.next()) as Next) : null;
+  },
+  /** A picture of the stream was taken: what is next. */
+  async take(name: string, json: string): Promise<Next | null> {
+    guide?.take(name, json);
+    return guide ? (JSON.parse(guide.next()) as Next) : null;
+  },
+  async frame(sought: Sought, name: string, width: number, height: number, pixels: Uint8ClampedArray, time: number): Promise<Watched> {
     const [{ Picture }, finder] = await Promise.all([seer(), finderOf(sought)]);
     const rgba = new Uint8Array(pixels.buffer, pixels.byteOffset, pixels.byteLength);
     return using(Picture.of_colours(width, height, rgba), (picture) => {
       let keep = false;
       const seen = told(finder, picture, name, (found) => (keep = watcher?.look(found) ?? false));
-      return { ...seen, keep, pixels };
+      const held = guide ? (JSON.parse(guide.look(time, seen.json)) as Holding) : null;
+      return { ...seen, keep, held, pixels };
     });
   },
   async calibrate(target: string, detections: string[], names: string[], model: string): Promise<Result> {

@@ -32,16 +32,26 @@ export default function make(): void {
   });
   deltille("icosahedron", "-o", folder, "--force");
   deltille("render", join(folder, "icosahedron.json"), "--camera", camera, "--eye", "150,220,600", "-o", join(folder, "solid.png"), "--force");
-  // 640 × 480, twelve pictures of each of a few places, at thirty a second.
+  // 640 × 480, at thirty a second: where the first picture is proposed, then at a few other places. The camera is the one that is
+  // assumed before anything is known.
   const small = join(folder, "small.yaml");
-  writeFileSync(small, "width: 640\nheight: 480\nfocal_px: [550, 550]\ncentre_px: [319.5, 239.5]\nmodel: pinhole\ndistortion: []\n");
+  const focal = 320 / Math.tan(1.15 / 2);
+  writeFileSync(small, `width: 640\nheight: 480\nfocal_px: [${focal}, ${focal}]\ncentre_px: [319.5, 239.5]\nmodel: pinhole\ndistortion: []\n`);
+  const next = join(folder, "next.json");
+  mkdirSync(join(folder, "none"), { recursive: true });
+  deltille("guide", join(folder, "none"), "--target", join(folder, "board.json"), "--camera", small, "--once", "-o", next, "--force");
+  const { camera_from_target: pose } = JSON.parse(readFileSync(next, "utf8")) as { camera_from_target: { rotation: number[]; translation_mm: number[] } };
+  // Facing the camera: half a turn about the x axis.
+  if (pose.rotation[0] !== 1) throw new Error("the first picture is proposed otherwise");
+  const facing = ["--pose", [Math.PI, 0, 0, ...pose.translation_mm].join(",")];
+  const places: [string[], number][] = [[facing, 45], ...["100,-60,380", "250,120,330", "-40,180,340"].map((eye): [string[], number] => [["--eye", eye], 20])];
   const frames: Buffer[] = [Buffer.from("YUV4MPEG2 W640 H480 F30:1 Ip A1:1 C420jpeg\n")];
   const chroma = Buffer.alloc((640 * 480) / 2, 128);
-  ["100,-60,380", "250,120,330", "-40,180,340"].forEach((eye, i) => {
+  places.forEach(([place, count], i) => {
     const path = join(folder, `frame-${i}.png`);
-    deltille("render", join(folder, "board.json"), "--camera", small, "--eye", eye, "--seed", String(i), "-o", path, "--force");
+    deltille("render", join(folder, "board.json"), "--camera", small, ...place, "--seed", String(i), "-o", path, "--force");
     const grey = pixels(path);
-    for (let again = 0; again < 20; again++) frames.push(Buffer.from("FRAME\n"), grey, chroma);
+    for (let again = 0; again < count; again++) frames.push(Buffer.from("FRAME\n"), grey, chroma);
   });
   writeFileSync(join(folder, "../webcam.y4m"), Buffer.concat(frames));
 }

@@ -296,10 +296,11 @@ impl<'a> Verifier<'a> {
         Self { cancel: Some(flag), ..self }
     }
 
-    /// The files that are verified together with `path`: all pages of a net, where each is a file
-    /// of its own. Any other file is verified by itself.
+    /// The files that are verified together with `path`: all pages of a net, or of a board over several pages, where
+    /// each is a file of its own. Any other file is verified by itself.
     pub fn set_of(&self, path: &Path) -> Vec<PathBuf> {
-        match fold::is_net(self.target) {
+        let in_parts = self.target.sheets.iter().any(|sheet| !sheet.pages.is_empty());
+        match in_parts || fold::is_net(self.target) {
             true => self.pages_with(path),
             false => vec![path.to_owned()],
         }

@@ -1,9 +1,12 @@
 //! Corners to a camera and its page.
 
-use deltille_core::calibrate::{Calibration, Intrinsics, Model, Reference, Words, views};
+use deltille_core::calibrate::{
+    self, Calibration, Held, Holding, Intrinsics, Model, NextView, Reference, View, Words, views,
+};
+use deltille_core::camera::Pose;
 use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
-use deltille_files::export::{calibration, camera, detection};
+use deltille_files::export::{calibration, camera, detection, next_view};
 use deltille_files::report::Report;
 use wasm_bindgen::prelude::*;
 
@@ -108,5 +111,95 @@ impl Solved {
     /// Its figures, as JSON.
     pub fn figures(&self) -> String {
         self.figures.clone()
+    }
+}
+
+/// Where the panels of a target are.
+fn places(reference: &Reference) -> impl Iterator<Item = Pose> {
+    reference.panels().into_iter().map(|panel| panel.target_from_panel)
+}
+
+/// Proposes the pictures of a webcam, one after the other, and says when the board is held as proposed.
+#[wasm_bindgen]
+pub struct Guide {
+    target: Target,
+    guide: calibrate::Guide,
+    views: Vec<View>,
+    refused: Vec<NextView>,
+    next: NextView,
+    holding: Holding,
+}
+
+#[wasm_bindgen]
+impl Guide {
+    /// One for pictures of a target of this width and height by a camera of a model.
+    ///
+    /// # Errors
+    /// In words, where there is no such model, or nothing to propose for it.
+    #[wasm_bindgen(constructor)]
+    pub fn new(target: &str, width: u32, height: u32, model: &str) -> Result<Self, JsError> {
+        let target = Target::from_json(target).raise()?;
+        let model: Model = model.parse().raise()?;
+        let guide = calibrate::Guide::new(&target, [width, height], model)
+            .ok_or_else(|| JsError::new("no pictures are proposed for this target and model"))?;
+        let next = guide.next(0, None);
+        let holding = Holding::new(&next, places(&Reference::Target(&target)));
+        Ok(Self { target, guide, views: Vec::new(), refused: Vec::new(), next, holding })
+    }
+
+    /// A picture was taken, with the JSON of what was found in it.
+    ///
+    /// # Errors
+    /// In words, where it is no detection of this target.
+    pub fn take(&mut self, name: &str, found: &str) -> Result<(), JsError> {
+        let view = self.view(name, found)?;
+        self.views.extend(view);
+        self.propose();
+        Ok(())
+    }
+
+    /// The board cannot be held as it is proposed.
+    pub fn refuse(&mut self) {
+        self.refused.push(self.next.clone());
+        self.propose();
+    }
+
+    /// The next picture, as `deltille guide` writes it.
+    pub fn next(&self) -> String {
+        next_view::write(&self.next, &self.target.name, self.views.len(), self.next.is_enough(None))
+    }
+
+    /// How the board is held in a picture that was taken at a time, s: a word, and the part of the time for which it has been
+    /// held as proposed.
+    ///
+    /// # Errors
+    /// In words, where it is no detection of this target.
+    pub fn look(&mut self, time_s: f64, found: &str) -> Result<String, JsError> {
+        let view = self.view("frame", found)?;
+        let held = self.holding.look(time_s, view.as_ref(), None);
+        let (word, part) = match held {
+            Held::Elsewhere { .. } => ("elsewhere", 0.0),
+            Held::Turned { .. } => ("turned", 0.0),
+            Held::Moving { .. } => ("moving", 0.0),
+            Held::Blurred => ("blurred", 0.0),
+            Held::Steady { part } => ("steady", part),
+            Held::Taken => ("taken", 1.0),
+            _ => ("unseen", 0.0),
+        };
+        Ok(serde_json::json!({ "held": word, "part": part }).to_string())
+    }
+
+    fn view(&self, name: &str, found: &str) -> Result<Option<View>, JsError> {
+        let named = [(name.to_owned(), detection::read(found).raise()?)];
+        // A picture without corners of the target is none, and no error.
+        let shown = views(&named, &Reference::Target(&self.target)).ok();
+        Ok(shown.and_then(|shown| shown.views.into_iter().next()))
+    }
+
+    fn propose(&mut self) {
+        let reference = Reference::Target(&self.target);
+        let guide = self.guide.clone().avoiding(&self.refused);
+        self.next = guide.after(&reference, &self.views).next;
+        self.holding = Holding::new(&self.next, places(&reference));
     }
 }
