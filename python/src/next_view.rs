@@ -6,7 +6,7 @@ use deltille::quantity::distance_mm;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::arrays::{self, number};
+use crate::arrays::{self, number, whole};
 use crate::calibrate::of_detections;
 use crate::camera::Camera;
 use crate::detection::{Results, Targets};
@@ -151,7 +151,7 @@ pub fn next_view(
     detections: Results<'_>,
     target: Option<Targets>,
     model: &str,
-    size_px: Option<(u32, u32)>,
+    size_px: Option<(i64, i64)>,
     camera: Option<PyRef<'_, Camera>>,
     nearest_mm: Option<f64>,
     farthest_mm: Option<f64>,
@@ -179,7 +179,9 @@ pub fn next_view(
     };
     let of_pictures = detections.all.first().map(|first| [first.found.width, first.found.height]);
     let of_camera = camera.map(|camera| [camera.0.width, camera.0.height]);
-    let size = of_pictures.or(of_camera).or(size_px.map(|(width, height)| [width, height]));
+    let side = |side: i64| whole("size_px", side, errors::calibration);
+    let size_px = size_px.map(|(width, height)| Ok::<_, PyErr>([side(width)?, side(height)?]));
+    let size = of_pictures.or(of_camera).or(size_px.transpose()?);
     let size = size.ok_or_else(|| wrong("size_px: give it before there is a picture"))?;
     let guide = Guide::new(target, size, intrinsics);
     let guide = guide.ok_or_else(|| {

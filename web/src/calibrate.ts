@@ -124,8 +124,8 @@ export function calibrate(): HTMLElement {
     // A frame is shown with what was found in it, not before.
     const hidden = el("canvas", {});
     const frame = hidden.getContext("2d", { willReadFrequently: true });
-    await looking.call("watch");
-    let [rate, asked] = [0, ""];
+    let rate = 0;
+    let asked: string | null = null;
     while (stream && context && frame && over.isConnected) {
       const begin = performance.now();
       const [width, height] = [video.videoWidth, video.videoHeight];
@@ -135,7 +135,7 @@ export function calibrate(): HTMLElement {
       }
       if (over.width !== width || over.height !== height) [over.width, over.height, hidden.width, hidden.height] = [width, height, width, height];
       try {
-        // Another model, or another way to take pictures, is begun anew with what was taken.
+        // The first frame, another model and another way to take pictures begin anew, with what was taken.
         const asking = guided ? `${model} ${width} ${height}` : "";
         if (asking !== asked) {
           asked = asking;

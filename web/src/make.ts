@@ -119,8 +119,8 @@ export function make(): HTMLElement {
           : []),
         number(text.boardId, "board_id", 0, 1_000_000),
         ...(ofSolid
-          ? [number(text.faceMargin, "face_margin_mm", 0, 1000, text.usual), box(text.skeleton, "skeleton"), box(text.perFace, "per_face")]
-          : [number(text.boards, "boards", 1, 500), box(text.inverted, "inverted")]),
+          ? [number(text.faceMargin, "face_margin_mm", 0, 1000, text.usual), box(text.skeleton, "skeleton"), box(text.perFace, "per_face"), box(text.allowSeams, "allow_seams")]
+          : [number(text.boards, "boards", 1, 500), box(text.inverted, "inverted"), box(text.poster, "poster")]),
       ),
     );
     downloads.replaceChildren(

@@ -16,6 +16,8 @@ export type Settings = {
   face_margin_mm: number | null;
   skeleton: boolean;
   per_face: boolean;
+  allow_seams: boolean;
+  poster: boolean;
   paper: string | null;
   orientation: string;
   margin_mm: number | null;
@@ -41,6 +43,8 @@ export const usual: Settings = {
   face_margin_mm: null,
   skeleton: false,
   per_face: false,
+  allow_seams: false,
+  poster: false,
   paper: null,
   orientation: "auto",
   margin_mm: null,
@@ -48,8 +52,8 @@ export const usual: Settings = {
   mesh: null,
 };
 
-const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "inverted"] as const;
-const OF_SOLIDS = ["tiles", "face_margin_mm", "skeleton", "per_face"] as const;
+const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "inverted", "poster"] as const;
+const OF_SOLIDS = ["tiles", "face_margin_mm", "skeleton", "per_face", "allow_seams"] as const;
 const NUMBERS = ["rows", "cols", "edge_mm", "tag_spacing", "tag_border", "first_id", "board_id", "boards", "tiles", "face_margin_mm", "margin_mm"];
 
 export const isSolid = (settings: Settings): boolean => settings.kind !== "deltille" && settings.kind !== "checker";
@@ -102,6 +106,7 @@ const KEYS: [string, keyof Settings][] = [
   ["board-id", "board_id"],
   ["boards", "boards"],
   ["invert", "inverted"],
+  ["poster", "poster"],
   ["paper", "paper"],
   ["orientation", "orientation"],
   ["margin", "margin_mm"],

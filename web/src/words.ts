@@ -43,6 +43,8 @@ export const words = {
     faceMargin: "Blank along the edges of a face, mm",
     skeleton: "With a skeleton to print in 3D",
     perFace: "A sheet for each face",
+    allowSeams: "A net larger than the paper in one piece, over pages to be joined",
+    poster: "Over several pages where it is larger than the paper",
     name: "Name",
     more: "More settings",
     preview: "The sheet, in true proportions",

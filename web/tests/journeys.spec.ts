@@ -123,6 +123,13 @@ test.describe("make", () => {
       await drop(page, [{ name: "saved.toml", content: saved }]);
       expect((await press(page, "JSON")).equals(readFileSync(join(made, `${name}.json`))), name).toBe(true);
     }
+    // A template that the program saved, of a board over several pages.
+    const wall = scratch();
+    const saved = join(wall, "saved.toml");
+    deltille("board", "--rows", "5", "--cols", "6", "--edge", "40mm", "--paper", "A4", "--poster", "--name", "wall", "--save-template", saved, "-o", wall);
+    await drop(page, [{ name: "saved.toml", content: readFileSync(saved) }]);
+    await expect(page.getByLabel("Name", { exact: true })).toHaveValue("wall");
+    expect((await press(page, "PDF")).equals(readFileSync(join(wall, "wall.pdf")))).toBe(true);
   });
 
   test("an icosahedron is turned, unfolded, and its files are the program's", async ({ page }) => {

@@ -29,6 +29,7 @@ pub mod family;
 pub mod json;
 pub mod lattice;
 pub mod name;
+pub mod polygon;
 pub mod quantity;
 pub mod raster;
 pub mod reading;

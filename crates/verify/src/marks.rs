@@ -20,6 +20,7 @@ use super::tiles::{EDGE_PX, PROBES, PlacedPanel};
 use super::{Finding, SheetVerdict};
 use deltille_core::artwork;
 use deltille_core::lattice::{Orientation, Tile};
+use deltille_core::polygon;
 use deltille_core::raster::{Coverage, Gray};
 use deltille_core::targets::{CHECK_BAR_STROKE_MM, Label, LineKind, SheetLayout};
 
@@ -336,18 +337,12 @@ impl<'a> Drawn<'a> {
             // Which way outlines of letters run is the font's business; those of strokes cross each other.
             match is_text {
                 true => letters.add(&polygon, 1.0),
-                false => strokes.add(&polygon, signed_area(&polygon).signum()),
+                false => strokes.add(&polygon, polygon::area(&polygon).signum()),
             }
         }
         let (letters, strokes) = (letters.finish(), strokes.finish());
         Gray::from_fn(width, height, |x, y| (letters.at(x, y).abs() + strokes.at(x, y)).min(1.0))
     }
-}
-
-/// Positive where a polygon runs clockwise on the screen.
-fn signed_area(polygon: &[DVec2]) -> f64 {
-    let next = polygon.iter().cycle().skip(1);
-    polygon.iter().zip(next).map(|(p, &q)| p.perp_dot(q)).sum()
 }
 
 /// The pixels of a rectangle of the page (mm) with `blank` more on every side: first and

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::document::{MAX_INK_ERROR, Page};
 use super::fit::AffineMap;
 use deltille_core::family::{Decoder, Family};
-use deltille_core::lattice::{GridKind, TagCells, Tile, Vertex};
+use deltille_core::lattice::{Cell, GridKind, TagCells, Tile, Vertex};
 use deltille_core::statistics::median;
 use deltille_core::targets::{Panel, Placement, TagPlacement};
 
@@ -233,7 +233,7 @@ impl TagLooks {
     pub fn new(family: &Family, panel: &Panel) -> Self {
         let cells = family.cells();
         let (margin, inset) = (panel.tag_margin_bits(), panel.tag_inset_bits());
-        let most = |of: fn(&deltille_core::lattice::Cell) -> u32| {
+        let most = |of: fn(&Cell) -> u32| {
             cells.cells().iter().map(of).max().map_or(0, |most| most as usize + 1)
         };
         let columns = most(|cell| cell.col);
@@ -267,9 +267,11 @@ impl TagLooks {
         }
         let upright = self.cells.kind() == GridKind::Checker || u.fract() + v.fract() < 1.0;
         let (row, col) = (v as usize, u as usize);
+        if col >= self.columns {
+            return None;
+        }
         let place = row * self.columns + col;
-        let known = col < self.columns;
-        known.then(|| self.bits.get(2 * place + usize::from(upright)).copied()).flatten().flatten()
+        self.bits.get(2 * place + usize::from(upright)).copied().flatten()
     }
 }
 

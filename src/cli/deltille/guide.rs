@@ -16,7 +16,7 @@ use super::{camera_file, target_file};
 use crate::calibrate::{
     Calibration, Estimate, Guide, Intrinsics, Model, NextView, PanelPlace, Reference, View, views,
 };
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens};
 use crate::cli::interrupt;
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::Interrupted;
@@ -149,8 +149,7 @@ impl Args {
     /// What is known of the camera, and the size of its pictures where that is.
     fn intrinsics(&self, near: Option<Camera>) -> anyhow::Result<(Intrinsics, Option<[u32; 2]>)> {
         if let Some(camera) = near {
-            let is_spline = camera.parameter_names().iter().any(|name| name.starts_with("dx_"));
-            ensure!(!is_spline, "--camera: {NO_SPLINE}");
+            ensure!(!matches!(camera.lens, Lens::Spline(_)), "--camera: {NO_SPLINE}");
             let size = [camera.width, camera.height];
             let free = vec![true; camera.parameters().len()];
             return Ok((Intrinsics::Near { camera, free }, Some(size)));

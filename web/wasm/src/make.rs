@@ -37,6 +37,8 @@ struct Wanted {
     face_margin_mm: Option<f64>,
     skeleton: bool,
     per_face: bool,
+    allow_seams: bool,
+    poster: bool,
     /// The text of an OBJ file.
     mesh: Option<String>,
     paper: Option<String>,
@@ -64,6 +66,8 @@ impl Default for Wanted {
             face_margin_mm: None,
             skeleton: false,
             per_face: false,
+            allow_seams: false,
+            poster: false,
             mesh: None,
             paper: None,
             orientation: "auto".to_owned(),
@@ -88,8 +92,12 @@ impl Wanted {
             size: size.map(str::parse).transpose().raise()?,
             orientation: self.orientation.parse().raise()?,
             margin_mm: self.margin_mm.unwrap_or(DEFAULT_MARGIN_MM),
-            solids: if self.per_face { SolidSheets::PerFace } else { SolidSheets::Net },
-            ..PaperSpec::default()
+            solids: match (self.per_face, self.allow_seams) {
+                (true, _) => SolidSheets::PerFace,
+                (false, true) => SolidSheets::SeamedNet,
+                (false, false) => SolidSheets::Net,
+            },
+            poster: self.poster,
         })
     }
 

@@ -150,7 +150,7 @@ impl Guide {
     /// A picture was taken, with the JSON of what was found in it.
     ///
     /// # Errors
-    /// In words, where it is no detection of this target.
+    /// In words, where it is no detection.
     pub fn take(&mut self, name: &str, found: &str) -> Result<(), JsError> {
         let view = self.view(name, found)?;
         self.views.extend(view);
@@ -173,7 +173,7 @@ impl Guide {
     /// held as proposed.
     ///
     /// # Errors
-    /// In words, where it is no detection of this target.
+    /// In words, where it is no detection.
     pub fn look(&mut self, time_s: f64, found: &str) -> Result<String, JsError> {
         let view = self.view("frame", found)?;
         let held = self.holding.look(time_s, view.as_ref(), None);

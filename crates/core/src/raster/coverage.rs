@@ -112,11 +112,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-
-    fn area(polygon: &[DVec2]) -> f64 {
-        let n = polygon.len();
-        (0..n).map(|i| polygon[i].perp_dot(polygon[(i + 1) % n])).sum::<f64>() / 2.0
-    }
+    use crate::polygon::area;
 
     prop_compose! {
         fn point(range: f64)(x in -range..range, y in -range..range) -> DVec2 {

@@ -7,6 +7,7 @@
 use glam::{DVec2, DVec3};
 
 use super::Surface;
+use crate::polygon::clip;
 
 /// A piece hides nothing of a plane above which it rises by less than this, mm: faces that meet in
 /// an edge.
@@ -67,8 +68,8 @@ impl Shadow {
         let mut visible = Vec::new();
         let mut rest = polygon;
         for half in &self.halves {
-            let outside = clip(&rest, Half { n: -half.n, c: -half.c });
-            rest = clip(&rest, *half);
+            let outside = clip(&rest, |p| -half.at(p));
+            rest = clip(&rest, |p| half.at(p));
             visible.extend((outside.len() > 2).then_some(outside));
             if rest.len() < 3 {
                 break;
@@ -76,21 +77,4 @@ impl Shadow {
         }
         visible
     }
-}
-
-/// The part of a polygon on one side of a line (Sutherland and Hodgman 1974). Where the polygon is
-/// not convex, parts stay joined along the line, where they enclose nothing.
-fn clip(polygon: &[DVec2], half: Half) -> Vec<DVec2> {
-    let mut kept = Vec::with_capacity(polygon.len() + 2);
-    for (i, &p) in polygon.iter().enumerate() {
-        let q = polygon[(i + 1) % polygon.len()];
-        let (at_p, at_q) = (half.at(p), half.at(q));
-        if at_p >= 0.0 {
-            kept.push(p);
-        }
-        if (at_p > 0.0 && at_q < 0.0) || (at_p < 0.0 && at_q > 0.0) {
-            kept.push(p + (q - p) * (at_p / (at_p - at_q)));
-        }
-    }
-    kept
 }

@@ -156,17 +156,7 @@ fn poster(
     let [left, lower, right, upper] = panel.field_mm();
     let corners = [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from);
     let poster = Poster::new(&corners, paper)?;
-    let excess = poster.excess();
-    if excess > 1.0 {
-        let edge = (board.edge_mm / excess.sqrt() * 0.95).floor();
-        let problem = format!(
-            "the board takes {} pages of {}, more than can be assembled and verified: take `BoardSpec::edge_mm` of at most \
-             {edge} mm, or larger `PaperSpec::size`",
-            poster.windows(),
-            Poster::paper_size(paper),
-        );
-        return Err(TargetError::invalid("BoardSpec::edge_mm", problem));
-    }
+    poster.check("the board", ("BoardSpec::edge_mm", board.edge_mm), "", paper)?;
     let mut sheet = poster.sheet();
     let motion = poster.sheet_from_points();
     sheet.placements.push(Placement {

@@ -155,10 +155,7 @@ fn fit_turned(
     turns: &[bool],
 ) -> Result<Option<Arrangement>, TargetError> {
     let margin = check_margin(paper)?;
-    let sizes: Vec<PaperSize> = match &paper.size {
-        Some(size) => vec![size.clone()],
-        None => PaperSize::automatic().collect(),
-    };
+    let sizes = paper.sizes();
     let fitting = |size| on_size(footprint, size, paper.orientation, margin, turns);
     Ok(sizes.iter().find_map(fitting))
 }

@@ -56,6 +56,16 @@ pub enum SolidSheets {
     PerFace,
 }
 
+impl PaperSpec {
+    /// The sizes that may be taken, smallest first: the one that is asked for, or those of [`PaperSize::automatic`].
+    pub(super) fn sizes(&self) -> Vec<PaperSize> {
+        match &self.size {
+            Some(size) => vec![size.clone()],
+            None => PaperSize::automatic().collect(),
+        }
+    }
+}
+
 impl Default for PaperSpec {
     fn default() -> Self {
         Self {

@@ -31,8 +31,8 @@ const WORDS_MM: f64 = 13.0;
 /// Smallest window, mm: on less there is more overlap than anything else.
 const LEAST_WINDOW_MM: f64 = 40.0;
 
-/// Most pages of a sheet: an afternoon's work.
-const MOST_PAGES: usize = 120;
+/// Most pages of a sheet or a net: an afternoon's work.
+pub(super) const MOST_PAGES: usize = 120;
 
 /// Largest sheet, mm²: pictures of it that still resolve its hairlines can be verified.
 const MOST_AREA_MM2: f64 = 4e6;
@@ -98,10 +98,9 @@ impl Poster {
         })
     }
 
-    /// The paper of its pages.
-    pub fn paper_size(paper: &PaperSpec) -> PaperSize {
-        let largest = || PaperSize::automatic().last().expect("there are sizes");
-        paper.size.clone().unwrap_or_else(largest)
+    /// The paper of its pages: the largest that may be taken.
+    fn paper_size(paper: &PaperSpec) -> PaperSize {
+        paper.sizes().pop().expect("there are sizes")
     }
 
     fn on(page: &Arrangement, turn: Motion, points: &[DVec2]) -> Self {
@@ -124,14 +123,32 @@ impl Poster {
     }
 
     /// The windows, whether they show anything or not.
-    pub fn windows(&self) -> usize {
+    fn windows(&self) -> usize {
         self.counts[0] * self.counts[1]
     }
 
-    /// How many times more pages, or a larger area, it has than can be assembled and verified; at most 1 where it can.
-    pub fn excess(&self) -> f64 {
+    /// Refuses more pages, or a larger sheet, than can be assembled and verified. `what` has edges of so many mm by a
+    /// setting; the refusal says which edge would do, or what `instead`.
+    pub fn check(
+        &self,
+        what: &str,
+        (setting, edge_mm): (&'static str, f64),
+        instead: &str,
+        paper: &PaperSpec,
+    ) -> Result<(), TargetError> {
         let area = self.size_mm().element_product();
-        (area / MOST_AREA_MM2).max(self.windows() as f64 / MOST_PAGES as f64)
+        let excess = (area / MOST_AREA_MM2).max(self.windows() as f64 / MOST_PAGES as f64);
+        if excess <= 1.0 {
+            return Ok(());
+        }
+        let edge = (edge_mm / excess.sqrt() * 0.95).floor();
+        let problem = format!(
+            "{what} takes {} pages of {}, more than can be assembled and verified: take {instead}`{setting}` of at most \
+             {edge} mm, or larger `PaperSpec::size`",
+            self.windows(),
+            Self::paper_size(paper),
+        );
+        Err(TargetError::invalid(setting, problem))
     }
 
     /// Where the points lie on the sheet.

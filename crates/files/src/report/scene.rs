@@ -11,6 +11,7 @@ use super::board_residuals::{camera_from_panel, on_plane};
 use super::page::escaped;
 use deltille_core::calibrate::{CameraEstimate, Estimate, PanelRef, ViewEstimate};
 use deltille_core::camera::{Camera, Pose};
+use deltille_core::polygon::hull;
 use deltille_core::statistics::median;
 
 /// Margin of the picture, user units.
@@ -245,37 +246,9 @@ fn panels(
     seen.into_iter().filter_map(shape).filter(|(_, shape)| shape.corners.len() > 2).collect()
 }
 
-/// The convex hull of points in the plane of a panel, counter-clockwise (Andrew's monotone chain).
-fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let half = |points: &mut dyn Iterator<Item = DVec2>| {
-        let mut chain: Vec<DVec2> = Vec::new();
-        for point in points {
-            while let [.., a, b] = chain[..]
-                && (b - a).perp_dot(point - b) <= 0.0
-            {
-                chain.pop();
-            }
-            chain.push(point);
-        }
-        chain.pop();
-        chain
-    };
-    let lower = half(&mut points.iter().copied());
-    let upper = half(&mut points.iter().rev().copied());
-    [lower, upper].concat()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_hull_of_a_grid_is_its_four_corners() {
-        let grid = (0..12).map(|i| DVec2::new(f64::from(i % 4), f64::from(i / 4)));
-        let expected = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]].map(DVec2::from);
-        assert_eq!(hull(grid.collect()), expected);
-    }
 
     #[test]
     fn lengths_of_the_scale_are_round() {

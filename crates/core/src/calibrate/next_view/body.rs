@@ -4,6 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::calibrate::panel::PanelRef;
 use crate::camera::{Camera, Pose, Projection};
+use crate::polygon::hull;
 use crate::targets::{Panel, Target, TargetSpec};
 
 /// Corners by which a panel is judged: more tell the same more slowly. Of several panels, of which a picture shows
@@ -211,31 +212,4 @@ fn narrowest(at: &Projection, turn: &DMat3) -> f64 {
     let [c, d] = rows.map(|row| row.dot(turn.y_axis));
     let (sum, product) = (a * a + b * b + c * c + d * d, a * d - b * c);
     (0.5 * (sum - (sum * sum - 4.0 * product * product).max(0.0).sqrt())).max(0.0).sqrt()
-}
-
-/// The convex hull of places, counterclockwise where y is up.
-pub(super) fn hull(mut places: Vec<DVec2>) -> Vec<DVec2> {
-    places.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    places.dedup();
-    if places.len() < 3 {
-        return places;
-    }
-    let mut hull: Vec<DVec2> = Vec::new();
-    let mut side = |places: &mut dyn Iterator<Item = DVec2>| {
-        let first = hull.len();
-        for place in places {
-            while hull.len() >= first + 2 {
-                let (a, b) = (hull[hull.len() - 2], hull[hull.len() - 1]);
-                if (b - a).perp_dot(place - b) > 0.0 {
-                    break;
-                }
-                hull.pop();
-            }
-            hull.push(place);
-        }
-        hull.pop();
-    };
-    side(&mut places.iter().copied());
-    side(&mut places.iter().rev().copied());
-    hull
 }

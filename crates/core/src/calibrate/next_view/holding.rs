@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::NextView;
-use super::body::hull;
 use crate::calibrate::panel::PanelRef;
 use crate::calibrate::pose::estimate_pose;
 use crate::calibrate::view::{Sighting, View};
 use crate::camera::Pose;
+use crate::polygon::{area, clip, hull};
 use crate::statistics::median;
 
 /// The part of both outlines together that they have in common where a board is where it is to be. Of squares of
@@ -201,28 +201,9 @@ fn overlap(a: &[DVec2], b: &[DVec2]) -> f64 {
     let mut common = a.to_vec();
     for (i, &from) in b.iter().enumerate() {
         let along = b[(i + 1) % b.len()] - from;
-        let side = |place: DVec2| along.perp_dot(place - from);
-        let mut kept = Vec::with_capacity(common.len() + 1);
-        for (k, &place) in common.iter().enumerate() {
-            let next = common[(k + 1) % common.len()];
-            let [here, there] = [side(place), side(next)];
-            if here >= 0.0 {
-                kept.push(place);
-            }
-            if (here >= 0.0) != (there >= 0.0) {
-                kept.push(place.lerp(next, here / (here - there)));
-            }
-        }
-        common = kept;
+        common = clip(&common, |place| along.perp_dot(place - from));
     }
     let shared = area(&common);
     let all = area(a) + area(b) - shared;
     if all > 0.0 { (shared / all).clamp(0.0, 1.0) } else { 0.0 }
-}
-
-/// The area of a polygon that goes round counterclockwise where y is up.
-fn area(polygon: &[DVec2]) -> f64 {
-    let twice =
-        polygon.iter().enumerate().map(|(i, a)| a.perp_dot(polygon[(i + 1) % polygon.len()]));
-    0.5 * twice.sum::<f64>()
 }

@@ -13,6 +13,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::DVec2;
 
 use super::plane::{Motion, bounds};
+use crate::polygon::area;
 
 /// Blank between pieces, mm: scissors pass.
 const BLANK_MM: f64 = 2.0;
@@ -76,11 +77,6 @@ pub fn fits(points: &[DVec2], rim: f64, room: DVec2) -> bool {
         let size = DVec2::new(right - left, upper - lower) + 2.0 * rim + BLANK_MM;
         size.cmple(room).all()
     })
-}
-
-fn area(polygon: &[DVec2]) -> f64 {
-    let ends = polygon.iter().zip(polygon.iter().cycle().skip(1));
-    0.5 * ends.map(|(a, b)| a.perp_dot(*b)).sum::<f64>()
 }
 
 /// The turns in which a piece is tried: from the one in which its bounding box is smallest, all round.

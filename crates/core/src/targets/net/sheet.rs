@@ -9,12 +9,13 @@ use super::plane::{Motion, bounds};
 use super::tabs::{self, Tab};
 use super::unfold::{self, Piece, Side, Sides};
 use crate::lattice::Vertex;
+use crate::polygon;
 use crate::targets::angles::turn_of;
 use crate::targets::face_sheet::edge_numbers;
 use crate::targets::layout::{ADVANCE_CAPS, Arrangement, Footprint, fit_upright};
 use crate::targets::length::format_mm;
-use crate::targets::paper::{PaperSize, PaperSpec, SolidSheets};
-use crate::targets::poster::Poster;
+use crate::targets::paper::{PaperSpec, SolidSheets};
+use crate::targets::poster::{MOST_PAGES, Poster};
 use crate::targets::{
     Face, FamilyRef, Label, LineKind, Panel, Placement, Polyhedron, SheetLayout, SheetLine,
     SheetText, SolidSpec, TargetError,
@@ -57,9 +58,6 @@ const PARTS_OF_ROOM: [f64; 6] = [1.0, 0.7, 0.5, 0.35, 0.25, 0.18];
 /// Orders of growth that are tried for each of them.
 const ORDERS: u64 = 4;
 
-/// Most pages of a net: an afternoon's work.
-const MOST_PAGES: usize = 120;
-
 /// Capital height of the number of a page, mm.
 const PAGE_CAP_MM: f64 = 5.0;
 
@@ -70,6 +68,21 @@ const BLANK_MM: f64 = 2.5;
 struct Net {
     pieces: Vec<Piece>,
     tabs: Vec<Vec<Tab>>,
+}
+
+/// A net whose pieces lie on pages.
+struct Nested {
+    net: Net,
+    /// Of each piece.
+    places: Vec<Place>,
+    pages: usize,
+}
+
+impl Nested {
+    /// Pages to print, then pieces to glue.
+    fn work(&self) -> [usize; 2] {
+        [self.pages, self.net.pieces.len()]
+    }
 }
 
 /// A piece of a net on a sheet.
@@ -129,12 +142,14 @@ fn seamed(
         let problem = "the faces leave no room for glue tabs: take `SolidSheets::PerFace`";
         return Err(TargetError::invalid("SolidSpec::edge_mm", problem));
     };
+    let what = format!("the net of a solid with {} edges", format_mm(spec.edge_mm));
+    let edge = ("SolidSpec::edge_mm", spec.edge_mm);
     let count = net.pieces.len();
     let pieces = net.pieces.iter().zip(&net.tabs).enumerate();
     pieces
         .map(|(index, (piece, tabs))| {
             let poster = Poster::new(&points(piece, tabs), paper)?;
-            check_size(&poster, spec, paper)?;
+            poster.check(&what, edge, "`SolidSheets::PerFace`, ", paper)?;
             let mut sheet = poster.sheet();
             drawing.draw(&mut sheet, piece, tabs, &poster.sheet_from_points());
             let of = match count {
@@ -153,23 +168,6 @@ fn seamed(
         .collect()
 }
 
-/// Refuses a net of more pages than can be assembled and verified.
-fn check_size(poster: &Poster, spec: &SolidSpec, paper: &PaperSpec) -> Result<(), TargetError> {
-    let excess = poster.excess();
-    if excess <= 1.0 {
-        return Ok(());
-    }
-    let edge = (spec.edge_mm / excess.sqrt() * 0.95).floor();
-    let problem = format!(
-        "the net of a solid with {} edges takes {} pages of {}, more than can be assembled and verified: take \
-         `SolidSheets::PerFace`, `SolidSpec::edge_mm` of at most {edge} mm, or larger `PaperSpec::size`",
-        format_mm(spec.edge_mm),
-        poster.windows(),
-        Poster::paper_size(paper),
-    );
-    Err(TargetError::invalid("SolidSpec::edge_mm", problem))
-}
-
 /// Pieces of whole faces, nested on pages: on the smallest paper that takes them all, or on as few pages as will do of the
 /// size that is asked for, or of the largest.
 fn nested(
@@ -177,12 +175,9 @@ fn nested(
     drawing: &Drawing,
     paper: &PaperSpec,
 ) -> Result<Vec<SheetLayout>, TargetError> {
-    let sizes: Vec<PaperSize> = match &paper.size {
-        Some(size) => vec![size.clone()],
-        None => PaperSize::automatic().collect(),
-    };
-    let flat: Vec<[DVec2; 3]> = drawing.faces.iter().map(|face| face.outline_mm).collect();
-    let area: f64 = flat.iter().map(|&[a, b, c]| 0.5 * (b - a).perp_dot(c - a)).sum();
+    let sizes = paper.sizes();
+    let flat = outlines(drawing.faces);
+    let area: f64 = flat.iter().map(|face| polygon::area(face)).sum();
     for (index, size) in sizes.iter().enumerate() {
         let paper = PaperSpec { size: Some(size.clone()), ..paper.clone() };
         let least = Footprint {
@@ -198,8 +193,9 @@ fn nested(
         if !is_last && area > room.element_product() {
             continue;
         }
-        let Some((net, places)) = nest_on(&flat, drawing.sides, room) else { continue };
-        let count = 1 + places.iter().map(|place| place.page).max().unwrap_or_default();
+        let Some(Nested { net, places, pages: count }) = nest_on(&flat, drawing.sides, room) else {
+            continue;
+        };
         if count > 1 && !is_last {
             continue;
         }
@@ -247,8 +243,8 @@ fn nested(
 }
 
 /// The net whose pieces take the fewest pages with a room of this size, then that with the fewest pieces.
-fn nest_on(flat: &[[DVec2; 3]], sides: &Sides, room: DVec2) -> Option<(Net, Vec<Place>)> {
-    let mut best: Option<([usize; 2], Net, Vec<Place>)> = None;
+fn nest_on(flat: &[[DVec2; 3]], sides: &Sides, room: DVec2) -> Option<Nested> {
+    let mut best: Option<Nested> = None;
     for part in PARTS_OF_ROOM {
         let mut fewest = usize::MAX;
         for seed in 0..ORDERS {
@@ -256,17 +252,17 @@ fn nest_on(flat: &[[DVec2; 3]], sides: &Sides, room: DVec2) -> Option<(Net, Vec<
             let fit = |points: &[DVec2]| nest::fits(points, tabs::MOST_DEPTH_MM, most);
             let pieces = unfold::in_pieces_that_fit(flat, sides, seed, fit);
             fewest = fewest.min(pieces.len());
-            let Some(tabs) = tabs::place(&pieces, sides) else { continue };
+            let Some(net) = with_tabs(pieces, sides) else { continue };
             let outline = |(piece, tabs): (&Piece, &Vec<Tab>)| -> Outline {
                 let faces = piece.iter().map(|face| face.corners.to_vec());
                 faces.chain(tabs.iter().map(|tab| tab.corners.to_vec())).collect()
             };
-            let outlines: Vec<Outline> = pieces.iter().zip(&tabs).map(outline).collect();
+            let outlines: Vec<Outline> = net.pieces.iter().zip(&net.tabs).map(outline).collect();
             let Some(places) = nest::nest(&outlines, room) else { continue };
             let pages = 1 + places.iter().map(|place| place.page).max().unwrap_or_default();
-            let value = [pages, pieces.len()];
-            if best.as_ref().is_none_or(|(least, ..)| value < *least) {
-                best = Some((value, Net { pieces, tabs }, places));
+            let nested = Nested { net, places, pages };
+            if best.as_ref().is_none_or(|best| nested.work() < best.work()) {
+                best = Some(nested);
             }
         }
         // There are no smaller pieces than single faces.
@@ -274,16 +270,13 @@ fn nest_on(flat: &[[DVec2; 3]], sides: &Sides, room: DVec2) -> Option<(Net, Vec<
             break;
         }
     }
-    best.map(|(_, net, places)| (net, places))
+    best
 }
 
 /// The unfoldings that have room for tabs, best liked first.
 fn nets(solid: &Polyhedron, spec: &SolidSpec, faces: &[Face], sides: &Sides) -> Vec<Net> {
-    let flat: Vec<[DVec2; 3]> = faces.iter().map(|face| face.outline_mm).collect();
-    let with_tabs = |pieces: Vec<Piece>| {
-        let tabs = tabs::place(&pieces, sides)?;
-        Some(Net { pieces, tabs })
-    };
+    let flat = outlines(faces);
+    let with_tabs = |pieces: Vec<Piece>| with_tabs(pieces, sides);
     let unfoldings = unfold::unfoldings(solid, &spec.shape, &flat);
     let nets: Vec<Net> = unfoldings.into_iter().filter_map(with_tabs).collect();
     if !nets.is_empty() {
@@ -296,6 +289,15 @@ fn nets(solid: &Polyhedron, spec: &SolidSpec, faces: &[Face], sides: &Sides) -> 
         small.min_by_key(|net| net.pieces.len())
     });
     fewest.next().into_iter().collect()
+}
+
+fn outlines(faces: &[Face]) -> Vec<[DVec2; 3]> {
+    faces.iter().map(|face| face.outline_mm).collect()
+}
+
+fn with_tabs(pieces: Vec<Piece>, sides: &Sides) -> Option<Net> {
+    let tabs = tabs::place(&pieces, sides)?;
+    Some(Net { pieces, tabs })
 }
 
 /// The triangle that the tiles of a face fill, in the panel frame, mm.
@@ -320,10 +322,7 @@ fn lay<'a>(
     tabs: &'a [Tab],
     paper: &PaperSpec,
 ) -> Result<Option<Laid<'a>>, TargetError> {
-    let sizes: Vec<PaperSize> = match &paper.size {
-        Some(size) => vec![size.clone()],
-        None => PaperSize::automatic().collect(),
-    };
+    let sizes = paper.sizes();
     let points = points(piece, tabs);
     // As the net stands, upright, then slanted as little as will do.
     let slanted = (1..18).flat_map(|n| [5 * n, -5 * n]).filter(|n| n % 90 != 0);
@@ -684,7 +683,7 @@ mod tests {
     fn used(target: &Target) -> (usize, f64) {
         let area = |placement: &Placement| {
             let [a, b, c] = triangle(target, placement);
-            0.5 * (b - a).perp_dot(c - a)
+            polygon::area(&[a, b, c])
         };
         let faces: f64 = target.sheets.iter().flat_map(|s| &s.placements).map(area).sum();
         let paper: f64 = target.sheets.iter().map(|s| s.width_mm * s.height_mm).sum();
