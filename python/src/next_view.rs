@@ -49,6 +49,13 @@ impl NextView {
         outlines.map(|outline| arrays::rows(py, outline.iter().map(|at| at.to_array()))).collect()
     }
 
+    /// An arrow from the middle of the board towards its upper side, 2 × 2, float64, px; ``None`` where the lens does not
+    /// see there.
+    #[getter]
+    fn upwards<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        self.next.upwards.map(|ends| arrays::rows(py, ends.iter().map(|at| at.to_array())))
+    }
+
     /// The corners that are expected to be found, N × 2, float64, px.
     #[getter]
     fn pixels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {

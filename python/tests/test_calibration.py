@@ -39,6 +39,7 @@ def test_the_next_view_is_where_the_camera_is_known_least(board, camera, detecti
     first = deltille.next_view([], board, size_px=(1280, 960))
     assert first.uncertainty_px is None and not first.is_enough() and "facing the camera" in first.words
     assert first.pixels.shape == (len(first.labels), 2) and len(first.outlines) == 1
+    assert first.upwards[1, 1] < first.upwards[0, 1] and abs(first.upwards[1, 0] - first.upwards[0, 0]) < 1
     few, more = (deltille.next_view(detections[:count]) for count in (5, 10))
     assert (few.views, more.views) == (5, 10)
     assert few.expected_px < few.uncertainty_px and more.uncertainty_px < few.uncertainty_px

@@ -14,15 +14,16 @@ use super::limits::ImageLimits;
 use super::sightings::{self, SheetArgs};
 use super::{camera_file, target_file};
 use crate::calibrate::{
-    Calibration, Estimate, Guide, Intrinsics, Model, NextView, PanelPlace, Reference, View, views,
+    Calibration, Excluded, Guide, Intrinsics, Model, NextView, PanelPlace, Reference, View, views,
 };
 use crate::camera::{Camera, Lens};
 use crate::cli::interrupt;
 use crate::cli::output::{self, Overwrite, say, tell};
 use crate::cli::run::Interrupted;
-use crate::detect::{Detector, DetectorConfig};
+use crate::detect::{Detection, Detector, DetectorConfig};
 use crate::export::calibration::Sheet;
-use crate::export::next_view;
+use crate::export::kind::Kind;
+use crate::export::{next_view, svg};
 use crate::limits::Limits;
 use crate::photograph;
 use crate::raster::AnyGray;
@@ -196,6 +197,8 @@ impl Args {
                 path.display()
             );
             output::check_writable("--picture", path)?;
+            let kind = if is_png { Kind::own_png() } else { Kind::of(svg::HEAD.as_bytes()) };
+            self.overwrite.check(path, &kind).context("--picture")?;
         }
         if let Some(path) = &json {
             output::check_writable("-o", path)?;
@@ -233,7 +236,15 @@ struct Picture {
     /// When it was found to be as it is.
     since: SystemTime,
     /// What came of it; `None` as long as it cannot be read, or may still grow.
-    view: Option<Option<View>>,
+    seen: Option<Seen>,
+}
+
+/// What a photograph showed.
+enum Seen {
+    /// Nothing that can be used, as was told.
+    Nothing,
+    /// The target.
+    Target(Detection),
 }
 
 /// A folder that is watched, and what is known from it.
@@ -246,10 +257,10 @@ struct Watch<'a> {
     intrinsics: Intrinsics,
     limits: Limits,
     places: Places,
-    /// From the first photograph on.
+    /// From the first photograph on, of the size that most have.
     guide: Option<Guide>,
     pictures: BTreeMap<PathBuf, Picture>,
-    /// Views of which it was told that they take no part.
+    /// What was told of views that take no part, as long as they do not.
     told: BTreeSet<String>,
 }
 
@@ -258,7 +269,7 @@ impl Watch<'_> {
         let mut is_first = true;
         loop {
             let (changed, last) = self.look()?;
-            let waits = self.pictures.values().any(|picture| picture.view.is_none());
+            let waits = self.pictures.values().any(|picture| picture.seen.is_none());
             // A view that may still come is waited for, before others are asked for.
             if (changed || is_first) && !(self.args.once && waits) {
                 is_first = false;
@@ -267,7 +278,9 @@ impl Watch<'_> {
                 }
             }
             if self.args.once && !waits {
-                return Ok(ExitCode::SUCCESS);
+                let is_none_of_use =
+                    !self.pictures.is_empty() && self.detections().next().is_none();
+                return Ok(if is_none_of_use { ExitCode::FAILURE } else { ExitCode::SUCCESS });
             }
             std::thread::sleep(PAUSE);
             self.check_interrupt()?;
@@ -278,8 +291,7 @@ impl Watch<'_> {
         if !interrupt::is_raised() {
             return Ok(());
         }
-        let views = self.pictures.values().filter(|picture| matches!(picture.view, Some(Some(_))));
-        let views = counted(views.count(), "view");
+        let views = counted(self.detections().count(), "view");
         Err(Interrupted(format!("{views} so far; start again to go on with them")).into())
     }
 
@@ -297,25 +309,25 @@ impl Watch<'_> {
             let stamp = Stamp { bytes: about.len(), changed: about.modified().ok() };
             let now = SystemTime::now();
             let known = self.pictures.get(&path).filter(|known| known.stamp == stamp);
-            if known.is_some_and(|known| known.view.is_some()) {
+            if known.is_some_and(|known| known.seen.is_some()) {
                 continue;
             }
             let since = known.map_or(now, |known| known.since);
-            let view = self.read(&path, since, now, &mut last)?;
-            changed |= view.is_some();
-            self.pictures.insert(path, Picture { stamp, since, view });
+            let seen = self.read(&path, since, now, &mut last)?;
+            changed |= seen.is_some();
+            self.pictures.insert(path, Picture { stamp, since, seen });
         }
         Ok((changed, last))
     }
 
     /// What a photograph shows; `None` where it cannot be read yet.
     fn read(
-        &mut self,
+        &self,
         path: &Path,
         since: SystemTime,
         now: SystemTime,
         last: &mut Option<AnyGray>,
-    ) -> anyhow::Result<Option<Option<View>>> {
+    ) -> anyhow::Result<Option<Seen>> {
         let show = name(path);
         let picture = match photograph::read_within(path, &self.limits) {
             Ok(picture) => picture,
@@ -325,67 +337,97 @@ impl Watch<'_> {
                     return Ok(None);
                 }
                 tell!("error: {error}");
-                return Ok(Some(None));
+                return Ok(Some(Seen::Nothing));
             }
         };
-        let size = [picture.width() as u32, picture.height() as u32];
-        let guide = match self.guide.take() {
-            Some(guide) => guide,
-            None => self.args.guide(self.target, size, &self.intrinsics)?,
-        };
-        let wanted = guide.size_px();
-        self.guide = Some(guide);
-        if size != wanted {
-            let ([width, height], [w, h]) = (size, wanted);
-            tell!("{show}: left out: it has {width} × {height} pixels, the others {w} × {h}");
-            return Ok(Some(None));
-        }
         let found = self.detector.detect(&picture, &show);
-        let reasons = found.reasons.clone();
-        let reference = Reference::Target(self.target);
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let view = match views(&[(stem, found)], &reference) {
-            Ok(found) => found.views.into_iter().next(),
+        let corners: usize = found.grids.iter().map(|grid| grid.corners.len()).sum();
+        if corners == 0 {
+            let why = found.reasons.first().map_or(String::new(), |why| format!(": {why}"));
+            tell!("{show}: no board{why}");
+            return Ok(Some(Seen::Nothing));
+        }
+        say!("{show}: {}", counted(corners, "corner"));
+        *last = Some(picture);
+        Ok(Some(Seen::Target(found)))
+    }
+
+    /// Photographs that show the target, with what they show.
+    fn detections(&self) -> impl Iterator<Item = (&Path, &Detection)> {
+        self.pictures.iter().filter_map(|(path, picture)| match &picture.seen {
+            Some(Seen::Target(found)) => Some((path.as_path(), found)),
+            _ => None,
+        })
+    }
+
+    /// The views of the photographs that have the guide's size, and why others take no part.
+    fn views(&self, size_px: [u32; 2]) -> anyhow::Result<(Vec<View>, Vec<String>)> {
+        let [width, height] = size_px;
+        let (ours, others): (Vec<_>, Vec<_>) =
+            self.detections().partition(|(_, found)| [found.width, found.height] == size_px);
+        let mut out: Vec<String> = others
+            .into_iter()
+            .map(|(path, found)| {
+                let (path, w, h) = (name(path), found.width, found.height);
+                format!("{path}: left out: it has {w} × {h} pixels, most have {width} × {height}")
+            })
+            .collect();
+        let named = ours.into_iter().map(|(path, found)| {
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+            (stem.into_owned(), found.clone())
+        });
+        let mut shown = match views(&named.collect::<Vec<_>>(), &Reference::Target(self.target)) {
+            Ok(shown) => shown,
             Err(error) => {
-                tell!("{show}: left out: {error}");
-                return Ok(Some(None));
+                out.push(error.to_string());
+                return Ok((Vec::new(), out));
             }
         };
-        let Some(view) = view else {
-            let why = reasons.first().map_or(String::new(), |why| format!(": {why}"));
-            tell!("{show}: no board{why}");
-            return Ok(Some(None));
-        };
-        let mut one = [view];
-        sightings::put_on(&self.sheet, Some(self.target), &mut one)?;
-        let [view] = one;
-        say!("{show}: {}", counted(view.corner_count(), "corner"));
-        *last = Some(picture);
-        Ok(Some(Some(view)))
+        sightings::put_on(&self.sheet, Some(self.target), &mut shown.views)?;
+        out.extend(shown.left_out.iter().map(|(_, left)| told(left)));
+        Ok((shown.views, out))
+    }
+
+    /// The guide for the size that most photographs have, of two the one that comes first; none before there is one.
+    fn sized(&mut self) -> anyhow::Result<Option<&Guide>> {
+        if self.args.camera.is_none() {
+            let sizes: Vec<[u32; 2]> =
+                self.detections().map(|(_, found)| [found.width, found.height]).collect();
+            let count = |size: &[u32; 2]| sizes.iter().filter(|other| *other == size).count();
+            let most = sizes.iter().rev().copied().max_by_key(count);
+            if let Some(size) = most
+                && self.guide.as_ref().map(Guide::size_px) != Some(size)
+            {
+                self.guide = Some(self.args.guide(self.target, size, &self.intrinsics)?);
+            }
+        }
+        Ok(self.guide.as_ref())
     }
 
     /// Tells and writes the next view; whether no more are needed.
     fn propose(&mut self, last: Option<&AnyGray>) -> anyhow::Result<bool> {
-        let views: Vec<View> =
-            self.pictures.values().filter_map(|picture| picture.view.clone()?).collect();
-        let Some(guide) = &self.guide else {
+        let Some(guide) = self.sized()?.cloned() else {
             say!(
                 "next: hold the board in the middle of the picture, facing the camera, so that it fills two thirds; \
                  the size of the first photograph tells the rest"
             );
             return Ok(false);
         };
+        let (views, mut out) = self.views(guide.size_px())?;
         let count = views.len();
         let calibration = Calibration::new(self.panels.clone()).board_shape(self.args.board_shape);
         let calibration = calibration.camera("camera", views, self.intrinsics.clone());
         let estimate = calibration.solve();
+        if let Ok(estimate) = &estimate {
+            out.extend(estimate.excluded.iter().map(told));
+        }
+        self.tell_once(out);
         let next = guide.next(count, estimate.as_ref().ok());
         let is_enough = next.is_enough(self.args.until);
         let views = counted(count, "view");
         match (&estimate, next.now_px) {
-            (Ok(estimate), Some(now)) => {
-                self.tell_excluded(estimate);
-                say!("{views}: projections are known to {now:.4} px over the image");
+            (Ok(_), Some(now)) => {
+                say!("{views}: projections are known to {now:.4} px over the image")
             }
             (Err(error), _) if count >= ENOUGH_TO_TELL => say!("{views}: no camera yet: {error}"),
             _ => say!("{views}: no camera yet"),
@@ -394,6 +436,12 @@ impl Watch<'_> {
         if is_enough {
             let folder = shown(&self.args.folder.display().to_string()).into_owned();
             say!("enough: calibrate the photographs of {folder}");
+            if count < FEW {
+                tell!(
+                    "{views} are few: what is known to {} px is so if the model fits, which shows in more",
+                    next.now_px.map_or(String::new(), |now| format!("{now:.4}"))
+                );
+            }
             return Ok(true);
         }
         let expected =
@@ -402,12 +450,12 @@ impl Watch<'_> {
         Ok(false)
     }
 
-    fn tell_excluded(&mut self, estimate: &Estimate) {
-        let now: BTreeSet<String> = estimate.excluded.iter().map(|out| out.view.clone()).collect();
-        for out in estimate.excluded.iter().filter(|out| !self.told.contains(&out.view)) {
-            tell!("{}: left out: {}", out.view, out.reason);
+    /// Tells why views take no part, each as long as it takes none once.
+    fn tell_once(&mut self, out: Vec<String>) {
+        for line in out.iter().filter(|line| !self.told.contains(*line)) {
+            tell!("{line}");
         }
-        self.told = now;
+        self.told = out.into_iter().collect();
     }
 
     /// Writes the files that were asked for, each beside its place and renamed.
@@ -425,8 +473,8 @@ impl Watch<'_> {
         if let Some(path) = &self.places.picture {
             let is_png = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
             let bytes = match is_png {
-                true => next_view::png(next, last).context("--picture")?,
-                false => next_view::svg(next).into_bytes(),
+                true => next_view::png(next, is_enough, last).context("--picture")?,
+                false => next_view::svg(next, is_enough).into_bytes(),
             };
             output::write(path, &bytes, self.args.overwrite).context("--picture")?;
         }
@@ -436,3 +484,11 @@ impl Watch<'_> {
 
 /// From so many views on it is said why there is no camera: before, there are too few.
 const ENOUGH_TO_TELL: usize = 3;
+
+/// Fewer views than these hardly tell a model that does not fit from one that does: each has six coordinates of its
+/// own, and a wrong model shows in what views disagree about.
+const FEW: usize = 8;
+
+fn told(left_out: &Excluded) -> String {
+    format!("{}: left out: {}", left_out.view, left_out.reason)
+}

@@ -94,6 +94,7 @@ fn photographs_that_are_asked_for_are_taken_until_they_are_enough() {
         let svg = std::fs::read_to_string(at.join("next.svg")).unwrap();
         let circles = svg.matches("<circle").count();
         assert_eq!(circles, next["corners"].as_array().unwrap().len());
+        assert_eq!(svg.matches("<polyline").count(), 1, "an arrow tells the upper side");
         sure.push(next["uncertainty_px"].as_f64());
         pose = proposed(&next);
     }
@@ -109,6 +110,45 @@ fn photographs_that_are_asked_for_are_taken_until_they_are_enough() {
     assert!(said(&output).contains("enough: calibrate the photographs of photos"));
     let picture = image::open(at.join("next.png")).unwrap();
     assert_eq!((picture.width(), picture.height()), (1024, 768));
+    let last = image::open(at.join("photos/7.png")).unwrap();
+    assert!(picture.to_rgb8() == last.to_rgb8(), "nothing is drawn that nobody has to hold");
+}
+
+#[test]
+fn pictures_of_the_size_that_most_have_count_and_each_counts_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let target = board();
+    std::fs::write(at.join("desk.json"), target.to_json()).unwrap();
+    std::fs::create_dir(at.join("photos")).unwrap();
+    let command = "guide photos --target desk.json --once";
+    std::fs::write(at.join("photos/a.png"), reduced(&photograph(&target, &poses(&target, 1)[0], 0), 8)).unwrap();
+    let output = deltille(at, command).code(1).get_output().clone();
+    assert!(said(&output).contains("hold the board in the middle"), "{}", said(&output));
+
+    let poses = poses(&target, 5);
+    for (index, pose) in poses.iter().enumerate() {
+        let png = photograph(&target, pose, index as u64);
+        let small = index == 0;
+        let png = if small { reduced(&png, 2) } else { png };
+        std::fs::write(at.join(format!("photos/b{index}.png")), &png).unwrap();
+        std::fs::write(at.join(format!("photos/c{index}.png")), &png).unwrap();
+    }
+    let output = deltille(at, command).success().get_output().clone();
+    assert!(said(&output).contains("\n4 views: projections are known"), "{}", said(&output));
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(stderr.contains("b0.png: left out: it has 512 × 384 pixels, most have 1024 × 768"), "{stderr}");
+    assert!(stderr.contains("c3: left out: it is the picture of b3 once more"), "{stderr}");
+}
+
+/// A picture reduced by a whole number.
+fn reduced(png: &[u8], by: u32) -> Vec<u8> {
+    let image = image::load_from_memory(png).unwrap();
+    let (width, height) = (image.width() / by, image.height() / by);
+    let small = image.resize_exact(width, height, image::imageops::FilterType::Triangle);
+    let mut png = std::io::Cursor::new(Vec::new());
+    small.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    png.into_inner()
 }
 
 #[test]

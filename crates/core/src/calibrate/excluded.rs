@@ -26,6 +26,11 @@ pub struct Excluded {
 pub enum Reason {
     /// A detection that is not of the target, and what is wrong with it.
     Foreign(String),
+    /// The picture of another view once more, which tells nothing new.
+    Copy {
+        /// Name of the other view.
+        of: String,
+    },
     /// A view for which there is no pose.
     NoPose,
     /// A view whose corners are too far off.
@@ -59,6 +64,7 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Foreign(problem) => f.write_str(problem),
+            Self::Copy { of } => write!(f, "it is the picture of {of} once more, and counts once"),
             Self::NoPose => f.write_str(
                 "no pose explains its corners: wrong labels, another target, or corners where the lens \
                  model has ended",

@@ -1,4 +1,5 @@
-use std::collections::BTreeMap;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{DQuat, DVec2, DVec3};
 
@@ -271,7 +272,8 @@ pub struct Shown {
     pub views: Vec<View>,
     /// Positions of the detections that show nothing.
     pub empty: Vec<usize>,
-    /// Positions of the detections that do not belong to the target, and what is wrong with them.
+    /// Positions of the detections that do not belong to the target, or are of the same picture as another, and what is
+    /// wrong with them.
     pub left_out: Vec<(usize, Excluded)>,
 }
 
@@ -307,6 +309,9 @@ pub fn views(
     let mut empty = Vec::new();
     let mut left_out = Vec::new();
     let mut first_wrong = None;
+    let mut wrong = 0;
+    let mut copies = 0;
+    let mut seen = HashMap::new();
     for (index, (name, detection)) in detections.iter().enumerate() {
         let size_px = [detection.width, detection.height];
         if let Some((first, other)) = detections.first()
@@ -319,17 +324,23 @@ pub fn views(
                 other_px: size_px,
             });
         }
+        let excluded = |panel, reason| Excluded {
+            camera: None,
+            view: name.clone(),
+            image: detection.image.clone(),
+            panel,
+            corners: detection.grids.iter().map(|grid| grid.corners.len()).sum(),
+            reason,
+        };
+        if let Some(of) = copied(detection, name, &mut seen) {
+            left_out.push((index, excluded(None, Reason::Copy { of })));
+            copies += 1;
+            continue;
+        }
         match sightings(detection, reference) {
             Err((panel, problem)) => {
-                let wrong = Excluded {
-                    camera: None,
-                    view: name.clone(),
-                    image: detection.image.clone(),
-                    panel,
-                    corners: detection.grids.iter().map(|grid| grid.corners.len()).sum(),
-                    reason: Reason::Foreign(problem.clone()),
-                };
-                left_out.push((index, wrong));
+                left_out.push((index, excluded(panel, Reason::Foreign(problem.clone()))));
+                wrong += 1;
                 let view = name.clone();
                 first_wrong.get_or_insert(CalibrationError::WrongDetection { view, problem });
             }
@@ -348,13 +359,32 @@ pub fn views(
             }
         }
     }
-    let all = detections.len() - empty.len();
+    let all = detections.len() - empty.len() - copies;
     match first_wrong {
-        Some(first) if 2 * left_out.len() > all => Err(match all {
+        Some(first) if 2 * wrong > all => Err(match all {
             1 => first,
-            _ => CalibrationError::MostWrong { first: Box::new(first), wrong: left_out.len(), all },
+            _ => CalibrationError::MostWrong { first: Box::new(first), wrong, all },
         }),
         _ => Ok(Shown { views, empty, left_out }),
+    }
+}
+
+/// The name of the detection before, if any, that has the same corners to the last bit: of the same picture.
+fn copied<'a>(
+    detection: &'a Detection,
+    name: &'a str,
+    seen: &mut HashMap<[u64; 2], (&'a str, &'a Detection)>,
+) -> Option<String> {
+    let first = detection.grids.iter().find_map(|grid| grid.corners.first())?;
+    match seen.entry([first.x, first.y].map(f64::to_bits)) {
+        Entry::Vacant(place) => {
+            place.insert((name, detection));
+            None
+        }
+        Entry::Occupied(before) => {
+            let (of, before) = *before.get();
+            (before.grids == detection.grids).then(|| of.to_owned())
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::motion::Motion;
 #[cfg(feature = "print")]
-use super::overlay::{self, OverlayError};
+use super::overlay::{self, Outlined, OverlayError};
 #[cfg(feature = "print")]
 use super::svg::HEAD;
 use deltille_core::calibrate::NextView;
@@ -39,6 +39,7 @@ struct File<'a> {
     roll_rad: f64,
     middle_px: DVec2,
     outlines_px: &'a [Vec<DVec2>],
+    upwards_px: Option<[DVec2; 2]>,
     corners: Vec<Corner>,
 }
 
@@ -77,30 +78,48 @@ pub fn write(next: &NextView, target: &str, views: usize, enough: bool) -> Strin
         roll_rad: next.roll_rad,
         middle_px: next.at * DVec2::from(size.map(f64::from)) - 0.5,
         outlines_px: &next.outlines,
+        upwards_px: next.upwards,
         corners: corners.collect(),
     };
     serde_json::to_string_pretty(&file).expect("plain data has a JSON form") + "\n"
 }
 
-/// The outline and the corners as an SVG of the image's size, to be laid over a live picture.
+/// The outline, an arrow towards the board's upper side and the corners as an SVG of the image's size, to be laid over a
+/// live picture; empty when views are enough.
 #[cfg(feature = "print")]
-pub fn svg(next: &NextView) -> String {
+pub fn svg(next: &NextView, enough: bool) -> String {
     let [r, g, b] = COLOUR;
     let (width, height) = (next.camera.width, next.camera.height);
     let line = line_px(next);
+    let label = if enough { "enough".to_owned() } else { next.to_string() };
     let mut text = format!(
         "{HEAD}<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"-0.5 -0.5 {width} {height}\" width=\"{width}\" \
-         height=\"{height}\" role=\"img\" aria-label=\"{next}\">\n"
+         height=\"{height}\" role=\"img\" aria-label=\"{label}\">\n"
     );
+    if enough {
+        return text + "</svg>\n";
+    }
     let colour = format!("rgb({r},{g},{b})");
+    let listed = |points: &[DVec2]| {
+        let points = points.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
+        points.collect::<Vec<_>>().join(" ")
+    };
     for outline in &next.outlines {
-        let points = outline.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
-        let points = points.collect::<Vec<_>>().join(" ");
+        let points = listed(outline);
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
             "<polygon points=\"{points}\" fill=\"{colour}\" fill-opacity=\"0.15\" stroke=\"{colour}\" \
              stroke-width=\"{line:.1}\"/>"
+        );
+    }
+    if let Some(arrow) = arrow(next) {
+        let points = listed(&arrow);
+        let _ = writeln!(
+            text,
+            "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{:.1}\" \
+             stroke-linejoin=\"round\"/>",
+            2.0 * line
         );
     }
     for corner in &next.corners {
@@ -113,16 +132,33 @@ pub fn svg(next: &NextView) -> String {
     text + "</svg>\n"
 }
 
-/// The same as a PNG, over the photograph that was taken last; on black without one, or where its size is another.
+/// The same as a PNG, over the photograph that was taken last; on black without one, or where its size is another. When
+/// views are enough it is that photograph.
 ///
 /// # Errors
 /// When the picture is too large to draw on, or cannot be encoded.
 #[cfg(feature = "print")]
-pub fn png(next: &NextView, last: Option<&AnyGray>) -> Result<Vec<u8>, OverlayError> {
+pub fn png(next: &NextView, enough: bool, last: Option<&AnyGray>) -> Result<Vec<u8>, OverlayError> {
     let size = [next.camera.width, next.camera.height];
     let last = last.filter(|last| [last.width() as u32, last.height() as u32] == size);
     let corners: Vec<DVec2> = next.corners.iter().map(|corner| corner.pixel).collect();
-    overlay::outlined(last, size, &next.outlines, &corners, line_px(next), COLOUR)
+    let drawn = Outlined {
+        polygons: &next.outlines,
+        line: arrow(next).map_or(Vec::new(), Vec::from),
+        dots: corners,
+        line_px: line_px(next),
+        colour: COLOUR,
+    };
+    overlay::outlined(last, size, (!enough).then_some(&drawn))
+}
+
+/// An arrow from the middle of the board towards its upper side, as one line, px.
+#[cfg(feature = "print")]
+fn arrow(next: &NextView) -> Option<[DVec2; 5]> {
+    let [from, to] = next.upwards?;
+    let back = 0.25 * (from - to);
+    let [left, right] = [1.0, -1.0].map(|side| to + back + side * 0.6 * back.perp());
+    Some([from, to, left, to, right])
 }
 
 /// A line that is seen on a small picture of the image, px.

@@ -69,10 +69,7 @@ pub fn png(image: &AnyGray, detection: &Detection) -> Result<Vec<u8>, OverlayErr
 pub(super) fn outlined(
     image: Option<&AnyGray>,
     [width, height]: [u32; 2],
-    outlines: &[Vec<DVec2>],
-    places: &[DVec2],
-    line_px: f64,
-    [r, g, b]: [u8; 3],
+    drawn: Option<&Outlined>,
 ) -> Result<Vec<u8>, OverlayError> {
     let mut canvas = match image {
         Some(AnyGray::U8(image)) => background(image, 1)?,
@@ -84,33 +81,56 @@ pub(super) fn outlined(
             black
         }
     };
-    let colour = Color::from_rgba8(r, g, b, 255);
-    // Pixel centres are at integers here, at halves in tiny-skia.
-    let at = |place: DVec2| ((place.x + 0.5) as f32, (place.y + 0.5) as f32);
-    for outline in outlines {
-        let mut path = PathBuilder::new();
-        for (index, &place) in outline.iter().enumerate() {
-            let (x, y) = at(place);
-            if index == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
-        }
-        path.close();
-        let Some(path) = path.finish() else { continue };
-        let mut faint = colour;
-        faint.set_alpha(0.15);
-        let identity = Transform::identity();
-        canvas.fill_path(&path, &solid(faint), FillRule::Winding, identity, None);
-        stroke(&mut canvas, Some(path), colour, line_px);
-    }
-    let mut dots = PathBuilder::new();
-    for &place in places {
-        let (x, y) = at(place);
-        dots.push_circle(x, y, line_px as f32);
-    }
-    if let Some(dots) = dots.finish() {
-        canvas.fill_path(&dots, &solid(colour), FillRule::Winding, Transform::identity(), None);
+    if let Some(drawn) = drawn {
+        drawn.draw(&mut canvas);
     }
     let png = canvas.encode_png().map_err(|error| OverlayError::Encode(error.to_string()))?;
     Ok(signed_png(png))
+}
+
+/// Polygons, filled faintly, a line of twice their outlines' width, and dots, px.
+pub(super) struct Outlined<'a> {
+    pub polygons: &'a [Vec<DVec2>],
+    pub line: Vec<DVec2>,
+    pub dots: Vec<DVec2>,
+    pub line_px: f64,
+    pub colour: [u8; 3],
+}
+
+impl Outlined<'_> {
+    fn draw(&self, canvas: &mut Pixmap) {
+        let [r, g, b] = self.colour;
+        let colour = Color::from_rgba8(r, g, b, 255);
+        // Pixel centres are at integers here, at halves in tiny-skia.
+        let at = |place: DVec2| ((place.x + 0.5) as f32, (place.y + 0.5) as f32);
+        let path = |places: &[DVec2]| {
+            let mut path = PathBuilder::new();
+            for (index, &place) in places.iter().enumerate() {
+                let (x, y) = at(place);
+                if index == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
+            }
+            path
+        };
+        for polygon in self.polygons {
+            let mut path = path(polygon);
+            path.close();
+            let Some(path) = path.finish() else { continue };
+            let mut faint = colour;
+            faint.set_alpha(0.15);
+            let identity = Transform::identity();
+            canvas.fill_path(&path, &solid(faint), FillRule::Winding, identity, None);
+            stroke(canvas, Some(path), colour, self.line_px);
+        }
+        stroke(canvas, path(&self.line).finish(), colour, 2.0 * self.line_px);
+        let mut dots = PathBuilder::new();
+        for &place in &self.dots {
+            let (x, y) = at(place);
+            dots.push_circle(x, y, self.line_px as f32);
+        }
+        if let Some(dots) = dots.finish() {
+            canvas.fill_path(&dots, &solid(colour), FillRule::Winding, Transform::identity(), None);
+        }
+    }
 }
 
 /// The factor by which the photograph is enlarged.

@@ -11,8 +11,11 @@ use crate::targets::{Panel, Target, TargetSpec};
 /// some, each has fewer.
 const SAMPLED: [usize; 2] = [40, 14];
 
+/// Of how far a board reaches from its middle, the length of the arrow that tells its upper side.
+const UPWARDS: f64 = 0.4;
+
 /// Steps along a side of an outline, so that it bends with the lens.
-const STEPS: usize = 6;
+const STEPS: usize = 16;
 
 /// What the detector needs of an edge in its most foreshortened direction, px: tags are read from 12 px on,
 /// untagged grids found from 7 px on (`docs/choosing.md`), and a hand is a quarter farther away than it should be.
@@ -114,6 +117,13 @@ impl Body {
             points.filter_map(|point| camera.project(point)).collect::<Vec<DVec2>>()
         });
         outlines.filter(|outline| outline.len() > 2).collect()
+    }
+
+    /// From its middle a part of the way to its upper side, px.
+    pub(super) fn upwards(&self, camera: &Camera, pose: &Pose) -> Option<[DVec2; 2]> {
+        let upper = self.front.rotation * DVec3::Y * (UPWARDS * self.reach_mm());
+        let place = |target_mm: DVec3| camera.project(pose.apply(target_mm));
+        Some([place(self.front.translation)?, place(self.front.translation + upper)?])
     }
 }
 

@@ -108,6 +108,9 @@ pub struct NextView {
     /// Outlines of the panels that are seen from the front, px: polygons without their first point again, which may
     /// reach beyond the image. Of a board it is one.
     pub outlines: Vec<Vec<DVec2>>,
+    /// From the middle of the board towards its upper side, px: the way its labels stand. `None` where the lens does not
+    /// see there.
+    pub upwards: Option<[DVec2; 2]>,
     /// The corners that are expected to be found.
     pub corners: Vec<ProposedCorner>,
     /// Where the middle of the board is, in parts of the image from its upper left corner.
@@ -275,7 +278,9 @@ impl Guide {
         });
         placing.and_then(|placing| self.view(camera, placing)).unwrap_or_else(|| {
             // In the middle of an image any lens sees.
-            let placing = Placing { distance_mm: 1000.0, ..UPRIGHT };
+            let [nearest, farthest] = self.distances_mm;
+            let distance_mm = 1000.0f64.max(nearest).min(farthest);
+            let placing = Placing { distance_mm, ..UPRIGHT };
             let camera_from_target = placing.pose(camera, &self.body).unwrap_or(Pose::IDENTITY);
             self.described(camera, camera_from_target, placing)
         })
@@ -377,6 +382,7 @@ impl Guide {
         NextView {
             camera_from_target: pose,
             outlines: self.body.outlines(camera, &pose),
+            upwards: self.body.upwards(camera, &pose),
             corners: corners.collect(),
             camera: camera.clone(),
             at: placing.at,
