@@ -112,7 +112,12 @@ class Target:
     def pdf(self) -> bytes: ...
     def svg(self, page: int = 0) -> str: ...
     def files(
-        self, format: TargetFormat, *, dpi: float = 300.0, texture_dpi: float | None = None
+        self,
+        format: TargetFormat,
+        *,
+        dpi: float = 300.0,
+        texture_dpi: float | None = None,
+        texture_px: int | None = None,
     ) -> dict[str, bytes]: ...
     def save(
         self,
@@ -121,6 +126,7 @@ class Target:
         *,
         dpi: float = 300.0,
         texture_dpi: float | None = None,
+        texture_px: int | None = None,
         force: bool = False,
     ) -> list[Path]: ...
     def verify(self, artifact: AnyPath | bytes | None = None, *, name: str | None = None) -> Verdict: ...

@@ -8,6 +8,7 @@ use deltille::limits::Limits;
 use deltille::targets::{self, Corner, Panel};
 use deltille::{export, target_file};
 use export::dsc::Dialect;
+use export::mesh::{MAX_TEXTURE_PX, Resolution};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -218,26 +219,30 @@ impl Target {
     /// Parameters
     /// ----------
     /// format : str
-    ///     ``"json"``, ``"pdf"``, ``"svg"``, ``"png"``, ``"dsc"``, ``"dsc-original"``; of a solid also ``"gltf"``,
-    ///     ``"obj"``, ``"stl"``, ``"skeleton"``, ``"panels"`` (DXF) and ``"net"`` (DXF).
+    ///     ``"json"``, ``"pdf"``, ``"svg"``, ``"png"``, ``"dsc"``, ``"dsc-original"``; as meshes ``"gltf"``,
+    ///     ``"obj"``, ``"sdf"``, ``"urdf"``, ``"mjcf"``, ``"usd"``; of a solid also ``"stl"``, ``"skeleton"``, ``"panels"`` (DXF)
+    ///     and ``"net"`` (DXF).
     /// dpi : float, optional
     ///     Resolution of PNG pages, dots per inch.
     /// texture_dpi : float, optional
-    ///     Resolution of the texture of a mesh; what tags need if left out.
+    ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
+    /// texture_px : int, optional
+    ///     Or its longest side; at least 4 px for a bit.
     ///
     /// Returns
     /// -------
     /// dict of str to bytes
     ///     Contents by names of files.
-    #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None))]
+    #[pyo3(signature = (format, *, dpi = 300.0, texture_dpi = None, texture_px = None))]
     fn files<'py>(
         &self,
         py: Python<'py>,
         format: &str,
         dpi: f64,
         texture_dpi: Option<f64>,
+        texture_px: Option<i64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let making = making(dpi, texture_dpi)?;
+        let making = making(dpi, texture_dpi, texture_px)?;
         let files = PyDict::new(py);
         for (name, bytes) in unlocked(py, || self.made(format, making))?? {
             files.set_item(name, PyBytes::new(py, &bytes))?;
@@ -256,7 +261,9 @@ impl Target {
     /// dpi : float, optional
     ///     Resolution of PNG pages, dots per inch.
     /// texture_dpi : float, optional
-    ///     Resolution of the texture of a mesh; what tags need if left out.
+    ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
+    /// texture_px : int, optional
+    ///     Or its longest side; at least 4 px for a bit.
     /// force : bool, optional
     ///     Whether files of another kind are replaced.
     ///
@@ -264,7 +271,7 @@ impl Target {
     /// -------
     /// list of pathlib.Path
     ///     The files, the description first.
-    #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, force = false))]
+    #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, texture_px = None, force = false))]
     fn save(
         &self,
         py: Python<'_>,
@@ -272,9 +279,10 @@ impl Target {
         formats: Option<Formats>,
         dpi: f64,
         texture_dpi: Option<f64>,
+        texture_px: Option<i64>,
         force: bool,
     ) -> PyResult<Vec<PathBuf>> {
-        let making = making(dpi, texture_dpi)?;
+        let making = making(dpi, texture_dpi, texture_px)?;
         unlocked(py, || {
             let mut files = self.made("json", making)?;
             let formats = formats.map_or_else(|| vec!["pdf".to_owned()], Formats::into_vec);
@@ -414,12 +422,26 @@ pub fn _target<'py>(
     of_class!(Board, Checkerboard, Tetrahedron, Octahedron, Icosahedron, Solid)
 }
 
-fn making(dpi: f64, texture_dpi: Option<f64>) -> PyResult<Making> {
+fn making(dpi: f64, texture_dpi: Option<f64>, texture_px: Option<i64>) -> PyResult<Making> {
     if !(1.0..=1e5).contains(&dpi) || texture_dpi.is_some_and(|dpi| !(1.0..=1e5).contains(&dpi)) {
         return Err(raised::TargetError::new_err("dpi: give dots per inch from 1 to 100000"));
     }
     let mut making = Making::default();
-    (making.dpi, making.texture_dpi) = (dpi, texture_dpi);
+    making.dpi = dpi;
+    making.mesh.resolution = match (texture_dpi, texture_px) {
+        (None, None) => Resolution::Usual,
+        (Some(dpi), None) => Resolution::Dpi(dpi),
+        (None, Some(px)) => {
+            let side = u32::try_from(px).ok().filter(|px| (1..=MAX_TEXTURE_PX).contains(px));
+            let refused = || format!("texture_px: give 1 to {MAX_TEXTURE_PX}");
+            Resolution::Side(side.ok_or_else(|| raised::TargetError::new_err(refused()))?)
+        }
+        (Some(_), Some(_)) => {
+            return Err(raised::TargetError::new_err(
+                "texture_dpi and texture_px: give one of them",
+            ));
+        }
+    };
     Ok(making)
 }
 

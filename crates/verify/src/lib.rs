@@ -27,10 +27,11 @@
 //! within [`FOLD_TOLERANCE_MM`] of their stated positions in space; the two sides of each edge must
 //! meet, and carry the same number where they are cut.
 //!
-//! A mesh (`.glb`, `.obj`) is loaded with its texture, and rendered by a virtual camera before each
+//! A mesh (`.glb`, `.obj`, `.usda`) is loaded with its texture, and rendered by a virtual camera before each
 //! face; every detected corner is projected along its ray onto the loaded triangles and must lie
 //! within [`MESH_TOLERANCE_MM`] of its stated position in space. The texture on each face is then
 //! laid out flat and compared like a sheet: every tile, every cell of every tag, and no other mark.
+//! Models for simulators (`.sdf`, `.urdf`, `.xml` of MuJoCo) must put that mesh in its place; a `.usda` holds it.
 //! A body to print (`.stl`) must be a closed surface with its normals outwards and of the stated
 //! shape.
 //!
@@ -62,6 +63,7 @@ mod marks;
 mod model;
 mod on_disk;
 mod reader;
+mod scene;
 mod solid;
 mod tags;
 mod tiles;
@@ -129,8 +131,8 @@ pub enum VerifyError {
     },
     /// The file name has no extension of a known [`Format`].
     #[error(
-        "{}: only .pdf, .svg, .png, .glb, .obj, .stl, .dsc and .dxf files are compared with their \
-         target",
+        "{}: only .pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml (MuJoCo), .usda, .stl, .dsc and .dxf files are \
+         compared with their target",
         path.display()
     )]
     OtherKind {
@@ -357,7 +359,10 @@ impl<'a> Verifier<'a> {
             Format::Pdf | Format::Svg | Format::Png => {
                 return self.verify_sheets(reader, path, format);
             }
-            Format::Glb | Format::Obj | Format::Stl => {}
+            Format::Sdf | Format::Urdf | Format::Mjcf => {
+                return scene::verify(self, reader, path, format);
+            }
+            Format::Glb | Format::Obj | Format::Usda | Format::Stl => {}
         }
         let (refused, parts) = construct::check(reader, path, format, self.target)?;
         if construct::refuse(&refused) {

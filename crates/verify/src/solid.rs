@@ -22,6 +22,7 @@ use deltille_core::lattice::Vertex;
 use deltille_core::raster::Gray;
 use deltille_core::targets::{Corner, Panel, TargetSpec};
 use deltille_core::words::counted;
+use deltille_files::export::mesh::{PLATE_TRIANGLES, UNTAGGED_CELLS};
 
 /// Largest deviation of a corner of a mesh, mm: a tenth of the error of a well glued panel.
 pub const MESH_TOLERANCE_MM: f64 = 0.05;
@@ -40,6 +41,10 @@ const MAX_SIDE_PX: f64 = 4000.0;
 /// angle of 11°, where depth matters.
 const DISTANCE: f64 = 6.0;
 const ASIDE: f64 = 1.2;
+
+/// The camera's roll, 15°: no edge of triangles or squares runs along rows or columns of pixels, where samples would see
+/// it in steps.
+const ROLL_RAD: f64 = std::f64::consts::PI / 12.0;
 
 /// Tolerance of a unit normal.
 const NORMAL_SLACK: f64 = 1e-4;
@@ -125,9 +130,17 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
     {
         findings.push(BoardFinding::Scale { panel: verifier.target.panels[0].id, scale }.into());
     }
-    if let TargetSpec::Solid(spec) = &verifier.target.spec {
+    let stated = match &verifier.target.spec {
         // As many as there are faces, all of which are looked at: there is nothing else.
-        let [found, stated] = [model.triangles.len(), spec.polyhedron().faces.len()];
+        TargetSpec::Solid(spec) => Some(spec.polyhedron().faces.len()),
+        TargetSpec::Board(_) => {
+            findings.extend(beside_front(&model, &verifier.target.panels));
+            Some(PLATE_TRIANGLES)
+        }
+        _ => None,
+    };
+    if let Some(stated) = stated {
+        let found = model.triangles.len();
         findings.extend(other_count(found, stated));
         if is_other_mesh(found, stated) {
             return Verdict::new(path, format, findings);
@@ -150,6 +163,26 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
     Verdict { faces, ..verdict }
 }
 
+/// What of a plate is not the front of its board, and should be white and behind it.
+fn beside_front(model: &Model, panels: &[Panel]) -> Option<Finding> {
+    let panel = panels.first()?;
+    let size = DVec2::new(model.texture.width() as f64, model.texture.height() as f64);
+    let problem = model.triangles.iter().find_map(|triangle| {
+        let heights = triangle.vertices_mm.map(|v| panel.pose.panel_from_target(v).z);
+        if heights.iter().any(|&z| z > MESH_TOLERANCE_MM) {
+            return Some("a part of the plate stands before the board");
+        }
+        if heights.iter().all(|z| z.abs() <= MESH_TOLERANCE_MM) {
+            return None;
+        }
+        let [a, b, c] = triangle.uv.map(|uv| uv * size - 0.5);
+        let is_one = a.distance(b) + a.distance(c) < 1e-6;
+        let is_white = is_one && model.texture.bilinear(a.x, a.y) > 254.5;
+        (!is_white).then_some("a side or the back of the plate is not white")
+    });
+    problem.map(|problem| MeshFinding::Body { problem: problem.to_owned() }.into())
+}
+
 /// Largest distance from the origin on the mesh over that on the target's solid, and the latter,
 /// mm.
 fn scale(verifier: &Verifier, model: &Model) -> Option<(f64, f64)> {
@@ -168,7 +201,7 @@ fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
     let corners = || panel.corners.iter().map(|c| c.target_mm);
     let radius = corners().map(|c| c.distance(centre)).fold(0.0, f64::max) + 2.0 * panel.edge_mm;
     let cells = verifier.family.map(|family| family.cells().width(panel.tag_inset_bits()));
-    let cell_mm = panel.edge_mm / cells.unwrap_or(1.0);
+    let cell_mm = panel.edge_mm / cells.unwrap_or(UNTAGGED_CELLS);
     let px_per_mm = (CELL_PX / cell_mm).min(MAX_SIDE_PX / (2.0 * radius));
     let [x, y, z] = [0, 1, 2].map(|axis| panel.pose.matrix().col(axis));
     let side = (2.0 * radius * px_per_mm).ceil().max(64.0) as u32;
@@ -176,7 +209,8 @@ fn view(verifier: &Verifier, model: &Model, panel: &Panel) -> (View, f64) {
         let eye = centre + radius * (DISTANCE * z + ASIDE * aside);
         let mut camera = Camera::pinhole(side, side, 1.0);
         camera.focal_px = DVec2::splat(px_per_mm * eye.distance(centre));
-        View { camera, camera_from_target: Pose::looking_at(eye, centre, y) }
+        let up = ROLL_RAD.cos() * y + ROLL_RAD.sin() * x;
+        View { camera, camera_from_target: Pose::looking_at(eye, centre, up) }
     };
     let open = |view: &View| {
         corners().all(|corner| {

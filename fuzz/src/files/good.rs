@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use deltille::artwork;
 use deltille::detect::{Detector, DetectorConfig};
 use deltille::export::dsc::{self, Dialect};
-use deltille::export::mesh::TexturedMesh;
+use deltille::export::mesh::{Meshing, TexturedMesh};
 use deltille::export::{detection, dxf, gltf, obj as obj_writer, pdf as pdf_writer};
 use deltille::export::{png, stl as stl_writer, svg as svg_writer};
 use deltille::family::Family;
@@ -46,7 +46,7 @@ pub static SOLID: LazyLock<Target> = LazyLock::new(|| {
 });
 
 static MESH: LazyLock<TexturedMesh> =
-    LazyLock::new(|| TexturedMesh::new(&SOLID, Some(&FAMILY), None).unwrap());
+    LazyLock::new(|| TexturedMesh::new(&SOLID, Some(&FAMILY), Meshing::default()).unwrap());
 
 /// Stem of the files of an extension, which tells what is in them.
 pub fn stem(extension: &str) -> &'static str {

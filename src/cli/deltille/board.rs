@@ -7,14 +7,15 @@ use anyhow::{Context, bail};
 
 use super::delivery::Delivery;
 use super::files::{File, Formats, drawn, text_file};
+use super::meshes::{MESHES, Meshes, check_plate};
 use super::settings::{Plan, Settings};
-use crate::artwork::{self, Artwork};
+use crate::artwork;
 use crate::cli::output::{self, tell};
 use crate::export::dsc;
 use crate::export::kind::Kind;
-use crate::family::{self, FamilyError, FamilyFileError, square_names};
+use crate::family::{self, Family, FamilyError, FamilyFileError, square_names};
 use crate::lattice::GridKind;
-use crate::targets::{Target, TargetSpec, id_range};
+use crate::targets::{Target, TargetSpec, id_range, parse_length_mm};
 
 /// Arguments of both.
 #[derive(clap::Args)]
@@ -28,6 +29,11 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     save_template: Option<PathBuf>,
     #[command(flatten)]
+    meshes: Meshes,
+    /// Thickness of the plate that carries the board in a mesh [default: 3mm]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm, help_heading = MESHES)]
+    plate: Option<f64>,
+    #[command(flatten)]
     delivery: Delivery,
 }
 
@@ -37,7 +43,11 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         Some(path) => args.settings.or(Settings::read(path, grid)?),
         None => args.settings,
     };
-    let plan = settings.plan(grid)?;
+    let mut plan = settings.plan(grid)?;
+    // A mesh alone needs no paper.
+    plan.pdf &= settings.prints() || !args.meshes.is_any();
+    args.meshes.check_use()?;
+    check_plate(args.plate, &args.meshes)?;
     let family = plan.spec.tags.as_ref().map(|tags| family::resolve(&tags.family)).transpose();
     let family = match (family, grid) {
         (Err(FamilyFileError::Name(FamilyError::Unknown { name })), GridKind::Checker) => bail!(
@@ -63,7 +73,9 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         );
     }
     let spec = TargetSpec::Board(plan.spec.clone());
-    let target = Target::build(&plan.name, &spec, family.as_ref(), Some(&plan.paper))?;
+    let is_printed = plan.pdf || plan.svg || plan.png;
+    let paper = is_printed.then_some(&plan.paper);
+    let target = Target::build(&plan.name, &spec, family.as_ref(), paper)?;
     args.delivery.check_beside(&target)?;
     let overwrite = args.delivery.overwrite;
     let template = args.save_template.as_ref().map(|path| {
@@ -72,8 +84,12 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
         Ok::<_, anyhow::Error>((path, toml))
     });
     let template = template.transpose()?;
-    let files = files(&plan, &target, artwork::draw(&target, family.as_ref())?)?;
-    let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &summary(&target))?;
+    let mut files = files(&plan, &target, family.as_ref())?;
+    let (meshes, texture) = args.meshes.files(&target, family.as_ref(), args.plate)?;
+    files.extend(meshes);
+    let told = [Some(summary(&target)), texture].into_iter().flatten();
+    let told = told.collect::<Vec<_>>().join("\n");
+    let delivered = args.delivery.deliver(&target, family.as_ref(), &files, &told)?;
     if let Some((path, toml)) = template {
         output::write(path, toml.as_bytes(), overwrite).context("--save-template")?;
     }
@@ -81,7 +97,7 @@ pub fn run(grid: GridKind, args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// The files of a plan. What can be refused is refused here, before anything is written.
-fn files(plan: &Plan, target: &Target, artwork: Artwork) -> anyhow::Result<Vec<File>> {
+fn files(plan: &Plan, target: &Target, family: Option<&Family>) -> anyhow::Result<Vec<File>> {
     let name = &target.name;
     let mut files = vec![text_file(format!("{name}.json"), target.to_json())];
     if let Some(dialect) = plan.dsc {
@@ -89,7 +105,9 @@ fn files(plan: &Plan, target: &Target, artwork: Artwork) -> anyhow::Result<Vec<F
         files.push(text_file(format!("{name}.dsc"), text));
     }
     let formats = Formats { pdf: plan.pdf, svg: plan.svg, png: plan.png };
-    files.extend(drawn(name, artwork, formats, plan.dpi));
+    if !target.sheets.is_empty() {
+        files.extend(drawn(name, artwork::draw(target, family)?, formats, plan.dpi));
+    }
     Ok(files)
 }
 
@@ -97,7 +115,7 @@ fn files(plan: &Plan, target: &Target, artwork: Artwork) -> anyhow::Result<Vec<F
 fn summary(target: &Target) -> String {
     let panels = &target.panels;
     let TargetSpec::Board(spec) = &target.spec else { return target.name.to_string() };
-    let (edge, sheet) = (spec.edge_mm, &target.sheets[0]);
+    let edge = spec.edge_mm;
     let boards = if panels.len() == 1 { String::new() } else { format!("{} × ", panels.len()) };
     let mut text =
         format!("{}: {boards}{} × {} corners, edge {edge} mm", target.name, spec.rows, spec.cols);
@@ -106,6 +124,7 @@ fn summary(target: &Target) -> String {
         let last = ids.next_back().unwrap_or(first);
         text += &format!(", {} {}", family.name, id_range(first, last));
     }
+    let Some(sheet) = target.sheets.first() else { return text };
     let page = sheet.pages.first().map_or(sheet, |page| &page.marks);
     let [width, height] = [page.width_mm, page.height_mm].map(|mm| (mm * 1e3).round() / 1e3);
     let pages = match sheet.page_count() {

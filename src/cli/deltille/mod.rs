@@ -15,6 +15,7 @@ mod guide;
 mod images;
 mod in_flight;
 mod limits;
+mod meshes;
 mod page;
 mod pose;
 mod refine;

@@ -222,6 +222,11 @@ impl Settings {
         }
     }
 
+    /// Whether a format to print is asked for.
+    pub fn prints(&self) -> bool {
+        self.pdf || self.svg || self.png
+    }
+
     /// Understands the settings; numbers that no board has are left to its making.
     pub fn plan(&self, grid: GridKind) -> anyhow::Result<Plan> {
         let (Some(rows), Some(cols)) = (self.rows, self.cols) else {

@@ -7,14 +7,14 @@ use anyhow::{Context, anyhow, bail};
 
 use super::delivery::Delivery;
 use super::files::{self, File, bytes_file, text_file};
+use super::meshes::Meshes;
 use super::settings::DEFAULT_DPI;
 use crate::artwork;
 use crate::cli::output::say;
 use crate::cli::values::{number, whole};
 use crate::export::artifacts::{self, Making, What};
 use crate::export::dsc::{self, Dialect};
-use crate::export::mesh::TexturedMesh;
-use crate::export::{gltf, obj};
+use crate::export::obj;
 use crate::family::{self, Family};
 use crate::quantity::unit_mm;
 use crate::targets::{
@@ -52,13 +52,6 @@ pub struct Args {
     /// Id of the first face's board; the others follow [default: 0]
     #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     board_id: Option<u32>,
-    /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); so it is where no other of gltf,
-    /// obj, stl, skeleton, dxf, pdf, svg, png is asked for
-    #[arg(long)]
-    gltf: bool,
-    /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres)
-    #[arg(long)]
-    obj: bool,
     /// Write <name>.stl, the bare solid (millimetres)
     #[arg(long)]
     stl: bool,
@@ -79,10 +72,6 @@ pub struct Args {
     /// (millimetres)
     #[arg(long)]
     dxf: bool,
-    /// Resolution of the texture, dots per inch [default: 20 texels per tag bit]
-    #[arg(long, value_name = "DPI", allow_negative_numbers = true,
-          value_parser = number(1.0..=1e5))]
-    texture_dpi: Option<f64>,
     /// Write <name>.pdf: the net to cut out, fold and glue, or with --per-face a page per face
     #[arg(long)]
     pdf: bool,
@@ -121,6 +110,8 @@ pub struct Args {
     /// Stem of the files' names, printed on the sheets [default: the solid's name]
     #[arg(long)]
     name: Option<String>,
+    #[command(flatten)]
+    meshes: Meshes,
     #[command(flatten)]
     delivery: Delivery,
 }
@@ -164,7 +155,8 @@ pub fn run_mesh(mut mesh: MeshArgs) -> anyhow::Result<ExitCode> {
     }
     let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = mesh.args.name.clone().unwrap_or_else(stem);
-    if mesh.args.obj && mesh.args.delivery.would_replace(&format!("{name}.obj"), path) {
+    if mesh.args.meshes.has_obj() && mesh.args.delivery.would_replace(&format!("{name}.obj"), path)
+    {
         bail!("--name: {name}.obj would be written over the mesh: give another name or folder");
     }
     let faces = solid.faces();
@@ -187,8 +179,10 @@ pub fn run(shape: SolidShape, args: Args) -> anyhow::Result<ExitCode> {
     let solid = TargetSpec::Solid(spec.clone());
     let target = Target::build(&name, &solid, Some(&family), layout)?;
     args.delivery.check_beside(&target)?;
-    let files = args.files(&target, net, &spec, &family)?;
-    args.delivery.deliver(&target, Some(&family), &files, &summary(&target, &spec)?)
+    let (files, texture) = args.files(&target, net, &spec, &family)?;
+    let told = [Some(summary(&target, &spec)?), texture].into_iter().flatten();
+    let told = told.collect::<Vec<_>>().join("\n");
+    args.delivery.deliver(&target, Some(&family), &files, &told)
 }
 
 impl Args {
@@ -196,8 +190,11 @@ impl Args {
         self.pdf || self.svg || self.png
     }
 
-    fn with_gltf(&self) -> bool {
-        self.gltf || !(self.obj || self.stl || self.skeleton || self.dxf || self.printed())
+    /// The meshes that are asked for; the glTF where nothing is.
+    fn meshes(&self) -> Meshes {
+        let nothing =
+            !(self.stl || self.skeleton || self.dxf || self.printed() || self.meshes.is_any());
+        if nothing { self.meshes.with_gltf() } else { self.meshes }
     }
 
     /// Refuses options that nothing asked for makes use of.
@@ -205,9 +202,7 @@ impl Args {
         let unused = |option: &str, needed: &str| {
             Err(anyhow!("{option}: it says nothing without {needed}: add one, or leave it out"))
         };
-        if self.texture_dpi.is_some() && !(self.with_gltf() || self.obj) {
-            return unused("--texture-dpi", "--gltf or --obj");
-        }
+        self.meshes().check_use()?;
         if self.dpi.is_some() && !self.png {
             return unused("--dpi", "--png");
         }
@@ -288,7 +283,7 @@ impl Args {
         net: bool,
         spec: &SolidSpec,
         family: &Family,
-    ) -> anyhow::Result<Vec<File>> {
+    ) -> anyhow::Result<(Vec<File>, Option<String>)> {
         let name = &target.name;
         let mut files = vec![text_file(format!("{name}.json"), target.to_json())];
         if self.dsc || self.dsc_dialect.is_some() {
@@ -299,7 +294,6 @@ impl Args {
             let text = dsc::write(target, dialect).context("--dsc")?;
             files.push(text_file(format!("{name}.dsc"), text));
         }
-        let (printed, with_gltf) = (self.printed(), self.with_gltf());
         let asked = [
             (self.stl, What::Stl),
             (spec.skeleton.is_some(), What::Skeleton),
@@ -310,28 +304,15 @@ impl Args {
             let made = artifacts::make(target, Some(family), what, Making::default())?;
             files.extend(made.into_iter().map(|(name, bytes)| bytes_file(name, bytes)));
         }
-        if with_gltf || self.obj {
-            let mesh = TexturedMesh::new(target, Some(family), self.texture_dpi);
-            let mesh = mesh.map_err(|error| match self.texture_dpi {
-                Some(_) => anyhow!(error).context("--texture-dpi"),
-                None => anyhow!(error),
-            })?;
-            if with_gltf {
-                files.push(bytes_file(format!("{name}.glb"), gltf::to_bytes(&mesh)));
-            }
-            if self.obj {
-                files.push(text_file(format!("{name}.obj"), obj::text(&mesh)));
-                files.push(text_file(format!("{name}.mtl"), obj::material(&mesh)));
-                files.push(bytes_file(obj::texture_name(name), mesh.texture_png));
-            }
-        }
-        if printed {
+        let (meshes, texture) = self.meshes().files(target, Some(family), None)?;
+        files.extend(meshes);
+        if self.printed() {
             let artwork = artwork::draw(target, Some(family))?;
             let formats = files::Formats { pdf: self.pdf, svg: self.svg, png: self.png };
             let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
             files.extend(files::drawn(name, artwork, formats, dpi));
         }
-        Ok(files)
+        Ok((files, texture))
     }
 }
 

@@ -122,7 +122,11 @@ fn pictures_of_the_size_that_most_have_count_and_each_counts_once() {
     std::fs::write(at.join("desk.json"), target.to_json()).unwrap();
     std::fs::create_dir(at.join("photos")).unwrap();
     let command = "guide photos --target desk.json --once";
-    std::fs::write(at.join("photos/a.png"), reduced(&photograph(&target, &poses(&target, 1)[0], 0), 8)).unwrap();
+    std::fs::write(
+        at.join("photos/a.png"),
+        reduced(&photograph(&target, &poses(&target, 1)[0], 0), 8),
+    )
+    .unwrap();
     let output = deltille(at, command).code(1).get_output().clone();
     assert!(said(&output).contains("hold the board in the middle"), "{}", said(&output));
 
@@ -137,7 +141,10 @@ fn pictures_of_the_size_that_most_have_count_and_each_counts_once() {
     let output = deltille(at, command).success().get_output().clone();
     assert!(said(&output).contains("\n4 views: projections are known"), "{}", said(&output));
     let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(stderr.contains("b0.png: left out: it has 512 × 384 pixels, most have 1024 × 768"), "{stderr}");
+    assert!(
+        stderr.contains("b0.png: left out: it has 512 × 384 pixels, most have 1024 × 768"),
+        "{stderr}"
+    );
     assert!(stderr.contains("c3: left out: it is the picture of b3 once more"), "{stderr}");
 }
 

@@ -2,7 +2,7 @@
 
 use deltille::artwork;
 use deltille::export::dsc::{self, Dialect};
-use deltille::export::mesh::TexturedMesh;
+use deltille::export::mesh::{Meshing, TexturedMesh};
 use deltille::export::{dxf, gltf, obj, pdf, png, sheet_file_name, stl, svg};
 use deltille::family::Family;
 use deltille::lattice::GridKind;
@@ -59,7 +59,7 @@ fn board_files(target: &Target) -> Vec<Artifact> {
 
 /// A solid in all its formats.
 fn solid_files(target: &Target, spec: &SolidSpec) -> Vec<Artifact> {
-    let mesh = TexturedMesh::new(target, Some(&family()), None).unwrap();
+    let mesh = TexturedMesh::new(target, Some(&family()), Meshing::default()).unwrap();
     let body = stl::to_bytes("i", &spec.polyhedron().triangles_mm());
     let cut = |drawing| dxf::text(&drawing);
     let more = [

@@ -1,4 +1,4 @@
-//! Texture atlas of a solid: all faces packed in rows on one sheet.
+//! Texture atlas of a solid, all faces packed in rows on one sheet, and that of a plate with a board.
 
 use std::f64::consts::PI;
 
@@ -7,12 +7,12 @@ use glam::DVec2;
 use super::board::draw_panel;
 use super::{ArtworkError, Sheet};
 use crate::family::Family;
-use crate::targets::{Face, Placement, Target};
+use crate::targets::{Face, Panel, Placement, Target};
 
 /// White between two faces, px: more than the filters of the first mipmap levels reach.
 const PADDING_PX: f64 = 16.0;
 
-/// All faces of a solid on one picture, which is the texture of its mesh.
+/// All faces of a solid, or the front of a plate, on one picture, which is the texture of its mesh.
 ///
 /// ```text
 ///    ╱╲‾‾╱╲‾‾╱      Faces stand alternately upright and upside down in rows. Their own margins and
@@ -26,7 +26,7 @@ pub struct Atlas {
     pub px_per_m: u32,
     /// Width and height of the texture, px.
     pub size_px: [u32; 2],
-    /// Vertices of each face on the sheet, mm, in the order of the faces.
+    /// Vertices of each face on the sheet, mm, in the order of the faces; of a plate two triangles.
     pub outlines_mm: Vec<[DVec2; 3]>,
 }
 
@@ -59,6 +59,32 @@ impl Atlas {
         }
         let sheet = Sheet { width_mm, height_mm, shapes };
         Ok(Atlas { sheet, px_per_m, size_px: size_px.as_uvec2().to_array(), outlines_mm })
+    }
+
+    /// Lays out the front of a plate: a board with its quiet zone.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_plate(
+        target: &Target,
+        panel: &Panel,
+        family: Option<&Family>,
+        px_per_m: u32,
+    ) -> Result<Atlas, ArtworkError> {
+        let mm_per_px = 1e3 / f64::from(px_per_m);
+        let padding = DVec2::splat(PADDING_PX * mm_per_px);
+        let [left, lower, right, upper] = panel.field_mm();
+        let low = DVec2::new(left, lower);
+        let plate = DVec2::new(right, upper) - low;
+        let size_px = ((plate + 2.0 * padding) / mm_per_px).ceil();
+        let DVec2 { x: width_mm, y: height_mm } = size_px * mm_per_px;
+        let placement = Placement { panel: panel.id, angle_rad: 0.0, origin_mm: padding - low };
+        let shapes = draw_panel(target, panel, &placement, family)?;
+        let [a, c] = [padding, padding + plate];
+        let [b, d] = [DVec2::new(c.x, a.y), DVec2::new(a.x, c.y)];
+        let sheet = Sheet { width_mm, height_mm, shapes };
+        let size_px = size_px.as_uvec2().to_array();
+        Ok(Atlas { sheet, px_per_m, size_px, outlines_mm: vec![[a, b, c], [a, c, d]] })
     }
 }
 

@@ -16,9 +16,9 @@ use std::str::FromStr;
 
 use super::dsc::{self, Dialect, DscError};
 use super::kind::Kind;
-use super::mesh::{MeshError, TexturedMesh};
+use super::mesh::{MeshError, Meshing, TexturedMesh};
 use super::staging::Staging;
-use super::{atomic, dxf, gltf, obj, pdf, png, sheet_file_name, stl, svg};
+use super::{atomic, dxf, gltf, obj, pdf, png, scene, sheet_file_name, stl, svg};
 use crate::limits::{Limits, ReadError};
 use deltille_core::artwork::{self, ArtworkError, CuttingError};
 use deltille_core::family::Family;
@@ -41,10 +41,18 @@ pub enum What {
     Png,
     /// `<name>.dsc`, the list of the reference detector or its fork.
     Dsc(Dialect),
-    /// `<name>.glb` of a solid.
+    /// `<name>.glb` of a solid, or of a plate with a board.
     Gltf,
-    /// `<name>.obj` of a solid, with its material and texture.
+    /// `<name>.obj`, with its material and texture.
     Obj,
+    /// `<name>.sdf`, a model for Gazebo, with the files of [`What::Obj`].
+    Sdf,
+    /// `<name>.urdf`, likewise for ROS.
+    Urdf,
+    /// `<name>.xml`, likewise for MuJoCo.
+    Mjcf,
+    /// `<name>.usda`, with its texture.
+    Usd,
     /// `<name>.stl`, the bare solid.
     Stl,
     /// `<name>-skeleton.stl` of a solid that has one.
@@ -58,7 +66,8 @@ pub enum What {
 /// A text that is nothing that can be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, stl, skeleton, panels or net"
+    "`{0}` is no format: json, pdf, svg, png, dsc, dsc-original, gltf, obj, sdf, urdf, mjcf, usd, stl, skeleton, panels \
+     or net"
 )]
 pub struct WhatError(String);
 
@@ -75,6 +84,10 @@ impl FromStr for What {
             "dsc-original" => Self::Dsc(Dialect::Original),
             "gltf" | "glb" => Self::Gltf,
             "obj" => Self::Obj,
+            "sdf" => Self::Sdf,
+            "urdf" => Self::Urdf,
+            "mjcf" => Self::Mjcf,
+            "usd" | "usda" => Self::Usd,
             "stl" => Self::Stl,
             "skeleton" => Self::Skeleton,
             "panels" => Self::Panels,
@@ -90,13 +103,13 @@ impl FromStr for What {
 pub struct Making {
     /// Resolution of PNG pages, dots per inch.
     pub dpi: f64,
-    /// Resolution of the texture of a mesh, dots per inch; where none is said that which tags need.
-    pub texture_dpi: Option<f64>,
+    /// How meshes are made.
+    pub mesh: Meshing,
 }
 
 impl Default for Making {
     fn default() -> Self {
-        Self { dpi: DEFAULT_DPI, texture_dpi: None }
+        Self { dpi: DEFAULT_DPI, mesh: Meshing::default() }
     }
 }
 
@@ -152,17 +165,8 @@ pub fn make(
         What::Json => named(".json", target.to_json().into_bytes()),
         What::Pdf | What::Svg | What::Png => drawn(target, family, what, making)?,
         What::Dsc(dialect) => named(".dsc", dsc::write(target, dialect)?.into_bytes()),
-        What::Gltf => {
-            let mesh = TexturedMesh::new(target, family, making.texture_dpi)?;
-            named(".glb", gltf::to_bytes(&mesh))
-        }
-        What::Obj => {
-            let mesh = TexturedMesh::new(target, family, making.texture_dpi)?;
-            vec![
-                (format!("{name}.obj"), obj::text(&mesh).into_bytes()),
-                (format!("{name}.mtl"), obj::material(&mesh).into_bytes()),
-                (obj::texture_name(name), mesh.texture_png),
-            ]
+        What::Gltf | What::Obj | What::Sdf | What::Urdf | What::Mjcf | What::Usd => {
+            of_mesh(&TexturedMesh::new(target, family, making.mesh)?, what)
         }
         What::Stl => {
             named(".stl", stl::to_bytes(name, &solid(target)?.polyhedron().triangles_mm()))
@@ -180,6 +184,27 @@ pub fn make(
         }
         What::Net => named("-net.dxf", dxf::text(&artwork::net_to_cut(target)?).into_bytes()),
     })
+}
+
+/// The files of a mesh in one format: [`What::Gltf`], [`What::Obj`], or a scene.
+///
+/// # Panics
+/// For what is not made of a mesh.
+pub fn of_mesh(mesh: &TexturedMesh, what: What) -> Files {
+    let name = &mesh.name;
+    let named = |end: &str, text: String| (format!("{name}{end}"), text.into_bytes());
+    let texture = || (obj::texture_name(name), mesh.texture_png.clone());
+    let scene = match what {
+        What::Gltf => return vec![(format!("{name}.glb"), gltf::to_bytes(mesh))],
+        What::Usd => return vec![named(".usda", scene::usda(mesh)), texture()],
+        What::Obj => None,
+        What::Sdf => Some(named(".sdf", scene::sdf(name))),
+        What::Urdf => Some(named(".urdf", scene::urdf(name))),
+        What::Mjcf => Some(named(".xml", scene::mjcf(name))),
+        _ => panic!("{what:?} is not made of a mesh"),
+    };
+    let parts = [named(".obj", obj::text(mesh)), named(".mtl", obj::material(mesh)), texture()];
+    scene.into_iter().chain(parts).collect()
 }
 
 fn solid(target: &Target) -> Result<&SolidSpec, MakeError> {

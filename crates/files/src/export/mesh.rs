@@ -1,4 +1,4 @@
-//! The textured mesh of a solid, from which glTF, OBJ and STL are written.
+//! The textured mesh of a solid, or of a plate with a board, from which glTF, OBJ and scenes for simulators are written.
 
 use std::io;
 
@@ -7,21 +7,37 @@ use glam::{DVec2, DVec3};
 use super::{GENERATOR, png};
 use deltille_core::artwork::{ArtworkError, Atlas};
 use deltille_core::family::Family;
-use deltille_core::targets::{Target, TargetError, TargetSpec};
+use deltille_core::targets::{Panel, Target, TargetError, TargetSpec};
 
-/// Least texels along the edge of a cell of a tag, so that a viewer sees it sharp at close range.
+/// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
+/// close range.
 pub const TEXELS_PER_BIT: f64 = 20.0;
+
+/// Least texels along the edge of a cell: tags are read from 2 px a cell on, and a camera may see no texel sharp.
+pub const LEAST_TEXELS_PER_BIT: f64 = 4.0;
 
 /// Longest side of a texture, px, that graphics hardware of the last ten years accepts.
 pub const MAX_TEXTURE_PX: u32 = 16_384;
+
+/// Cells along the edge of a tile without a tag, as if it had a small one.
+pub const UNTAGGED_CELLS: f64 = 8.0;
+
+/// Triangles of a plate: the front in two, and as many for each of the other five sides.
+pub const PLATE_TRIANGLES: usize = 12;
+
+/// Thickness of a plate, mm, unless another is asked for.
+pub const PLATE_MM: f64 = 3.0;
 
 /// Why a target has no mesh.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// The target is flat, or known by its corners only.
-    #[error("{0} was not made as a solid: it has no mesh")]
-    NotSolid(String),
+    /// The target is known by its corners only, or is a sheet of tags.
+    #[error("{0} was made neither as a board nor as a solid: it has no mesh")]
+    NoShape(String),
+    /// Several boards that lie about have no place beside each other.
+    #[error("{0} has {1} boards, of which each is a mesh of its own: make one at a time")]
+    SeveralBoards(String, usize),
     /// The texture would be too large.
     #[error(
         "the texture would have {width} x {height} px, more than {MAX_TEXTURE_PX} a side: {instead}"
@@ -36,17 +52,18 @@ pub enum MeshError {
     },
     /// The requested resolution leaves the tags unsharp.
     #[error(
-        "{dpi} dpi are {texels:.1} texels per tag bit, at least {TEXELS_PER_BIT} are \
-         needed: give {least} or more"
+        "the texture would have {texels:.1} texels per tag bit, at least {LEAST_TEXELS_PER_BIT} are needed: give \
+         {least} or more"
     )]
     Unsharp {
-        /// Resolution asked for, dots per inch.
-        dpi: f64,
         /// Texels per bit.
         texels: f64,
-        /// Least sufficient resolution, dots per inch.
-        least: u32,
+        /// Least sufficient resolution, in the unit of what was asked for.
+        least: String,
     },
+    /// A thickness that no plate has.
+    #[error("a plate cannot be {0} mm thick: give 0.1 to 1000 mm")]
+    Thickness(f64),
     /// The faces cannot be made.
     #[error(transparent)]
     Target(#[from] TargetError),
@@ -56,6 +73,34 @@ pub enum MeshError {
     /// The texture cannot be encoded.
     #[error("cannot encode the texture: {0}")]
     Encode(#[from] io::Error),
+}
+
+/// How finely a texture is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Resolution {
+    /// By [`TEXELS_PER_BIT`], or as finely as [`MAX_TEXTURE_PX`] permits.
+    #[default]
+    Usual,
+    /// Dots per inch on the target.
+    Dpi(f64),
+    /// No side of the texture is longer than this, px.
+    Side(u32),
+}
+
+/// How a mesh is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Meshing {
+    /// Of the texture.
+    pub resolution: Resolution,
+    /// Thickness of the plate of a board, mm.
+    pub plate_mm: f64,
+}
+
+impl Default for Meshing {
+    fn default() -> Self {
+        Self { resolution: Resolution::Usual, plate_mm: PLATE_MM }
+    }
 }
 
 /// Specification and family of a target as JSON, for the metadata of its mesh.
@@ -74,17 +119,19 @@ pub fn extras(target: &Target) -> serde_json::Value {
 pub struct TexturedMesh {
     /// Name of the target.
     pub name: String,
-    /// The faces, in the order of the panels.
+    /// The triangles: the faces of a solid in the order of its panels, or those of a plate, the front first.
     pub faces: Vec<MeshFace>,
     /// The texture as a grey 8-bit PNG file.
     pub texture_png: Vec<u8>,
     /// Width and height of the texture, px.
     pub texture_px: [u32; 2],
+    /// Texels along the edge of the smallest cell of a tag; `None` where there are no tags.
+    pub texels_per_bit: Option<f64>,
     /// Specification and family of the target, for the metadata of the file.
     pub extras: serde_json::Value,
 }
 
-/// A triangular face of the solid.
+/// A triangle of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MeshFace {
@@ -96,63 +143,188 @@ pub struct MeshFace {
     pub uv: [DVec2; 3],
 }
 
+impl MeshFace {
+    fn new(vertices_mm: [DVec3; 3], uv: [DVec2; 3]) -> Self {
+        let [a, b, c] = vertices_mm;
+        Self { vertices_mm, normal: (b - a).cross(c - a).normalize(), uv }
+    }
+}
+
 impl TexturedMesh {
-    /// Makes the mesh of a solid. `dpi` is the resolution of the texture in dots per inch on the
-    /// solid; by default it is that of [`TEXELS_PER_BIT`].
+    /// Makes the mesh of a solid, or of a plate with a board, its quiet zone around it, whose front is the board's plane.
     ///
     /// # Errors
-    /// When the target is not a solid, its family is missing, or the texture would be too large or
+    /// When the target is neither, or is several boards, its family is missing, or the texture would be too large, or
     /// too coarse for the tags.
     pub fn new(
         target: &Target,
         family: Option<&Family>,
-        dpi: Option<f64>,
+        meshing: Meshing,
     ) -> Result<Self, MeshError> {
-        let TargetSpec::Solid(spec) = &target.spec else {
-            return Err(MeshError::NotSolid(target.name.to_string()));
-        };
-        let faces = spec.faces()?;
-        let rows = family.map_or(0, |family| family.dimension().rows());
-        let bits = f64::from(rows) + 3.0 * spec.tags.border_bits;
-        let finest = faces.iter().map(|face| face.tile_edge_mm).fold(f64::INFINITY, f64::min);
-        let least_per_m = 1e3 * TEXELS_PER_BIT * bits / finest;
-        let per_m = dpi.map_or(least_per_m, |dpi| dpi / 0.0254);
-        // A resolution in whole dots per inch may be the least one, rounded.
-        if per_m < least_per_m * (1.0 - 1e-9) {
-            let texels = TEXELS_PER_BIT * per_m / least_per_m;
-            let least = (least_per_m * 0.0254).ceil() as u32;
-            return Err(MeshError::Unsharp { dpi: dpi.unwrap_or_default(), texels, least });
-        }
-        let px_per_m = per_m.ceil().min(f64::from(u32::MAX)) as u32;
-        let atlas = Atlas::new(target, &faces, family, px_per_m)?;
-        let [width, height] = atlas.size_px;
-        if width.max(height) > MAX_TEXTURE_PX {
-            let instead = match dpi {
-                Some(_) => "choose a lower resolution".to_owned(),
-                None => "take fewer `SolidSpec::tiles`, or a family of fewer bits".to_owned(),
-            };
-            return Err(MeshError::Texture { width, height, instead });
-        }
-        let solid = spec.polyhedron();
-        let size_mm = DVec2::new(atlas.sheet.width_mm, atlas.sheet.height_mm);
-        let mesh_face = |index: usize| {
-            let vertices_mm = solid.triangle_mm(index);
-            let [a, b, c] = vertices_mm;
-            MeshFace {
-                vertices_mm,
-                normal: (b - a).cross(c - a).normalize(),
-                uv: atlas.outlines_mm[index].map(|corner| {
-                    let part = corner / size_mm;
-                    DVec2::new(part.x, 1.0 - part.y)
-                }),
+        let name = || target.name.to_string();
+        let plate = match (&target.spec, target.panels.as_slice()) {
+            (TargetSpec::Solid(_), _) => None,
+            (TargetSpec::Board(_), [panel]) => Some(panel),
+            (TargetSpec::Board(_), panels) => {
+                return Err(MeshError::SeveralBoards(name(), panels.len()));
             }
+            _ => return Err(MeshError::NoShape(name())),
         };
+        if !(0.1..=1000.0).contains(&meshing.plate_mm) {
+            return Err(MeshError::Thickness(meshing.plate_mm));
+        }
+        let atlas = |px_per_m: u32| match (&target.spec, plate) {
+            (_, Some(panel)) => Ok(Atlas::of_plate(target, panel, family, px_per_m)?),
+            (TargetSpec::Solid(spec), None) => {
+                Ok(Atlas::new(target, &spec.faces()?, family, px_per_m)?)
+            }
+            _ => Err(MeshError::NoShape(name())),
+        };
+        let cell_mm = smallest_cell_mm(target, family);
+        let atlas = drawn(atlas, meshing.resolution, cell_mm)?;
+        let size_mm = DVec2::new(atlas.sheet.width_mm, atlas.sheet.height_mm);
+        let front = atlas.outlines_mm.iter().map(|outline| {
+            outline.map(|corner| {
+                let part = corner / size_mm;
+                DVec2::new(part.x, 1.0 - part.y)
+            })
+        });
+        let faces = match (&target.spec, plate) {
+            (TargetSpec::Solid(spec), _) => {
+                let solid = spec.polyhedron();
+                front.enumerate().map(|(i, uv)| MeshFace::new(solid.triangle_mm(i), uv)).collect()
+            }
+            (_, Some(panel)) => plate_faces(panel, meshing.plate_mm, front.collect(), &atlas),
+            _ => Vec::new(),
+        };
+        let px_per_m = f64::from(atlas.px_per_m);
         Ok(Self {
-            name: target.name.to_string(),
-            faces: (0..faces.len()).map(mesh_face).collect(),
-            texture_png: png::to_bytes(&atlas.sheet, &target.name, f64::from(px_per_m) * 0.0254)?,
+            name: name(),
+            faces,
+            texture_png: png::to_bytes(&atlas.sheet, &target.name, px_per_m * 0.0254)?,
             texture_px: atlas.size_px,
+            texels_per_bit: target.family.is_some().then_some(px_per_m * cell_mm / 1e3),
             extras: extras(target),
         })
     }
 }
+
+/// Edge of the smallest cell of a tag, mm, or what would be one.
+fn smallest_cell_mm(target: &Target, family: Option<&Family>) -> f64 {
+    let cells = |panel: &Panel| match (family, panel.border_bits) {
+        (Some(family), Some(_)) => family.cells().width(panel.tag_inset_bits()),
+        _ => UNTAGGED_CELLS,
+    };
+    let edges = target.panels.iter().map(|panel| panel.edge_mm / cells(panel));
+    edges.fold(f64::INFINITY, f64::min)
+}
+
+/// The atlas at the resolution that was asked for.
+fn drawn(
+    atlas: impl Fn(u32) -> Result<Atlas, MeshError>,
+    resolution: Resolution,
+    cell_mm: f64,
+) -> Result<Atlas, MeshError> {
+    // Pixels per metre that so many texels a cell are.
+    let per_m = |texels: f64| 1e3 * texels / cell_mm;
+    let whole = |per_m: f64| per_m.ceil().clamp(1.0, u32::MAX.into()) as u32;
+    let atlas = match resolution {
+        Resolution::Usual => {
+            let usual = atlas(whole(per_m(TEXELS_PER_BIT)))?;
+            match usual.size_px.into_iter().max() {
+                Some(side) if side > MAX_TEXTURE_PX => within(usual, MAX_TEXTURE_PX, &atlas)?,
+                _ => usual,
+            }
+        }
+        Resolution::Dpi(dpi) => atlas(whole(dpi / 0.0254))?,
+        Resolution::Side(side) => {
+            let usual = atlas(whole(per_m(TEXELS_PER_BIT)))?;
+            within(usual, side.min(MAX_TEXTURE_PX), &atlas)?
+        }
+    };
+    let [width, height] = atlas.size_px;
+    // A resolution in whole dots per inch may be the least one, rounded.
+    let texels = f64::from(atlas.px_per_m) * cell_mm / 1e3;
+    if texels < LEAST_TEXELS_PER_BIT * (1.0 - 1e-9) {
+        let more = LEAST_TEXELS_PER_BIT / texels;
+        let least = match resolution {
+            Resolution::Side(_) | Resolution::Usual => {
+                format!("{:.0} px", (f64::from(width.max(height)) * more).ceil())
+            }
+            Resolution::Dpi(_) => {
+                format!("{:.0} dpi", (per_m(LEAST_TEXELS_PER_BIT) * 0.0254).ceil())
+            }
+        };
+        return Err(match resolution {
+            Resolution::Usual => too_large(width, height, TOO_MANY_CELLS),
+            _ => MeshError::Unsharp { texels, least },
+        });
+    }
+    match width.max(height) > MAX_TEXTURE_PX {
+        true => Err(too_large(width, height, "choose a lower resolution")),
+        false => Ok(atlas),
+    }
+}
+
+const TOO_MANY_CELLS: &str =
+    "its tags would be unsharp in a smaller one; take fewer tiles, or a family of fewer bits";
+
+fn too_large(width: u32, height: u32, instead: &str) -> MeshError {
+    MeshError::Texture { width, height, instead: instead.to_owned() }
+}
+
+/// The finest atlas whose sides have no more than `side` px. Space between faces is in px, so that sizes are not quite
+/// in proportion to the resolution.
+fn within(
+    first: Atlas,
+    side: u32,
+    atlas: impl Fn(u32) -> Result<Atlas, MeshError>,
+) -> Result<Atlas, MeshError> {
+    let longest = |atlas: &Atlas| atlas.size_px.into_iter().max().unwrap_or(1);
+    let mut found = first;
+    for _ in 0..MOST_ATTEMPTS {
+        let is = longest(&found);
+        if is <= side && f64::from(is) > CLOSE * f64::from(side) {
+            break;
+        }
+        let part = CLOSE.midpoint(1.0) * f64::from(side) / f64::from(is);
+        found = atlas((f64::from(found.px_per_m) * part).max(1.0) as u32)?;
+    }
+    Ok(found)
+}
+
+/// A texture that is so much of the longest side is as large as can be.
+const CLOSE: f64 = 0.99;
+
+/// Each attempt is nearer by the part that spaces are of the whole.
+const MOST_ATTEMPTS: usize = 12;
+
+/// The triangles of a plate: the front with its texture, the sides and the back in the colour of the texture's border.
+fn plate_faces(
+    panel: &Panel,
+    thickness_mm: f64,
+    front: Vec<[DVec2; 3]>,
+    atlas: &Atlas,
+) -> Vec<MeshFace> {
+    let [left, lower, right, upper] = panel.field_mm();
+    let around = [(left, lower), (right, lower), (right, upper), (left, upper)];
+    let before = around.map(|(x, y)| panel.pose.target_from_panel(DVec2::new(x, y)));
+    let behind = before.map(|place| place - thickness_mm * panel.pose.matrix().z_axis);
+    let [a, b, c, d] = before;
+    let white = DVec2::splat(BLANK_PX) / DVec2::from(atlas.size_px.map(f64::from));
+    let two = |[p, q, r, s]: [DVec3; 4]| [[p, q, r], [p, r, s]];
+    let sides = (0..4).map(|i| {
+        let next = (i + 1) % 4;
+        [before[next], before[i], behind[i], behind[next]]
+    });
+    let [e, f, g, h] = behind;
+    let others = sides.chain([[h, g, f, e]]).flat_map(two);
+    let textured = [[a, b, c], [a, c, d]].into_iter().zip(front);
+    textured
+        .map(|(vertices_mm, uv)| MeshFace::new(vertices_mm, uv))
+        .chain(others.map(|vertices_mm| MeshFace::new(vertices_mm, [white; 3])))
+        .collect()
+}
+
+/// A place in the blank border of a texture, px from its corner.
+const BLANK_PX: f64 = 2.0;

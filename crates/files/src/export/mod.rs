@@ -37,6 +37,8 @@ pub mod png;
 pub mod pose;
 pub mod rig;
 pub mod saved;
+#[cfg(feature = "meshes")]
+pub mod scene;
 pub mod staging;
 pub mod stl;
 #[cfg(feature = "print")]

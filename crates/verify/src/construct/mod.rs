@@ -15,6 +15,7 @@ mod pdf_content;
 mod png;
 mod stl;
 mod svg;
+pub(crate) mod usda;
 
 use std::path::Path;
 
@@ -27,6 +28,7 @@ use super::{Artifact, DocumentError, Finding, Format, PageFinding};
 use deltille_core::artwork::subject;
 use deltille_core::targets::Target;
 use deltille_files::export::mesh::extras;
+use deltille_files::export::scene;
 
 /// Problem of marks outside the page: some viewers show more than the page, and then these as well.
 const OFF_PAGE: &str = "a mark that reaches over the edge of the page";
@@ -179,16 +181,29 @@ pub(super) fn check(
     if format == Format::Obj {
         return obj::check(reader, path, &bytes, &words).map(|(found, parts)| (found.0, parts));
     }
+    if format == Format::Usda {
+        return usda::check(reader, path, &bytes, &words).map(|(found, parts)| (found.0, parts));
+    }
     let found = reader.run(path, move || match format {
         Format::Svg => svg::check(&bytes, &words, &limits),
         Format::Pdf => pdf::check(&bytes, &words, &limits),
         Format::Png => png::check(&bytes, &words.title, &limits),
         Format::Glb => glb::check(&bytes, &words, &limits),
         Format::Stl => stl::check(&bytes, &words.title, &limits),
+        Format::Sdf => model(&bytes, &scene::sdf(&words.title)),
+        Format::Urdf => model(&bytes, &scene::urdf(&words.title)),
+        Format::Mjcf => model(&bytes, &scene::mjcf(&words.title)),
         // Their readers know nothing but what is written.
-        Format::Obj | Format::Dsc | Format::Dxf => Ok(Findings::default()),
+        Format::Obj | Format::Usda | Format::Dsc | Format::Dxf => Ok(Findings::default()),
     })?;
     Ok((found.0, Vec::new()))
+}
+
+/// Inspects a model that puts the mesh of an OBJ in its place and does nothing else.
+fn model(bytes: &[u8], stated: &str) -> Result<Findings, String> {
+    let mut found = Findings::default();
+    usda::same_lines(text(bytes)?, stated, str::to_owned, &mut found);
+    Ok(found)
 }
 
 /// The content of a text file.

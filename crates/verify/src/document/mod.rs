@@ -46,11 +46,19 @@ pub enum Format {
     Dsc,
     /// Drawing for a cutter.
     Dxf,
+    /// Model for Gazebo.
+    Sdf,
+    /// Model for ROS.
+    Urdf,
+    /// Model for MuJoCo.
+    Mjcf,
+    /// Universal Scene Description, as text.
+    Usda,
 }
 
 impl Format {
     /// All formats with the extensions of their files.
-    pub const ALL: [(Self, &str); 8] = [
+    pub const ALL: [(Self, &str); 12] = [
         (Self::Pdf, "pdf"),
         (Self::Svg, "svg"),
         (Self::Png, "png"),
@@ -59,6 +67,10 @@ impl Format {
         (Self::Stl, "stl"),
         (Self::Dsc, "dsc"),
         (Self::Dxf, "dxf"),
+        (Self::Sdf, "sdf"),
+        (Self::Urdf, "urdf"),
+        (Self::Mjcf, "xml"),
+        (Self::Usda, "usda"),
     ];
 
     /// The format by the extension of a file name; `None` for other extensions.

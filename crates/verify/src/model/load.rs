@@ -1,5 +1,5 @@
 //! Textured meshes, `.glb` and `.obj`, loaded through the gltf and tobj crates, as other programs
-//! load them.
+//! load them, and the lists of a `.usda`.
 //!
 //! Whatever the format, positions are returned in millimetres, and texture coordinates with the
 //! origin in the upper left corner. The files were inspected before, see [`construct`], so that
@@ -7,6 +7,7 @@
 //!
 //! [`construct`]: crate::construct
 
+use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -14,8 +15,9 @@ use glam::{DMat4, DVec2, DVec3, Vec2, Vec3};
 use image::ImageDecoder as _;
 
 use super::{Model, Triangle};
+use crate::construct::usda::list;
 use crate::reader::Reader;
-use crate::{Artifact, DocumentError};
+use crate::{Artifact, DocumentError, Format};
 use deltille_core::raster::Gray;
 use deltille_files::limits::Limits;
 
@@ -31,11 +33,12 @@ pub(crate) fn load(
     parts: Vec<Artifact>,
 ) -> Result<Model, DocumentError> {
     let unreadable = |problem: String| DocumentError::unreadable(path, problem);
-    let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+    let format = Format::of(path);
     let (bytes, limits) = (reader.read(path)?, reader.limits);
-    let model = reader.run(path, move || match is_obj {
-        true => obj(&bytes, &parts, &limits),
-        false => glb(&bytes, &limits),
+    let model = reader.run(path, move || match format {
+        Some(Format::Obj) => obj(&bytes, &parts, &limits),
+        Some(Format::Usda) => usda(&bytes, &parts, &limits),
+        _ => glb(&bytes, &limits),
     })?;
     if model.triangles.is_empty() {
         return Err(unreadable("it has no triangles".to_owned()));
@@ -129,6 +132,40 @@ fn obj(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, Strin
         texture = material.and_then(|material| material.diffuse_texture.clone()).or(texture);
     }
     let texture = texture.and_then(|name| part(Path::new(&name))).ok_or("it has no texture")?;
+    Ok(Model { triangles, texture: image(texture.bytes(), limits)? })
+}
+
+/// Loads a `.usda`, which is in metres, with its texture.
+fn usda(bytes: &[u8], parts: &[Artifact], limits: &Limits) -> Result<Model, String> {
+    let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
+    let mut lists: BTreeMap<&str, Vec<f64>> = text.lines().filter_map(list).collect();
+    let mut take = |name: &str| lists.remove(name).ok_or_else(|| format!("it has no {name}"));
+    let points = |values: Vec<f64>| -> Vec<DVec3> {
+        values.as_chunks::<3>().0.iter().copied().map(DVec3::from).collect()
+    };
+    let metres = points(take("point3f[] points")?);
+    let normals = points(take("normal3f[] normals")?);
+    let extent = points(take("float3[] extent")?);
+    let uvs = take("texCoord2f[] primvars:st")?;
+    // USD counts v upwards from the lower edge of the texture.
+    let uvs: Vec<DVec2> =
+        uvs.as_chunks::<2>().0.iter().map(|&[u, v]| DVec2::new(u, 1.0 - v)).collect();
+    if take("int[] faceVertexCounts")?.iter().any(|&count| count != 3.0) {
+        return Err("a face that is no triangle".to_owned());
+    }
+    let indices: Vec<u32> =
+        take("int[] faceVertexIndices")?.into_iter().map(|index| index as u32).collect();
+    let [least, most] = [DVec3::min, DVec3::max]
+        .map(|pick| metres.iter().copied().reduce(pick).unwrap_or_default());
+    if extent.len() != 2 || extent[0].distance(least) + extent[1].distance(most) > 1e-6 {
+        return Err("an extent that is not that of the points".to_owned());
+    }
+    let positions: Vec<DVec3> = metres.into_iter().map(|place| place * 1e3).collect();
+    // Normals and texture coordinates are of the corners of faces, one after the other.
+    let corners: Vec<u32> = (0..indices.len() as u32).collect();
+    let mut triangles = Vec::new();
+    add(&mut triangles, &indices, &positions, (&corners, &normals), (&corners, &uvs))?;
+    let texture = parts.first().ok_or("it has no texture")?;
     Ok(Model { triangles, texture: image(texture.bytes(), limits)? })
 }
 

@@ -19,7 +19,7 @@ use std::sync::LazyLock;
 
 use deltille::artwork;
 use deltille::export::dsc::{self, Dialect};
-use deltille::export::mesh::TexturedMesh;
+use deltille::export::mesh::{Meshing, TexturedMesh};
 use deltille::export::{dxf, gltf, obj as obj_writer, pdf as pdf_writer, png as png_writer};
 use deltille::export::{stl as stl_writer, svg as svg_writer};
 use deltille::family::Family;
@@ -83,7 +83,7 @@ static SOLID: LazyLock<Artifacts> = LazyLock::new(|| {
     artifacts.draw();
     let (target, write) =
         (&artifacts.target, |name: &str, bytes: &[u8]| artifacts.write(name, bytes));
-    let mesh = TexturedMesh::new(target, Some(&artifacts.family), None).unwrap();
+    let mesh = TexturedMesh::new(target, Some(&artifacts.family), Meshing::default()).unwrap();
     write("t.glb", &gltf::to_bytes(&mesh));
     write("t.obj", obj_writer::text(&mesh).as_bytes());
     write("t.mtl", obj_writer::material(&mesh).as_bytes());

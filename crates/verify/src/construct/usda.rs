@@ -1,0 +1,98 @@
+//! The lines of a USD that this program writes: one mesh of triangles with one texture.
+
+use std::path::Path;
+
+use super::{Findings, Words, decimal, png, text};
+use crate::reader::Reader;
+use crate::{Artifact, DocumentError};
+use deltille_files::export::obj::texture_name;
+use deltille_files::export::scene::{USD_LISTS, usda_frame};
+
+/// Inspects a USD and its texture; returns the findings, and the texture if nothing was refused.
+///
+/// # Errors
+///
+/// One of the files cannot be read, is no text or no PNG, or exceeds the limits.
+pub(super) fn check(
+    reader: &Reader,
+    path: &Path,
+    bytes: &[u8],
+    words: &Words,
+) -> Result<(Findings, Vec<Artifact>), DocumentError> {
+    let unreadable = |problem: String| DocumentError::unreadable(path, problem);
+    let text = text(bytes).map_err(unreadable)?;
+    let mut found = Findings::default();
+    same_lines(text, &usda_frame(&words.title), list_of, &mut found);
+    if found.refuse() {
+        return Ok((found, Vec::new()));
+    }
+    let texture = texture_name(&words.title);
+    let file = path.with_file_name(&texture);
+    let picture = reader.read(&file)?;
+    let of_texture = png::check(&picture, &words.title, &reader.limits)
+        .map_err(|problem| DocumentError::unreadable(&file, problem))?;
+    found.add_of(&texture, of_texture);
+    Ok((found, vec![Artifact::of(texture, picture)]))
+}
+
+/// Adds the first line that is not that of `stated`, after `plain` was taken of both; the versions of the program that
+/// wrote them may differ.
+pub(super) fn same_lines(
+    text: &str,
+    stated: &str,
+    plain: impl Fn(&str) -> String,
+    found: &mut Findings,
+) {
+    let plain = |line: &str| plain(&without_version(line));
+    let mut lines = text.lines().map(plain);
+    let mut stated = stated.lines().map(plain);
+    let mut number = 0;
+    loop {
+        number += 1;
+        match (lines.next(), stated.next()) {
+            (None, None) => return,
+            (line, stated) if line == stated => {}
+            (line, _) => {
+                let line = line.unwrap_or_else(|| "its end".to_owned());
+                let start: String = line.trim().chars().take(40).collect();
+                found.add(format!("line {number}"), format!("`{start}`"));
+                return;
+            }
+        }
+    }
+}
+
+/// A line without the numbers of a version after the name of this program.
+fn without_version(line: &str) -> String {
+    let Some((before, after)) = line.split_once("deltille ") else { return line.to_owned() };
+    let version = |c: char| c.is_ascii_digit() || c == '.';
+    format!("{before}deltille {}", after.trim_start_matches(version))
+}
+
+/// A line without the numbers of its list, if it is one whose every number all readers take alike.
+fn list_of(line: &str) -> String {
+    let Some(_) = list(line) else { return line.to_owned() };
+    let [from, to] = brackets(line);
+    format!("{}{}", &line[..from], &line[to..])
+}
+
+/// Where the brackets of a list begin and end.
+fn brackets(line: &str) -> [usize; 2] {
+    let from = line.find("= [").map_or(0, |at| at + 2);
+    let to = line.rfind(']').map_or(from, |at| at + 1);
+    [from, to.max(from)]
+}
+
+/// The list that a line has: its name and its numbers.
+pub(crate) fn list(line: &str) -> Option<(&'static str, Vec<f64>)> {
+    let trimmed = line.trim_start();
+    let name = USD_LISTS.into_iter().find(|name| trimmed.starts_with(&format!("{name} = [")))?;
+    let [from, to] = brackets(line);
+    let inside = line[from..to].strip_prefix('[')?.strip_suffix(']')?;
+    let numbers = inside.split(',').map(|word| decimal(word.trim().trim_matches(['(', ')'])));
+    let numbers: Option<Vec<f64>> = match inside.is_empty() {
+        true => Some(Vec::new()),
+        false => numbers.collect(),
+    };
+    Some((name, numbers?))
+}

@@ -1,0 +1,24 @@
+//! Verification of models for simulators that name the mesh in an OBJ: the model must put it where the target is, and
+//! the OBJ must be that of the target.
+
+use std::path::Path;
+
+use super::construct;
+use super::reader::Reader;
+use super::{Format, Verdict, Verifier, VerifyError};
+
+/// Compares a `.sdf`, `.urdf` or MuJoCo's `.xml`, and the mesh that it shows, with the target.
+pub(super) fn verify(
+    verifier: &Verifier,
+    reader: &Reader,
+    path: &Path,
+    format: Format,
+) -> Result<Verdict, VerifyError> {
+    let (refused, _) = construct::check(reader, path, format, verifier.target)?;
+    if construct::refuse(&refused) {
+        return Ok(Verdict::new(path, format, refused));
+    }
+    let mesh = path.with_file_name(format!("{}.obj", verifier.target.name));
+    let of_mesh = verifier.verify_by(reader, &mesh)?;
+    Ok(Verdict { artifact: super::file_name(path), format, ..of_mesh })
+}

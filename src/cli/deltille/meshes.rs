@@ -1,0 +1,136 @@
+//! Options of all commands that make meshes, and the files of these.
+
+#![allow(rustdoc::invalid_html_tags)] // The comments on options are the help of the program, too.
+
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
+use anyhow::{Context, anyhow, ensure};
+
+use super::files::{File, bytes_file};
+use crate::cli::values::{number, whole};
+use crate::export::artifacts::{What, of_mesh};
+use crate::export::mesh::{MAX_TEXTURE_PX, Meshing, Resolution, TexturedMesh};
+use crate::family::Family;
+use crate::targets::Target;
+
+/// Heading of these options.
+pub const MESHES: &str = "Meshes and models for simulators";
+
+/// Sides of a texture, px.
+const SIDE_PX: RangeInclusive<u32> = 64..=MAX_TEXTURE_PX;
+
+/// Which meshes are written.
+#[derive(clap::Args, Clone, Copy)]
+#[command(next_help_heading = MESHES)]
+pub struct Meshes {
+    /// Write <name>.glb, the textured mesh as glTF 2.0 (metres)
+    #[arg(long)]
+    gltf: bool,
+    /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres)
+    #[arg(long)]
+    obj: bool,
+    /// Write <name>.sdf, a static model for Gazebo, with the files of --obj
+    #[arg(long)]
+    sdf: bool,
+    /// Write <name>.urdf, a link for ROS, with the files of --obj
+    #[arg(long)]
+    urdf: bool,
+    /// Write <name>.xml, a body for MuJoCo, with the files of --obj
+    #[arg(long)]
+    mjcf: bool,
+    /// Write <name>.usda, for Isaac Sim, Omniverse or Blender, with its texture (metres)
+    #[arg(long)]
+    usd: bool,
+    /// Longest side of the texture, px; at least 4 px are needed for a bit of a tag [default: 20 px
+    /// for a bit, or as many as 16384 px take]
+    #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
+    texture: Option<u32>,
+    /// Resolution of the texture, dots per inch, instead of its size
+    #[arg(long, value_name = "DPI", allow_negative_numbers = true, conflicts_with = "texture",
+          value_parser = number(1.0..=1e5))]
+    texture_dpi: Option<f64>,
+}
+
+impl Meshes {
+    /// Whether any is asked for.
+    pub fn is_any(&self) -> bool {
+        self.gltf || self.obj || self.sdf || self.urdf || self.mjcf || self.usd
+    }
+
+    /// These, and the glTF.
+    pub fn with_gltf(self) -> Self {
+        Self { gltf: true, ..self }
+    }
+
+    /// Whether an OBJ is among the files.
+    pub fn has_obj(&self) -> bool {
+        self.obj || self.sdf || self.urdf || self.mjcf
+    }
+
+    /// Refuses options of a texture that is not made.
+    pub fn check_use(&self) -> anyhow::Result<()> {
+        let textures =
+            [("--texture", self.texture.is_some()), ("--texture-dpi", self.texture_dpi.is_some())];
+        let given = textures.into_iter().find(|(_, given)| *given && !self.is_any());
+        given.map_or(Ok(()), |(option, _)| {
+            Err(anyhow!("{option}: it says nothing without a mesh: add --gltf, or leave it out"))
+        })
+    }
+
+    /// The files that are asked for, and a line on their texture.
+    pub fn files(
+        &self,
+        target: &Target,
+        family: Option<&Family>,
+        plate_mm: Option<f64>,
+    ) -> anyhow::Result<(Vec<File>, Option<String>)> {
+        if !self.is_any() {
+            return Ok((Vec::new(), None));
+        }
+        let mut meshing = Meshing::default();
+        meshing.plate_mm = plate_mm.unwrap_or(meshing.plate_mm);
+        let option = match (self.texture, self.texture_dpi) {
+            (Some(side), _) => {
+                meshing.resolution = Resolution::Side(side);
+                Some("--texture")
+            }
+            (None, Some(dpi)) => {
+                meshing.resolution = Resolution::Dpi(dpi);
+                Some("--texture-dpi")
+            }
+            (None, None) => None,
+        };
+        let mesh = TexturedMesh::new(target, family, meshing);
+        let mesh = match option {
+            Some(option) => mesh.context(option)?,
+            None => mesh?,
+        };
+        let asked = [
+            (self.gltf, What::Gltf),
+            (self.obj, What::Obj),
+            (self.sdf, What::Sdf),
+            (self.urdf, What::Urdf),
+            (self.mjcf, What::Mjcf),
+            (self.usd, What::Usd),
+        ];
+        let asked = asked.into_iter().filter(|(asked, _)| *asked);
+        // Scenes have the files of the OBJ in common.
+        let files: BTreeMap<String, Vec<u8>> =
+            asked.flat_map(|(_, what)| of_mesh(&mesh, what)).collect();
+        let files = files.into_iter().map(|(name, bytes)| bytes_file(name, bytes)).collect();
+        let [width, height] = mesh.texture_px;
+        let texels = mesh.texels_per_bit;
+        let texels = texels.map_or(String::new(), |px| format!(", {px:.1} px for a bit of a tag"));
+        Ok((files, Some(format!("texture: {width} × {height} px{texels}"))))
+    }
+}
+
+/// Refuses a thickness of a plate that is not made.
+pub fn check_plate(plate_mm: Option<f64>, meshes: &Meshes) -> anyhow::Result<()> {
+    ensure!(
+        plate_mm.is_none() || meshes.is_any(),
+        "--plate: it says nothing without a mesh: add --gltf, or leave it out"
+    );
+    Ok(())
+}
