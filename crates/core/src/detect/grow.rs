@@ -24,7 +24,7 @@ use super::parts::join;
 use super::rectified::Rectified;
 use super::saddles::{Saddle, SaddleFinder, merge_px, too_many};
 use super::sectors::turn;
-use super::tiling::{kind, neighbours, step, tiles_at};
+use super::tiling::{kind, neighbours, step, tiles_from};
 use crate::lattice::{GridKind, Vertex};
 use crate::raster::Pyramid;
 
@@ -211,7 +211,7 @@ fn without_tag_cells<const N: usize>(mut grids: Vec<SaddleGrid>) -> Vec<SaddleGr
 /// Positions of the vertices, px, of every tile all of whose vertices are in a grid.
 fn tiles_of<const N: usize>(grid: &SaddleGrid) -> impl Iterator<Item = Vec<DVec2>> {
     let place = |v: &Vertex| grid.get(v).map(|p| p.position);
-    let tiles = grid.keys().flat_map(|&v| tiles_at::<N>(v));
+    let tiles = grid.keys().flat_map(|&v| tiles_from::<N>(v));
     tiles.filter_map(move |tile| tile.iter().map(place).collect())
 }
 

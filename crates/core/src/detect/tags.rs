@@ -132,7 +132,7 @@ impl TagReader {
         let dark = (self.tags_in == TagsIn::Black) != inverted;
         let tiles: Vec<Tile> = grid
             .keys()
-            .flat_map(|&v| self.kind.tiles_at(v))
+            .flat_map(|&v| self.kind.tiles_from(v))
             .filter(|tile| tile.is_dark() == dark)
             .filter(|tile| tile.vertices().all(|v| grid.contains_key(&v)))
             .collect();

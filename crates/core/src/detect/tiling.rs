@@ -30,7 +30,7 @@ pub fn neighbours<const N: usize>(vertex: Vertex) -> [Vertex; N] {
     std::array::from_fn(|k| vertex + step::<N>(k))
 }
 
-/// Vertices of the tiles whose lowest, leftmost vertices are at `vertex`, counter-clockwise.
-pub fn tiles_at<const N: usize>(vertex: Vertex) -> Vec<Vec<Vertex>> {
-    kind::<N>().tiles_at(vertex).map(|tile| tile.vertices().collect()).collect()
+/// Vertices of the tiles whose first vertex is `vertex`, counter-clockwise.
+pub fn tiles_from<const N: usize>(vertex: Vertex) -> Vec<Vec<Vertex>> {
+    kind::<N>().tiles_from(vertex).map(|tile| tile.vertices().collect()).collect()
 }

@@ -99,6 +99,12 @@ impl GridKind {
         let tiles = anchors.into_iter().flat_map(move |anchor| self.tiles_at(anchor));
         tiles.filter(move |tile| tile.vertices().any(|v| v == vertex))
     }
+
+    /// The tiles whose first vertex is `vertex`. Of a set of vertices they are all tiles that have none but these, each
+    /// once; the anchor of an inverted triangle is none of its vertices.
+    pub fn tiles_from(self, vertex: Vertex) -> impl Iterator<Item = Tile> {
+        self.tiles_around(vertex).filter(move |tile| tile.vertices().next() == Some(vertex))
+    }
 }
 
 #[cfg(test)]
@@ -110,6 +116,16 @@ mod tests {
     const KINDS: [GridKind; 2] = [GridKind::Deltille, GridKind::Checker];
 
     proptest! {
+        #[test]
+        fn each_tile_comes_from_one_of_its_vertices(row in -9..9, col in -9..9) {
+            for kind in KINDS {
+                for tile in kind.tiles_around(Vertex::new(row, col)) {
+                    let from = tile.vertices().flat_map(|v| kind.tiles_from(v));
+                    prop_assert_eq!(from.filter(|&other| other == tile).count(), 1);
+                }
+            }
+        }
+
         #[test]
         fn as_many_tiles_as_neighbours_meet_at_a_vertex(row in -9..9, col in -9..9) {
             for kind in KINDS {
