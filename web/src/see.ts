@@ -3,7 +3,7 @@ import { dropZone, el, field, save, select } from "./dom";
 import { LibraryError, drawing, looking } from "./library";
 import { type Sample, samples } from "./samples";
 import { asked, usual } from "./settings";
-import { made, seen } from "./shared";
+import { made, seen, stem } from "./shared";
 import { words } from "./words";
 import type { Recognised, Shown, Sought } from "./worker";
 
@@ -28,7 +28,7 @@ const ELLIPSE = 100;
 const RESULTS = ["json", "csv", "orpc"] as const;
 const COLOURS = ["#0a84ff", "#ff9f0a", "#30d158", "#ff453a", "#bf5af2", "#64d2ff"];
 
-const stem = (name: string) => name.replace(/\.[^.]*$/, "");
+const photoOf = (name: string, bytes: Photo["bytes"]): Photo => ({ name, bytes, of: null, ink: null, result: null, found: null, error: "" });
 
 export function see(): HTMLElement {
   /** What is looked for; nothing while no photograph has told what is in it. */

@@ -138,6 +138,14 @@ export const words = {
     guided: (px: number, then: number | null) => `Distant points are known to ${px.toPrecision(2)} px${then === null ? "" : `, with this picture to ${then.toPrecision(2)} px`}.`,
     enough: "These pictures are enough: one more would tell hardly anything new.",
     held: {
+    forget: "Forget the webcam's pictures",
+    survey: {
+      pictures: (count: number) => (count === 1 ? "1 picture" : `${count} pictures`),
+      covered: (percent: number) => `${percent} % of the camera's picture covered`,
+      tilts: (least: number, most: number) => (least === most ? `tilted by ${least}°` : `tilts of ${least}° to ${most}°`),
+      coverage: "Where corners were seen: the stronger, the more.",
+      leanings: "Each dot is a picture: how far the board was tilted, and to where it was farther away.",
+    },
       unseen: "The target is not seen.",
       elsewhere: "Bring it to the outline.",
       turned: "Tilt it as the outline is.",

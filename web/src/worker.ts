@@ -47,6 +47,8 @@ export type Shown = Seen & { width: number; height: number; grey: Uint8ClampedAr
 export type Holding = { held: "unseen" | "elsewhere" | "turned" | "moving" | "blurred" | "steady" | "taken"; part: number };
 /** The next picture, and how sure the camera is. */
 export type Next = { words: string; enough: boolean; uncertainty_px: number | null; expected_px: number | null; outlines_px: [number, number][][] };
+/** What pictures show of the camera's: corners in cells of it, and of each the tilt of the board and where to, rad. */
+export type Survey = { size_px: [number, number]; cells: [number, number]; counts: number[]; covered: number; tilts: ([number, number] | null)[] };
 export type Watched = Seen & { keep: boolean; held: Holding | null; pixels: Uint8ClampedArray };
 export type Recognised = { target: string; spec: Record<string, unknown>; tags: number; corners: number; shown: number };
 export type FamilyFacts = { name: string; kind: string; bits: number; distance: number; codes: number };
@@ -264,6 +266,11 @@ export type Name = keyof Calls;
 /** What need not be copied on its way to the page. */
 function handedOver(result: unknown): Transferable[] {
   if (typeof result !== "object" || result === null) return [];
+  async survey(target: string, detections: string[], names: string[], model: string): Promise<Survey | null> {
+    const { survey } = await solver();
+    const found = survey(target, detections, names, model);
+    return found === undefined ? null : (JSON.parse(found) as Survey);
+  },
   return Object.values(result).flatMap((value) => (ArrayBuffer.isView(value) && value.buffer instanceof ArrayBuffer ? [value.buffer] : []));
 }
 

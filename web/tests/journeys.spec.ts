@@ -293,10 +293,44 @@ test.describe("calibrate", () => {
     await page.getByRole("button", { name: "Calibrate", exact: true }).click();
     await expect(page.getByText(/Residuals of 0\.0\d+ px over 10 views/)).toBeVisible({ timeout: 60_000 });
     await screen(page, "calibrate");
-    const yaml = (await press(page, "camera.yaml")).toString();
-    expect(yaml).toContain("focal_px");
-    const report = (await press(page, "The whole report")).toString();
-    expect(report).toContain("<html");
+    // The program finds the same camera in the same photographs.
+    const [detections, out, target] = [scratch(), scratch(), ["--target", join(folder, "board.json")]];
+    deltille("detect", ...shots, ...target, "-o", detections);
+    deltille("calibrate", detections, ...target, "--model", "radtan", "--format", "own,opencv,ros", "--report", join(out, "camera-report.html"), "-o", out);
+    const read = (file: string) => readFileSync(join(out, file), "utf8");
+    // Sums of products are in the order that the processor's vectors have, which is not that of WebAssembly: last digits differ.
+    for (const file of ["camera.yaml", "camera.json", "camera-opencv.yaml", "camera-ros.yaml"]) {
+      const [text, others] = [(await press(page, file)).toString(), read(file)].map(split);
+      expect(text?.words, file).toEqual(others?.words);
+      const worst = apart(text?.numbers, others?.numbers);
+      console.log(`${file} differs by ${worst.toExponential(1)} of a number at most`);
+      expect(worst, file).toBeLessThan(1e-6);
+    }
+    // Drawings are rounded to a tenth of a pixel; the page has no options.
+    const [drawn, others] = [(await press(page, "The whole report")).toString(), read("camera-report.html").replace("--print-scale", "scale")].map(split);
+    expect(drawn?.words).toEqual(others?.words);
+    expect(Math.max(...(drawn?.numbers ?? []).map((number, i) => Math.abs(number - (others?.numbers[i] ?? NaN))))).toBeLessThan(0.11);
+
+    // What was covered, counted in the program's files.
+    const seen = shots.map((_, i) => corners(JSON.parse(readFileSync(join(detections, `${i}.json`), "utf8")) as Detection));
+    const cells = new Set(seen.flat().map(({ x, y }) => `${Math.floor((x + 0.5) / 80)} ${Math.floor((y + 0.5) / 80)}`));
+    expect(part).toBe(Math.round((100 * cells.size) / (16 * 12)));
+    // And how the board was tilted against the line of sight to the middle of its corners, the lens taken for a pinhole.
+    const { views } = JSON.parse(read("camera.json")) as { views: { camera_from_target: { rotation: number[] } }[] };
+    const tilts = views.map(({ camera_from_target: { rotation } }, i) => {
+      const middle = (axis: "x" | "y") => (seen[i] ?? []).reduce((sum, corner) => sum + corner[axis], 0) / (seen[i]?.length ?? NaN);
+      const sight = [(middle("x") - 640) / 1100, (middle("y") - 480) / 1100, 1];
+      return (180 / Math.PI) * Math.acos(-sight.reduce((sum, at, axis) => sum + at * (rotation[3 * axis + 2] ?? NaN), 0) / Math.hypot(...sight));
+    });
+    expect(Math.abs(Math.min(...tilts) - (least ?? NaN))).toBeLessThan(1);
+    expect(Math.abs(Math.max(...tilts) - (most ?? NaN))).toBeLessThan(1);
+
+    for (const scheme of ["light", "dark"] as const) {
+      await page.emulateMedia({ colorScheme: scheme });
+      await page.setViewportSize({ width: 390, height: 844 });
+      expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBeLessThanOrEqual(390);
+      await screen(page, `calibrate-phone-${scheme}-covered`);
+    }
   });
 
   test("what is missing is said", async ({ page }) => {
@@ -316,6 +350,11 @@ test.describe("calibrate", () => {
     await page.getByRole("button", { name: "Use a webcam" }).click();
     await expect(page.getByText("Hold the board in the middle of the picture, about 25 cm away, facing the camera.")).toBeVisible({ timeout: 30_000 });
     await screen(page, "calibrate-guided-first");
+    const covered = page.getByText(/10 pictures; \d+ % of the camera's picture covered; tilts of \d+° to \d+°/);
+    await expect(covered).toBeVisible({ timeout: 30_000 });
+    const [, part, least, most] = (/; (\d+) %.* (\d+)° to (\d+)°/.exec((await covered.textContent()) ?? "") ?? []).map(Number);
+    await expect(page.getByRole("img", { name: `${part} % of the camera's picture covered` })).toBeVisible();
+    await expect(page.getByRole("img", { name: `tilts of ${least}° to ${most}°` })).toBeVisible();
     // It is taken by itself, and another one is proposed, which the video does not show.
     await expect(page.getByText("1 picture taken")).toBeVisible({ timeout: 60_000 });
     await expect(page.getByText(/tilted away by 40°/)).toBeVisible();
@@ -357,6 +396,7 @@ test.describe("calibrate", () => {
     expect((1000 * (last - first)) / (end - begin)).toBeGreaterThan(10);
     await page.getByRole("button", { name: "Stop the webcam" }).click();
   });
+    await expect(page.getByText(/7 pictures; \d+ % of the camera's picture covered; (tilts of|tilted by) /)).toBeVisible({ timeout: 30_000 });
 });
 
 /** Memory of all processes of the browser, MB. */
@@ -371,6 +411,7 @@ test("a tag is damaged and corrected", async ({ page }) => {
   await expect(page.getByText("Read as tag 0.")).toBeVisible({ timeout: 30_000 });
   const cells = page.getByRole("switch");
   // The middle of the box around a triangle lies on its edge.
+    await expect(page.getByText(/[3-9] pictures; \d+ % of the camera's picture covered/)).toBeVisible();
   await cells.nth(3).dispatchEvent("click");
   await expect(page.getByText("Read as tag 0, 1 wrong cell corrected.")).toBeVisible();
   await cells.nth(7).press("Space");
@@ -386,6 +427,9 @@ test("a tag is damaged and corrected", async ({ page }) => {
 
 test("once loaded, the page works without a network", async ({ page, context }) => {
   await page.goto("/");
+    // The photograph counts again where the webcam's pictures are forgotten.
+    await page.getByRole("button", { name: "Forget the webcam's pictures" }).click();
+    await expect(page.getByText(/1 picture; \d+ % of the camera's picture covered; tilted by /)).toBeVisible({ timeout: 30_000 });
   await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
   await page.evaluate(async () => void (await navigator.serviceWorker.ready));
   await context.setOffline(true);

@@ -7,7 +7,7 @@ use deltille_core::camera::Pose;
 use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
 use deltille_files::export::{calibration, camera, detection, next_view};
-use deltille_files::report::Report;
+use deltille_files::report::{Report, Survey};
 use wasm_bindgen::prelude::*;
 
 use crate::errors::{Raise, told};
@@ -116,6 +116,51 @@ impl Solved {
 
 /// Where the panels of a target are.
 fn places(reference: &Reference) -> impl Iterator<Item = Pose> {
+/// What pictures of a target show of the camera's so far, as JSON: the size of the picture, columns and rows of cells, the corners
+/// in each of these row by row, the part of the cells that shows any, and of each picture by how much the board is tilted and in
+/// which direction it is farther away, rad from right towards below; `null` of solids. Nothing where no picture shows the target.
+///
+/// # Errors
+/// In words, where detections are none, or of pictures of different sizes, or there is no such model.
+#[wasm_bindgen]
+pub fn survey(
+    target: &str,
+    detections: Vec<String>,
+    names: Vec<String>,
+    model: &str,
+) -> Result<Option<String>, JsError> {
+    let target = Target::from_json(target).raise()?;
+    let reference = Reference::Target(&target);
+    let model: Model = model.parse().raise()?;
+    let views = views(&read(names, &detections)?, &reference).raise()?.views;
+    let Some(size_px) = views.first().map(|view| view.size_px) else { return Ok(None) };
+    let solve = |intrinsics: Intrinsics| {
+        let calibration = Calibration::of(&reference, reference.panels());
+        calibration.camera("camera", views.clone(), intrinsics).solve().ok()
+    };
+    // Of too few pictures, or too much alike, by the camera that is assumed before anything is known.
+    let estimate = solve(model.into()).or_else(|| {
+        let assumed = calibrate::Guide::new(&target, size_px, model)?.next(0, None).camera;
+        solve(Intrinsics::Known(assumed))
+    });
+    let Some(camera) = estimate.as_ref().and_then(|estimate| estimate.cameras.first()) else {
+        return Ok(None);
+    };
+    let survey = Survey::new(camera);
+    let tilts = survey.views.iter().map(|view| view.tilt_rad.zip(view.away_rad));
+    let told = serde_json::json!({
+        "size_px": size_px, "cells": survey.cells, "counts": survey.counts, "covered": survey.covered(),
+        "tilts": tilts.collect::<Vec<_>>(),
+    });
+    Ok(Some(told.to_string()))
+}
+
+/// Detections with their names.
+fn read(names: Vec<String>, detections: &[String]) -> Result<Vec<(String, Detection)>, JsError> {
+    let read = detections.iter().map(|text| detection::read(text));
+    Ok(names.into_iter().zip(read.collect::<Result<Vec<_>, _>>().raise()?).collect())
+}
+
     reference.panels().into_iter().map(|panel| panel.target_from_panel)
 }
 
