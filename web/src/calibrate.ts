@@ -108,7 +108,7 @@ export function calibrate(): HTMLElement {
       sure ? el("p", {}, text.sure(sure.toFixed(4))) : "",
       said.length > 0 ? el("ul", {}, ...said.map((sentence) => el("li", {}, sentence))) : el("p", {}, text.nothing),
       el("table", {}, el("thead", {}, el("tr", {}, ...[text.parameter, text.value, text.deviation].map((head) => el("th", { scope: "col" }, head)))), el("tbody", {}, ...rows)),
-      el("div", { class: "buttons" }, ...files.map(({ name, text }) => el("button", { type: "button", click: () => save(name, text) }, name === "camera.html" ? words.calibrate.page : name))),
+      el("div", { class: "buttons" }, ...files.map(({ name, text }) => el("button", { type: "button", click: () => save(name, text) }, name === "camera-report.html" ? words.calibrate.page : name))),
     );
   }
 

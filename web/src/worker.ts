@@ -78,6 +78,9 @@ async function using<T extends Held, R>(made: T, work: (made: T) => R | Promise<
 }
 
 let finder: { key: string; made: See.Finder } | null = null;
+/** The ink of a print, as several pictures show it together: for the library, and in words. */
+export type Ink = { estimate: string; words: string };
+
 let recogniser: See.Recogniser | null = null;
 let watcher: See.Watcher | null = null;
 let guide: Solve.Guide | null = null;
@@ -204,6 +207,11 @@ const calls = {
     guide?.free();
     guide = null;
   },
+  /** What photographs say together of the ink of the print; nothing where looking again would find nothing else. */
+  async ink(sought: Sought, found: unknown[]): Promise<Ink | null> {
+    const [estimate, words] = (await finderOf(sought)).ink_of_all(JSON.stringify(found)) ?? [];
+    return estimate !== undefined && words !== undefined ? { estimate, words } : null;
+  },
   /** Begins to propose pictures, those that were taken in mind. */
   async guide(target: string, width: number, height: number, model: string, taken: { name: string; json: string }[]): Promise<Next> {
     const { Guide } = await solver();
@@ -238,12 +246,12 @@ const calls = {
       const files = [
         { name: "camera.json", text: solved.json() },
         { name: "camera.yaml", text: solved.yaml() },
-        { name: "camera.html", text: solved.page() },
+        { name: "camera-report.html", text: solved.page() },
       ];
       const opencv = solved.opencv();
-      if (opencv !== undefined) files.push({ name: "camera.opencv.yaml", text: opencv });
+      if (opencv !== undefined) files.push({ name: "camera-opencv.yaml", text: opencv });
       const ros = solved.ros();
-      if (ros !== undefined) files.push({ name: "camera.ros.yaml", text: ros });
+      if (ros !== undefined) files.push({ name: "camera-ros.yaml", text: ros });
       return { figures: JSON.parse(solved.figures()) as Figures, said: solved.said(), files };
     });
   },

@@ -229,6 +229,26 @@ test.describe("see", () => {
     await chooseFiles(page, [join(folder, "board.json"), ...Array.from({ length: 10 }, (_, i) => join(folder, `${i}.png`))]);
     await expect(page.getByRole("button", { name: /9\.png \d+ corners/ })).toBeVisible({ timeout: 60_000 });
     for (let i = 0; i < 10; i++) {
+  test("photographs of one print are looked at with the ink that all of them show, as by the program", async ({ page }) => {
+    const out = scratch();
+    const photograph = readFileSync(join(root, "tests/photographs/robot-hand-0108.png"));
+    const darker = PNG.sync.read(photograph);
+    darker.data = Buffer.from(darker.data.map((value, i) => (i % 4 === 3 ? value : 0.8 * value)));
+    writeFileSync(join(out, "one.png"), photograph);
+    writeFileSync(join(out, "other.png"), PNG.sync.write(darker));
+    deltille("detect", join(out, "one.png"), join(out, "other.png"), "--grid", "deltille", "-o", out);
+    await page.goto("/#see");
+    await chooseFiles(page, [join(out, "one.png"), join(out, "other.png")]);
+    await expect(page.getByText(/As 2 photographs of one print show together, what is dark has grown by [\d.]+ ± [\d.]+ % of an edge on every side/)).toBeVisible({ timeout: 60_000 });
+    for (const name of ["one", "other"]) {
+      await page.getByRole("button", { name: new RegExp(`^${name}\\.png`) }).click();
+      const [found, expected] = [(await press(page, "JSON")).toString(), readFileSync(join(out, `${name}.json`), "utf8")].map((text) => JSON.parse(text) as Detection);
+      expect(corners(found as Detection).length).toBe(110);
+      expect(apart(found, expected)).toBeLessThan(1e-9);
+    }
+    await screen(page, "see-ink");
+  });
+
       await page.getByRole("button", { name: new RegExp(`${i}\\.png`) }).click();
       times.push(Number(/(\d+) ms/.exec((await page.locator(".stage").getByText(/\d+ ms\./).textContent()) ?? "")?.[1]));
     }

@@ -4,13 +4,14 @@ use deltille_core::calibrate::{
     self, Calibration, Held, Holding, Intrinsics, Model, NextView, Reference, View, Words, views,
 };
 use deltille_core::camera::Pose;
+use deltille_core::detect::{Detection, InkEstimate};
 use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
 use deltille_files::export::{calibration, camera, detection, next_view};
 use deltille_files::report::{Report, Survey};
 use wasm_bindgen::prelude::*;
 
-use crate::errors::{Raise, told};
+use crate::errors::{Raise, named, told};
 
 /// A calibrated camera: its files and its page.
 #[wasm_bindgen]
@@ -40,13 +41,10 @@ impl Solved {
         let target = Target::from_json(target).raise()?;
         let reference = Reference::Target(&target);
         let model: Model = model.parse().raise()?;
-        let read = detections
-            .iter()
-            .map(|text| detection::read(text))
-            .collect::<Result<Vec<_>, _>>()
-            .raise()?;
-        let named: Vec<_> = names.into_iter().zip(read).collect();
-        let shown = views(&named, &reference).raise()?;
+        let read = read(names, &detections)?;
+        let found: Vec<_> = read.iter().filter_map(|(_, found)| found.ink).collect();
+        let print = Print { scale: None, ink: InkEstimate::of_all(&found) };
+        let shown = views(&read, &reference).raise()?;
         let calibration = Calibration::of(&reference, reference.panels()).camera(
             "camera",
             shown.views,
@@ -59,7 +57,10 @@ impl Solved {
         let words = Words::new(&estimate, None);
         let said = diagnoses.iter().map(|diagnosis| told(&words.sentence(diagnosis))).collect();
         let mut page = Report::new("camera", &estimate);
-        page.diagnoses = &diagnoses;
+        // Too few views to compare models are no error.
+        let models = [calibration.compare_models(0).unwrap_or_default()];
+        (page.diagnoses, page.stated) = (&diagnoses, calibration.panels());
+        (page.print, page.models) = (print, &models);
         let figures = serde_json::json!({
             "rms_px": found.rms_px, "views": found.views.len(), "corners": found.corner_count(),
             "names": found.camera.parameter_names(), "values": found.camera.parameters(),
@@ -67,12 +68,13 @@ impl Solved {
             "projection_sd_px": found.projection_sd_px(None, deltille_core::calibrate::Source::Noise),
         });
         Ok(Self {
-            json: calibration::write(&estimate, &diagnoses, Print::default(), Residuals::LeftOut)
+            json: calibration::write(&estimate, &diagnoses, print, Residuals::LeftOut)
+                .map(|json| named(&json))
                 .unwrap_or_default(),
             yaml: found.camera.to_yaml(),
             opencv: camera::opencv(&found.camera).ok(),
             ros: camera::ros(&found.camera, "camera").ok(),
-            page: page.html(),
+            page: named(&page.html()),
             said,
             figures: figures.to_string(),
         })
