@@ -112,6 +112,7 @@ export const words = {
     remove: "Remove all",
     overlay: "Overlay (PNG)",
     time: (ms: number) => `${ms.toFixed(0)} ms`,
+    inked: (ink: string, photographs: number) => `As ${photographs} photographs of one print show together, ${ink}. Each was looked at once more with this.`,
     corner: (row: number, col: number, id: number | null, sx: number, sy: number) =>
       `Row ${row}, column ${col}${id === null ? "" : `, id ${id}`}: ± ${sx.toFixed(4)} × ${sy.toFixed(4)} px.`,
   },

@@ -81,13 +81,14 @@ let finder: { key: string; made: See.Finder } | null = null;
 /** The ink of a print, as several pictures show it together: for the library, and in words. */
 export type Ink = { estimate: string; words: string };
 
+let codes: { name: string; made: Make.Codes } | null = null;
 let recogniser: See.Recogniser | null = null;
 let watcher: See.Watcher | null = null;
 let guide: Solve.Guide | null = null;
 
-async function finderOf(sought: Sought): Promise<See.Finder> {
+async function finderOf(sought: Sought, ink: Ink | null = null): Promise<See.Finder> {
   const { Finder, family_of } = await seer();
-  const key = JSON.stringify(sought);
+  const key = JSON.stringify([sought, ink]);
   if (finder?.key === key) return finder.made;
   let made: See.Finder;
   if ("grid" in sought) made = Finder.of_grid(sought.grid, 0, 0);
@@ -112,6 +113,7 @@ async function pictureOf(photograph: Photo.Photograph): Promise<See.Picture> {
 function told(finder: See.Finder, picture: See.Picture, name: string, also: (found: See.Found) => void = () => undefined): Seen {
   const begin = performance.now();
   const found = finder.find(picture, name);
+  if (ink) made = made.with_ink(ink.estimate);
   const ms = performance.now() - begin;
   try {
     also(found);
@@ -173,8 +175,8 @@ const calls = {
       return JSON.parse(prove(made.json(), file, files.map(({ name }) => name), files.map(({ bytes }) => bytes))) as Proof;
     });
   },
-  async photograph(sought: Sought, name: string, bytes: Uint8Array): Promise<Shown> {
-    const [{ Photograph }, finder] = await Promise.all([photographer(), finderOf(sought)]);
+  async photograph(sought: Sought, ink: Ink | null, name: string, bytes: Uint8Array): Promise<Shown> {
+    const [{ Photograph }, finder] = await Promise.all([photographer(), finderOf(sought, ink)]);
     return using(new Photograph(name, bytes), async (photograph) => {
       const [width = 0, height = 0] = photograph.size();
       const seen = await using(await pictureOf(photograph), (picture) => told(finder, picture, name));
@@ -205,12 +207,12 @@ const calls = {
     watcher?.free();
     watcher = new Watcher();
     guide?.free();
-    guide = null;
-  },
   /** What photographs say together of the ink of the print; nothing where looking again would find nothing else. */
   async ink(sought: Sought, found: unknown[]): Promise<Ink | null> {
     const [estimate, words] = (await finderOf(sought)).ink_of_all(JSON.stringify(found)) ?? [];
     return estimate !== undefined && words !== undefined ? { estimate, words } : null;
+  },
+    guide = null;
   },
   /** Begins to propose pictures, those that were taken in mind. */
   async guide(target: string, width: number, height: number, model: string, taken: { name: string; json: string }[]): Promise<Next> {

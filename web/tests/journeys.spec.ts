@@ -4,7 +4,8 @@ import { mkdtempSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
-import { content, deltille, folder, tetrahedron } from "./pictures";
+import { PNG } from "pngjs";
+import { content, deltille, drawn, folder, tetrahedron } from "./pictures";
 
 const root = fileURLToPath(new URL("../..", import.meta.url));
 const scratch = () => mkdtempSync(join(tmpdir(), "page-"));
