@@ -52,6 +52,21 @@ export type Survey = { size_px: [number, number]; cells: [number, number]; count
 export type Watched = Seen & { keep: boolean; held: Holding | null; pixels: Uint8ClampedArray };
 export type Recognised = { target: string; spec: Record<string, unknown>; tags: number; corners: number; shown: number };
 export type FamilyFacts = { name: string; kind: string; bits: number; distance: number; codes: number };
+export type FamilyFigures = {
+  name: string;
+  bits: number;
+  codes: number;
+  distance: number;
+  correctable: number;
+  kind: string;
+  histogram: Record<string, number>;
+  /** How many codes no family exceeds. */
+  linear_programming: number;
+  sphere_packing: number;
+  /** How often a tag turns into itself, and the cell whose content each cell then receives. */
+  turns: number;
+  rotation: number[];
+};
 export type Figures = {
   rms_px: number;
   views: number;
@@ -62,6 +77,9 @@ export type Figures = {
   projection_sd_px: number | null;
 };
 export type Result = { figures: Figures; said: string[]; files: { name: string; text: string }[] };
+
+/** The ink of a print, as several pictures show it together: for the library, and in words. */
+export type Ink = { estimate: string; words: string };
 
 /** What is looked for: the description of a target, or an untagged board. */
 export type Sought = { target: string } | { grid: string };
@@ -78,9 +96,6 @@ async function using<T extends Held, R>(made: T, work: (made: T) => R | Promise<
 }
 
 let finder: { key: string; made: See.Finder } | null = null;
-/** The ink of a print, as several pictures show it together: for the library, and in words. */
-export type Ink = { estimate: string; words: string };
-
 let codes: { name: string; made: Make.Codes } | null = null;
 let recogniser: See.Recogniser | null = null;
 let watcher: See.Watcher | null = null;
@@ -98,8 +113,18 @@ async function finderOf(sought: Sought, ink: Ink | null = null): Promise<See.Fin
     if (name !== undefined && file === undefined) throw new Error(`the target has tags of the family ${name}, which does not come along`);
     made = Finder.of_target(sought.target, file);
   }
+  if (ink) made = made.with_ink(ink.estimate);
   finder?.made.free();
   finder = { key, made };
+  return made;
+}
+
+async function codesOf(name: string): Promise<Make.Codes> {
+  const { Codes } = await maker();
+  if (codes?.name === name) return codes.made;
+  const made = new Codes((await familyFile(name)) ?? "");
+  codes?.made.free();
+  codes = { name, made };
   return made;
 }
 
@@ -113,7 +138,6 @@ async function pictureOf(photograph: Photo.Photograph): Promise<See.Picture> {
 function told(finder: See.Finder, picture: See.Picture, name: string, also: (found: See.Found) => void = () => undefined): Seen {
   const begin = performance.now();
   const found = finder.find(picture, name);
-  if (ink) made = made.with_ink(ink.estimate);
   const ms = performance.now() - begin;
   try {
     also(found);
@@ -183,6 +207,11 @@ const calls = {
       return { ...seen, width, height, grey: new Uint8ClampedArray(photograph.shown().buffer as ArrayBuffer) };
     });
   },
+  /** What photographs say together of the ink of the print; nothing where looking again would find nothing else. */
+  async ink(sought: Sought, found: unknown[]): Promise<Ink | null> {
+    const [estimate, words] = (await finderOf(sought)).ink_of_all(JSON.stringify(found)) ?? [];
+    return estimate !== undefined && words !== undefined ? { estimate, words } : null;
+  },
   async recognise(name: string, bytes: Uint8Array): Promise<Recognised | null> {
     const [{ Photograph }, { Recogniser }] = await Promise.all([photographer(), seer()]);
     if (!recogniser) {
@@ -207,11 +236,6 @@ const calls = {
     watcher?.free();
     watcher = new Watcher();
     guide?.free();
-  /** What photographs say together of the ink of the print; nothing where looking again would find nothing else. */
-  async ink(sought: Sought, found: unknown[]): Promise<Ink | null> {
-    const [estimate, words] = (await finderOf(sought)).ink_of_all(JSON.stringify(found)) ?? [];
-    return estimate !== undefined && words !== undefined ? { estimate, words } : null;
-  },
     guide = null;
   },
   /** Begins to propose pictures, those that were taken in mind. */
@@ -242,6 +266,11 @@ const calls = {
       return { ...seen, keep, held, pixels };
     });
   },
+  async survey(target: string, detections: string[], names: string[], model: string): Promise<Survey | null> {
+    const { survey } = await solver();
+    const found = survey(target, detections, names, model);
+    return found === undefined ? null : (JSON.parse(found) as Survey);
+  },
   async calibrate(target: string, detections: string[], names: string[], model: string): Promise<Result> {
     const { Solved } = await solver();
     return using(new Solved(target, detections, names, model), (solved) => {
@@ -257,16 +286,22 @@ const calls = {
       return { figures: JSON.parse(solved.figures()) as Figures, said: solved.said(), files };
     });
   },
-  async family(name: string): Promise<{ figures: string; cells: string; codes: bigint[] }> {
-    const { Codes } = await maker();
-    return using(new Codes((await familyFile(name)) ?? ""), (codes) => ({ figures: codes.figures(), cells: codes.cells(1.5), codes: [...codes.codes()] }));
+  async family(name: string): Promise<{ figures: FamilyFigures; cells: string; codes: bigint[] }> {
+    const codes = await codesOf(name);
+    return { figures: JSON.parse(codes.figures()) as FamilyFigures, cells: codes.cells(1.5), codes: [...codes.codes()] };
   },
   async decode(name: string, word: bigint, errors: number): Promise<number[] | null> {
-    const { Codes } = await maker();
-    return using(new Codes((await familyFile(name)) ?? ""), (codes) => {
-      const found = codes.decode(word, errors);
-      return found ? [...found] : null;
-    });
+    const found = (await codesOf(name)).decode(word, errors);
+    return found ? [...found] : null;
+  },
+  /** A word after its tag was turned once. */
+  async turned(name: string, word: bigint): Promise<bigint> {
+    return (await codesOf(name)).turned(word);
+  },
+  /** The shares of tags that are read, and misread, at each of these rates of wrong cells. */
+  async reading(name: string, rates: number[]): Promise<[number, number][]> {
+    const shares = (await codesOf(name)).reading(Float64Array.from(rates));
+    return rates.map((_, i) => [shares[2 * i] ?? 0, shares[2 * i + 1] ?? 0]);
   },
 };
 
@@ -276,11 +311,6 @@ export type Name = keyof Calls;
 /** What need not be copied on its way to the page. */
 function handedOver(result: unknown): Transferable[] {
   if (typeof result !== "object" || result === null) return [];
-  async survey(target: string, detections: string[], names: string[], model: string): Promise<Survey | null> {
-    const { survey } = await solver();
-    const found = survey(target, detections, names, model);
-    return found === undefined ? null : (JSON.parse(found) as Survey);
-  },
   return Object.values(result).flatMap((value) => (ArrayBuffer.isView(value) && value.buffer instanceof ArrayBuffer ? [value.buffer] : []));
 }
 

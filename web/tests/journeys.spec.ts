@@ -464,6 +464,54 @@ test("once loaded, the page works without a network", async ({ page, context }) 
 
 test("the keyboard goes everywhere", async ({ page }) => {
   await page.goto("/");
+test("the mathematics of families is drawn as it is computed otherwise", async ({ page }) => {
+  await page.goto("/#families");
+  await page.getByLabel("Family").selectOption("d25h7");
+  const figures = page.locator(".figures");
+  const row = (name: string) => figures.getByRole("row", { name });
+  await expect(row("d25h7 has")).toContainText("1,208", { timeout: 30_000 });
+  // A third of 2^25 words over balls of three cells; that of linear programming is in docs/families.md.
+  const ball = 1 + 25 + (25 * 24) / 2 + (25 * 24 * 23) / 6;
+  await expect(row("sphere packing")).toContainText(Math.floor(Math.floor(2 ** 25 / ball) / 3).toLocaleString("en"));
+  await expect(row("linear programming")).toContainText("3,478");
+
+  // A turn takes each cell of a circle to the place of the next.
+  await expect(page.getByText("in 8 circles of 3; the one in the middle stays")).toBeVisible();
+  const cells = page.getByRole("switch");
+  const middles = await cells.evaluateAll((all) =>
+    all.map((cell) => {
+      const corners = (cell.getAttribute("points") ?? "").split(" ").map((corner) => corner.split(",").map(Number));
+      return [0, 1].map((axis) => corners.reduce((sum, corner) => sum + (corner[axis] ?? 0), 0) / corners.length);
+    }),
+  );
+  const turned = ([u = 0, v = 0]: number[]) => middles.findIndex(([x = 0, y = 0]) => Math.hypot(x - (1 - u - v), y - u) < 1e-9);
+  const cycle = [3, turned(middles[3] ?? []), turned(middles[turned(middles[3] ?? [])] ?? []), 3].map((cell) => `cell ${cell + 1}`);
+  await cells.nth(3).focus();
+  await expect(page.getByText(`A turn by 120° takes the content of ${cycle.join(" to ")}.`)).toBeVisible();
+  await page.getByRole("button", { name: "Turn by 120°" }).click();
+  await expect(page.getByText("Read as tag 0, turned by 120°.")).toBeVisible();
+  await cells.nth(5).press("Space");
+  await expect(page.getByText("Read as tag 0, turned by 120°, 1 wrong cell corrected.")).toBeVisible();
+
+  // A tag is read as a word where the cells in which they differ are few, whichever were wrong: counted cell by cell.
+  const rate = 0.1;
+  await page.getByRole("slider", { name: "Wrong cells" }).fill(String(200 * rate));
+  const family = JSON.parse(readFileSync(join(root, "crates/core/families/d25h7.json"), "utf8")) as { distance_histogram: Record<string, number>; codes: string[] };
+  const near = (apart: number): number => {
+    let shares = [1];
+    for (let cell = 0; cell < 25; cell++) {
+      const differs = cell < apart ? 1 - rate : rate;
+      shares = [...shares, 0].map((share, count) => share * (1 - differs) + (shares[count - 1] ?? 0) * differs);
+    }
+    return shares.slice(0, 4).reduce((sum, share) => sum + share, 0);
+  };
+  const misread = Object.entries(family.distance_histogram).reduce((sum, [apart, pairs]) => sum + ((2 * pairs) / (3 * family.codes.length)) * near(Number(apart)), 0);
+  const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
+  await expect(figures.getByText("Where 10 % of all cells are wrong")).toContainText(`${percent(near(0))} of the tags are read, ${percent(1 - near(0) - misread)} refused and one in ${Number((1 / misread).toPrecision(2)).toLocaleString("en")} misread.`);
+  await cells.nth(9).hover();
+  await screen(page, "families-figures");
+});
+
   await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
   await page.keyboard.press("Tab");
   await expect(page.getByRole("link", { name: "Skip to content" })).toBeFocused();
@@ -475,18 +523,20 @@ test("the keyboard goes everywhere", async ({ page }) => {
   await expect(page.getByText("Read as tag 0.")).toBeVisible({ timeout: 30_000 });
 });
 
-for (const part of ["make", "see", "calibrate", "families"]) {
-  for (const scheme of ["light", "dark"] as const) {
-    test(`${part} fits a phone, ${scheme}`, async ({ page }) => {
-      await page.emulateMedia({ colorScheme: scheme });
+/** What each part shows when it is there. */
+const there = { make: "110 corners", see: "Nothing was looked at yet.", calibrate: "0 photographs", families: "Tags that are seen badly" };
+for (const [part, sign] of Object.entries(there)) {
+  test(`${part} fits a phone, light and dark`, async ({ page }) => {
+    await page.goto(`/#${part}`);
+    await expect(page.getByText(sign)).toBeVisible({ timeout: 30_000 });
+    for (const colorScheme of ["light", "dark"] as const) {
+      await page.emulateMedia({ colorScheme });
       await page.setViewportSize({ width: 390, height: 844 });
-      await page.goto(`/#${part}`);
-      await page.waitForTimeout(2000);
-      const wide = await page.evaluate(() => document.documentElement.scrollWidth);
-      expect(wide).toBeLessThanOrEqual(390);
-      await screen(page, `${part}-phone-${scheme}`);
+      await page.evaluate(() => new Promise(requestAnimationFrame));
+      expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBeLessThanOrEqual(390);
+      await screen(page, `${part}-phone-${colorScheme}`);
       await page.setViewportSize({ width: 1280, height: 900 });
-      await screen(page, `${part}-${scheme}`);
-    });
-  }
+      await screen(page, `${part}-${colorScheme}`);
+    }
+  });
 }

@@ -116,8 +116,6 @@ impl Solved {
     }
 }
 
-/// Where the panels of a target are.
-fn places(reference: &Reference) -> impl Iterator<Item = Pose> {
 /// What pictures of a target show of the camera's so far, as JSON: the size of the picture, columns and rows of cells, the corners
 /// in each of these row by row, the part of the cells that shows any, and of each picture by how much the board is tilted and in
 /// which direction it is farther away, rad from right towards below; `null` of solids. Nothing where no picture shows the target.
@@ -163,6 +161,8 @@ fn read(names: Vec<String>, detections: &[String]) -> Result<Vec<(String, Detect
     Ok(names.into_iter().zip(read.collect::<Result<Vec<_>, _>>().raise()?).collect())
 }
 
+/// Where the panels of a target are.
+fn places(reference: &Reference) -> impl Iterator<Item = Pose> {
     reference.panels().into_iter().map(|panel| panel.target_from_panel)
 }
 
