@@ -24,7 +24,8 @@ export function calibrate(): HTMLElement {
   let frames = 0;
 
   const count = el("p", { class: "facts", "aria-live": "polite" });
-  const covered = el("div", { "aria-live": "polite" });
+  const covered = el("p", { class: "facts", "aria-live": "polite" });
+  const drawings = el("div", { class: "survey" });
   const result = el("div", { class: "result", "aria-live": "polite" });
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
   const video = el("video", { playsinline: true, muted: true, hidden: true });
@@ -62,7 +63,9 @@ export function calibrate(): HTMLElement {
     }
     if (of !== surveyOf) return;
     survey = found;
-    covered.replaceChildren(...(found ? [surveyed(found)] : []));
+    const { said, figures } = found ? surveyed(found) : { said: "", figures: [] };
+    covered.textContent = said;
+    drawings.replaceChildren(...figures);
   }
 
   function forgetAll(): void {
@@ -272,10 +275,10 @@ export function calibrate(): HTMLElement {
       "div",
       { class: "columns" },
       el("div", {}, field(words.calibrate.model, select(models, model, (value) => ((model = value), tally()))), field(words.calibrate.way, way), count, el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam, forget)),
-      el("div", { class: "stage" }, problem, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, covered, result),
+      el("div", { class: "stage" }, problem, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, covered, drawings, result),
     ),
   );
-  window.addEventListener("hashchange", () => tally());
+  for (const event of ["hashchange", "seen"]) window.addEventListener(event, tally);
   tally();
   return whole;
 }

@@ -16,6 +16,8 @@ function cycleOf(bit: number, rotation: number[]): number[] {
 
 export function families(): HTMLElement {
   let family: Family | null = null;
+  /** The family that was asked for last. */
+  let asked = "";
   let id = 0;
   let word = 0n;
   /** The code of the tag and how it is turned. */
@@ -27,12 +29,14 @@ export function families(): HTMLElement {
   const verdict = el("p", { class: "facts", "aria-live": "polite" });
   const tag = el("div", { class: "tag" });
   const cycles = el("p", { class: "facts", "aria-live": "polite" });
-  const turn = el("button", { type: "button", click: () => void turned() });
+  const turn = el("button", { type: "button", click: () => void turned() }, words.families.turn(120));
   const histogram = el("div", { class: "histogram" });
   const figures = el("div", { class: "figures" });
 
   async function choose(name: string): Promise<void> {
+    asked = name;
     const found = await looking.call("family", name);
+    if (name !== asked) return;
     family = { figures: found.figures, cells: JSON.parse(found.cells) as [number, number][][], codes: found.codes };
     number.max = String(family.codes.length - 1);
     facts.textContent = words.families.facts(family.figures.codes, family.figures.distance, family.figures.correctable);
@@ -40,7 +44,7 @@ export function families(): HTMLElement {
     pick(Math.min(id, family.codes.length - 1));
     bars(family.figures.histogram);
     const shares = await looking.call("reading", name, RATES);
-    if (family?.figures.name !== name) return;
+    if (name !== asked) return;
     figures.replaceChildren(sizes(family.figures), reading(shares, family.figures.correctable));
   }
 

@@ -239,6 +239,7 @@ export function see(): HTMLElement {
         const corners = grids.reduce((sum, grid) => sum + grid.corners.length, 0);
         return { name: photo.name, json: photo.result?.json ?? "", corners, labelled: grids.some((grid) => grid.panel !== null) };
       });
+    window.dispatchEvent(new Event("seen"));
   }
 
   function figures(photo: Photo): string {

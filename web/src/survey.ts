@@ -15,21 +15,17 @@ export function tints({ counts }: Survey): number[] {
   return counts.map((count) => (count === 0 ? 0 : 0.25 + 0.75 * Math.sqrt(count / most)));
 }
 
-/** The two figures, with their words. */
-export function surveyed(survey: Survey): HTMLElement {
+/** What there is to say, and the two figures. */
+export function surveyed(survey: Survey): { said: string; figures: HTMLElement[] } {
   const text = words.calibrate.survey;
   const tilts = survey.tilts.filter((tilt) => tilt !== null);
-  const told = tilts.map(([tilt]) => degrees(tilt));
+  const leant = tilts.map(([tilt]) => Math.round(degrees(tilt)));
   const covered = text.covered(Math.round(100 * survey.covered));
-  const range = told.length > 0 ? text.tilts(Math.round(Math.min(...told)), Math.round(Math.max(...told))) : "";
+  const range = leant.length > 0 ? text.tilts(Math.min(...leant), Math.max(...leant)) : "";
   const figure = (drawing: SVGElement, caption: string) => el("figure", {}, drawing, el("figcaption", {}, caption));
-  return el(
-    "div",
-    { class: "survey" },
-    el("p", { class: "facts" }, `${[text.pictures(survey.tilts.length), covered, range].filter(Boolean).join("; ")}.`),
-    figure(coverage(survey, covered), text.coverage),
-    told.length > 0 ? figure(leanings(tilts, range), text.leanings) : null,
-  );
+  const figures = [figure(coverage(survey, covered), text.coverage)];
+  if (leant.length > 0) figures.push(figure(leanings(tilts, range), text.leanings));
+  return { said: `${[text.pictures(survey.tilts.length), covered, range].filter(Boolean).join("; ")}.`, figures };
 }
 
 /** The picture of the camera, its cells tinted by the number of corners in them. */

@@ -96,7 +96,7 @@ async function using<T extends Held, R>(made: T, work: (made: T) => R | Promise<
 }
 
 let finder: { key: string; made: See.Finder } | null = null;
-let codes: { name: string; made: Make.Codes } | null = null;
+const codes = new Map<string, Promise<Make.Codes>>();
 let recogniser: See.Recogniser | null = null;
 let watcher: See.Watcher | null = null;
 let guide: Solve.Guide | null = null;
@@ -119,12 +119,13 @@ async function finderOf(sought: Sought, ink: Ink | null = null): Promise<See.Fin
   return made;
 }
 
-async function codesOf(name: string): Promise<Make.Codes> {
-  const { Codes } = await maker();
-  if (codes?.name === name) return codes.made;
-  const made = new Codes((await familyFile(name)) ?? "");
-  codes?.made.free();
-  codes = { name, made };
+/** The codes of a family, which are few enough to be kept. */
+function codesOf(name: string): Promise<Make.Codes> {
+  const known = codes.get(name);
+  if (known) return known;
+  const made = maker().then(async ({ Codes }) => new Codes((await familyFile(name)) ?? ""));
+  codes.set(name, made);
+  made.catch(() => codes.delete(name));
   return made;
 }
 
