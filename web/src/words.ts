@@ -123,7 +123,7 @@ export const words = {
     lead: "Calibrate a camera from the photographs of “See”, or from a webcam.",
     model: "Camera model",
     start: "Calibrate",
-    few: (count: number) => `${count} photographs with labelled corners; ten or more, tilted by 20° to 45°, make a good calibration.`,
+    few: (count: number) => `${count === 1 ? "1 picture" : `${count} pictures`} with labelled corners; ten or more, tilted by 20° to 45°, make a good calibration.`,
     solving: "Calibrating…",
     rms: (rms: string, views: number) => `Residuals of ${rms} px over ${views} views.`,
     sure: (px: string) => `Projections of distant points are known to ${px} px.`,

@@ -293,7 +293,7 @@ test.describe("calibrate", () => {
     await chooseFiles(page, [join(folder, "board.json"), ...shots]);
     await expect(page.getByRole("button", { name: /9\.png \d+ corners/ })).toBeVisible({ timeout: 60_000 });
     await page.getByRole("link", { name: "Calibrate" }).click();
-    await expect(page.getByText("10 photographs with labelled corners")).toBeVisible();
+    await expect(page.getByText("10 pictures with labelled corners")).toBeVisible();
     const covered = page.getByText(/10 pictures; \d+ % of the camera's picture covered; tilts of \d+° to \d+°/);
     await expect(covered).toBeVisible({ timeout: 30_000 });
     const [, part, least, most] = (/; (\d+) %.* (\d+)° to (\d+)°/.exec((await covered.textContent()) ?? "") ?? []).map(Number);
@@ -473,7 +473,7 @@ test("the keyboard goes everywhere", async ({ page }) => {
 });
 
 /** What each part shows when it is there. */
-const there = { make: "110 corners", see: "Nothing was looked at yet.", calibrate: "0 photographs", families: "Tags that are seen badly" };
+const there = { make: "110 corners", see: "Nothing was looked at yet.", calibrate: "0 pictures with labelled corners", families: "Tags that are seen badly" };
 for (const [part, sign] of Object.entries(there)) {
   test(`${part} fits a phone, light and dark`, async ({ page }) => {
     await page.goto(`/#${part}`);
