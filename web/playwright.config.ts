@@ -7,7 +7,14 @@ const video = fileURLToPath(new URL("./test-results/webcam.y4m", import.meta.url
 export default defineConfig({
   testDir: "tests",
   timeout: 120_000,
-  workers: 1,
+  workers: 2,
+  fullyParallel: true,
+  // What is measured has the machine for itself.
+  projects: [
+    { name: "journeys", testMatch: "journeys.spec.ts" },
+    { name: "times", testMatch: "times.spec.ts", dependencies: ["journeys"], fullyParallel: false },
+    { name: "redraw", testMatch: "redraw.spec.ts", dependencies: ["times"] },
+  ],
   outputDir: "test-results/out",
   globalSetup: "./tests/pictures.ts",
   use: {
@@ -21,6 +28,7 @@ export default defineConfig({
         "--disable-background-networking",
         "--disable-component-update",
         "--disable-sync",
+        "--js-flags=--expose-gc",
         "--use-gl=angle",
         "--use-angle=swiftshader",
         "--enable-unsafe-swiftshader",

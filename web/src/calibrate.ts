@@ -1,9 +1,10 @@
 // Calibrate: from the photographs that were looked at, or from a webcam.
 import { el, field, save, select } from "./dom";
 import { looking } from "./library";
-import { type Shot, made, seen } from "./shared";
+import { type Shot, made, seen, stem } from "./shared";
+import { surveyed, tints } from "./survey";
 import { words } from "./words";
-import type { Holding, Next, Result } from "./worker";
+import type { Holding, Next, Result, Survey } from "./worker";
 
 const models: [string, string][] = ["radtan", "radtan5", "rational", "kannala-brandt", "eucm", "double-sphere"].map((model) => [model, model]);
 
@@ -14,10 +15,17 @@ export function calibrate(): HTMLElement {
   /** Whether pictures are taken where they are proposed, or wherever they are new. */
   let guided = true;
   let next: Next | null = null;
+  /** What the pictures so far cover, and which these are. */
+  let survey: Survey | null = null;
+  let surveyOf: string[] = [];
+  /** In what the webcam is watched; nothing where that begins anew. */
+  let watched: string | null = null;
   /** Frames that were looked at since the page was opened. */
   let frames = 0;
 
   const count = el("p", { class: "facts", "aria-live": "polite" });
+  const covered = el("p", { class: "facts", "aria-live": "polite" });
+  const drawings = el("div", { class: "survey" });
   const result = el("div", { class: "result", "aria-live": "polite" });
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
   const video = el("video", { playsinline: true, muted: true, hidden: true });
@@ -28,11 +36,43 @@ export function calibrate(): HTMLElement {
   const elsewhere = el("button", { type: "button", hidden: true, click: () => void refuse() }, words.calibrate.refuse);
   const now = el("button", { type: "button", hidden: true, click: () => (takeNow = true) }, words.calibrate.now);
   let takeNow = false;
+  const forget = el("button", { type: "button", hidden: true, click: () => forgetAll() }, words.calibrate.forget);
   const webcam = el("button", { type: "button", click: () => void (stream ? stop() : start()) }, words.calibrate.webcam);
 
-  const shots = () => [...seen.shots.filter((shot) => shot.labelled), ...taken];
+  /** The pictures of the webcam, else the photographs: these are of different cameras. */
+  const shots = () => (stream || taken.length > 0 ? taken : seen.shots.filter((shot) => shot.labelled));
   const target = () => (seen.sought && "target" in seen.sought ? seen.sought.target : made.json);
-  const tally = () => (count.textContent = words.calibrate.few(shots().length));
+
+  function tally(): void {
+    count.textContent = words.calibrate.few(shots().length);
+    forget.hidden = taken.length === 0;
+    if (location.hash.startsWith("#calibrate")) void look();
+  }
+
+  /** Shows what the pictures cover, where these are others than before. */
+  async function look(): Promise<void> {
+    const all = shots();
+    const of = [target(), model, ...all.map(({ json }) => json)];
+    if (of.length === surveyOf.length && of.every((part, i) => part === surveyOf[i])) return;
+    surveyOf = of;
+    let found: Survey | null = null;
+    try {
+      found = all.length > 0 ? await looking.call("survey", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model) : null;
+    } catch {
+      // What is wrong with the pictures is said where a camera is asked for.
+    }
+    if (of !== surveyOf) return;
+    survey = found;
+    const { said, figures } = found ? surveyed(found) : { said: "", figures: [] };
+    covered.textContent = said;
+    drawings.replaceChildren(...figures);
+  }
+
+  function forgetAll(): void {
+    taken = [];
+    watched = null;
+    tally();
+  }
 
   function tell(error: unknown): void {
     problem.textContent = error instanceof Error && error.message ? error.message : words.failed;
@@ -49,7 +89,7 @@ export function calibrate(): HTMLElement {
     result.replaceChildren(el("p", { class: "busy" }, words.calibrate.solving));
     try {
       const all = shots();
-      show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => name), model));
+      show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model));
     } catch (error) {
       result.replaceChildren();
       tell(error);
@@ -71,7 +111,7 @@ export function calibrate(): HTMLElement {
       sure ? el("p", {}, text.sure(sure.toFixed(4))) : "",
       said.length > 0 ? el("ul", {}, ...said.map((sentence) => el("li", {}, sentence))) : el("p", {}, text.nothing),
       el("table", {}, el("thead", {}, el("tr", {}, ...[text.parameter, text.value, text.deviation].map((head) => el("th", { scope: "col" }, head)))), el("tbody", {}, ...rows)),
-      el("div", { class: "buttons" }, ...files.map(({ name, text }) => el("button", { type: "button", click: () => save(name, text) }, name === "camera.html" ? words.calibrate.page : name))),
+      el("div", { class: "buttons" }, ...files.map(({ name, text }) => el("button", { type: "button", click: () => save(name, text) }, name === "camera-report.html" ? words.calibrate.page : name))),
     );
   }
 
@@ -106,6 +146,7 @@ export function calibrate(): HTMLElement {
     await video.play();
     over.hidden = false;
     now.hidden = false;
+    tally();
     void watch();
   }
 
@@ -117,6 +158,7 @@ export function calibrate(): HTMLElement {
     now.hidden = true;
     live.textContent = "";
     propose(null);
+    tally();
   }
 
   async function watch(): Promise<void> {
@@ -125,7 +167,7 @@ export function calibrate(): HTMLElement {
     const hidden = el("canvas", {});
     const frame = hidden.getContext("2d", { willReadFrequently: true });
     let rate = 0;
-    let asked: string | null = null;
+    watched = null;
     while (stream && context && frame && over.isConnected) {
       const begin = performance.now();
       const [width, height] = [video.videoWidth, video.videoHeight];
@@ -137,8 +179,8 @@ export function calibrate(): HTMLElement {
       try {
         // The first frame, another model and another way to take pictures begin anew, with what was taken.
         const asking = guided ? `${model} ${width} ${height}` : "";
-        if (asking !== asked) {
-          asked = asking;
+        if (asking !== watched) {
+          watched = asking;
           await looking.call("watch");
           const begun = guided ? await looking.call("guide", target(), width, height, model, taken) : null;
           if (!stream) break;
@@ -158,6 +200,8 @@ export function calibrate(): HTMLElement {
         const found = await looking.handing([data.buffer], "frame", { target: target() }, name, width, height, data, begin / 1000);
         if (!stream) break;
         context.putImageData(new ImageData(found.pixels as Uint8ClampedArray<ArrayBuffer>, width, height), 0, 0);
+        // Without a proposal it is of use to see where no corners were yet.
+        if (!guided && survey) tint(context, survey);
         const corners = mark(context, found.json);
         if (next) outline(context, next, found.held);
         state.textContent = found.held ? (words.calibrate.held[found.held.held] ?? "") : "";
@@ -198,6 +242,17 @@ export function calibrate(): HTMLElement {
     context.restore();
   }
 
+  /** Tints what is covered already of the picture. */
+  function tint(context: CanvasRenderingContext2D, survey: Survey): void {
+    const { width, height } = context.canvas;
+    if (survey.size_px[0] !== width || survey.size_px[1] !== height) return;
+    const [columns, rows] = survey.cells;
+    tints(survey).forEach((tint, i) => {
+      context.fillStyle = `rgba(10, 132, 255, ${0.5 * tint})`;
+      context.fillRect(((i % columns) * width) / columns, (Math.floor(i / columns) * height) / rows, width / columns, height / rows);
+    });
+  }
+
   /** Marks the labelled corners of a frame, and counts them. */
   function mark(context: CanvasRenderingContext2D, json: string): number {
     const { grids } = JSON.parse(json) as { grids: { panel: number | null; corners: { x: number; y: number }[] }[] };
@@ -219,11 +274,11 @@ export function calibrate(): HTMLElement {
     el(
       "div",
       { class: "columns" },
-      el("div", {}, field(words.calibrate.model, select(models, model, (value) => (model = value))), field(words.calibrate.way, way), count, el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam)),
-      el("div", { class: "stage" }, problem, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, result),
+      el("div", {}, field(words.calibrate.model, select(models, model, (value) => ((model = value), tally()))), field(words.calibrate.way, way), count, el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam, forget)),
+      el("div", { class: "stage" }, problem, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, covered, drawings, result),
     ),
   );
-  window.addEventListener("hashchange", () => tally());
+  for (const event of ["hashchange", "seen"]) window.addEventListener(event, tally);
   tally();
   return whole;
 }

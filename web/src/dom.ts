@@ -14,6 +14,16 @@ export function el<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: At
   return made;
 }
 
+const SVG = "http://www.w3.org/2000/svg";
+
+/** The same of a drawing. */
+export function shape(tag: string, attributes: Record<string, string | number>, ...children: (Node | string)[]): SVGElement {
+  const made = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
+  made.append(...children);
+  return made;
+}
+
 let count = 0;
 
 /** A labelled control. */

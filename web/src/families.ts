@@ -1,52 +1,78 @@
 // Families: codes of tags, damaged and decoded.
-import { el, field, select } from "./dom";
+import { el, field, select, shape } from "./dom";
+import { RATES, bar, reading, sizes } from "./family-figures";
 import { drawing as looking } from "./library";
 import { words } from "./words";
+import type { FamilyFigures } from "./worker";
 
-type Figures = { name: string; bits: number; codes: number; distance: number; correctable: number; kind: string; histogram: Record<string, number> };
-type Family = { figures: Figures; cells: [number, number][][]; codes: bigint[] };
+type Family = { figures: FamilyFigures; cells: [number, number][][]; codes: bigint[] };
 
-const SVG = "http://www.w3.org/2000/svg";
-
-function shape(tag: string, attributes: Record<string, string>, ...children: Node[]): SVGElement {
-  const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  made.append(...children);
-  return made;
+/** Cells that a turn exchanges in a circle, from one on: the content of each goes to the next. */
+function cycleOf(bit: number, rotation: number[]): number[] {
+  const cycle = [bit];
+  for (let at = rotation.indexOf(bit); at !== bit; at = rotation.indexOf(at)) cycle.push(at);
+  return cycle;
 }
 
 export function families(): HTMLElement {
   let family: Family | null = null;
+  /** The family that was asked for last. */
+  let asked = "";
   let id = 0;
   let word = 0n;
+  /** The code of the tag and how it is turned. */
+  let code = 0n;
+  let turns = 0;
   const chooser = el("div", {});
   const number = el("input", { type: "number", min: 0, value: 0, input: () => pick(Number(number.value)) });
   const facts = el("p", { class: "facts" });
   const verdict = el("p", { class: "facts", "aria-live": "polite" });
   const tag = el("div", { class: "tag" });
+  const cycles = el("p", { class: "facts", "aria-live": "polite" });
+  const turn = el("button", { type: "button", click: () => void turned() }, words.families.turn(120));
   const histogram = el("div", { class: "histogram" });
+  const figures = el("div", { class: "figures" });
 
   async function choose(name: string): Promise<void> {
+    asked = name;
     const found = await looking.call("family", name);
-    family = { figures: JSON.parse(found.figures) as Figures, cells: JSON.parse(found.cells) as [number, number][][], codes: found.codes };
+    if (name !== asked) return;
+    family = { figures: found.figures, cells: JSON.parse(found.cells) as [number, number][][], codes: found.codes };
     number.max = String(family.codes.length - 1);
     facts.textContent = words.families.facts(family.figures.codes, family.figures.distance, family.figures.correctable);
+    turn.textContent = words.families.turn(angle());
     pick(Math.min(id, family.codes.length - 1));
     bars(family.figures.histogram);
+    const shares = await looking.call("reading", name, RATES);
+    if (name !== asked) return;
+    figures.replaceChildren(sizes(family.figures), reading(shares, family.figures.correctable));
   }
+
+  /** By how much a tag is turned, degrees. */
+  const angle = () => 360 / (family?.figures.turns ?? 3);
 
   function pick(wanted: number): void {
     if (!family || !Number.isInteger(wanted) || wanted < 0 || wanted >= family.codes.length) return;
     id = wanted;
     number.value = String(id);
-    word = family.codes[id] ?? 0n;
+    word = code = family.codes[id] ?? 0n;
+    turns = 0;
+    draw();
+  }
+
+  async function turned(): Promise<void> {
+    if (!family) return;
+    const { name, turns: all } = family.figures;
+    const of = word;
+    const [next, nextCode] = await Promise.all([looking.call("turned", name, word), looking.call("turned", name, code)]);
+    if (of !== word) return;
+    [word, code, turns] = [next, nextCode, (turns + 1) % all];
     draw();
   }
 
   function draw(): void {
     if (!family) return;
     const isSquare = family.figures.kind === "checker";
-    const code = family.codes[id] ?? 0n;
     const height = Math.sqrt(3) / 2;
     const outline = isSquare ? "0,0 1,0 1,1 0,1" : "0,0 1,0 0,1";
     const cells = family.cells.map((corners, bit) => {
@@ -71,13 +97,27 @@ export function families(): HTMLElement {
         event.preventDefault();
         flip();
       });
+      for (const event of ["pointerenter", "focus"]) cell.addEventListener(event, () => show(bit));
+      for (const event of ["pointerleave", "blur"]) cell.addEventListener(event, () => show(null));
       return cell;
     });
+    const ring = shape("polygon", { class: "cycle" });
+    /** Shows where a turn takes the content of a cell; of none how many circles there are. */
+    const show = (bit: number | null) => {
+      if (!family) return;
+      const { rotation, turns: all } = family.figures;
+      const cycle = bit === null ? [] : cycleOf(bit, rotation);
+      const middle = (corners: [number, number][]) => [0, 1].map((axis) => corners.reduce((sum, corner) => sum + (corner[axis] ?? 0), 0) / corners.length);
+      ring.setAttribute("points", cycle.map((bit) => middle(family?.cells[bit] ?? []).join(",")).join(" "));
+      const stay = rotation.filter((from, to) => from === to).length;
+      cycles.textContent = bit === null ? words.families.cycles(angle(), (rotation.length - stay) / all, all, stay) : words.families.cycle(angle(), cycle.map((bit) => bit + 1));
+    };
     const top = isSquare ? 1 : height;
     // The frame of tags has y up; of triangles its axes are 60° apart.
     const axes = isSquare ? "matrix(1 0 0 -1 0 1)" : `matrix(1 0 0.5 ${-height} 0 ${height})`;
-    const all = shape("g", { transform: axes }, shape("polygon", { points: outline, class: "border" }), ...cells);
+    const all = shape("g", { transform: axes }, shape("polygon", { points: outline, class: "border" }), ...cells, ring);
     tag.replaceChildren(shape("svg", { viewBox: `-0.02 -0.02 1.04 ${top + 0.04}` }, all));
+    show(null);
     void decode();
   }
 
@@ -86,9 +126,10 @@ export function families(): HTMLElement {
     const of = word;
     const found = await looking.call("decode", family.figures.name, word, family.figures.correctable);
     if (of !== word) return;
-    const [read = 0, , errors = 0] = found ?? [];
-    verdict.textContent = !found ? words.families.refused : read === id ? words.families.read(id, errors) : words.families.mistaken(id, read);
-    verdict.className = `facts ${!found ? "plain" : read === id ? "good" : "bad"}`;
+    const [read = 0, turn = 0, errors = 0] = found ?? [];
+    const isRight = read === id && turn === turns;
+    verdict.textContent = !found ? words.families.refused : isRight ? words.families.read(id, turn * angle(), errors) : words.families.mistaken(id, turns * angle(), read, turn * angle());
+    verdict.className = `facts ${!found ? "plain" : isRight ? "good" : "bad"}`;
   }
 
   function bars(counts: Record<string, number>): void {
@@ -99,10 +140,7 @@ export function families(): HTMLElement {
       el(
         "table",
         {},
-        el("tbody", {}, ...all.map(([distance, count]) => {
-          const meter = shape("svg", { viewBox: "0 0 100 6", preserveAspectRatio: "none", class: "bar", "aria-hidden": "true" }, shape("rect", { width: String((100 * count) / most), height: "6" }));
-          return el("tr", {}, el("th", { scope: "row" }, String(distance)), el("td", {}, meter), el("td", {}, count.toLocaleString("en")));
-        })),
+        el("tbody", {}, ...all.map(([distance, count]) => el("tr", {}, el("th", { scope: "row" }, String(distance)), el("td", {}, bar(count / most)), el("td", {}, count.toLocaleString("en"))))),
       ),
     );
   }
@@ -121,8 +159,8 @@ export function families(): HTMLElement {
     el(
       "div",
       { class: "columns" },
-      el("div", {}, chooser, field(words.families.id, number), facts, el("div", { class: "buttons" }, el("button", { type: "button", click: () => pick(id) }, words.families.repair)), histogram),
-      el("div", { class: "stage" }, tag, verdict),
+      el("div", {}, chooser, field(words.families.id, number), facts, el("div", { class: "buttons" }, el("button", { type: "button", click: () => pick(id) }, words.families.repair), turn), histogram),
+      el("div", { class: "stage" }, tag, verdict, cycles, figures),
     ),
   );
 }

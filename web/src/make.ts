@@ -37,6 +37,7 @@ export function make(): HTMLElement {
   let isTurning = false;
   let folding: Folding | null = null;
   let families: FamilyFacts[] = [];
+  let familyChoice: HTMLSelectElement;
 
   const form = el("form", { class: "form", submit: (event) => event.preventDefault() });
   const picture = el("img", { class: "sheet", alt: words.make.preview });
@@ -89,6 +90,7 @@ export function make(): HTMLElement {
     const options: [string, string][] = names.map((name) => [name, name]);
     if (!ofSolid) options.push(["", text.noTags]);
     const usualFamily = pages?.family ?? (isSquare ? "" : (names[0] ?? ""));
+    familyChoice = select(options, settings.family ?? usualFamily, (family) => changed({ family }, true));
     const name = el("input", { type: "text", value: settings.name, input: () => changed({ name: name.value }) });
     const isOpen = form.querySelector("details")?.open ?? false;
     const hasTags = ofSolid || (settings.family ?? usualFamily) !== "";
@@ -100,7 +102,7 @@ export function make(): HTMLElement {
     form.replaceChildren(
       field(text.kind, select(kinds, settings.kind, choose)),
       ...sizes,
-      field(text.family, select(options, settings.family ?? usualFamily, (family) => changed({ family }, true))),
+      field(text.family, familyChoice),
       field(text.paper, select([["", text.smallest], ...papers.map((paper) => [paper, paper] as [string, string])], settings.paper ?? "", (paper) => changed({ paper: paper || null }))),
       field(text.name, name),
       el(
@@ -182,14 +184,14 @@ export function make(): HTMLElement {
     const of = asked(settings);
     address();
     try {
-      const before = pages?.family;
       pages = await drawing.call("draw", of);
       made.json = pages.json;
       made.name = settings.name;
       problem.hidden = true;
       at = Math.min(at, pages.pages.length - 1);
       await show();
-      if (pages.family !== before && settings.family === null) fill();
+      // The form stays as it is, as somebody may be typing in it.
+      if (pages.family !== null && settings.family === null) familyChoice.value = pages.family;
       if (isTurning && !isStale) await showSolid();
     } catch (error) {
       if (isStale) return;

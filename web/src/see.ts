@@ -3,13 +3,22 @@ import { dropZone, el, field, save, select } from "./dom";
 import { LibraryError, drawing, looking } from "./library";
 import { type Sample, samples } from "./samples";
 import { asked, usual } from "./settings";
-import { made, seen } from "./shared";
+import { made, seen, stem } from "./shared";
 import { words } from "./words";
 import type { Recognised, Shown, Sought } from "./worker";
 
 type Corner = { row: number; col: number; id: number | null; x: number; y: number; cov: [number, number, number] | null };
-type Detection = { grids: { kind: string; panel: number | null; corners: Corner[]; tags: { id: number }[] }[] };
-type Photo = { name: string; bytes: () => Promise<Uint8Array>; result: Shown | null; found: Detection | null; error: string };
+type Detection = { ink?: unknown; grids: { kind: string; panel: number | null; corners: Corner[]; tags: { id: number }[] }[] };
+type Photo = {
+  name: string;
+  bytes: () => Promise<Uint8Array>;
+  /** What was looked for in it, and what it alone says of the ink of the print. */
+  of: Sought | null;
+  ink: unknown;
+  result: Shown | null;
+  found: Detection | null;
+  error: string;
+};
 type BoardSpec = {
   kind: "board";
   grid?: string;
@@ -28,7 +37,7 @@ const ELLIPSE = 100;
 const RESULTS = ["json", "csv", "orpc"] as const;
 const COLOURS = ["#0a84ff", "#ff9f0a", "#30d158", "#ff453a", "#bf5af2", "#64d2ff"];
 
-const stem = (name: string) => name.replace(/\.[^.]*$/, "");
+const photoOf = (name: string, bytes: Photo["bytes"]): Photo => ({ name, bytes, of: null, ink: null, result: null, found: null, error: "" });
 
 export function see(): HTMLElement {
   /** What is looked for; nothing while no photograph has told what is in it. */
@@ -58,6 +67,7 @@ export function see(): HTMLElement {
   const credit = el("p", { class: "credit", hidden: true });
   const hint = el("p", { class: "facts", hidden: true }, words.see.magnifier);
   const list = el("ul", { class: "photos" });
+  const inked = el("p", { class: "facts", "aria-live": "polite" });
   const downloads = el("div", { class: "buttons" });
   const chooser = el("input", { type: "file", multiple: true, hidden: true, accept: ".jpg,.jpeg,.png,.tif,.tiff,.webp,.bmp,.pgm,.ppm,.json", change: () => void take([...(chooser.files ?? [])]) });
   const zone = dropZone(
@@ -103,7 +113,7 @@ export function see(): HTMLElement {
     chooser.value = "";
     const target = files.find((file) => file.name.endsWith(".json"));
     const shots = files.filter((file) => file !== target);
-    photos = photos.concat(shots.map((file) => ({ name: file.name, bytes: async () => new Uint8Array(await file.arrayBuffer()), result: null, found: null, error: "" })));
+    photos = photos.concat(shots.map((file) => photoOf(file.name, async () => new Uint8Array(await file.arrayBuffer()))));
     if (!target) return look();
     described = { name: target.name, json: await target.text() };
     choose("described");
@@ -112,7 +122,7 @@ export function see(): HTMLElement {
 
   async function sampled(sample: Sample): Promise<void> {
     const bytes = async () => new Uint8Array(await (await fetch(sample.address)).arrayBuffer());
-    photos.push({ name: sample.name, bytes, result: null, found: null, error: "" });
+    photos.push(photoOf(sample.name, bytes));
     at = -1;
     blank();
     await look();
@@ -126,7 +136,7 @@ export function see(): HTMLElement {
     // Without tags, the tiling of which there is more.
     const counts = await Promise.all(
       Object.keys(words.see.grid).map(async (grid): Promise<[number, string]> => {
-        const { json } = await looking.call("photograph", { grid }, photo.name, bytes);
+        const { json } = await looking.call("photograph", { grid }, null, photo.name, bytes);
         return [(JSON.parse(json) as Detection).grids.reduce((sum, { corners }) => sum + corners.length, 0), grid];
       }),
     );
@@ -136,6 +146,8 @@ export function see(): HTMLElement {
 
   async function look(): Promise<void> {
     const turn = ++asking;
+    list.setAttribute("aria-busy", "true");
+    inked.textContent = "";
     fill();
     for (const [index, photo] of photos.entries()) {
       if (photo.result || photo.error) continue;
@@ -147,11 +159,12 @@ export function see(): HTMLElement {
           sought = of;
           tellTarget(recognised);
         }
-        const result = await looking.call("photograph", of, photo.name, await photo.bytes());
+        const result = await looking.call("photograph", of, null, photo.name, await photo.bytes());
         if (turn !== asking) return;
         photo.result = result;
         photo.found = JSON.parse(result.json) as Detection;
-        seen.sought = of;
+        photo.ink = photo.found.ink ?? null;
+        photo.of = seen.sought = of;
       } catch (error) {
         if (turn !== asking) return;
         photo.error = error instanceof LibraryError && error.message ? error.message : words.failed;
@@ -162,7 +175,32 @@ export function see(): HTMLElement {
       }
       fill();
     }
+    try {
+      await lookTogether(turn);
+    } catch (error) {
+      if (turn === asking) tell(error);
+    }
+    if (turn !== asking) return;
     share();
+    list.removeAttribute("aria-busy");
+  }
+
+  /** Looks once more at photographs of one print, with what they say together of its ink, as the program does. */
+  async function lookTogether(turn: number): Promise<void> {
+    const { sought: of } = seen;
+    const alike = photos.filter((photo) => photo.result && JSON.stringify(photo.of) === JSON.stringify(of));
+    if (!of || alike.length < 2) return;
+    const ink = await looking.call("ink", of, alike.map((photo) => photo.ink));
+    for (const photo of ink ? alike : []) {
+      const result = await looking.call("photograph", of, ink, photo.name, await photo.bytes());
+      if (turn !== asking) return;
+      photo.result = result;
+      photo.found = JSON.parse(result.json) as Detection;
+      if (photo === photos[at]) draw();
+    }
+    if (turn !== asking) return;
+    inked.textContent = ink ? words.see.inked(ink.words, alike.length) : "";
+    fill();
   }
 
   /** What was recognised, with the edge that no photograph tells. */
@@ -201,6 +239,7 @@ export function see(): HTMLElement {
         const corners = grids.reduce((sum, grid) => sum + grid.corners.length, 0);
         return { name: photo.name, json: photo.result?.json ?? "", corners, labelled: grids.some((grid) => grid.panel !== null) };
       });
+    window.dispatchEvent(new Event("seen"));
   }
 
   function figures(photo: Photo): string {
@@ -235,6 +274,7 @@ export function see(): HTMLElement {
     asking += 1;
     if (choice === "auto") choose("auto");
     blank();
+    inked.textContent = "";
     share();
     fill();
   }
@@ -406,6 +446,6 @@ export function see(): HTMLElement {
     "section",
     { class: "see", "aria-label": words.tabs.see },
     el("p", { class: "lead" }, words.see.lead),
-    el("div", { class: "columns" }, el("div", { class: "settings" }, zone, options, known, heading, list), el("div", { class: "stage" }, invitation, el("div", { class: "frame" }, canvas, lens), told, hint, downloads, credit)),
+    el("div", { class: "columns" }, el("div", { class: "settings" }, zone, options, known, heading, list, inked), el("div", { class: "stage" }, invitation, el("div", { class: "frame" }, canvas, lens), told, hint, downloads, credit)),
   );
 }

@@ -9,3 +9,6 @@ export type Shot = { name: string; json: string; corners: number; labelled: bool
 
 /** What was seen, and in what. */
 export const seen: { sought: Sought | null; shots: Shot[] } = { sought: null, shots: [] };
+
+/** The name of a file without its ending: what it shows is called so. */
+export const stem = (name: string) => name.replace(/\.[^.]*$/, "");

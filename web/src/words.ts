@@ -1,4 +1,7 @@
 // All texts of the page, in one place, so that other languages can be added.
+const turnedBy = (degrees: number) => (degrees === 0 ? "" : `, turned by ${degrees}°`);
+const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
+
 export const words = {
   title: "deltille",
   tabs: { make: "Make", see: "See", calibrate: "Calibrate", families: "Families" },
@@ -109,6 +112,7 @@ export const words = {
     magnifier: "Point at the picture to magnify it; ellipses are 100 standard deviations.",
     keys: "Arrow keys go from corner to corner.",
     list: "Photographs",
+    inked: (ink: string, photographs: number) => `As ${photographs} photographs of one print show together, ${ink}. Each was looked at once more with this.`,
     remove: "Remove all",
     overlay: "Overlay (PNG)",
     time: (ms: number) => `${ms.toFixed(0)} ms`,
@@ -119,7 +123,7 @@ export const words = {
     lead: "Calibrate a camera from the photographs of “See”, or from a webcam.",
     model: "Camera model",
     start: "Calibrate",
-    few: (count: number) => `${count} photographs with labelled corners; ten or more, tilted by 20° to 45°, make a good calibration.`,
+    few: (count: number) => `${count === 1 ? "1 picture" : `${count} pictures`} with labelled corners; ten or more, tilted by 20° to 45°, make a good calibration.`,
     solving: "Calibrating…",
     rms: (rms: string, views: number) => `Residuals of ${rms} px over ${views} views.`,
     sure: (px: string) => `Projections of distant points are known to ${px} px.`,
@@ -134,6 +138,14 @@ export const words = {
     way: "The webcam takes pictures",
     ways: { guided: "where they tell most", free: "wherever the target is held" },
     now: "Take this one",
+    forget: "Forget the webcam's pictures",
+    survey: {
+      pictures: (count: number) => (count === 1 ? "1 picture" : `${count} pictures`),
+      covered: (percent: number) => `${percent} % of the camera's picture covered`,
+      tilts: (least: number, most: number) => (least === most ? `tilted by ${least}°` : `tilts of ${least}° to ${most}°`),
+      coverage: "Where corners were seen: the stronger, the more.",
+      leanings: "Each dot is a picture: how far the board was tilted, and to where it was farther away.",
+    },
     refuse: "It cannot be held there",
     guided: (px: number, then: number | null) => `Distant points are known to ${px.toPrecision(2)} px${then === null ? "" : `, with this picture to ${then.toPrecision(2)} px`}.`,
     enough: "These pictures are enough: one more would tell hardly anything new.",
@@ -153,16 +165,41 @@ export const words = {
     rate: (fps: number) => `${fps.toFixed(0)} pictures a second`,
   },
   families: {
-    lead: "Click cells of a tag to damage it, and see it corrected or refused.",
+    lead: "Click cells of a tag to damage it, and see it corrected or refused. Turn it: how it lies is read, too.",
     family: "Family",
     id: "Tag id",
     facts: (codes: number, distance: number, correctable: number) =>
       `${codes} codes that differ in ${distance} cells or more in every rotation; ${correctable} wrong cells are always corrected.`,
-    read: (id: number, errors: number) => (errors === 0 ? `Read as tag ${id}.` : `Read as tag ${id}, ${errors} wrong ${errors === 1 ? "cell" : "cells"} corrected.`),
+    read: (id: number, degrees: number, errors: number) =>
+      `Read as tag ${id}${turnedBy(degrees)}${errors === 0 ? "" : `, ${errors} wrong ${errors === 1 ? "cell" : "cells"} corrected`}.`,
     refused: "No code is near enough: refused.",
-    mistaken: (id: number, instead: number) => `Read as tag ${instead} instead of ${id}: more cells are wrong than can be corrected.`,
+    mistaken: (id: number, degrees: number, instead: number, read: number) =>
+      `Read as tag ${instead}${turnedBy(read)} instead of ${id}${turnedBy(degrees)}: more cells are wrong than can be corrected.`,
     repair: "Repair",
+    turn: (degrees: number) => `Turn by ${degrees}°`,
+    cycles: (degrees: number, count: number, length: number, stay: number) =>
+      `A turn by ${degrees}° moves the cells in ${count} circles of ${length}${stay === 0 ? "" : "; the one in the middle stays"}. Point at a cell to see its circle.`,
+    cycle: (degrees: number, cells: number[]) =>
+      cells.length === 1 ? `A turn by ${degrees}° leaves cell ${cells[0]} where it is.` : `A turn by ${degrees}° takes the content of cell ${[...cells, cells[0]].join(" to cell ")}.`,
     histogram: "Pairs of codes by their distance",
+    sizes: {
+      heading: "How many codes there can be",
+      codes: (family: string) => `${family} has`,
+      linear: "at most, by linear programming",
+      spheres: "at most, by sphere packing",
+      why: (distance: number, correctable: number) =>
+        `In every turn, words differ in ${distance} cells or more: balls of ${correctable} cells around them do not overlap, and no more fit among all words. Linear programming counts the distances, too. Bars are logarithmic.`,
+    },
+    reading: {
+      heading: "Tags that are seen badly",
+      slider: "Wrong cells",
+      rate: (percent: number) => `${percent} %`,
+      chart: "The shares of tags that are read, refused and misread, against the share of wrong cells",
+      key: { read: "read", refused: "refused", misread: "misread" },
+      told: (rate: string, read: number, refused: number, misread: number) =>
+        `Where ${rate} of all cells are wrong, ${percent(read)} of the tags are read, ${percent(refused)} refused and ${misread > 0 ? `one in ${Number((1 / misread).toPrecision(2)).toLocaleString("en")}` : "none"} misread.`,
+      why: (correctable: number) => `Each cell is wrong by itself, and up to ${correctable} are corrected.`,
+    },
     cell: (index: number, on: boolean) => `Cell ${index + 1}, ${on ? "white" : "black"}`,
   },
 };

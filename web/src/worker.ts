@@ -47,9 +47,26 @@ export type Shown = Seen & { width: number; height: number; grey: Uint8ClampedAr
 export type Holding = { held: "unseen" | "elsewhere" | "turned" | "moving" | "blurred" | "steady" | "taken"; part: number };
 /** The next picture, and how sure the camera is. */
 export type Next = { words: string; enough: boolean; uncertainty_px: number | null; expected_px: number | null; outlines_px: [number, number][][] };
+/** What pictures show of the camera's: corners in cells of it, and of each the tilt of the board and where to, rad. */
+export type Survey = { size_px: [number, number]; cells: [number, number]; counts: number[]; covered: number; tilts: ([number, number] | null)[] };
 export type Watched = Seen & { keep: boolean; held: Holding | null; pixels: Uint8ClampedArray };
 export type Recognised = { target: string; spec: Record<string, unknown>; tags: number; corners: number; shown: number };
 export type FamilyFacts = { name: string; kind: string; bits: number; distance: number; codes: number };
+export type FamilyFigures = {
+  name: string;
+  bits: number;
+  codes: number;
+  distance: number;
+  correctable: number;
+  kind: string;
+  histogram: Record<string, number>;
+  /** How many codes no family exceeds. */
+  linear_programming: number;
+  sphere_packing: number;
+  /** How often a tag turns into itself, and the cell whose content each cell then receives. */
+  turns: number;
+  rotation: number[];
+};
 export type Figures = {
   rms_px: number;
   views: number;
@@ -60,6 +77,9 @@ export type Figures = {
   projection_sd_px: number | null;
 };
 export type Result = { figures: Figures; said: string[]; files: { name: string; text: string }[] };
+
+/** The ink of a print, as several pictures show it together: for the library, and in words. */
+export type Ink = { estimate: string; words: string };
 
 /** What is looked for: the description of a target, or an untagged board. */
 export type Sought = { target: string } | { grid: string };
@@ -76,13 +96,14 @@ async function using<T extends Held, R>(made: T, work: (made: T) => R | Promise<
 }
 
 let finder: { key: string; made: See.Finder } | null = null;
+const codes = new Map<string, Promise<Make.Codes>>();
 let recogniser: See.Recogniser | null = null;
 let watcher: See.Watcher | null = null;
 let guide: Solve.Guide | null = null;
 
-async function finderOf(sought: Sought): Promise<See.Finder> {
+async function finderOf(sought: Sought, ink: Ink | null = null): Promise<See.Finder> {
   const { Finder, family_of } = await seer();
-  const key = JSON.stringify(sought);
+  const key = JSON.stringify([sought, ink]);
   if (finder?.key === key) return finder.made;
   let made: See.Finder;
   if ("grid" in sought) made = Finder.of_grid(sought.grid, 0, 0);
@@ -92,8 +113,19 @@ async function finderOf(sought: Sought): Promise<See.Finder> {
     if (name !== undefined && file === undefined) throw new Error(`the target has tags of the family ${name}, which does not come along`);
     made = Finder.of_target(sought.target, file);
   }
+  if (ink) made = made.with_ink(ink.estimate);
   finder?.made.free();
   finder = { key, made };
+  return made;
+}
+
+/** The codes of a family, which are few enough to be kept. */
+function codesOf(name: string): Promise<Make.Codes> {
+  const known = codes.get(name);
+  if (known) return known;
+  const made = maker().then(async ({ Codes }) => new Codes((await familyFile(name)) ?? ""));
+  codes.set(name, made);
+  made.catch(() => codes.delete(name));
   return made;
 }
 
@@ -168,13 +200,18 @@ const calls = {
       return JSON.parse(prove(made.json(), file, files.map(({ name }) => name), files.map(({ bytes }) => bytes))) as Proof;
     });
   },
-  async photograph(sought: Sought, name: string, bytes: Uint8Array): Promise<Shown> {
-    const [{ Photograph }, finder] = await Promise.all([photographer(), finderOf(sought)]);
+  async photograph(sought: Sought, ink: Ink | null, name: string, bytes: Uint8Array): Promise<Shown> {
+    const [{ Photograph }, finder] = await Promise.all([photographer(), finderOf(sought, ink)]);
     return using(new Photograph(name, bytes), async (photograph) => {
       const [width = 0, height = 0] = photograph.size();
       const seen = await using(await pictureOf(photograph), (picture) => told(finder, picture, name));
       return { ...seen, width, height, grey: new Uint8ClampedArray(photograph.shown().buffer as ArrayBuffer) };
     });
+  },
+  /** What photographs say together of the ink of the print; nothing where looking again would find nothing else. */
+  async ink(sought: Sought, found: unknown[]): Promise<Ink | null> {
+    const [estimate, words] = (await finderOf(sought)).ink_of_all(JSON.stringify(found)) ?? [];
+    return estimate !== undefined && words !== undefined ? { estimate, words } : null;
   },
   async recognise(name: string, bytes: Uint8Array): Promise<Recognised | null> {
     const [{ Photograph }, { Recogniser }] = await Promise.all([photographer(), seer()]);
@@ -230,31 +267,42 @@ const calls = {
       return { ...seen, keep, held, pixels };
     });
   },
+  async survey(target: string, detections: string[], names: string[], model: string): Promise<Survey | null> {
+    const { survey } = await solver();
+    const found = survey(target, detections, names, model);
+    return found === undefined ? null : (JSON.parse(found) as Survey);
+  },
   async calibrate(target: string, detections: string[], names: string[], model: string): Promise<Result> {
     const { Solved } = await solver();
     return using(new Solved(target, detections, names, model), (solved) => {
       const files = [
         { name: "camera.json", text: solved.json() },
         { name: "camera.yaml", text: solved.yaml() },
-        { name: "camera.html", text: solved.page() },
+        { name: "camera-report.html", text: solved.page() },
       ];
       const opencv = solved.opencv();
-      if (opencv !== undefined) files.push({ name: "camera.opencv.yaml", text: opencv });
+      if (opencv !== undefined) files.push({ name: "camera-opencv.yaml", text: opencv });
       const ros = solved.ros();
-      if (ros !== undefined) files.push({ name: "camera.ros.yaml", text: ros });
+      if (ros !== undefined) files.push({ name: "camera-ros.yaml", text: ros });
       return { figures: JSON.parse(solved.figures()) as Figures, said: solved.said(), files };
     });
   },
-  async family(name: string): Promise<{ figures: string; cells: string; codes: bigint[] }> {
-    const { Codes } = await maker();
-    return using(new Codes((await familyFile(name)) ?? ""), (codes) => ({ figures: codes.figures(), cells: codes.cells(1.5), codes: [...codes.codes()] }));
+  async family(name: string): Promise<{ figures: FamilyFigures; cells: string; codes: bigint[] }> {
+    const codes = await codesOf(name);
+    return { figures: JSON.parse(codes.figures()) as FamilyFigures, cells: codes.cells(1.5), codes: [...codes.codes()] };
   },
   async decode(name: string, word: bigint, errors: number): Promise<number[] | null> {
-    const { Codes } = await maker();
-    return using(new Codes((await familyFile(name)) ?? ""), (codes) => {
-      const found = codes.decode(word, errors);
-      return found ? [...found] : null;
-    });
+    const found = (await codesOf(name)).decode(word, errors);
+    return found ? [...found] : null;
+  },
+  /** A word after its tag was turned once. */
+  async turned(name: string, word: bigint): Promise<bigint> {
+    return (await codesOf(name)).turned(word);
+  },
+  /** The shares of tags that are read, and misread, at each of these rates of wrong cells. */
+  async reading(name: string, rates: number[]): Promise<[number, number][]> {
+    const shares = (await codesOf(name)).reading(Float64Array.from(rates));
+    return rates.map((_, i) => [shares[2 * i] ?? 0, shares[2 * i + 1] ?? 0]);
   },
 };
 

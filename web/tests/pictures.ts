@@ -9,7 +9,19 @@ const root = fileURLToPath(new URL("../..", import.meta.url));
 export const program = process.env.DELTILLE_PROGRAM ?? join(root, "target/release/deltille");
 export const folder = join(root, "web/test-results/pictures");
 
-const EYES = ["0,-50,420", "300,60,330", "-90,200,380", "250,280,350", "80,-160,300", "380,200,300", "100,60,330", "-40,20,300", "180,300,300", "330,-80,380"];
+/** Where the camera stands, what is up in its picture, and what it looks at, mm: tilts to all sides, the board all over the picture. */
+const VIEWS = [
+  ["0,-50,420", "0,0,1", "115,60,0"],
+  ["300,60,330", "0,1,0", "60,15,0"],
+  ["-90,200,380", "0,1,0", "170,105,0"],
+  ["250,280,350", "1,0,0", "90,60,0"],
+  ["80,-160,300", "0,1,0", "60,110,0"],
+  ["380,200,300", "0,0,1", "115,60,0"],
+  ["100,60,330", "0,1,0", "170,10,0"],
+  ["-40,20,300", "0,-1,0", "160,20,0"],
+  ["180,300,300", "-1,0,0", "140,60,0"],
+  ["330,-80,380", "0,1,0", "50,105,0"],
+] as const;
 
 /** A mesh of four faces with edges of 150 mm. */
 export const tetrahedron = ((side: number) => {
@@ -22,15 +34,18 @@ export function deltille(...given: string[]): string {
   return execFileSync(program, given, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
 }
 
+/** Makes a target and its files, to be compared. That these show the target is proved by the tests of the program. */
+export const drawn = (...given: string[]): string => deltille(...given, "--no-verify");
+
 export default function make(): void {
   mkdirSync(folder, { recursive: true });
   if (existsSync(join(folder, "../webcam.y4m"))) return;
   const camera = join(root, "templates/camera.yaml");
-  deltille("board", "--rows", "8", "--cols", "9", "--name", "board", "-o", folder, "--force");
-  EYES.forEach((eye, i) => {
-    deltille("render", join(folder, "board.json"), "--camera", camera, "--eye", eye, "--seed", String(i), "-o", join(folder, `${i}.png`), "--force");
+  drawn("board", "--rows", "8", "--cols", "9", "--name", "board", "-o", folder, "--force");
+  VIEWS.forEach(([eye, up, at], i) => {
+    deltille("render", join(folder, "board.json"), "--camera", camera, "--eye", eye, "--up", up, "--look-at", at, "--seed", String(i), "-o", join(folder, `${i}.png`), "--force");
   });
-  deltille("icosahedron", "-o", folder, "--force");
+  drawn("icosahedron", "-o", folder, "--force");
   deltille("render", join(folder, "icosahedron.json"), "--camera", camera, "--eye", "150,220,600", "-o", join(folder, "solid.png"), "--force");
   // 640 × 480, at thirty a second: where the first picture is proposed, then at a few other places. The camera is the one that is
   // assumed before anything is known.

@@ -3,6 +3,7 @@ use std::process::ExitCode;
 use super::parameters::Parameters;
 use crate::cli::output::say;
 use crate::family::{self, Construction, bounds::bounds, shipped_names};
+use crate::lattice::GridKind;
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -12,7 +13,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Parameters { dimension, distance } = args.family;
-    let bounds = bounds(dimension, distance);
+    let bounds = bounds(GridKind::Deltille, dimension, distance);
     // Better bounds may be known.
     say!("no family of {} bits and distance {distance} has more tags than", dimension.bits());
     say!("{:>12}  by linear programming (Delsarte)", bounds.linear_programming);

@@ -49,7 +49,7 @@ pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
     say!("  construction    {construction}");
     say!(
         "  upper bound     {} codes (linear programming)",
-        bounds(family.dimension(), family.distance()).linear_programming
+        bounds(family.kind(), family.dimension(), family.distance()).linear_programming
     );
     let [rows, cols] = BOARD;
     let board = tags_of(&TargetSpec::Board(BoardSpec::new(GridKind::Deltille, rows, cols, 20.0)))?;

@@ -1,5 +1,6 @@
 //! Codes of tags, looked at and damaged.
 
+use deltille_core::family::bounds::bounds;
 use deltille_core::family::{Decoder, Family, shipped_families};
 use wasm_bindgen::prelude::*;
 
@@ -37,14 +38,18 @@ impl Codes {
         Ok(Self { family, decoder })
     }
 
-    /// What is known of it, as JSON: bits, codes, distance, and how many pairs of codes have each distance.
+    /// What is known of it, as JSON: bits, codes, distance, how many pairs of codes have each distance, how many codes no family
+    /// exceeds, how often a tag turns into itself, and the cell whose content each cell then receives.
     pub fn figures(&self) -> String {
         let family = &self.family;
+        let bounds = bounds(family.kind(), family.dimension(), family.distance());
         serde_json::json!({
             "name": family.name(), "bits": family.dimension().bits(), "codes": family.len(),
             "distance": family.distance(), "correctable": family.correctable(),
             "kind": family.kind(), "histogram": family.histogram(),
             "false_positives": family.false_positive_rates(),
+            "linear_programming": bounds.linear_programming, "sphere_packing": bounds.sphere_packing,
+            "turns": family.kind().turns(), "rotation": family.cells().rotation(),
         })
         .to_string()
     }
@@ -62,6 +67,18 @@ impl Codes {
     /// The codes of all tags.
     pub fn codes(&self) -> Vec<u64> {
         self.family.codes().to_vec()
+    }
+
+    /// A word after the tag was turned counter-clockwise, by 120° or 90°.
+    pub fn turned(&self, word: u64) -> u64 {
+        self.family.cells().rotate(word)
+    }
+
+    /// The shares of tags that are read, and misread, where cells are wrong with each of these probabilities: one after the
+    /// other.
+    pub fn reading(&self, rates: &[f64]) -> Vec<f64> {
+        let shares = rates.iter().filter_map(|&rate| self.family.reading(rate));
+        shares.flat_map(|shares| [shares.read, shares.misread]).collect()
     }
 
     /// The tag that a word is nearest to, with its turns and the number of cells that were wrong; nothing where none is

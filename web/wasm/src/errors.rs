@@ -4,10 +4,14 @@ use std::fmt::Display;
 
 use wasm_bindgen::JsError;
 
-/// A message on one line. What the library calls `BoardSpec::rows` is `rows` on the page.
+/// A message on one line.
 pub fn told(message: &impl Display) -> String {
-    let text = message.to_string().replace('\n', " ");
-    let (mut told, mut rest) = (String::with_capacity(text.len()), text.as_str());
+    named(&message.to_string().replace('\n', " "))
+}
+
+/// A text in which settings have the names of the page: what the library calls `BoardSpec::rows` is `rows`.
+pub fn named(text: &str) -> String {
+    let (mut told, mut rest) = (String::with_capacity(text.len()), text);
     while let Some((before, after)) = rest.split_once('`') {
         told += before;
         let Some((name, after)) = after.split_once('`') else {

@@ -1,6 +1,6 @@
 //! Grey values, and frames of a webcam, to corners.
 
-use deltille_core::detect::{Detection, Detector, DetectorConfig, Watch};
+use deltille_core::detect::{Detection, Detector, DetectorConfig, InkEstimate, Watch};
 use deltille_core::family::Family;
 use deltille_core::lattice::GridKind;
 use deltille_core::raster::{AnyGray, FileNotes, Gray, grey_of_colours};
@@ -117,6 +117,26 @@ impl Finder {
         let size = (rows > 0 && cols > 0).then_some((rows, cols));
         let detector = Detector::for_grid(kind, size, DetectorConfig::default());
         Ok(Self { detector, target: None })
+    }
+
+    /// What pictures of one print say together of its ink: of the list of what was found in each, as JSON, one estimate, and
+    /// that in words. Nothing where a second look with it would find nothing else.
+    ///
+    /// # Errors
+    /// In words, where it is no such list.
+    pub fn ink_of_all(&self, found: &str) -> Result<Option<Vec<String>>, JsError> {
+        let found: Vec<Option<InkEstimate>> = serde_json::from_str(found).raise()?;
+        let ink = self.detector.with_ink_of(&found).and_then(|detector| detector.known_ink());
+        ink.map(|ink| Ok(vec![serde_json::to_string(&ink).raise()?, ink.to_string()])).transpose()
+    }
+
+    /// One that looks again, with the ink that all pictures show.
+    ///
+    /// # Errors
+    /// In words, where it is no estimate of ink.
+    pub fn with_ink(self, ink: &str) -> Result<Self, JsError> {
+        let ink: InkEstimate = serde_json::from_str(ink).raise()?;
+        Ok(Self { detector: self.detector.with_ink(ink), ..self })
     }
 
     /// Looks at a picture.

@@ -4,13 +4,14 @@ use deltille_core::calibrate::{
     self, Calibration, Held, Holding, Intrinsics, Model, NextView, Reference, View, Words, views,
 };
 use deltille_core::camera::Pose;
+use deltille_core::detect::{Detection, InkEstimate};
 use deltille_core::targets::Target;
 use deltille_files::export::calibration::{Print, Residuals};
 use deltille_files::export::{calibration, camera, detection, next_view};
-use deltille_files::report::Report;
+use deltille_files::report::{Report, Survey};
 use wasm_bindgen::prelude::*;
 
-use crate::errors::{Raise, told};
+use crate::errors::{Raise, named, told};
 
 /// A calibrated camera: its files and its page.
 #[wasm_bindgen]
@@ -40,13 +41,10 @@ impl Solved {
         let target = Target::from_json(target).raise()?;
         let reference = Reference::Target(&target);
         let model: Model = model.parse().raise()?;
-        let read = detections
-            .iter()
-            .map(|text| detection::read(text))
-            .collect::<Result<Vec<_>, _>>()
-            .raise()?;
-        let named: Vec<_> = names.into_iter().zip(read).collect();
-        let shown = views(&named, &reference).raise()?;
+        let read = read(names, &detections)?;
+        let found: Vec<_> = read.iter().filter_map(|(_, found)| found.ink).collect();
+        let print = Print { scale: None, ink: InkEstimate::of_all(&found) };
+        let shown = views(&read, &reference).raise()?;
         let calibration = Calibration::of(&reference, reference.panels()).camera(
             "camera",
             shown.views,
@@ -59,7 +57,10 @@ impl Solved {
         let words = Words::new(&estimate, None);
         let said = diagnoses.iter().map(|diagnosis| told(&words.sentence(diagnosis))).collect();
         let mut page = Report::new("camera", &estimate);
-        page.diagnoses = &diagnoses;
+        // Too few views to compare models are no error.
+        let models = [calibration.compare_models(0).unwrap_or_default()];
+        (page.diagnoses, page.stated) = (&diagnoses, calibration.panels());
+        (page.print, page.models) = (print, &models);
         let figures = serde_json::json!({
             "rms_px": found.rms_px, "views": found.views.len(), "corners": found.corner_count(),
             "names": found.camera.parameter_names(), "values": found.camera.parameters(),
@@ -67,12 +68,13 @@ impl Solved {
             "projection_sd_px": found.projection_sd_px(None, deltille_core::calibrate::Source::Noise),
         });
         Ok(Self {
-            json: calibration::write(&estimate, &diagnoses, Print::default(), Residuals::LeftOut)
+            json: calibration::write(&estimate, &diagnoses, print, Residuals::LeftOut)
+                .map(|json| named(&json))
                 .unwrap_or_default(),
             yaml: found.camera.to_yaml(),
             opencv: camera::opencv(&found.camera).ok(),
             ros: camera::ros(&found.camera, "camera").ok(),
-            page: page.html(),
+            page: named(&page.html()),
             said,
             figures: figures.to_string(),
         })
@@ -112,6 +114,51 @@ impl Solved {
     pub fn figures(&self) -> String {
         self.figures.clone()
     }
+}
+
+/// What pictures of a target show of the camera's so far, as JSON: the size of the picture, columns and rows of cells, the corners
+/// in each of these row by row, the part of the cells that shows any, and of each picture by how much the board is tilted and in
+/// which direction it is farther away, rad from right towards below; `null` of solids. Nothing where no picture shows the target.
+///
+/// # Errors
+/// In words, where detections are none, or of pictures of different sizes, or there is no such model.
+#[wasm_bindgen]
+pub fn survey(
+    target: &str,
+    detections: Vec<String>,
+    names: Vec<String>,
+    model: &str,
+) -> Result<Option<String>, JsError> {
+    let target = Target::from_json(target).raise()?;
+    let reference = Reference::Target(&target);
+    let model: Model = model.parse().raise()?;
+    let views = views(&read(names, &detections)?, &reference).raise()?.views;
+    let Some(size_px) = views.first().map(|view| view.size_px) else { return Ok(None) };
+    let solve = |intrinsics: Intrinsics| {
+        let calibration = Calibration::of(&reference, reference.panels());
+        calibration.camera("camera", views.clone(), intrinsics).solve().ok()
+    };
+    // Of too few pictures, or too much alike, by the camera that is assumed before anything is known.
+    let estimate = solve(model.into()).or_else(|| {
+        let assumed = calibrate::Guide::new(&target, size_px, model)?.next(0, None).camera;
+        solve(Intrinsics::Known(assumed))
+    });
+    let Some(camera) = estimate.as_ref().and_then(|estimate| estimate.cameras.first()) else {
+        return Ok(None);
+    };
+    let survey = Survey::new(camera);
+    let tilts = survey.views.iter().map(|view| view.tilt_rad.zip(view.away_rad));
+    let told = serde_json::json!({
+        "size_px": size_px, "cells": survey.cells, "counts": survey.counts, "covered": survey.covered(),
+        "tilts": tilts.collect::<Vec<_>>(),
+    });
+    Ok(Some(told.to_string()))
+}
+
+/// Detections with their names.
+fn read(names: Vec<String>, detections: &[String]) -> Result<Vec<(String, Detection)>, JsError> {
+    let read = detections.iter().map(|text| detection::read(text));
+    Ok(names.into_iter().zip(read.collect::<Result<Vec<_>, _>>().raise()?).collect())
 }
 
 /// Where the panels of a target are.

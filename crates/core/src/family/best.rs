@@ -26,7 +26,7 @@ use super::search::Search;
 use super::shipped::shipped_names;
 use super::{Construction, Control, Family, FamilyError, Progress, Rules, Screen, TagWords};
 use crate::Clock;
-use crate::lattice::Dimension;
+use crate::lattice::{Dimension, GridKind};
 
 /// What to search and for how long.
 ///
@@ -341,7 +341,7 @@ impl Best {
 
     /// No family is larger; once there are so many codes, the search is over.
     fn most(&self) -> usize {
-        let bounds = bounds(self.dimension, self.distance);
+        let bounds = bounds(GridKind::Deltille, self.dimension, self.distance);
         bounds.linear_programming.min(bounds.sphere_packing) as usize
     }
 

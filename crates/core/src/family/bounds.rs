@@ -1,7 +1,7 @@
 //! Upper bounds on the size of a family.
 //!
 //! The codes of a family and their turns are a binary code of length b, distance h, with three
-//! words a tag; so what bounds binary codes bounds families, divided by three.
+//! words a tag, of square tags four; so what bounds binary codes bounds families, divided by these.
 //!
 //! *Sphere packing*: balls of radius ⌊(h−1)/2⌋ do not overlap.
 //!
@@ -13,21 +13,22 @@
 //! gives a code of length b+1, distance h+1 and even distances only, whose bound is often lower.
 
 use super::statistics::ball;
-use crate::lattice::Dimension;
+use crate::lattice::{Dimension, GridKind};
 
 /// Upper bounds on the number of tags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Bounds {
-    /// A third of Delsarte's linear programming bound, as every tag takes three words.
+    /// A third of Delsarte's linear programming bound, as every tag takes three words; of square tags a quarter.
     pub linear_programming: u64,
-    /// A third of the sphere-packing bound.
+    /// The same part of the sphere-packing bound.
     pub sphere_packing: u64,
 }
 
-/// Bounds for tags of a dimension at distance `distance` ≥ 1.
-pub fn bounds(dimension: Dimension, distance: u32) -> Bounds {
+/// Bounds for tags of a kind and a dimension at distance `distance` ≥ 1.
+pub fn bounds(kind: GridKind, dimension: Dimension, distance: u32) -> Bounds {
     let b = dimension.bits();
+    let turns = u64::from(kind.turns());
     let words = 2f64.powi(b as i32) / ball(b, distance.saturating_sub(1) / 2);
     let plain = delsarte(b, (distance..=b).collect());
     let all = 1u64 << b;
@@ -37,7 +38,7 @@ pub fn bounds(dimension: Dimension, distance: u32) -> Bounds {
     } else {
         plain
     };
-    Bounds { linear_programming: best.min(all) / 3, sphere_packing: words as u64 / 3 }
+    Bounds { linear_programming: best.min(all) / turns, sphere_packing: words as u64 / turns }
 }
 
 /// K_k(i) for length n, exactly: the coefficient of z^k in (1−z)^i (1+z)^(n−i).
@@ -143,8 +144,12 @@ mod tests {
             (36, 9, 251_756),
             (36, 11, 22_313),
         ] {
-            let found = bounds(Dimension::from_bits(bits).unwrap(), distance).linear_programming;
+            let dimension = Dimension::from_bits(bits).unwrap();
+            let found = bounds(GridKind::Deltille, dimension, distance).linear_programming;
             assert_eq!(found, expected, "d{bits}h{distance}");
+            let square = bounds(GridKind::Checker, dimension, distance).linear_programming;
+            let quarter = 3 * expected / 4..=(3 * expected + 2) / 4;
+            assert!(quarter.contains(&square), "a square tag takes four words, not three");
         }
     }
 

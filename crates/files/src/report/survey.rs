@@ -12,7 +12,7 @@
 use glam::{DVec2, DVec3};
 
 use deltille_core::calibrate::{CameraEstimate, ImageCircle, ViewEstimate};
-use deltille_core::camera::Camera;
+use deltille_core::camera::{Camera, Pose};
 
 /// Number of cells of the maps along the longer side of the image; cells are nearly square.
 const CELLS: usize = 16;
@@ -56,6 +56,9 @@ pub struct SurveyedView {
     /// Angle between the board's normal and the line of sight to the middle of its corners, rad;
     /// `None` for solids.
     pub tilt_rad: Option<f64>,
+    /// Direction in the image towards which the tilted board is farther away, rad from right towards below; `None` for
+    /// solids.
+    pub away_rad: Option<f64>,
     /// Distance of the origin of the target from the camera, mm.
     pub distance_mm: f64,
 }
@@ -147,12 +150,52 @@ fn cell_mean(residuals: &[DVec2]) -> Option<CellMean> {
 /// Tilt and distance of a view; without a tilt where the target is no plane, or where the lens has
 /// no ray for the mean position of the corners.
 fn surveyed(camera: &Camera, view: &ViewEstimate, planar: bool) -> SurveyedView {
-    let normal = view.pose.rotation * DVec3::Z;
     let count = view.corners.len().max(1) as f64;
     let middle = view.corners.iter().map(|corner| corner.pixel).sum::<DVec2>() / count;
-    let sight = camera.unproject(middle).map(|ray| ray.direction).filter(|_| planar);
+    let lean = lean(camera, &view.pose, middle).filter(|_| planar);
     SurveyedView {
-        tilt_rad: sight.map(|sight| normal.angle_between(-sight)),
+        tilt_rad: lean.map(|[tilt, _]| tilt),
+        away_rad: lean.map(|[_, away]| away),
         distance_mm: view.pose.translation.length(),
+    }
+}
+
+/// The angle between the normal of a board and the line of sight to a place of the image, and the direction in the image in
+/// which the board is farther away, rad; `None` where the lens has no ray there.
+fn lean(camera: &Camera, pose: &Pose, place: DVec2) -> Option<[f64; 2]> {
+    let normal = pose.rotation * DVec3::Z;
+    let sight = camera.unproject(place)?.direction.normalize();
+    // A board that faces the camera has its normal against the line of sight; it leans to where it is farther away.
+    let leant = normal.reject_from_normalized(sight);
+    let step = camera.project(sight + STEP * leant)? - camera.project(sight)?;
+    Some([normal.angle_between(-sight), step.to_angle()])
+}
+
+/// A step across the line of sight that is short against the curvature of any lens, in distances.
+const STEP: f64 = 1e-3;
+
+#[cfg(test)]
+mod tests {
+    use deltille_core::calibrate::{Guide, Model};
+    use deltille_core::targets::{BoardSpec, Target};
+
+    use super::*;
+
+    #[test]
+    fn boards_lean_as_they_were_asked_to_be_held() {
+        let board = Target::new("desk", BoardSpec::deltille(9, 12, 20.0)).unwrap();
+        for model in [Model::Radtan5, Model::KannalaBrandt(4)] {
+            let guide = Guide::new(&board, [1280, 720], model).unwrap();
+            for taken in 0..9 {
+                let next = guide.next(taken, None);
+                let place = next.at * DVec2::new(1280.0, 720.0) - 0.5;
+                let [tilt, away] = lean(&next.camera, &next.camera_from_target, place).unwrap();
+                assert!((tilt - next.tilt_rad).abs() < 1e-6, "{tilt} {}", next.tilt_rad);
+                if next.tilt_rad > 0.0 {
+                    let off = DVec2::from_angle(away).angle_to(DVec2::from_angle(next.away_rad));
+                    assert!(off.abs() < 0.02, "{away} {}", next.away_rad);
+                }
+            }
+        }
     }
 }
