@@ -31,6 +31,9 @@ pub const MESH_TOLERANCE_MM: f64 = 0.05;
 /// tile of any board that is detected so.
 const GRAZING_TOLERANCE_MM: f64 = 1.0;
 
+/// How exactly a corner is located in the picture, px: of a board of more than a metre that is more than the tolerance.
+const LOCATED_PX: f64 = 0.04;
+
 /// Edge of a tag's cell in the picture, px.
 const CELL_PX: f64 = 8.0;
 
@@ -345,7 +348,9 @@ fn check_corners(
             continue;
         };
         let own = seen.id == panel.id;
+        let found_to_mm = LOCATED_PX / verdict.px_per_mm;
         let tolerance_mm = if own { MESH_TOLERANCE_MM } else { GRAZING_TOLERANCE_MM };
+        let tolerance_mm = tolerance_mm.max(found_to_mm);
         for corner in &grid.corners {
             let vertex = Vertex::new(corner.row, corner.col);
             let Some(stated) = seen.corner_at(vertex).filter(|c| corner.id == Some(c.id)) else {

@@ -207,11 +207,14 @@ impl fmt::Display for Verdict {
                 |count: fn(&FaceVerdict) -> usize| self.faces.iter().map(count).sum::<usize>();
             let deviation = self.faces.iter().map(|s| s.max_deviation_mm).fold(0.0, f64::max);
             let corners = counted(sum(|s| s.corners_found), "corner");
-            let tags = counted(sum(|s| s.tags_exact), "tag");
+            let tags = match sum(|s| s.tags_exact) {
+                0 => String::new(),
+                tags => format!(", {} exact", counted(tags, "tag")),
+            };
             let faces = counted(self.faces.len(), "face");
             return write!(
                 f,
-                "verified, {faces}, {corners} in space within {deviation:.4} mm, {tags} exact"
+                "verified, {faces}, {corners} in space within {deviation:.4} mm{tags}"
             );
         }
         if self.passed {

@@ -70,8 +70,14 @@ impl Delivery {
             say!("wrote {}", path.display());
         }
         let texture = obj::texture_name(&target.name);
-        let artifacts: Vec<PathBuf> =
-            written.into_iter().filter(|path| is_proved(path, &texture)).collect();
+        // A model for a simulator is proved together with the OBJ that it names.
+        let models = [Format::Sdf, Format::Urdf, Format::Mjcf].map(Some);
+        let is_in_model = written.iter().any(|path| models.contains(&Format::of(path)));
+        let artifacts: Vec<PathBuf> = written
+            .into_iter()
+            .filter(|path| is_proved(path, &texture))
+            .filter(|path| !(is_in_model && Format::of(path) == Some(Format::Obj)))
+            .collect();
         if self.no_verify || artifacts.is_empty() {
             return Ok(ExitCode::SUCCESS);
         }

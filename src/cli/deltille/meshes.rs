@@ -5,12 +5,12 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use anyhow::{Context, anyhow, ensure};
+use anyhow::{anyhow, ensure};
 
 use super::files::{File, bytes_file};
 use crate::cli::values::{number, whole};
 use crate::export::artifacts::{What, of_mesh};
-use crate::export::mesh::{MAX_TEXTURE_PX, Meshing, Resolution, TexturedMesh};
+use crate::export::mesh::{MAX_TEXTURE_PX, MeshError, Meshing, Resolution, TexturedMesh};
 use crate::family::Family;
 use crate::targets::Target;
 
@@ -24,7 +24,8 @@ const SIDE_PX: RangeInclusive<u32> = 64..=MAX_TEXTURE_PX;
 #[derive(clap::Args, Clone, Copy)]
 #[command(next_help_heading = MESHES)]
 pub struct Meshes {
-    /// Write <name>.glb, the textured mesh as glTF 2.0 (metres)
+    /// Write <name>.glb, the textured mesh as glTF 2.0 (metres); of a solid also where nothing else
+    /// is asked for
     #[arg(long)]
     gltf: bool,
     /// Write <name>.obj, <name>.mtl and <name>-texture.png (millimetres)
@@ -101,11 +102,14 @@ impl Meshes {
             }
             (None, None) => None,
         };
-        let mesh = TexturedMesh::new(target, family, meshing);
-        let mesh = match option {
-            Some(option) => mesh.context(option)?,
-            None => mesh?,
-        };
+        let mesh = TexturedMesh::new(target, family, meshing).map_err(|error| {
+            let option = match &error {
+                MeshError::Thickness(_) => Some("--plate"),
+                MeshError::SeveralBoards(..) => Some("--boards"),
+                _ => option,
+            };
+            option.map_or_else(|| anyhow!("{error}"), |option| anyhow!("{option}: {error}"))
+        })?;
         let asked = [
             (self.gltf, What::Gltf),
             (self.obj, What::Obj),
