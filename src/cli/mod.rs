@@ -6,5 +6,6 @@ pub mod interrupt;
 pub mod output;
 pub mod progress;
 pub mod run;
+pub mod shell;
 mod values;
 pub mod wording;

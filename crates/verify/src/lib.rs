@@ -240,6 +240,16 @@ pub struct Verifier<'a> {
     limits: Limits,
     guard: Guard,
     cancel: Option<&'a AtomicBool>,
+    progress: Option<&'a (dyn Fn(Progress) + Sync)>,
+}
+
+/// How far the comparison of an artifact has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Pages, or faces of a mesh, that were compared.
+    pub done: usize,
+    /// How many there are.
+    pub total: usize,
 }
 
 impl<'a> Verifier<'a> {
@@ -277,6 +287,7 @@ impl<'a> Verifier<'a> {
             limits: Limits::default(),
             guard: Guard::default(),
             cancel: None,
+            progress: None,
         })
     }
 
@@ -296,6 +307,19 @@ impl<'a> Verifier<'a> {
     /// [`verify`](Self::verify) returns [`VerifyError::Cancelled`].
     pub fn stopped_by(self, flag: &'a AtomicBool) -> Self {
         Self { cancel: Some(flag), ..self }
+    }
+
+    /// The same verifier, which tells after each page of a document and each face of a mesh how far it has come; faces are
+    /// compared on several threads.
+    pub fn telling(self, progress: &'a (dyn Fn(Progress) + Sync)) -> Self {
+        Self { progress: Some(progress), ..self }
+    }
+
+    /// Tells that so many of all were compared.
+    fn tell(&self, done: usize, total: usize) {
+        if let Some(progress) = self.progress {
+            progress(Progress { done, total });
+        }
     }
 
     /// The files that are verified together with `path`: all pages of a net, or of a board over several pages, where
@@ -429,14 +453,16 @@ impl<'a> Verifier<'a> {
                 return Err(VerifyError::Cancelled);
             }
             let pages = &sources[first..first + layout.page_count()];
+            let before = first;
             first += layout.page_count();
             let Some(pages) = pages.iter().copied().collect::<Option<Vec<Source>>>() else {
                 continue;
             };
             let (verdict, found) = match layout.pages.is_empty() {
                 true => self.verify_page(pages[0], index)?,
-                false => self.verify_pages(&pages, index)?,
+                false => self.verify_pages(&pages, index, before)?,
             };
+            self.tell(first, stated);
             verdicts.push(verdict);
             seen.push(found);
         }
@@ -516,12 +542,13 @@ impl<'a> Verifier<'a> {
         Ok((verdict, seen))
     }
 
-    /// Compares a sheet that is printed on several pages: first the area around the window of each
+    /// Compares a sheet that is printed on several pages, with so many pages of other sheets `before` it: first the area around the window of each
     /// page, then the sheet assembled from all windows.
     fn verify_pages(
         &self,
         sources: &[Source],
         index: usize,
+        before: usize,
     ) -> Result<(SheetVerdict, Seen), DocumentError> {
         let layout = &self.target.sheets[index];
         let wish = self.wish_px_per_mm(layout);
@@ -540,6 +567,8 @@ impl<'a> Verifier<'a> {
             check_bars_mm.extend(verdict.check_bars_mm);
             // Kept no finer than the sheet is looked at.
             pages.push(if wish > most { source.render(marks, most)?.0 } else { page });
+            // The whole sheet is compared after them.
+            self.tell(before + pages.len() - 1, self.target.page_count());
         }
         let (sheet, different) = assemble::assemble(&pages, layout, wish.min(most));
         let mut verdict = SheetVerdict::new(index, &sheet, different);

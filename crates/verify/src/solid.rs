@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -159,7 +160,14 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
     }
     if scale.is_none_or(|(scale, _)| (scale - 1.0).abs() < MAX_SCALE_ERROR) {
         let panels = verifier.target.panels.par_iter();
-        faces = panels.map(|panel| check_face(verifier, &model, panel)).collect();
+        let done = AtomicUsize::new(0);
+        let check = |panel| {
+            let verdict = check_face(verifier, &model, panel);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            verifier.tell(done, verifier.target.panels.len());
+            verdict
+        };
+        faces = panels.map(check).collect();
     }
     let mut verdict = Verdict::new(path, format, findings);
     verdict.passed &= faces.iter().all(|face| face.findings.is_empty());

@@ -240,7 +240,9 @@ impl fmt::Display for Verdict {
                 write!(f, "{} matched, ", counted(edges, "edge"))?;
             }
             let tags = sum(|s| s.tags_exact);
-            write!(f, "{} exact, ", counted(tags, "tag"))?;
+            if tags > 0 {
+                write!(f, "{} exact, ", counted(tags, "tag"))?;
+            }
             let bars = self.sheets.iter().flat_map(|s| &s.check_bars_mm);
             let bars: Vec<String> =
                 bars.filter_map(|(_, found)| Some(format!("{:.2}", (*found)?))).collect();

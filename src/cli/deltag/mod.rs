@@ -21,6 +21,7 @@ use anyhow::bail;
 use clap::{Parser, Subcommand};
 
 use crate::cli::output::tell;
+use crate::cli::shell;
 use crate::family::{self, Family, PAIRS_COUNTED, certify_codes, shipped_names};
 use crate::lattice::GridKind;
 
@@ -56,6 +57,10 @@ enum Command {
     Sheet(sheet::Args),
     /// List the families that come with the program
     List(list::Args),
+    /// Print what a shell reads to complete commands and options
+    Completions(shell::Completions),
+    /// Write pages of the manual
+    Man(shell::Man),
 }
 
 /// Runs the program.
@@ -71,6 +76,8 @@ pub fn run(deltag: Deltag) -> anyhow::Result<ExitCode> {
         Command::Show(args) => show::run(args),
         Command::Sheet(args) => sheet::run(args),
         Command::List(args) => list::run(args),
+        Command::Completions(args) => shell::completions::<Deltag>(args),
+        Command::Man(args) => shell::man::<Deltag>(args),
     }
 }
 

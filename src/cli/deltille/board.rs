@@ -29,12 +29,12 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     save_template: Option<PathBuf>,
     #[command(flatten)]
+    delivery: Delivery,
+    #[command(flatten)]
     meshes: Meshes,
     /// Thickness of the plate that carries the board in a mesh [default: 3mm]
     #[arg(long, value_name = "LENGTH", value_parser = parse_length_mm, help_heading = MESHES)]
     plate: Option<f64>,
-    #[command(flatten)]
-    delivery: Delivery,
 }
 
 /// Makes a board, writes its files, and verifies what it wrote.

@@ -8,6 +8,7 @@ mod camera_file;
 mod compare;
 mod delivery;
 mod detect;
+mod examples;
 mod experiment;
 pub(in crate::cli) mod files;
 mod finder;
@@ -33,6 +34,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::cli::shell;
 use crate::lattice::GridKind;
 use crate::targets::SolidShape;
 
@@ -47,45 +49,67 @@ pub struct Deltille {
 #[derive(Subcommand)]
 enum Command {
     /// Make a board: its description, and what to print
-    #[command(mut_arg("tags_in", |arg| arg.hide(true)))]
+    #[command(after_help = examples::BOARD, mut_arg("tags_in", |arg| arg.hide(true)))]
     Board(Box<board::Args>),
     /// Make a checkerboard, plain or with square tags
+    #[command(after_help = examples::CHECKERBOARD)]
     #[command(mut_arg("family", |arg| arg.long("tags").alias("family")))]
     Checkerboard(Box<board::Args>),
     /// Make a tetrahedron with tagged boards on its faces: a mesh, and what to print
+    #[command(after_help = examples::SOLID)]
     Tetrahedron(Box<solid::Args>),
     /// Make an octahedron
+    #[command(after_help = examples::SOLID)]
     Octahedron(Box<solid::Args>),
     /// Make an icosahedron
+    #[command(after_help = examples::SOLID)]
     Icosahedron(Box<solid::Args>),
     /// Make a solid of any closed mesh of equilateral or nearly equilateral triangles
+    #[command(after_help = examples::MESH)]
     Solid(Box<solid::MeshArgs>),
+    /// Compare the files of a target with its description
+    #[command(after_help = examples::VERIFY)]
+    Verify(verify::Args),
+    /// Take a synthetic photograph of a target, with the true positions of its corners
+    #[command(after_help = examples::RENDER)]
+    Render(render::Args),
     /// Find a target, or untagged boards, in photographs
+    #[command(after_help = examples::DETECT)]
     Detect(detect::Args),
-    /// Find a camera from detections
-    Calibrate(calibrate::Args),
+    /// Refine given positions of corners
+    #[command(after_help = examples::REFINE)]
+    Refine(refine::Args),
     /// Say which photograph of a target to take next, until the camera is known well enough
+    #[command(after_help = examples::GUIDE)]
     Guide(Box<guide::Args>),
+    /// Find a camera from detections
+    #[command(after_help = examples::CALIBRATE)]
+    Calibrate(calibrate::Args),
+    /// Find the cameras of a rig, and where they are to each other, from detections
+    #[command(after_help = examples::RIG)]
+    Rig(rig::Args),
     /// Say whether two calibrations of a camera or rig differ by more than chance
+    #[command(after_help = examples::COMPARE)]
     Compare(compare::Args),
+    /// Say where a target is in photographs of a known camera
+    #[command(after_help = examples::POSE)]
+    Pose(pose::Args),
+    /// Take the distortion of a camera out of photographs: pictures as of a pinhole, or maps
+    #[command(after_help = examples::UNDISTORT)]
+    Undistort(undistort::Args),
+    /// Rectify two cameras of a rig, so that a point is in the same row of both pictures
+    #[command(after_help = examples::RECTIFY)]
+    Rectify(undistort::PairArgs),
     /// Time the stages of detection on this machine
     Bench(bench::Args),
     /// Measure the library on simulated images
     Experiment(experiment::Args),
-    /// Refine given positions of corners
-    Refine(refine::Args),
-    /// Say where a target is in photographs of a known camera
-    Pose(pose::Args),
-    /// Find the cameras of a rig, and where they are to each other, from detections
-    Rig(rig::Args),
-    /// Take a synthetic photograph of a target, with the true positions of its corners
-    Render(render::Args),
-    /// Take the distortion of a camera out of photographs: pictures as of a pinhole, or maps
-    Undistort(undistort::Args),
-    /// Rectify two cameras of a rig, so that a point is in the same row of both pictures
-    Rectify(undistort::PairArgs),
-    /// Compare the files of a target with its description
-    Verify(verify::Args),
+    /// Print what a shell reads to complete commands and options
+    #[command(after_help = shell::COMPLETIONS)]
+    Completions(shell::Completions),
+    /// Write pages of the manual
+    #[command(after_help = shell::MAN)]
+    Man(shell::Man),
 }
 
 /// Runs the program.
@@ -110,5 +134,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Undistort(args) => undistort::run(args),
         Command::Rectify(args) => undistort::run_pair(args),
         Command::Verify(args) => verify::run(args),
+        Command::Completions(args) => shell::completions::<Deltille>(args),
+        Command::Man(args) => shell::man::<Deltille>(args),
     }
 }

@@ -26,6 +26,13 @@ pub const DEFAULT_DPI: u32 = 300;
 /// Range of the resolution: in a coarser picture a check bar cannot be measured to 0.02 mm.
 const DPI: RangeInclusive<u32> = 200..=2400;
 
+/// Heading of the help of boards and solids: tags.
+pub const TAGS: &str = "Tags";
+/// Likewise: paper.
+pub const PAPER: &str = "Paper";
+/// Likewise: what is printed or listed.
+pub const PRINT: &str = "Files to print, and lists";
+
 /// Settings as they are given; what is not given has a default.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
@@ -46,28 +53,28 @@ pub struct Settings {
     edge: Option<String>,
     /// Tag family: on a board a name from `deltag list`, or a family file [default: delTag25h7]; on a
     /// checkerboard aprilTag36h11, aprilTag25h9 or aprilTag16h5 [default: no tags]
-    #[arg(long)]
+    #[arg(long, help_heading = TAGS)]
     #[serde(alias = "tags")]
     family: Option<String>,
     /// Squares of a checkerboard that carry the tags: black, the square itself being the border, or
     /// white, each tag with a border of its own, for detectors that know single tags only
     /// [default: black]
-    #[arg(long, value_name = "COLOUR", value_parser = colour)]
+    #[arg(long, help_heading = TAGS, value_name = "COLOUR", value_parser = colour)]
     tags_in: Option<TagsIn>,
     /// No tags
-    #[arg(long, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "first_id"])]
+    #[arg(long, help_heading = TAGS, conflicts_with_all = ["family", "tags_in", "tag_spacing", "tag_border", "first_id"])]
     #[serde(skip_serializing_if = "is_false")]
     untagged: bool,
     /// A tag in every n-th row and column, on a checkerboard where the square has the right colour,
     /// which with an odd n every second has [default: 3, on a checkerboard 2]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
+    #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
     /// Black border of a tag, in widths of a bit, 0.6 to 10, on a checkerboard at least 1
     /// [default: 1.5, in black squares 2, in white ones 1]
-    #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
+    #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     tag_border: Option<f64>,
     /// Id of the first tag; the others follow [default: 0]
-    #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
     /// Id of the first board [default: 0]
     #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
@@ -81,39 +88,39 @@ pub struct Settings {
     invert: bool,
     /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm [default: the smallest of A4
     /// to A0 that takes the board]
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, help_heading = PAPER, value_name = "SIZE")]
     paper: Option<String>,
     /// Print a board that is larger than the paper over several pages, to be joined
-    #[arg(long)]
+    #[arg(long, help_heading = PAPER)]
     #[serde(skip_serializing_if = "is_false")]
     poster: bool,
     /// auto, portrait or landscape [default: auto]
-    #[arg(long)]
+    #[arg(long, help_heading = PAPER)]
     orientation: Option<String>,
     /// Blank along the edges of the paper; 0.5 mm are left in any case [default: 5mm]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
     margin: Option<String>,
     /// Write <name>.pdf; so it is where no other of pdf, svg, png is asked for
-    #[arg(long)]
+    #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     pdf: bool,
     /// Write <name>.svg
-    #[arg(long)]
+    #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     svg: bool,
     /// Write <name>.png
-    #[arg(long)]
+    #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     png: bool,
     /// Write <name>.dsc, for the reference detector or its fork
-    #[arg(long)]
+    #[arg(long, help_heading = PRINT)]
     #[serde(skip_serializing_if = "is_false")]
     dsc: bool,
     /// fork or original [default: fork]
-    #[arg(long, value_name = "DIALECT")]
+    #[arg(long, help_heading = PRINT, value_name = "DIALECT")]
     dsc_dialect: Option<String>,
     /// Resolution of the PNG, 200 to 2400 dots per inch [default: 300]
-    #[arg(long, allow_negative_numbers = true, value_parser = whole(DPI))]
+    #[arg(long, help_heading = PRINT, allow_negative_numbers = true, value_parser = whole(DPI))]
     dpi: Option<u32>,
     /// Stem of the files' names, printed on the sheet [default: board, or checkerboard]
     #[arg(long)]

@@ -8,7 +8,7 @@ use anyhow::{Context, anyhow, bail};
 use super::delivery::Delivery;
 use super::files::{self, File, bytes_file, text_file};
 use super::meshes::Meshes;
-use super::settings::DEFAULT_DPI;
+use super::settings::{DEFAULT_DPI, PAPER, PRINT, TAGS};
 use crate::artwork;
 use crate::cli::output::say;
 use crate::cli::values::{number, whole};
@@ -22,6 +22,9 @@ use crate::targets::{
     Skeleton, SkeletonSpec, SolidShape, SolidSheets, SolidSpec, TagSpec, TagsIn, Target,
     TargetSpec, parse_length_mm,
 };
+
+/// Heading of the help.
+const BODIES: &str = "Bodies to print, outlines to cut";
 
 /// Arguments of the commands that make solids.
 #[derive(clap::Args)]
@@ -38,82 +41,82 @@ pub struct Args {
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     face_margin: Option<String>,
     /// Tag family: a name from `deltag list`, or a family file [default: delTag25h7]
-    #[arg(long)]
+    #[arg(long, help_heading = TAGS)]
     family: Option<String>,
     /// A tag in every n-th row and column of a face [default: 3]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
+    #[arg(long, help_heading = TAGS, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=MOST_ROWS))]
     tag_spacing: Option<u32>,
     /// Black border of a tag, in widths of a bit [default: 1.5]
-    #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
+    #[arg(long, help_heading = TAGS, value_name = "BITS", allow_negative_numbers = true, value_parser = number(BORDER_BITS))]
     tag_border: Option<f64>,
     /// Id of the first tag; the others follow, face by face [default: 0]
-    #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
+    #[arg(long, help_heading = TAGS, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     first_id: Option<u32>,
     /// Id of the first face's board; the others follow [default: 0]
     #[arg(long, value_name = "ID", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     board_id: Option<u32>,
     /// Write <name>.stl, the bare solid (millimetres)
-    #[arg(long)]
+    #[arg(long, help_heading = BODIES)]
     stl: bool,
     /// Write <name>-skeleton.stl, a frame to print with a seat for a panel on each face
-    #[arg(long)]
+    #[arg(long, help_heading = BODIES)]
     skeleton: bool,
     /// Thickness of the panels and what is glued on them [default: 3mm]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
+    #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
     panel_thickness: Option<String>,
     /// Thickness of the skeleton below the panels [default: 4mm]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
+    #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
     wall: Option<String>,
     /// Distance of the seats from the edges of the faces [default: the least that stays solid]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
+    #[arg(long, help_heading = BODIES, value_name = "LENGTH", allow_hyphen_values = true, requires = "skeleton")]
     rib: Option<String>,
     /// Write <name>-panels.dxf, the outlines of all faces to cut, or of what the seats of the
     /// skeleton take, and without --per-face <name>-net.dxf, the net to cut, score and fold
     /// (millimetres)
-    #[arg(long)]
+    #[arg(long, help_heading = BODIES)]
     dxf: bool,
     /// Write <name>.pdf: the net to cut out, fold and glue, or with --per-face a page per face
-    #[arg(long)]
+    #[arg(long, help_heading = PRINT)]
     pdf: bool,
     /// Write <name>-<page>.svg
-    #[arg(long)]
+    #[arg(long, help_heading = PRINT)]
     svg: bool,
     /// Write <name>-<page>.png
-    #[arg(long)]
+    #[arg(long, help_heading = PRINT)]
     png: bool,
     /// Print each face on a sheet of its own, to be glued on a rigid skeleton, instead of the net
-    #[arg(long)]
+    #[arg(long, help_heading = PAPER)]
     per_face: bool,
     /// Print a net that is larger than the paper in one piece, over pages that are joined along seams
     /// through its tiles, instead of in pieces of whole faces
-    #[arg(long, conflicts_with = "per_face")]
+    #[arg(long, help_heading = PAPER, conflicts_with = "per_face")]
     allow_seams: bool,
     /// Write <name>.dsc, for the reference detector or its fork
-    #[arg(long)]
+    #[arg(long, help_heading = PRINT)]
     dsc: bool,
     /// fork or original [default: fork]
-    #[arg(long, value_name = "DIALECT")]
+    #[arg(long, help_heading = PRINT, value_name = "DIALECT")]
     dsc_dialect: Option<String>,
     /// Resolution of the PNG pages, dots per inch [default: 300]
-    #[arg(long, value_parser = whole(200..=2400u32))]
+    #[arg(long, help_heading = PRINT, value_parser = whole(200..=2400u32))]
     dpi: Option<u32>,
     /// A0 to A5, letter, legal, tabloid, or a size such as 297x420mm; a net that is larger is
     /// printed in several pieces of whole faces [default: the smallest of A4 to A0 that takes it, else A0]
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, help_heading = PAPER, value_name = "SIZE")]
     paper: Option<String>,
     /// auto, portrait or landscape [default: auto]
-    #[arg(long)]
+    #[arg(long, help_heading = PAPER)]
     orientation: Option<String>,
     /// Blank along the edges of the paper [default: 5mm]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(long, help_heading = PAPER, value_name = "LENGTH", allow_hyphen_values = true)]
     margin: Option<String>,
     /// Stem of the files' names, printed on the sheets [default: the solid's name]
     #[arg(long)]
     name: Option<String>,
     #[command(flatten)]
-    meshes: Meshes,
-    #[command(flatten)]
     delivery: Delivery,
+    #[command(flatten)]
+    meshes: Meshes,
 }
 
 /// Arguments of `deltille solid`.

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use anyhow::{Context, bail};
 use serde::Serialize;
@@ -12,14 +13,15 @@ use super::limits::AllLimits;
 use super::target_file;
 use crate::cli::interrupt;
 use crate::cli::output::{self, Overwrite, say, tell};
+use crate::cli::progress;
 use crate::cli::run::{self, FAILED};
 use crate::export::kind::Kind;
 use crate::export::{sheet_file_name, stl};
 use crate::family::Family;
 use crate::limits::Limits;
 use crate::targets::Target;
-use crate::verify::{Verdict, Verifier};
-use crate::words::counted;
+use crate::verify::{Progress, Verdict, Verifier};
+use crate::words::{counted, shown};
 
 /// Arguments of `deltille verify`.
 #[derive(clap::Args)]
@@ -59,7 +61,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if artifacts.is_empty() {
         let name = &target.name;
         bail!(
-            "no {name}.pdf, .svg, .png, .glb, .obj, .stl, .dsc or .dxf beside {}: name the files",
+            "no {name}.pdf, .svg, .png, .glb, .obj, .sdf, .urdf, .xml, .usda, .stl, .dsc or .dxf beside {}: name the files",
             args.target.display()
         );
     }
@@ -72,6 +74,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     verify(&target, family.as_ref(), &artifacts, alone, report, limits)
 }
 
+/// How often the time that has passed is shown.
+const TICK: Duration = Duration::from_millis(200);
+
 /// Verifies files and prints a line on each, then the sum of it. All pages of a target are among them,
 /// unless one is verified `alone`.
 pub fn verify(
@@ -82,7 +87,13 @@ pub fn verify(
     report: Option<(&Path, Overwrite)>,
     limits: Limits,
 ) -> anyhow::Result<ExitCode> {
+    let bar = progress::bar(1, "");
+    let show = |Progress { done, total }: Progress| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    };
     let verifier = Verifier::new(target, family)?.within(limits).stopped_by(interrupt::flag());
+    let verifier = verifier.telling(&show);
     let mut verdicts = Vec::with_capacity(artifacts.len());
     let mut done = BTreeSet::new();
     let mut errors = Vec::new();
@@ -92,7 +103,13 @@ pub fn verify(
             continue;
         }
         done.extend(verifier.set_of(path));
-        match verifier.verify_path(path) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        bar.set_message(shown(&name).into_owned());
+        bar.reset();
+        bar.enable_steady_tick(TICK);
+        let verdict = verifier.verify_path(path);
+        bar.finish_and_clear();
+        match verdict {
             Ok(verdict) => {
                 say!("{verdict}");
                 verdicts.push(verdict);
@@ -142,7 +159,8 @@ fn artifacts_beside(folder: &Path, target: &Target) -> Vec<PathBuf> {
     });
     let printed = [format!("{name}.pdf")].into_iter().chain(drawn).filter_map(present);
     let printed: Vec<PathBuf> = printed.collect();
-    let meshes = ["glb", "obj", "stl", "dsc"].map(|extension| format!("{name}.{extension}"));
+    let meshes = ["glb", "obj", "sdf", "urdf", "xml", "usda", "stl", "dsc"];
+    let meshes = meshes.map(|extension| format!("{name}.{extension}"));
     let more = [stl::skeleton_name(name), format!("{name}-panels.dxf"), format!("{name}-net.dxf")];
     let meshes = meshes.into_iter().chain(more).filter_map(present);
     if target.sheets.is_empty() {

@@ -522,7 +522,7 @@ fn what_cannot_be_made_is_refused_in_one_line_and_leaves_nothing() {
         "icosahedron --face-margin -1mm",
         "icosahedron --first-id 300",
         "icosahedron --family delTag16h5",
-        "icosahedron --texture-dpi 100",
+        "icosahedron --texture-dpi 50",
         "icosahedron --texture-dpi 9000",
         "icosahedron --pdf --edge 3m",
         "icosahedron --pdf --paper A5 --edge 440mm",

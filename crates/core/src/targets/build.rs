@@ -133,7 +133,9 @@ fn board_parts(
         Some((Ok(arrangement), _)) => {
             let sheet = |panel: &Panel| {
                 let ink = if panel.inverted { panel.field_mm() } else { panel.bounds_mm() };
-                arrangement.sheet(panel.id, ink, words(panel))
+                let mut sheet = arrangement.sheet(panel.id, ink, words(panel));
+                sheet.texts.extend(arrangement.large_id(board, panel.id, ink));
+                sheet
             };
             panels.iter().map(sheet).collect()
         }

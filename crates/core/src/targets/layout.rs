@@ -5,9 +5,9 @@
 //!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      ┬  │   the board lies in the middle of the page unless that
 //!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   would bring a mark into its quiet zone;
 //!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   the bars lie along the lower and the right margin, the
-//!   │  ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   words between their ends; the label below the lower
+//!   │0 ▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲▲      │  │   words between their ends; the label below the lower
 //!   │  ├────── 180 mm ──────┤     ┴  │   bar, or beside the right one where that saves the board
-//!   │  name · 10 × 11 corners · …    │
+//!   │  name · 10 × 11 corners · …    │   where there is room the board's id in large type
 //!   └────────────────────────────────┘
 //! ```
 
@@ -29,6 +29,9 @@ const LABEL_CAP_MM: f64 = 2.2;
 /// Length of a bar's end strokes, across the bar, mm: enough to lay a ruler on, short enough to
 /// leave room for the words.
 pub const CHECK_BAR_STROKE_MM: f64 = 2.0;
+/// Capital height of a board's id, mm: legible from three metres; and the least that is worth printing.
+const LARGE_CAP_MM: f64 = 8.0;
+const LEAST_LARGE_CAP_MM: f64 = 4.0;
 /// What letters such as g reach below the base line, in capital heights.
 const DESCENT_CAPS: f64 = 0.33;
 /// Blanks between a bar, its words and the label, mm: the first that leaves room for the board. The
@@ -260,6 +263,36 @@ impl Arrangement {
             texts,
             pages: Vec::new(),
         }
+    }
+
+    /// The id of a board in large type beside its lower left corner, standing as the board does, so that boards are told
+    /// apart, and up from down, from some metres away; none where there is no room. `ink` is a rectangle of the board's frame.
+    pub(super) fn large_id(&self, spec: &BoardSpec, id: u32, ink: [f64; 4]) -> Option<SheetText> {
+        let placement = self.placement(id, ink);
+        let [left, lower, right, upper] = self.clear_mm();
+        let corners = [DVec2::new(left, lower), DVec2::new(right, upper)];
+        let [a, b] = corners.map(|corner| placement.panel_from_page(corner));
+        let clear = a.min(b);
+        let blank = Footprint::new(spec, self.margin).mark_blank;
+        let text = id.to_string();
+        let caps_wide = ADVANCE_CAPS * text.len() as f64;
+        let cap_in = |room: f64, caps: f64| {
+            let cap = (room / caps).min(LARGE_CAP_MM);
+            (cap >= LEAST_LARGE_CAP_MM).then_some(cap)
+        };
+        let end = DVec2::new(ink[0], ink[1]) - blank;
+        let beside = cap_in(end.x - clear.x, caps_wide)
+            .map(|cap| (cap, DVec2::new(end.x - caps_wide * cap, ink[1])));
+        let below = cap_in(end.y - clear.y, 1.0).map(|cap| (cap, DVec2::new(ink[0], end.y - cap)));
+        let places = below.into_iter().chain(beside);
+        let (cap_height_mm, at) = places.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(SheetText {
+            text: Label::Words(text),
+            at_mm: placement.page_from_panel(at),
+            angle_rad: placement.angle_rad,
+            cap_height_mm,
+            max_width_mm: caps_wide * cap_height_mm,
+        })
     }
 
     /// Width and height of the page, mm.

@@ -334,6 +334,13 @@ impl Placement {
         let right = angles::direction(self.angle_rad);
         self.origin_mm + right * point.x + right.perp() * point.y
     }
+
+    /// A point of the page in the frame of the panel, mm.
+    pub fn panel_from_page(&self, point: DVec2) -> DVec2 {
+        let right = angles::direction(self.angle_rad);
+        let from_origin = point - self.origin_mm;
+        DVec2::new(from_origin.dot(right), from_origin.dot(right.perp()))
+    }
 }
 
 /// A straight line of a page.

@@ -5,7 +5,8 @@
 //!   │     ││    │       windows overlap; crosses in the overlap are printed on both pages. Pages
 //!   ├─────┼┼────┤ ×     are numbered row by row from the upper left. Windows that show nothing of
 //!   ├─────┼┼────┤       it are not printed.
-//!   3─────┴┴────┘4      A page with another on its left or above has a line there to be trimmed along.
+//!   3─────┴┴────┘4      A page with another on its left or above has a line there to be trimmed along; ticks on the
+//!                       other end where that edge comes to lie.
 //! ```
 
 use glam::DVec2;
@@ -48,6 +49,9 @@ const LINE_MM: f64 = 0.15;
 
 /// Distance of the line to be trimmed along from the window, mm: the paper that it leaves hides nothing.
 const TRIM_MM: f64 = 0.3;
+
+/// Length of a tick, mm.
+const TICK_MM: f64 = 2.0;
 
 /// Width of the frame around the page's own window on the overview, mm.
 const FRAME_MM: f64 = 0.5;
@@ -217,6 +221,7 @@ impl Poster {
                     let b = self.window_on_sheet(next.0, next.1);
                     let shared = [a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])];
                     sheet.lines.extend(crosses(shared, &obstacles));
+                    sheet.lines.extend(ticks(shared, next.0 > column, &obstacles));
                 }
             }
         }
@@ -226,13 +231,15 @@ impl Poster {
             let name = format!("{} of {}", index + 1, shown.len());
             let mut marks = self.page.sheet(0, [0.0; 4], format!("{label} · page {name}"));
             marks.placements.clear();
-            self.explain(&mut marks, name, &words);
+            let number_of = |beside: Option<(usize, usize)>| {
+                let index = shown.iter().position(|&at| Some(at) == beside)?;
+                Some(index + 1)
+            };
+            let before = number_of(column.checked_sub(1).map(|column| (column, row)));
+            let above = number_of(row.checked_sub(1).map(|row| (column, row)));
+            self.explain(&mut marks, name, joining(before, above), &words);
             self.draw_overview(&mut marks, overview, window);
-            let is_shown =
-                |beside: Option<(usize, usize)>| beside.is_some_and(|at| shown.contains(&at));
-            let before = column.checked_sub(1).map(|column| (column, row));
-            let above = row.checked_sub(1).map(|row| (column, row));
-            marks.lines.extend(self.trims(is_shown(before), is_shown(above)));
+            marks.lines.extend(self.trims(before.is_some(), above.is_some()));
             SheetPage {
                 label: (index + 1).to_string(),
                 window_mm: self.window_mm,
@@ -270,6 +277,7 @@ impl Poster {
         &self,
         marks: &mut SheetLayout,
         name: String,
+        joining: String,
         words: impl Fn(DVec2, f64) -> Vec<SheetText>,
     ) {
         let [left, lower, right, _] = self.page.clear_mm();
@@ -290,8 +298,7 @@ impl Poster {
         let words = words(DVec2::new(start, at), room);
         let above = at + words.len() as f64 * 3.6;
         marks.texts.extend(words);
-        let join = "Trim each page along its line on the left and above; glue it on the page before, cross on cross.";
-        marks.texts.push(text(join.to_owned(), (start, above), 2.2, room));
+        marks.texts.push(text(joining, (start, above), 2.2, room));
     }
 
     /// A small picture of the sheet with the window of the page framed.
@@ -320,6 +327,19 @@ impl Poster {
     }
 }
 
+/// What to do with a page that has pages of these numbers on its left and above.
+fn joining(left: Option<usize>, above: Option<usize>) -> String {
+    let (line, pages) = match (left, above) {
+        (None, None) => return "Lay this page down; the next ones are glued on it.".to_owned(),
+        (Some(left), None) => ("the line on the left", format!("page {left}")),
+        (None, Some(above)) => ("the line above", format!("page {above}")),
+        (Some(left), Some(above)) => {
+            ("the lines on the left and above", format!("pages {left} and {above}"))
+        }
+    };
+    format!("Trim along {line}; glue it on {pages}, its edge on the ticks, cross on cross.")
+}
+
 /// A rectangle, counter-clockwise.
 fn rectangle([left, lower, right, upper]: [f64; 4]) -> [DVec2; 4] {
     [(left, lower), (right, lower), (right, upper), (left, upper)].map(DVec2::from)
@@ -337,6 +357,42 @@ fn obstacles(sheet: &SheetLayout, areas: Vec<Vec<DVec2>>) -> Vec<Vec<DVec2>> {
         vec![below, below + along * width, at + up + along * width, at + up]
     });
     areas.into_iter().chain(lines).chain(texts).collect()
+}
+
+/// Up to two ticks that end where the trimmed edge of a page comes to lie on its neighbour, on the left of what both
+/// show, or above it: on the page below, beside that edge.
+fn ticks(
+    [left, lower, right, upper]: [f64; 4],
+    is_left: bool,
+    obstacles: &[Vec<DVec2>],
+) -> Vec<SheetLine> {
+    let (origin, along, out, length) = match is_left {
+        true => (DVec2::new(left, lower), DVec2::Y, -DVec2::X, upper - lower),
+        false => (DVec2::new(left, upper), DVec2::X, DVec2::Y, right - left),
+    };
+    let ends = |at: f64| [TRIM_MM, TRIM_MM + TICK_MM].map(|far| origin + along * at + out * far);
+    let clear = |at: &f64| {
+        let [near, far] = ends(*at);
+        let blank = CROSS_MM.1 * (along + out);
+        let low = near.min(far) - blank.abs();
+        let high = near.max(far) + blank.abs();
+        let area = rectangle([low.x, low.y, high.x, high.y]);
+        obstacles.iter().all(|polygon| gap_mm(polygon, &area) > 0.0)
+    };
+    let steps = (length / CROSS_STEP_MM) as usize;
+    let places = || (1..steps).map(|n| n as f64 * CROSS_STEP_MM);
+    let first = places().find(clear);
+    let last =
+        places().rev().find(clear).filter(|last| first.is_some_and(|first| last - first > TICK_MM));
+    let found = first.into_iter().chain(last).map(ends);
+    found
+        .map(|[from_mm, to_mm]| SheetLine {
+            kind: LineKind::Align,
+            from_mm,
+            to_mm,
+            width_mm: LINE_MM,
+        })
+        .collect()
 }
 
 /// Up to two crosses in an area, as far apart as what is printed there allows.

@@ -1,0 +1,90 @@
+//! Examples at the end of every command's help. Each is a command that the program understands: see the test below.
+
+pub const BOARD: &str = "Examples:
+  deltille board --rows 10 --cols 11 --name desk -o desk
+  deltille board --rows 7 --cols 9 --paper A3 --svg --png
+  deltille board --rows 30 --cols 31 --edge 18mm --paper A4 --poster
+  deltille board --rows 7 --cols 9 --edge 30mm --sdf --mjcf --texture 2048 -o models";
+
+pub const CHECKERBOARD: &str = "Examples:
+  deltille checkerboard --rows 8 --cols 11 --edge 25mm
+  deltille checkerboard --rows 8 --cols 11 --tags t36h11 --name tagged -o tagged";
+
+pub const SOLID: &str = "Examples:
+  deltille icosahedron --edge 150mm --pdf --name ico -o ico
+  deltille octahedron --paper A4 --pdf
+  deltille icosahedron --skeleton --per-face --pdf --dxf --name rigid -o rigid
+  deltille tetrahedron --usd --texture 4096";
+
+pub const MESH: &str = "Examples:
+  deltille solid --mesh part.obj --pdf
+  deltille solid --mesh ball.obj --scale 1000 --name ball --gltf --pdf -o ball";
+
+pub const VERIFY: &str = "Examples:
+  deltille verify desk/desk.json
+  deltille verify desk/desk.json from-the-printer.pdf --report verdict.json";
+
+pub const RENDER: &str = "Examples:
+  deltille render ico/ico.json --camera camera.yaml --eye 500,-300,350 -o view.png
+  deltille render desk/desk.json --camera camera.yaml --pose 0.3,3.0,0,-90,60,420 --noise 2";
+
+pub const DETECT: &str = "Examples:
+  deltille detect photos --target desk/desk.json -o corners
+  deltille detect 'photos/*.jpg' --target desk/desk.json --overlay -o corners
+  deltille detect photos --grid checker --rows 8 --cols 11 -o corners
+  deltille detect photos --target desk/desk.json --format parquet -o corners";
+
+pub const REFINE: &str = "Examples:
+  deltille refine photo.png --kind checker --seeds corners.csv";
+
+pub const GUIDE: &str = "Examples:
+  deltille guide photos --target desk/desk.json --picture next.png
+  deltille guide photos --target desk/desk.json --once -o next.json --until 0.05";
+
+pub const CALIBRATE: &str = "Examples:
+  deltille calibrate corners --target desk/desk.json --model radtan -o camera.yaml
+  deltille calibrate corners --target desk/desk.json --model auto --holdout 4 --report camera.html
+  deltille calibrate corners --grid checker --rows 8 --cols 11 --edge 25mm
+  deltille calibrate corners --target desk/desk.json --print-scale 1.0012,0.9995";
+
+pub const RIG: &str = "Examples:
+  deltille rig --camera left=corners/l --camera right=corners/r --target ico/ico.json
+  deltille rig --camera a=a --camera b=b --known a=a.yaml --target ico/ico.json --refine-target";
+
+pub const COMPARE: &str = "Examples:
+  deltille compare monday.json friday.json
+  deltille compare before.yaml after.json --tolerance 0.1 -o change.json";
+
+pub const POSE: &str = "Examples:
+  deltille pose photos --target desk/desk.json --camera camera.yaml
+  deltille pose photo.png --target desk/desk.json --camera camera.yaml --every-picture";
+
+pub const UNDISTORT: &str = "Examples:
+  deltille undistort photos --camera camera.yaml -o straight";
+
+pub const RECTIFY: &str = "Examples:
+  deltille rectify rig.json --pair left,right -o rectified";
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use crate::cli::deltille::Deltille;
+
+    #[test]
+    fn every_command_has_examples_that_it_understands() {
+        let program = Deltille::command();
+        for command in program.get_subcommands().filter(|command| !command.has_subcommands()) {
+            let name = command.get_name();
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let examples: Vec<&str> =
+                help.lines().filter_map(|line| line.strip_prefix("  ")).collect();
+            assert!(!examples.is_empty(), "{name}");
+            for example in examples {
+                let words = example.split_whitespace().map(|word| word.trim_matches('\''));
+                let parsed = Deltille::command().try_get_matches_from(words);
+                assert!(parsed.is_ok(), "{example}: {}", parsed.unwrap_err());
+            }
+        }
+    }
+}
