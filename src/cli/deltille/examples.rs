@@ -1,5 +1,10 @@
 //! Examples at the end of every command's help. Each is a command that the program understands: see the test below.
 
+pub const PLAN: &str = "Examples:
+  deltille plan --size 1920x1080 --fov 62 --distance 50cm..3m
+  deltille plan --camera camera.yaml --distance 0.2..1m --tilt 60 --paper A3
+  deltille plan --size 640x480 --distance 30cm..1m --checker";
+
 pub const BOARD: &str = "Examples:
   deltille board --rows 10 --cols 11 --name desk -o desk
   deltille board --rows 7 --cols 9 --paper A3 --svg --png
@@ -44,8 +49,8 @@ pub const GUIDE: &str = "Examples:
 pub const CALIBRATE: &str = "Examples:
   deltille calibrate corners --target desk/desk.json --model radtan -o camera.yaml
   deltille calibrate corners --target desk/desk.json --model auto --holdout 4 --report camera.html
-  deltille calibrate corners --grid checker --rows 8 --cols 11 --edge 25mm
-  deltille calibrate corners --target desk/desk.json --print-scale 1.0012,0.9995";
+  deltille calibrate corners --grid checker --rows 8 --cols 11 --edge 25mm --model radtan5
+  deltille calibrate corners --target desk/desk.json --model radtan --print-scale 1.0012,0.9995";
 
 pub const RIG: &str = "Examples:
   deltille rig --camera left=corners/l --camera right=corners/r --target ico/ico.json

@@ -18,6 +18,7 @@ mod in_flight;
 mod limits;
 mod meshes;
 mod page;
+mod plan;
 mod pose;
 mod refine;
 mod render;
@@ -48,6 +49,9 @@ pub struct Deltille {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Propose a board for a camera and the distances from which it is to be seen
+    #[command(after_help = examples::PLAN)]
+    Plan(plan::Args),
     /// Make a board: its description, and what to print
     #[command(after_help = examples::BOARD, mut_arg("tags_in", |arg| arg.hide(true)))]
     Board(Box<board::Args>),
@@ -119,6 +123,7 @@ pub fn run(deltille: Deltille) -> anyhow::Result<ExitCode> {
         Command::Calibrate(args) => calibrate::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Guide(args) => guide::run(*args),
+        Command::Plan(args) => plan::run(args),
         Command::Board(args) => board::run(GridKind::Deltille, *args),
         Command::Checkerboard(args) => board::run(GridKind::Checker, *args),
         Command::Tetrahedron(args) => solid::run(SolidShape::Tetrahedron, *args),

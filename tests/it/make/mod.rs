@@ -4,5 +4,6 @@ mod dsc;
 mod export;
 mod meshes;
 mod net;
+mod plan;
 mod solid;
 mod tag_sheets;

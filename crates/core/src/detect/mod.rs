@@ -19,7 +19,8 @@
 //!    that `refine_grid` chooses by blur (`clearance`) and by what else they show.
 //! 8. `recognise` guesses which target it is, where none is given.
 //!
-//! Beside them `reach` says from where a target can be used, and `watch` which pictures of a stream are worth keeping.
+//! Beside them `reach` says from where a target can be used, `proposal` which board suits a camera, and `watch` which
+//! pictures of a stream are worth keeping.
 //!
 //! Both tilings go the same way; `tiling` says where they differ.
 
@@ -52,6 +53,7 @@ mod outline;
 mod parts;
 mod places;
 mod polynomial;
+mod proposal;
 mod quadric;
 mod reach;
 mod reason;
@@ -78,6 +80,7 @@ pub use curve::{Tone, ToneEstimate};
 pub use detection::{DecodedTag, Detection, Grid, GridCorner};
 pub use detector::{Detector, DetectorConfig};
 pub use ink::{Ink, InkEstimate};
+pub use proposal::{Proposal, Situation, Unsuited};
 pub use reach::Reach;
 pub use reason::{Reason, ReasonKind};
 pub use recognise::{Recognised, Recogniser};

@@ -7,7 +7,14 @@ use crate::family::Family;
 use crate::targets::{Target, TargetSpec};
 
 /// A cell of a tag that is so long leaves room for tilt, blur and noise, px; without these half of it is read.
-const COMFORTABLE_BIT_PX: f64 = 2.0;
+pub(super) const COMFORTABLE_BIT_PX: f64 = 2.0;
+
+/// Likewise the edge of a tile of a board without tags.
+pub(super) const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
+
+/// A cell of a tag from which on boards are labelled where pictures are sharp, px: half of the views are at 1.25, nearly all
+/// from a twentieth more on. Tilted cells need as large an area.
+const LEAST_BIT_PX: f64 = 1.3;
 
 /// What a target offers, and from where a camera can use it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -77,6 +84,16 @@ impl Reach {
         let near = focal_px * self.size_mm / width_px;
         let far = focal_px * self.detail_mm / self.needed_px;
         (near < far).then_some([near, far])
+    }
+
+    /// The distance up to which boards are labelled in sharp pictures of a camera of a focal length in px, tilted by an
+    /// angle, mm. Tagged boards are hardly labelled a tenth farther away; those without tags often are.
+    pub fn labelled_to_mm(&self, focal_px: f64, tilt_rad: f64) -> f64 {
+        let (needed_px, shortened) = match self.tags {
+            0 => (COMFORTABLE_EDGE_PX, tilt_rad.cos()),
+            _ => (LEAST_BIT_PX, tilt_rad.cos().sqrt()),
+        };
+        focal_px * self.detail_mm * shortened / needed_px
     }
 }
 

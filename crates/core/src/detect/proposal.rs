@@ -1,0 +1,151 @@
+//! Which board suits a camera, and the distances from which it is to be seen.
+
+use super::reach::{COMFORTABLE_BIT_PX, COMFORTABLE_EDGE_PX, Reach};
+use crate::family::Family;
+use crate::lattice::{GridKind, ROW_HEIGHT};
+use crate::targets::{
+    BoardSpec, PaperSpec, TagSpec, Target, TargetError, TargetSpec, largest_edge_mm,
+};
+
+/// The part of a picture that a board may fill: beyond, a hand moves it out.
+const FILLED: f64 = 0.9;
+
+/// Rows and columns of corners of the smallest and the largest board that is proposed: fewer tell little of a camera, and
+/// more are not held by hand.
+const LEAST: [u32; 2] = [4, 5];
+const MOST: u32 = 40;
+
+/// A camera, and from where it is to see a board.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Situation {
+    /// Focal length, px.
+    pub focal_px: f64,
+    /// Width and height of its pictures, px.
+    pub size_px: [u32; 2],
+    /// The nearest and the farthest distance, mm.
+    pub distances_mm: [f64; 2],
+    /// The tilt up to which all of it is to be read at the farthest distance, rad.
+    pub tilt_rad: f64,
+}
+
+/// A board that suits, and what it is good for.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Proposal {
+    /// The board.
+    pub spec: BoardSpec,
+    /// What it offers.
+    pub reach: Reach,
+    /// From where on a board that faces the camera is whole in the picture, mm. Nearer, parts of a board with tags are
+    /// labelled too.
+    pub whole_from_mm: f64,
+}
+
+/// Why no board suits.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Unsuited {
+    /// Tiles that are large enough at the farthest distance leave no room for a board in the picture there.
+    #[error(
+        "tiles must be {edge_mm:.0} mm long to be read from {far_mm:.0} mm, and the picture there takes less than 4 × 5 \
+         corners of them: take a camera of more pixels, a lens of a wider view, less tilt or a shorter distance"
+    )]
+    Picture {
+        /// Edge of a tile, mm.
+        edge_mm: f64,
+        /// The farthest distance, mm.
+        far_mm: f64,
+    },
+    /// They do not fit the paper.
+    #[error(
+        "tiles must be {edge_mm:.0} mm long to be read from {far_mm:.0} mm, and the paper takes less than 4 × 5 corners of \
+         them: take larger paper, or print a poster"
+    )]
+    Paper {
+        /// Edge of a tile, mm.
+        edge_mm: f64,
+        /// The farthest distance, mm.
+        far_mm: f64,
+    },
+    /// There is no such board.
+    #[error(transparent)]
+    Target(#[from] TargetError),
+}
+
+impl Situation {
+    /// The board with the most corners whose tags, or tiles where there are none, are large enough at the farthest
+    /// distance, which is whole in the picture at the nearest if that takes 4 × 5 corners, and fits the paper.
+    ///
+    /// ```
+    /// use deltille_core::detect::Situation;
+    /// use deltille_core::family::Family;
+    /// use deltille_core::lattice::GridKind;
+    /// use deltille_core::targets::{PaperSpec, TagSpec};
+    ///
+    /// let webcam = Situation {
+    ///     focal_px: 1000.0,
+    ///     size_px: [1280, 720],
+    ///     distances_mm: [300.0, 1000.0],
+    ///     tilt_rad: 0.785,
+    /// };
+    /// let family = Family::shipped("delTag25h7")?;
+    /// let tags = Some((&TagSpec::default(), &family)).map(|(tags, family)| (tags.clone(), family));
+    /// let found = webcam.board(GridKind::Deltille, tags, &PaperSpec::default())?;
+    /// assert_eq!((found.spec.rows, found.spec.cols, found.spec.edge_mm), (7, 11, 27.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn board(
+        &self,
+        kind: GridKind,
+        tags: Option<(TagSpec, &Family)>,
+        paper: &PaperSpec,
+    ) -> Result<Proposal, Unsuited> {
+        let [near_mm, far_mm] = self.distances_mm;
+        let mut spec = BoardSpec::new(kind, LEAST[0], LEAST[1], 1.0);
+        spec.tags = tags.as_ref().map(|(tags, _)| tags.clone());
+        let family = tags.map(|(_, family)| family);
+        // A board of tiles of one millimetre tells what of a tile must be seen.
+        let unit = Target::build("plan", &TargetSpec::Board(spec.clone()), family, None)?;
+        let unit = Reach::of(&unit, family);
+        let comfortable = if family.is_some() { COMFORTABLE_BIT_PX } else { COMFORTABLE_EDGE_PX };
+        let shortened = self.tilt_rad.cos();
+        let shortened = if family.is_some() { shortened.sqrt() } else { shortened };
+        let px_at_far = self.focal_px / far_mm * shortened;
+        spec.edge_mm = (comfortable / (unit.detail_mm * px_at_far)).ceil();
+        let edge_mm = spec.edge_mm;
+        let sides = |distance: f64| {
+            let seen =
+                self.size_px.map(|px| FILLED * f64::from(px) * distance / self.focal_px / edge_mm);
+            let (rows, cols) = match kind {
+                GridKind::Deltille => (seen[1] / ROW_HEIGHT - 1.0, seen[0] - 1.5),
+                GridKind::Checker => (seen[1] - 1.0, seen[0] - 1.0),
+            };
+            [rows, cols].map(|n| n.clamp(0.0, f64::from(MOST)) as u32)
+        };
+        let takes = |[rows, cols]: [u32; 2]| rows >= LEAST[0] && cols >= LEAST[1];
+        // Where the nearest picture takes too little, the board is whole from a little farther on.
+        let steps =
+            (0..=STEPS).map(|k| near_mm * (far_mm / near_mm).powf(f64::from(k) / f64::from(STEPS)));
+        let whole =
+            steps.map(|distance| (distance, sides(distance))).find(|&(_, sides)| takes(sides));
+        let (whole_from_mm, most) = whole.ok_or(Unsuited::Picture { edge_mm, far_mm })?;
+        let fits = |[rows, cols]: [u32; 2]| {
+            let spec = BoardSpec { rows, cols, ..spec.clone() };
+            largest_edge_mm(&spec, paper).is_some_and(|largest| largest >= edge_mm)
+        };
+        let smaller = (0..MOST).map(|less| {
+            let part = 1.0 - f64::from(less) / f64::from(MOST);
+            most.map(|n| (f64::from(n) * part).round() as u32)
+        });
+        let found = smaller.take_while(|&sides| takes(sides)).find(|&sides| fits(sides));
+        [spec.rows, spec.cols] = found.ok_or(Unsuited::Paper { edge_mm, far_mm })?;
+        let target = Target::build("plan", &TargetSpec::Board(spec.clone()), family, None)?;
+        Ok(Proposal { spec, reach: Reach::of(&target, family), whole_from_mm })
+    }
+}
+
+/// Distances between the nearest and the farthest that are tried.
+const STEPS: u32 = 60;

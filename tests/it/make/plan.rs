@@ -1,0 +1,92 @@
+//! `deltille plan`: boards that are proposed, and whether they are seen from where it says.
+
+use crate::common::command::deltille;
+use crate::common::page::Page;
+use deltille::camera::{BrownConrady, Camera, Lens, Pose};
+use deltille::detect::{Detector, DetectorConfig, Reach, Situation};
+use deltille::family::Family;
+use deltille::lattice::GridKind;
+use deltille::synth::{Light, scene_of_target};
+use deltille::targets::{PaperSpec, TagSpec, Target, TargetSpec};
+use glam::DVec3;
+
+#[test]
+fn boards_are_proposed_and_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut page = Page::default();
+    for arguments in [
+        "--size 1920x1080 --fov 62 --distance 50cm..3m",
+        "--size 640x480 --distance 0.3..1m --checker",
+        "--size 4000x3000 --fov 80 --distance 0.5..2m --tilt 60 --family d36h11 --paper A2",
+        "--size 1280x960 --distance 20cm..60cm --untagged",
+        "--size 1920x1080 --distance 1..5m --checker --family t36h11",
+    ] {
+        let output = page.run(at, &format!("deltille plan {arguments}"));
+        let said = String::from_utf8(output.stdout).unwrap();
+        let command = said.lines().find_map(|line| line.strip_prefix("deltille ")).unwrap();
+        deltille(at, &format!("{command} --no-verify")).success();
+    }
+    for arguments in [
+        "--size 640x480 --fov 20 --distance 1m..300m",
+        "--size 640x480 --distance 5..20m --paper A4",
+        "--size 640 --distance 1..2m",
+        "--size 640x480 --distance 2..1m",
+        "--size 640x480 --distance 1",
+        "--distance 1..2m",
+        "--size 640x480 --distance 1..2m --family aprilTag36h11",
+        "--size 640x480 --distance 1..2m --family nobody",
+    ] {
+        page.refused(at, &format!("deltille plan {arguments}"));
+    }
+    page.is("plan");
+}
+
+/// A tenth nearer than it says boards are labelled, a tenth farther most are not: views by the synthesiser, blurred as
+/// sharp pictures are.
+#[test]
+fn boards_are_labelled_as_far_as_is_said() {
+    let family = Family::shipped("delTag25h7").unwrap();
+    let tags = || Some((TagSpec::default(), &family));
+    for (kind, tags) in
+        [(GridKind::Deltille, tags()), (GridKind::Deltille, None), (GridKind::Checker, None)]
+    {
+        let situation = Situation {
+            focal_px: 700.0,
+            size_px: [800, 600],
+            distances_mm: [400.0, 1500.0],
+            tilt_rad: 0.785,
+        };
+        let family = tags.as_ref().map(|(_, family)| *family);
+        let board = situation.board(kind, tags, &PaperSpec::default()).unwrap().spec;
+        let target = Target::build("plan", &TargetSpec::Board(board), family, None).unwrap();
+        let reach = Reach::of(&target, family);
+        for tilt_deg in [0.0f64, 30.0, 45.0, 60.0] {
+            let limit = reach.labelled_to_mm(situation.focal_px, tilt_deg.to_radians());
+            let [near, far] =
+                [0.9, 1.1].map(|part| labelled(&target, family, tilt_deg, part * limit));
+            let what = format!("{kind:?}, {} tags, {tilt_deg}°, {limit:.0} mm", reach.tags);
+            assert_eq!(near, 6, "{what}: a tenth nearer all of 6 views are labelled");
+            assert!(reach.tags == 0 || far <= 2, "{what}: a tenth farther {far} of 6");
+        }
+    }
+}
+
+/// How many of six views from a distance, tilted to six sides, are labelled.
+fn labelled(target: &Target, family: Option<&Family>, tilt_deg: f64, distance: f64) -> usize {
+    let detector = Detector::for_target(target, family, DetectorConfig::default());
+    let scene = scene_of_target(target, family).unwrap();
+    let middle = target.panels[0].middle_mm();
+    let tilt = tilt_deg.to_radians();
+    let views = (0..6u64).filter(|&view| {
+        let way = view as f64 * 1.05 + 0.2;
+        let aside = DVec3::new(tilt.sin() * way.cos(), tilt.sin() * way.sin(), tilt.cos());
+        let pose = Pose::looking_at(middle + distance * aside, middle, DVec3::new(0.1, 1.0, 0.0));
+        let light = Light::default().blur_px(0.7).noise(0.005).seed(view);
+        let lens = Lens::BrownConrady(BrownConrady::default());
+        let image = scene.render(&Camera::centred(800, 600, 700.0, lens), &pose, &light);
+        let found = detector.detect(&image.map(|grey| (255.0 * grey + 0.5) as u8), "view");
+        found.grids.iter().any(|grid| grid.corners.iter().any(|corner| corner.id.is_some()))
+    });
+    views.count()
+}
