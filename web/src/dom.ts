@@ -78,3 +78,19 @@ export function settled<A extends unknown[]>(work: (...given: A) => void, ms: nu
     timer = setTimeout(() => work(...given), ms) as unknown as number;
   };
 }
+/** Does a work that takes time: while it is done, the last of those that are asked for waits. */
+export function latest(work: (isStale: () => boolean) => Promise<void>): () => Promise<void> {
+  let isBusy = false;
+  let isAsked = false;
+  return async () => {
+    isAsked = true;
+    if (isBusy) return;
+    isBusy = true;
+    while (isAsked) {
+      isAsked = false;
+      await work(() => isAsked);
+    }
+    isBusy = false;
+  };
+}
+

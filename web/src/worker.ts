@@ -40,7 +40,7 @@ export type Hinge = { face: number; on: number | null; ends_mm: [number, number,
 export type Pages = { pages: string[]; json: string; reach: Reach; family: string | null };
 export type File = { name: string; bytes: Uint8Array };
 export type Solid = { glb: Uint8Array; hinges: Hinge[] };
-export type Proof = { passed: boolean; line: string; sentences: string[] };
+export type Proof = { passed: boolean; line: string; sentences: string[]; files: number };
 export type Seen = { json: string; csv: string; orpc: string; reasons: string[]; ms: number };
 export type Shown = Seen & { width: number; height: number; grey: Uint8ClampedArray };
 /** How the board is held against what is proposed. */
@@ -197,7 +197,8 @@ const calls = {
     return using(made, async (made) => {
       const files = inFiles(made.files(format, 300));
       const file = family === undefined ? undefined : await familyFile(family);
-      return JSON.parse(prove(made.json(), file, files.map(({ name }) => name), files.map(({ bytes }) => bytes))) as Proof;
+      const proof = JSON.parse(prove(made.json(), file, files.map(({ name }) => name), files.map(({ bytes }) => bytes))) as Omit<Proof, "files">;
+      return { ...proof, files: files.length };
     });
   },
   async photograph(sought: Sought, ink: Ink | null, name: string, bytes: Uint8Array): Promise<Shown> {

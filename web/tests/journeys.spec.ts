@@ -53,7 +53,7 @@ test.describe("make", () => {
     await page.goto("/");
     await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
     await page.getByLabel("Rows of corners").fill("1");
-    await expect(page.getByRole("alert")).toContainText("rows: 1 is not between 2 and 500");
+    await expect(page.getByRole("alert")).toContainText("Rows of corners: give a whole number from 2 to 500.");
     await screen(page, "make-problem");
     await page.getByLabel("Rows of corners").fill("8");
     await page.getByLabel("Corners in a row").fill("9");
@@ -154,6 +154,65 @@ test.describe("make", () => {
     for (const [button, file] of [["GLB", "icosahedron.glb"], ["STL", "icosahedron.stl"], ["DXF (net)", "icosahedron-net.dxf"], ["DXF (panels)", "icosahedron-panels.dxf"], ["PDF", "icosahedron.pdf"]] as const) {
       expect((await press(page, button)).equals(readFileSync(join(made, file))), file).toBe(true);
     }
+  });
+
+  test("numbers that are none are told of by the names of their fields, and nothing is made of them", async ({ page }) => {
+    await page.goto("/");
+    await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
+    for (const [label, wrong, right, said] of [
+      ["Rows of corners", "", "8", "Rows of corners: give a whole number from 2 to 500."],
+      ["Corners in a row", "3.5", "9", "Corners in a row: give a whole number from 2 to 500."],
+      ["Edge of a tile, mm", "-1", "", "Edge of a tile, mm: give a number from 1 to 1000."],
+      ["First tag id", "1e10", "0", "First tag id: give a whole number from 0 to 4294967295."],
+    ] as const) {
+      if (label === "First tag id") await page.getByText("More settings").click();
+      await page.getByLabel(label).fill(wrong);
+      await expect(page.getByRole("alert")).toHaveText(said);
+      for (const name of ["PDF", "Prove it"]) await expect(page.getByRole("button", { name, exact: true })).toBeDisabled();
+      await page.getByLabel(label).fill(right);
+      await expect(page.getByRole("alert")).toBeHidden();
+    }
+    await expect(page.getByText("72 corners")).toBeVisible();
+    await expect(page.getByText(/Your camera can use it from 15 cm/)).toBeVisible();
+    await page.getByLabel("Field of view, °").fill("0");
+    await expect(page.getByText("Field of view, °: give a number from 1 to 170.")).toBeVisible();
+    await page.getByLabel("Field of view, °").fill("60");
+    await expect(page.getByText(/Your camera can use it from 15 cm/)).toBeVisible();
+    // A checkerboard has no tags unless they are asked for.
+    await page.getByLabel("Target", { exact: true }).selectOption("checker");
+    await expect(page.getByLabel("Family of the tags")).toHaveValue("");
+    await expect(page.getByLabel("First tag id")).toHaveCount(0);
+  });
+
+  test("what an address says wrongly is as usual, and the address says what is shown", async ({ page }) => {
+    for (const nonsense of ["kind=foo&orientation=upside&tags_in=purple", "kind=mesh&name=part", "rows=many"]) {
+      await page.goto("about:blank");
+      await page.goto(`/#make?${nonsense}`);
+      await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
+      await expect(page.getByRole("alert")).toBeHidden();
+    }
+    await page.goto("about:blank");
+    await page.goto("/#make?kind=icosahedron&paper=900x1300mm");
+    await expect(page.getByText("720 corners")).toBeVisible({ timeout: 30_000 });
+    await expect(page.getByLabel("Name", { exact: true })).toHaveValue("icosahedron");
+    await expect(page.getByLabel("Paper", { exact: true })).toHaveValue("900x1300mm");
+    // Settings stay in the address when another part was looked at.
+    for (const name of ["See", "Make"]) await page.getByRole("link", { name, exact: true }).click();
+    await expect.poll(() => page.url()).toContain("kind=icosahedron&paper=900x1300mm");
+    await page.reload();
+    await expect(page.getByText("720 corners")).toBeVisible({ timeout: 30_000 });
+    await page.goto("/#make?rows=1");
+    await expect(page.getByRole("alert")).toContainText("Rows of corners");
+    // A mesh is in no address.
+    await page.goto("/");
+    await drop(page, [{ name: "body.obj", content: Buffer.from(tetrahedron) }]);
+    await expect(page.locator(".solid canvas")).toBeVisible({ timeout: 30_000 });
+    await expect(page.getByRole("button", { name: "Copy a link" })).toBeHidden();
+    expect(page.url()).not.toContain("mesh");
+    await drop(page, [{ name: "other.json", content: Buffer.from('{"kind": "other"}') }]);
+    await expect(page.getByRole("alert")).toHaveText("other.json: these are no settings of a target");
+    await drop(page, [{ name: "board.json", content: content("board.json") }]);
+    await expect(page.getByRole("alert")).toContainText("board.json: this describes a target that was made");
   });
 
   test("a mesh is dropped, whatever its format", async ({ page }) => {
