@@ -1,5 +1,5 @@
 import { type Page, expect, test } from "@playwright/test";
-import { mkdtempSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -343,6 +343,35 @@ test.describe("see", () => {
     await chooseFiles(page, [join(folder, "0.png")]);
     await expect(page.getByRole("button", { name: /0\.png \d+ corners/ })).toBeVisible({ timeout: 30_000 });
   });
+});
+
+test("folders are dropped, none counts twice, and one is removed", async ({ page, context }) => {
+  await page.goto("/#see");
+  const here = scratch();
+  mkdirSync(join(here, "more"));
+  for (const name of ["0.png", "1.png", "more/2.png"]) writeFileSync(join(here, name), content(name.replace("more/", "")));
+  const devtools = await context.newCDPSession(page);
+  // Beside the place for it.
+  const dropped = async (...files: string[]) => {
+    for (const type of ["dragEnter", "dragOver", "drop"] as const) await devtools.send("Input.dispatchDragEvent", { type, x: 900, y: 500, data: { items: [], files, dragOperationsMask: 1 } });
+  };
+  await expect(page.getByText("Nothing was looked at yet.")).toBeVisible();
+  await dropped(here);
+  const photographs = page.getByRole("button", { name: /\.png 72 corners/ });
+  await expect(photographs).toHaveText([/^0\.png/, /^1\.png/, /^2\.png/], { timeout: 60_000 });
+  await dropped(here, join(here, "0.png"));
+  await expect(photographs).toHaveCount(3);
+  await photographs.nth(1).click();
+  await page.getByRole("button", { name: "Remove this one" }).click();
+  await expect(photographs).toHaveText([/^0\.png/, /^2\.png/]);
+  // What describes no target is told of, and changes nothing.
+  for (const [name, text] of [["other.json", '{"kind": "other"}'], ["cut.JSON", '{"schema": "deltille/target/1"']] as const) {
+    await chooseFiles(page, [{ name, mimeType: "application/json", buffer: Buffer.from(text) }]);
+    await expect(page.getByRole("alert")).toContainText(`${name}: `);
+    await expect(photographs).toHaveCount(2);
+  }
+  await page.getByRole("link", { name: "Calibrate" }).click();
+  await expect(page.getByText("2 pictures with labelled corners")).toBeVisible();
 });
 
 test.describe("calibrate", () => {
