@@ -422,6 +422,12 @@ test.describe("calibrate", () => {
     expect(Math.abs(Math.min(...tilts) - (least ?? NaN))).toBeLessThan(1);
     expect(Math.abs(Math.max(...tilts) - (most ?? NaN))).toBeLessThan(1);
 
+    // What is shown is told to be of another model.
+    await page.getByLabel("Camera model").selectOption("rational");
+    await expect(page.getByText("This is of other pictures, or of another model")).toBeVisible();
+    await page.getByRole("button", { name: "Calibrate", exact: true }).click();
+    await expect(page.getByText("This is of other pictures, or of another model")).toBeHidden();
+
     for (const scheme of ["light", "dark"] as const) {
       await page.emulateMedia({ colorScheme: scheme });
       await page.setViewportSize({ width: 390, height: 844 });
