@@ -4,6 +4,8 @@ const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 
 export const words = {
   title: "deltille",
+  skip: "Skip to content",
+  parts: "Parts of this page",
   tabs: { make: "Make", see: "See", calibrate: "Calibrate", families: "Families" },
   privacy: "Everything happens on this machine: no picture and no file leaves it.",
   version: (version: string) => `deltille ${version}`,

@@ -568,6 +568,10 @@ test("the keyboard goes everywhere", async ({ page }) => {
 
 /** What each part shows when it is there. */
 const there = { make: "110 corners", see: "Nothing was looked at yet.", calibrate: "0 pictures with labelled corners", families: "Tags that are seen badly" };
+  // To the content of this part, and from there on.
+  await page.getByRole("link", { name: "Skip to content" }).press("Enter");
+  await page.keyboard.press("Tab");
+  await expect(page.getByLabel("Family")).toBeFocused();
 for (const [part, sign] of Object.entries(there)) {
   test(`${part} fits a phone, light and dark`, async ({ page }) => {
     await page.goto(`/#${part}`);
