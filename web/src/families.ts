@@ -25,7 +25,7 @@ export function families(): HTMLElement {
   let code = 0n;
   let turns = 0;
   const chooser = el("div", {});
-  const number = el("input", { type: "number", min: 0, value: 0, input: () => pick(Number(number.value)) });
+  const number = el("input", { type: "number", min: 0, value: 0, required: true, input: () => pick(number.valueAsNumber) });
   const facts = el("p", { class: "facts" });
   const verdict = el("p", { class: "facts", "aria-live": "polite" });
   const tag = el("div", { class: "tag" });
@@ -53,7 +53,12 @@ export function families(): HTMLElement {
   const angle = () => 360 / (family?.figures.turns ?? 3);
 
   function pick(wanted: number): void {
-    if (!family || !Number.isInteger(wanted) || wanted < 0 || wanted >= family.codes.length) return;
+    if (!family) return;
+    if (!Number.isInteger(wanted) || wanted < 0 || wanted >= family.codes.length) {
+      verdict.textContent = words.families.noId(family.codes.length - 1);
+      verdict.className = "facts bad";
+      return;
+    }
     id = wanted;
     number.value = String(id);
     word = code = family.codes[id] ?? 0n;

@@ -85,9 +85,9 @@ export const words = {
     load: "Choose a file",
     drop: "Drop settings (.toml, .json) or a closed mesh of triangles (.obj, .stl, .glb) here.",
     noSettings: "these are no settings of a target",
+    isDescription: "this describes a target that was made; drop it in “See”, to look for it",
     seeIt: "Look for this target in photographs",
   },
-    isDescription: "this describes a target that was made; drop it in “See”, to look for it",
   see: {
     lead: "Drop photographs of a target: its corners are found to hundredths of a pixel, each with its uncertainty.",
     drop: "Drop photographs here: JPEG, PNG, TIFF, WebP, BMP or PGM.",
@@ -98,10 +98,10 @@ export const words = {
       credit:
         "Photograph of the data set github.com/deltille/dataset (Ha, Perdoch, Alismail, So Kweon and Sheikh, “Deltille Grids for Geometric Camera Calibration”, ICCV 2017), under CC BY 4.0 (creativecommons.org/licenses/by/4.0), re-encoded as grey PNG.",
     },
-    empty: "Nothing was looked at yet.",
-    target: "What is in them",
     unreadable: "it could not be read",
     noDescription: "this is no description of a target",
+    empty: "Nothing was looked at yet.",
+    target: "What is in them",
     auto: "what its tags say",
     made: "the target of “Make”",
     description: "A description (.json) that is dropped here is taken, too.",
@@ -122,17 +122,15 @@ export const words = {
     list: "Photographs",
     inked: (ink: string, photographs: number) => `As ${photographs} photographs of one print show together, ${ink}. Each was looked at once more with this.`,
     remove: "Remove all",
+    removeThis: "Remove this one",
     overlay: "Overlay (PNG)",
     time: (ms: number) => `${ms.toFixed(0)} ms`,
-    removeThis: "Remove this one",
     corner: (row: number, col: number, id: number | null, sx: number, sy: number) =>
       `Row ${row}, column ${col}${id === null ? "" : `, id ${id}`}: ± ${sx.toFixed(4)} × ${sy.toFixed(4)} px.`,
   },
   calibrate: {
     lead: "Calibrate a camera from the photographs of “See”, or from a webcam.",
     model: "Camera model",
-    start: "Calibrate",
-    few: (count: number) => `${count === 1 ? "1 picture" : `${count} pictures`} with labelled corners; ten or more, tilted by 20° to 45°, make a good calibration.`,
     models: {
       radtan: "radtan: usual lenses",
       radtan5: "radtan5: usual lenses, a term more",
@@ -141,10 +139,12 @@ export const words = {
       eucm: "eucm: for programs that need it",
       "double-sphere": "double-sphere: for programs that need it",
     } as Record<string, string>,
+    start: "Calibrate",
+    few: (count: number) => `${count === 1 ? "1 picture" : `${count} pictures`} with labelled corners; ten or more, tilted by 20° to 45°, make a good calibration.`,
     solving: "Calibrating…",
+    outdated: "This is of other pictures, or of another model, than are chosen now: calibrate again.",
     rms: (rms: string, views: number) => `Residuals of ${rms} px over ${views} views.`,
     sure: (px: string) => `Projections of distant points are known to ${px} px.`,
-    outdated: "This is of other pictures, or of another model, than are chosen now: calibrate again.",
     parameter: "Parameter",
     value: "Value",
     deviation: "Deviation",
@@ -187,9 +187,10 @@ export const words = {
     family: "Family",
     id: "Tag id",
     facts: (codes: number, distance: number, correctable: number) =>
-      `${codes} codes that differ in ${distance} cells or more in every rotation; ${correctable} wrong cells are always corrected.`,
+      `${codes.toLocaleString("en")} codes that differ in ${distance} cells or more in every rotation; ${correctable} wrong cells are always corrected.`,
     read: (id: number, degrees: number, errors: number) =>
       `Read as tag ${id}${turnedBy(degrees)}${errors === 0 ? "" : `, ${errors} wrong ${errors === 1 ? "cell" : "cells"} corrected`}.`,
+    noId: (most: number) => `Give a whole number from 0 to ${most}.`,
     refused: "No code is near enough: refused.",
     mistaken: (id: number, degrees: number, instead: number, read: number) =>
       `Read as tag ${instead}${turnedBy(read)} instead of ${id}${turnedBy(degrees)}: more cells are wrong than can be corrected.`,

@@ -487,6 +487,10 @@ test("a tag is damaged and corrected", async ({ page }) => {
   await screen(page, "families");
   await page.getByRole("button", { name: "Repair" }).click();
   await expect(page.getByText("Read as tag 0.")).toBeVisible();
+  await page.getByLabel("Tag id").fill("343");
+  await expect(page.getByText("Give a whole number from 0 to 342.")).toBeVisible();
+  await page.getByLabel("Tag id").fill("7");
+  await expect(page.getByText("Read as tag 7.")).toBeVisible();
   await page.getByLabel("Family").selectOption("aprilTag36h11");
   await expect(page.getByText("587 codes")).toBeVisible({ timeout: 30_000 });
   await screen(page, "families-square");
@@ -564,14 +568,14 @@ test("the keyboard goes everywhere", async ({ page }) => {
   }
   await page.keyboard.press("Enter");
   await expect(page.getByText("Read as tag 0.")).toBeVisible({ timeout: 30_000 });
-});
-
-/** What each part shows when it is there. */
-const there = { make: "110 corners", see: "Nothing was looked at yet.", calibrate: "0 pictures with labelled corners", families: "Tags that are seen badly" };
   // To the content of this part, and from there on.
   await page.getByRole("link", { name: "Skip to content" }).press("Enter");
   await page.keyboard.press("Tab");
   await expect(page.getByLabel("Family")).toBeFocused();
+});
+
+/** What each part shows when it is there. */
+const there = { make: "110 corners", see: "Nothing was looked at yet.", calibrate: "0 pictures with labelled corners", families: "Tags that are seen badly" };
 for (const [part, sign] of Object.entries(there)) {
   test(`${part} fits a phone, light and dark`, async ({ page }) => {
     await page.goto(`/#${part}`);
