@@ -427,6 +427,7 @@ export function see(): HTMLElement {
   function step(event: KeyboardEvent): void {
     const way = ({ ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] } as Record<string, [number, number]>)[event.key];
     const corners = photos[at]?.found?.grids.flatMap((grid) => grid.corners) ?? [];
+    if (event.key === "Escape") lens.hidden = true;
     if (!way) return;
     event.preventDefault();
     // The nearest that lies more that way than across it.

@@ -278,6 +278,8 @@ test.describe("see", () => {
     const one = await page.getByText(/Row \d+, column/).textContent();
     await page.keyboard.press("ArrowDown");
     await expect(page.getByText(one ?? "")).toBeHidden();
+    await page.keyboard.press("Escape");
+    await expect(page.locator(".lens")).toBeHidden();
   });
 
   test("photographs of one print are looked at with the ink that all of them show, as by the program", async ({ page }) => {
