@@ -6,8 +6,6 @@ import { surveyed, tints } from "./survey";
 import { words } from "./words";
 import type { Holding, Next, Result, Survey } from "./worker";
 
-const models: [string, string][] = ["radtan", "radtan5", "rational", "kannala-brandt", "eucm", "double-sphere"].map((model) => [model, model]);
-
 export function calibrate(): HTMLElement {
   let model = "radtan";
   let taken: Shot[] = [];
@@ -18,6 +16,8 @@ export function calibrate(): HTMLElement {
   /** What the pictures so far cover, and which these are. */
   let survey: Survey | null = null;
   let surveyOf: string[] = [];
+  /** What the camera that is shown was calibrated from. */
+  let solvedOf: string[] = [];
   /** In what the webcam is watched; nothing where that begins anew. */
   let watched: string | null = null;
   /** Frames that were looked at since the page was opened. */
@@ -27,6 +27,7 @@ export function calibrate(): HTMLElement {
   const covered = el("p", { class: "facts", "aria-live": "polite" });
   const drawings = el("div", { class: "survey" });
   const result = el("div", { class: "result", "aria-live": "polite" });
+  const outdated = el("p", { class: "problem", hidden: true }, words.calibrate.outdated);
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
   const video = el("video", { playsinline: true, muted: true, hidden: true });
   const over = el("canvas", { class: "photo", role: "img", "aria-label": words.calibrate.webcam, hidden: true });
@@ -41,20 +42,26 @@ export function calibrate(): HTMLElement {
 
   /** The pictures of the webcam, else the photographs: these are of different cameras. */
   const shots = () => (stream || taken.length > 0 ? taken : seen.shots.filter((shot) => shot.labelled));
+  /** What a camera is calibrated from. */
+  const given = () => [target(), model, ...shots().map(({ json }) => json)];
+  const isSame = (one: string[], other: string[]) => one.length === other.length && one.every((part, i) => part === other[i]);
   const target = () => (seen.sought && "target" in seen.sought ? seen.sought.target : made.json);
 
   function tally(): void {
     count.textContent = words.calibrate.few(shots().length);
     forget.hidden = taken.length === 0;
+    outdated.hidden = solvedOf.length === 0 || isSame(solvedOf, given());
     if (location.hash.startsWith("#calibrate")) void look();
   }
 
   /** Shows what the pictures cover, where these are others than before. */
   async function look(): Promise<void> {
     const all = shots();
-    const of = [target(), model, ...all.map(({ json }) => json)];
-    if (of.length === surveyOf.length && of.every((part, i) => part === surveyOf[i])) return;
+    const of = given();
+    if (isSame(of, surveyOf)) return;
     surveyOf = of;
+    // What was wrong with others.
+    problem.hidden = true;
     let found: Survey | null = null;
     try {
       found = all.length > 0 ? await looking.call("survey", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model) : null;
@@ -87,10 +94,14 @@ export function calibrate(): HTMLElement {
       return;
     }
     result.replaceChildren(el("p", { class: "busy" }, words.calibrate.solving));
+    solvedOf = given();
+    tally();
     try {
       const all = shots();
       show(await looking.call("calibrate", target(), all.map(({ json }) => json), all.map(({ name }) => stem(name)), model));
     } catch (error) {
+      solvedOf = [];
+      tally();
       result.replaceChildren();
       tell(error);
     }
@@ -203,6 +214,10 @@ export function calibrate(): HTMLElement {
         // Without a proposal it is of use to see where no corners were yet.
         if (!guided && survey) tint(context, survey);
         const corners = mark(context, found.json);
+        if (takeNow && corners === 0) {
+          takeNow = false;
+          tell(new Error(words.calibrate.held.unseen));
+        }
         if (next) outline(context, next, found.held);
         state.textContent = found.held ? (words.calibrate.held[found.held.held] ?? "") : "";
         if (corners > 0 && (takeNow || (guided ? found.held?.held === "taken" : found.keep))) {
@@ -210,10 +225,11 @@ export function calibrate(): HTMLElement {
           tally();
           if (guided) propose(await looking.call("take", name, found.json));
           takeNow = false;
+          problem.hidden = true;
         }
       } catch (error) {
-        tell(error);
         stop();
+        tell(error);
         return;
       }
       frames += 1;
@@ -274,8 +290,8 @@ export function calibrate(): HTMLElement {
     el(
       "div",
       { class: "columns" },
-      el("div", {}, field(words.calibrate.model, select(models, model, (value) => ((model = value), tally()))), field(words.calibrate.way, way), count, el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam, forget)),
-      el("div", { class: "stage" }, problem, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, covered, drawings, result),
+      el("div", {}, field(words.calibrate.model, select(Object.entries(words.calibrate.models), model, (value) => ((model = value), tally()))), field(words.calibrate.way, way), count, el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void solve() }, words.calibrate.start), webcam, forget)),
+      el("div", { class: "stage" }, problem, wish, video, over, state, el("div", { class: "buttons" }, now, elsewhere), live, covered, drawings, outdated, result),
     ),
   );
   for (const event of ["hashchange", "seen"]) window.addEventListener(event, tally);

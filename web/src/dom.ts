@@ -40,26 +40,37 @@ export function select(options: [string, string][], value: string, changed: (val
   return made;
 }
 
-/** A place for files to be dropped. */
+/** A place for files to be dropped; they may miss it, as nothing else on the page takes files. */
 export function dropZone(take: (files: File[]) => void, ...children: Child[]): HTMLElement {
-  const zone = el(
-    "div",
-    {
-      class: "drop",
-      dragover: (event) => {
-        event.preventDefault();
-        zone.classList.add("over");
-      },
-      dragleave: () => zone.classList.remove("over"),
-      drop: (event) => {
-        event.preventDefault();
-        zone.classList.remove("over");
-        take([...((event as DragEvent).dataTransfer?.files ?? [])]);
-      },
-    },
-    ...children,
-  );
+  const zone = el("div", { class: "drop" }, ...children);
+  const over = (isOver: boolean) => () => zone.classList.toggle("over", isOver);
+  window.addEventListener("dragover", over(true));
+  window.addEventListener("dragleave", over(false));
+  window.addEventListener("drop", ({ dataTransfer }) => {
+    over(false)();
+    if (zone.isConnected && dataTransfer) void filesOf(dataTransfer).then(take);
+  });
   return zone;
+}
+
+/** What was dropped, with what is in folders in their place. */
+async function filesOf({ items }: DataTransfer): Promise<File[]> {
+  // Asked for at once, as nothing is left of it a moment later.
+  const all = [...items].map((item) => ({ file: item.getAsFile(), entry: item.webkitGetAsEntry() }));
+  const files = await Promise.all(all.map(({ file, entry }) => (entry?.isDirectory ? within(entry).catch(() => (file ? [file] : [])) : file ? [file] : [])));
+  return files.flat();
+}
+
+async function within(entry: FileSystemEntry): Promise<File[]> {
+  // What systems leave in folders for themselves.
+  if (entry.name.startsWith(".")) return [];
+  if (entry.isFile) return [await new Promise<File>((resolve, reject) => (entry as FileSystemFileEntry).file(resolve, reject))];
+  const reader = (entry as FileSystemDirectoryEntry).createReader();
+  const all: FileSystemEntry[] = [];
+  // A part at a time, until there is none.
+  for (let part; (part = await new Promise<FileSystemEntry[]>((resolve, reject) => reader.readEntries(resolve, reject))).length > 0; ) all.push(...part);
+  all.sort((one, other) => (one.name < other.name ? -1 : 1));
+  return (await Promise.all(all.map(within))).flat();
 }
 
 /** Offers a file to be saved. */
@@ -68,6 +79,22 @@ export function save(name: string, content: BlobPart, type = "application/octet-
   const link = el("a", { href: url, download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
+}
+
+/** Does a work that takes time: while it is done, the last of those that are asked for waits. */
+export function latest(work: (isStale: () => boolean) => Promise<void>): () => Promise<void> {
+  let isBusy = false;
+  let isAsked = false;
+  return async () => {
+    isAsked = true;
+    if (isBusy) return;
+    isBusy = true;
+    while (isAsked) {
+      isAsked = false;
+      await work(() => isAsked);
+    }
+    isBusy = false;
+  };
 }
 
 /** Runs what comes last, a moment after the last call. */

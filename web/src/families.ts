@@ -2,6 +2,7 @@
 import { el, field, select, shape } from "./dom";
 import { RATES, bar, reading, sizes } from "./family-figures";
 import { drawing as looking } from "./library";
+import { USUAL_FAMILY } from "./settings";
 import { words } from "./words";
 import type { FamilyFigures } from "./worker";
 
@@ -24,7 +25,7 @@ export function families(): HTMLElement {
   let code = 0n;
   let turns = 0;
   const chooser = el("div", {});
-  const number = el("input", { type: "number", min: 0, value: 0, input: () => pick(Number(number.value)) });
+  const number = el("input", { type: "number", min: 0, value: 0, required: true, input: () => pick(number.valueAsNumber) });
   const facts = el("p", { class: "facts" });
   const verdict = el("p", { class: "facts", "aria-live": "polite" });
   const tag = el("div", { class: "tag" });
@@ -52,7 +53,12 @@ export function families(): HTMLElement {
   const angle = () => 360 / (family?.figures.turns ?? 3);
 
   function pick(wanted: number): void {
-    if (!family || !Number.isInteger(wanted) || wanted < 0 || wanted >= family.codes.length) return;
+    if (!family) return;
+    if (!Number.isInteger(wanted) || wanted < 0 || wanted >= family.codes.length) {
+      verdict.textContent = words.families.noId(family.codes.length - 1);
+      verdict.className = "facts bad";
+      return;
+    }
     id = wanted;
     number.value = String(id);
     word = code = family.codes[id] ?? 0n;
@@ -147,7 +153,7 @@ export function families(): HTMLElement {
 
   looking.call("families").then((all) => {
     const names = all.map(({ name }) => name);
-    const first = names.includes("delTag25h7") ? "delTag25h7" : (names[0] ?? "");
+    const first = names.includes(USUAL_FAMILY) ? USUAL_FAMILY : (names[0] ?? "");
     chooser.replaceChildren(field(words.families.family, select(names.map((name) => [name, name]), first, (name) => void choose(name))));
     return choose(first);
   }, (error: unknown) => (facts.textContent = error instanceof Error && error.message ? error.message : words.failed));

@@ -50,6 +50,8 @@ class Door {
 
 /** Draws targets, at once. */
 export const drawing = new Door();
+/** Makes solids in space, which takes seconds. */
+export const folding = new Door();
 /** Proves files, which takes seconds. */
 export const proving = new Door();
 /** Looks at pictures, and calibrates. */

@@ -32,6 +32,14 @@ function show(): void {
   }
 }
 
+// The address says which part is shown: going to the content must not change it.
+const skip = document.querySelector(".skip") as HTMLElement;
+skip.textContent = words.skip;
+skip.addEventListener("click", (event) => {
+  event.preventDefault();
+  main.focus();
+});
+tabs.setAttribute("aria-label", words.parts);
 for (const part of Object.keys(parts) as Part[]) {
   const link = el("a", { href: `#${part}`, "data-part": part }, words.tabs[part]);
   tabs.append(link);

@@ -1,7 +1,7 @@
 // Make: settings, the sheet as it will be printed, files, and their proof.
-import { dropZone, el, field, save, select, settled } from "./dom";
-import { LibraryError, drawing, proving } from "./library";
-import { type Settings, asked, isSolid, nameOf, ofTemplate, query, read, settled as settingsOf, template } from "./settings";
+import { dropZone, el, field, latest, save, select, settled } from "./dom";
+import { LibraryError, drawing, folding, proving } from "./library";
+import { type Settings, asked, isKind, isSolid, nameOf, ofTemplate, query, read, settled as settingsOf, template, USUAL_FAMILY } from "./settings";
 import { made } from "./shared";
 import type { Folding } from "./solid";
 import { templates } from "./templates";
@@ -26,38 +26,43 @@ const solidFormats: [string, string][] = [
 /** A description proves nothing: the others are compared with it. */
 const PROVED_BY_ALL = "json";
 const types: Record<string, string> = { pdf: "application/pdf", svg: "image/svg+xml", png: "image/png", json: "application/json" };
+/** Ids are numbers of 32 bits. */
+const MOST_IDS = 2 ** 32 - 1;
 const papers = ["A5", "A4", "A3", "A2", "A1", "A0", "letter", "legal", "tabloid"];
 
 export function make(): HTMLElement {
   let settings: Settings = read(location.hash.split("?")[1] ?? "");
   let pages: Pages | null = null;
   let at = 0;
-  let fov = 60;
-  let wide = 1920;
   let isTurning = false;
-  let folding: Folding | null = null;
+  let folded: Folding | null = null;
+  /** The settings of the solid that is shown. */
+  let foldedOf = "";
   let families: FamilyFacts[] = [];
   let familyChoice: HTMLSelectElement;
 
   const form = el("form", { class: "form", submit: (event) => event.preventDefault() });
   const picture = el("img", { class: "sheet", alt: words.make.preview });
   const solid = el("div", { class: "solid" });
-  const slider = el("input", { type: "range", min: 0, max: 100, value: 0, input: () => folding?.unfold(Number(slider.value) / 100) });
+  const slider = el("input", { type: "range", min: 0, max: 100, value: 0, input: () => folded?.unfold(Number(slider.value) / 100) });
   const fold = field(words.make.unfold, slider);
-  const space = el("div", { hidden: true }, solid, fold);
+  fold.hidden = true;
+  const making = el("p", { class: "busy", hidden: true }, words.make.making);
+  const space = el("div", { hidden: true }, solid, fold, making);
   const problem = el("p", { class: "problem", role: "alert", hidden: true });
   const facts = el("p", { class: "facts", "aria-live": "polite" });
   const range = el("p", { class: "facts", "aria-live": "polite" });
   const pager = el("p", { class: "pager" });
   const views = el("p", { class: "pager" });
   const downloads = el("div", { class: "buttons" });
+  const prover = el("button", { type: "button", class: "first", click: () => void prove() }, words.make.prove);
   const verdict = el("div", { class: "verdict", "aria-live": "polite" });
   const chooser = el("input", { type: "file", accept: ".toml,.json,.obj,.stl,.glb", hidden: true, change: () => void load([...(chooser.files ?? [])]) });
 
   const changed = (change: Partial<Settings>, isForm = false): void => {
     settings = { ...settings, ...change };
     if (isForm) fill();
-    void draw();
+    draw();
   };
 
   function number(label: string, key: keyof Settings, least: number, most: number, usual?: string): HTMLElement {
@@ -69,6 +74,7 @@ export function make(): HTMLElement {
       step: key.endsWith("_mm") || key === "tag_border" ? "any" : 1,
       value: value ?? "",
       placeholder: usual,
+      required: usual === undefined,
       input: () => changed({ [key]: control.value === "" ? null : Number(control.value) } as Partial<Settings>),
     });
     return field(label, control);
@@ -89,21 +95,24 @@ export function make(): HTMLElement {
     const names = families.filter(({ kind }) => kind === (isSquare ? "checker" : "deltille")).map(({ name }) => name);
     const options: [string, string][] = names.map((name) => [name, name]);
     if (!ofSolid) options.push(["", text.noTags]);
-    const usualFamily = pages?.family ?? (isSquare ? "" : (names[0] ?? ""));
+    const usualFamily = isSquare ? "" : USUAL_FAMILY;
+    // What a link or a template gave stays to be seen.
+    if (settings.family && !names.includes(settings.family)) options.push([settings.family, settings.family]);
+    const sizes = settings.paper === null || papers.includes(settings.paper) ? papers : [...papers, settings.paper];
     familyChoice = select(options, settings.family ?? usualFamily, (family) => changed({ family }, true));
     const name = el("input", { type: "text", value: settings.name, input: () => changed({ name: name.value }) });
     const isOpen = form.querySelector("details")?.open ?? false;
     const hasTags = ofSolid || (settings.family ?? usualFamily) !== "";
     const kinds = Object.entries(text.kinds).filter(([kind]) => kind !== "mesh" || settings.mesh !== null);
-    const sizes = ofSolid
+    const measures = ofSolid
       ? [number(text.solidEdge, "edge_mm", 1, 100_000, settings.kind === "mesh" ? text.usualEdge : text.usual), number(text.tiles, "tiles", 3, 200, text.usual)]
-      : [number(text.rows, "rows", 2, 500), number(text.cols, "cols", 2, 500), number(text.edge, "edge_mm", 0.1, 1000, text.fitting)];
+      : [number(text.rows, "rows", 2, 500), number(text.cols, "cols", 2, 500), number(text.edge, "edge_mm", 1, 1000, text.fitting)];
     const choose = (kind: string) => changed({ kind, family: null, edge_mm: null, name: settings.name === nameOf(settings.kind) ? nameOf(kind) : settings.name }, true);
     form.replaceChildren(
       field(text.kind, select(kinds, settings.kind, choose)),
-      ...sizes,
+      ...measures,
       field(text.family, familyChoice),
-      field(text.paper, select([["", text.smallest], ...papers.map((paper) => [paper, paper] as [string, string])], settings.paper ?? "", (paper) => changed({ paper: paper || null }))),
+      field(text.paper, select([["", text.smallest], ...sizes.map((paper) => [paper, paper] as [string, string])], settings.paper ?? "", (paper) => changed({ paper: paper || null }))),
       field(text.name, name),
       el(
         "details",
@@ -116,10 +125,10 @@ export function make(): HTMLElement {
               ...(ofSolid || settings.kind === "deltille" ? [] : [field(text.tagsIn, select(Object.entries(text.tagsInColours), settings.tags_in, (tags_in) => changed({ tags_in })))]),
               number(text.spacing, "tag_spacing", 1, 500, text.usual),
               number(text.border, "tag_border", 0.6, 10, text.usual),
-              number(text.firstId, "first_id", 0, 1_000_000),
+              number(text.firstId, "first_id", 0, MOST_IDS),
             ]
           : []),
-        number(text.boardId, "board_id", 0, 1_000_000),
+        number(text.boardId, "board_id", 0, MOST_IDS),
         ...(ofSolid
           ? [number(text.faceMargin, "face_margin_mm", 0, 1000, text.usual), box(text.skeleton, "skeleton"), box(text.perFace, "per_face"), box(text.allowSeams, "allow_seams")]
           : [number(text.boards, "boards", 1, 500), box(text.inverted, "inverted"), box(text.poster, "poster")]),
@@ -133,6 +142,7 @@ export function make(): HTMLElement {
         ? ([false, true] as const).map((space) => el("button", { type: "button", "aria-pressed": String(isTurning === space), click: () => turn(space) }, space ? text.view.solid : text.view.sheet))
         : []),
     );
+    link.hidden = settings.kind === "mesh";
     if (!ofSolid && isTurning) turn(false);
   }
 
@@ -145,19 +155,25 @@ export function make(): HTMLElement {
     if (isOn) void showSolid();
   }
 
-  async function showSolid(): Promise<void> {
+  const showSolid = latest(async () => {
     const of = asked(settings);
+    if (of === foldedOf) return folded?.fit();
+    making.hidden = false;
     try {
-      const [{ showMesh }, { glb, hinges }] = await Promise.all([import("./solid"), drawing.call("solid", of)]);
+      const [{ showMesh }, { glb, hinges }] = await Promise.all([import("./solid"), folding.call("solid", of)]);
       if (of !== asked(settings)) return;
-      folding?.end();
-      folding = await showMesh(solid, glb, hinges, words.make.solidView);
+      folded?.end();
+      folded = await showMesh(solid, glb, hinges, words.make.solidView);
+      foldedOf = of;
       fold.hidden = hinges.length === 0;
-      folding.unfold(Number(slider.value) / 100);
+      folded.unfold(Number(slider.value) / 100);
     } catch (error) {
-      tell(error);
+      // What is wrong with settings is said where the sheet is drawn.
+      if (pages && of === asked(settings)) tell(error);
+    } finally {
+      making.hidden = true;
     }
-  }
+  });
 
   function tell(error: unknown): void {
     const text = error instanceof Error ? error.message : String(error);
@@ -165,41 +181,50 @@ export function make(): HTMLElement {
     problem.hidden = false;
   }
 
-  // While one is drawn, the last of those that are asked for waits.
-  let isDrawing = false;
-  let isStale = false;
-  async function draw(): Promise<void> {
-    verdict.replaceChildren();
-    isStale = true;
-    if (isDrawing) return;
-    isDrawing = true;
-    while (isStale) {
-      isStale = false;
-      await drawOnce();
-    }
-    isDrawing = false;
+  /** What is wrong with a number, which the library would tell in its own words. */
+  function mistaken(numbers: Iterable<HTMLInputElement>): string | undefined {
+    const wrong = [...numbers].find((control) => !control.validity.valid);
+    const details = wrong?.closest("details");
+    if (details) details.open = true;
+    return wrong && words.make.mistaken(wrong.labels?.[0]?.textContent ?? "", Number(wrong.min), Number(wrong.max), wrong.step !== "any");
   }
 
-  async function drawOnce(): Promise<void> {
+  const redraw = latest(async (isStale) => {
     const of = asked(settings);
     address();
     try {
-      pages = await drawing.call("draw", of);
-      made.json = pages.json;
-      made.name = settings.name;
-      problem.hidden = true;
-      at = Math.min(at, pages.pages.length - 1);
-      await show();
-      // The form stays as it is, as somebody may be typing in it.
-      if (pages.family !== null && settings.family === null) familyChoice.value = pages.family;
-      if (isTurning && !isStale) await showSolid();
+      const mistake = mistaken(form.querySelectorAll<HTMLInputElement>("input[type=number]"));
+      if (mistake) throw new LibraryError(mistake);
+      show(await drawing.call("draw", of));
+      if (isTurning && !isStale()) void showSolid();
     } catch (error) {
-      if (isStale) return;
-      pages = null;
-      facts.textContent = "";
-      range.textContent = "";
+      if (isStale()) return;
+      show(null);
       tell(error);
     }
+  });
+
+  function draw(): void {
+    verdict.replaceChildren();
+    void redraw();
+  }
+
+  /** The sheet that was drawn; nothing where there is none. */
+  function show(drawn: Pages | null): void {
+    pages = drawn;
+    picture.classList.toggle("past", !drawn);
+    for (const button of [prover, ...downloads.querySelectorAll("button")]) button.disabled = !drawn;
+    if (!drawn) {
+      facts.textContent = range.textContent = "";
+      return;
+    }
+    made.json = drawn.json;
+    made.name = settings.name;
+    problem.hidden = true;
+    turnTo(Math.min(at, drawn.pages.length - 1));
+    tellFacts(drawn);
+    // The form stays as it is, as somebody may be typing in it.
+    if (settings.family === null) familyChoice.value = drawn.family ?? "";
   }
 
   const address = settled(() => {
@@ -207,16 +232,15 @@ export function make(): HTMLElement {
     if (form.isConnected) history.replaceState(null, "", `#make${of ? `?${of}` : ""}`);
   }, 250);
 
-  async function show(): Promise<void> {
+  /** Shows another page of the sheets. */
+  function turnTo(page: number): void {
     if (!pages) return;
+    at = page;
     const count = pages.pages.length;
     const before = picture.src;
     picture.src = URL.createObjectURL(new Blob([pages.pages[at] ?? ""], { type: "image/svg+xml" }));
     if (before) URL.revokeObjectURL(before);
-    const step = (by: number) => () => {
-      at = (at + by + count) % count;
-      void show();
-    };
+    const step = (by: number) => () => turnTo((at + by + count) % count);
     pager.replaceChildren(
       ...(count > 1
         ? [
@@ -226,19 +250,26 @@ export function make(): HTMLElement {
           ]
         : []),
     );
-    const { corners, tags, ids_left } = pages.reach;
-    facts.textContent = words.make.facts(corners, tags, count);
-    if (tags > 0) facts.textContent += ` ${words.make.idsLeft(ids_left, pages.family ?? "")}`;
-    await showRange();
+  }
+
+  function tellFacts({ pages, reach, family }: Pages): void {
+    facts.textContent = words.make.facts(reach.corners, reach.tags, pages.length);
+    if (reach.tags > 0) facts.textContent += ` ${words.make.idsLeft(reach.ids_left, family ?? "")}`;
+    void showRange();
   }
 
   /** From where a camera can use it, as the library has it. */
   async function showRange(): Promise<void> {
-    if (!pages) return;
-    const found = await drawing.call("distances", asked(settings), fov, wide).catch(() => undefined);
-    if (found === undefined) return;
+    const mistake = mistaken([view, pixels]);
+    if (mistake || !pages) {
+      range.textContent = mistake && pages ? mistake : "";
+      return;
+    }
+    const { reach } = pages;
+    const found = await drawing.call("distances", asked(settings), Number(view.value), Number(pixels.value)).catch(() => undefined);
+    if (found === undefined || reach !== pages?.reach) return;
     const told = (mm: number) => (mm >= 1000 ? `${(mm / 1000).toFixed(1)} m` : `${(mm / 10).toFixed(0)} cm`);
-    range.textContent = found ? words.make.range(told(found[0]), told(found[1]), pages.reach.tags > 0) : words.make.never;
+    range.textContent = found ? words.make.range(told(found[0]), told(found[1]), reach.tags > 0) : words.make.never;
   }
 
   async function download(format: string): Promise<void> {
@@ -254,26 +285,33 @@ export function make(): HTMLElement {
   async function prove(): Promise<void> {
     const of = asked(settings);
     const lines = el("ul", { class: "lines" });
-    const sum = el("p", { class: "busy" }, words.make.proving);
-    verdict.replaceChildren(sum, lines);
-    let failed = 0;
-    let count = 0;
     const all = [...formats, ...(isSolid(settings) ? solidFormats : [])].filter(([format]) => format !== PROVED_BY_ALL);
-    for (const [format, name] of all) {
+    const sum = el("p", { class: "busy" }, words.make.proving(0, all.length));
+    verdict.replaceChildren(sum, lines);
+    prover.disabled = true;
+    let failed = false;
+    let count = 0;
+    for (const [index, [format, name]] of all.entries()) {
       try {
         const proof = await proving.call("prove", of, format);
         if (of !== asked(settings)) return;
-        count += 1;
-        if (!proof.passed) failed += 1;
+        count += proof.files;
+        if (!proof.passed) failed = true;
         const findings = proof.sentences.map((sentence) => el("li", {}, sentence));
         lines.append(el("li", { class: proof.passed ? "passed" : "refused" }, proof.line, findings.length > 0 ? el("ul", {}, ...findings) : ""));
       } catch (error) {
         if (of !== asked(settings)) return;
-        lines.append(el("li", { class: "plain" }, `${name}: ${error instanceof Error && error.message ? error.message : words.failed}`));
+        // What the library says is why there is no such file; else it stopped, and nothing is proved.
+        const told = error instanceof LibraryError ? error.message : "";
+        if (!told) failed = true;
+        lines.append(el("li", { class: told ? "plain" : "refused" }, `${name}: ${told || words.failed}`));
       }
+      sum.textContent = words.make.proving(index + 1, all.length);
     }
-    sum.className = failed === 0 ? "good" : "bad";
-    sum.textContent = failed === 0 ? words.make.proved(count) : words.make.notProved(failed, count);
+    prover.disabled = false;
+    const isProved = !failed && count > 0;
+    sum.className = isProved ? "good" : "bad";
+    sum.textContent = isProved ? words.make.proved(count) : words.make.notProved;
   }
 
   async function load(files: File[]): Promise<void> {
@@ -291,7 +329,7 @@ export function make(): HTMLElement {
       const text = await file.text();
       settings = /\.toml$/i.test(file.name) ? ofTemplate(text) : ofValues(text);
       fill();
-      await draw();
+      draw();
     } catch (error) {
       tell(new LibraryError(`${file.name}: ${error instanceof SyntaxError || !(error instanceof Error) ? words.make.noSettings : error.message}`));
     }
@@ -299,7 +337,9 @@ export function make(): HTMLElement {
 
   function ofValues(text: string): Settings {
     const values = JSON.parse(text) as Record<string, unknown>;
-    if (typeof values !== "object" || values === null || !("kind" in values)) throw new Error(words.make.noSettings);
+    if (typeof values !== "object" || values === null) throw new Error(words.make.noSettings);
+    if ("schema" in values) throw new Error(words.make.isDescription);
+    if (!isKind(values.kind)) throw new Error(words.make.noSettings);
     const given = Object.entries(values).filter(([, value]) => value !== null);
     return settingsOf(given.map(([key, value]) => [key, String(value)]));
   }
@@ -320,25 +360,30 @@ export function make(): HTMLElement {
     setTimeout(() => (link.textContent = words.make.link), 3000);
   }
 
-  const view = el("input", { type: "number", min: 1, max: 170, value: fov, input: () => ((fov = Number(view.value) || fov), void showRange()) });
-  const pixels = el("input", { type: "number", min: 64, max: 20_000, value: wide, input: () => ((wide = Number(pixels.value) || wide), void showRange()) });
+  const view = el("input", { type: "number", min: 1, max: 170, value: 60, step: "any", required: true, input: () => void showRange() });
+  const pixels = el("input", { type: "number", min: 64, max: 20_000, value: 1920, required: true, input: () => void showRange() });
   const offered = select([["", words.make.noTemplate], ...templates.map(({ name }) => [name, name] as [string, string])], "", (name) => {
     const chosen = templates.find((template) => template.name === name);
     if (!chosen) return;
     settings = ofTemplate(chosen.text);
     fill();
-    void draw();
+    draw();
   });
   // A link to other settings, followed while the page is open.
   window.addEventListener("hashchange", () => {
     const [part, of = ""] = location.hash.slice(1).split("?");
-    if (part !== "make" || of === query(settings) || (of === "" && !location.hash.includes("?"))) return;
+    if (part !== "make" || of === query(settings)) return;
+    // A link to this part carries no settings: the address does again.
+    if (!location.hash.includes("?")) {
+      address();
+      return;
+    }
     settings = read(of);
     fill();
-    void draw();
+    draw();
   });
   fill();
-  void draw();
+  draw();
   drawing.call("families").then((all) => {
     families = all;
     fill();
@@ -369,9 +414,10 @@ export function make(): HTMLElement {
         pager,
         facts,
         range,
+        el("p", { class: "printed" }, words.make.printed),
         el("h2", {}, words.make.download),
         downloads,
-        el("div", { class: "buttons" }, el("button", { type: "button", class: "first", click: () => void prove() }, words.make.prove), el("a", { class: "button", href: "#see", click: () => (made.isWanted = true) }, words.make.seeIt)),
+        el("div", { class: "buttons" }, prover, el("a", { class: "button", href: "#see", click: () => (made.isWanted = true) }, words.make.seeIt)),
         verdict,
         el("div", { class: "buttons quiet" }, link, el("button", { type: "button", click: store }, words.make.template)),
       ),

@@ -11,6 +11,8 @@ type Corner = { row: number; col: number; id: number | null; x: number; y: numbe
 type Detection = { ink?: unknown; grids: { kind: string; panel: number | null; corners: Corner[]; tags: { id: number }[] }[] };
 type Photo = {
   name: string;
+  /** What tells it from others. */
+  key: string;
   bytes: () => Promise<Uint8Array>;
   /** What was looked for in it, and what it alone says of the ink of the print. */
   of: Sought | null;
@@ -37,7 +39,16 @@ const ELLIPSE = 100;
 const RESULTS = ["json", "csv", "orpc"] as const;
 const COLOURS = ["#0a84ff", "#ff9f0a", "#30d158", "#ff453a", "#bf5af2", "#64d2ff"];
 
-const photoOf = (name: string, bytes: Photo["bytes"]): Photo => ({ name, bytes, of: null, ink: null, result: null, found: null, error: "" });
+const photoOf = (name: string, key: string, bytes: () => Promise<ArrayBuffer>): Photo => ({
+  name,
+  key,
+  bytes: () => bytes().then((buffer) => new Uint8Array(buffer), () => Promise.reject(new LibraryError(words.see.unreadable))),
+  of: null,
+  ink: null,
+  result: null,
+  found: null,
+  error: "",
+});
 
 export function see(): HTMLElement {
   /** What is looked for; nothing while no photograph has told what is in it. */
@@ -58,11 +69,13 @@ export function see(): HTMLElement {
     height: 0,
     pointermove: (event) => point(event as PointerEvent),
     pointerdown: (event) => point(event as PointerEvent),
-    pointerleave: () => (lens.hidden = true),
+    // A finger is lifted to see what was under it.
+    pointerleave: (event) => (lens.hidden ||= (event as PointerEvent).pointerType === "mouse"),
     blur: () => (lens.hidden = true),
     keydown: (event) => step(event as KeyboardEvent),
   });
   const lens = el("canvas", { class: "lens", width: 240, height: 240, hidden: true, "aria-hidden": "true" });
+  const problem = el("p", { class: "problem", role: "alert", hidden: true });
   const told = el("p", { class: "facts", "aria-live": "polite" });
   const credit = el("p", { class: "credit", hidden: true });
   const hint = el("p", { class: "facts", hidden: true }, words.see.magnifier);
@@ -111,20 +124,41 @@ export function see(): HTMLElement {
 
   async function take(files: File[]): Promise<void> {
     chooser.value = "";
-    const target = files.find((file) => file.name.endsWith(".json"));
-    const shots = files.filter((file) => file !== target);
-    photos = photos.concat(shots.map((file) => photoOf(file.name, async () => new Uint8Array(await file.arrayBuffer()))));
-    if (!target) return look();
-    described = { name: target.name, json: await target.text() };
+    problem.hidden = true;
+    const isDescription = ({ name }: File) => /\.json$/i.test(name);
+    for (const file of files.filter((file) => !isDescription(file))) add(photoOf(file.name, `${file.name} ${file.size} ${file.lastModified}`, () => file.arrayBuffer()));
+    fill();
+    let isOther = false;
+    for (const file of files.filter(isDescription)) isOther = (await describe(file)) || isOther;
+    if (!isOther) return look();
     choose("described");
     offer();
   }
 
+  /** Takes what a file describes as what is looked for; what describes no target changes nothing. */
+  async function describe(file: File): Promise<boolean> {
+    try {
+      const json = await file.text();
+      if (!/"schema"\s*:\s*"deltille\/target\//.test(json)) throw new LibraryError(words.see.noDescription);
+      await looking.call("know", { target: json });
+      described = { name: file.name, json };
+      return true;
+    } catch (error) {
+      problem.textContent = `${file.name}: ${error instanceof LibraryError && error.message ? error.message : words.see.unreadable}`;
+      problem.hidden = false;
+      return false;
+    }
+  }
+
+  /** Takes a photograph along, but none twice: a camera would be thought to be known better than it is. */
+  function add(photo: Photo): void {
+    if (!photos.some(({ key }) => key === photo.key)) photos.push(photo);
+  }
+
   async function sampled(sample: Sample): Promise<void> {
-    const bytes = async () => new Uint8Array(await (await fetch(sample.address)).arrayBuffer());
-    photos.push(photoOf(sample.name, bytes));
-    at = -1;
-    blank();
+    add(photoOf(sample.name, sample.address, async () => (await fetch(sample.address)).arrayBuffer()));
+    at = photos.findIndex(({ key }) => key === sample.address);
+    draw();
     await look();
   }
 
@@ -251,16 +285,32 @@ export function see(): HTMLElement {
     return corners === 0 ? words.see.none : words.see.found(corners, tags);
   }
 
+  function pick(index: number): void {
+    at = index;
+    draw();
+    fill();
+    frame.scrollIntoView({ block: "nearest" });
+  }
+
   function fill(): void {
     list.replaceChildren(
       ...photos.map((photo, index) =>
         el(
           "li",
           {},
-          el("button", { type: "button", "aria-pressed": index === at ? "true" : "false", click: () => ((at = index), draw(), fill()) }, el("strong", {}, photo.name), ` ${figures(photo)}`),
+          el("button", { type: "button", "aria-pressed": index === at ? "true" : "false", click: () => pick(index) }, el("strong", {}, photo.name), ` ${figures(photo)}`),
         ),
       ),
-      ...(photos.length > 0 ? [el("li", {}, el("button", { type: "button", class: "quiet", click: () => clear() }, words.see.remove))] : []),
+      ...(photos.length > 0
+        ? [
+            el(
+              "li",
+              { class: "buttons quiet" },
+              photos.length > 1 && at >= 0 ? el("button", { type: "button", click: () => removeThis() }, words.see.removeThis) : null,
+              el("button", { type: "button", click: () => clear() }, words.see.remove),
+            ),
+          ]
+        : []),
     );
     heading.hidden = photos.length === 0;
     invitation.hidden = at >= 0;
@@ -268,10 +318,18 @@ export function see(): HTMLElement {
     invitation.classList.toggle("busy", photos.length > 0);
   }
 
+  function removeThis(): void {
+    photos.splice(at, 1);
+    at = Math.min(at, photos.length - 1);
+    draw();
+    void look();
+  }
+
   function clear(): void {
     photos = [];
     at = -1;
     asking += 1;
+    problem.hidden = true;
     if (choice === "auto") choose("auto");
     blank();
     inked.textContent = "";
@@ -295,7 +353,7 @@ export function see(): HTMLElement {
     downloads.replaceChildren();
     lens.hidden = true;
     if (!photo) return;
-    const sample = samples.find(({ name }) => name === photo.name);
+    const sample = samples.find(({ address }) => address === photo.key);
     credit.textContent = sample?.credit ?? "";
     credit.hidden = !sample?.credit;
     if (!photo.result || !photo.found) {
@@ -311,7 +369,11 @@ export function see(): HTMLElement {
     pointed = [width / 2, height / 2];
     const context = canvas.getContext("2d");
     if (!context) return;
-    context.putImageData(new ImageData(grey as Uint8ClampedArray<ArrayBuffer>, width, height), 0, 0);
+    const shades = new ImageData(width, height);
+    // Red, green and blue are the grey value, and nothing is transparent.
+    const pixels = new Uint32Array(shades.data.buffer);
+    for (let i = 0; i < pixels.length; i++) pixels[i] = 0xff000000 | (0x010101 * (grey[i] ?? 0));
+    context.putImageData(shades, 0, 0);
     const thick = Math.max(width / 900, 1);
     photo.found.grids.forEach((grid, index) => {
       context.strokeStyle = context.fillStyle = COLOURS[index % COLOURS.length] ?? "#0a84ff";
@@ -337,7 +399,7 @@ export function see(): HTMLElement {
       }
     });
     canvas.setAttribute("aria-label", `${photo.name}: ${figures(photo)}. ${words.see.keys}`);
-    told.textContent = [`${figures(photo)}, ${words.see.time(ms)}.`, ...reasons.map((reason) => `${reason.charAt(0).toUpperCase()}${reason.slice(1)}.`)].join(" ");
+    told.textContent = [`${figures(photo)}, ${words.see.time(ms)}.`, ...reasons.map((reason) => `${reason.charAt(0).toUpperCase()}${reason.slice(1)}${reason.endsWith("?") ? "" : "."}`)].join(" ");
     hint.hidden = photo.found.grids.length === 0;
     hint.textContent = words.see.magnifier;
     downloads.replaceChildren(
@@ -365,6 +427,7 @@ export function see(): HTMLElement {
   function step(event: KeyboardEvent): void {
     const way = ({ ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] } as Record<string, [number, number]>)[event.key];
     const corners = photos[at]?.found?.grids.flatMap((grid) => grid.corners) ?? [];
+    if (event.key === "Escape") lens.hidden = true;
     if (!way) return;
     event.preventDefault();
     // The nearest that lies more that way than across it.
@@ -390,7 +453,7 @@ export function see(): HTMLElement {
     for (let j = 0; j < MAGNIFIED; j++) {
       for (let i = 0; i < MAGNIFIED; i++) {
         const [px, py] = [left + i, top + j];
-        const value = px >= 0 && py >= 0 && px < width && py < height ? (grey[4 * (py * width + px)] ?? 0) : 0;
+        const value = px >= 0 && py >= 0 && px < width && py < height ? (grey[py * width + px] ?? 0) : 0;
         part.data.set([value, value, value, 255], 4 * (j * MAGNIFIED + i));
       }
     }
@@ -428,6 +491,7 @@ export function see(): HTMLElement {
     hint.textContent = found?.cov ? words.see.corner(found.row, found.col, found.id, Math.sqrt(found.cov[0]), Math.sqrt(found.cov[2])) : words.see.magnifier;
   }
 
+  const frame = el("div", { class: "frame" }, canvas, lens);
   const heading = el("h2", {}, words.see.list);
   const invitation = el("p", { class: "empty" }, words.see.empty);
   /** The target of “Make” may have become known, or another one, while this part was not shown. */
@@ -446,6 +510,6 @@ export function see(): HTMLElement {
     "section",
     { class: "see", "aria-label": words.tabs.see },
     el("p", { class: "lead" }, words.see.lead),
-    el("div", { class: "columns" }, el("div", { class: "settings" }, zone, options, known, heading, list, inked), el("div", { class: "stage" }, invitation, el("div", { class: "frame" }, canvas, lens), told, hint, downloads, credit)),
+    el("div", { class: "columns" }, el("div", { class: "settings" }, zone, options, known, heading, list, inked), el("div", { class: "stage" }, problem, invitation, frame, told, hint, downloads, credit)),
   );
 }

@@ -54,33 +54,52 @@ export const usual: Settings = {
 
 const OF_BOARDS = ["rows", "cols", "tags_in", "boards", "inverted", "poster"] as const;
 const OF_SOLIDS = ["tiles", "face_margin_mm", "skeleton", "per_face", "allow_seams"] as const;
+/** What some settings can be. */
+const CHOICES: Record<string, string[]> = {
+  kind: ["deltille", "checker", "icosahedron", "octahedron", "tetrahedron", "mesh"],
+  tags_in: ["black", "white"],
+  orientation: ["auto", "portrait", "landscape"],
+};
 const NUMBERS = ["rows", "cols", "edge_mm", "tag_spacing", "tag_border", "first_id", "board_id", "boards", "tiles", "face_margin_mm", "margin_mm"];
+
+/** The family of tags where none is given and there are tags. */
+export const USUAL_FAMILY = "delTag25h7";
 
 export const isSolid = (settings: Settings): boolean => settings.kind !== "deltille" && settings.kind !== "checker";
 
 /** What goes without saying of a kind of target. */
 export const nameOf = (kind: string): string => ({ deltille: "board", checker: "checkerboard", mesh: "solid" })[kind] ?? kind;
 
-/** Settings with other values than usual, as a query. A mesh is too long for an address. */
+/** Settings with other values than usual, as a query; nothing of a mesh, which is too long for an address. */
 export function query(settings: Settings): string {
-  const pairs = Object.entries(settings).filter(([key, value]) => key !== "mesh" && value !== usual[key as keyof Settings]);
+  if (settings.kind === "mesh") return "";
+  const without: Settings = { ...usual, name: nameOf(settings.kind), mesh: settings.mesh };
+  const pairs = Object.entries(settings).filter(([key, value]) => value !== without[key as keyof Settings]);
   return new URLSearchParams(pairs.map(([key, value]) => [key, String(value)])).toString();
 }
 
 /** Settings from values by their names; what they do not say, or say wrongly, is as usual. */
 export function settled(values: Iterable<[string, string]>): Settings {
   const found: Record<string, unknown> = { ...usual };
-  for (const [key, value] of values) {
+  const all = new Map(values);
+  for (const [key, value] of all) {
     if (!(key in usual)) continue;
     const before = usual[key as keyof Settings];
     if (typeof before === "boolean") found[key] = value === "true";
     else if (NUMBERS.includes(key)) found[key] = value !== "" && Number.isFinite(Number(value)) ? Number(value) : before;
-    else found[key] = value;
+    else if (!CHOICES[key] || CHOICES[key].includes(value)) found[key] = value;
   }
-  return found as Settings;
+  const settings = found as Settings;
+  return all.has("name") ? settings : { ...settings, name: nameOf(settings.kind) };
 }
 
-export const read = (text: string): Settings => settled(new URLSearchParams(text));
+/** The settings of an address, which has no mesh. */
+export function read(text: string): Settings {
+  const found = settled(new URLSearchParams(text));
+  return found.kind === "mesh" ? usual : found;
+}
+
+export const isKind = (kind: unknown): boolean => CHOICES.kind?.includes(String(kind)) ?? false;
 
 /** What the library takes: nothing that says nothing of this kind of target. */
 export function asked(settings: Settings): string {

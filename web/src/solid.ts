@@ -4,6 +4,10 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import type { Hinge } from "./worker";
 
+/** The height of the picture to its width, and to that of the window, so that what moves it is seen, too. */
+const HIGH = 0.8;
+const OF_WINDOW = 0.6;
+
 /** Of the box around what is shown, how far away the camera is. */
 const AWAY = 1.35;
 
@@ -14,6 +18,8 @@ let renderer: WebGLRenderer | null = null;
 export type Folding = {
   /** Shows it unfolded by a part: 0 is the solid, 1 the net. */
   unfold(part: number): void;
+  /** Fits it into the room that there is. */
+  fit(): void;
   /** Gives back what the graphics hardware holds of it. */
   end(): void;
 };
@@ -50,7 +56,7 @@ export async function showMesh(place: HTMLElement, glb: Uint8Array, hinges: Hing
   if (canvas.parentElement !== place) place.replaceChildren(canvas);
   const scene = new Scene();
   scene.add(object, new AmbientLight(0xffffff, 2.2));
-  const camera = new PerspectiveCamera(35, 1.25);
+  const camera = new PerspectiveCamera(35, 1 / HIGH);
   const light = new DirectionalLight(0xffffff, 1.2);
   camera.add(light);
   scene.add(camera);
@@ -58,9 +64,9 @@ export async function showMesh(place: HTMLElement, glb: Uint8Array, hinges: Hing
   controls.listenToKeyEvents(canvas);
   const draw = () => screen.render(scene, camera);
   const fit = () => {
-    const side = Math.max(place.clientWidth, 200);
+    const side = Math.max(Math.min(place.clientWidth, (OF_WINDOW / HIGH) * window.innerHeight), 200);
     screen.setPixelRatio(window.devicePixelRatio);
-    screen.setSize(side, side * 0.8);
+    screen.setSize(side, side * HIGH);
     draw();
   };
 
@@ -111,6 +117,7 @@ export async function showMesh(place: HTMLElement, glb: Uint8Array, hinges: Hing
   fit();
   return {
     unfold,
+    fit,
     end() {
       window.removeEventListener("resize", fit);
       controls.dispose();

@@ -4,6 +4,8 @@ const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 
 export const words = {
   title: "deltille",
+  skip: "Skip to content",
+  parts: "Parts of this page",
   tabs: { make: "Make", see: "See", calibrate: "Calibrate", families: "Families" },
   privacy: "Everything happens on this machine: no picture and no file leaves it.",
   version: (version: string) => `deltille ${version}`,
@@ -68,9 +70,12 @@ export const words = {
     pixels: "Width of its picture, px",
     download: "Download",
     prove: "Prove it",
-    proving: "Reading each file back and comparing every tile…",
+    proving: (done: number, all: number) => `Reading each file back and comparing every tile… ${done} of ${all} formats done.`,
     proved: (files: number) => `Proved: ${files === 1 ? "the file shows" : `all ${files} files show`} this target and nothing else.`,
-    notProved: (failed: number, files: number) => `${failed} of ${files} files do not show this target:`,
+    notProved: "Not proved: see below.",
+    mistaken: (label: string, least: number, most: number, isWhole: boolean) => `${label}: give a ${isWhole ? "whole " : ""}number from ${least} to ${most}.`,
+    making: "Making the solid…",
+    printed: "This is not the true size: to have the target on paper, print its PDF.",
     link: "Copy a link to these settings",
     copied: "Copied.",
     inAddress: "Copying is not allowed here: the link is in the address.",
@@ -80,6 +85,7 @@ export const words = {
     load: "Choose a file",
     drop: "Drop settings (.toml, .json) or a closed mesh of triangles (.obj, .stl, .glb) here.",
     noSettings: "these are no settings of a target",
+    isDescription: "this describes a target that was made; drop it in “See”, to look for it",
     seeIt: "Look for this target in photographs",
   },
   see: {
@@ -92,6 +98,8 @@ export const words = {
       credit:
         "Photograph of the data set github.com/deltille/dataset (Ha, Perdoch, Alismail, So Kweon and Sheikh, “Deltille Grids for Geometric Camera Calibration”, ICCV 2017), under CC BY 4.0 (creativecommons.org/licenses/by/4.0), re-encoded as grey PNG.",
     },
+    unreadable: "it could not be read",
+    noDescription: "this is no description of a target",
     empty: "Nothing was looked at yet.",
     target: "What is in them",
     auto: "what its tags say",
@@ -109,11 +117,12 @@ export const words = {
     looking: "Looking…",
     found: (corners: number, tags: number) => `${corners} corners, ${tags} ${tags === 1 ? "tag" : "tags"}`,
     none: "nothing",
-    magnifier: "Point at the picture to magnify it; ellipses are 100 standard deviations.",
+    magnifier: "Point at the picture, or tap it, to magnify it; ellipses are 100 standard deviations.",
     keys: "Arrow keys go from corner to corner.",
     list: "Photographs",
     inked: (ink: string, photographs: number) => `As ${photographs} photographs of one print show together, ${ink}. Each was looked at once more with this.`,
     remove: "Remove all",
+    removeThis: "Remove this one",
     overlay: "Overlay (PNG)",
     time: (ms: number) => `${ms.toFixed(0)} ms`,
     corner: (row: number, col: number, id: number | null, sx: number, sy: number) =>
@@ -122,9 +131,18 @@ export const words = {
   calibrate: {
     lead: "Calibrate a camera from the photographs of “See”, or from a webcam.",
     model: "Camera model",
+    models: {
+      radtan: "radtan: usual lenses",
+      radtan5: "radtan5: usual lenses, a term more",
+      rational: "rational: wide lenses",
+      "kannala-brandt": "kannala-brandt: fisheyes",
+      eucm: "eucm: for programs that need it",
+      "double-sphere": "double-sphere: for programs that need it",
+    } as Record<string, string>,
     start: "Calibrate",
     few: (count: number) => `${count === 1 ? "1 picture" : `${count} pictures`} with labelled corners; ten or more, tilted by 20° to 45°, make a good calibration.`,
     solving: "Calibrating…",
+    outdated: "This is of other pictures, or of another model, than are chosen now: calibrate again.",
     rms: (rms: string, views: number) => `Residuals of ${rms} px over ${views} views.`,
     sure: (px: string) => `Projections of distant points are known to ${px} px.`,
     parameter: "Parameter",
@@ -169,9 +187,10 @@ export const words = {
     family: "Family",
     id: "Tag id",
     facts: (codes: number, distance: number, correctable: number) =>
-      `${codes} codes that differ in ${distance} cells or more in every rotation; ${correctable} wrong cells are always corrected.`,
+      `${codes.toLocaleString("en")} codes that differ in ${distance} cells or more in every rotation; ${correctable} wrong cells are always corrected.`,
     read: (id: number, degrees: number, errors: number) =>
       `Read as tag ${id}${turnedBy(degrees)}${errors === 0 ? "" : `, ${errors} wrong ${errors === 1 ? "cell" : "cells"} corrected`}.`,
+    noId: (most: number) => `Give a whole number from 0 to ${most}.`,
     refused: "No code is near enough: refused.",
     mistaken: (id: number, degrees: number, instead: number, read: number) =>
       `Read as tag ${instead}${turnedBy(read)} instead of ${id}${turnedBy(degrees)}: more cells are wrong than can be corrected.`,

@@ -40,9 +40,9 @@ export type Hinge = { face: number; on: number | null; ends_mm: [number, number,
 export type Pages = { pages: string[]; json: string; reach: Reach; family: string | null };
 export type File = { name: string; bytes: Uint8Array };
 export type Solid = { glb: Uint8Array; hinges: Hinge[] };
-export type Proof = { passed: boolean; line: string; sentences: string[] };
+export type Proof = { passed: boolean; line: string; sentences: string[]; files: number };
 export type Seen = { json: string; csv: string; orpc: string; reasons: string[]; ms: number };
-export type Shown = Seen & { width: number; height: number; grey: Uint8ClampedArray };
+export type Shown = Seen & { width: number; height: number; grey: Uint8Array };
 /** How the board is held against what is proposed. */
 export type Holding = { held: "unseen" | "elsewhere" | "turned" | "moving" | "blurred" | "steady" | "taken"; part: number };
 /** The next picture, and how sure the camera is. */
@@ -197,7 +197,8 @@ const calls = {
     return using(made, async (made) => {
       const files = inFiles(made.files(format, 300));
       const file = family === undefined ? undefined : await familyFile(family);
-      return JSON.parse(prove(made.json(), file, files.map(({ name }) => name), files.map(({ bytes }) => bytes))) as Proof;
+      const proof = JSON.parse(prove(made.json(), file, files.map(({ name }) => name), files.map(({ bytes }) => bytes))) as Omit<Proof, "files">;
+      return { ...proof, files: files.length };
     });
   },
   async photograph(sought: Sought, ink: Ink | null, name: string, bytes: Uint8Array): Promise<Shown> {
@@ -205,7 +206,11 @@ const calls = {
     return using(new Photograph(name, bytes), async (photograph) => {
       const [width = 0, height = 0] = photograph.size();
       const seen = await using(await pictureOf(photograph), (picture) => told(finder, picture, name));
-      return { ...seen, width, height, grey: new Uint8ClampedArray(photograph.shown().buffer as ArrayBuffer) };
+      // A byte for each pixel, as all photographs are kept.
+      const colours = photograph.shown();
+      const grey = new Uint8Array(width * height);
+      for (let i = 0; i < grey.length; i++) grey[i] = colours[4 * i] ?? 0;
+      return { ...seen, width, height, grey };
     });
   },
   /** What photographs say together of the ink of the print; nothing where looking again would find nothing else. */
@@ -226,6 +231,10 @@ const calls = {
         return found === undefined ? null : (JSON.parse(found) as Recognised);
       }),
     );
+  },
+  /** Refuses what describes no target. */
+  async know(sought: Sought): Promise<void> {
+    await finderOf(sought);
   },
   async overlay(name: string, bytes: Uint8Array, found: string): Promise<Uint8Array> {
     const { Photograph } = await photographer();

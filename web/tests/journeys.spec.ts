@@ -1,5 +1,5 @@
 import { type Page, expect, test } from "@playwright/test";
-import { mkdtempSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -53,7 +53,7 @@ test.describe("make", () => {
     await page.goto("/");
     await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
     await page.getByLabel("Rows of corners").fill("1");
-    await expect(page.getByRole("alert")).toContainText("rows: 1 is not between 2 and 500");
+    await expect(page.getByRole("alert")).toContainText("Rows of corners: give a whole number from 2 to 500.");
     await screen(page, "make-problem");
     await page.getByLabel("Rows of corners").fill("8");
     await page.getByLabel("Corners in a row").fill("9");
@@ -156,6 +156,65 @@ test.describe("make", () => {
     }
   });
 
+  test("numbers that are none are told of by the names of their fields, and nothing is made of them", async ({ page }) => {
+    await page.goto("/");
+    await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
+    for (const [label, wrong, right, said] of [
+      ["Rows of corners", "", "8", "Rows of corners: give a whole number from 2 to 500."],
+      ["Corners in a row", "3.5", "9", "Corners in a row: give a whole number from 2 to 500."],
+      ["Edge of a tile, mm", "-1", "", "Edge of a tile, mm: give a number from 1 to 1000."],
+      ["First tag id", "1e10", "0", "First tag id: give a whole number from 0 to 4294967295."],
+    ] as const) {
+      if (label === "First tag id") await page.getByText("More settings").click();
+      await page.getByLabel(label).fill(wrong);
+      await expect(page.getByRole("alert")).toHaveText(said);
+      for (const name of ["PDF", "Prove it"]) await expect(page.getByRole("button", { name, exact: true })).toBeDisabled();
+      await page.getByLabel(label).fill(right);
+      await expect(page.getByRole("alert")).toBeHidden();
+    }
+    await expect(page.getByText("72 corners")).toBeVisible();
+    await expect(page.getByText(/Your camera can use it from 15 cm/)).toBeVisible();
+    await page.getByLabel("Field of view, °").fill("0");
+    await expect(page.getByText("Field of view, °: give a number from 1 to 170.")).toBeVisible();
+    await page.getByLabel("Field of view, °").fill("60");
+    await expect(page.getByText(/Your camera can use it from 15 cm/)).toBeVisible();
+    // A checkerboard has no tags unless they are asked for.
+    await page.getByLabel("Target", { exact: true }).selectOption("checker");
+    await expect(page.getByLabel("Family of the tags")).toHaveValue("");
+    await expect(page.getByLabel("First tag id")).toHaveCount(0);
+  });
+
+  test("what an address says wrongly is as usual, and the address says what is shown", async ({ page }) => {
+    for (const nonsense of ["kind=foo&orientation=upside&tags_in=purple", "kind=mesh&name=part", "rows=many"]) {
+      await page.goto("about:blank");
+      await page.goto(`/#make?${nonsense}`);
+      await expect(page.getByText("110 corners")).toBeVisible({ timeout: 30_000 });
+      await expect(page.getByRole("alert")).toBeHidden();
+    }
+    await page.goto("about:blank");
+    await page.goto("/#make?kind=icosahedron&paper=900x1300mm");
+    await expect(page.getByText("720 corners")).toBeVisible({ timeout: 30_000 });
+    await expect(page.getByLabel("Name", { exact: true })).toHaveValue("icosahedron");
+    await expect(page.getByLabel("Paper", { exact: true })).toHaveValue("900x1300mm");
+    // Settings stay in the address when another part was looked at.
+    for (const name of ["See", "Make"]) await page.getByRole("link", { name, exact: true }).click();
+    await expect.poll(() => page.url()).toContain("kind=icosahedron&paper=900x1300mm");
+    await page.reload();
+    await expect(page.getByText("720 corners")).toBeVisible({ timeout: 30_000 });
+    await page.goto("/#make?rows=1");
+    await expect(page.getByRole("alert")).toContainText("Rows of corners");
+    // A mesh is in no address.
+    await page.goto("/");
+    await drop(page, [{ name: "body.obj", content: Buffer.from(tetrahedron) }]);
+    await expect(page.locator(".solid canvas")).toBeVisible({ timeout: 30_000 });
+    await expect(page.getByRole("button", { name: "Copy a link" })).toBeHidden();
+    expect(page.url()).not.toContain("mesh");
+    await drop(page, [{ name: "other.json", content: Buffer.from('{"kind": "other"}') }]);
+    await expect(page.getByRole("alert")).toHaveText("other.json: these are no settings of a target");
+    await drop(page, [{ name: "board.json", content: content("board.json") }]);
+    await expect(page.getByRole("alert")).toContainText("board.json: this describes a target that was made");
+  });
+
   test("a mesh is dropped, whatever its format", async ({ page }) => {
     await page.goto("/");
     const made = scratch();
@@ -219,6 +278,8 @@ test.describe("see", () => {
     const one = await page.getByText(/Row \d+, column/).textContent();
     await page.keyboard.press("ArrowDown");
     await expect(page.getByText(one ?? "")).toBeHidden();
+    await page.keyboard.press("Escape");
+    await expect(page.locator(".lens")).toBeHidden();
   });
 
   test("photographs of one print are looked at with the ink that all of them show, as by the program", async ({ page }) => {
@@ -286,6 +347,35 @@ test.describe("see", () => {
   });
 });
 
+test("folders are dropped, none counts twice, and one is removed", async ({ page, context }) => {
+  await page.goto("/#see");
+  const here = scratch();
+  mkdirSync(join(here, "more"));
+  for (const name of ["0.png", "1.png", "more/2.png"]) writeFileSync(join(here, name), content(name.replace("more/", "")));
+  const devtools = await context.newCDPSession(page);
+  // Beside the place for it.
+  const dropped = async (...files: string[]) => {
+    for (const type of ["dragEnter", "dragOver", "drop"] as const) await devtools.send("Input.dispatchDragEvent", { type, x: 900, y: 500, data: { items: [], files, dragOperationsMask: 1 } });
+  };
+  await expect(page.getByText("Nothing was looked at yet.")).toBeVisible();
+  await dropped(here);
+  const photographs = page.getByRole("button", { name: /\.png 72 corners/ });
+  await expect(photographs).toHaveText([/^0\.png/, /^1\.png/, /^2\.png/], { timeout: 60_000 });
+  await dropped(here, join(here, "0.png"));
+  await expect(photographs).toHaveCount(3);
+  await photographs.nth(1).click();
+  await page.getByRole("button", { name: "Remove this one" }).click();
+  await expect(photographs).toHaveText([/^0\.png/, /^2\.png/]);
+  // What describes no target is told of, and changes nothing.
+  for (const [name, text] of [["other.json", '{"kind": "other"}'], ["cut.JSON", '{"schema": "deltille/target/1"']] as const) {
+    await chooseFiles(page, [{ name, mimeType: "application/json", buffer: Buffer.from(text) }]);
+    await expect(page.getByRole("alert")).toContainText(`${name}: `);
+    await expect(photographs).toHaveCount(2);
+  }
+  await page.getByRole("link", { name: "Calibrate" }).click();
+  await expect(page.getByText("2 pictures with labelled corners")).toBeVisible();
+});
+
 test.describe("calibrate", () => {
   test("a camera is calibrated from photographs", async ({ page }) => {
     await page.goto("/#see");
@@ -333,6 +423,12 @@ test.describe("calibrate", () => {
     });
     expect(Math.abs(Math.min(...tilts) - (least ?? NaN))).toBeLessThan(1);
     expect(Math.abs(Math.max(...tilts) - (most ?? NaN))).toBeLessThan(1);
+
+    // What is shown is told to be of another model.
+    await page.getByLabel("Camera model").selectOption("rational");
+    await expect(page.getByText("This is of other pictures, or of another model")).toBeVisible();
+    await page.getByRole("button", { name: "Calibrate", exact: true }).click();
+    await expect(page.getByText("This is of other pictures, or of another model")).toBeHidden();
 
     for (const scheme of ["light", "dark"] as const) {
       await page.emulateMedia({ colorScheme: scheme });
@@ -393,6 +489,10 @@ test("a tag is damaged and corrected", async ({ page }) => {
   await screen(page, "families");
   await page.getByRole("button", { name: "Repair" }).click();
   await expect(page.getByText("Read as tag 0.")).toBeVisible();
+  await page.getByLabel("Tag id").fill("343");
+  await expect(page.getByText("Give a whole number from 0 to 342.")).toBeVisible();
+  await page.getByLabel("Tag id").fill("7");
+  await expect(page.getByText("Read as tag 7.")).toBeVisible();
   await page.getByLabel("Family").selectOption("aprilTag36h11");
   await expect(page.getByText("587 codes")).toBeVisible({ timeout: 30_000 });
   await screen(page, "families-square");
@@ -470,6 +570,10 @@ test("the keyboard goes everywhere", async ({ page }) => {
   }
   await page.keyboard.press("Enter");
   await expect(page.getByText("Read as tag 0.")).toBeVisible({ timeout: 30_000 });
+  // To the content of this part, and from there on.
+  await page.getByRole("link", { name: "Skip to content" }).press("Enter");
+  await page.keyboard.press("Tab");
+  await expect(page.getByLabel("Family")).toBeFocused();
 });
 
 /** What each part shows when it is there. */
