@@ -51,6 +51,10 @@ pub(super) fn check_family(
         let (name, codes) = (larger.name, larger.codes);
         proposals.push(format!("take `TagSpec::family` {name} with its {codes} codes"));
     }
+    if proposals.is_empty() {
+        proposals
+            .push("make a smaller target, or a larger family by `deltag gen-family`".to_owned());
+    }
     Err(TargetError::IdsRunOut {
         first: tags.first_id,
         last: first + needed - 1,

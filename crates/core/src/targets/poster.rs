@@ -51,7 +51,7 @@ const LINE_MM: f64 = 0.15;
 const TRIM_MM: f64 = 0.3;
 
 /// Length of a tick, mm.
-const TICK_MM: f64 = 2.0;
+pub(super) const TICK_MM: f64 = 2.0;
 
 /// Width of the frame around the page's own window on the overview, mm.
 const FRAME_MM: f64 = 0.5;
@@ -205,7 +205,7 @@ impl Poster {
         label: &str,
         words: impl Fn(DVec2, f64) -> Vec<SheetText>,
     ) {
-        let obstacles = obstacles(sheet, areas);
+        let mut obstacles = obstacles(sheet, areas);
         let [columns, rows] = self.counts;
         let shown: Vec<(usize, usize)> = (0..rows)
             .flat_map(|row| (0..columns).map(move |column| (column, row)))
@@ -214,6 +214,7 @@ impl Poster {
                 obstacles.iter().any(|polygon| gap_mm(polygon, &window) < 0.0)
             })
             .collect();
+        let mut overlaps = Vec::new();
         for &(column, row) in &shown {
             for next in [(column + 1, row), (column, row + 1)] {
                 if shown.contains(&next) {
@@ -221,9 +222,15 @@ impl Poster {
                     let b = self.window_on_sheet(next.0, next.1);
                     let shared = [a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])];
                     sheet.lines.extend(crosses(shared, &obstacles));
-                    sheet.lines.extend(ticks(shared, next.0 > column, &obstacles));
+                    overlaps.push((shared, next.0 > column));
                 }
             }
+        }
+        obstacles.extend(sheet.lines.iter().map(|line| vec![line.from_mm, line.to_mm]));
+        for (shared, is_left) in overlaps {
+            let ticks = ticks(shared, is_left, &obstacles);
+            obstacles.extend(ticks.iter().map(|tick| vec![tick.from_mm, tick.to_mm]));
+            sheet.lines.extend(ticks);
         }
         let pages = shown.iter().enumerate().map(|(index, &(column, row))| {
             let [left, lower, ..] = self.window_mm;
@@ -380,7 +387,7 @@ fn ticks(
         obstacles.iter().all(|polygon| gap_mm(polygon, &area) > 0.0)
     };
     let steps = (length / CROSS_STEP_MM) as usize;
-    let places = || (1..steps).map(|n| n as f64 * CROSS_STEP_MM);
+    let places = || (4..steps.saturating_sub(3)).map(|n| n as f64 * CROSS_STEP_MM);
     let first = places().find(clear);
     let last =
         places().rev().find(clear).filter(|last| first.is_some_and(|first| last - first > TICK_MM));
