@@ -272,6 +272,7 @@ impl Target {
     /// list of pathlib.Path
     ///     The files, the description first.
     #[pyo3(signature = (folder, formats = None, *, dpi = 300.0, texture_dpi = None, texture_px = None, force = false))]
+    #[expect(clippy::too_many_arguments, reason = "keywords")]
     fn save(
         &self,
         py: Python<'_>,

@@ -244,7 +244,7 @@ enum Seen {
     /// Nothing that can be used, as was told.
     Nothing,
     /// The target.
-    Target(Detection),
+    Target(Box<Detection>),
 }
 
 /// A folder that is watched, and what is known from it.
@@ -349,13 +349,13 @@ impl Watch<'_> {
         }
         say!("{show}: {}", counted(corners, "corner"));
         *last = Some(picture);
-        Ok(Some(Seen::Target(found)))
+        Ok(Some(Seen::Target(Box::new(found))))
     }
 
     /// Photographs that show the target, with what they show.
     fn detections(&self) -> impl Iterator<Item = (&Path, &Detection)> {
         self.pictures.iter().filter_map(|(path, picture)| match &picture.seen {
-            Some(Seen::Target(found)) => Some((path.as_path(), found)),
+            Some(Seen::Target(found)) => Some((path.as_path(), found.as_ref())),
             _ => None,
         })
     }
