@@ -66,7 +66,13 @@ def test_solids_are_meshes_too(tmp_path, root):
     files = solid.save(tmp_path, ["gltf", "stl"])
     assert files[1].read_bytes().startswith(b"glTF")
     assert solid.verify(files[1])
-    assert solid.files("obj").keys() == {"icosahedron.obj", "icosahedron.mtl", "icosahedron-texture.png"}
+    parts = {"icosahedron.obj", "icosahedron.mtl", "icosahedron-texture.png"}
+    assert solid.files("obj").keys() == parts
+    for format, file in {"sdf": "icosahedron.sdf", "urdf": "icosahedron.urdf", "mjcf": "icosahedron.xml"}.items():
+        assert solid.files(format, texture_px=2048).keys() == parts | {file}
+    board = deltille.Board(5, 6, edge_mm=30.0, name="desk")
+    board.save(tmp_path, ["usd"], texture_px=1024)
+    assert board.verify(tmp_path / "desk.usda").passed
     (tmp_path / "part.obj").write_bytes(deltille.Tetrahedron().files("obj")["tetrahedron.obj"])
     part = deltille.Solid(tmp_path / "part.obj", name="part")
     assert len(part.panels) == 4
