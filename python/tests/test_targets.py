@@ -72,7 +72,7 @@ def test_solids_are_meshes_too(tmp_path, root):
         assert solid.files(format, texture_px=2048).keys() == parts | {file}
     board = deltille.Board(5, 6, edge_mm=30.0, name="desk")
     board.save(tmp_path, ["usd"], texture_px=1024)
-    assert board.verify(tmp_path / "desk.usda").passed
+    assert board.verify(tmp_path / "desk.usda")
     (tmp_path / "part.obj").write_bytes(deltille.Tetrahedron().files("obj")["tetrahedron.obj"])
     part = deltille.Solid(tmp_path / "part.obj", name="part")
     assert len(part.panels) == 4
