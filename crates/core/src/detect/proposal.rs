@@ -89,9 +89,9 @@ impl Situation {
     ///     tilt_rad: 0.785,
     /// };
     /// let family = Family::shipped("delTag25h7")?;
-    /// let tags = Some((&TagSpec::default(), &family)).map(|(tags, family)| (tags.clone(), family));
+    /// let tags = Some((TagSpec::default(), &family));
     /// let found = webcam.board(GridKind::Deltille, tags, &PaperSpec::default())?;
-    /// assert_eq!((found.spec.rows, found.spec.cols, found.spec.edge_mm), (7, 11, 27.0));
+    /// assert_eq!((found.spec.rows, found.spec.cols, found.spec.edge_mm), (8, 13, 23.0));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
