@@ -227,7 +227,7 @@ impl Target {
     /// texture_dpi : float, optional
     ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
     /// texture_px : int, optional
-    ///     Or its longest side; at least 4 px for a bit.
+    ///     Or its longest side; at least 4 px for a bit, of a checkerboard 12.
     ///
     /// Returns
     /// -------
@@ -263,7 +263,7 @@ impl Target {
     /// texture_dpi : float, optional
     ///     Resolution of the texture of a mesh; 20 px for a bit of a tag if left out.
     /// texture_px : int, optional
-    ///     Or its longest side; at least 4 px for a bit.
+    ///     Or its longest side; at least 4 px for a bit, of a checkerboard 12.
     /// force : bool, optional
     ///     Whether files of another kind are replaced.
     ///

@@ -248,6 +248,6 @@ fn depth(facets: &[Facet], from: DVec3, direction: DVec3) -> f64 {
 
 /// The volume enclosed by a closed surface, mm³, by the divergence theorem: the sum of a · (b × c) / 6
 /// over triangles a b c, negative where they are oriented inwards.
-fn volume(triangles: impl Iterator<Item = [DVec3; 3]>) -> f64 {
+pub(super) fn volume(triangles: impl Iterator<Item = [DVec3; 3]>) -> f64 {
     triangles.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }

@@ -35,6 +35,9 @@ const GRAZING_TOLERANCE_MM: f64 = 1.0;
 /// How exactly a corner is located in the picture, px: of a board of more than a metre that is more than the tolerance.
 const LOCATED_PX: f64 = 0.04;
 
+/// And in pixels of the texture: between two of them it is interpolated, which moves edges along its rows or columns.
+const LOCATED_TEXELS: f64 = 0.15;
+
 /// Edge of a tag's cell in the picture, px.
 const CELL_PX: f64 = 8.0;
 
@@ -168,6 +171,9 @@ pub(super) fn verify(verifier: &Verifier, path: &Path, model: Model, format: For
             verdict
         };
         faces = panels.map(check).collect();
+    }
+    if findings.is_empty() && faces.iter().all(|face| face.findings.is_empty()) {
+        findings.extend(wrong_surface(verifier, &model));
     }
     let mut verdict = Verdict::new(path, format, findings);
     verdict.passed &= faces.iter().all(|face| face.findings.is_empty());
@@ -351,14 +357,14 @@ fn check_corners(
     verdict: &mut FaceVerdict,
 ) {
     let mut found = BTreeSet::new();
+    let located_mm = (LOCATED_PX / verdict.px_per_mm).max(LOCATED_TEXELS * texel_mm(model, panel));
     for grid in &detection.grids {
         let Some(seen) = verifier.target.panels.iter().find(|p| Some(p.id) == grid.panel) else {
             continue;
         };
         let own = seen.id == panel.id;
-        let found_to_mm = LOCATED_PX / verdict.px_per_mm;
         let tolerance_mm = if own { MESH_TOLERANCE_MM } else { GRAZING_TOLERANCE_MM };
-        let tolerance_mm = tolerance_mm.max(found_to_mm);
+        let tolerance_mm = tolerance_mm.max(located_mm);
         for corner in &grid.corners {
             let vertex = Vertex::new(corner.row, corner.col);
             let Some(stated) = seen.corner_at(vertex).filter(|c| corner.id == Some(c.id)) else {
@@ -385,6 +391,86 @@ fn check_corners(
         BoardFinding::CornerMissing { id, row, col }.into()
     };
     verdict.findings.extend(missing.map(finding));
+}
+
+/// Side of the largest pixel of the texture on the front of a panel, mm.
+fn texel_mm(model: &Model, panel: &Panel) -> f64 {
+    let size = DVec2::new(model.texture.width() as f64, model.texture.height() as f64);
+    let sides = model.triangles.iter().filter_map(|triangle| {
+        let is_front = |v: &DVec3| panel.pose.panel_from_target(*v).z.abs() <= MESH_TOLERANCE_MM;
+        let [a, b, c] = triangle.uv.map(|uv| uv * size);
+        let texels = (b - a).perp_dot(c - a).abs();
+        (triangle.vertices_mm.iter().all(is_front) && texels > 0.0)
+            .then(|| (triangle.winding().length() / texels).sqrt())
+    });
+    sides.fold(0.0, f64::max)
+}
+
+/// What is wrong with the surface where everything on it is right: its vertices, and that it is closed.
+fn wrong_surface(verifier: &Verifier, model: &Model) -> Option<Finding> {
+    let stated: Vec<DVec3> = match &verifier.target.spec {
+        TargetSpec::Solid(spec) => spec.polyhedron().vertices_mm,
+        TargetSpec::Board(_) => plate_vertices(verifier.target.panels.first()?, model),
+        _ => return None,
+    };
+    let body = |problem: String| Some(MeshFinding::Body { problem }.into());
+    let index_of =
+        |place: DVec3| stated.iter().position(|stated| stated.distance(place) <= MESH_TOLERANCE_MM);
+    let mut edges = BTreeSet::new();
+    for triangle in &model.triangles {
+        let mut corners = [0; 3];
+        for (corner, place) in corners.iter_mut().zip(triangle.vertices_mm) {
+            let Some(index) = index_of(place) else {
+                let DVec3 { x, y, z } = place;
+                return body(format!(
+                    "a vertex at ({}, {}, {}) mm where the body has none",
+                    shown(x),
+                    shown(y),
+                    shown(z)
+                ));
+            };
+            *corner = index;
+        }
+        let [a, b, c] = corners;
+        for edge in [[a, b], [b, c], [c, a]] {
+            if edge[0] == edge[1] || !edges.insert(edge) {
+                return body("triangles that overlap, or have no area".to_owned());
+            }
+        }
+    }
+    let is_open = edges.iter().any(|&[a, b]| !edges.contains(&[b, a]));
+    if is_open {
+        return body("the surface is open".to_owned());
+    }
+    let triangles = model.triangles.iter().map(|triangle| triangle.vertices_mm);
+    let volume = super::body::volume(triangles);
+    let least = match &verifier.target.spec {
+        TargetSpec::Solid(spec) => {
+            super::body::volume(spec.polyhedron().triangles_mm().into_iter())
+        }
+        _ => {
+            let [a, b, _, d, e, ..] = stated[..] else { return None };
+            a.distance(b) * a.distance(d) * a.distance(e)
+        }
+    };
+    ((volume / least - 1.0).abs() > VOLUME_SLACK).then(|| {
+        let problem = format!("a volume of {:.2} cm³ instead of {:.2}", volume / 1e3, least / 1e3);
+        MeshFinding::Body { problem }.into()
+    })
+}
+
+/// Relative tolerance of a volume: that of vertices that are off by what they may, on the smallest bodies.
+const VOLUME_SLACK: f64 = 0.1;
+
+/// The vertices of the plate of a board: the corners of its field, and those behind them by the thickness that it has.
+fn plate_vertices(panel: &Panel, model: &Model) -> Vec<DVec3> {
+    let [left, lower, right, upper] = panel.field_mm();
+    let front = [(left, lower), (right, lower), (right, upper), (left, upper)]
+        .map(|(x, y)| panel.pose.target_from_panel(DVec2::new(x, y)));
+    let vertices = model.triangles.iter().flat_map(|triangle| triangle.vertices_mm);
+    let depth = vertices.map(|v| -panel.pose.panel_from_target(v).z).fold(0.0, f64::max);
+    let behind = front.map(|place| place - depth * panel.pose.matrix().z_axis);
+    front.into_iter().chain(behind).collect()
 }
 
 fn sees(detection: &Detection, panel: u32) -> bool {

@@ -36,6 +36,10 @@ const TONE_SPREAD: f64 = 0.1;
 const MOVED_EDGE_PX: f64 = 0.25;
 const SMEARED_MOVED_EDGE_PX: f64 = 0.5;
 
+/// And of edges in a coarse texture, in its pixels: between two of them a picture is interpolated, which moves an edge along
+/// rows or columns by up to a tenth, and its ends by more.
+const MOVED_EDGE_TEXELS: f64 = 0.35;
+
 /// A deviation of a tile or of the tag in it. Lengths in mm in the page frame.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -377,7 +381,10 @@ impl<'a> PlacedPanel<'a> {
         }
         if report.findings.is_empty() {
             let is_smeared = self.page.smear_px > 0.0;
-            let tolerance_px = if is_smeared { SMEARED_MOVED_EDGE_PX } else { MOVED_EDGE_PX };
+            let tolerance_px = match is_smeared {
+                true => SMEARED_MOVED_EDGE_PX.max(MOVED_EDGE_TEXELS * (self.page.smear_px - 1.0)),
+                false => MOVED_EDGE_PX,
+            };
             let moved = self.moved_edges(&expected, tolerance_px);
             report.findings.extend(moved.into_iter().map(|moved| TileFinding::EdgeMoved {
                 row: moved.tile.anchor.row,

@@ -43,8 +43,8 @@ pub struct Meshes {
     /// Write <name>.usda, for Isaac Sim, Omniverse or Blender, with its texture (metres)
     #[arg(long)]
     usd: bool,
-    /// Longest side of the texture, px; at least 4 px are needed for a bit of a tag [default: 20 px
-    /// for a bit, or as many as 16384 px take]
+    /// Longest side of the texture, px; at least 4 px are needed for a bit of a tag, of a
+    /// checkerboard 12 [default: 20 px for a bit, or as many as 16384 px take]
     #[arg(long, value_name = "PX", allow_negative_numbers = true, value_parser = whole(SIDE_PX))]
     texture: Option<u32>,
     /// Resolution of the texture, dots per inch, instead of its size

@@ -165,7 +165,7 @@ fn tell(
     );
     let whole = match proposal.reach.tags {
         0 => "; nearer it is not labelled",
-        _ => "; nearer, the parts that are seen are labelled",
+        _ => "; nearer, parts with a tag in them are labelled",
     };
     say!(
         "{}, {}; whole in the picture from {} on{whole}",

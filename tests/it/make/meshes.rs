@@ -3,6 +3,7 @@
 
 use crate::common::command::deltille;
 use crate::common::page::Page;
+use glam::DVec3;
 
 /// What a target is in all formats of meshes.
 const ALL: &str = "--gltf --obj --sdf --urdf --mjcf --usd --texture 1024";
@@ -81,4 +82,55 @@ fn meshes_that_cannot_be_made_are_refused_in_a_line() {
         page.refused(at, &format!("deltille {arguments}"));
     }
     page.is("no-meshes");
+}
+
+/// An OBJ whose vertices were moved, with the normals that follow.
+fn moved(obj: &str, place: impl Fn(DVec3) -> DVec3) -> String {
+    let numbers = |line: &str| {
+        let mut words = line.split_whitespace().skip(1).map(|word| word.parse::<f64>().unwrap());
+        DVec3::from_array(std::array::from_fn(|_| words.next().unwrap()))
+    };
+    let mut face = Vec::new();
+    let lines = obj.lines().map(|line| match line.split_whitespace().next() {
+        Some("v") => {
+            let v = place(numbers(line));
+            face.push(v);
+            format!("v {:.6} {:.6} {:.6}", v.x, v.y, v.z)
+        }
+        Some("vn") => {
+            let n = (face[1] - face[0]).cross(face[2] - face[0]).normalize();
+            face.clear();
+            format!("vn {:.9} {:.9} {:.9}", n.x, n.y, n.z)
+        }
+        _ => line.to_owned(),
+    });
+    lines.collect::<Vec<_>>().join("\n") + "\n"
+}
+
+#[test]
+fn bodies_of_another_shape_are_named_though_the_print_is_right() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    deltille(at, "board --rows 3 --cols 4 --edge 30mm --name desk --obj --texture 1024").success();
+    let good = std::fs::read_to_string(at.join("desk.obj")).unwrap();
+    let mut page = Page::default();
+    let write = |text: String| std::fs::write(at.join("desk.obj"), text).unwrap();
+    write(moved(&good, |v| v));
+    page.run(at, "deltille verify desk.json desk.obj");
+    page.title("The back is sheared");
+    write(moved(&good, |v| if v.z < -1.0 { v + DVec3::X * 20.0 } else { v }));
+    page.run(at, "deltille verify desk.json desk.obj");
+    page.title("A face of the back is open");
+    let mut count = 0;
+    let torn = good.lines().map(|line| {
+        count += usize::from(line.starts_with("v ") && line.ends_with("-3.000000"));
+        match line.starts_with("v ") && line.ends_with("-3.000000") && count == 3 {
+            true => line.replace("-3.000000", "-9.000000"),
+            false => line.to_owned(),
+        }
+    });
+    let torn = torn.collect::<Vec<_>>().join("\n") + "\n";
+    write(moved(&torn, |v| v));
+    page.run(at, "deltille verify desk.json desk.obj");
+    page.is("other-bodies");
 }

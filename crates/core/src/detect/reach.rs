@@ -16,6 +16,9 @@ pub(super) const COMFORTABLE_EDGE_PX: f64 = 1.25 * MIN_UNTAGGED_EDGE_PX;
 /// from a twentieth more on. Tilted cells need as large an area.
 const LEAST_BIT_PX: f64 = 1.3;
 
+/// Boards of two tags, of 32 and 50 bits, need two fifths and a tenth more px for each to be labelled.
+const FEW_BITS: f64 = 24.0;
+
 /// What a target offers, and from where a camera can use it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
@@ -24,6 +27,8 @@ pub struct Reach {
     pub corners: usize,
     /// Tags of all panels.
     pub tags: usize,
+    /// Bits of all tags.
+    pub bits: u32,
     /// Ids of the family that are left for other targets after the last one of this.
     pub ids_left: usize,
     /// The smallest thing that must be seen, mm: a cell of a tag, or the edge of a tile where there are no tags.
@@ -70,6 +75,8 @@ impl Reach {
         };
         Self {
             corners: target.panels.iter().map(|panel| panel.corners.len()).sum(),
+            bits: family
+                .map_or(0, |family| family.dimension().bits() * tags.clone().count() as u32),
             tags: tags.count(),
             ids_left: family.map_or(0, |family| family.len().saturating_sub(after)),
             detail_mm: cell_mm.unwrap_or(edge_mm),
@@ -89,9 +96,12 @@ impl Reach {
     /// The distance up to which boards are labelled in sharp pictures of a camera of a focal length in px, tilted by an
     /// angle, mm. Tagged boards are hardly labelled a tenth farther away; those without tags often are.
     pub fn labelled_to_mm(&self, focal_px: f64, tilt_rad: f64) -> f64 {
-        let (needed_px, shortened) = match self.tags {
+        let (needed_px, shortened) = match self.bits {
             0 => (COMFORTABLE_EDGE_PX, tilt_rad.cos()),
-            _ => (LEAST_BIT_PX, tilt_rad.cos().sqrt()),
+            // Few bits must be the surer.
+            bits => {
+                (LEAST_BIT_PX * (1.0 + (FEW_BITS / f64::from(bits)).powi(3)), tilt_rad.cos().sqrt())
+            }
         };
         focal_px * self.detail_mm * shortened / needed_px
     }

@@ -177,7 +177,12 @@ fn poster(
             width_mm: 0.15,
         })
         .collect();
-    poster.add_pages(&mut sheet, vec![field.to_vec()], &outline, label, |_, _| Vec::new());
+    let of = match (board.boards, panel.id) {
+        (1, 0) => String::new(),
+        (_, id) => format!("board {id} · "),
+    };
+    let tiles = vec![field.to_vec()];
+    poster.add_pages(&mut sheet, tiles, &outline, (label, &of), |_, _| Vec::new());
     Ok(sheet)
 }
 

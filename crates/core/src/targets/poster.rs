@@ -196,13 +196,13 @@ impl Poster {
     /// Adds crosses to a sheet that holds everything else, and its pages.
     ///
     /// `areas` are convex polygons of the sheet that no cross may meet, beside its lines and texts; the `overview` is drawn
-    /// small on every page; the `words` are set from a place on, in a room of some width.
+    /// small on every page, whose number stands in large type after what it is `of`; the `words` are set from a place on, in a room of some width.
     pub fn add_pages(
         &self,
         sheet: &mut SheetLayout,
         areas: Vec<Vec<DVec2>>,
         overview: &[SheetLine],
-        label: &str,
+        (label, of): (&str, &str),
         words: impl Fn(DVec2, f64) -> Vec<SheetText>,
     ) {
         let mut obstacles = obstacles(sheet, areas);
@@ -237,6 +237,7 @@ impl Poster {
             let window = self.window_on_sheet(column, row);
             let name = format!("{} of {}", index + 1, shown.len());
             let mut marks = self.page.sheet(0, [0.0; 4], format!("{label} · page {name}"));
+            let name = format!("{of}{name}");
             marks.placements.clear();
             let number_of = |beside: Option<(usize, usize)>| {
                 let index = shown.iter().position(|&at| Some(at) == beside)?;

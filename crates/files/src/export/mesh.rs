@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 use super::{GENERATOR, png};
 use deltille_core::artwork::{ArtworkError, Atlas};
 use deltille_core::family::Family;
+use deltille_core::lattice::GridKind;
 use deltille_core::targets::{Panel, Target, TargetError, TargetSpec};
 
 /// Texels along the edge of a cell of a tag, unless another resolution is asked for, so that a viewer sees it sharp at
@@ -15,6 +16,9 @@ pub const TEXELS_PER_BIT: f64 = 20.0;
 
 /// Least texels along the edge of a cell: tags are read from 2 px a cell on, and a camera may see no texel sharp.
 pub const LEAST_TEXELS_PER_BIT: f64 = 4.0;
+
+/// And of squares, whose edges run along its rows and columns: interpolation rounds their ends.
+pub const LEAST_TEXELS_PER_SQUARE_BIT: f64 = 12.0;
 
 /// Longest side of a texture, px, that graphics hardware of the last ten years accepts.
 pub const MAX_TEXTURE_PX: u32 = 16_384;
@@ -52,12 +56,13 @@ pub enum MeshError {
     },
     /// The requested resolution leaves the tags unsharp.
     #[error(
-        "the texture would have {texels:.1} texels per tag bit, at least {LEAST_TEXELS_PER_BIT} are needed: give \
-         {least} or more"
+        "the texture would have {texels:.1} texels per tag bit, at least {needed} are needed: give {least} or more"
     )]
     Unsharp {
         /// Texels per bit.
         texels: f64,
+        /// How many are needed.
+        needed: f64,
         /// Least sufficient resolution, in the unit of what was asked for.
         least: String,
     },
@@ -181,7 +186,9 @@ impl TexturedMesh {
             _ => Err(MeshError::NoShape(name())),
         };
         let cell_mm = smallest_cell_mm(target, family);
-        let atlas = drawn(atlas, meshing.resolution, cell_mm)?;
+        let is_square = target.panels.iter().any(|panel| panel.kind == GridKind::Checker);
+        let needed = if is_square { LEAST_TEXELS_PER_SQUARE_BIT } else { LEAST_TEXELS_PER_BIT };
+        let atlas = drawn(atlas, meshing.resolution, (cell_mm, needed))?;
         let size_mm = DVec2::new(atlas.sheet.width_mm, atlas.sheet.height_mm);
         let front = atlas.outlines_mm.iter().map(|outline| {
             outline.map(|corner| {
@@ -219,11 +226,11 @@ fn smallest_cell_mm(target: &Target, family: Option<&Family>) -> f64 {
     edges.fold(f64::INFINITY, f64::min)
 }
 
-/// The atlas at the resolution that was asked for.
+/// The atlas at the resolution that was asked for, of cells of this size in mm, which need so many texels.
 fn drawn(
     atlas: impl Fn(u32) -> Result<Atlas, MeshError>,
     resolution: Resolution,
-    cell_mm: f64,
+    (cell_mm, needed): (f64, f64),
 ) -> Result<Atlas, MeshError> {
     // Pixels per metre that so many texels a cell are.
     let per_m = |texels: f64| 1e3 * texels / cell_mm;
@@ -245,19 +252,20 @@ fn drawn(
     let [width, height] = atlas.size_px;
     // A resolution in whole dots per inch may be the least one, rounded.
     let texels = f64::from(atlas.px_per_m) * cell_mm / 1e3;
-    if texels < LEAST_TEXELS_PER_BIT * (1.0 - 1e-9) {
-        let more = LEAST_TEXELS_PER_BIT / texels;
+    if texels < needed * (1.0 - 1e-9) {
+        // And some for spaces, which are in px.
+        let more = 1.02 * needed / texels;
         let least = match resolution {
             Resolution::Side(_) | Resolution::Usual => {
                 format!("{:.0} px", (f64::from(width.max(height)) * more).ceil())
             }
             Resolution::Dpi(_) => {
-                format!("{:.0} dpi", (per_m(LEAST_TEXELS_PER_BIT) * 0.0254).ceil())
+                format!("{:.0} dpi", (per_m(needed) * 0.0254).ceil())
             }
         };
         return Err(match resolution {
             Resolution::Usual => too_large(width, height, TOO_MANY_CELLS),
-            _ => MeshError::Unsharp { texels, least },
+            _ => MeshError::Unsharp { texels, needed, least },
         });
     }
     match width.max(height) > MAX_TEXTURE_PX {

@@ -14,12 +14,13 @@ pub const SCALE: &str = "0.001 0.001 0.001";
 
 /// `<name>.sdf`, a static model with one link.
 pub fn sdf(name: &str) -> String {
+    let model = model_name(name);
     let geometry = format!(
         "<geometry>\n          <mesh>\n            <uri>{name}.obj</uri>\n            <scale>{SCALE}</scale>\n          \
          </mesh>\n        </geometry>"
     );
     format!(
-        "{}<sdf version=\"1.9\">\n  <model name=\"{name}\">\n    <static>true</static>\n    <link name=\"target\">\n      \
+        "{}<sdf version=\"1.9\">\n  <model name=\"{model}\">\n    <static>true</static>\n    <link name=\"target\">\n      \
          <visual name=\"print\">\n        {geometry}\n      </visual>\n      <collision name=\"body\">\n        \
          {geometry}\n      </collision>\n    </link>\n  </model>\n</sdf>\n",
         head()
@@ -40,12 +41,13 @@ pub fn urdf(name: &str) -> String {
 
 /// `<name>.xml` for MuJoCo, a body without joints. The texture is seen as it is, without gloss.
 pub fn mjcf(name: &str) -> String {
+    let body = model_name(name);
     let texture = texture_name(name);
     format!(
         "{}<mujoco model=\"{name}\">\n  <asset>\n    <texture name=\"{name}\" type=\"2d\" file=\"{texture}\"/>\n    \
          <material name=\"{name}\" texture=\"{name}\" specular=\"0\" shininess=\"0\"/>\n    \
          <mesh name=\"{name}\" file=\"{name}.obj\" scale=\"{SCALE}\"/>\n  </asset>\n  <worldbody>\n    \
-         <body name=\"{name}\">\n      <geom type=\"mesh\" mesh=\"{name}\" material=\"{name}\"/>\n    </body>\n  \
+         <body name=\"{body}\">\n      <geom type=\"mesh\" mesh=\"{name}\" material=\"{name}\"/>\n    </body>\n  \
          </worldbody>\n</mujoco>\n",
         head()
     )
@@ -153,6 +155,12 @@ def Xform "{prim}" (
 }}
 "#
     )
+}
+
+/// The name of a model: that of the target, unless simulators keep that for themselves.
+fn model_name(name: &str) -> String {
+    let is_kept = name == "world" || name.starts_with("__") && name.ends_with("__");
+    if is_kept { format!("target-{name}") } else { name.to_owned() }
 }
 
 fn head() -> String {

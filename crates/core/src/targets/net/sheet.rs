@@ -162,7 +162,7 @@ fn seamed(
             });
             let (tiles, lines) = (tiles.collect(), sheet.lines.clone());
             let words = |at: DVec2, room: f64| instructions(&lines, at, room).to_vec();
-            poster.add_pages(&mut sheet, tiles, &lines, &drawing.label(&of), words);
+            poster.add_pages(&mut sheet, tiles, &lines, (&drawing.label(&of), ""), words);
             Ok(sheet)
         })
         .collect()
